@@ -1,0 +1,191 @@
+//! The width-1 instances: plain `f32` and `f64`, the same operations in the same order.
+
+use super::{Bits, Lanes, MAX_WIDTH, Mask, round_i64};
+
+impl Mask for bool {
+    #[inline(always)]
+    fn any(self) -> bool {
+        self
+    }
+    #[inline(always)]
+    fn all(self) -> bool {
+        self
+    }
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from(self)
+    }
+}
+
+/// One `u32` that wraps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct One(u32);
+
+macro_rules! one_op {
+    ($($trait:ident $name:ident |$a:ident, $b:ident| $result:expr),*) => {$(
+        impl std::ops::$trait for One {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                let ($a, $b) = (self.0, other.0);
+                Self($result)
+            }
+        }
+    )*};
+}
+
+one_op!(
+    Add add |a, b| u32::wrapping_add(a, b),
+    Mul mul |a, b| u32::wrapping_mul(a, b),
+    BitXor bitxor |a, b| a ^ b,
+    BitAnd bitand |a, b| a & b,
+    BitOr bitor |a, b| a | b
+);
+
+impl std::ops::Shl<u32> for One {
+    type Output = Self;
+    #[inline(always)]
+    fn shl(self, n: u32) -> Self {
+        Self(self.0 << n)
+    }
+}
+
+impl std::ops::Shr<u32> for One {
+    type Output = Self;
+    #[inline(always)]
+    fn shr(self, n: u32) -> Self {
+        Self(self.0 >> n)
+    }
+}
+
+impl Bits for One {
+    #[inline(always)]
+    fn splat(x: u32) -> Self {
+        Self(x)
+    }
+    #[inline(always)]
+    fn from_fn(mut f: impl FnMut(usize) -> u32) -> Self {
+        Self(f(0))
+    }
+    #[inline(always)]
+    fn lane(self, _: usize) -> u32 {
+        self.0
+    }
+    #[inline(always)]
+    fn reverse(self) -> Self {
+        Self(self.0.reverse_bits())
+    }
+}
+
+macro_rules! scalar_lanes {
+    ($float:ident, $bits:ident, $unit:expr) => {
+        impl Lanes for $float {
+            const WIDTH: usize = 1;
+            const NAME: &'static str = stringify!($float);
+            const EPSILON: f64 = $float::EPSILON as f64;
+            const MAX: f64 = $float::MAX as f64;
+            type Scalar = $float;
+            type Mask = bool;
+            type Bits = One;
+
+            #[inline(always)]
+            fn splat(x: $float) -> Self {
+                x
+            }
+            #[inline(always)]
+            fn from_fn(mut f: impl FnMut(usize) -> $float) -> Self {
+                f(0)
+            }
+            #[inline(always)]
+            fn lane(self, _: usize) -> $float {
+                self
+            }
+            #[inline(always)]
+            fn mul_add(self, a: Self, b: Self) -> Self {
+                // The vectors fuse on these targets only; a fused call elsewhere would be slow and
+                // would differ from them.
+                if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
+                    <$float>::mul_add(self, a, b)
+                } else {
+                    self * a + b
+                }
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                if self < other { self } else { other }
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                if self > other { self } else { other }
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                <$float>::abs(self)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                <$float>::sqrt(self)
+            }
+            #[inline(always)]
+            fn sin_cos(self) -> (Self, Self) {
+                <$float>::sin_cos(self)
+            }
+            #[inline(always)]
+            fn ln(self) -> Self {
+                <$float>::ln(self)
+            }
+            #[inline(always)]
+            fn exp(self) -> Self {
+                <$float>::exp(self)
+            }
+            #[inline(always)]
+            fn copysign(self, sign: Self) -> Self {
+                <$float>::copysign(self, sign)
+            }
+            #[inline(always)]
+            fn lt(self, other: Self) -> bool {
+                self < other
+            }
+            #[inline(always)]
+            fn le(self, other: Self) -> bool {
+                self <= other
+            }
+            #[inline(always)]
+            fn mask(value: bool) -> bool {
+                value
+            }
+            #[inline(always)]
+            fn select(mask: bool, yes: Self, no: Self) -> Self {
+                if mask { yes } else { no }
+            }
+            #[inline(always)]
+            fn tag(label: u32) -> Self {
+                <$float>::from_bits($bits::from(label))
+            }
+            #[inline(always)]
+            fn tag_lane(self, _: usize) -> u32 {
+                self.to_bits() as u32
+            }
+            #[inline(always)]
+            fn same_tag(self, mask: bool) -> Option<u32> {
+                mask.then(|| self.tag_lane(0))
+            }
+            #[inline(always)]
+            fn unit(bits: One) -> Self {
+                let unit: fn(u32) -> $float = $unit;
+                unit(bits.0)
+            }
+            #[inline(always)]
+            fn fixed_sum(self, scale: f64) -> i64 {
+                round_i64(f64::from(self) * scale)
+            }
+            #[inline(always)]
+            fn fixed(self, scale: f64, out: &mut [i64; MAX_WIDTH]) {
+                out[0] = round_i64(f64::from(self) * scale);
+            }
+        }
+    };
+}
+
+scalar_lanes!(f32, u32, |x| (x >> 8) as f32 * (1.0 / 16_777_216.0));
+scalar_lanes!(f64, u64, |x| (f64::from(x) + 0.5) * (1.0 / 4_294_967_296.0));

@@ -1,0 +1,187 @@
+//! Vectors and orthonormal frames of lanes.
+
+use super::{Lanes, Real};
+use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+
+/// Three coordinates (or three colour channels), each a vector of lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct V3<L> {
+    /// First coordinate or red.
+    pub x: L,
+    /// Second coordinate or green.
+    pub y: L,
+    /// Third coordinate or blue.
+    pub z: L,
+}
+
+impl<L: Lanes> V3<L> {
+    /// From its coordinates.
+    #[inline(always)]
+    pub fn new(x: L, y: L, z: L) -> Self {
+        Self { x, y, z }
+    }
+    /// The same vector in every lane.
+    #[inline(always)]
+    pub fn splat(v: [L::Scalar; 3]) -> Self {
+        Self::new(L::splat(v[0]), L::splat(v[1]), L::splat(v[2]))
+    }
+    /// The same vector, rounded to this precision, in every lane.
+    #[inline(always)]
+    pub fn of(v: [f64; 3]) -> Self {
+        Self::splat(v.map(L::Scalar::of))
+    }
+    /// Lane `i` is `f(i)`.
+    #[inline(always)]
+    pub fn from_fn(mut f: impl FnMut(usize) -> [L::Scalar; 3]) -> Self {
+        Self::new(L::from_fn(|i| f(i)[0]), L::from_fn(|i| f(i)[1]), L::from_fn(|i| f(i)[2]))
+    }
+    /// Zero in every lane.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        Self::new(L::zero(), L::zero(), L::zero())
+    }
+    /// Lane `i`.
+    #[inline(always)]
+    pub fn lane(self, i: usize) -> [L::Scalar; 3] {
+        [self.x.lane(i), self.y.lane(i), self.z.lane(i)]
+    }
+    /// Scalar product.
+    #[inline(always)]
+    pub fn dot(self, other: Self) -> L {
+        self.x.mul_add(other.x, self.y.mul_add(other.y, self.z * other.z))
+    }
+    /// Vector product.
+    #[inline(always)]
+    pub fn cross(self, o: Self) -> Self {
+        Self::new(
+            self.y.mul_add(o.z, -(self.z * o.y)),
+            self.z.mul_add(o.x, -(self.x * o.z)),
+            self.x.mul_add(o.y, -(self.y * o.x)),
+        )
+    }
+    /// Squared length.
+    #[inline(always)]
+    pub fn length2(self) -> L {
+        self.dot(self)
+    }
+    /// The vector divided by its length; not finite for a zero vector.
+    #[inline(always)]
+    pub fn normalize(self) -> Self {
+        self * (L::one() / self.length2().sqrt())
+    }
+    /// `self * t + b`.
+    #[inline(always)]
+    pub fn mul_add(self, t: L, b: Self) -> Self {
+        Self::new(self.x.mul_add(t, b.x), self.y.mul_add(t, b.y), self.z.mul_add(t, b.z))
+    }
+    /// Coordinate by coordinate.
+    #[inline(always)]
+    pub fn times(self, o: Self) -> Self {
+        Self::new(self.x * o.x, self.y * o.y, self.z * o.z)
+    }
+    /// The largest coordinate.
+    #[inline(always)]
+    pub fn max_element(self) -> L {
+        self.x.max(self.y).max(self.z)
+    }
+    /// The largest magnitude among the coordinates.
+    #[inline(always)]
+    pub fn max_abs(self) -> L {
+        self.x.abs().max(self.y.abs()).max(self.z.abs())
+    }
+    /// `yes` where `mask` is true, `no` elsewhere.
+    #[inline(always)]
+    pub fn select(mask: L::Mask, yes: Self, no: Self) -> Self {
+        Self::new(
+            L::select(mask, yes.x, no.x),
+            L::select(mask, yes.y, no.y),
+            L::select(mask, yes.z, no.z),
+        )
+    }
+    /// `self` where `mask` is true, zero elsewhere.
+    #[inline(always)]
+    pub fn only(self, mask: L::Mask) -> Self {
+        Self::new(self.x.only(mask), self.y.only(mask), self.z.only(mask))
+    }
+    /// The mirror image of this direction at a plane with unit normal `n`: v - 2 (v.n) n.
+    #[inline(always)]
+    pub fn reflect(self, n: Self) -> Self {
+        let twice = self.dot(n) * L::of(-2.0);
+        n.mul_add(twice, self)
+    }
+}
+
+impl<L: Lanes> Add for V3<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self::new(self.x + o.x, self.y + o.y, self.z + o.z)
+    }
+}
+
+impl<L: Lanes> AddAssign for V3<L> {
+    #[inline(always)]
+    fn add_assign(&mut self, o: Self) {
+        *self = *self + o;
+    }
+}
+
+impl<L: Lanes> Sub for V3<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Self::new(self.x - o.x, self.y - o.y, self.z - o.z)
+    }
+}
+
+impl<L: Lanes> Mul<L> for V3<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, s: L) -> Self {
+        Self::new(self.x * s, self.y * s, self.z * s)
+    }
+}
+
+impl<L: Lanes> Neg for V3<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self::new(-self.x, -self.y, -self.z)
+    }
+}
+
+/// An orthonormal frame around a unit vector.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<L> {
+    /// First tangent.
+    pub t: V3<L>,
+    /// Second tangent.
+    pub b: V3<L>,
+    /// The vector it was built around.
+    pub n: V3<L>,
+}
+
+impl<L: Lanes> Frame<L> {
+    /// Branch-free basis around the unit vector `n`, continuous but for n.z = 0.
+    ///
+    /// Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1).
+    #[inline(always)]
+    pub fn around(n: V3<L>) -> Self {
+        let sign = L::one().copysign(n.z);
+        let a = -(L::one() / (sign + n.z));
+        let b = n.x * n.y * a;
+        let t = V3::new((sign * n.x * n.x).mul_add(a, L::one()), sign * b, -(sign * n.x));
+        let b = V3::new(b, (n.y * n.y).mul_add(a, sign), -n.y);
+        Self { t, b, n }
+    }
+    /// From coordinates in this frame (t, b, n) to the frame's surroundings.
+    #[inline(always)]
+    pub fn to_world(&self, v: V3<L>) -> V3<L> {
+        self.t.mul_add(v.x, self.b.mul_add(v.y, self.n * v.z))
+    }
+    /// From the frame's surroundings to coordinates (t, b, n).
+    #[inline(always)]
+    pub fn to_local(&self, v: V3<L>) -> V3<L> {
+        V3::new(self.t.dot(v), self.b.dot(v), self.n.dot(v))
+    }
+}

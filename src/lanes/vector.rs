@@ -1,0 +1,249 @@
+//! The vector instances, over the types of the `wide` crate.
+
+use super::{Bits, Lanes, MAX_WIDTH, Mask, ROUNDER, round_i64};
+use wide::bytemuck::cast;
+use wide::{f32x8, f64x4, i32x4, i32x8, u32x4, u32x8};
+#[cfg(target_feature = "avx512f")]
+use wide::{f32x16, f64x8, i32x16, u32x16};
+
+macro_rules! vector_bits {
+    ($bits:ident, $n:literal, $reverse:expr) => {
+        impl Bits for $bits {
+            #[inline(always)]
+            fn splat(x: u32) -> Self {
+                $bits::splat(x)
+            }
+            #[inline(always)]
+            fn from_fn(f: impl FnMut(usize) -> u32) -> Self {
+                $bits::new(std::array::from_fn(f))
+            }
+            #[inline(always)]
+            fn lane(self, i: usize) -> u32 {
+                self.as_array()[i]
+            }
+            #[inline(always)]
+            fn reverse(self) -> Self {
+                let reverse: fn($bits) -> $bits = $reverse;
+                reverse(self)
+            }
+        }
+    };
+}
+
+/// Reverses the bits of each 32-bit lane by shifts and masks.
+#[inline(always)]
+#[allow(dead_code, reason = "used by the widths that have no byte shuffle of their own")]
+fn reverse_by_shifts<B: Bits>(x: B) -> B {
+    let swap = |x: B, n: u32, m: u32| ((x >> n) & B::splat(m)) | ((x & B::splat(m)) << n);
+    let x = swap(x, 1, 0x5555_5555);
+    let x = swap(x, 2, 0x3333_3333);
+    let x = swap(x, 4, 0x0f0f_0f0f);
+    let x = swap(x, 8, 0x00ff_00ff);
+    (x >> 16) | (x << 16)
+}
+
+/// The reversed bits of each nibble, shifted up: `HIGH[n] = reverse4(n) << 4`.
+const HIGH: [i8; 16] = {
+    let mut table = [0i8; 16];
+    let mut n = 0;
+    while n < 16 {
+        table[n] = (n as u8).reverse_bits() as i8;
+        n += 1;
+    }
+    table
+};
+
+/// Reverses the bits of each 32-bit lane by byte shuffles: a table look-up per nibble, then the bytes
+/// of each word in reverse order.
+#[inline(always)]
+fn reverse8(x: u32x8) -> u32x8 {
+    use wide::i8x32;
+    const fn twice(t: [i8; 16]) -> [i8; 32] {
+        let mut out = [0; 32];
+        let mut i = 0;
+        while i < 32 {
+            out[i] = t[i % 16];
+            i += 1;
+        }
+        out
+    }
+    const TABLE: [i8; 32] = twice(HIGH);
+    const ORDER: [i8; 32] = twice([3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12]);
+    let nibble = u32x8::splat(0x0f0f_0f0f);
+    let table = i8x32::new(TABLE);
+    let low: u32x8 = cast(table.swizzle_half_relaxed(cast(x & nibble)));
+    let high: u32x8 = cast(table.swizzle_half_relaxed(cast((x >> 4u32) & nibble)));
+    let bytes = low | ((high >> 4u32) & nibble);
+    cast(i8x32::swizzle_half_relaxed(cast(bytes), i8x32::new(ORDER)))
+}
+
+/// The same for four lanes.
+#[inline(always)]
+fn reverse4(x: u32x4) -> u32x4 {
+    use wide::i8x16;
+    let nibble = u32x4::splat(0x0f0f_0f0f);
+    let table = i8x16::new(HIGH);
+    let low: u32x4 = cast(table.shuffle(cast(x & nibble)));
+    let high: u32x4 = cast(table.shuffle(cast((x >> 4u32) & nibble)));
+    let bytes = low | ((high >> 4u32) & nibble);
+    let order = wide::u8x16::new([3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12]);
+    cast(i8x16::shuffle(cast(bytes), order))
+}
+
+vector_bits!(u32x8, 8, reverse8);
+vector_bits!(u32x4, 4, reverse4);
+#[cfg(target_feature = "avx512f")]
+vector_bits!(u32x16, 16, reverse_by_shifts);
+
+macro_rules! vector_lanes {
+    ($vector:ident, $scalar:ident, $bits:ident, $raw:ident, $n:literal, $unit:expr) => {
+        impl Mask for $vector {
+            #[inline(always)]
+            fn any(self) -> bool {
+                $vector::to_bitmask(self) != 0
+            }
+            #[inline(always)]
+            fn all(self) -> bool {
+                $vector::to_bitmask(self) == (1u32 << $n) - 1
+            }
+            #[inline(always)]
+            fn bits(self) -> u32 {
+                $vector::to_bitmask(self)
+            }
+        }
+
+        impl Lanes for $vector {
+            const WIDTH: usize = $n;
+            const NAME: &'static str = stringify!($vector);
+            const EPSILON: f64 = $scalar::EPSILON as f64;
+            const MAX: f64 = $scalar::MAX as f64;
+            type Scalar = $scalar;
+            type Mask = $vector;
+            type Bits = $bits;
+
+            #[inline(always)]
+            fn splat(x: $scalar) -> Self {
+                $vector::splat(x)
+            }
+            #[inline(always)]
+            fn from_fn(f: impl FnMut(usize) -> $scalar) -> Self {
+                $vector::new(std::array::from_fn(f))
+            }
+            #[inline(always)]
+            fn lane(self, i: usize) -> $scalar {
+                self.as_array()[i]
+            }
+            #[inline(always)]
+            fn mul_add(self, a: Self, b: Self) -> Self {
+                $vector::mul_add(self, a, b)
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                $vector::fast_min(self, other)
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                $vector::fast_max(self, other)
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                $vector::abs(self)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                $vector::sqrt(self)
+            }
+            #[inline(always)]
+            fn sin_cos(self) -> (Self, Self) {
+                $vector::sin_cos(self)
+            }
+            #[inline(always)]
+            fn ln(self) -> Self {
+                $vector::ln(self)
+            }
+            #[inline(always)]
+            fn exp(self) -> Self {
+                $vector::exp(self)
+            }
+            #[inline(always)]
+            fn copysign(self, sign: Self) -> Self {
+                $vector::copysign(self, sign)
+            }
+            #[inline(always)]
+            fn lt(self, other: Self) -> Self {
+                self.simd_lt(other)
+            }
+            #[inline(always)]
+            fn le(self, other: Self) -> Self {
+                self.simd_le(other)
+            }
+            #[inline(always)]
+            fn mask(value: bool) -> Self {
+                let bits = if value { $raw::MAX } else { 0 };
+                $vector::splat($scalar::from_bits(bits))
+            }
+            #[inline(always)]
+            fn select(mask: Self, yes: Self, no: Self) -> Self {
+                mask.select(yes, no)
+            }
+            #[inline(always)]
+            fn only(self, mask: Self) -> Self {
+                self & mask
+            }
+            #[inline(always)]
+            fn tag(label: u32) -> Self {
+                $vector::splat($scalar::from_bits($raw::from(label)))
+            }
+            #[inline(always)]
+            fn tag_lane(self, i: usize) -> u32 {
+                self.as_array()[i].to_bits() as u32
+            }
+            #[inline(always)]
+            fn same_tag(self, mask: Self) -> Option<u32> {
+                let members = Mask::bits(mask);
+                if members == 0 {
+                    return None;
+                }
+                let label = self.tag_lane(members.trailing_zeros() as usize);
+                let same = self.to_bits().simd_eq(Self::tag(label).to_bits());
+                (same.to_bitmask() & members == members).then_some(label)
+            }
+            #[inline(always)]
+            fn unit(bits: $bits) -> Self {
+                let unit: fn($bits) -> $vector = $unit;
+                unit(bits)
+            }
+            #[inline(always)]
+            fn fixed_sum(self, scale: f64) -> i64 {
+                let rounded = self.as_array().map(|x| (f64::from(x) * scale + ROUNDER).to_bits());
+                let sum = rounded.iter().fold(0u64, |sum, x| sum.wrapping_add(*x));
+                sum.wrapping_sub(ROUNDER.to_bits().wrapping_mul($n)) as i64
+            }
+            #[inline(always)]
+            fn fixed(self, scale: f64, out: &mut [i64; MAX_WIDTH]) {
+                for (out, x) in out.iter_mut().zip(self.as_array()) {
+                    *out = round_i64(f64::from(*x) * scale);
+                }
+            }
+        }
+    };
+}
+
+vector_lanes!(f32x8, f32, u32x8, u32, 8, |bits| {
+    f32x8::from_i32x8(cast::<u32x8, i32x8>(bits >> 8u32)) * f32x8::splat(1.0 / 16_777_216.0)
+});
+vector_lanes!(f64x4, f64, u32x4, u64, 4, |bits| {
+    let signed: i32x4 = cast(bits ^ u32x4::splat(0x8000_0000));
+    (f64x4::from_i32x4(signed) + f64x4::splat(2_147_483_648.5))
+        * f64x4::splat(1.0 / 4_294_967_296.0)
+});
+#[cfg(target_feature = "avx512f")]
+vector_lanes!(f32x16, f32, u32x16, u32, 16, |bits| {
+    f32x16::from_i32x16(cast::<u32x16, i32x16>(bits >> 8u32)) * f32x16::splat(1.0 / 16_777_216.0)
+});
+#[cfg(target_feature = "avx512f")]
+vector_lanes!(f64x8, f64, u32x8, u64, 8, |bits| {
+    let signed: i32x8 = cast(bits ^ u32x8::splat(0x8000_0000));
+    (f64x8::from_i32x8(signed) + f64x8::splat(2_147_483_648.5))
+        * f64x8::splat(1.0 / 4_294_967_296.0)
+});

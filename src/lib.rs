@@ -1,0 +1,11 @@
+//! zerkalo: a progressive, accumulating ray tracer that lives in a terminal.
+//!
+//! The map of the rooms, and who may import whom, stands in ARCHITECTURE.md; a test holds it.
+
+pub mod camera;
+pub mod lanes;
+pub mod light;
+pub mod material;
+pub mod scene;
+pub mod shape;
+pub mod value;

@@ -1,0 +1,2 @@
+//! The command `zerkalo`.
+fn main() {}

@@ -1,0 +1,137 @@
+//! Materials: how a surface answers light.
+
+use crate::value::Color;
+use serde::{Deserialize, Serialize};
+
+/// A surface's finish. Every key may be left out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Material {
+    /// Body colour: multiplies the ambient and the diffuse part.
+    pub color: Color,
+    /// Ambient coefficient k_a.
+    pub ambient: f64,
+    /// Diffuse coefficient k_d.
+    pub diffuse: f64,
+    /// Highlight coefficient k_s.
+    pub specular: f64,
+    /// Phong exponent alpha of (R.V)^alpha.
+    pub exponent: f64,
+    /// Which formula gives the highlight of a light.
+    pub highlight: Highlight,
+    /// Reflection coefficient k_r of the traced reflection.
+    pub reflection: f64,
+    /// Radius of the reflection cone's base at unit distance; 0: a perfect mirror.
+    pub roughness: f64,
+    /// How the reflected ray is spread.
+    pub lobe: Lobe,
+    /// Microfacet slope; without it roughness / (2 sqrt 2).
+    pub alpha: Option<f64>,
+    /// Masking and shadowing of microfacets.
+    pub masking: Masking,
+    /// How reflectance depends on the angle; without it `exact` for a metal, else `constant`.
+    pub fresnel: Option<Fresnel>,
+    /// Reflectance F0 at normal incidence, per channel; without it white.
+    pub reflectance: Option<Color>,
+    /// A metal's F0 instead of `reflectance`.
+    pub metal: Option<Metal>,
+    /// Whether the back of a surface is finished like its front; otherwise the back is black.
+    pub two_sided: bool,
+}
+
+/// The formula of a light's highlight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Highlight {
+    /// k_s (R.V)^alpha.
+    Phong,
+    /// k_s D G F / (4 N.L N.V): microfacets with the lobe's distribution (Beckmann unless the lobe
+    /// is ggx).
+    CookTorrance,
+}
+
+/// The spread of the reflected ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Lobe {
+    /// No spread, whatever the roughness.
+    Mirror,
+    /// Uniform in a cone.
+    Cone,
+    /// Uniform on a square perpendicular to the mirror direction: the cheap stand-in for the cone.
+    Square,
+    /// Microfacets, Beckmann distribution.
+    Beckmann,
+    /// Microfacets, GGX (Trowbridge-Reitz) distribution.
+    Ggx,
+}
+
+/// Masking and shadowing between microfacets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Masking {
+    /// Torrance-Sparrow's V-shaped grooves.
+    VCavity,
+    /// Smith, height-correlated.
+    Smith,
+}
+
+/// Reflectance against angle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fresnel {
+    /// F0 at every angle.
+    Constant,
+    /// Schlick's approximation.
+    Schlick,
+    /// The Fresnel equations for the index of refraction that F0 stands for.
+    Exact,
+}
+
+/// Metals by reflectance at normal incidence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Metal {
+    /// 0.989 0.876 0.349
+    Gold,
+    /// 0.950 0.930 0.880
+    Silver,
+    /// 0.755 0.490 0.095
+    Copper,
+    /// 0.530 0.505 0.480
+    Iron,
+}
+
+impl Metal {
+    /// Reflectance F0 at normal incidence.
+    pub fn f0(self) -> Color {
+        Color(match self {
+            Self::Gold => [0.989, 0.876, 0.349],
+            Self::Silver => [0.950, 0.930, 0.880],
+            Self::Copper => [0.755, 0.490, 0.095],
+            Self::Iron => [0.530, 0.505, 0.480],
+        })
+    }
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            color: Color([0.8; 3]),
+            ambient: 1.0,
+            diffuse: 1.0,
+            specular: 0.0,
+            exponent: 32.0,
+            highlight: Highlight::Phong,
+            reflection: 0.0,
+            roughness: 0.0,
+            lobe: Lobe::Cone,
+            alpha: None,
+            masking: Masking::VCavity,
+            fresnel: None,
+            reflectance: None,
+            metal: None,
+            two_sided: true,
+        }
+    }
+}
