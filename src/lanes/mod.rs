@@ -230,6 +230,8 @@ pub trait Lanes:
     fn tag(label: u32) -> Self;
     /// The label in lane `i`.
     fn tag_lane(self, i: usize) -> u32;
+    /// Where the label is `label`.
+    fn has_tag(self, label: u32) -> Self::Mask;
     /// The label of all lanes in which `mask` is true, if it is one and the same (`None`: they
     /// differ, or the mask is empty).
     fn same_tag(self, mask: Self::Mask) -> Option<u32>;

@@ -167,6 +167,10 @@ macro_rules! scalar_lanes {
                 self.to_bits() as u32
             }
             #[inline(always)]
+            fn has_tag(self, label: u32) -> bool {
+                self.tag_lane(0) == label
+            }
+            #[inline(always)]
             fn same_tag(self, mask: bool) -> Option<u32> {
                 mask.then(|| self.tag_lane(0))
             }

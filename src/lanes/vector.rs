@@ -199,14 +199,17 @@ macro_rules! vector_lanes {
                 self.as_array()[i].to_bits() as u32
             }
             #[inline(always)]
+            fn has_tag(self, label: u32) -> Self {
+                $vector::from_bits(self.to_bits().simd_eq(Self::tag(label).to_bits()))
+            }
+            #[inline(always)]
             fn same_tag(self, mask: Self) -> Option<u32> {
                 let members = Mask::bits(mask);
                 if members == 0 {
                     return None;
                 }
                 let label = self.tag_lane(members.trailing_zeros() as usize);
-                let same = self.to_bits().simd_eq(Self::tag(label).to_bits());
-                (same.to_bitmask() & members == members).then_some(label)
+                (Mask::bits(self.has_tag(label)) & members == members).then_some(label)
             }
             #[inline(always)]
             fn unit(bits: $bits) -> Self {

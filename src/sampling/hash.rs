@@ -1,0 +1,39 @@
+//! Integer hashes, scalar and in lanes.
+
+use crate::lanes::Bits;
+
+/// A bijective mixer of 32 bits with low bias (constants: Wellons 2018, *Prospecting for Hash
+/// Functions*, `lowbias32`).
+#[inline(always)]
+pub fn mix<B: Bits>(x: B) -> B {
+    let x = (x ^ (x >> 16)) * B::splat(0x7feb_352d);
+    let x = (x ^ (x >> 15)) * B::splat(0x846c_a68b);
+    x ^ (x >> 16)
+}
+
+/// [`mix`] of one word.
+pub fn mix1(mut x: u32) -> u32 {
+    x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
+    x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
+    x ^ (x >> 16)
+}
+
+/// One word from several, each of which changes it.
+pub fn fold(words: &[u32]) -> u32 {
+    words
+        .iter()
+        .fold(0x9e37_79b9, |h, w| mix1(h.rotate_left(5).wrapping_add(0x85eb_ca6b) ^ mix1(*w)))
+}
+
+/// Owen scrambling of numbers whose first binary digit is in bit 0: every digit is flipped or not by
+/// a function of `seed` and of the digits before it.
+///
+/// The Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
+#[inline(always)]
+pub fn owen<B: Bits>(x: B, seed: B) -> B {
+    let x = x ^ (x * B::splat(0x3d20_adea));
+    let x = x + seed;
+    let x = x * ((seed >> 16) | B::splat(1));
+    let x = x ^ (x * B::splat(0x0552_6c56));
+    x ^ (x * B::splat(0x53a2_2864))
+}

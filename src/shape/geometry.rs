@@ -1,0 +1,170 @@
+//! All things of a scene, ready for rays: batches, and a tree over them where it pays.
+
+use super::batch::{Batch, Compiled, Hit, Ray, Surface, compile};
+use super::form::Form;
+use super::tree::Tree;
+use crate::lanes::{Lanes, Mask, V3};
+use std::fmt;
+
+/// From this many bounded items a tree is faster than a list. Measured by `benches/kernel.rs`,
+/// group `list or tree`.
+pub const TREE_FROM: usize = 24;
+
+/// One batch and where its items stand in the numbering of all items.
+struct Part<L: Lanes> {
+    batch: Box<dyn Batch<L>>,
+    base: u32,
+    end: u32,
+    in_tree: bool,
+}
+
+/// The things of a scene, compiled for one lane type.
+pub struct Geometry<L: Lanes> {
+    parts: Vec<Part<L>>,
+    tree: Option<Tree<L>>,
+    /// `(part, number in the part)` of the tree's items.
+    tree_items: Vec<(u32, u32)>,
+    /// `source[item]`: which form, in the order given to [`Geometry::new`].
+    source: Vec<u32>,
+    counts: Vec<String>,
+}
+
+impl<L: Lanes> Geometry<L> {
+    /// Compiles `forms`, as a list or with a tree by their number.
+    pub fn new(forms: &[Form]) -> Self {
+        let bounded = forms.iter().filter(|f| f.bounds().is_some()).count();
+        Self::with_tree(forms, bounded >= TREE_FROM)
+    }
+
+    /// Compiles `forms` with or without a tree, whatever their number.
+    pub fn with_tree(forms: &[Form], tree: bool) -> Self {
+        let mut out = Self {
+            parts: Vec::new(),
+            tree: None,
+            tree_items: Vec::new(),
+            source: Vec::new(),
+            counts: Vec::new(),
+        };
+        let mut bounds = Vec::new();
+        for Compiled { batch, sources, noun, infinite } in compile(forms) {
+            let base = out.source.len() as u32;
+            let in_tree = tree && !infinite;
+            let how = if in_tree { "tree" } else { "list" };
+            let name = if sources.len() == 1 { noun.0 } else { noun.1 };
+            out.counts.push(format!("{} {name} ({how})", sources.len()));
+            if in_tree {
+                for (i, source) in sources.iter().enumerate() {
+                    bounds.extend(forms[*source].bounds());
+                    out.tree_items.push((out.parts.len() as u32, i as u32));
+                }
+            }
+            out.source.extend(sources.iter().map(|s| *s as u32));
+            let end = out.source.len() as u32;
+            out.parts.push(Part { batch, base, end, in_tree });
+        }
+        out.tree = (!bounds.is_empty()).then(|| Tree::new(&bounds));
+        out
+    }
+
+    /// Number of items.
+    pub fn len(&self) -> usize {
+        self.source.len()
+    }
+
+    /// No items at all.
+    pub fn is_empty(&self) -> bool {
+        self.source.is_empty()
+    }
+
+    /// For each item, which form it came from.
+    pub fn sources(&self) -> &[u32] {
+        &self.source
+    }
+
+    /// The nearest item in front of each ray.
+    #[inline]
+    pub fn closest(&self, ray: &Ray<L>) -> Hit<L> {
+        let mut hit = Hit::none();
+        for part in self.parts.iter().filter(|p| !p.in_tree) {
+            part.batch.closest(0..part.batch.len(), part.base, ray, &mut hit);
+        }
+        if let Some(tree) = &self.tree {
+            tree.walk(ray, hit.t, |item, _| {
+                let (part, i) = self.tree_items[item];
+                let part = &self.parts[part as usize];
+                part.batch.closest(i as usize..i as usize + 1, part.base, ray, &mut hit);
+                hit.t
+            });
+        }
+        hit
+    }
+
+    /// Which lanes of `wanted` meet anything at a distance in (0, limit).
+    #[inline]
+    pub fn blocked(&self, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+        let mut blocked = L::mask(false);
+        for part in self.parts.iter().filter(|p| !p.in_tree) {
+            let open = wanted.and_not(blocked);
+            blocked = blocked | part.batch.blocked(0..part.batch.len(), ray, limit, open);
+            if wanted.and_not(blocked).none() {
+                return blocked;
+            }
+        }
+        if let Some(tree) = &self.tree {
+            let limit_of = |blocked| L::select(wanted.and_not(blocked), limit, L::of(-1.0));
+            tree.walk(ray, limit_of(blocked), |item, left| {
+                let (part, i) = self.tree_items[item];
+                let i = i as usize;
+                let open = wanted.and_not(blocked);
+                let batch = &self.parts[part as usize].batch;
+                let new = batch.blocked(i..i + 1, ray, left, open);
+                blocked = blocked | (new & open);
+                limit_of(blocked)
+            });
+        }
+        blocked
+    }
+
+    /// The surfaces met: for each lane of `mask`, that of `hit`'s item at `hit`'s distance.
+    #[inline]
+    pub fn surface(&self, ray: &Ray<L>, hit: &Hit<L>, mask: L::Mask) -> Surface<L> {
+        let point = ray.at(hit.t);
+        let mut left = mask;
+        let mut all = Surface { point, normal: V3::zero(), reach: L::zero() };
+        loop {
+            let bits = left.bits();
+            if bits == 0 {
+                return all;
+            }
+            let item = hit.item.tag_lane(bits.trailing_zeros() as usize);
+            let here = hit.item.has_tag(item);
+            let one = self.surface_of(item, point);
+            if mask.and_not(here).none() {
+                return one;
+            }
+            all.point = V3::select(here, one.point, all.point);
+            all.normal = V3::select(here, one.normal, all.normal);
+            all.reach = L::select(here, one.reach, all.reach);
+            left = left.and_not(here);
+        }
+    }
+
+    #[inline]
+    fn surface_of(&self, item: u32, point: V3<L>) -> Surface<L> {
+        for part in &self.parts {
+            if item < part.end {
+                return part.batch.surface((item - part.base) as usize, point);
+            }
+        }
+        unreachable!("every item belongs to a part")
+    }
+}
+
+impl<L: Lanes> fmt::Display for Geometry<L> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.counts.is_empty() {
+            return f.write_str("no objects");
+        }
+        f.write_str(&self.counts.join(", "))
+    }
+}
