@@ -106,3 +106,76 @@ pub fn quantised_8(code: f64) -> u8 {
 pub fn quantised_16(code: f64) -> u16 {
     (code * (65535.0 / 255.0)).round() as u16
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_curve_is_that_of_the_standard() {
+        // The two pieces meet, and every 8-bit code decodes to what encodes to it.
+        let [below, above] = [0.003_130_79, 0.003_130_81].map(srgb_from_linear);
+        assert!((above - below).abs() < 1e-6 && above > below);
+        for code in 0..=255u8 {
+            let v = f64::from(code) / 255.0;
+            let linear = if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+            let codes = Display::default().codes([linear; 3]);
+            assert!((codes[0] - f64::from(code)).abs() < 1e-5, "{code}: {codes:?}");
+            assert_eq!(quantised_8(codes[1]), code);
+            assert_eq!(quantised_16(codes[2]), u16::from(code) * 257);
+        }
+        let grey = Display::default().codes([0.5, 0.214_041_14, 0.01]);
+        let expected = [187.515_6, 127.5, 25.463];
+        (0..3).for_each(|c| assert!((grey[c] - expected[c]).abs() < 2e-3, "{grey:?}"));
+    }
+
+    #[test]
+    fn quantisation_rounds_to_nearest_and_stays_in_range() {
+        assert_eq!([0.49, 0.51, 254.49, 254.51].map(quantised_8), [0, 1, 254, 255]);
+        assert_eq!([-3.0, 300.0, f64::NAN].map(quantised_8), [0, 255, 0]);
+        assert_eq!([0.0, 127.5, 255.0].map(quantised_16), [0, 32_768, 65_535]);
+    }
+
+    #[test]
+    fn exposure_multiplies_by_powers_of_two() {
+        let bright = Display { exposure_ev: 3.0, tone: Tone::Clip };
+        let plain = Display::default();
+        assert_eq!(bright.codes([0.01, 0.1, 2.0]), plain.codes([0.08, 0.8, 1.0]));
+    }
+
+    /// From the published shader, evaluated by hand in double precision.
+    #[test]
+    fn neutral_follows_its_publication() {
+        let neutral = Display { exposure_ev: 0.0, tone: Tone::Neutral };
+        // Below the toe's end a grey g becomes 6.25 g^2, above it g - 0.04.
+        let near = |got: [f64; 3], expected: [f64; 3]| {
+            (0..3).for_each(|c| assert!((got[c] - expected[c]).abs() < 1e-12, "{got:?}"));
+        };
+        near(neutral.shown([0.04; 3]), [0.01; 3]);
+        near(neutral.shown([0.2, 0.5, 0.7]), [0.16, 0.46, 0.66]);
+        // Peak 4 - 0.04 = 3.96: 1 - 0.24^2 / (3.96 + 0.24 - 0.76) = 0.983255813953...
+        let peak = 1.0 - 0.0576 / 3.44;
+        near(neutral.shown([4.0; 3]), [peak; 3]);
+        // Colour: offset 0 (least is 0); new peak 1 - 0.0576 / 1.48; towards white by g.
+        let peak = 1.0 - 0.0576 / 1.48;
+        let g = 1.0 - 1.0 / (0.15 * (2.0 - peak) + 1.0);
+        near(neutral.shown([2.0, 1.0, 0.0]), [peak, peak / 2.0 * (1.0 + g), peak * g]);
+    }
+
+    #[test]
+    fn tone_curves_rise_and_stay_in_range() {
+        for (name, tone) in Tone::NAMED {
+            assert_eq!((name.parse(), tone.to_string()), (Ok(tone), name.to_string()));
+            let display = Display { exposure_ev: 0.0, tone };
+            let mut last = 0.0;
+            for i in 0..20_000 {
+                let [r, g, b] = display.codes([f64::from(i) * 1e-3; 3]);
+                assert!(r >= last && r <= 255.0 && r == g && g == b, "{name} at {i}");
+                last = r;
+            }
+            assert!(display.codes([1e30, 1e300, 0.0]).iter().all(|c| (0.0..=255.0).contains(c)));
+        }
+        let unknown = "filmic".parse::<Tone>().unwrap_err();
+        assert_eq!(unknown, "tone curve `filmic` is not known; known: clip, neutral");
+    }
+}

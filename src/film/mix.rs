@@ -116,3 +116,52 @@ impl Film {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{each_tile, fill, film, white};
+    use super::*;
+
+    #[test]
+    fn a_pixel_is_the_mixed_mean_of_both_replicates() {
+        let mut film = film(20, 18, &[2f64.powi(20), 2f64.powi(-3)]);
+        fill(&mut film, 4, |x, y, r| {
+            let (x, y, r) = (x as f64, y as f64, r as f64);
+            vec![x, y, 1.0 + r, 64.0 * x, 128.0, 64.0 * r]
+        });
+        let mix = Mix { weights: vec![[1.0, 2.0, 3.0], [0.5, 0.0, 1.0]] };
+        // Sums over 4 + 4 samples: A and B alike in x and y; 1 + 2 and 0 + 64 in blue.
+        let expected = |x: f64, y: f64| [x / 4.0 + 8.0 * x, 2.0 * y / 4.0, 9.0 / 8.0 + 8.0];
+        for (x, y) in [(0, 0), (19, 17), (16, 15), (3, 16)] {
+            assert_eq!(film.pixel(x, y, &mix), expected(x as f64, y as f64), "{x} {y}");
+        }
+        let mut row = Vec::new();
+        film.row(17, Part::Both, &mix, &mut row);
+        assert_eq!(row.len(), 20);
+        assert_eq!(row[19], expected(19.0, 17.0));
+        film.row(17, Part::B, &Mix::only(0, 2), &mut row);
+        assert_eq!(row[5], [5.0 / 4.0, 17.0 / 4.0, 0.5]);
+    }
+
+    #[test]
+    fn unequal_counts_weigh_the_replicates() {
+        let mut film = film(1, 1, &[1.0]);
+        each_tile(&mut film, |tile, _| {
+            tile.add(0, 0, &[30, 30, 30]);
+            tile.advance(0, 3);
+            tile.add(1, 0, &[6, 0, 2]);
+            tile.advance(1, 1);
+        });
+        assert_eq!(film.pixel(0, 0, &white(1)), [9.0, 7.5, 8.0]);
+    }
+
+    #[test]
+    fn without_samples_all_is_black() {
+        let mut film = film(3, 3, &[1.0]);
+        assert_eq!(film.pixel(2, 2, &white(1)), [0.0; 3]);
+        fill(&mut film, 1, |_, _, _| vec![1.0; 3]);
+        assert_eq!(film.pixel(2, 2, &white(1)), [1.0; 3]);
+        film.restart();
+        assert_eq!(film.pixel(2, 2, &white(1)), [0.0; 3]);
+    }
+}

@@ -16,6 +16,8 @@ mod png;
 mod resample;
 mod storage;
 mod target;
+#[cfg(test)]
+mod testing;
 mod tile;
 
 pub use bad::{BAD_REMEMBERED, BadSample, BadSamples};

@@ -153,3 +153,223 @@ impl Film {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Rng, each_tile, fill, film, white};
+    use super::super::{Part, quantised_8};
+    use super::*;
+
+    /// A pixel whose samples have a known mean: `[group][channel]` of each is
+    /// `dark + light` with probability `chance` and else `dark`, or normal around the mean.
+    #[derive(Clone, Copy)]
+    struct Pixel {
+        chance: f64,
+        normal: bool,
+    }
+
+    const DARK: [f64; 3] = [0.02, 0.05, 0.04];
+    const LIGHT: [f64; 3] = [0.2, 0.7, 0.3];
+
+    impl Pixel {
+        fn mean(self) -> [f64; 3] {
+            [0, 1, 2].map(|c| DARK[c] + self.chance * LIGHT[c])
+        }
+
+        /// The sum of `n` samples. Stratified: one in each n-th of the unit interval.
+        fn sum(self, n: u32, stratified: bool, rng: &mut Rng) -> [f64; 3] {
+            let count = f64::from(n);
+            let hits = if self.normal {
+                (count * self.chance + 0.3 * count.sqrt() * rng.normal()).max(0.0)
+            } else {
+                let draw = |i: u32| match stratified {
+                    true => (f64::from(i) + rng.unit()) / count,
+                    false => rng.unit(),
+                };
+                (0..n).map(draw).filter(|u| *u < self.chance).count() as f64
+            };
+            [0, 1, 2].map(|c| count * DARK[c] + hits * LIGHT[c])
+        }
+    }
+
+    /// Pixels of a scene of 64x48, with a few that see the light hardly ever or nearly always.
+    fn scene(normal: bool, rng: &mut Rng) -> Vec<Pixel> {
+        (0..64 * 48).map(|_| Pixel { chance: rng.unit(), normal }).collect()
+    }
+
+    struct Outcome {
+        linear: Vec<f64>,
+        codes: Vec<f64>,
+        /// Estimated RMSE of each tile, in codes, over the true one (in the mean over the seeds).
+        tile_spread: f64,
+    }
+
+    /// True RMSE over the estimate, for each of 20 seeds.
+    fn ratios(n: u32, normal: bool, stratified: bool) -> Outcome {
+        let pixels = scene(normal, &mut Rng(11));
+        let (mix, display) = (white(1), Display::default());
+        let mut outcome = Outcome { linear: vec![], codes: vec![], tile_spread: 0.0 };
+        let mut tiles: Vec<Vec<f64>> = vec![vec![]; 12];
+        for seed in 0..20 {
+            let mut rng = Rng(1000 + seed);
+            let mut film = film(64, 48, &[2f64.powi(28)]);
+            fill(&mut film, n, |x, y, _| pixels[y * 64 + x].sum(n, stratified, &mut rng).to_vec());
+            let (mut linear, mut codes) = (0.0, 0.0);
+            for (i, pixel) in pixels.iter().enumerate() {
+                let (got, truth) = (film.pixel(i % 64, i / 64, &mix), pixel.mean());
+                let (got_codes, true_codes) = (display.codes(got), display.codes(truth));
+                for c in 0..3 {
+                    linear += (got[c] - truth[c]).powi(2) / (3.0 * 64.0 * 48.0);
+                    codes += (got_codes[c] - true_codes[c]).powi(2) / (3.0 * 64.0 * 48.0);
+                }
+            }
+            let noise = film.noise(&mix, &display).unwrap();
+            outcome.linear.push(linear.sqrt() / noise.rmse_linear);
+            outcome.codes.push(codes.sqrt() / noise.rmse_codes);
+            let estimator = Estimator::new(film.scales(), &mix, &display);
+            for (index, tile) in film.touched() {
+                tiles[index].push(estimator.tile(tile).unwrap().codes_mse.sqrt());
+            }
+        }
+        let spreads: Vec<_> = tiles
+            .iter()
+            .map(|tile| {
+                let deviations: Vec<_> =
+                    tile.iter().map(|t| (t / mean(tile) - 1.0).powi(2)).collect();
+                mean(&deviations).sqrt()
+            })
+            .collect();
+        outcome.tile_spread = mean(&spreads);
+        outcome
+    }
+
+    fn mean(values: &[f64]) -> f64 {
+        values.iter().sum::<f64>() / values.len() as f64
+    }
+
+    #[test]
+    fn estimates_are_honest() {
+        for n in [16, 64, 512] {
+            for (normal, stratified) in [(true, false), (false, false), (false, true)] {
+                let outcome = ratios(n, normal, stratified);
+                let (linear, codes) = (mean(&outcome.linear), mean(&outcome.codes));
+                let case = format!(
+                    "n {n}, normal {normal}, stratified {stratified}: linear {linear:.3}, \
+                     codes {codes:.3}, spread {:.3}",
+                    outcome.tile_spread
+                );
+                println!("{case}");
+                assert!((0.95..1.05).contains(&linear), "{case}");
+                assert!((0.9..1.1).contains(&codes), "{case}");
+                assert!(outcome.tile_spread <= 0.2, "{case}");
+            }
+        }
+    }
+
+    /// Dark pixels that few samples find lit, where the tone curve is steep and bent: the estimate
+    /// against the two simpler ones.
+    #[test]
+    fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
+        let (n, mut rng) = (16u32, Rng(5));
+        let display = Display::default();
+        let curve = |x: f64| display.codes([x; 3])[0];
+        let mut sum = [0.0; 4];
+        for _ in 0..20_000 {
+            let chance = 10f64.powf(-2.5 * rng.unit());
+            let mut hits =
+                || (0..n).filter(|i| (f64::from(*i) + rng.unit()) / 16.0 < chance).count() as f64;
+            let (a, b) = (0.7 * hits() / 16.0, 0.7 * hits() / 16.0);
+            let mut film = film(1, 1, &[2f64.powi(28)]);
+            fill(&mut film, n, |_, _, r| vec![16.0 * [a, b][r]; 3]);
+            let picture = 0.5 * (a + b);
+            let slope = (curve(picture + 1e-7) - curve((picture - 1e-7).max(0.0))) / 2e-7;
+            sum[0] += (curve(picture) - curve(0.7 * chance)).powi(2);
+            sum[1] += film.noise(&white(1), &display).unwrap().rmse_codes.powi(2);
+            sum[2] += (0.5 * (curve(a) - curve(b))).powi(2);
+            sum[3] += (0.5 * (a - b) * slope).powi(2);
+        }
+        let [ours, half, slope] = [1, 2, 3].map(|i| (sum[0] / sum[i]).sqrt());
+        println!("true / estimate: {ours:.3}, half difference {half:.3}, slope {slope:.3}");
+        assert!((ours - 1.0).abs() < 0.16 && half > ours + 0.05 && slope > ours + 0.3);
+    }
+
+    #[test]
+    fn one_pixel_by_hand() {
+        let mut film = film(1, 1, &[1024.0, 2.0]);
+        fill(&mut film, 2, |_, _, r| vec![[0.25, 0.5][r], 1.0, 0.5, 0.0, 0.0, [2.0, 0.0][r]]);
+        let mix = Mix { weights: vec![[1.0; 3], [0.0, 0.0, 0.25]] };
+        let display = Display { exposure_ev: 1.0, tone: Tone::Clip };
+        let tile =
+            Estimator::new(film.scales(), &mix, &display).tile(film.tile(0).unwrap()).unwrap();
+        // Red 0.125 and 0.25, blue 0.25 + 0.25 and 0.25.
+        let expected = (0.0625f64.powi(2) + 0.125f64.powi(2)) / 3.0;
+        assert!((tile.linear_mse - expected).abs() < 1e-15, "{tile:?}");
+        let code = |x: f64| display.codes([x; 3])[0];
+        let apart = |a: f64, b: f64| {
+            let m = code(0.5 * (a + b));
+            0.5 * ((code(a) - m).powi(2) + (code(b) - m).powi(2))
+        };
+        let expected = (apart(0.125, 0.25) + apart(0.5, 0.25)) / 3.0;
+        assert!((tile.codes_mse / expected - 1.0).abs() < 1e-4, "{tile:?} {expected}");
+        assert_eq!(tile.pixels, 1);
+        // Far over white nothing is seen of the difference.
+        let bright = Display { exposure_ev: 9.0, tone: Tone::Clip };
+        let noise = film.noise(&Mix::only(0, 2), &bright).unwrap();
+        assert_eq!((noise.rmse_codes, quantised_8(bright.codes([0.125; 3])[0])), (0.0, 255));
+        assert!(noise.rmse_linear > 0.0);
+    }
+
+    #[test]
+    fn both_tone_curves_are_estimated_as_displayed() {
+        for (name, tone) in Tone::NAMED {
+            let display = Display { exposure_ev: -0.5, tone };
+            let (mut film, mut rng) = (film(16, 16, &[2f64.powi(20)]), Rng(3));
+            fill(&mut film, 1, |_, _, _| (0..3).map(|_| 2.0 * rng.unit()).collect());
+            let (mut row, mut mse) = ([vec![], vec![], vec![]], 0.0);
+            for y in 0..16 {
+                for (part, row) in [Part::Both, Part::A, Part::B].into_iter().zip(&mut row) {
+                    film.row(y, part, &white(1), row);
+                }
+                for x in 0..16 {
+                    let [m, a, b] = [0, 1, 2].map(|i: usize| display.codes(row[i][x]));
+                    for c in 0..3 {
+                        mse += ((a[c] - m[c]).powi(2) + (b[c] - m[c]).powi(2)) / (2.0 * 768.0);
+                    }
+                }
+            }
+            let noise = film.noise(&white(1), &display).unwrap();
+            assert!((noise.rmse_codes / mse.sqrt() - 1.0).abs() < 1e-5, "{name}: {noise:?} {mse}");
+        }
+    }
+
+    #[test]
+    fn unequal_counts_have_no_noise() {
+        let mut film = film(32, 16, &[1.0]);
+        let noise = |film: &Film| film.noise(&white(1), &Display::default());
+        assert_eq!(noise(&film), None);
+        fill(&mut film, 3, |_, _, _| vec![1.0; 3]);
+        let zero = Noise { rmse_linear: 0.0, rmse_codes: 0.0, p95_codes: 0.0, worst_codes: 0.0 };
+        assert_eq!(noise(&film), Some(zero));
+        film.slots(&[1]).remove(0).open().advance(0, 1);
+        assert_eq!(noise(&film), None);
+        film.slots(&[1]).remove(0).open().advance(1, 1);
+        assert!(noise(&film).is_some());
+        film.restart();
+        each_tile(&mut film, |tile, _| tile.set_lattice(8));
+        assert_eq!(noise(&film), None);
+    }
+
+    #[test]
+    fn the_picture_sums_up_its_tiles() {
+        let tile = |codes: f64, pixels| {
+            Some(TileNoise { linear_mse: 0.01, codes_mse: codes * codes, pixels })
+        };
+        let tiles = (1..=20).map(|i| tile(f64::from(i), 256)).chain([tile(7.0, 0)]);
+        let noise = Noise::of_tiles(tiles).unwrap();
+        assert!((noise.rmse_linear - 0.1).abs() < 1e-15);
+        assert!((noise.rmse_codes - 143.5f64.sqrt()).abs() < 1e-12);
+        assert_eq!((noise.p95_codes, noise.worst_codes), (19.0, 20.0));
+        assert_eq!(Noise::of_tiles([tile(1.0, 256), None]), None);
+        assert_eq!(Noise::of_tiles([]), None);
+    }
+}

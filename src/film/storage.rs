@@ -63,7 +63,7 @@ impl fmt::Display for Mismatch {
         match self {
             Self::Header(what, ours, theirs) => write!(
                 f,
-                "these films cannot be added: their {what} differs, {ours} here and {theirs} there; \
+                "these films cannot be added: {what} {ours} here, {theirs} there; \
                  only films of the same scene, size, seed and precision can"
             ),
             Self::Overlap(tile) => write!(
@@ -221,7 +221,7 @@ impl Film {
         let show = |h: &Header| -> [(&'static str, String); 4] {
             [
                 ("size", format!("{}x{}", h.width, h.height)),
-                ("set of light group scales", format!("{:?}", h.scales)),
+                ("light group scales", format!("{:?}", h.scales)),
                 ("seed", h.seed.to_string()),
                 ("precision", h.precision.clone()),
             ]
@@ -235,5 +235,99 @@ impl Film {
             theirs.lattice_px() != 0 && self.tile(*index).is_some_and(|t| t.lattice_px() != 0)
         });
         clash.map_or(Ok(()), |(index, _)| Err(Mismatch::Overlap(index)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{fill, film, white};
+    use super::*;
+
+    #[test]
+    fn tiles_cover_the_film() {
+        let film = film(33, 17, &[1.0]);
+        assert_eq!((film.tile_count(), film.tile_columns()), (6, 3));
+        assert_eq!((film.tile_origin(5), film.tiles[5].extent()), ([32, 16], [1, 1]));
+        assert_eq!((film.tile_origin(1), film.tiles[1].extent()), ([16, 0], [16, 16]));
+        assert_eq!(film.touched().count(), 0);
+    }
+
+    #[test]
+    fn slots_come_in_the_order_asked_for() {
+        let mut film = film(48, 32, &[1.0]);
+        let slots = film.slots(&[4, 0, 5, 2]);
+        let order: Vec<_> = slots.iter().map(|slot| (slot.index, slot.origin)).collect();
+        assert_eq!(order, [(4, [16, 16]), (0, [0, 0]), (5, [32, 16]), (2, [32, 0])]);
+        // Only opened tiles are touched.
+        slots.into_iter().nth(2).unwrap().open().advance(0, 3);
+        let touched: Vec<_> = film.touched().map(|(i, tile)| (i, tile.counts())).collect();
+        assert_eq!(touched, [(5, [3, 0])]);
+        assert_eq!(film.samples(), 3 * 256);
+    }
+
+    #[test]
+    #[should_panic(expected = "tile 2 is named twice")]
+    fn no_tile_is_handed_out_twice() {
+        film(48, 32, &[1.0]).slots(&[2, 1, 2]);
+    }
+
+    #[test]
+    fn a_restart_forgets() {
+        let (mut film, empty) = (film(20, 20, &[1.0]), film(20, 20, &[1.0]).bytes());
+        fill(&mut film, 2, |x, _, _| vec![x as f64; 3]);
+        let full = film.bytes();
+        film.restart();
+        assert_eq!((film.samples(), film.bytes()), (0, empty));
+        fill(&mut film, 2, |x, _, _| vec![x as f64; 3]);
+        assert_eq!(film.bytes(), full);
+    }
+
+    #[test]
+    fn only_alike_films_add_up() {
+        let mut ours = film(20, 20, &[1.0]);
+        fill(&mut ours, 2, |x, _, _| vec![x as f64; 3]);
+        let before = ours.bytes();
+        let alter = |change: fn(&mut Header)| {
+            let mut header = ours.header().clone();
+            change(&mut header);
+            Film::new(header)
+        };
+        let others = [
+            (alter(|h| h.width = 19), "size 20x20 here, 19x20 there"),
+            (alter(|h| h.scales = vec![2.0]), "scales [1.0] here, [2.0] there"),
+            (alter(|h| h.scales = vec![1.0, 1.0]), "[1.0] here, [1.0, 1.0] there"),
+            (alter(|h| h.seed = 2), "seed 1 here, 2 there"),
+            (alter(|h| h.precision = "f64x4".into()), "precision f32x8 here, f64x4 there"),
+        ];
+        for (other, words) in others {
+            let message = ours.add(&other).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+        assert_eq!(ours.bytes(), before);
+        ours.add(&film(20, 20, &[1.0])).unwrap();
+        assert_eq!(ours.bytes(), before);
+    }
+
+    #[test]
+    fn the_first_sample_is_not_added_twice() {
+        let lattice = || {
+            let mut film = film(16, 16, &[1.0]);
+            film.slots(&[0]).remove(0).open().set_lattice(8);
+            film
+        };
+        let mut ours = lattice();
+        assert_eq!(ours.add(&lattice()), Err(Mismatch::Overlap(0)));
+        let mut rest = film(16, 16, &[1.0]);
+        fill(&mut rest, 4, |_, _, _| vec![4.0; 3]);
+        rest.add(&ours).unwrap();
+        assert_eq!(rest.samples(), 2 * 4 * 256 + 4);
+        assert_eq!(rest.pixel(8, 8, &white(1)), [8.0 / 9.0; 3]);
+        assert_eq!(rest.pixel(9, 8, &white(1)), [1.0; 3]);
+    }
+
+    #[test]
+    #[should_panic(expected = "not a power of two")]
+    fn scales_are_powers_of_two() {
+        film(1, 1, &[3.0]);
     }
 }
