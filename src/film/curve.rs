@@ -1,6 +1,6 @@
-//! The sRGB curve by table, for error estimates: a hundred times cheaper than the power function.
+//! The sRGB curve by table, many times cheaper than the power function.
 
-use super::display::srgb_from_linear;
+use super::display::{quantised_8, srgb_from_linear};
 use std::sync::LazyLock;
 
 /// Segments per octave (power of two).
@@ -13,7 +13,6 @@ const BASE: u64 = (((1023 + FIRST_OCTAVE) as u64) << SEGMENTS_LOG2) - 1;
 const ENTRIES: usize = ((-FIRST_OCTAVE as usize) << SEGMENTS_LOG2) + 2;
 
 /// Largest difference from the exact curve, in codes of 0..=255.
-#[cfg(test)]
 const MAX_ERROR_CODES: f64 = 5.5e-4;
 
 /// sRGB codes by chords between exact points, 128 to an octave of linear light.
@@ -49,6 +48,16 @@ impl Curve {
         let [at_zero, slope] = self.chords[entry.min(ENTRIES - 1)];
         at_zero + slope * linear
     }
+
+    /// The exact code, rounded to 8 bits, of linear light 0..=1.
+    #[inline]
+    pub fn code_8(&self, linear: f64) -> u8 {
+        let code = self.code(linear);
+        if (code.fract() - 0.5).abs() <= MAX_ERROR_CODES {
+            return quantised_8(255.0 * srgb_from_linear(linear));
+        }
+        quantised_8(code)
+    }
 }
 
 #[cfg(test)]
@@ -67,6 +76,27 @@ mod tests {
         }
         assert!(worst < MAX_ERROR_CODES, "{worst}");
         assert!(worst > MAX_ERROR_CODES / 2.0, "the stated bound is too loose: {worst}");
+    }
+
+    #[test]
+    fn eight_bits_are_those_of_the_exact_curve() {
+        let exact = |linear| quantised_8(255.0 * srgb_from_linear(linear));
+        for i in 0..=200_000 {
+            let linear = f64::from(i) * 5e-6;
+            assert_eq!(Curve::shared().code_8(linear), exact(linear), "{linear}");
+        }
+        // Around every border between two codes.
+        for border in (0..255).map(|code| (f64::from(code) + 0.5) / 255.0) {
+            let linear = if border <= 0.04045 {
+                border / 12.92
+            } else {
+                ((border + 0.055) / 1.055).powf(2.4)
+            };
+            for step in -2000..=2000 {
+                let linear = linear * (1.0 + f64::from(step) * 1e-8);
+                assert_eq!(Curve::shared().code_8(linear), exact(linear), "{linear}");
+            }
+        }
     }
 
     #[test]

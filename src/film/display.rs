@@ -1,5 +1,6 @@
 //! From radiance to the numbers of a picture file: exposure, tone curve, sRGB.
 
+use super::curve::Curve;
 use std::fmt;
 use std::str::FromStr;
 
@@ -51,6 +52,12 @@ impl Display {
     /// Radiance to sRGB codes, 0..=255, not rounded.
     pub fn codes(&self, radiance: [f64; 3]) -> [f64; 3] {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
+    }
+
+    /// Radiance to sRGB codes, rounded to 8 bits: the same as rounding [`Display::codes`], but several
+    /// times as fast.
+    pub fn codes_8(&self, radiance: [f64; 3]) -> [u8; 3] {
+        self.shown(radiance).map(|c| Curve::shared().code_8(c))
     }
 
     /// Radiance to linear light of the display, 0..=1.

