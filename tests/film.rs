@@ -7,7 +7,7 @@ use std::io::BufReader;
 use std::ops::Range;
 use std::path::Path;
 use zerkalo::film::{
-    BadSample, Depth, Display, Film, Header, Mix, Part, Picture, TILE, Target, Tile, Tone,
+    BadSample, Depth, Display, Film, Header, Mix, Part, Picture, Slot, TILE, Target, Tile, Tone,
     lattice_pixels, quantised_8, quantised_16,
 };
 
@@ -40,7 +40,7 @@ fn mixed_bits(x: u64) -> u64 {
 fn sample(x: usize, y: usize, replicate: usize, index: u32) -> Option<[f64; 6]> {
     let at = ((x * 64 + y) * 2 + replicate) as u64 * 1_000_003 + u64::from(index);
     let value = |c: u64| mixed_bits(at * 8 + c) as f64 / 1.8e19;
-    (mixed_bits(at) % 2000 != 0).then(|| [0, 1, 2, 3, 4, 5].map(value))
+    (!mixed_bits(at).is_multiple_of(2000)).then(|| [0, 1, 2, 3, 4, 5].map(value))
 }
 
 fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: usize, index: u32) {
@@ -60,15 +60,42 @@ fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: u
 /// Adds samples `range` of one replicate to the tiles in the order given.
 fn trace(film: &mut Film, tiles: &[usize], replicate: usize, range: Range<u32>) {
     for slot in film.slots(tiles) {
-        let origin = slot.origin;
-        let tile = slot.open();
-        let [width, height] = tile.extent();
-        for index in range.clone() {
-            for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-                trace_pixel(tile, origin, replicate, y * TILE + x, index);
-            }
+        trace_slot(slot, replicate, range.clone());
+    }
+}
+
+fn trace_slot(slot: Slot, replicate: usize, range: Range<u32>) {
+    let origin = slot.origin;
+    let tile = slot.open();
+    let [width, height] = tile.extent();
+    for index in range.clone() {
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            trace_pixel(tile, origin, replicate, y * TILE + x, index);
         }
-        tile.advance(replicate, range.len() as u32);
+    }
+    tile.advance(replicate, range.len() as u32);
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let expected = whole().bytes();
+    for threads in [1, 2, 7] {
+        let mut film = new_film();
+        let all = all_tiles(&film);
+        for replicate in 0..2 {
+            let mut shares: Vec<Vec<_>> = (0..threads).map(|_| vec![]).collect();
+            for (i, slot) in film.slots(&all).into_iter().enumerate() {
+                shares[i % threads].push(slot);
+            }
+            std::thread::scope(|scope| {
+                for share in shares {
+                    scope.spawn(move || {
+                        share.into_iter().for_each(|s| trace_slot(s, replicate, 0..12))
+                    });
+                }
+            });
+        }
+        assert!(film.bytes() == expected, "{threads} threads");
     }
 }
 

@@ -10,9 +10,9 @@ pub struct BadSample {
     pub index: u32,
     /// 0: A, 1: B.
     pub replicate: u8,
-    /// Row, from the top [pixels].
+    /// Row, from the top, in pixels.
     pub y: u32,
-    /// Column, from the left [pixels].
+    /// Column, from the left, in pixels.
     pub x: u32,
 }
 

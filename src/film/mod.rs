@@ -29,5 +29,5 @@ pub use storage::{Film, Header, Mismatch, Slot};
 pub use target::{Depth, Picture, Target, WriteError};
 pub use tile::{TILE_PIXELS, Tile, lattice_pixels};
 
-/// Side of a tile [pixels].
+/// Side of a tile, in pixels.
 pub const TILE: usize = 16;

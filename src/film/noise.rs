@@ -332,13 +332,15 @@ mod tests {
             let display = Display { exposure_ev: -0.5, tone };
             let (mut film, mut rng) = (film(16, 16, &[2f64.powi(20)]), Rng(3));
             fill(&mut film, 1, |_, _, _| (0..3).map(|_| 2.0 * rng.unit()).collect());
-            let (mut row, mut mse) = ([vec![], vec![], vec![]], 0.0);
+            let mut mse = 0.0;
             for y in 0..16 {
-                for (part, row) in [Part::Both, Part::A, Part::B].into_iter().zip(&mut row) {
-                    film.row(y, part, &white(1), row);
-                }
-                for x in 0..16 {
-                    let [m, a, b] = [0, 1, 2].map(|i: usize| display.codes(row[i][x]));
+                let [m, a, b] = [Part::Both, Part::A, Part::B].map(|part| {
+                    let mut row = vec![];
+                    film.row(y, part, &white(1), &mut row);
+                    row
+                });
+                for ((m, a), b) in m.iter().zip(&a).zip(&b) {
+                    let [m, a, b] = [m, a, b].map(|radiance| display.codes(*radiance));
                     for c in 0..3 {
                         mse += ((a[c] - m[c]).powi(2) + (b[c] - m[c]).powi(2)) / (2.0 * 768.0);
                     }

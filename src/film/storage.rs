@@ -8,9 +8,9 @@ use std::fmt;
 /// What two films must share to be added.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
-    /// Columns [pixels], at least 1.
+    /// Columns, in pixels, at least 1.
     pub width: usize,
-    /// Rows [pixels], at least 1.
+    /// Rows, in pixels, at least 1.
     pub height: usize,
     /// For each light group, what a sample is multiplied with before it is rounded to an integer; a
     /// power of two, so that the product is exact.
@@ -99,12 +99,12 @@ impl Film {
         Self { epoch: 1, tiles, header }
     }
 
-    /// Columns [pixels].
+    /// Columns, in pixels.
     pub fn width(&self) -> usize {
         self.header.width
     }
 
-    /// Rows [pixels].
+    /// Rows, in pixels.
     pub fn height(&self) -> usize {
         self.header.height
     }

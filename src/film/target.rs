@@ -25,7 +25,7 @@ pub struct Picture<'a> {
     /// Bits per channel, for formats that hold what a display shows.
     pub depth: Depth,
     /// Keys and values to be written into the file. Keys: 1 to 79 printable ASCII characters without
-    /// leading, trailing or double spaces.
+    /// leading, trailing or double spaces, the first one a capital (OpenEXR's own begin small).
     pub metadata: &'a [(String, String)],
 }
 
@@ -189,7 +189,7 @@ impl Target {
     fn explained(&self, error: &io::Error, directory: &Path) -> WriteError {
         let shown = directory.display();
         match error.kind() {
-            ErrorKind::NotFound => self.error(
+            ErrorKind::NotFound if !directory.exists() => self.error(
                 format!("the directory {shown} does not exist"),
                 "create it first or name another one",
             ),
@@ -205,7 +205,7 @@ impl Target {
                 "name a directory on another one",
             ),
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded => self.error(
-                format!("no space is left for it in {shown} ({error})"),
+                format!("no space is left for it in {shown}"),
                 "free some space or name a directory on another disk",
             ),
             _ => self.error(error.to_string(), "if that is unclear, try another directory"),

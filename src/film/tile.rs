@@ -63,7 +63,7 @@ impl Tile {
         self.epoch == epoch
     }
 
-    /// Width and height of the part that lies inside the picture [pixels], 1..=16 each.
+    /// Width and height of the part that lies inside the picture, in pixels, 1..=16 each.
     pub fn extent(&self) -> [usize; 2] {
         self.extent
     }
