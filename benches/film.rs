@@ -1,0 +1,88 @@
+//! What the film costs beside tracing: noise of a tile, the display's picture, adding, files.
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use std::hint::black_box;
+use zerkalo::film::{
+    Depth, Display, Estimator, Film, Header, Mix, Picture, TILE_PIXELS, Target, Tone,
+};
+
+/// A noisy gradient of `groups` lights, 64 + 64 samples in every pixel.
+fn film(width: usize, height: usize, groups: usize) -> Film {
+    let scales = vec![2f64.powi(28); groups];
+    let mut film = Film::new(Header { width, height, scales, seed: 1, precision: "f32x8".into() });
+    let all: Vec<_> = (0..film.tile_count()).collect();
+    let mut state = 1u64;
+    for slot in film.slots(&all) {
+        let [x0, y0] = slot.origin;
+        let tile = slot.open();
+        for (replicate, pixel) in (0..2).flat_map(|r| (0..TILE_PIXELS).map(move |p| (r, p))) {
+            let (x, y) = (x0 + pixel % 16, y0 + pixel / 16);
+            let values: Vec<_> = (0..groups * 3)
+                .map(|c| {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    let noise = (state >> 40) as f64 / 16_777_216.0;
+                    let plain = (x * (c + 1) + y) as f64 / (width * (c + 1) + height) as f64;
+                    (64.0 * 2f64.powi(28) * (plain + 0.02 * noise) / groups as f64) as i64
+                })
+                .collect();
+            tile.add(replicate, pixel, &values);
+        }
+        tile.advance(0, 64);
+        tile.advance(1, 64);
+    }
+    film
+}
+
+fn white(groups: usize) -> Mix {
+    Mix { weights: vec![[1.0; 3]; groups] }
+}
+
+fn noise(c: &mut Criterion) {
+    let mut group = c.benchmark_group("noise of a tile");
+    for groups in [1, 4] {
+        let film = film(640, 480, groups);
+        for (name, tone) in Tone::NAMED {
+            let display = Display { exposure_ev: 0.0, tone };
+            let estimator = Estimator::new(film.scales(), &white(groups), &display);
+            let mut tile = (0..film.tile_count()).cycle();
+            let id = BenchmarkId::new(format!("{groups} groups"), name);
+            group.bench_function(id, |b| {
+                b.iter(|| estimator.tile(film.tile(tile.next().unwrap()).unwrap()));
+            });
+        }
+    }
+}
+
+fn pictures(c: &mut Criterion) {
+    let mut group = c.benchmark_group("1920x1080");
+    group.sample_size(10);
+    let one = film(1920, 1080, 1);
+    let other = film(1920, 1080, 1);
+    group.bench_function("resampled to 200x110", |b| {
+        b.iter(|| one.resampled(200, 110, &white(1)));
+    });
+    group.bench_function("add", |b| {
+        let mut sum = film(1920, 1080, 1);
+        b.iter(|| sum.add(black_box(&other)));
+    });
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    for (name, depth) in
+        [("8.png", Depth::Eight), ("16.png", Depth::Sixteen), ("32.exr", Depth::Eight)]
+    {
+        let target = Target::from_path(dir.path().join(name)).expect("a known extension");
+        let picture = Picture {
+            film: &one,
+            mix: &white(1),
+            group_names: &["lamp".to_string()],
+            display: Display::default(),
+            depth,
+            metadata: &[],
+        };
+        group.bench_function(name, |b| b.iter(|| target.write(&picture)));
+        let bytes = std::fs::metadata(target.path()).map_or(0, |m| m.len());
+        println!("{name}: {bytes} bytes");
+    }
+}
+
+criterion_group!(benches, noise, pictures);
+criterion_main!(benches);

@@ -1,0 +1,188 @@
+//! From radiance to the numbers of a picture file: exposure, tone curve, sRGB.
+
+use super::curve::Curve;
+use std::fmt;
+use std::str::FromStr;
+
+/// What is done with light that is brighter than the display's white.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Tone {
+    /// Each channel stops at 1.
+    #[default]
+    Clip,
+    /// The Khronos PBR Neutral tone mapper (KHR specification of 2024): keeps hues and all but the
+    /// brightest fifth of the range, up to a small constant in the dark, and compresses the rest.
+    Neutral,
+}
+
+impl Tone {
+    /// Every tone curve and its name.
+    pub const NAMED: [(&'static str, Self); 2] = [("clip", Self::Clip), ("neutral", Self::Neutral)];
+}
+
+impl fmt::Display for Tone {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let named = Self::NAMED.iter().find(|(_, tone)| tone == self);
+        f.write_str(named.map_or("", |(name, _)| name))
+    }
+}
+
+impl FromStr for Tone {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = Self::NAMED.iter().find(|(name, _)| *name == text);
+        named.map(|(_, tone)| *tone).ok_or_else(|| {
+            let names: Vec<_> = Self::NAMED.iter().map(|(name, _)| *name).collect();
+            format!("tone curve `{text}` is not known; known: {}", names.join(", "))
+        })
+    }
+}
+
+/// How radiance becomes a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Display {
+    /// Radiance is multiplied by 2 to the power of this.
+    pub exposure_ev: f64,
+    /// What follows the exposure.
+    pub tone: Tone,
+}
+
+impl Display {
+    /// Radiance to sRGB codes, 0..=255, not rounded.
+    pub fn codes(&self, radiance: [f64; 3]) -> [f64; 3] {
+        self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
+    }
+
+    /// Radiance to sRGB codes, rounded to 8 bits: the same as rounding [`Display::codes`], but several
+    /// times as fast.
+    pub fn codes_8(&self, radiance: [f64; 3]) -> [u8; 3] {
+        self.shown(radiance).map(|c| Curve::shared().code_8(c))
+    }
+
+    /// Radiance to linear light of the display, 0..=1.
+    pub fn shown(&self, radiance: [f64; 3]) -> [f64; 3] {
+        toned(self.tone, radiance.map(|c| c * self.exposure_factor()))
+    }
+
+    /// What the exposure multiplies radiance with.
+    pub fn exposure_factor(&self) -> f64 {
+        self.exposure_ev.exp2()
+    }
+}
+
+/// Applies a tone curve; the result lies in 0..=1.
+#[inline(always)]
+pub(super) fn toned(tone: Tone, color: [f64; 3]) -> [f64; 3] {
+    match tone {
+        Tone::Clip => color.map(|c| c.clamp(0.0, 1.0)),
+        Tone::Neutral => neutral(color).map(|c| c.clamp(0.0, 1.0)),
+    }
+}
+
+/// Khronos PBR Neutral, as published.
+#[inline(always)]
+fn neutral(color: [f64; 3]) -> [f64; 3] {
+    const F90: f64 = 0.04;
+    const START: f64 = 0.8 - F90;
+    const DESATURATION: f64 = 0.15;
+    let least = color[0].min(color[1]).min(color[2]);
+    let offset = if least < 2.0 * F90 { least - least * least / (4.0 * F90) } else { F90 };
+    let color = color.map(|c| c - offset);
+    let peak = color[0].max(color[1]).max(color[2]);
+    if peak < START {
+        return color;
+    }
+    let room = 1.0 - START;
+    let new_peak = 1.0 - room * room / (peak + room - START);
+    let to_white = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    color.map(|c| c * (new_peak / peak)).map(|c| c + (new_peak - c) * to_white)
+}
+
+/// Linear light 0..=1 to sRGB code 0..=1 (IEC 61966-2-1, piecewise).
+pub(super) fn srgb_from_linear(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// A code 0..=255 to the nearest of 8 bits.
+pub fn quantised_8(code: f64) -> u8 {
+    code.round() as u8
+}
+
+/// A code 0..=255 to the nearest of 16 bits, 65535 for 255.
+pub fn quantised_16(code: f64) -> u16 {
+    (code * (65535.0 / 255.0)).round() as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_curve_is_that_of_the_standard() {
+        // The two pieces meet, and every 8-bit code decodes to what encodes to it.
+        let [below, above] = [0.003_130_79, 0.003_130_81].map(srgb_from_linear);
+        assert!((above - below).abs() < 1e-6 && above > below);
+        for code in 0..=255u8 {
+            let v = f64::from(code) / 255.0;
+            let linear = if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+            let codes = Display::default().codes([linear; 3]);
+            assert!((codes[0] - f64::from(code)).abs() < 1e-5, "{code}: {codes:?}");
+            assert_eq!(quantised_8(codes[1]), code);
+            assert_eq!(quantised_16(codes[2]), u16::from(code) * 257);
+        }
+        let grey = Display::default().codes([0.5, 0.214_041_14, 0.01]);
+        let expected = [187.515_6, 127.5, 25.463];
+        (0..3).for_each(|c| assert!((grey[c] - expected[c]).abs() < 2e-3, "{grey:?}"));
+    }
+
+    #[test]
+    fn quantisation_rounds_to_nearest_and_stays_in_range() {
+        assert_eq!([0.49, 0.51, 254.49, 254.51].map(quantised_8), [0, 1, 254, 255]);
+        assert_eq!([-3.0, 300.0, f64::NAN].map(quantised_8), [0, 255, 0]);
+        assert_eq!([0.0, 127.5, 255.0].map(quantised_16), [0, 32_768, 65_535]);
+    }
+
+    #[test]
+    fn exposure_multiplies_by_powers_of_two() {
+        let bright = Display { exposure_ev: 3.0, tone: Tone::Clip };
+        let plain = Display::default();
+        assert_eq!(bright.codes([0.01, 0.1, 2.0]), plain.codes([0.08, 0.8, 1.0]));
+    }
+
+    /// From the published shader, evaluated by hand in double precision.
+    #[test]
+    fn neutral_follows_its_publication() {
+        let neutral = Display { exposure_ev: 0.0, tone: Tone::Neutral };
+        // Below the toe's end a grey g becomes 6.25 g^2, above it g - 0.04.
+        let near = |got: [f64; 3], expected: [f64; 3]| {
+            (0..3).for_each(|c| assert!((got[c] - expected[c]).abs() < 1e-12, "{got:?}"));
+        };
+        near(neutral.shown([0.04; 3]), [0.01; 3]);
+        near(neutral.shown([0.2, 0.5, 0.7]), [0.16, 0.46, 0.66]);
+        // Peak 4 - 0.04 = 3.96: 1 - 0.24^2 / (3.96 + 0.24 - 0.76) = 0.983255813953...
+        let peak = 1.0 - 0.0576 / 3.44;
+        near(neutral.shown([4.0; 3]), [peak; 3]);
+        // Colour: offset 0 (least is 0); new peak 1 - 0.0576 / 1.48; towards white by g.
+        let peak = 1.0 - 0.0576 / 1.48;
+        let g = 1.0 - 1.0 / (0.15 * (2.0 - peak) + 1.0);
+        near(neutral.shown([2.0, 1.0, 0.0]), [peak, peak / 2.0 * (1.0 + g), peak * g]);
+    }
+
+    #[test]
+    fn tone_curves_rise_and_stay_in_range() {
+        for (name, tone) in Tone::NAMED {
+            assert_eq!((name.parse(), tone.to_string()), (Ok(tone), name.to_string()));
+            let display = Display { exposure_ev: 0.0, tone };
+            let mut last = 0.0;
+            for i in 0..20_000 {
+                let [r, g, b] = display.codes([f64::from(i) * 1e-3; 3]);
+                assert!(r >= last && r <= 255.0 && r == g && g == b, "{name} at {i}");
+                last = r;
+            }
+            assert!(display.codes([1e30, 1e300, 0.0]).iter().all(|c| (0.0..=255.0).contains(c)));
+        }
+        let unknown = "filmic".parse::<Tone>().unwrap_err();
+        assert_eq!(unknown, "tone curve `filmic` is not known; known: clip, neutral");
+    }
+}

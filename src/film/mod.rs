@@ -1,0 +1,33 @@
+//! The film: integer sums of samples, and what is read from them.
+//!
+//! Two independent replicates, A and B, of the same picture are kept apart: their mean is the
+//! picture, their difference measures the error that is left. Sums are integers, so that no order of
+//! adding changes a bit. Each light (group) has its own sums, taken as if it were white and of unit
+//! strength; a [`Mix`] gives it colour and strength afterwards.
+
+mod bad;
+mod bytes;
+mod curve;
+mod display;
+mod exr;
+mod mix;
+mod noise;
+mod png;
+mod resample;
+mod storage;
+mod target;
+#[cfg(test)]
+mod testing;
+mod tile;
+
+pub use bad::{BAD_REMEMBERED, BadSample, BadSamples};
+pub use display::{Display, Tone, quantised_8, quantised_16};
+pub use mix::{Mix, Part};
+pub use noise::{Estimator, Noise, TileNoise};
+pub use resample::Thumbnail;
+pub use storage::{Film, Header, Mismatch, Slot};
+pub use target::{Depth, Picture, Target, WriteError};
+pub use tile::{TILE_PIXELS, Tile, lattice_pixels};
+
+/// Side of a tile, in pixels.
+pub const TILE: usize = 16;

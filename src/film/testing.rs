@@ -1,0 +1,68 @@
+//! Films with known contents, for the tests of this room.
+
+use super::storage::{Film, Header};
+use super::tile::Tile;
+use super::{Mix, TILE};
+
+/// Numbers for tests (SplitMix64).
+pub struct Rng(pub u64);
+
+impl Rng {
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Standard normal.
+    pub fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.unit()).cos()
+    }
+}
+
+pub fn film(width: usize, height: usize, scales: &[f64]) -> Film {
+    let scales = scales.to_vec();
+    Film::new(Header { width, height, scales, seed: 1, precision: "f32x8".to_string() })
+}
+
+/// Unit weights.
+pub fn white(groups: usize) -> Mix {
+    Mix { weights: vec![[1.0; 3]; groups] }
+}
+
+/// Opens every tile and calls `f` with it and the column and row of its upper left pixel.
+pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
+    let all: Vec<_> = (0..film.tile_count()).collect();
+    for slot in film.slots(&all) {
+        let origin = slot.origin;
+        f(slot.open(), origin);
+    }
+}
+
+/// Gives both replicates `count` samples in every pixel, whose sums in `[group][channel]` are
+/// `sums(x, y, replicate)` times the group's scale, rounded.
+pub fn fill(film: &mut Film, count: u32, mut sums: impl FnMut(usize, usize, usize) -> Vec<f64>) {
+    let scales = film.scales().to_vec();
+    each_tile(film, |tile, [x0, y0]| {
+        let [width, height] = tile.extent();
+        for replicate in 0..2 {
+            for pixel in (0..height).flat_map(|y| (0..width).map(move |x| y * TILE + x)) {
+                let sums = sums(x0 + pixel % TILE, y0 + pixel / TILE, replicate);
+                let fixed: Vec<_> = sums
+                    .iter()
+                    .enumerate()
+                    .map(|(i, sum)| (sum * scales[i / 3]).round() as i64)
+                    .collect();
+                tile.add(replicate, pixel, &fixed);
+            }
+            tile.advance(replicate, count);
+        }
+    });
+}
