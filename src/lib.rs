@@ -6,6 +6,7 @@ pub mod camera;
 pub mod lanes;
 pub mod light;
 pub mod material;
+pub mod render;
 pub mod scene;
 pub mod shape;
 pub mod value;

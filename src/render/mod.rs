@@ -1,0 +1,4 @@
+//! From a scene to a growing film: what to trace next, and the threads that do it.
+
+pub mod schedule;
+pub mod wave;

@@ -1,0 +1,472 @@
+//! Which tiles get how many samples next, and when to stop. Decides, does nothing: the clock is an
+//! argument, the film is known only through the reports of finished jobs.
+//!
+//! A decision gives each chosen tile the same sample indices in replicate A and then in replicate B,
+//! so that whenever something is decided every tile holds equally many of both and its error is
+//! known. Decisions depend on estimated errors and rays counted, never on time or threads; time only
+//! ends the work.
+
+mod allocation;
+#[cfg(test)]
+mod tests;
+mod tile;
+mod trend;
+
+use crate::render::wave::{Job, TileError, Wave, WaveReport};
+use tile::{Tile, clamp_slope};
+use trend::Trend;
+
+/// Samples per replicate that every tile gets before its estimate is believed.
+const FLOOR: u32 = 16;
+/// The same for tiles in which a path met a glossy lobe.
+const GLOSSY_FLOOR: u32 = 32;
+/// Estimates begin here: below, they say little and cost as much as the samples.
+const FIRST_ESTIMATE: u32 = 4;
+/// Samples are given in multiples of a packet.
+const PACKET: u32 = 8;
+/// Samples per replicate at which a tile is full: half of what a 32-bit index can count.
+const FULL: u32 = 1 << 31;
+
+/// What "noise" means when tiles compete for samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Criterion {
+    /// The error as displayed, in 8-bit codes.
+    Codes,
+    /// The error of the linear mix.
+    Linear,
+}
+
+impl Criterion {
+    fn of(self, error: TileError) -> f64 {
+        match self {
+            Self::Codes => error.codes,
+            Self::Linear => error.linear,
+        }
+    }
+}
+
+/// When to stop; whichever comes first. Nothing set: never.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stop {
+    /// Mean samples per pixel, A and B together; rounds up to even.
+    pub spp: Option<u32>,
+    /// Estimated RMSE of the whole picture as displayed, in 8-bit codes.
+    pub noise_codes: Option<f64>,
+    /// Estimated linear RMSE of the whole picture.
+    pub rmse_linear: Option<f64>,
+    /// Seconds of rendering; tested between waves.
+    pub seconds: Option<f64>,
+}
+
+/// Why the work ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StoppedBy {
+    /// The sample count was reached.
+    Spp,
+    /// The noise as displayed was reached.
+    Noise,
+    /// The linear RMSE was reached.
+    Rmse,
+    /// The time was over.
+    Time,
+    /// Every glossy tile has its cap of rays per pixel, and the others meet the target.
+    RaysPerPixel,
+    /// Every tile holds as many samples as can be counted.
+    Full,
+}
+
+impl StoppedBy {
+    /// Stable name for statistics.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Spp => "spp",
+            Self::Noise => "noise",
+            Self::Rmse => "rmse",
+            Self::Time => "time",
+            Self::RaysPerPixel => "rays_per_pixel",
+            Self::Full => "full",
+        }
+    }
+}
+
+/// How to schedule.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Whether tiles may get different counts (else only the cap makes a difference).
+    pub adaptive: bool,
+    /// The error that the tiles' order minimises.
+    pub criterion: Criterion,
+    /// The most samples per pixel, A and B together, of tiles that met a glossy lobe (rounds down to
+    /// even, at least 2); 0: no cap.
+    pub rays_per_pixel: u32,
+    /// When to stop.
+    pub stop: Stop,
+}
+
+/// What comes next.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Step {
+    /// Trace this.
+    Trace(Wave),
+    /// Nothing: the work is done.
+    Rest(StoppedBy),
+}
+
+/// Estimated error of the whole picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// RMSE as displayed, in 8-bit codes.
+    pub codes: f64,
+    /// Linear RMSE.
+    pub linear: f64,
+    /// 95th percentile of the tiles' RMSE in codes.
+    pub p95_codes: f64,
+}
+
+/// Samples per pixel over the picture, A and B together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spp {
+    /// The fewest.
+    pub min: u32,
+    /// The mean over pixels.
+    pub mean: f64,
+    /// The most.
+    pub max: u32,
+}
+
+/// The scheduler.
+#[derive(Clone, Debug)]
+pub struct Schedule {
+    settings: Settings,
+    tiles: Vec<Tile>,
+    tiles_per_row: usize,
+    /// The jobs decided last; both replicates get them.
+    decided: Vec<Job>,
+    estimate: bool,
+    replicate: usize,
+    /// What is left of `decided` in the current replicate.
+    left: Vec<Job>,
+    trend: Trend,
+    /// Samples traced, all pixels and both replicates.
+    samples: u64,
+    rays: u64,
+    noise: Option<Noise>,
+    /// Samples per replicate when the noise was last estimated, in uniform phases.
+    estimated_at: u32,
+}
+
+impl Schedule {
+    /// For a picture whose tiles, row by row, have these numbers of pixels.
+    pub fn new(pixels: &[u32], tiles_per_row: usize, settings: Settings) -> Self {
+        Self {
+            settings,
+            tiles: pixels.iter().map(|p| Tile::new(*p)).collect(),
+            tiles_per_row,
+            decided: Vec::new(),
+            estimate: false,
+            replicate: 1,
+            left: Vec::new(),
+            trend: Trend::default(),
+            samples: 0,
+            rays: 0,
+            noise: None,
+            estimated_at: 0,
+        }
+    }
+
+    /// What to do next, `seconds` after the work began. Call [`Schedule::complete`] with the wave's
+    /// report before calling this again.
+    pub fn next(&mut self, seconds: f64) -> Step {
+        if self.left.is_empty() {
+            if self.replicate == 0 {
+                self.replicate = 1;
+            } else {
+                if let Some(reason) = self.reason_to_stop(seconds) {
+                    return Step::Rest(reason);
+                }
+                self.decided = self.decide();
+                if self.decided.is_empty() {
+                    return Step::Rest(self.reason_without_work());
+                }
+                self.replicate = 0;
+            }
+            self.left.clone_from(&self.decided);
+        }
+        Step::Trace(Wave {
+            replicate: self.replicate,
+            jobs: self.left.clone(),
+            estimate: self.estimate && self.replicate == 1,
+        })
+    }
+
+    /// Takes in what became of the wave that [`Schedule::next`] gave out. Cancelled jobs will be
+    /// given out again.
+    pub fn complete(&mut self, wave: &Wave, report: &WaveReport) {
+        self.left.clear();
+        for (job, report) in wave.jobs.iter().zip(&report.reports) {
+            let Some(report) = report else {
+                self.left.push(*job);
+                continue;
+            };
+            let tile = &mut self.tiles[job.tile as usize];
+            self.samples += u64::from(job.count) * u64::from(tile.pixels);
+            self.rays += report.rays;
+            let count = job.first + job.count;
+            tile.note(report, count);
+            if wave.replicate == 1 {
+                tile.done = count;
+            }
+        }
+        if self.left.is_empty() && wave.estimate {
+            self.noise = self.pooled_noise();
+            if let Some(noise) = self.noise {
+                let rmse = match self.settings.criterion {
+                    Criterion::Codes => noise.codes,
+                    Criterion::Linear => noise.linear,
+                };
+                self.trend.note(self.rays as f64, rmse);
+            }
+        }
+    }
+
+    /// The latest estimate of the whole picture's error.
+    pub fn noise(&self) -> Option<Noise> {
+        self.noise
+    }
+
+    /// Samples traced so far, over all pixels.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Rays traced so far.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+
+    /// Samples per pixel, counting what both replicates hold.
+    pub fn spp(&self) -> Spp {
+        let counts = || self.tiles.iter().map(|t| 2 * t.done);
+        let (pixels, samples) = self.tiles.iter().fold((0u64, 0u64), |(pixels, samples), t| {
+            (pixels + u64::from(t.pixels), samples + 2 * u64::from(t.done) * u64::from(t.pixels))
+        });
+        Spp {
+            min: counts().min().unwrap_or(0),
+            mean: samples as f64 / pixels.max(1) as f64,
+            max: counts().max().unwrap_or(0),
+        }
+    }
+
+    /// A lower and an upper guess of the seconds left until the first of the targets, `seconds` after
+    /// the work began.
+    pub fn eta_seconds(&self, seconds: f64) -> Option<(f64, f64)> {
+        let left = |(low, high): (f64, f64)| ((low - 1.0) * seconds, (high - 1.0) * seconds);
+        let by_noise = self.target().and_then(|(_, t)| self.trend.work_factor(t)).map(left);
+        let by_spp = self.settings.stop.spp.filter(|_| self.samples > 0).map(|spp| {
+            let total = 2.0 * f64::from(spp.div_ceil(2)) * self.pixels() as f64;
+            let factor = (total / self.samples as f64).max(1.0);
+            left((factor, factor))
+        });
+        let by_time =
+            self.settings.stop.seconds.map(|s| ((s - seconds).max(0.0), (s - seconds).max(0.0)));
+        [by_noise, by_spp, by_time]
+            .into_iter()
+            .flatten()
+            .reduce(|(low, high), (l, h)| (low.min(l), high.min(h)))
+    }
+
+    /// How far the work is on its way to the nearest target, 0..1: the share of the work, as far as it
+    /// can be told.
+    pub fn progress(&self, seconds: f64) -> Option<f64> {
+        let (low, high) = self.eta_seconds(seconds)?;
+        let left = 0.5 * (low + high);
+        Some(if seconds > 0.0 { seconds / (seconds + left) } else { 0.0 })
+    }
+
+    fn pixels(&self) -> u64 {
+        self.tiles.iter().map(|t| u64::from(t.pixels)).sum()
+    }
+
+    /// The error that the work aims at: which one, and how large. With both set, that of the
+    /// criterion.
+    fn target(&self) -> Option<(Criterion, f64)> {
+        let codes = self.settings.stop.noise_codes.map(|t| (Criterion::Codes, t));
+        let linear = self.settings.stop.rmse_linear.map(|t| (Criterion::Linear, t));
+        match self.settings.criterion {
+            Criterion::Codes => codes.or(linear),
+            Criterion::Linear => linear.or(codes),
+        }
+    }
+
+    /// The most samples per replicate that `tile` may get.
+    fn cap(&self, tile: &Tile) -> u32 {
+        match self.settings.rays_per_pixel {
+            0 => FULL,
+            _ if !tile.glossy => FULL,
+            cap => (cap / 2).clamp(1, FULL),
+        }
+    }
+
+    /// Whether every tile has had its floor, so that the pooled error is to be believed.
+    fn floors_reached(&self) -> bool {
+        let floor = |t: &Tile| {
+            let wanted = if self.settings.adaptive && t.glossy { GLOSSY_FLOOR } else { FLOOR };
+            t.done >= wanted.min(self.cap(t))
+        };
+        self.tiles.iter().all(floor)
+    }
+
+    /// Root of the mean squared error over the pixels of the tiles that `counts` selects.
+    fn pooled(&self, criterion: Criterion, counts: impl Fn(&Tile) -> bool) -> f64 {
+        let (sum, pixels) =
+            self.tiles.iter().filter(|t| counts(t)).fold((0.0, 0u64), |(s, n), t| {
+                (s + t.mse(criterion) * f64::from(t.pixels), n + u64::from(t.pixels))
+            });
+        (sum / pixels.max(1) as f64).sqrt()
+    }
+
+    fn pooled_noise(&self) -> Option<Noise> {
+        let mut tiles: Vec<f64> =
+            self.tiles.iter().map(|t| t.error.map(|(_, e)| e.codes)).collect::<Option<_>>()?;
+        // The smallest value that at least 95 per cent of the tiles do not exceed.
+        let rank = (tiles.len() * 95).div_ceil(100).checked_sub(1)?;
+        let (_, p95, _) = tiles.select_nth_unstable_by(rank, f64::total_cmp);
+        Some(Noise {
+            p95_codes: p95.sqrt(),
+            codes: self.pooled(Criterion::Codes, |_| true),
+            linear: self.pooled(Criterion::Linear, |_| true),
+        })
+    }
+
+    fn reason_to_stop(&self, seconds: f64) -> Option<StoppedBy> {
+        let stop = &self.settings.stop;
+        if let Some(noise) = self.noise.filter(|_| self.floors_reached()) {
+            if stop.noise_codes.is_some_and(|t| noise.codes <= t) {
+                return Some(StoppedBy::Noise);
+            }
+            if stop.rmse_linear.is_some_and(|t| noise.linear <= t) {
+                return Some(StoppedBy::Rmse);
+            }
+            if self.capped_at_target() {
+                return Some(StoppedBy::RaysPerPixel);
+            }
+        }
+        // The first samples are always traced: a picture has at least one of each replicate.
+        let begun = self.samples > 0;
+        stop.seconds.filter(|limit| begun && seconds >= *limit).map(|_| StoppedBy::Time)
+    }
+
+    /// Whether the cap on glossy tiles is all that keeps the picture from its target.
+    fn capped_at_target(&self) -> bool {
+        let Some((criterion, target)) = self.target() else { return false };
+        let free = |t: &Tile| t.done < self.cap(t);
+        self.tiles.iter().any(|t| !free(t)) && self.pooled(criterion, free) <= target
+    }
+
+    /// Why there is nothing left to give out.
+    fn reason_without_work(&self) -> StoppedBy {
+        let open = || self.tiles.iter().filter(|t| t.done < self.cap(t));
+        if self.tiles.iter().all(|t| t.done == FULL) {
+            StoppedBy::Full
+        } else if self.settings.stop.spp.is_some() && open().next().is_some() {
+            StoppedBy::Spp
+        } else {
+            StoppedBy::RaysPerPixel
+        }
+    }
+
+    /// Samples per replicate, over all pixels, until the mean count is reached.
+    fn samples_left(&self) -> u64 {
+        let Some(spp) = self.settings.stop.spp else { return u64::MAX };
+        let done: u64 = self.tiles.iter().map(|t| u64::from(t.done) * u64::from(t.pixels)).sum();
+        (u64::from(spp.div_ceil(2)) * self.pixels()).saturating_sub(done)
+    }
+
+    /// The next jobs; none if there is nothing to do. Sets whether they end with an estimate.
+    fn decide(&mut self) -> Vec<Job> {
+        self.estimate = true;
+        let common = self.common_count();
+        if common < FLOOR || !self.settings.adaptive {
+            return self.uniform(common);
+        }
+        let floor = self.glossy_floor();
+        if floor.is_empty() { self.by_gain() } else { floor }
+    }
+
+    /// Samples per replicate of the tiles that no cap holds back (of all if every one is capped).
+    fn common_count(&self) -> u32 {
+        let open = self.tiles.iter().filter(|t| t.done < self.cap(t));
+        open.map(|t| t.done).min().unwrap_or(FULL)
+    }
+
+    /// The same indices for every tile that is not capped.
+    fn uniform(&mut self, common: u32) -> Vec<Job> {
+        let grown = match common {
+            0 => 1,
+            n if n < FLOOR => n,
+            // An eighth more: few barriers, and the time limit is overshot by little.
+            n => ((n / 8).max(self.blocks_to_target(n)) / PACKET * PACKET).max(PACKET),
+        };
+        let limit = self.settings.stop.spp.map_or(FULL, |spp| spp.div_ceil(2)).min(FULL);
+        let count = grown.min(limit.saturating_sub(common));
+        let after = common + count;
+        let last = after == limit;
+        let aims = self.target().is_some() || self.settings.stop.seconds.is_some();
+        let due =
+            if aims { after >= FIRST_ESTIMATE } else { after / 2 >= self.estimated_at.max(2) };
+        self.estimate = due || last;
+        if self.estimate {
+            self.estimated_at = after;
+        }
+        let cut = |t: &Tile| after.min(self.cap(t)).saturating_sub(t.done);
+        self.jobs(cut)
+    }
+
+    /// In uniform mode, far from a target on the error: half of the way there, at most as many
+    /// samples as there are.
+    fn blocks_to_target(&self, done: u32) -> u32 {
+        let Some((criterion, target)) = self.target() else { return 0 };
+        let noise = self.pooled(criterion, |_| true);
+        let factor = (noise / target).powf(1.0 / self.trend.slope());
+        (0.5 * f64::from(done) * (factor - 1.0).clamp(0.0, 2.0)) as u32
+    }
+
+    /// The second half of the floor for the tiles that met a glossy lobe, as far as the sample count
+    /// allows it.
+    fn glossy_floor(&self) -> Vec<Job> {
+        let wanting = |t: &Tile| {
+            if t.glossy { GLOSSY_FLOOR.min(self.cap(t)).saturating_sub(t.done) } else { 0 }
+        };
+        let pixels: u64 =
+            self.tiles.iter().filter(|t| wanting(t) > 0).map(|t| u64::from(t.pixels)).sum();
+        let allowed = u32::try_from(self.samples_left() / pixels.max(1)).unwrap_or(FULL);
+        self.jobs(|t| wanting(t).min(allowed))
+    }
+
+    fn jobs(&self, count: impl Fn(&Tile) -> u32) -> Vec<Job> {
+        let tiles = self.tiles.iter().zip(0..);
+        tiles
+            .map(|(t, tile)| Job { tile, first: t.done, count: count(t) })
+            .filter(|job| job.count > 0)
+            .collect()
+    }
+
+    /// The slope of the error over all tiles alike (glossy or not), from their latest doublings.
+    fn pooled_slope(&self, glossy: bool) -> f64 {
+        let criterion = self.settings.criterion;
+        let alike = self.tiles.iter().filter(|t| t.glossy == glossy);
+        let doublings =
+            alike.filter_map(|t| Some((f64::from(t.pixels), t.last_doubling(criterion)?)));
+        let [mut before, mut after, mut growth] = [0.0; 3];
+        for (pixels, [(n0, e0), (n1, e1)]) in doublings {
+            before += pixels * e0;
+            after += pixels * e1;
+            growth += pixels * e0 * (n1 / n0).ln();
+        }
+        if before > 0.0 && after > 0.0 {
+            clamp_slope(0.5 * (before / after).ln() / (growth / before))
+        } else {
+            0.5
+        }
+    }
+}
