@@ -7,12 +7,15 @@
 //! ends the work.
 
 mod allocation;
+mod settings;
+mod stop;
 #[cfg(test)]
 mod tests;
 mod tile;
 mod trend;
 
-use crate::render::wave::{Job, TileError, Wave, WaveReport};
+use crate::render::wave::{Job, Wave, WaveReport};
+pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
 use trend::Trend;
 
@@ -26,82 +29,6 @@ const FIRST_ESTIMATE: u32 = 4;
 const PACKET: u32 = 8;
 /// Samples per replicate at which a tile is full: half of what a 32-bit index can count.
 const FULL: u32 = 1 << 31;
-
-/// What "noise" means when tiles compete for samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Criterion {
-    /// The error as displayed, in 8-bit codes.
-    Codes,
-    /// The error of the linear mix.
-    Linear,
-}
-
-impl Criterion {
-    fn of(self, error: TileError) -> f64 {
-        match self {
-            Self::Codes => error.codes,
-            Self::Linear => error.linear,
-        }
-    }
-}
-
-/// When to stop; whichever comes first. Nothing set: never.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Stop {
-    /// Mean samples per pixel, A and B together; rounds up to even.
-    pub spp: Option<u32>,
-    /// Estimated RMSE of the whole picture as displayed, in 8-bit codes.
-    pub noise_codes: Option<f64>,
-    /// Estimated linear RMSE of the whole picture.
-    pub rmse_linear: Option<f64>,
-    /// Seconds of rendering; tested between waves.
-    pub seconds: Option<f64>,
-}
-
-/// Why the work ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StoppedBy {
-    /// The sample count was reached.
-    Spp,
-    /// The noise as displayed was reached.
-    Noise,
-    /// The linear RMSE was reached.
-    Rmse,
-    /// The time was over.
-    Time,
-    /// Every glossy tile has its cap of rays per pixel, and the others meet the target.
-    RaysPerPixel,
-    /// Every tile holds as many samples as can be counted.
-    Full,
-}
-
-impl StoppedBy {
-    /// Stable name for statistics.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Spp => "spp",
-            Self::Noise => "noise",
-            Self::Rmse => "rmse",
-            Self::Time => "time",
-            Self::RaysPerPixel => "rays_per_pixel",
-            Self::Full => "full",
-        }
-    }
-}
-
-/// How to schedule.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Whether tiles may get different counts (else only the cap makes a difference).
-    pub adaptive: bool,
-    /// The error that the tiles' order minimises.
-    pub criterion: Criterion,
-    /// The most samples per pixel, A and B together, of tiles that met a glossy lobe (rounds down to
-    /// even, at least 2); 0: no cap.
-    pub rays_per_pixel: u32,
-    /// When to stop.
-    pub stop: Stop,
-}
 
 /// What comes next.
 #[derive(Clone, Debug, PartialEq)]
@@ -257,45 +184,8 @@ impl Schedule {
         }
     }
 
-    /// A lower and an upper guess of the seconds left until the first of the targets, `seconds` after
-    /// the work began.
-    pub fn eta_seconds(&self, seconds: f64) -> Option<(f64, f64)> {
-        let left = |(low, high): (f64, f64)| ((low - 1.0) * seconds, (high - 1.0) * seconds);
-        let by_noise = self.target().and_then(|(_, t)| self.trend.work_factor(t)).map(left);
-        let by_spp = self.settings.stop.spp.filter(|_| self.samples > 0).map(|spp| {
-            let total = 2.0 * f64::from(spp.div_ceil(2)) * self.pixels() as f64;
-            let factor = (total / self.samples as f64).max(1.0);
-            left((factor, factor))
-        });
-        let by_time =
-            self.settings.stop.seconds.map(|s| ((s - seconds).max(0.0), (s - seconds).max(0.0)));
-        [by_noise, by_spp, by_time]
-            .into_iter()
-            .flatten()
-            .reduce(|(low, high), (l, h)| (low.min(l), high.min(h)))
-    }
-
-    /// How far the work is on its way to the nearest target, 0..1: the share of the work, as far as it
-    /// can be told.
-    pub fn progress(&self, seconds: f64) -> Option<f64> {
-        let (low, high) = self.eta_seconds(seconds)?;
-        let left = 0.5 * (low + high);
-        Some(if seconds > 0.0 { seconds / (seconds + left) } else { 0.0 })
-    }
-
     fn pixels(&self) -> u64 {
         self.tiles.iter().map(|t| u64::from(t.pixels)).sum()
-    }
-
-    /// The error that the work aims at: which one, and how large. With both set, that of the
-    /// criterion.
-    fn target(&self) -> Option<(Criterion, f64)> {
-        let codes = self.settings.stop.noise_codes.map(|t| (Criterion::Codes, t));
-        let linear = self.settings.stop.rmse_linear.map(|t| (Criterion::Linear, t));
-        match self.settings.criterion {
-            Criterion::Codes => codes.or(linear),
-            Criterion::Linear => linear.or(codes),
-        }
     }
 
     /// The most samples per replicate that `tile` may get.
@@ -305,15 +195,6 @@ impl Schedule {
             _ if !tile.glossy => FULL,
             cap => (cap / 2).clamp(1, FULL),
         }
-    }
-
-    /// Whether every tile has had its floor, so that the pooled error is to be believed.
-    fn floors_reached(&self) -> bool {
-        let floor = |t: &Tile| {
-            let wanted = if self.settings.adaptive && t.glossy { GLOSSY_FLOOR } else { FLOOR };
-            t.done >= wanted.min(self.cap(t))
-        };
-        self.tiles.iter().all(floor)
     }
 
     /// Root of the mean squared error over the pixels of the tiles that `counts` selects.
@@ -336,43 +217,6 @@ impl Schedule {
             codes: self.pooled(Criterion::Codes, |_| true),
             linear: self.pooled(Criterion::Linear, |_| true),
         })
-    }
-
-    fn reason_to_stop(&self, seconds: f64) -> Option<StoppedBy> {
-        let stop = &self.settings.stop;
-        if let Some(noise) = self.noise.filter(|_| self.floors_reached()) {
-            if stop.noise_codes.is_some_and(|t| noise.codes <= t) {
-                return Some(StoppedBy::Noise);
-            }
-            if stop.rmse_linear.is_some_and(|t| noise.linear <= t) {
-                return Some(StoppedBy::Rmse);
-            }
-            if self.capped_at_target() {
-                return Some(StoppedBy::RaysPerPixel);
-            }
-        }
-        // The first samples are always traced: a picture has at least one of each replicate.
-        let begun = self.samples > 0;
-        stop.seconds.filter(|limit| begun && seconds >= *limit).map(|_| StoppedBy::Time)
-    }
-
-    /// Whether the cap on glossy tiles is all that keeps the picture from its target.
-    fn capped_at_target(&self) -> bool {
-        let Some((criterion, target)) = self.target() else { return false };
-        let free = |t: &Tile| t.done < self.cap(t);
-        self.tiles.iter().any(|t| !free(t)) && self.pooled(criterion, free) <= target
-    }
-
-    /// Why there is nothing left to give out.
-    fn reason_without_work(&self) -> StoppedBy {
-        let open = || self.tiles.iter().filter(|t| t.done < self.cap(t));
-        if self.tiles.iter().all(|t| t.done == FULL) {
-            StoppedBy::Full
-        } else if self.settings.stop.spp.is_some() && open().next().is_some() {
-            StoppedBy::Spp
-        } else {
-            StoppedBy::RaysPerPixel
-        }
     }
 
     /// Samples per replicate, over all pixels, until the mean count is reached.
@@ -404,8 +248,7 @@ impl Schedule {
         let grown = match common {
             0 => 1,
             n if n < FLOOR => n,
-            // An eighth more: few barriers, and the time limit is overshot by little.
-            n => ((n / 8).max(self.blocks_to_target(n)) / PACKET * PACKET).max(PACKET),
+            n => (self.uniform_growth(n) / PACKET * PACKET).max(PACKET),
         };
         let limit = self.settings.stop.spp.map_or(FULL, |spp| spp.div_ceil(2)).min(FULL);
         let count = grown.min(limit.saturating_sub(common));
@@ -422,13 +265,16 @@ impl Schedule {
         self.jobs(cut)
     }
 
-    /// In uniform mode, far from a target on the error: half of the way there, at most as many
-    /// samples as there are.
-    fn blocks_to_target(&self, done: u32) -> u32 {
-        let Some((criterion, target)) = self.target() else { return 0 };
+    /// By how many samples to grow a uniform picture that holds `done` of each replicate: half of the
+    /// way to the target on the error, at most as many as there are; or an eighth, when there is no
+    /// such target or a time limit that a larger wave would overshoot.
+    fn uniform_growth(&self, done: u32) -> u32 {
+        let eighth = done / 8;
+        let Some((criterion, target)) = self.target() else { return eighth };
         let noise = self.pooled(criterion, |_| true);
         let factor = (noise / target).powf(1.0 / self.trend.slope());
-        (0.5 * f64::from(done) * (factor - 1.0).clamp(0.0, 2.0)) as u32
+        let half_way = (0.5 * f64::from(done) * (factor - 1.0).clamp(0.0, 2.0)) as u32;
+        if self.settings.stop.seconds.is_some() { half_way.min(eighth) } else { half_way }
     }
 
     /// The second half of the floor for the tiles that met a glossy lobe, as far as the sample count

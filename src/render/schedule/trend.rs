@@ -33,13 +33,12 @@ impl Trend {
         }
     }
 
-    /// How many times the work done so far will have been done when the noise has fallen to
-    /// `target`: a lower and an upper guess, from the steepest and the flattest of the slopes over
+    /// How many rays will have been traced, in all, when the noise has fallen to `target`: a lower and an upper guess, from the steepest and the flattest of the slopes over
     /// the last one, two and three doublings. `None` before there is a slope.
-    pub fn work_factor(&self, target: f64) -> Option<(f64, f64)> {
+    pub fn rays_needed(&self, target: f64) -> Option<(f64, f64)> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {
-            return Some((1.0, 1.0));
+            return Some((rays, rays));
         }
         let slopes = [2, 4, 6].into_iter().filter_map(|back| {
             let (rays0, noise0) = *self.points.get(self.points.len().checked_sub(back + 1)?)?;
@@ -50,8 +49,8 @@ impl Trend {
         if flat > steep {
             return None;
         }
-        let more = |p: f64| (noise / target).powf(1.0 / p) - 1.0;
-        Some((1.0 + more(steep) * (1.0 - SPREAD), 1.0 + more(flat) * (1.0 + SPREAD)))
+        let more = |p: f64| rays * ((noise / target).powf(1.0 / p) - 1.0);
+        Some((rays + more(steep) * (1.0 - SPREAD), rays + more(flat) * (1.0 + SPREAD)))
     }
 
     /// The slope over the last three doublings (or what there is of them), 0.5 before there are two
