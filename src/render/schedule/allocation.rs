@@ -146,8 +146,13 @@ impl Schedule {
     }
 }
 
+/// The law through a tile's estimates, weighted by their counts. The earlier ones take part so that
+/// chance in the latest weighs less: a tile that is passed over because its estimate is low by chance
+/// leaves the estimate of the whole picture too low.
 fn law(tile: &Tile, criterion: Criterion, pooled: [f64; 2]) -> Law {
     let slope = tile.slope(criterion, pooled[usize::from(tile.glossy)]);
-    let n = f64::from(tile.error.map_or(1, |(n, _)| n));
-    Law { scale: tile.mse(criterion) * n.powf(2.0 * slope), slope }
+    let (sum, weights) = tile.estimates(criterion).fold((0.0, 0.0), |(sum, weights), (n, mse)| {
+        (sum + n * mse * n.powf(2.0 * slope), weights + n)
+    });
+    Law { scale: sum / f64::max(weights, 1.0), slope }
 }

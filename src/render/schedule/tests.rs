@@ -224,7 +224,6 @@ fn gain(share: f64) -> f64 {
 fn adaptive_order_pays() {
     for (share, least) in [(0.05, 8.4), (0.3, 2.6), (0.9, 1.1)] {
         let gain = gain(share);
-        println!("GAIN {share} {gain}");
         assert!(gain >= least, "{share}: {gain}");
     }
 }
@@ -251,7 +250,7 @@ fn a_target_is_reached_without_overshoot() {
 #[test]
 fn the_estimate_stays_honest_when_it_decides() {
     for effective in [16, 64, 256] {
-        let (mut ratio, runs) = (0.0, 20);
+        let (mut ratio, runs) = (0.0, 8);
         for seed in 0..runs {
             let truth = clustered(600, 0.3).into_iter().enumerate();
             let truth = truth.map(|(i, t)| Truth { sigma: t.sigma + 10.0 * (i % 7) as f64, ..t });
@@ -259,8 +258,7 @@ fn the_estimate_stays_honest_when_it_decides() {
             let (schedule, _) = model.finish(until(spp(256), true));
             ratio += model.rmse() / schedule.noise().unwrap().codes / f64::from(runs as u32);
         }
-        println!("HONEST {effective} {ratio}");
-        assert!((0.97..1.15).contains(&ratio), "{effective}: true/estimate {ratio}");
+        assert!((0.98..1.045).contains(&ratio), "{effective}: true/estimate {ratio}");
     }
 }
 

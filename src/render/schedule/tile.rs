@@ -53,6 +53,13 @@ impl Tile {
         self.error.map_or(0.0, |(_, e)| criterion.of(e))
     }
 
+    /// The estimates on record and the latest: counts and mean squared errors.
+    pub fn estimates(&self, criterion: Criterion) -> impl Iterator<Item = (f64, f64)> {
+        let latest = self.error.filter(|e| self.history.last() != Some(e));
+        let all = self.history.iter().copied().chain(latest);
+        all.map(move |(n, e)| (f64::from(n), criterion.of(e)))
+    }
+
     /// The last doubling on record: counts and errors before and after.
     pub fn last_doubling(&self, criterion: Criterion) -> Option<[(f64, f64); 2]> {
         let [.., before, after] = self.history.as_slice() else { return None };
