@@ -3,6 +3,7 @@
 //! The map of the rooms, and who may import whom, stands in ARCHITECTURE.md; a test holds it.
 
 pub mod camera;
+pub mod film;
 pub mod lanes;
 pub mod light;
 pub mod material;

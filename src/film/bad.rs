@@ -1,0 +1,71 @@
+//! Samples that are no light: NaN, infinite or negative.
+
+/// How many bad samples are remembered one by one; the rest are only counted.
+pub const BAD_REMEMBERED: usize = 16;
+
+/// Where a bad sample arose; enough to trace it again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct BadSample {
+    /// Index in the replicate's sequence.
+    pub index: u32,
+    /// 0: A, 1: B.
+    pub replicate: u8,
+    /// Row, from the top [pixels].
+    pub y: u32,
+    /// Column, from the left [pixels].
+    pub x: u32,
+}
+
+/// A count of bad samples, and the first of them in the order of [`BadSample`]'s fields: an order in
+/// which it does not matter who met them when.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BadSamples {
+    /// How many there were.
+    pub count: u64,
+    /// The first [`BAD_REMEMBERED`], ascending.
+    pub first: Vec<BadSample>,
+}
+
+impl BadSamples {
+    pub(super) fn record(&mut self, sample: BadSample) {
+        self.count += 1;
+        self.remember(sample);
+    }
+
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        other.first.iter().for_each(|sample| self.remember(*sample));
+    }
+
+    fn remember(&mut self, sample: BadSample) {
+        let place = self.first.partition_point(|known| *known <= sample);
+        if place < BAD_REMEMBERED {
+            self.first.truncate(BAD_REMEMBERED - 1);
+            self.first.insert(place, sample);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_do_not_depend_on_the_order() {
+        let all: Vec<_> = (0..40)
+            .map(|i| BadSample { index: i * 7 % 40, replicate: (i % 2) as u8, y: i, x: 3 })
+            .collect();
+        let gather = |samples: &mut dyn Iterator<Item = &BadSample>| {
+            let mut bad = BadSamples::default();
+            samples.for_each(|s| bad.record(*s));
+            bad
+        };
+        let forward = gather(&mut all.iter());
+        let mut halves = gather(&mut all[20..].iter().rev());
+        halves.merge(&gather(&mut all[..20].iter()));
+        assert_eq!(forward, halves);
+        assert_eq!(forward.count, 40);
+        let indices: Vec<_> = forward.first.iter().map(|s| s.index).collect();
+        assert_eq!(indices, (0..16).collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,24 @@
+//! The film: integer sums of samples, and what is read from them.
+//!
+//! Two independent replicates, A and B, of the same picture are kept apart: their mean is the
+//! picture, their difference measures the error that is left. Sums are integers, so that no order of
+//! adding changes a bit. Each light (group) has its own sums, taken as if it were white and of unit
+//! strength; a [`Mix`] gives it colour and strength afterwards.
+
+mod bad;
+mod bytes;
+mod display;
+mod mix;
+mod resample;
+mod storage;
+mod tile;
+
+pub use bad::{BAD_REMEMBERED, BadSample, BadSamples};
+pub use display::{Display, Tone, quantised_8, quantised_16};
+pub use mix::{Mix, Part};
+pub use resample::Thumbnail;
+pub use storage::{Film, Header, Mismatch, Slot};
+pub use tile::{TILE_PIXELS, Tile, lattice_pixels};
+
+/// Side of a tile [pixels].
+pub const TILE: usize = 16;

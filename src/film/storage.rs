@@ -1,0 +1,239 @@
+//! The film: tiles of integer sums, restarted lazily, added exactly.
+
+use super::TILE;
+use super::bad::BadSamples;
+use super::tile::Tile;
+use std::fmt;
+
+/// What two films must share to be added.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// Columns [pixels], at least 1.
+    pub width: usize,
+    /// Rows [pixels], at least 1.
+    pub height: usize,
+    /// For each light group, what a sample is multiplied with before it is rounded to an integer; a
+    /// power of two, so that the product is exact.
+    pub scales: Vec<f64>,
+    /// The seed of all samples.
+    pub seed: u64,
+    /// Name of the lane type that traced them, such as `f32x8`.
+    pub precision: String,
+}
+
+/// Sums of samples for every pixel, light group, channel and replicate, in integers: the same bits in
+/// whatever order they were added. Sample sums of a pixel divided by `scale * count` are radiance.
+#[derive(Debug)]
+pub struct Film {
+    header: Header,
+    epoch: u64,
+    tiles: Vec<Tile>,
+}
+
+/// A tile handed to a worker, which makes it ready (allocates or clears it) by [`Slot::open`].
+#[derive(Debug)]
+pub struct Slot<'a> {
+    /// Number of the tile.
+    pub index: usize,
+    /// Column and row of its upper left pixel.
+    pub origin: [usize; 2],
+    tile: &'a mut Tile,
+    epoch: u64,
+}
+
+impl<'a> Slot<'a> {
+    /// The tile, ready to be added to.
+    pub fn open(self) -> &'a mut Tile {
+        self.tile.touch(self.epoch);
+        self.tile
+    }
+}
+
+/// Why two films cannot be added.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Mismatch {
+    /// They differ in what is named; what each has.
+    Header(&'static str, String, String),
+    /// Both hold parts of the first sample of the tile with this number.
+    Overlap(usize),
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Header(what, ours, theirs) => write!(
+                f,
+                "these films cannot be added: their {what} differs, {ours} here and {theirs} there; \
+                 only films of the same scene, size, seed and precision can"
+            ),
+            Self::Overlap(tile) => write!(
+                f,
+                "these films cannot be added: both hold the first sample of tile {tile}; \
+                 only films of disjoint sample ranges can"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for Mismatch {}
+
+impl Film {
+    /// A film without samples.
+    ///
+    /// # Panics
+    /// If width, height or the number of groups is 0, or a scale is not a power of two.
+    pub fn new(header: Header) -> Self {
+        let Header { width, height, scales, .. } = &header;
+        assert!(*width > 0 && *height > 0, "a film of {width} x {height} pixels");
+        assert!(!scales.is_empty(), "a film without light groups");
+        for scale in scales {
+            let power_of_two = scale.is_normal() && *scale > 0.0 && scale.to_bits() << 12 == 0;
+            assert!(power_of_two, "a film scale of {scale}, which is not a power of two");
+        }
+        let [columns, rows] = [width.div_ceil(TILE), height.div_ceil(TILE)];
+        let inside = |size: usize, i: usize| (size - i * TILE).min(TILE);
+        let tiles = (0..columns * rows)
+            .map(|t| [inside(*width, t % columns), inside(*height, t / columns)])
+            .map(|extent| Tile::untouched(scales.len(), extent))
+            .collect();
+        Self { epoch: 1, tiles, header }
+    }
+
+    /// Columns [pixels].
+    pub fn width(&self) -> usize {
+        self.header.width
+    }
+
+    /// Rows [pixels].
+    pub fn height(&self) -> usize {
+        self.header.height
+    }
+
+    /// Number of light groups.
+    pub fn groups(&self) -> usize {
+        self.header.scales.len()
+    }
+
+    /// What a sample of each group is multiplied with before rounding; powers of two.
+    pub fn scales(&self) -> &[f64] {
+        &self.header.scales
+    }
+
+    /// Size, scales, seed and precision.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Forgets all samples. Tiles are cleared when they are next touched.
+    pub fn restart(&mut self) {
+        self.epoch += 1;
+    }
+
+    /// Number of tiles; they are numbered row by row.
+    pub fn tile_count(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// Tiles in a row of tiles.
+    pub fn tile_columns(&self) -> usize {
+        self.header.width.div_ceil(TILE)
+    }
+
+    /// Column and row of a tile's upper left pixel.
+    pub fn tile_origin(&self, index: usize) -> [usize; 2] {
+        let columns = self.tile_columns();
+        [index % columns * TILE, index / columns * TILE]
+    }
+
+    /// A tile, if it has been touched since the last restart.
+    pub fn tile(&self, index: usize) -> Option<&Tile> {
+        Some(&self.tiles[index]).filter(|tile| tile.is_of(self.epoch))
+    }
+
+    /// The touched tiles and their numbers.
+    pub fn touched(&self) -> impl Iterator<Item = (usize, &Tile)> {
+        self.tiles.iter().enumerate().filter(|(_, tile)| tile.is_of(self.epoch))
+    }
+
+    /// Tiles to be written to, in the order of `indices`, each to be opened by the thread that works
+    /// on it.
+    ///
+    /// # Panics
+    /// If an index is named twice or is not below [`Film::tile_count`].
+    pub fn slots(&mut self, indices: &[usize]) -> Vec<Slot<'_>> {
+        let mut order: Vec<usize> = (0..indices.len()).collect();
+        order.sort_unstable_by_key(|i| indices[*i]);
+        let (columns, epoch) = (self.tile_columns(), self.epoch);
+        let mut found: Vec<Option<Slot>> = indices.iter().map(|_| None).collect();
+        let mut rest = self.tiles.as_mut_slice();
+        let mut passed = 0;
+        for i in order {
+            let index = indices[i];
+            assert!(index >= passed, "tile {index} is named twice");
+            let (tile, after) = rest[index - passed..].split_first_mut().expect("tile in range");
+            let origin = [index % columns * TILE, index / columns * TILE];
+            found[i] = Some(Slot { index, origin, tile, epoch });
+            (rest, passed) = (after, index + 1);
+        }
+        found.into_iter().flatten().collect()
+    }
+
+    /// Samples of all pixels and both replicates.
+    pub fn samples(&self) -> u64 {
+        let of_tile = |tile: &Tile| {
+            let [width, height] = tile.extent();
+            let counts = tile.counts().map(u64::from);
+            let lattice = match tile.lattice_px() {
+                0 => 0,
+                step => width.div_ceil(step) * height.div_ceil(step),
+            };
+            (counts[0] + counts[1]) * (width * height) as u64 + lattice as u64
+        };
+        self.touched().map(|(_, tile)| of_tile(tile)).sum()
+    }
+
+    /// Bad samples since the last restart.
+    pub fn bad_samples(&self) -> BadSamples {
+        let mut all = BadSamples::default();
+        self.touched().for_each(|(_, tile)| all.merge(tile.bad()));
+        all
+    }
+
+    /// Number of channel sums that have reached the largest value a sum can have.
+    pub fn saturated(&self) -> u64 {
+        self.touched().map(|(_, tile)| tile.saturated()).sum()
+    }
+
+    /// Adds the samples of another film. Films of disjoint sample ranges, added in any order, equal
+    /// the film of the whole. Nothing is changed on error.
+    pub fn add(&mut self, other: &Self) -> Result<(), Mismatch> {
+        self.check_addable(other)?;
+        for (index, theirs) in other.touched() {
+            let ours = &mut self.tiles[index];
+            ours.touch(self.epoch);
+            ours.add_tile(theirs).map_err(|()| Mismatch::Overlap(index))?;
+        }
+        Ok(())
+    }
+
+    fn check_addable(&self, other: &Self) -> Result<(), Mismatch> {
+        let (ours, theirs) = (&self.header, &other.header);
+        let show = |h: &Header| -> [(&'static str, String); 4] {
+            [
+                ("size", format!("{}x{}", h.width, h.height)),
+                ("set of light group scales", format!("{:?}", h.scales)),
+                ("seed", h.seed.to_string()),
+                ("precision", h.precision.clone()),
+            ]
+        };
+        for ((what, ours), (_, theirs)) in show(ours).into_iter().zip(show(theirs)) {
+            if ours != theirs {
+                return Err(Mismatch::Header(what, ours, theirs));
+            }
+        }
+        let clash = other.touched().find(|(index, theirs)| {
+            theirs.lattice_px() != 0 && self.tile(*index).is_some_and(|t| t.lattice_px() != 0)
+        });
+        clash.map_or(Ok(()), |(index, _)| Err(Mismatch::Overlap(index)))
+    }
+}

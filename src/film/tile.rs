@@ -1,0 +1,272 @@
+//! One 16x16 square of the film: integer sums for both replicates.
+
+use super::bad::BadSamples;
+use super::{BadSample, TILE};
+
+/// Number of pixels in a tile.
+pub const TILE_PIXELS: usize = TILE * TILE;
+
+/// The sums of one 16x16 square of pixels. Pixels are numbered `y * 16 + x` inside the tile; the
+/// tiles at the right and lower edge have pixels that lie outside the picture (see
+/// [`Tile::extent`]) and stay zero.
+///
+/// Every pixel has the same number of samples, one number per replicate, except while the very first
+/// sample of replicate A is taken in interleaved order: then [`Tile::lattice_px`] tells which pixels
+/// have it already.
+#[derive(Debug)]
+pub struct Tile {
+    /// The film's epoch in which the contents were made; 0: never.
+    epoch: u64,
+    /// `groups * 3`.
+    stride: usize,
+    extent: [usize; 2],
+    counts: [u32; 2],
+    lattice_px: u8,
+    saturated: bool,
+    bad: BadSamples,
+    /// `[replicate][pixel][group][channel]`; empty until the first touch.
+    sums: Vec<i64>,
+}
+
+impl Tile {
+    pub(super) fn untouched(groups: usize, extent: [usize; 2]) -> Self {
+        Self {
+            epoch: 0,
+            stride: groups * 3,
+            extent,
+            counts: [0; 2],
+            lattice_px: 0,
+            saturated: false,
+            bad: BadSamples::default(),
+            sums: Vec::new(),
+        }
+    }
+
+    /// Makes the tile one of `epoch`: allocates or clears it if it is not one yet.
+    pub(super) fn touch(&mut self, epoch: u64) {
+        if self.epoch == epoch {
+            return;
+        }
+        if self.sums.is_empty() {
+            self.sums = vec![0; 2 * TILE_PIXELS * self.stride];
+        } else {
+            self.sums.fill(0);
+        }
+        self.epoch = epoch;
+        self.counts = [0; 2];
+        self.lattice_px = 0;
+        self.saturated = false;
+        self.bad = BadSamples::default();
+    }
+
+    pub(super) fn is_of(&self, epoch: u64) -> bool {
+        self.epoch == epoch
+    }
+
+    /// Width and height of the part that lies inside the picture [pixels], 1..=16 each.
+    pub fn extent(&self) -> [usize; 2] {
+        self.extent
+    }
+
+    /// Samples that every pixel has, of replicates A and B.
+    pub fn counts(&self) -> [u32; 2] {
+        self.counts
+    }
+
+    /// While the first sample of replicate A is taken in interleaved order: the pixels whose x and y
+    /// are both multiples of this have it, in addition to [`Tile::counts`]. 0: no such pixel.
+    pub fn lattice_px(&self) -> usize {
+        usize::from(self.lattice_px)
+    }
+
+    /// Samples that one pixel has, of replicates A and B.
+    #[inline]
+    pub fn counts_of(&self, pixel: usize) -> [u32; 2] {
+        let extra = self.lattice_px != 0 && on_lattice(pixel, usize::from(self.lattice_px));
+        [self.counts[0] + u32::from(extra), self.counts[1]]
+    }
+
+    /// Whether a pixel has any sample.
+    pub fn sampled(&self, pixel: usize) -> bool {
+        self.counts_of(pixel) != [0; 2]
+    }
+
+    /// Whether any pixel has a sample.
+    pub fn any_sampled(&self) -> bool {
+        self.counts != [0; 2] || self.lattice_px != 0
+    }
+
+    /// Records that every pixel got `samples` more of `replicate` (0: A, 1: B).
+    pub fn advance(&mut self, replicate: usize, samples: u32) {
+        self.counts[replicate] = self.counts[replicate].saturating_add(samples);
+    }
+
+    /// Records that the pixels whose x and y are multiples of `step_px` (1, 2, 4, 8 or 16) all have
+    /// their first sample of replicate A; with 1 that is every pixel, and the count grows by one.
+    ///
+    /// # Panics
+    /// If `step_px` is none of these, or coarser than what is there already.
+    pub fn set_lattice(&mut self, step_px: usize) {
+        assert!(
+            matches!(step_px, 1 | 2 | 4 | 8 | 16)
+                && (self.lattice_px == 0 || step_px <= self.lattice_px()),
+            "a lattice of {step_px} pixels after one of {}",
+            self.lattice_px
+        );
+        if step_px == 1 {
+            self.lattice_px = 0;
+            self.advance(0, 1);
+        } else {
+            self.lattice_px = step_px as u8;
+        }
+    }
+
+    /// The sums of one pixel and replicate (0: A, 1: B): `[group][channel]`, length `groups * 3`.
+    /// Adding to them directly is for sums that cannot overflow; else use [`Tile::add`].
+    #[inline(always)]
+    pub fn pixel_mut(&mut self, replicate: usize, pixel: usize) -> &mut [i64] {
+        let start = (replicate * TILE_PIXELS + pixel) * self.stride;
+        &mut self.sums[start..start + self.stride]
+    }
+
+    /// The sums of one pixel and replicate: `[group][channel]`.
+    #[inline(always)]
+    pub fn pixel(&self, replicate: usize, pixel: usize) -> &[i64] {
+        let start = (replicate * TILE_PIXELS + pixel) * self.stride;
+        &self.sums[start..start + self.stride]
+    }
+
+    /// Adds non-negative `values` (`[group][channel]`, length `groups * 3`) to a pixel. A sum that
+    /// would pass `i64::MAX` stays there and counts as saturated: being non-negative, the values give
+    /// the same sums in any order even then.
+    #[inline(always)]
+    pub fn add(&mut self, replicate: usize, pixel: usize, values: &[i64]) {
+        let mut overflowed = false;
+        for (sum, value) in self.pixel_mut(replicate, pixel).iter_mut().zip(values) {
+            overflowed |= add_saturating(sum, *value);
+        }
+        self.saturated |= overflowed;
+    }
+
+    /// Number of channel sums that have reached the largest value a sum can have.
+    pub fn saturated(&self) -> u64 {
+        if !self.saturated {
+            return 0;
+        }
+        self.sums.iter().filter(|sum| **sum == i64::MAX).count() as u64
+    }
+
+    /// Records a sample that was NaN, infinite or negative. It counts as a sample of value 0.
+    #[cold]
+    pub fn record_bad(&mut self, sample: BadSample) {
+        self.bad.record(sample);
+    }
+
+    pub(super) fn bad(&self) -> &BadSamples {
+        &self.bad
+    }
+
+    /// Adds another tile of the same place. `Err`: both hold parts of the same first sample.
+    pub(super) fn add_tile(&mut self, other: &Self) -> Result<(), ()> {
+        if self.lattice_px != 0 && other.lattice_px != 0 {
+            return Err(());
+        }
+        let mut overflowed = false;
+        for (sum, value) in self.sums.iter_mut().zip(&other.sums) {
+            overflowed |= add_saturating(sum, *value);
+        }
+        self.saturated |= overflowed | other.saturated;
+        self.lattice_px = self.lattice_px.max(other.lattice_px);
+        for replicate in 0..2 {
+            self.advance(replicate, other.counts[replicate]);
+        }
+        self.bad.merge(&other.bad);
+        Ok(())
+    }
+}
+
+/// Adds; at the limit the sum stays there, and the answer is true.
+#[inline(always)]
+fn add_saturating(sum: &mut i64, value: i64) -> bool {
+    let (wrapped, overflowed) = sum.overflowing_add(value);
+    *sum = if overflowed { i64::MAX } else { wrapped };
+    overflowed
+}
+
+#[inline(always)]
+fn on_lattice(pixel: usize, step_px: usize) -> bool {
+    // Steps are powers of two: x and y have no bit below the step.
+    ((pixel % TILE) | (pixel / TILE)) & (step_px - 1) == 0
+}
+
+/// The pixels of a tile that a lattice of `step_px` has and one of `before_px` has not (0: no lattice
+/// before), in row order. `step_px` divides 16.
+pub fn lattice_pixels(before_px: usize, step_px: usize) -> impl Iterator<Item = usize> {
+    (0..TILE_PIXELS)
+        .filter(move |p| on_lattice(*p, step_px) && (before_px == 0 || !on_lattice(*p, before_px)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tile() -> Tile {
+        let mut tile = Tile::untouched(2, [16, 16]);
+        tile.touch(1);
+        tile
+    }
+
+    #[test]
+    fn lattices_visit_every_pixel_once() {
+        let mut seen = [0; TILE_PIXELS];
+        for (before, step) in [(0, 16), (16, 8), (8, 4), (4, 2), (2, 1)] {
+            lattice_pixels(before, step).for_each(|p| seen[p] += 1);
+        }
+        assert_eq!(seen, [1; TILE_PIXELS]);
+        assert_eq!(lattice_pixels(0, 8).collect::<Vec<_>>(), [0, 8, 128, 136]);
+        assert_eq!(lattice_pixels(8, 1).count(), 252);
+    }
+
+    #[test]
+    fn a_lattice_tells_which_pixels_have_the_first_sample() {
+        let mut tile = tile();
+        assert!(!tile.any_sampled());
+        tile.set_lattice(8);
+        assert!(tile.any_sampled() && tile.sampled(136) && !tile.sampled(137));
+        assert_eq!((tile.counts(), tile.counts_of(8)), ([0, 0], [1, 0]));
+        tile.set_lattice(1);
+        assert_eq!((tile.counts(), tile.lattice_px()), ([1, 0], 0));
+        assert_eq!(tile.counts_of(137), [1, 0]);
+    }
+
+    #[test]
+    #[should_panic(expected = "a lattice of 8 pixels after one of 4")]
+    fn a_lattice_only_becomes_finer() {
+        let mut tile = tile();
+        tile.set_lattice(4);
+        tile.set_lattice(8);
+    }
+
+    #[test]
+    fn saturation_stays_and_is_counted() {
+        let mut tile = tile();
+        tile.add(1, 3, &[i64::MAX - 1, 1, 2, 3, 4, 5]);
+        assert_eq!(tile.saturated(), 0);
+        tile.add(1, 3, &[2, 1, 2, 3, 4, 5]);
+        tile.add(1, 3, &[2, 0, 0, 0, 0, 0]);
+        assert_eq!(tile.saturated(), 1);
+        assert_eq!(tile.pixel(1, 3), [i64::MAX, 2, 4, 6, 8, 10]);
+        assert_eq!(tile.pixel(0, 3), [0; 6]);
+    }
+
+    #[test]
+    fn a_new_epoch_clears() {
+        let mut tile = tile();
+        tile.add(0, 0, &[1; 6]);
+        tile.advance(0, 1);
+        tile.touch(1);
+        assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (1, [1, 0]));
+        tile.touch(2);
+        assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (0, [0, 0]));
+    }
+}
