@@ -61,7 +61,7 @@ pub struct RenderArgs {
     pub threads: Option<u16>,
     /// Number that the random choices follow from; the same seed gives the same picture
     #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u32,
+    pub seed: u64,
     /// Precision of the geometry; auto: double where the scene's proportions need it
     #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]
     pub precision: PrecisionArg,

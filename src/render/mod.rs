@@ -1,4 +1,5 @@
 //! From a scene to a growing film: what to trace next, and the threads that do it.
 
 pub mod schedule;
+pub mod session;
 pub mod wave;

@@ -14,6 +14,7 @@ mod tests;
 mod tile;
 mod trend;
 
+use crate::lanes::{Lanes, Single};
 use crate::render::wave::{Job, Wave, WaveReport};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
@@ -25,8 +26,9 @@ const FLOOR: u32 = 16;
 const GLOSSY_FLOOR: u32 = 32;
 /// Estimates begin here: below, they say little and cost as much as the samples.
 const FIRST_ESTIMATE: u32 = 4;
-/// Samples are given in multiples of a packet.
-const PACKET: u32 = 8;
+/// From the first packet on, samples are given in multiples of the widest packet that renders; only a
+/// tile's last block may be shorter.
+const PACKET: u32 = if Single::WIDTH > 8 { Single::WIDTH as u32 } else { 8 };
 /// Samples per replicate at which a tile is full: half of what a 32-bit index can count.
 const FULL: u32 = 1 << 31;
 
@@ -161,6 +163,11 @@ impl Schedule {
         self.noise
     }
 
+    /// The latest estimate of each tile's RMSE in codes, row by row; 0 before the first.
+    pub fn tile_noise_codes(&self) -> Vec<f32> {
+        self.tiles.iter().map(|t| t.mse(Criterion::Codes).sqrt() as f32).collect()
+    }
+
     /// Samples traced so far, over all pixels.
     pub fn samples(&self) -> u64 {
         self.samples
@@ -286,6 +293,7 @@ impl Schedule {
         let pixels: u64 =
             self.tiles.iter().filter(|t| wanting(t) > 0).map(|t| u64::from(t.pixels)).sum();
         let allowed = u32::try_from(self.samples_left() / pixels.max(1)).unwrap_or(FULL);
+        let allowed = allowed / PACKET * PACKET;
         self.jobs(|t| wanting(t).min(allowed))
     }
 

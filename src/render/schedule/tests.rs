@@ -105,6 +105,8 @@ impl Model {
         let count = &mut self.counts[wave.replicate][tile];
         assert_eq!(*count, job.first, "tile {tile}: every index once, in order");
         assert!(job.count > 0);
+        let packets = job.first % PACKET == 0;
+        assert!(packets || (job.first < PACKET && job.first.is_power_of_two()), "{job:?}");
         *count += job.count;
         let truth = self.truth[tile];
         let step = truth.sigma * f64::from(job.count).sqrt();
