@@ -7,17 +7,24 @@
 
 mod bad;
 mod bytes;
+mod curve;
 mod display;
+mod exr;
 mod mix;
+mod noise;
+mod png;
 mod resample;
 mod storage;
+mod target;
 mod tile;
 
 pub use bad::{BAD_REMEMBERED, BadSample, BadSamples};
 pub use display::{Display, Tone, quantised_8, quantised_16};
 pub use mix::{Mix, Part};
+pub use noise::{Estimator, Noise, TileNoise};
 pub use resample::Thumbnail;
 pub use storage::{Film, Header, Mismatch, Slot};
+pub use target::{Depth, Picture, Target, WriteError};
 pub use tile::{TILE_PIXELS, Tile, lattice_pixels};
 
 /// Side of a tile [pixels].

@@ -1,0 +1,174 @@
+//! OpenEXR: linear radiance in 32-bit floats, with the replicates, the light groups and the sample
+//! count beside the picture.
+//!
+//! Channels of one part, layers by name prefix: `R G B` the picture; `A.R ..` and `B.R ..` the two
+//! replicates, whose half difference is the picture's error; `light_NAME.R ..` what each light group
+//! contributes, summing up to the picture; `count` the samples of a pixel.
+
+use super::mix::{Part, Sums};
+use super::target::{Picture, Sink};
+use exr::block::UncompressedBlock;
+use exr::block::writer::ChunksWriter;
+use exr::compression::Compression;
+use exr::error::Error;
+use exr::math::Vec2;
+use exr::meta::attribute::{
+    AttributeValue, ChannelDescription, Chromaticities, LineOrder, SampleType, Text,
+};
+use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
+use exr::meta::{BlockDescription, Headers};
+use std::io;
+
+pub(super) fn encode(picture: &Picture, sink: &mut dyn Sink) -> io::Result<()> {
+    encode_to(picture, sink).map_err(|error| match error {
+        Error::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    })
+}
+
+/// What a channel holds.
+#[derive(Clone, Copy)]
+enum Source {
+    /// Radiance of colour channel `.1` in the samples `.0`, all groups together.
+    Mixed(Part, usize),
+    /// What group `.0` contributes to colour channel `.1`.
+    Group(usize, usize),
+    /// Samples of both replicates.
+    Count,
+}
+
+fn encode_to(picture: &Picture, sink: &mut dyn Sink) -> Result<(), Error> {
+    let film = picture.film;
+    let channels = channels(&layer_names(picture.group_names, film.groups()));
+    let size = Vec2(film.width(), film.height());
+    let mut image = ImageAttributes::with_size(size);
+    image.chromaticities = Some(Chromaticities {
+        red: Vec2(0.64, 0.33),
+        green: Vec2(0.3, 0.6),
+        blue: Vec2(0.15, 0.06),
+        white: Vec2(0.3127, 0.329),
+    });
+    let mut layer = LayerAttributes::default();
+    for (key, value) in picture.metadata {
+        layer.other.insert(text(key), AttributeValue::Text(text(value)));
+    }
+    let descriptions = channels
+        .iter()
+        .map(|(name, source)| {
+            let kind = if let Source::Count = source { SampleType::U32 } else { SampleType::F32 };
+            ChannelDescription::named(text(name), kind)
+        })
+        .collect();
+    let header = Header::new(text("picture"), size, descriptions)
+        .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
+        .with_shared_attributes(image)
+        .with_attributes(layer);
+    let headers = Headers::from_elem(header, 1);
+    exr::block::write(sink, headers, true, |meta, writer| {
+        let mut rows = Rows::new(picture, channels.iter().map(|(_, source)| *source).collect());
+        let mut compressor = writer.sequential_blocks_compressor(&meta);
+        for (index, block) in exr::block::enumerate_ordered_header_block_indices(&meta.headers) {
+            let channels = &meta.headers[0].channels;
+            let block = UncompressedBlock::from_lines(channels, block, |line| {
+                let at = line.location;
+                let row = rows.load(at.position.y());
+                line.value.copy_from_slice(&row[at.channel]);
+            });
+            compressor.compress_block(index, block)?;
+        }
+        Ok(())
+    })
+}
+
+fn text(text: &str) -> Text {
+    Text::new_or_none(text).unwrap_or_else(|| Text::from_bytes_unchecked(text.bytes().collect()))
+}
+
+/// All channels in the order that the format demands, by name.
+fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
+    let mut channels = vec![("count".to_string(), Source::Count)];
+    for (c, color) in ["R", "G", "B"].into_iter().enumerate() {
+        channels.push((color.to_string(), Source::Mixed(Part::Both, c)));
+        channels.push((format!("A.{color}"), Source::Mixed(Part::A, c)));
+        channels.push((format!("B.{color}"), Source::Mixed(Part::B, c)));
+        for (group, layer) in group_layers.iter().enumerate() {
+            channels.push((format!("{layer}.{color}"), Source::Group(group, c)));
+        }
+    }
+    channels.sort_by(|(a, _), (b, _)| a.as_bytes().cmp(b.as_bytes()));
+    channels
+}
+
+/// A layer name for each group: ASCII letters, digits, `_` and `-`, no two alike.
+fn layer_names(names: &[String], groups: usize) -> Vec<String> {
+    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+    let mut layers: Vec<String> = Vec::new();
+    for group in 0..groups {
+        let name: String = match names.get(group).filter(|name| !name.is_empty()) {
+            Some(name) => name.chars().map(plain).take(100).collect(),
+            None => group.to_string(),
+        };
+        let candidates = std::iter::once(format!("light_{name}"))
+            .chain((2..).map(|n| format!("light_{name}_{n}")));
+        let free = candidates.into_iter().find(|candidate| !layers.contains(candidate));
+        layers.extend(free);
+    }
+    layers
+}
+
+/// One row of the film at a time, as the bytes of each channel.
+struct Rows<'a> {
+    picture: &'a Picture<'a>,
+    sources: Vec<Source>,
+    mixed: Vec<f64>,
+    loaded: Option<usize>,
+    bytes: Vec<Vec<u8>>,
+}
+
+impl<'a> Rows<'a> {
+    fn new(picture: &'a Picture<'a>, sources: Vec<Source>) -> Self {
+        Self {
+            picture,
+            mixed: picture.mix.per_unit(picture.film.scales()),
+            loaded: None,
+            bytes: sources.iter().map(|_| Vec::new()).collect(),
+            sources,
+        }
+    }
+
+    fn load(&mut self, y: usize) -> &[Vec<u8>] {
+        if self.loaded == Some(y) {
+            return &self.bytes;
+        }
+        self.loaded = Some(y);
+        let Self { picture, sources, mixed, bytes, .. } = self;
+        for bytes in bytes.iter_mut() {
+            bytes.clear();
+            bytes.resize(picture.film.width() * 4, 0);
+        }
+        picture.film.visit_row(y, |x, sums| {
+            let parts = [Part::Both, Part::A, Part::B].map(|part| sums.mean(part, mixed));
+            for (source, bytes) in sources.iter().zip(bytes.iter_mut()) {
+                let value = match *source {
+                    Source::Mixed(Part::Both, c) => (parts[0][c] as f32).to_ne_bytes(),
+                    Source::Mixed(Part::A, c) => (parts[1][c] as f32).to_ne_bytes(),
+                    Source::Mixed(Part::B, c) => (parts[2][c] as f32).to_ne_bytes(),
+                    Source::Group(group, c) => {
+                        group_mean(&sums, mixed, 3 * group + c).to_ne_bytes()
+                    }
+                    Source::Count => sums.count(Part::Both).to_ne_bytes(),
+                };
+                bytes[x * 4..][..4].copy_from_slice(&value);
+            }
+        });
+        &self.bytes
+    }
+}
+
+/// What one group contributes to one colour channel; `i` counts `[group][channel]`.
+fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
+    match sums.count(Part::Both) {
+        0 => 0.0,
+        count => (sums.value(Part::Both, i) * per_unit[i] / f64::from(count)) as f32,
+    }
+}

@@ -1,0 +1,155 @@
+//! How much error is left: estimated from the difference of the two replicates.
+//!
+//! A and B are independent and equally distributed when their counts are equal. So their half
+//! difference d = (A - B) / 2 has the variance of the picture M = (A + B) / 2, and in linear light the
+//! mean of d^2 is the picture's mean square error, unbiased for any sampler. As displayed, the error
+//! is code(M) - code(truth); its estimate is code(M) - code(M + d) and code(M) - code(M - d), that
+//! is, the distance from the picture's codes to those of A and B, squared, averaged. M + d and M - d
+//! are A and B. This displaces the picture by as much as it is wrong itself, so a curved or clipped
+//! tone curve acts on both alike; the half difference of codes(A) and codes(B), or the slope at M
+//! times d, understate the error of dark pixels with few samples by a fifth to a half (a test
+//! compares them).
+//!
+//! One pixel has a single degree of freedom and no meaningful estimate; a tile's is good to some 5 %
+//! if its pixels are alike, and a whole picture's to well under that.
+
+use super::TILE;
+use super::curve::Curve;
+use super::display::{Display, Tone, toned};
+use super::mix::Mix;
+use super::storage::Film;
+use super::tile::Tile;
+
+/// Estimated mean square error of one tile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TileNoise {
+    /// In linear radiance, over pixels and channels.
+    pub linear_mse: f64,
+    /// As displayed, in codes of 0..=255, over pixels and channels.
+    pub codes_mse: f64,
+    /// Pixels of the tile inside the picture.
+    pub pixels: u32,
+}
+
+/// Estimates the error of tiles under one mix of lights and one display transform.
+pub struct Estimator {
+    /// `[group][channel]`.
+    per_unit: Vec<f64>,
+    exposure: f64,
+    tone: Tone,
+    curve: &'static Curve,
+}
+
+impl Estimator {
+    /// For tiles of films with these `scales` (see [`Film::scales`]).
+    pub fn new(scales: &[f64], mix: &Mix, display: &Display) -> Self {
+        Self {
+            per_unit: mix.per_unit(scales),
+            exposure: display.exposure_factor(),
+            tone: display.tone,
+            curve: Curve::shared(),
+        }
+    }
+
+    /// The error of a tile; `None` while A and B have different numbers of samples, or none.
+    pub fn tile(&self, tile: &Tile) -> Option<TileNoise> {
+        let [count, count_b] = tile.counts();
+        if count == 0 || count != count_b || tile.lattice_px() != 0 {
+            return None;
+        }
+        let per_count = 1.0 / f64::from(count);
+        let per_sum: Vec<f64> = self.per_unit.iter().map(|factor| factor * per_count).collect();
+        let [width, height] = tile.extent();
+        let (mut linear, mut codes) = (0.0, 0.0);
+        for y in 0..height {
+            for pixel in y * TILE..y * TILE + width {
+                let a = weighted(tile.pixel(0, pixel), &per_sum);
+                let b = weighted(tile.pixel(1, pixel), &per_sum);
+                if a == b {
+                    continue;
+                }
+                let half = [0, 1, 2].map(|c| 0.5 * (a[c] - b[c]));
+                linear += half[0] * half[0] + half[1] * half[1] + half[2] * half[2];
+                let mean = self.codes([0, 1, 2].map(|c| b[c] + half[c]));
+                let (a, b) = (self.codes(a), self.codes(b));
+                for c in 0..3 {
+                    let (to_a, to_b) = (a[c] - mean[c], b[c] - mean[c]);
+                    codes += 0.5 * (to_a * to_a + to_b * to_b);
+                }
+            }
+        }
+        let values = (3 * width * height) as f64;
+        Some(TileNoise {
+            linear_mse: linear / values,
+            codes_mse: codes / values,
+            pixels: (width * height) as u32,
+        })
+    }
+
+    #[inline(always)]
+    fn codes(&self, radiance: [f64; 3]) -> [f64; 3] {
+        toned(self.tone, radiance.map(|c| c * self.exposure)).map(|c| self.curve.code(c))
+    }
+}
+
+#[inline(always)]
+fn weighted(sums: &[i64], per_sum: &[f64]) -> [f64; 3] {
+    let mut rgb = [0.0; 3];
+    for (sum, factor) in sums.chunks_exact(3).zip(per_sum.chunks_exact(3)) {
+        for c in 0..3 {
+            rgb[c] += sum[c] as f64 * factor[c];
+        }
+    }
+    rgb
+}
+
+/// Estimated error of a whole picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Root mean square error in linear radiance.
+    pub rmse_linear: f64,
+    /// Root mean square error as displayed, in codes of 0..=255.
+    pub rmse_codes: f64,
+    /// 95 of 100 tiles have at most this, in codes.
+    pub p95_codes: f64,
+    /// The largest of a tile, in codes.
+    pub worst_codes: f64,
+}
+
+impl Noise {
+    /// From the estimates of all tiles; `None` if there are none or one is missing.
+    pub fn of_tiles(tiles: impl IntoIterator<Item = Option<TileNoise>>) -> Option<Self> {
+        let (mut linear, mut codes, mut pixels) = (0.0, 0.0, 0.0);
+        let mut of_tiles = Vec::new();
+        for tile in tiles {
+            let tile = tile?;
+            let weight = f64::from(tile.pixels);
+            linear += tile.linear_mse * weight;
+            codes += tile.codes_mse * weight;
+            pixels += weight;
+            of_tiles.push(tile.codes_mse);
+        }
+        // The smallest value that at least 95 % of the tiles do not exceed.
+        let rank = (of_tiles.len() * 19).div_ceil(20).checked_sub(1)?;
+        let (_, p95, _) = of_tiles.select_nth_unstable_by(rank, f64::total_cmp);
+        let p95_codes = p95.sqrt();
+        let worst = of_tiles.iter().copied().fold(0.0, f64::max);
+        Some(Self {
+            rmse_linear: (linear / pixels).sqrt(),
+            rmse_codes: (codes / pixels).sqrt(),
+            p95_codes,
+            worst_codes: worst.sqrt(),
+        })
+    }
+}
+
+impl Film {
+    /// Estimated error of the picture; `None` while a tile has unequal numbers of samples in A and B.
+    pub fn noise(&self, mix: &Mix, display: &Display) -> Option<Noise> {
+        let estimator = Estimator::new(self.scales(), mix, display);
+        Noise::of_tiles(
+            (0..self.tile_count())
+                .map(|index| self.tile(index).and_then(|tile| estimator.tile(tile))),
+        )
+    }
+}

@@ -1,0 +1,74 @@
+//! PNG: what the display shows, in 8 or 16 bits per channel, sRGB, with text metadata.
+
+use super::display::{quantised_8, quantised_16};
+use super::mix::Part;
+use super::target::{Depth, Picture, Sink};
+use png::{
+    BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SourceChromaticities,
+    SrgbRenderingIntent,
+};
+use std::io;
+
+pub(super) fn encode(picture: &Picture, sink: &mut dyn Sink) -> io::Result<()> {
+    encode_to(picture, sink).map_err(|error| match error {
+        EncodingError::IoError(error) => error,
+        other => io::Error::other(other),
+    })
+}
+
+fn encode_to(picture: &Picture, sink: &mut dyn Sink) -> Result<(), EncodingError> {
+    let film = picture.film;
+    let too_large = |_| io::Error::new(io::ErrorKind::InvalidInput, "too large for a PNG file");
+    let width = u32::try_from(film.width()).map_err(too_large)?;
+    let height = u32::try_from(film.height()).map_err(too_large)?;
+    let mut encoder = Encoder::new(sink, width, height);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(match picture.depth {
+        Depth::Eight => BitDepth::Eight,
+        Depth::Sixteen => BitDepth::Sixteen,
+    });
+    encoder.set_compression(Compression::Fast);
+    // The values that the PNG specification gives for sRGB, for readers that do not know its chunk.
+    encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
+    encoder.set_source_gamma(ScaledFloat::from_scaled(45_455));
+    let xy = |x, y| (ScaledFloat::from_scaled(x), ScaledFloat::from_scaled(y));
+    encoder.set_source_chromaticities(SourceChromaticities {
+        white: xy(31_270, 32_900),
+        red: xy(64_000, 33_000),
+        green: xy(30_000, 60_000),
+        blue: xy(15_000, 6_000),
+    });
+    for (key, value) in picture.metadata {
+        // The older chunk is more widely read, but holds Latin-1 only.
+        if value.is_ascii() {
+            encoder.add_text_chunk(key.clone(), value.clone())?;
+        } else {
+            encoder.add_itxt_chunk(key.clone(), value.clone())?;
+        }
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&pixels(picture))?;
+    writer.finish()
+}
+
+/// The picture's bytes: rows of red, green, blue; 16-bit values big end first, as PNG has them.
+fn pixels(picture: &Picture) -> Vec<u8> {
+    let (film, mut row) = (picture.film, Vec::new());
+    let bytes_per_channel = match picture.depth {
+        Depth::Eight => 1,
+        Depth::Sixteen => 2,
+    };
+    let mut bytes = Vec::with_capacity(film.width() * film.height() * 3 * bytes_per_channel);
+    for y in 0..film.height() {
+        film.row(y, Part::Both, picture.mix, &mut row);
+        for radiance in &row {
+            for code in picture.display.codes(*radiance) {
+                match picture.depth {
+                    Depth::Eight => bytes.push(quantised_8(code)),
+                    Depth::Sixteen => bytes.extend(quantised_16(code).to_be_bytes()),
+                }
+            }
+        }
+    }
+    bytes
+}
