@@ -1,5 +1,7 @@
 //! What the schedule decides and the pass carries out, as plain data.
 
+use crate::film::TileNoise;
+
 /// Samples to trace in every pixel of one tile: indices `first..first + count` of one replicate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Job {
@@ -32,16 +34,7 @@ pub struct JobReport {
     /// Whether a path met a glossy lobe.
     pub glossy: bool,
     /// The error of the tile's pixels now, if the wave asked for it.
-    pub error: Option<TileError>,
-}
-
-/// Estimated mean squared error over a tile's pixels and channels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TileError {
-    /// As displayed, in squared 8-bit codes (0..255).
-    pub codes: f64,
-    /// Of the linear mix, squared.
-    pub linear: f64,
+    pub error: Option<TileNoise>,
 }
 
 /// What became of a wave.

@@ -14,6 +14,7 @@ mod tests;
 mod tile;
 mod trend;
 
+use crate::film::Noise;
 use crate::lanes::{Lanes, Single};
 use crate::render::wave::{Job, Wave, WaveReport};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
@@ -39,17 +40,6 @@ pub enum Step {
     Trace(Wave),
     /// Nothing: the work is done.
     Rest(StoppedBy),
-}
-
-/// Estimated error of the whole picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Noise {
-    /// RMSE as displayed, in 8-bit codes.
-    pub codes: f64,
-    /// Linear RMSE.
-    pub linear: f64,
-    /// 95th percentile of the tiles' RMSE in codes.
-    pub p95_codes: f64,
 }
 
 /// Samples per pixel over the picture, A and B together.
@@ -147,11 +137,11 @@ impl Schedule {
             }
         }
         if self.left.is_empty() && wave.estimate {
-            self.noise = self.pooled_noise();
+            self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error.map(|(_, e)| e)));
             if let Some(noise) = self.noise {
                 let rmse = match self.settings.criterion {
-                    Criterion::Codes => noise.codes,
-                    Criterion::Linear => noise.linear,
+                    Criterion::Codes => noise.rmse_codes,
+                    Criterion::Linear => noise.rmse_linear,
                 };
                 self.trend.note(self.rays as f64, rmse);
             }
@@ -211,19 +201,6 @@ impl Schedule {
                 (s + t.mse(criterion) * f64::from(t.pixels), n + u64::from(t.pixels))
             });
         (sum / pixels.max(1) as f64).sqrt()
-    }
-
-    fn pooled_noise(&self) -> Option<Noise> {
-        let mut tiles: Vec<f64> =
-            self.tiles.iter().map(|t| t.error.map(|(_, e)| e.codes)).collect::<Option<_>>()?;
-        // The smallest value that at least 95 per cent of the tiles do not exceed.
-        let rank = (tiles.len() * 95).div_ceil(100).checked_sub(1)?;
-        let (_, p95, _) = tiles.select_nth_unstable_by(rank, f64::total_cmp);
-        Some(Noise {
-            p95_codes: p95.sqrt(),
-            codes: self.pooled(Criterion::Codes, |_| true),
-            linear: self.pooled(Criterion::Linear, |_| true),
-        })
     }
 
     /// Samples per replicate, over all pixels, until the mean count is reached.

@@ -48,10 +48,10 @@ impl Schedule {
     pub(super) fn reason_to_stop(&self, seconds: f64) -> Option<StoppedBy> {
         let stop = &self.settings.stop;
         if let Some(noise) = self.noise.filter(|_| self.floors_reached()) {
-            if stop.noise_codes.is_some_and(|t| noise.codes <= t) {
+            if stop.noise_codes.is_some_and(|t| noise.rmse_codes <= t) {
                 return Some(StoppedBy::Noise);
             }
-            if stop.rmse_linear.is_some_and(|t| noise.linear <= t) {
+            if stop.rmse_linear.is_some_and(|t| noise.rmse_linear <= t) {
                 return Some(StoppedBy::Rmse);
             }
             if self.capped_at_target() {

@@ -1,7 +1,8 @@
 //! The schedule against pictures that are nothing but numbers.
 
 use super::*;
-use crate::render::wave::{JobReport, TileError};
+use crate::film::TileNoise;
+use crate::render::wave::JobReport;
 
 /// Pixels of a whole tile.
 const PIXELS: u32 = 256;
@@ -105,7 +106,7 @@ impl Model {
         let count = &mut self.counts[wave.replicate][tile];
         assert_eq!(*count, job.first, "tile {tile}: every index once, in order");
         assert!(job.count > 0);
-        let packets = job.first % PACKET == 0;
+        let packets = job.first.is_multiple_of(PACKET);
         assert!(packets || (job.first < PACKET && job.first.is_power_of_two()), "{job:?}");
         *count += job.count;
         let truth = self.truth[tile];
@@ -115,8 +116,8 @@ impl Model {
         }
         let error = wave.estimate.then(|| {
             assert_eq!(self.counts[0][tile], self.counts[1][tile], "estimate with unequal counts");
-            let codes = self.estimate(tile);
-            TileError { codes, linear: codes * 1e-6 }
+            let mse = self.estimate(tile);
+            TileNoise { codes_mse: mse, linear_mse: mse * 1e-6, pixels: PIXELS }
         });
         let rays = u64::from(job.count) * u64::from(self.pixels[tile]) * truth.rays_per_sample;
         JobReport { rays, glossy: truth.glossy, error }
@@ -237,7 +238,7 @@ fn a_target_is_reached_without_overshoot() {
             let mut model = Model::random(clustered(600, 0.3), 30, 64, seed);
             let (schedule, reason) = model.finish(until(noise(target), adaptive));
             assert_eq!(reason, StoppedBy::Noise);
-            let reached = schedule.noise().unwrap().codes;
+            let reached = schedule.noise().unwrap().rmse_codes;
             assert!(reached <= target, "{reached} > {target}");
             // A uniform picture cannot stop between packets of 8.
             let packet = if adaptive { 0.0 } else { f64::from(2 * PACKET) / schedule.spp().mean };
@@ -258,7 +259,7 @@ fn the_estimate_stays_honest_when_it_decides() {
             let truth = truth.map(|(i, t)| Truth { sigma: t.sigma + 10.0 * (i % 7) as f64, ..t });
             let mut model = Model::random(truth.collect(), 30, effective, seed);
             let (schedule, _) = model.finish(until(spp(256), true));
-            ratio += model.rmse() / schedule.noise().unwrap().codes / f64::from(runs as u32);
+            ratio += model.rmse() / schedule.noise().unwrap().rmse_codes / f64::from(runs as u32);
         }
         assert!((0.98..1.045).contains(&ratio), "{effective}: true/estimate {ratio}");
     }
@@ -314,7 +315,10 @@ fn caps_hold_for_glossy_tiles_only() {
         assert_eq!(reason, StoppedBy::RaysPerPixel, "adaptive {adaptive}");
         assert!(schedule.tiles.iter().all(|t| !t.glossy || t.done == 20));
         assert!(schedule.tiles.iter().any(|t| !t.glossy && t.done > 200));
-        assert!(schedule.noise().unwrap().codes > 1.0, "the noise is that of the whole picture");
+        assert!(
+            schedule.noise().unwrap().rmse_codes > 1.0,
+            "the noise is that of the whole picture"
+        );
 
         // All are glossy: nothing is left to do.
         let mut model = Model::exact(vec![NOISY; 25], 5);

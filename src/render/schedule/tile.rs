@@ -1,7 +1,8 @@
 //! What the schedule remembers of one tile.
 
 use super::Criterion;
-use crate::render::wave::{JobReport, TileError};
+use crate::film::TileNoise;
+use crate::render::wave::JobReport;
 
 /// The most doublings of the sample count over which a slope is fitted.
 const DOUBLINGS: u32 = 3;
@@ -18,9 +19,9 @@ pub(super) struct Tile {
     /// Whether a path met a glossy lobe.
     pub glossy: bool,
     /// Latest estimate of the mean squared error, and for how many samples per replicate it holds.
-    pub error: Option<(u32, TileError)>,
+    pub error: Option<(u32, TileNoise)>,
     /// Estimates at counts that at least doubled from one to the next, oldest first.
-    history: Vec<(u32, TileError)>,
+    history: Vec<(u32, TileNoise)>,
 }
 
 impl Tile {

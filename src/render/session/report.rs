@@ -1,7 +1,7 @@
 //! What a session tells its guests.
 
-use crate::film::Thumbnail;
-use crate::render::schedule::{Noise, Spp, StoppedBy};
+use crate::film::{Noise, Thumbnail};
+use crate::render::schedule::{Spp, StoppedBy};
 use std::sync::Mutex;
 
 /// What the session is doing.

@@ -2,9 +2,9 @@
 //! nothing.
 
 use super::*;
-use crate::film::{Header, TILE};
-use crate::render::schedule::{Criterion, Noise, Spp, Stop, StoppedBy};
-use crate::render::wave::{JobReport, TileError};
+use crate::film::{Header, Noise, TILE, TileNoise};
+use crate::render::schedule::{Criterion, Spp, Stop, StoppedBy};
+use crate::render::wave::JobReport;
 use std::sync::atomic::AtomicUsize;
 use std::time::{Duration, Instant};
 
@@ -38,7 +38,8 @@ impl Double {
         let tile = slot.open();
         assert_eq!(tile.counts()[wave.replicate], job.first, "each index once, in order");
         tile.advance(wave.replicate, job.count);
-        let error = TileError { codes: 1.0 / f64::from(job.first + 1), linear: 0.0 };
+        let error =
+            TileNoise { codes_mse: 1.0 / f64::from(job.first + 1), linear_mse: 0.0, pixels: 256 };
         JobReport { rays: 1, glossy: false, error: wave.estimate.then_some(error) }
     }
 }
@@ -252,7 +253,7 @@ fn reports_tell_noise_and_time_left() {
     let (mut session, _) = session(stop, 100, 5);
     session.set_scene(scene(64));
     let running = wait_for(&session, |s| s.report.noise.is_some()).report;
-    let Noise { codes, .. } = running.noise.unwrap();
+    let Noise { rmse_codes: codes, .. } = running.noise.unwrap();
     assert!(codes > 0.0 && codes < 1.0);
     let (low, high) = running.eta_seconds.expect("a time");
     assert!(low > 0.0 && high >= low);
