@@ -1,5 +1,24 @@
 //! Shapes: what users describe, one kind a file, and what rays meet, one batch per form.
 
+mod cube;
+mod cuboid;
 mod form;
+mod kinds;
+mod plane;
+mod platform;
+mod prism;
+mod pyramid;
+mod rectangle;
+mod sphere;
+mod upright;
 
+pub use cube::Cube;
+pub use cuboid::Cuboid;
 pub use form::{Form, HalfSpace};
+pub use kinds::{EXAMPLES, KINDS, Kind, Shape};
+pub use plane::Plane;
+pub use platform::Platform;
+pub use prism::Prism;
+pub use pyramid::Pyramid;
+pub use rectangle::Rectangle;
+pub use sphere::Sphere;
