@@ -1,16 +1,19 @@
 //! The command line.
 
+use crate::film::Tone;
+use crate::sampling::SamplerKind;
+use crate::world::Precision;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-
-/// The widest and highest picture [pixels].
-const MAX_SIDE: u32 = 65_535;
 
 /// A progressive, accumulating ray tracer that lives in a terminal.
 #[derive(Debug, Parser)]
 #[command(version, about, args_conflicts_with_subcommands = true)]
-#[command(after_help = "Exit status: 0 done, 1 failed, 2 wrong usage, 130 or 143 stopped by a signal \
-                        after writing the picture so far.")]
+#[command(
+    after_help = "Exit status: 0 done, 1 failed, 2 wrong usage, 130 or 143 stopped by a signal \
+                        after writing the picture so far."
+)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -32,9 +35,11 @@ pub enum Command {
 }
 
 /// Arguments of `zerkalo render`.
-#[derive(Debug, Args)]
-#[command(after_help = "Rendering stops at whichever of --spp, --noise, --rmse and --time is reached \
-                        first; with none of them, at --noise 0.5.")]
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Rendering stops at whichever of --spp, --noise, --rmse and --time is reached \
+                        first; with none of them, at --noise 0.5."
+)]
 pub struct RenderArgs {
     /// The scene file
     pub scene: PathBuf,
@@ -48,13 +53,13 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
     /// Stop at this noise: estimated RMSE of the picture as displayed, in 8-bit codes [default: 0.5]
-    #[arg(long, value_name = "CODES", value_parser = positive)]
+    #[arg(long, value_name = "CODES", value_parser = positive, allow_negative_numbers = true)]
     pub noise: Option<f64>,
     /// Stop at this estimated RMSE of the linear picture
-    #[arg(long, value_name = "LINEAR", value_parser = positive)]
+    #[arg(long, value_name = "LINEAR", value_parser = positive, allow_negative_numbers = true)]
     pub rmse: Option<f64>,
     /// Stop after this many seconds of rendering
-    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub time: Option<f64>,
     /// Threads that trace [default: one per processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096))]
@@ -78,8 +83,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, allow_negative_numbers = true)]
     pub exposure: f64,
     /// What becomes of light brighter than white: clip it, or compress it keeping the hue
-    #[arg(long, value_enum, default_value_t = ToneArg::Clip)]
-    pub tone: ToneArg,
+    #[arg(long, value_parser = tone(), default_value = "clip")]
+    pub tone: Tone,
     /// Write statistics of the run as JSON
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
@@ -119,20 +124,40 @@ pub enum SamplerArg {
     Random,
 }
 
-/// Values of `--tone`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ToneArg {
-    /// Each channel stops at white
-    Clip,
-    /// Highlights are compressed and keep their hue
-    Neutral,
+impl PrecisionArg {
+    /// What the world calls it.
+    pub fn precision(self) -> Precision {
+        match self {
+            Self::Single => Precision::Single,
+            Self::Double => Precision::Double,
+            Self::Auto => Precision::Auto,
+        }
+    }
 }
 
+impl SamplerArg {
+    /// What the sampler calls it.
+    pub fn kind(self) -> SamplerKind {
+        match self {
+            Self::Sobol => SamplerKind::Sobol,
+            Self::Random => SamplerKind::Random,
+        }
+    }
+}
+
+/// Parses the name of a tone curve.
+fn tone() -> impl TypedValueParser<Value = Tone> {
+    let names = PossibleValuesParser::new(Tone::NAMED.map(|(name, _)| name));
+    names.map(|given| {
+        let named = Tone::NAMED.into_iter().find(|(name, _)| *name == given);
+        named.map(|(_, tone)| tone).unwrap_or_default()
+    })
+}
+
+/// `640x480`; what a size may be is the scene's to say.
 fn size(text: &str) -> Result<[u32; 2], String> {
-    let expected = || format!("expected WIDTHxHEIGHT, such as 640x480, each 1 to {MAX_SIDE}");
-    let (width, height) = text.split_once('x').ok_or_else(expected)?;
-    let side = |digits: &str| digits.parse().ok().filter(|n| (1..=MAX_SIDE).contains(n));
-    Ok([side(width).ok_or_else(expected)?, side(height).ok_or_else(expected)?])
+    let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_string())
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -175,7 +200,7 @@ mod tests {
     #[test]
     fn sizes() {
         assert_eq!(render(&["--size", "640x480"]).unwrap().size, Some([640, 480]));
-        for wrong in ["640", "640x", "0x480", "640x-1", "65536x1", "640X480", "1x1x1", ""] {
+        for wrong in ["640", "640x", "x480", "640x-1", "640X480", "1x1x1", "5000000000x1", ""] {
             assert!(render(&["--size", wrong]).is_err(), "{wrong}");
         }
     }

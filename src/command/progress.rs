@@ -44,10 +44,12 @@ impl Progress {
                 bar.set_message(status(report));
             }
             Self::Lines(due) if report.seconds >= *due => {
-                let percent = report.progress.map_or(String::new(), |p| format!("{:.0} %  ", 100.0 * p));
+                let percent =
+                    report.progress.map_or(String::new(), |p| format!("{:.0} %  ", 100.0 * p));
                 // Progress that cannot be told (stderr is closed) is no reason to stop rendering.
                 let _ = writeln!(std::io::stderr(), "{percent}{}", status(report));
-                *due = report.seconds + report.seconds.clamp(FIRST_LINE_SECONDS, LONGEST_INTERVAL_SECONDS);
+                *due = report.seconds
+                    + report.seconds.clamp(FIRST_LINE_SECONDS, LONGEST_INTERVAL_SECONDS);
             }
             Self::Lines(_) => {}
         }

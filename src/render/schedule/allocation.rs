@@ -9,7 +9,8 @@ use std::collections::BinaryHeap;
 /// A decision gives out about this share of the rays spent so far: small enough to correct itself,
 /// large enough for few barriers.
 const SHARE: f64 = 0.1;
-/// And at least so many blocks, so that all threads have work between two barriers.
+/// And at least so many blocks, or one for each tile of a picture that has fewer, so that all threads
+/// have work between two barriers.
 const MIN_BLOCKS: usize = 64;
 /// Once the best tiles have doubled their count (further an estimate does not reach), the others go
 /// on only as long as their gain is at least this share of what those would still give.
@@ -92,9 +93,10 @@ impl Schedule {
             .map_or(-1.0, |(_, target)| target * target * self.pixels() as f64);
         let mut heap: BinaryHeap<Bid> =
             count.iter().enumerate().filter_map(|(i, n)| bid(i, *n)).collect();
+        let min_blocks = MIN_BLOCKS.min(heap.len());
         let (mut spent, mut blocks, mut set_aside) = (0.0, 0, 0.0f64);
         while let Some(Bid { gain, tile }) = heap.pop() {
-            let done = (spent >= budget || gain < WORTHWHILE * set_aside) && blocks >= MIN_BLOCKS;
+            let done = (spent >= budget || gain < WORTHWHILE * set_aside) && blocks >= min_blocks;
             if done || (error <= enough && blocks > 0) {
                 break;
             }

@@ -14,13 +14,14 @@ use crate::film::Film;
 use crate::render::schedule::{Schedule, Settings};
 use crate::render::wave::{Wave, WaveReport};
 use crate::scene::Scene;
-use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 use report::Slot;
 pub use report::{Report, Snapshot, State};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use std::time::Duration;
 use worker::Worker;
 
 /// A scene that is being traced: what a session drives.
@@ -143,6 +144,18 @@ impl<T: Traced> Session<T> {
     /// Rings (receives a message) whenever there is a new snapshot to take.
     pub fn bell(&self) -> &Receiver<()> {
         &self.bell
+    }
+
+    /// Waits for the bell, at most for `limit`, and takes the snapshot.
+    ///
+    /// # Panics
+    /// If the rendering thread has panicked.
+    pub fn wait(&self, limit: Duration) -> Option<Snapshot> {
+        match self.bell.recv_timeout(limit) {
+            Ok(()) => self.take(),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => panic!("the rendering thread has ended"),
+        }
     }
 
     /// The latest snapshot, if it has not been taken yet.

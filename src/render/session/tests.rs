@@ -129,8 +129,8 @@ fn scene(width: u32) -> Arc<Scene> {
 fn wait_for(session: &Session<Double>, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {
     let end = Instant::now() + PATIENCE;
     loop {
-        session.bell().recv_deadline(end).expect("a snapshot in time");
-        if let Some(snapshot) = session.take().filter(&wanted) {
+        let left = end.checked_duration_since(Instant::now()).expect("a snapshot in time");
+        if let Some(snapshot) = session.wait(left).filter(&wanted) {
             return snapshot;
         }
     }
@@ -140,8 +140,7 @@ fn wait_for(session: &Session<Double>, wanted: impl Fn(&Snapshot) -> bool) -> Sn
 fn the_newest_scene_wins_and_the_others_are_not_compiled() {
     let (mut session, log) = session(endless(), 0, 20);
     let last = (0..50).map(|_| session.set_scene(scene(64))).last().unwrap();
-    let shown = wait_for(&session, |s| s.report.generation == last && s.report.samples > 0);
-    assert_eq!(shown.report.state, State::Tracing);
+    wait_for(&session, |s| s.report.generation == last && s.report.samples > 0);
     let compiled = log.compiled.load(Ordering::SeqCst);
     assert!(compiled <= 5, "{compiled} of 50 scenes compiled");
 }
@@ -275,4 +274,13 @@ fn dropping_a_session_ends_it_at_once() {
     drop(session);
     let jobs = log.jobs.load(Ordering::SeqCst) - before;
     assert!(jobs < 1000, "{jobs} jobs after the end");
+}
+
+#[test]
+#[should_panic(expected = "the rendering thread has ended")]
+fn a_panic_of_the_worker_reaches_the_guest() {
+    let (mut session, _) = session(endless(), 0, 0);
+    session.set_scene(scene(64));
+    session.with(|_, _| panic!("a task gone wrong"));
+    wait_for(&session, |_| false);
 }

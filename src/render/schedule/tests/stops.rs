@@ -81,6 +81,20 @@ fn time_ends_the_work_with_both_replicates_alike() {
 }
 
 #[test]
+fn time_is_overshot_by_little() {
+    for (tiles, columns) in [(1, 1), (12, 4), (400, 20)] {
+        for adaptive in [false, true] {
+            let stop = Stop { seconds: Some(0.5), ..Stop::default() };
+            let mut model = Model::exact(vec![NOISY; tiles], columns);
+            let (schedule, _) = model.finish(until(stop, adaptive));
+            // At a nanosecond per ray.
+            let seconds = schedule.rays() as f64 * 1e-9;
+            assert!(seconds < 0.66, "{tiles} tiles, adaptive {adaptive}: {seconds} s");
+        }
+    }
+}
+
+#[test]
 fn whichever_comes_first() {
     let stop = Stop { spp: Some(64), noise_codes: Some(1e-3), ..Stop::default() };
     assert_eq!(model_of(NOISY).finish(until(stop, true)).1, StoppedBy::Spp);
