@@ -142,7 +142,10 @@ impl Camera {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<Fault> {
         let (key, degrees) = self.view_angle.key_degrees();
-        let angle = Checks::new(VIEW_ANGLES).numbers(key, &[degrees]).faults();
+        let mut angle = Checks::new(VIEW_ANGLES).numbers(key, &[degrees]).faults();
+        for fault in &mut angle {
+            fault.found = format!("view_angle.{}", fault.found);
+        }
         let given = match (&self.target, &self.direction) {
             (None, None) => Some(Fault::new(
                 "",

@@ -2,7 +2,7 @@
 //! nowhere or to two places.
 
 use super::Scene;
-use super::suggest::did_you_mean;
+use super::suggest::nearest;
 use crate::value::{Fault, excerpt};
 use std::collections::HashMap;
 use std::fmt;
@@ -110,9 +110,8 @@ impl Scene {
                 names => format!("Defined: {}.", names.join(", ")),
             };
             let known = self.materials.keys().map(String::as_str);
-            if let Some(question) = did_you_mean(&object.material, known) {
-                help += " ";
-                help += &question;
+            if let Some(meant) = nearest(&object.material, known) {
+                help += &format!(" Did you mean \"{}\"?", excerpt(meant));
             }
             let found = format!("material \"{}\" is not defined", excerpt(&object.material));
             findings.push(self.finding(&["object", &i.to_string(), "material"], found, help));

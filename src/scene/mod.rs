@@ -1,11 +1,15 @@
 //! The scene: what the user wrote, checked, in double precision, editable.
 
+mod align;
 mod check;
 mod document;
+mod fresh;
+mod keep;
 mod locate;
 mod message;
 mod object;
 mod read;
+mod rewrite;
 mod schema;
 mod settings;
 mod suggest;

@@ -6,7 +6,7 @@ use super::check::subject;
 use super::locate::place;
 use super::message::Message;
 use super::settings::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, TRACE_FIELDS};
-use super::suggest::did_you_mean;
+use super::suggest::nearest;
 use crate::value::{Color, Field, Preset, Range, Takes, excerpt};
 use crate::{camera, light, material};
 use std::ops;
@@ -73,24 +73,36 @@ impl Walk<'_> {
             Some("object" | "light" | "materials") => 2,
             _ => 1,
         };
-        self.path.get(above..).unwrap_or_default().join(".")
+        match self.path.get(above..).unwrap_or_default() {
+            [transform, step, rest @ ..] if transform == "transform" => {
+                let step = step.parse().map_or(0, |i: usize| i + 1);
+                let rest: String = rest.iter().map(|key| format!(".{key}")).collect();
+                format!("step {step} of transform{rest}")
+            }
+            keys => keys.join("."),
+        }
     }
 
     /// `radius`, or `shape.sphere` for what has no key of its own.
     fn wrong(&mut self, span: ops::Range<usize>, value: &DeValue, expected: &str) {
         let name = match self.inner() {
-            inner if inner.is_empty() => "this".to_string(),
+            inner if inner.is_empty() => "it".to_string(),
             inner => inner,
         };
         self.add(span, format!("{name} is {}", describe(value)), format!("Expected {expected}."));
     }
 
-    fn unknown(&mut self, key: &Spanned<toml::de::DeString>, fields: &[Field]) {
+    /// Returns the key that was probably meant.
+    fn unknown(
+        &mut self,
+        key: &Spanned<toml::de::DeString>,
+        fields: &[Field],
+    ) -> Option<&'static str> {
         let names = || fields.iter().map(|f| f.name);
         let mut help = format!("Known: {}.", names().collect::<Vec<_>>().join(", "));
-        if let Some(question) = did_you_mean(key.get_ref(), names()) {
-            help += " ";
-            help += &question;
+        let meant = nearest(key.get_ref(), names());
+        if let Some(meant) = meant {
+            help += &format!(" Did you mean {meant:?}?");
         }
         let place = match self.inner() {
             inner if inner.is_empty() => String::new(),
@@ -98,17 +110,19 @@ impl Walk<'_> {
         };
         let found = format!("unknown key \"{}\"{place}", excerpt(key.get_ref()));
         self.add(key.span(), found, help);
+        meant
     }
 
     fn table(&mut self, table: &DeTable, span: ops::Range<usize>, fields: &'static [Field]) {
+        let mut meant = Vec::new();
         for (key, value) in table {
             match fields.iter().find(|f| f.name == key.get_ref().as_ref()) {
                 Some(field) => self.field(field, value),
-                None => self.unknown(key, fields),
+                None => meant.extend(self.unknown(key, fields)),
             }
         }
         for field in fields.iter().filter(|f| f.preset == Preset::Required) {
-            if !table.contains_key(field.name) {
+            if !table.contains_key(field.name) && !meant.contains(&field.name) {
                 let place = match self.inner() {
                     inner if inner.is_empty() => String::new(),
                     inner => format!(" in {inner}"),
@@ -127,7 +141,9 @@ impl Walk<'_> {
         for (key, value) in table {
             match fields.iter().find(|f| f.name == key.get_ref().as_ref()) {
                 Some(field) => known.push((key, value, field)),
-                None => self.unknown(key, fields),
+                None => {
+                    self.unknown(key, fields);
+                }
             }
         }
         known.sort_by_key(|(key, ..)| key.span().start);
@@ -193,9 +209,8 @@ impl Walk<'_> {
             (takes, value) if fits(takes, value) => {}
             (Takes::Choice(choices), DeValue::String(word)) => {
                 let mut help = format!("Expected {}.", field.takes);
-                if let Some(question) = did_you_mean(word, choices.iter().map(|c| c.name)) {
-                    help += " ";
-                    help += &question;
+                if let Some(meant) = nearest(word, choices.iter().map(|c| c.name)) {
+                    help += &format!(" Did you mean {meant:?}?");
                 }
                 self.add(span, format!("{} is {}", self.inner(), describe(value)), help);
             }

@@ -1,10 +1,10 @@
 //! "Did you mean": the nearest of the words that would have been right.
 
-/// `Did you mean "ivory"?` if one of `words` is near enough to `given` to be what was meant.
-pub(super) fn did_you_mean<'a>(
+/// The one of `words` that is near enough to `given` to be what was meant.
+pub(super) fn nearest<'a>(
     given: &str,
     words: impl IntoIterator<Item = &'a str>,
-) -> Option<String> {
+) -> Option<&'a str> {
     // Longer than any key by far: nobody mistyped that.
     if given.len() > 100 {
         return None;
@@ -12,7 +12,7 @@ pub(super) fn did_you_mean<'a>(
     let (distance, word) =
         words.into_iter().map(|w| (distance(given, w), w)).min_by_key(|(d, _)| *d)?;
     let length = word.chars().count().max(given.chars().count());
-    (distance <= 1 + length / 4 && distance < length).then(|| format!("Did you mean {word:?}?"))
+    (distance <= 1 + length / 4 && distance < length).then_some(word)
 }
 
 /// Damerau-Levenshtein distance (optimal string alignment), letters' case ignored: insertions,
@@ -39,7 +39,7 @@ fn distance(a: &str, b: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::{did_you_mean, distance};
+    use super::{distance, nearest};
 
     #[test]
     fn distances() {
@@ -59,10 +59,10 @@ mod tests {
     #[test]
     fn only_near_words_are_offered() {
         let words = ["ebony", "ivory", "board"];
-        assert_eq!(did_you_mean("ivroy", words).as_deref(), Some("Did you mean \"ivory\"?"));
-        assert_eq!(did_you_mean("xylophone", words), None);
-        assert_eq!(did_you_mean("", words), None);
-        assert_eq!(did_you_mean(&"i".repeat(1 << 20), words), None);
-        assert_eq!(did_you_mean("x", [] as [&str; 0]), None);
+        assert_eq!(nearest("ivroy", words), Some("ivory"));
+        assert_eq!(nearest("xylophone", words), None);
+        assert_eq!(nearest("", words), None);
+        assert_eq!(nearest(&"i".repeat(1 << 20), words), None);
+        assert_eq!(nearest("x", [] as [&str; 0]), None);
     }
 }
