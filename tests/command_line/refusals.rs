@@ -50,6 +50,28 @@ fn failures_have_status_1_a_located_message_and_leave_the_old_picture() {
     assert_eq!(desk.files(), ["bad.toml", "file", "old.png", "scene.toml"]);
 }
 
+#[test]
+fn every_bad_scene_has_status_1_and_names_its_file() {
+    let desk = Desk::new();
+    fs::write(desk.path("old.png"), "precious").unwrap();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad-scenes");
+    let mut refused = 0;
+    for entry in fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "toml") {
+            continue;
+        }
+        let scene = path.to_str().unwrap();
+        let run = desk.run(&["render", scene, "-o", "old.png", "--spp", "2"]);
+        assert_eq!(run.status, 1, "{scene}: {}", run.err);
+        assert!(run.err.contains(path.file_name().unwrap().to_str().unwrap()), "{}", run.err);
+        assert!(!run.err.contains("panicked") && run.out.is_empty(), "{scene}: {}", run.err);
+        refused += 1;
+    }
+    assert!(refused >= 40, "only {refused} bad scenes");
+    assert_eq!(fs::read_to_string(desk.path("old.png")).unwrap(), "precious");
+}
+
 /// What happens on a processor that lacks what the program was built for, under an emulator.
 #[cfg(target_arch = "x86_64")]
 #[test]
