@@ -52,10 +52,9 @@ fn finished(session: &Session<Rendering>, generation: u64) -> Report {
     let end = Instant::now() + Duration::from_secs(60);
     while Instant::now() < end {
         let Some(snapshot) = session.wait(Duration::from_millis(100)) else { continue };
-        if snapshot.report.generation == generation {
-            if let State::Resting(_) = snapshot.report.state {
-                return snapshot.report;
-            }
+        let resting = matches!(snapshot.report.state, State::Resting(_));
+        if resting && snapshot.report.generation == generation {
+            return snapshot.report;
         }
     }
     panic!("not finished in time")
