@@ -5,9 +5,9 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
 
-/// Nothing is shown before [s]: a render that is done by then needs no bar.
+/// Nothing is shown before so many seconds: a render that is done by then needs no bar.
 const QUIET_SECONDS: f64 = 0.25;
-/// The first line in a log comes after [s]; each interval is twice the one before, up to the longest.
+/// The first line in a log comes after so many seconds; each interval is twice the one before, up to the longest.
 const FIRST_LINE_SECONDS: f64 = 1.0;
 const LONGEST_INTERVAL_SECONDS: f64 = 60.0;
 
@@ -18,7 +18,7 @@ const STEPS: u64 = 1000;
 pub enum Progress {
     /// In a terminal; made when there is something to show.
     Bar(Option<ProgressBar>),
-    /// In a log: when the next line is due [s].
+    /// In a log: the seconds of rendering after which the next line is due.
     Lines(f64),
 }
 

@@ -15,7 +15,7 @@ pub struct Stats {
     pub output: String,
     /// Version of the program.
     pub version: &'static str,
-    /// Width and height [pixels].
+    /// Width and height in pixels.
     pub size: [u32; 2],
     pub seed: u64,
     pub sampler: &'static str,
@@ -63,7 +63,7 @@ impl Stats {
     }
 }
 
-/// The most memory that the process has had resident [bytes], where Linux tells it.
+/// The most memory that the process has had resident, in bytes, where Linux tells it.
 pub fn peak_rss_bytes() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;

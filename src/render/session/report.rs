@@ -32,15 +32,15 @@ pub struct Report {
     pub samples: u64,
     /// Rays of every kind.
     pub rays: u64,
-    /// Time spent on tracing this scene [s], without compilation and pauses.
+    /// Seconds spent on tracing this scene, without compilation and pauses.
     pub seconds: f64,
-    /// Time that the compilation of the scene took [s].
+    /// Seconds that the compilation of the scene took.
     pub compile_seconds: f64,
-    /// Time from taking up the scene to its first complete picture [s].
+    /// Seconds from taking up the scene to its first complete picture.
     pub first_picture_seconds: Option<f64>,
     /// Estimated error.
     pub noise: Option<Noise>,
-    /// A lower and an upper guess of the time left [s].
+    /// A lower and an upper guess of the seconds left.
     pub eta_seconds: Option<(f64, f64)>,
     /// Share of the work that is done, 0..=1.
     pub progress: Option<f64>,
@@ -67,7 +67,7 @@ impl Report {
         }
     }
 
-    /// Mean speed of tracing [1/s].
+    /// Mean speed of tracing, samples per second.
     pub fn samples_per_second(&self) -> f64 {
         if self.seconds > 0.0 { self.samples as f64 / self.seconds } else { 0.0 }
     }
