@@ -3,11 +3,14 @@
 //! The map of the rooms, and who may import whom, stands in ARCHITECTURE.md; a test holds it.
 
 pub mod camera;
+pub mod command;
 pub mod film;
 pub mod lanes;
 pub mod light;
 pub mod material;
+pub mod render;
 pub mod sampling;
 pub mod scene;
 pub mod shape;
 pub mod value;
+pub mod world;

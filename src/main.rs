@@ -1,2 +1,9 @@
 //! The command `zerkalo`.
-fn main() {}
+
+use std::process::ExitCode;
+use zerkalo::command;
+
+fn main() -> ExitCode {
+    command::require_cpu();
+    command::main()
+}

@@ -1,22 +1,30 @@
 //! The camera: a pinhole.
 
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// Where the picture is taken from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(deny_unknown_fields)]
 pub struct Camera {
     /// The eye.
+    #[serde(default = "eye")]
     pub eye: [f64; 3],
     /// The point looked at; exactly one of `target` and `direction`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<[f64; 3]>,
     /// The direction looked in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<[f64; 3]>,
     /// What is up in the picture.
+    #[serde(default = "up")]
     pub up: [f64; 3],
     /// Opening angle; exactly one of its keys.
+    #[serde(default = "view_angle")]
     pub view_angle: ViewAngle,
     /// Nothing nearer than this, measured along the view direction, is seen.
+    #[serde(default)]
     pub near: f64,
 }
 
@@ -30,15 +38,205 @@ pub enum ViewAngle {
     Horizontal(f64),
 }
 
+fn eye() -> [f64; 3] {
+    [0.0, 1.0, 5.0]
+}
+
+fn up() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}
+
+fn view_angle() -> ViewAngle {
+    ViewAngle::Vertical(40.0)
+}
+
+/// The camera of a scene that says nothing about it: it looks at the origin. (A file that has a
+/// `[camera]` has to say where it looks.)
 impl Default for Camera {
     fn default() -> Self {
         Self {
-            eye: [0.0, 1.0, 5.0],
-            target: None,
+            eye: eye(),
+            target: Some([0.0; 3]),
             direction: None,
-            up: [0.0, 1.0, 0.0],
-            view_angle: ViewAngle::Vertical(40.0),
+            up: up(),
+            view_angle: view_angle(),
             near: 0.0,
         }
+    }
+}
+
+/// The keys of `[camera]`.
+pub const FIELDS: &[Field] = &[
+    Field::preset(
+        "eye",
+        Takes::Numbers(3, Range::COORDINATE),
+        "scene units",
+        "[0.0, 1.0, 5.0]",
+        "Where the picture is taken from.",
+    ),
+    Field::without(
+        "target",
+        Takes::Numbers(3, Range::COORDINATE),
+        "scene units",
+        "`direction` is needed",
+        "The point looked at. Exactly one of `target` and `direction` is given.",
+    ),
+    Field::without(
+        "direction",
+        Takes::Direction,
+        "",
+        "`target` is needed",
+        "The direction looked in.",
+    ),
+    Field::preset(
+        "up",
+        Takes::Direction,
+        "",
+        "[0.0, 1.0, 0.0]",
+        "What is up in the picture; not parallel to the view direction.",
+    ),
+    Field::preset(
+        "view_angle",
+        Takes::OneOf(VIEW_ANGLES),
+        "",
+        "{ vertical = 40.0 }",
+        "Opening angle, across the height or across the width of the picture.",
+    ),
+    Field::preset(
+        "near",
+        Takes::Number(Range::closed(0.0, 1e9)),
+        "scene units",
+        "0.0",
+        "Nothing nearer than this, measured along the view direction, is seen.",
+    ),
+];
+
+const ANGLE: Takes = Takes::Number(Range::between(0.0, 180.0));
+const VIEW_ANGLES: &[Field] = &[
+    Field::required("vertical", ANGLE, "degrees", "Across the picture's height."),
+    Field::required("horizontal", ANGLE, "degrees", "Across the picture's width."),
+];
+
+impl ViewAngle {
+    /// Its key and its angle [degrees].
+    pub fn key_degrees(&self) -> (&'static str, f64) {
+        match *self {
+            Self::Vertical(degrees) => ("vertical", degrees),
+            Self::Horizontal(degrees) => ("horizontal", degrees),
+        }
+    }
+}
+
+impl Camera {
+    /// Unit vector of the view direction; `None` if `target` is the eye itself, `direction` is zero,
+    /// or not exactly one of them is given.
+    pub fn view(&self) -> Option<DVec3> {
+        let look = match (self.target, self.direction) {
+            (Some(target), None) => DVec3::from_array(target) - DVec3::from_array(self.eye),
+            (None, Some(direction)) => DVec3::from_array(direction),
+            _ => return None,
+        };
+        unit(look)
+    }
+
+    /// What is wrong with it.
+    pub fn faults(&self) -> Vec<Fault> {
+        let (key, degrees) = self.view_angle.key_degrees();
+        let mut angle = Checks::new(VIEW_ANGLES).numbers(key, &[degrees]).faults();
+        for fault in &mut angle {
+            fault.found = format!("view_angle.{}", fault.found);
+        }
+        let given = match (&self.target, &self.direction) {
+            (None, None) => Some(Fault::new(
+                "",
+                "neither target nor direction is given",
+                "exactly one of them, such as target = [0.0, 0.0, 0.0]",
+            )),
+            (Some(_), Some(_)) => Some(Fault::new(
+                "direction",
+                "both target and direction are given",
+                "exactly one of them",
+            )),
+            _ => None,
+        };
+        let checks = Checks::new(FIELDS)
+            .numbers("eye", &self.eye)
+            .maybe("target", self.target.as_ref().map(|t| &t[..]))
+            .maybe("direction", self.direction.as_ref().map(|d| &d[..]))
+            .numbers("up", &self.up)
+            .inner("view_angle", angle)
+            .numbers("near", &[self.near])
+            .and(given);
+        let lost = if checks.clean() { self.lost() } else { None };
+        checks.and(lost).faults()
+    }
+
+    /// What makes a picture impossible although every number is in its range.
+    fn lost(&self) -> Option<Fault> {
+        let Some(view) = self.view() else {
+            return Some(Fault::new(
+                "target",
+                "target is the eye itself, which leaves no direction to look in",
+                "a target away from the eye",
+            ));
+        };
+        let up = unit(DVec3::from_array(self.up))?;
+        // Within 1e-6 of parallel the picture's sides are noise.
+        (view.cross(up).length() <= 1e-6).then(|| {
+            Fault::new(
+                "up",
+                "up is parallel to the view direction, so that the picture could lie any way round",
+                "an `up` across the view direction, such as [0.0, 0.0, -1.0] when looking down",
+            )
+        })
+    }
+}
+
+/// `v` with length 1, whatever its length; `None` if that is 0.
+fn unit(v: DVec3) -> Option<DVec3> {
+    (v / v.abs().max_element()).try_normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Camera, ViewAngle};
+
+    fn keys(camera: &Camera) -> Vec<String> {
+        camera.faults().into_iter().map(|f| f.key).collect()
+    }
+
+    #[test]
+    fn every_number_is_checked() {
+        let camera = Camera {
+            eye: [f64::INFINITY, 0.0, 0.0],
+            target: Some([f64::NAN; 3]),
+            direction: Some([0.0; 3]),
+            up: [0.0; 3],
+            view_angle: ViewAngle::Vertical(180.0),
+            near: -1.0,
+        };
+        assert_eq!(
+            keys(&camera),
+            ["eye", "target", "direction", "up", "view_angle.vertical", "near", "direction"]
+        );
+        for degrees in [0.0, 180.0, -1.0, f64::NAN] {
+            let view_angle = ViewAngle::Horizontal(degrees);
+            let camera = Camera { view_angle, ..Camera::default() };
+            assert_eq!(keys(&camera), ["view_angle.horizontal"], "{degrees}");
+        }
+    }
+
+    #[test]
+    fn a_view_needs_a_direction_and_an_up_across_it() {
+        let camera = Camera::default();
+        assert!(keys(&camera).is_empty());
+        assert_eq!(keys(&Camera { target: None, ..camera.clone() }), [""]);
+        assert_eq!(keys(&Camera { target: Some(camera.eye), ..camera.clone() }), ["target"]);
+        for sign in [1.0, -1e-200] {
+            let direction = Some([0.0, sign, 0.0]);
+            assert_eq!(keys(&Camera { target: None, direction, ..camera.clone() }), ["up"]);
+        }
+        let direction = Some([0.0, -1.0, 1e-3]);
+        assert!(keys(&Camera { target: None, direction, ..camera }).is_empty());
     }
 }

@@ -1,6 +1,6 @@
 //! Lights.
 
-use crate::value::Color;
+use crate::value::{Checks, Choice, Color, Fault, Field, Range, Takes};
 use serde::{Deserialize, Serialize};
 
 /// One light: exactly one of `point` and `directional`, a colour, an intensity.
@@ -8,10 +8,13 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct Light {
     /// Name, for messages and the outline.
+    #[serde(skip_serializing_if = "String::is_empty")]
     pub name: String,
     /// Emits from a point.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub point: Option<Point>,
     /// Arrives along one direction everywhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub directional: Option<Directional>,
     /// Colour; multiplies the intensity.
     pub color: Color,
@@ -60,5 +63,143 @@ impl Default for Light {
             falloff: Falloff::None,
             on: true,
         }
+    }
+}
+
+/// The keys of `[[light]]`.
+pub const FIELDS: &[Field] = &[
+    Field::without("name", Takes::Text, "", "a number", "Name; no two lights have the same."),
+    Field::without(
+        "point",
+        Takes::Table(POINT),
+        "",
+        "`directional` is needed",
+        "Light from one point. Exactly one of `point` and `directional` is given.",
+    ),
+    Field::without(
+        "directional",
+        Takes::Table(DIRECTIONAL),
+        "",
+        "`point` is needed",
+        "Light from infinitely far away.",
+    ),
+    Field::preset(
+        "color",
+        Takes::Color(Range::LIGHT),
+        "",
+        "[1.0, 1.0, 1.0]",
+        "Colour; multiplies the intensity.",
+    ),
+    Field::preset(
+        "intensity",
+        Takes::Number(Range::LIGHT),
+        "W/sr, or irradiance / π",
+        "1.0",
+        "With falloff `inverse-square` the radiant intensity [W/sr]. With `none`, and for a \
+         directional light, the brightness of a white matt surface that faces the light.",
+    ),
+    Field::preset(
+        "falloff",
+        Takes::Choice(FALLOFFS),
+        "",
+        "\"none\"",
+        "How a point light weakens with distance.",
+    ),
+    Field::preset("on", Takes::Switch, "", "true", "Whether it shines."),
+];
+
+const POINT: &[Field] = &[Field::required(
+    "position",
+    Takes::Numbers(3, Range::COORDINATE),
+    "scene units",
+    "Where it stands.",
+)];
+
+const DIRECTIONAL: &[Field] =
+    &[Field::required("direction", Takes::Direction, "", "Direction in which the light travels.")];
+
+const FALLOFFS: &[Choice] = &[
+    Choice { name: "none", doc: "not at all" },
+    Choice { name: "inverse-square", doc: "with the square of the distance" },
+];
+
+impl Light {
+    /// What is wrong with it.
+    pub fn faults(&self) -> Vec<Fault> {
+        let point = self
+            .point
+            .map(|p| Checks::new(POINT).numbers("position", &p.position).faults())
+            .unwrap_or_default();
+        let directional = self
+            .directional
+            .map(|d| Checks::new(DIRECTIONAL).numbers("direction", &d.direction).faults())
+            .unwrap_or_default();
+        let kinds = match (&self.point, &self.directional) {
+            (Some(_), None) => None,
+            (None, None) => Some(Fault::new(
+                "",
+                "neither point nor directional is given",
+                "exactly one of them, such as point = { position = [2.0, 4.0, 3.0] }",
+            )),
+            (Some(_), Some(_)) => Some(Fault::new(
+                "directional",
+                "both point and directional are given",
+                "exactly one of them; a second light needs its own [[light]]",
+            )),
+            (None, Some(_)) => (self.falloff == Falloff::InverseSquare).then(|| {
+                Fault::new(
+                    "falloff",
+                    "a directional light cannot weaken with distance, but falloff is \"inverse-square\"",
+                    "falloff \"none\", or a point light",
+                )
+            }),
+        };
+        Checks::new(FIELDS)
+            .inner("point", point)
+            .inner("directional", directional)
+            .numbers("color", &self.color.0)
+            .numbers("intensity", &[self.intensity])
+            .and(kinds)
+            .faults()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Directional, Falloff, Light, Point};
+    use crate::value::Color;
+
+    fn keys(light: &Light) -> Vec<String> {
+        light.faults().into_iter().map(|f| f.key).collect()
+    }
+
+    #[test]
+    fn exactly_one_kind() {
+        let mut light = Light::default();
+        assert_eq!(keys(&light), [""]);
+        light.point = Some(Point { position: [0.0; 3] });
+        assert!(keys(&light).is_empty());
+        light.falloff = Falloff::InverseSquare;
+        assert!(keys(&light).is_empty());
+        light.directional = Some(Directional { direction: [0.0, -1.0, 0.0] });
+        assert_eq!(keys(&light), ["directional"]);
+        light.point = None;
+        assert_eq!(keys(&light), ["falloff"]);
+        light.falloff = Falloff::None;
+        assert!(keys(&light).is_empty());
+    }
+
+    #[test]
+    fn every_number_is_checked() {
+        let light = Light {
+            point: Some(Point { position: [f64::NAN, 0.0, 0.0] }),
+            color: Color([-1.0; 3]),
+            intensity: -1.0,
+            ..Light::default()
+        };
+        assert_eq!(keys(&light), ["point.position", "color", "intensity"]);
+        let still = Directional { direction: [0.0; 3] };
+        let light = Light { directional: Some(still), ..Light::default() };
+        assert_eq!(keys(&light), ["directional.direction"]);
     }
 }

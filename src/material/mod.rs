@@ -1,6 +1,10 @@
 //! Materials: how a surface answers light.
 
-use crate::value::Color;
+mod fields;
+
+pub use fields::FIELDS;
+
+use crate::value::{Checks, Color, Fault};
 use serde::{Deserialize, Serialize};
 
 /// A surface's finish. Every key may be left out.
@@ -26,14 +30,18 @@ pub struct Material {
     /// How the reflected ray is spread.
     pub lobe: Lobe,
     /// Microfacet slope; without it roughness / (2 sqrt 2).
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub alpha: Option<f64>,
     /// Masking and shadowing of microfacets.
     pub masking: Masking,
     /// How reflectance depends on the angle; without it `exact` for a metal, else `constant`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub fresnel: Option<Fresnel>,
     /// Reflectance F0 at normal incidence, per channel; without it white.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub reflectance: Option<Color>,
     /// A metal's F0 instead of `reflectance`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub metal: Option<Metal>,
     /// Whether the back of a surface is finished like its front; otherwise the back is black.
     pub two_sided: bool,
@@ -133,5 +141,36 @@ impl Default for Material {
             metal: None,
             two_sided: true,
         }
+    }
+}
+
+impl Material {
+    /// Whether a microfacet distribution is asked for, by the reflection or by the highlight.
+    pub fn has_microfacets(&self) -> bool {
+        matches!(self.lobe, Lobe::Beckmann | Lobe::Ggx)
+            || self.highlight == Highlight::CookTorrance && self.specular > 0.0
+    }
+
+    /// What is wrong with it.
+    pub fn faults(&self) -> Vec<Fault> {
+        let both = self.reflectance.is_some() && self.metal.is_some();
+        Checks::new(FIELDS)
+            .numbers("color", &self.color.0)
+            .numbers("ambient", &[self.ambient])
+            .numbers("diffuse", &[self.diffuse])
+            .numbers("specular", &[self.specular])
+            .numbers("exponent", &[self.exponent])
+            .numbers("reflection", &[self.reflection])
+            .numbers("roughness", &[self.roughness])
+            .maybe("alpha", self.alpha.as_ref().map(std::slice::from_ref))
+            .maybe("reflectance", self.reflectance.as_ref().map(|c| &c.0[..]))
+            .and(both.then(|| {
+                Fault::new(
+                    "metal",
+                    "both metal and reflectance are given",
+                    "only one of them: a metal stands for its reflectance",
+                )
+            }))
+            .faults()
     }
 }

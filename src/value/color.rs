@@ -17,6 +17,40 @@ impl Color {
     pub fn scaled(self, s: f64) -> Self {
         Self(self.0.map(|c| c * s))
     }
+
+    /// The largest channel.
+    pub fn largest(self) -> f64 {
+        self.0.into_iter().fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// From an sRGB colour `#rrggbb`; `None` if `text` is not of that form.
+    pub fn from_hex(text: &str) -> Option<Self> {
+        let digits = text.strip_prefix('#')?;
+        // from_str_radix would take a sign.
+        if digits.len() != 6 || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
+            return None;
+        }
+        let code = u32::from_str_radix(digits, 16).ok()?;
+        Some(Self([16, 8, 0].map(|shift| linear_from_srgb(f64::from(code >> shift & 255) / 255.0))))
+    }
+
+    /// The `#rrggbb` that stands for exactly this colour, if there is one.
+    pub fn to_hex(self) -> Option<String> {
+        let mut text = "#".to_string();
+        for channel in self.0 {
+            let code = (srgb_from_linear(channel) * 255.0).round();
+            if !(0.0..=255.0).contains(&code) {
+                return None;
+            }
+            text += &format!("{:02x}", code as u8);
+        }
+        (Self::from_hex(&text) == Some(self)).then_some(text)
+    }
+}
+
+/// Inverse of [`linear_from_srgb`].
+fn srgb_from_linear(linear: f64) -> f64 {
+    if linear <= 0.0031308 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// sRGB (IEC 61966-2-1) code 0..1 to linear light 0..1.
@@ -41,9 +75,7 @@ impl<'de> de::Visitor<'de> for ColorVisitor {
 
     fn visit_str<E: de::Error>(self, text: &str) -> Result<Color, E> {
         let wrong = || E::invalid_value(de::Unexpected::Str(text), &self);
-        let digits = text.strip_prefix('#').filter(|d| d.len() == 6).ok_or_else(wrong)?;
-        let code = u32::from_str_radix(digits, 16).map_err(|_| wrong())?;
-        Ok(Color([16, 8, 0].map(|shift| linear_from_srgb(f64::from(code >> shift & 255) / 255.0))))
+        Color::from_hex(text).ok_or_else(wrong)
     }
 
     fn visit_seq<A: de::SeqAccess<'de>>(self, mut seq: A) -> Result<Color, A::Error> {
@@ -61,5 +93,31 @@ impl<'de> de::Visitor<'de> for ColorVisitor {
 impl<'de> Deserialize<'de> for Color {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(ColorVisitor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Color;
+
+    #[test]
+    fn hex_codes_go_there_and_back() {
+        for code in ["#000000", "#ffffff", "#0a80fe", "#010b0c"] {
+            let color = Color::from_hex(code).unwrap();
+            assert_eq!(color.to_hex().as_deref(), Some(code));
+        }
+        assert_eq!(Color::from_hex("#ffffff"), Some(Color::WHITE));
+        let half = Color::from_hex("#bcbcbc").unwrap().0[0];
+        assert!((half - 0.502_886).abs() < 1e-6, "sRGB 188 is {half}");
+        assert_eq!(Color([0.5, 0.5, 0.5]).to_hex(), None);
+        assert_eq!(Color([2.0, 0.0, 0.0]).to_hex(), None);
+        assert_eq!(Color([f64::NAN, 0.0, 0.0]).to_hex(), None);
+    }
+
+    #[test]
+    fn other_strings_are_no_colours() {
+        for text in ["", "#", "ffffff", "#fff", "#+12345", "#gggggg", "#ffffff0", "#ééé"] {
+            assert_eq!(Color::from_hex(text), None, "{text}");
+        }
     }
 }

@@ -1,8 +1,17 @@
-//! What users write, as values: colours, and the faults that a value can have. Known to every
-//! description (shape, material, light, camera, scene) and knowing none of them.
+//! What users write, as values: colours, the faults that a value can have, and the tables that say
+//! what may be written. Known to every description (shape, material, light, camera, scene) and
+//! knowing none of them.
 
+mod angle;
 mod color;
 mod fault;
+mod field;
+mod range;
+mod text;
 
+pub use angle::sin_cos_degrees;
 pub use color::Color;
-pub use fault::Fault;
+pub use fault::{Checks, Fault};
+pub use field::{Choice, Field, Preset, Takes};
+pub use range::{Range, number};
+pub use text::{excerpt, printable};

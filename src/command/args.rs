@@ -1,0 +1,232 @@
+//! The command line.
+
+use crate::film::Tone;
+use crate::sampling::SamplerKind;
+use crate::world::Precision;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// A progressive, accumulating ray tracer that lives in a terminal.
+#[derive(Debug, Parser)]
+#[command(version, about, args_conflicts_with_subcommands = true)]
+#[command(
+    after_help = "Exit status: 0 done, 1 failed, 2 wrong usage, 130 or 143 stopped by a signal \
+                        after writing the picture so far."
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// A scene file.
+    #[arg(hide = true)]
+    pub scene: Option<PathBuf>,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene to a picture file
+    Render(Box<RenderArgs>),
+    /// Validate a scene and say what it contains
+    Check(CheckArgs),
+    /// Write a commented starter scene
+    New(NewArgs),
+}
+
+/// Arguments of `zerkalo render`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Rendering stops at whichever of --spp, --noise, --rmse and --time is reached \
+                        first; with none of them, at --noise 0.5."
+)]
+pub struct RenderArgs {
+    /// The scene file
+    pub scene: PathBuf,
+    /// The picture; the extension chooses the format: .png or .exr
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Width and height in pixels, instead of the scene's
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// Stop at this many samples per pixel (the mean, if adaptive; rounds up to even)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: Option<u32>,
+    /// Stop at this noise: estimated RMSE of the picture as displayed, in 8-bit codes [default: 0.5]
+    #[arg(long, value_name = "CODES", value_parser = positive, allow_negative_numbers = true)]
+    pub noise: Option<f64>,
+    /// Stop at this estimated RMSE of the linear picture
+    #[arg(long, value_name = "LINEAR", value_parser = positive, allow_negative_numbers = true)]
+    pub rmse: Option<f64>,
+    /// Stop after this many seconds of rendering
+    #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
+    pub time: Option<f64>,
+    /// Threads that trace [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096))]
+    pub threads: Option<u16>,
+    /// Number that the random choices follow from; the same seed gives the same picture
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Precision of the geometry; auto: double where the scene's proportions need it
+    #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]
+    pub precision: PrecisionArg,
+    /// Where samples lie: sobol spreads them evenly, random is for comparison
+    #[arg(long, value_enum, default_value_t = SamplerArg::Sobol)]
+    pub sampler: SamplerArg,
+    /// Give every pixel the same number of samples
+    #[arg(long)]
+    pub uniform: bool,
+    /// Bits per channel of a PNG
+    #[arg(long, value_name = "8|16", default_value = "8", value_parser = bits)]
+    pub bits: u8,
+    /// Exposure, in stops: the picture times 2 to the power of EV
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, allow_negative_numbers = true)]
+    pub exposure: f64,
+    /// What becomes of light brighter than white: clip it, or compress it keeping the hue
+    #[arg(long, value_parser = tone(), default_value = "clip")]
+    pub tone: Tone,
+    /// Write statistics of the run as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+}
+
+/// Arguments of `zerkalo check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// The scene file
+    pub scene: PathBuf,
+}
+
+/// Arguments of `zerkalo new`.
+#[derive(Debug, Args)]
+pub struct NewArgs {
+    /// The scene file to write; must not exist
+    pub file: PathBuf,
+}
+
+/// Values of `--precision`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PrecisionArg {
+    /// 32-bit
+    Single,
+    /// 64-bit
+    Double,
+    /// As the scene's proportions need it
+    Auto,
+}
+
+/// Values of `--sampler`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SamplerArg {
+    /// Owen-scrambled Sobol
+    Sobol,
+    /// Independent random numbers
+    Random,
+}
+
+impl PrecisionArg {
+    /// What the world calls it.
+    pub fn precision(self) -> Precision {
+        match self {
+            Self::Single => Precision::Single,
+            Self::Double => Precision::Double,
+            Self::Auto => Precision::Auto,
+        }
+    }
+}
+
+impl SamplerArg {
+    /// What the sampler calls it.
+    pub fn kind(self) -> SamplerKind {
+        match self {
+            Self::Sobol => SamplerKind::Sobol,
+            Self::Random => SamplerKind::Random,
+        }
+    }
+}
+
+/// Parses the name of a tone curve.
+fn tone() -> impl TypedValueParser<Value = Tone> {
+    let names = PossibleValuesParser::new(Tone::NAMED.map(|(name, _)| name));
+    names.map(|given| {
+        let named = Tone::NAMED.into_iter().find(|(name, _)| *name == given);
+        named.map(|(_, tone)| tone).unwrap_or_default()
+    })
+}
+
+/// `640x480`; what a size may be is the scene's to say.
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_string())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
+    number.ok_or_else(|| "expected a number greater than 0".to_string())
+}
+
+fn exposure(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|x: &f64| x.abs() <= 64.0);
+    number.ok_or_else(|| "expected a number from -64 to 64".to_string())
+}
+
+fn bits(text: &str) -> Result<u8, String> {
+    match text {
+        "8" => Ok(8),
+        "16" => Ok(16),
+        _ => Err("expected 8 or 16".to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    fn render(more: &[&str]) -> Result<Box<RenderArgs>, clap::Error> {
+        let start = ["zerkalo", "render", "a.toml", "-o", "a.png"];
+        let cli = Cli::try_parse_from(start.iter().chain(more))?;
+        match cli.command {
+            Some(Command::Render(args)) => Ok(args),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn sizes() {
+        assert_eq!(render(&["--size", "640x480"]).unwrap().size, Some([640, 480]));
+        for wrong in ["640", "640x", "x480", "640x-1", "640X480", "1x1x1", "5000000000x1", ""] {
+            assert!(render(&["--size", wrong]).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn numbers_have_ranges() {
+        assert_eq!(render(&["--exposure", "-1.5"]).unwrap().exposure, -1.5);
+        for wrong in [
+            ["--noise", "0"],
+            ["--noise", "nan"],
+            ["--rmse", "-1"],
+            ["--time", "inf"],
+            ["--spp", "0"],
+            ["--threads", "0"],
+            ["--bits", "12"],
+            ["--exposure", "1e3"],
+            ["--seed", "-1"],
+        ] {
+            assert_eq!(render(&wrong).unwrap_err().exit_code(), 2, "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn a_scene_alone_is_understood() {
+        assert!(Cli::try_parse_from(["zerkalo"]).unwrap().command.is_none());
+        let cli = Cli::try_parse_from(["zerkalo", "a.toml"]).unwrap();
+        assert_eq!(cli.scene, Some(PathBuf::from("a.toml")));
+    }
+}

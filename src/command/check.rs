@@ -1,0 +1,46 @@
+//! `zerkalo check`: is a scene valid, and what is in it?
+
+use super::args::CheckArgs;
+use super::{Failure, say, warn};
+use crate::film::{TILE, TILE_PIXELS};
+use crate::scene::Document;
+use crate::world::{self, AnyWorld};
+
+pub fn run(args: &CheckArgs) -> Result<(), Failure> {
+    let document = Document::read(&args.scene).map_err(|e| Failure::Failed(e.to_string()))?;
+    for warning in document.warnings() {
+        warn(&format!("{warning}"));
+    }
+    let scene = document.scene();
+    let world = AnyWorld::compile(scene, &world::Options::default());
+    let [width, height] = scene.film.size;
+    let groups = world.group_names();
+    let bytes = film_bytes(scene.film.size, groups.len());
+    say(&format!("{}: valid", args.scene.display()));
+    say(&format!("  contains  {}", world.inventory()));
+    say(&format!("  picture   {width} x {height} pixels"));
+    say(&format!("  lights    {} separate: {}", groups.len(), groups.join(", ")));
+    say(&format!("  memory    {:.0} MB for the samples", (bytes as f64 * 1e-6).max(1.0)));
+    for bias in world.biases() {
+        say(&format!("  biased    {bias}"));
+    }
+    Ok(())
+}
+
+/// Memory of a whole film: a 64-bit sum for each replicate, pixel, group and channel.
+fn film_bytes(size: [u32; 2], groups: usize) -> u64 {
+    let [columns, rows] = size.map(|n| u64::from(n).div_ceil(TILE as u64));
+    columns * rows * (2 * TILE_PIXELS * groups * 3 * size_of::<i64>()) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::film_bytes;
+
+    #[test]
+    fn memory_of_films() {
+        // Whole tiles: 40 x 30 of them.
+        assert_eq!(film_bytes([640, 480], 1), 640 * 480 * 48);
+        assert_eq!(film_bytes([1, 1], 3), 256 * 48 * 3);
+    }
+}

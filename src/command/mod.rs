@@ -1,0 +1,70 @@
+//! The command line: what users ask for, done by the other rooms.
+
+mod args;
+mod check;
+mod cpu;
+mod metadata;
+mod new;
+mod progress;
+mod render;
+mod signals;
+mod stats;
+
+pub use cpu::require as require_cpu;
+
+use args::{Cli, Command};
+use clap::Parser;
+use std::io::Write;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Exit status of a command line that cannot be understood; clap uses the same.
+const WRONG_USAGE: u8 = 2;
+
+/// How a command ends if not well.
+enum Failure {
+    /// Exit status 1, and why.
+    Failed(String),
+    /// Exit status 2, and why.
+    Usage(String),
+    /// Ended by a signal after saving what there is: the exit status, 130 or 143.
+    Signalled(u8),
+}
+
+/// Runs the command line that the program was started with.
+#[inline(never)]
+pub fn main() -> ExitCode {
+    let started = Instant::now();
+    let cli = Cli::parse();
+    let result = match &cli.command {
+        Some(Command::Render(args)) => render::run(args, started),
+        Some(Command::Check(args)) => check::run(args),
+        Some(Command::New(args)) => new::run(args),
+        None => Err(no_command(&cli)),
+    };
+    let (status, message) = match result {
+        Ok(()) => return ExitCode::SUCCESS,
+        Err(Failure::Failed(why)) => (1, why),
+        Err(Failure::Usage(why)) => (WRONG_USAGE, why),
+        Err(Failure::Signalled(status)) => return ExitCode::from(status),
+    };
+    warn(&message);
+    ExitCode::from(status)
+}
+
+fn no_command(cli: &Cli) -> Failure {
+    let scene = cli.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
+    Failure::Usage(format!(
+        "nothing to do: `zerkalo render {scene} -o PICTURE.png` renders a scene, `zerkalo --help` tells more"
+    ))
+}
+
+/// A line on stderr; if nobody can read it, that is no reason to fail.
+fn warn(message: &str) {
+    let _ = writeln!(std::io::stderr(), "{message}");
+}
+
+/// A line on stdout; as [`warn`].
+fn say(message: &str) {
+    let _ = writeln!(std::io::stdout(), "{message}");
+}

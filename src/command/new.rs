@@ -1,0 +1,26 @@
+//! `zerkalo new`: a scene to start from.
+
+use super::args::NewArgs;
+use super::{Failure, say};
+use crate::scene::starter;
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write};
+
+pub fn run(args: &NewArgs) -> Result<(), Failure> {
+    let shown = args.file.display();
+    // Creating fails if the file exists, also if it came into being a moment ago.
+    let created = OpenOptions::new().write(true).create_new(true).open(&args.file);
+    created.and_then(|mut file| file.write_all(starter().as_bytes())).map_err(|error| {
+        Failure::Failed(match error.kind() {
+            ErrorKind::AlreadyExists => {
+                format!("{shown} exists and was not changed; name another file or remove it first")
+            }
+            ErrorKind::NotFound => {
+                format!("cannot write {shown}: its directory does not exist; create it first")
+            }
+            _ => format!("cannot write {shown}: {error}"),
+        })
+    })?;
+    say(&format!("{shown} written; `zerkalo render {shown} -o PICTURE.png` renders it"));
+    Ok(())
+}

@@ -1,0 +1,136 @@
+//! How a render is getting on, on stderr: a bar in a terminal, lines in a log.
+
+use crate::render::session::Report;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::{IsTerminal, Write};
+use std::time::Duration;
+
+/// Nothing is shown before so many seconds: a render that is done by then needs no bar.
+const QUIET_SECONDS: f64 = 0.25;
+/// The first line in a log comes after so many seconds; each interval is twice the one before, up to the longest.
+const FIRST_LINE_SECONDS: f64 = 1.0;
+const LONGEST_INTERVAL_SECONDS: f64 = 60.0;
+
+/// The steps of the bar.
+const STEPS: u64 = 1000;
+
+/// Tells how far a render is.
+pub enum Progress {
+    /// In a terminal; made when there is something to show.
+    Bar(Option<ProgressBar>),
+    /// In a log: the seconds of rendering after which the next line is due.
+    Lines(f64),
+}
+
+impl Progress {
+    /// For the stderr that there is.
+    pub fn on_stderr() -> Self {
+        if std::io::stderr().is_terminal() {
+            Self::Bar(None)
+        } else {
+            Self::Lines(FIRST_LINE_SECONDS)
+        }
+    }
+
+    /// Shows `report`, if it is time to.
+    pub fn show(&mut self, report: &Report) {
+        if report.seconds < QUIET_SECONDS {
+            return;
+        }
+        match self {
+            Self::Bar(bar) => {
+                let bar = bar.get_or_insert_with(new_bar);
+                bar.set_position((report.progress.unwrap_or(0.0) * STEPS as f64) as u64);
+                bar.set_message(status(report));
+            }
+            Self::Lines(due) if report.seconds >= *due => {
+                let percent =
+                    report.progress.map_or(String::new(), |p| format!("{:.0} %  ", 100.0 * p));
+                // Progress that cannot be told (stderr is closed) is no reason to stop rendering.
+                let _ = writeln!(std::io::stderr(), "{percent}{}", status(report));
+                *due = report.seconds
+                    + report.seconds.clamp(FIRST_LINE_SECONDS, LONGEST_INTERVAL_SECONDS);
+            }
+            Self::Lines(_) => {}
+        }
+    }
+
+    /// Clears the bar away.
+    pub fn finish(self) {
+        if let Self::Bar(Some(bar)) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn new_bar() -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:24} {percent:>3} %  {wide_msg}")
+        .expect("the template is well-formed");
+    let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
+    bar.with_style(style)
+}
+
+/// `33 spp (32-210)  41.2 Msamples/s  noise 0.81  3-5 s left`
+fn status(report: &Report) -> String {
+    let spp = &report.spp;
+    let mut text = if spp.min == spp.max {
+        format!("{} spp", spp.min)
+    } else {
+        format!("{:.0} spp ({}-{})", spp.mean, spp.min, spp.max)
+    };
+    text += &format!("  {:.1} Msamples/s", report.samples_per_second() * 1e-6);
+    if let Some(noise) = report.noise {
+        text += &format!("  noise {:.2}", noise.rmse_codes);
+    }
+    if let Some((low, high)) = report.eta_seconds {
+        text += &format!("  {} left", span(low, high));
+    }
+    text
+}
+
+/// A range of times in words.
+fn span(low: f64, high: f64) -> String {
+    let [low_text, high_text] = [low, high].map(duration);
+    if low_text == high_text {
+        return low_text;
+    }
+    // `3-5 s` rather than `3 s-5 s`.
+    match (low_text.split_once(' '), high_text.split_once(' ')) {
+        (Some((a, unit)), Some((b, same))) if unit == same => format!("{a}-{b} {unit}"),
+        _ => format!("{low_text} - {high_text}"),
+    }
+}
+
+/// `0.4 s`, `12 s`, `5 min`, `3.4 h`, `2.1 d`
+fn duration(seconds: f64) -> String {
+    const MINUTE: f64 = 60.0;
+    const HOUR: f64 = 60.0 * MINUTE;
+    const DAY: f64 = 24.0 * HOUR;
+    match seconds {
+        s if s < 9.95 => format!("{s:.1} s"),
+        s if s < 2.0 * MINUTE => format!("{s:.0} s"),
+        s if s < 2.0 * HOUR => format!("{:.0} min", s / MINUTE),
+        s if s < 2.0 * DAY => format!("{:.1} h", s / HOUR),
+        s => format!("{:.1} d", Duration::from_secs_f64(s.min(1e15)).as_secs_f64() / DAY),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_in_words() {
+        for (low, high, text) in [
+            (0.4, 0.4, "0.4 s"),
+            (3.0, 5.0, "3.0-5.0 s"),
+            (9.0, 15.0, "9.0-15 s"),
+            (90.0, 150.0, "90 s - 2 min"),
+            (300.0, 420.0, "5-7 min"),
+            (7200.0, 10_800.0, "2.0-3.0 h"),
+            (864_000.0, f64::MAX, "10.0-11574074074.1 d"),
+        ] {
+            assert_eq!(span(low, high), text);
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! What may be written in a material.
+
+use crate::value::{Choice, Field, Range, Takes};
+
+/// The keys of `[materials.NAME]`.
+pub const FIELDS: &[Field] = &[
+    Field::preset(
+        "color",
+        Takes::Color(Range::COEFFICIENT),
+        "",
+        "[0.8, 0.8, 0.8]",
+        "Body colour: multiplies the ambient and the diffuse part.",
+    ),
+    Field::preset("ambient", COEFFICIENT, "", "1.0", "Ambient coefficient k_a."),
+    Field::preset("diffuse", COEFFICIENT, "", "1.0", "Diffuse coefficient k_d."),
+    Field::preset("specular", COEFFICIENT, "", "0.0", "Highlight coefficient k_s."),
+    Field::preset(
+        "exponent",
+        Takes::Number(Range::closed(0.0, 1e9)),
+        "",
+        "32.0",
+        "Phong exponent alpha of (R.V)^alpha: the larger, the smaller the highlight.",
+    ),
+    Field::preset(
+        "highlight",
+        Takes::Choice(HIGHLIGHTS),
+        "",
+        "\"phong\"",
+        "Formula of a light's highlight.",
+    ),
+    Field::preset(
+        "reflection",
+        COEFFICIENT,
+        "",
+        "0.0",
+        "Reflection coefficient k_r: weight of what the surface mirrors.",
+    ),
+    Field::preset(
+        "roughness",
+        Takes::Number(Range::closed(0.0, 1e6)),
+        "",
+        "0.0",
+        "Blur of the reflection: radius of the cone's base at unit distance; 0 is a perfect mirror.",
+    ),
+    Field::preset(
+        "lobe",
+        Takes::Choice(LOBES),
+        "",
+        "\"cone\"",
+        "How the reflected ray is spread; the same roughness means a comparable blur in each.",
+    ),
+    Field::without(
+        "alpha",
+        Takes::Number(Range::closed(0.0, 1e6)),
+        "",
+        "roughness / (2 √2)",
+        "Slope parameter of the microfacets.",
+    ),
+    Field::preset(
+        "masking",
+        Takes::Choice(MASKINGS),
+        "",
+        "\"v-cavity\"",
+        "Masking and shadowing between microfacets.",
+    ),
+    Field::without(
+        "fresnel",
+        Takes::Choice(FRESNELS),
+        "",
+        "`exact` for a metal, otherwise `constant`",
+        "How the reflectance depends on the angle.",
+    ),
+    Field::without(
+        "reflectance",
+        Takes::Color(Range::SHARE),
+        "",
+        "white",
+        "Reflectance F0 at normal incidence. Not together with `metal`.",
+    ),
+    Field::without(
+        "metal",
+        Takes::Choice(METALS),
+        "",
+        "no metal",
+        "A metal, for its reflectance. Not together with `reflectance`.",
+    ),
+    Field::preset(
+        "two_sided",
+        Takes::Switch,
+        "",
+        "true",
+        "Whether the back of a surface is finished like its front; otherwise the back is black.",
+    ),
+];
+
+const COEFFICIENT: Takes = Takes::Number(Range::COEFFICIENT);
+
+const HIGHLIGHTS: &[Choice] = &[
+    Choice { name: "phong", doc: "k_s (R.V)^alpha" },
+    Choice { name: "cook-torrance", doc: "microfacets with the distribution of the lobe" },
+];
+
+const LOBES: &[Choice] = &[
+    Choice { name: "mirror", doc: "no spread, whatever the roughness" },
+    Choice { name: "cone", doc: "uniform in a cone" },
+    Choice { name: "square", doc: "uniform on a square across the mirror direction: cheaper" },
+    Choice { name: "beckmann", doc: "microfacets, Beckmann distribution" },
+    Choice { name: "ggx", doc: "microfacets, GGX (Trowbridge-Reitz) distribution" },
+];
+
+const MASKINGS: &[Choice] = &[
+    Choice { name: "v-cavity", doc: "V-shaped grooves (Torrance-Sparrow)" },
+    Choice { name: "smith", doc: "Smith, height-correlated" },
+];
+
+const FRESNELS: &[Choice] = &[
+    Choice { name: "constant", doc: "the same at every angle" },
+    Choice { name: "schlick", doc: "Schlick's approximation" },
+    Choice {
+        name: "exact",
+        doc: "Fresnel's equations for the index of refraction that F0 stands for",
+    },
+];
+
+const METALS: &[Choice] = &[
+    Choice { name: "gold", doc: "0.989 0.876 0.349" },
+    Choice { name: "silver", doc: "0.950 0.930 0.880" },
+    Choice { name: "copper", doc: "0.755 0.490 0.095" },
+    Choice { name: "iron", doc: "0.530 0.505 0.480" },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::{FIELDS, METALS};
+    use crate::material::{Material, Metal};
+    use crate::value::Color;
+
+    #[test]
+    fn documented_reflectances_are_the_ones_in_use() {
+        for metal in METALS {
+            let text = format!("metal = \"{}\"", metal.name);
+            let metal_read: Metal = toml::from_str::<Material>(&text).unwrap().metal.unwrap();
+            let told: Vec<f64> = metal.doc.split(' ').map(|n| n.parse().unwrap()).collect();
+            assert_eq!(metal_read.f0().0.to_vec(), told, "{}", metal.name);
+        }
+    }
+
+    #[test]
+    fn every_number_is_checked() {
+        let mut bad = Material {
+            color: Color([-1.0, 0.0, 0.0]),
+            ambient: f64::NAN,
+            diffuse: -1.0,
+            specular: f64::INFINITY,
+            exponent: -1.0,
+            reflection: -0.1,
+            roughness: -1e-9,
+            alpha: Some(-1.0),
+            reflectance: Some(Color([1.1, 0.0, 0.0])),
+            ..Material::default()
+        };
+        let keys: Vec<_> = bad.faults().into_iter().map(|f| f.key).collect();
+        let numbers = [
+            "color",
+            "ambient",
+            "diffuse",
+            "specular",
+            "exponent",
+            "reflection",
+            "roughness",
+            "alpha",
+            "reflectance",
+        ];
+        assert_eq!(keys, numbers);
+        assert_eq!(FIELDS.len(), numbers.len() + 6, "a new field? Check its range here");
+        bad = Material { metal: Some(Metal::Gold), ..Material::default() };
+        assert!(bad.faults().is_empty());
+        bad.reflectance = Some(Color::WHITE);
+        assert_eq!(bad.faults()[0].key, "metal");
+    }
+}

@@ -1,0 +1,303 @@
+//! Which tiles get how many samples next, and when to stop. Decides, does nothing: the clock is an
+//! argument, the film is known only through the reports of finished jobs.
+//!
+//! A decision gives each chosen tile the same sample indices in replicate A and then in replicate B,
+//! so that whenever something is decided every tile holds equally many of both and its error is
+//! known. Decisions depend on estimated errors and rays counted, never on time or threads; time only
+//! ends the work.
+
+mod allocation;
+mod settings;
+mod stop;
+#[cfg(test)]
+mod tests;
+mod tile;
+mod trend;
+
+use crate::film::Noise;
+use crate::lanes::{Lanes, Single};
+use crate::render::wave::{Job, Wave, WaveReport};
+pub use settings::{Criterion, Settings, Stop, StoppedBy};
+use tile::{Tile, clamp_slope};
+use trend::Trend;
+
+/// Samples per replicate that every tile gets before its estimate is believed.
+const FLOOR: u32 = 16;
+/// The same for tiles in which a path met a glossy lobe.
+const GLOSSY_FLOOR: u32 = 32;
+/// Estimates begin here: below, they say little and cost as much as the samples.
+const FIRST_ESTIMATE: u32 = 4;
+/// From the first packet on, samples are given in multiples of the widest packet that renders; only a
+/// tile's last block may be shorter.
+const PACKET: u32 = if Single::WIDTH > 8 { Single::WIDTH as u32 } else { 8 };
+/// Samples per replicate at which a tile is full: half of what a 32-bit index can count.
+const FULL: u32 = 1 << 31;
+
+/// What comes next.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Step {
+    /// Trace this.
+    Trace(Wave),
+    /// Nothing: the work is done.
+    Rest(StoppedBy),
+}
+
+/// Samples per pixel over the picture, A and B together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spp {
+    /// The fewest.
+    pub min: u32,
+    /// The mean over pixels.
+    pub mean: f64,
+    /// The most.
+    pub max: u32,
+}
+
+/// The scheduler.
+#[derive(Clone, Debug)]
+pub struct Schedule {
+    settings: Settings,
+    tiles: Vec<Tile>,
+    tiles_per_row: usize,
+    /// The jobs decided last; both replicates get them.
+    decided: Vec<Job>,
+    estimate: bool,
+    replicate: usize,
+    /// What is left of `decided` in the current replicate.
+    left: Vec<Job>,
+    trend: Trend,
+    /// Samples traced, all pixels and both replicates.
+    samples: u64,
+    rays: u64,
+    noise: Option<Noise>,
+    /// Samples per replicate when the noise was last estimated, in uniform phases.
+    estimated_at: u32,
+}
+
+impl Schedule {
+    /// For a picture whose tiles, row by row, have these numbers of pixels.
+    pub fn new(pixels: &[u32], tiles_per_row: usize, settings: Settings) -> Self {
+        Self {
+            settings,
+            tiles: pixels.iter().map(|p| Tile::new(*p)).collect(),
+            tiles_per_row,
+            decided: Vec::new(),
+            estimate: false,
+            replicate: 1,
+            left: Vec::new(),
+            trend: Trend::default(),
+            samples: 0,
+            rays: 0,
+            noise: None,
+            estimated_at: 0,
+        }
+    }
+
+    /// What to do next, `seconds` after the work began. Call [`Schedule::complete`] with the wave's
+    /// report before calling this again.
+    pub fn next(&mut self, seconds: f64) -> Step {
+        if self.left.is_empty() {
+            if self.replicate == 0 {
+                self.replicate = 1;
+            } else {
+                if let Some(reason) = self.reason_to_stop(seconds) {
+                    return Step::Rest(reason);
+                }
+                self.decided = self.decide();
+                if self.decided.is_empty() {
+                    return Step::Rest(self.reason_without_work());
+                }
+                self.replicate = 0;
+            }
+            self.left.clone_from(&self.decided);
+        }
+        Step::Trace(Wave {
+            replicate: self.replicate,
+            jobs: self.left.clone(),
+            estimate: self.estimate && self.replicate == 1,
+        })
+    }
+
+    /// Takes in what became of the wave that [`Schedule::next`] gave out. Cancelled jobs will be
+    /// given out again.
+    pub fn complete(&mut self, wave: &Wave, report: &WaveReport) {
+        self.left.clear();
+        for (job, report) in wave.jobs.iter().zip(&report.reports) {
+            let Some(report) = report else {
+                self.left.push(*job);
+                continue;
+            };
+            let tile = &mut self.tiles[job.tile as usize];
+            self.samples += u64::from(job.count) * u64::from(tile.pixels);
+            self.rays += report.rays;
+            let count = job.first + job.count;
+            tile.note(report, count);
+            if wave.replicate == 1 {
+                tile.done = count;
+            }
+        }
+        if self.left.is_empty() && wave.estimate {
+            self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error.map(|(_, e)| e)));
+            if let Some(noise) = self.noise {
+                let rmse = match self.settings.criterion {
+                    Criterion::Codes => noise.rmse_codes,
+                    Criterion::Linear => noise.rmse_linear,
+                };
+                self.trend.note(self.rays as f64, rmse);
+            }
+        }
+    }
+
+    /// The latest estimate of the whole picture's error.
+    pub fn noise(&self) -> Option<Noise> {
+        self.noise
+    }
+
+    /// The latest estimate of each tile's RMSE in codes, row by row; 0 before the first.
+    pub fn tile_noise_codes(&self) -> Vec<f32> {
+        self.tiles.iter().map(|t| t.mse(Criterion::Codes).sqrt() as f32).collect()
+    }
+
+    /// Samples traced so far, over all pixels.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Rays traced so far.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+
+    /// Samples per pixel, counting what both replicates hold.
+    pub fn spp(&self) -> Spp {
+        let counts = || self.tiles.iter().map(|t| 2 * t.done);
+        let (pixels, samples) = self.tiles.iter().fold((0u64, 0u64), |(pixels, samples), t| {
+            (pixels + u64::from(t.pixels), samples + 2 * u64::from(t.done) * u64::from(t.pixels))
+        });
+        Spp {
+            min: counts().min().unwrap_or(0),
+            mean: samples as f64 / pixels.max(1) as f64,
+            max: counts().max().unwrap_or(0),
+        }
+    }
+
+    fn pixels(&self) -> u64 {
+        self.tiles.iter().map(|t| u64::from(t.pixels)).sum()
+    }
+
+    /// The most samples per replicate that `tile` may get.
+    fn cap(&self, tile: &Tile) -> u32 {
+        match self.settings.rays_per_pixel {
+            0 => FULL,
+            _ if !tile.glossy => FULL,
+            cap => (cap / 2).clamp(1, FULL),
+        }
+    }
+
+    /// Root of the mean squared error over the pixels of the tiles that `counts` selects.
+    fn pooled(&self, criterion: Criterion, counts: impl Fn(&Tile) -> bool) -> f64 {
+        let (sum, pixels) =
+            self.tiles.iter().filter(|t| counts(t)).fold((0.0, 0u64), |(s, n), t| {
+                (s + t.mse(criterion) * f64::from(t.pixels), n + u64::from(t.pixels))
+            });
+        (sum / pixels.max(1) as f64).sqrt()
+    }
+
+    /// Samples per replicate, over all pixels, until the mean count is reached.
+    fn samples_left(&self) -> u64 {
+        let Some(spp) = self.settings.stop.spp else { return u64::MAX };
+        let done: u64 = self.tiles.iter().map(|t| u64::from(t.done) * u64::from(t.pixels)).sum();
+        (u64::from(spp.div_ceil(2)) * self.pixels()).saturating_sub(done)
+    }
+
+    /// The next jobs; none if there is nothing to do. Sets whether they end with an estimate.
+    fn decide(&mut self) -> Vec<Job> {
+        self.estimate = true;
+        let common = self.common_count();
+        if common < FLOOR || !self.settings.adaptive {
+            return self.uniform(common);
+        }
+        let floor = self.glossy_floor();
+        if floor.is_empty() { self.by_gain() } else { floor }
+    }
+
+    /// Samples per replicate of the tiles that no cap holds back (of all if every one is capped).
+    fn common_count(&self) -> u32 {
+        let open = self.tiles.iter().filter(|t| t.done < self.cap(t));
+        open.map(|t| t.done).min().unwrap_or(FULL)
+    }
+
+    /// The same indices for every tile that is not capped.
+    fn uniform(&mut self, common: u32) -> Vec<Job> {
+        let grown = match common {
+            0 => 1,
+            n if n < FLOOR => n,
+            n => (self.uniform_growth(n) / PACKET * PACKET).max(PACKET),
+        };
+        let limit = self.settings.stop.spp.map_or(FULL, |spp| spp.div_ceil(2)).min(FULL);
+        let count = grown.min(limit.saturating_sub(common));
+        let after = common + count;
+        let last = after == limit;
+        let aims = self.target().is_some() || self.settings.stop.seconds.is_some();
+        let due =
+            if aims { after >= FIRST_ESTIMATE } else { after / 2 >= self.estimated_at.max(2) };
+        self.estimate = due || last;
+        if self.estimate {
+            self.estimated_at = after;
+        }
+        let cut = |t: &Tile| after.min(self.cap(t)).saturating_sub(t.done);
+        self.jobs(cut)
+    }
+
+    /// By how many samples to grow a uniform picture that holds `done` of each replicate: half of the
+    /// way to the target on the error, at most as many as there are; or an eighth, when there is no
+    /// such target or a time limit that a larger wave would overshoot.
+    fn uniform_growth(&self, done: u32) -> u32 {
+        let eighth = done / 8;
+        let Some((criterion, target)) = self.target() else { return eighth };
+        let noise = self.pooled(criterion, |_| true);
+        let factor = (noise / target).powf(1.0 / self.trend.slope());
+        let half_way = (0.5 * f64::from(done) * (factor - 1.0).clamp(0.0, 2.0)) as u32;
+        if self.settings.stop.seconds.is_some() { half_way.min(eighth) } else { half_way }
+    }
+
+    /// The second half of the floor for the tiles that met a glossy lobe, as far as the sample count
+    /// allows it.
+    fn glossy_floor(&self) -> Vec<Job> {
+        let wanting = |t: &Tile| {
+            if t.glossy { GLOSSY_FLOOR.min(self.cap(t)).saturating_sub(t.done) } else { 0 }
+        };
+        let pixels: u64 =
+            self.tiles.iter().filter(|t| wanting(t) > 0).map(|t| u64::from(t.pixels)).sum();
+        let allowed = u32::try_from(self.samples_left() / pixels.max(1)).unwrap_or(FULL);
+        let allowed = allowed / PACKET * PACKET;
+        self.jobs(|t| wanting(t).min(allowed))
+    }
+
+    fn jobs(&self, count: impl Fn(&Tile) -> u32) -> Vec<Job> {
+        let tiles = self.tiles.iter().zip(0..);
+        tiles
+            .map(|(t, tile)| Job { tile, first: t.done, count: count(t) })
+            .filter(|job| job.count > 0)
+            .collect()
+    }
+
+    /// The slope of the error over all tiles alike (glossy or not), from their latest doublings.
+    fn pooled_slope(&self, glossy: bool) -> f64 {
+        let criterion = self.settings.criterion;
+        let alike = self.tiles.iter().filter(|t| t.glossy == glossy);
+        let doublings =
+            alike.filter_map(|t| Some((f64::from(t.pixels), t.last_doubling(criterion)?)));
+        let [mut before, mut after, mut growth] = [0.0; 3];
+        for (pixels, [(n0, e0), (n1, e1)]) in doublings {
+            before += pixels * e0;
+            after += pixels * e1;
+            growth += pixels * e0 * (n1 / n0).ln();
+        }
+        if before > 0.0 && after > 0.0 {
+            clamp_slope(0.5 * (before / after).ln() / (growth / before))
+        } else {
+            0.5
+        }
+    }
+}

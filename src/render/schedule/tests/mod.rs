@@ -1,0 +1,169 @@
+//! The schedule against pictures that are nothing but numbers.
+
+mod adaptive;
+mod stops;
+
+use super::*;
+use crate::film::TileNoise;
+use crate::render::wave::JobReport;
+
+/// Pixels of a whole tile.
+const PIXELS: u32 = 256;
+
+/// Uniform in (0, 1) and standard normal numbers (SplitMix64, Box-Muller).
+struct Chance(u64);
+
+impl Chance {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 + f64::MIN_POSITIVE
+    }
+    fn normal(&mut self) -> f64 {
+        (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+}
+
+/// A tile whose error is known: the RMSE of one replicate after n samples is `sigma * n^-slope`.
+#[derive(Clone, Copy)]
+struct Truth {
+    sigma: f64,
+    slope: f64,
+    glossy: bool,
+    rays_per_sample: u64,
+}
+
+const CALM: Truth = Truth { sigma: 0.0, slope: 0.5, glossy: false, rays_per_sample: 2 };
+const NOISY: Truth = Truth { sigma: 40.0, slope: 0.5, glossy: true, rays_per_sample: 3 };
+
+/// A picture that answers waves.
+struct Model {
+    truth: Vec<Truth>,
+    pixels: Vec<u32>,
+    columns: usize,
+    /// Samples per replicate of each tile.
+    counts: [Vec<u32>; 2],
+    /// Sums of the errors of `[replicate][tile][effective pixel]`, as random walks; empty: exact.
+    walks: [Vec<Vec<f64>>; 2],
+    chance: Chance,
+    waves: usize,
+}
+
+impl Model {
+    fn exact(truth: Vec<Truth>, columns: usize) -> Self {
+        let tiles = truth.len();
+        Self {
+            truth,
+            pixels: vec![PIXELS; tiles],
+            columns,
+            counts: [vec![0; tiles], vec![0; tiles]],
+            walks: [vec![vec![]; tiles], vec![vec![]; tiles]],
+            chance: Chance(1),
+            waves: 0,
+        }
+    }
+
+    /// Errors by chance, for slope 0.5: each tile's error sits in `effective` independent values.
+    fn random(truth: Vec<Truth>, columns: usize, effective: usize, seed: u64) -> Self {
+        let tiles = truth.len();
+        let walks = vec![vec![0.0; effective]; tiles];
+        Self { walks: [walks.clone(), walks], chance: Chance(seed), ..Self::exact(truth, columns) }
+    }
+
+    /// The estimate from A - B, if the film holds equally many of both.
+    fn estimate(&self, tile: usize) -> f64 {
+        let n = f64::from(self.counts[0][tile]);
+        let [a, b] = [&self.walks[0][tile], &self.walks[1][tile]];
+        if a.is_empty() {
+            return self.true_mse(tile);
+        }
+        let squares: f64 = a.iter().zip(b).map(|(a, b)| ((a - b) / n).powi(2)).sum();
+        squares / 4.0 / a.len() as f64
+    }
+
+    /// The squared error that the picture (A + B) / 2 really has.
+    fn true_mse(&self, tile: usize) -> f64 {
+        let t = self.truth[tile];
+        let n = f64::from(self.counts[0][tile]);
+        let [a, b] = [&self.walks[0][tile], &self.walks[1][tile]];
+        if a.is_empty() {
+            return t.sigma.powi(2) * n.powf(-2.0 * t.slope) / 2.0;
+        }
+        a.iter().zip(b).map(|(a, b)| ((a + b) / (2.0 * n)).powi(2)).sum::<f64>() / a.len() as f64
+    }
+
+    fn rmse(&self) -> f64 {
+        let sum: f64 = (0..self.truth.len()).map(|i| self.true_mse(i)).sum();
+        (sum / self.truth.len() as f64).sqrt()
+    }
+
+    fn run(&mut self, wave: &Wave) -> WaveReport {
+        self.waves += 1;
+        let reports = wave.jobs.iter().map(|job| Some(self.job(wave, job))).collect();
+        WaveReport { reports }
+    }
+
+    fn job(&mut self, wave: &Wave, job: &Job) -> JobReport {
+        let tile = job.tile as usize;
+        let count = &mut self.counts[wave.replicate][tile];
+        assert_eq!(*count, job.first, "tile {tile}: every index once, in order");
+        assert!(job.count > 0);
+        let packets = job.first.is_multiple_of(PACKET);
+        assert!(packets || (job.first < PACKET && job.first.is_power_of_two()), "{job:?}");
+        *count += job.count;
+        let truth = self.truth[tile];
+        let step = truth.sigma * f64::from(job.count).sqrt();
+        for sum in &mut self.walks[wave.replicate][tile] {
+            *sum += step * self.chance.normal();
+        }
+        let error = wave.estimate.then(|| {
+            assert_eq!(self.counts[0][tile], self.counts[1][tile], "estimate with unequal counts");
+            let mse = self.estimate(tile);
+            TileNoise { codes_mse: mse, linear_mse: mse * 1e-6, pixels: PIXELS }
+        });
+        let rays = u64::from(job.count) * u64::from(self.pixels[tile]) * truth.rays_per_sample;
+        JobReport { rays, glossy: truth.glossy, error }
+    }
+
+    fn schedule(&self, settings: Settings) -> Schedule {
+        Schedule::new(&self.pixels, self.columns, settings)
+    }
+
+    /// Runs to the end (a nanosecond per ray); panics if it does not end.
+    fn finish(&mut self, settings: Settings) -> (Schedule, StoppedBy) {
+        let mut schedule = self.schedule(settings);
+        for _ in 0..100_000 {
+            match schedule.next(schedule.rays() as f64 * 1e-9) {
+                Step::Rest(reason) => return (schedule, reason),
+                Step::Trace(wave) => {
+                    let report = self.run(&wave);
+                    schedule.complete(&wave, &report);
+                }
+            }
+        }
+        panic!("no end");
+    }
+}
+
+fn until(stop: Stop, adaptive: bool) -> Settings {
+    Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel: 0, stop }
+}
+
+fn noise(codes: f64) -> Stop {
+    Stop { noise_codes: Some(codes), ..Stop::default() }
+}
+
+fn spp(spp: u32) -> Stop {
+    Stop { spp: Some(spp), ..Stop::default() }
+}
+
+/// `tiles` tiles in a square, of which the first `share` (in rows, as things in pictures cluster)
+/// are noisy.
+fn clustered(tiles: usize, share: f64) -> Vec<Truth> {
+    (0..tiles).map(|i| if (i as f64) < share * tiles as f64 { NOISY } else { CALM }).collect()
+}
+
+fn model_of(truth: Truth) -> Model {
+    Model::exact(vec![truth; 25], 5)
+}

@@ -1,0 +1,138 @@
+//! What is wrong with a scene beyond the form of its file: values out of range, names that lead
+//! nowhere or to two places.
+
+use super::Scene;
+use super::suggest::nearest;
+use crate::value::{Fault, excerpt};
+use std::collections::HashMap;
+use std::fmt;
+
+/// Something wrong or dubious in a scene, without file and line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// The keys (and positions in lists, from 0) that lead to it: `object`, `3`, `shape`, `sphere`.
+    pub path: Vec<String>,
+    /// What it is about: `object "queen"`; empty: the scene.
+    pub subject: String,
+    /// What was found, as a phrase.
+    pub found: String,
+    /// What would be right, and the remedy, in sentences.
+    pub help: String,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        use crate::value::printable;
+        if !self.subject.is_empty() {
+            write!(f, "{}: ", printable(&self.subject))?;
+        }
+        write!(f, "{}. {}", printable(&self.found), printable(&self.help))
+    }
+}
+
+/// How messages name what stands behind the first keys of a path: `object "queen"`, `light 2`.
+/// `name` gives the name of an entry of a list, if it has one.
+pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<String>) -> String {
+    match path {
+        [list, index, ..] if list == "object" || list == "light" => {
+            let index: usize = index.parse().unwrap_or(0);
+            match name(list, index).filter(|n| !n.is_empty()) {
+                Some(name) => format!("{list} \"{}\"", excerpt(&name)),
+                None => format!("{list} {}", index + 1),
+            }
+        }
+        [list, name, ..] if list == "materials" => format!("material \"{}\"", excerpt(name)),
+        [first, ..] => first.clone(),
+        [] => String::new(),
+    }
+}
+
+fn keys(parts: &[&str]) -> Vec<String> {
+    parts.iter().map(|p| p.to_string()).collect()
+}
+
+impl Scene {
+    /// How messages name the thing at `path`.
+    pub(super) fn subject(&self, path: &[String]) -> String {
+        subject(path, |list, index| match list {
+            "object" => self.objects.get(index).map(|o| o.name.clone()),
+            _ => self.lights.get(index).map(|l| l.name.clone()),
+        })
+    }
+
+    pub(super) fn finding(&self, path: &[&str], found: String, help: String) -> Finding {
+        let path = keys(path);
+        Finding { subject: self.subject(&path), path, found, help }
+    }
+
+    /// Everything wrong with the scene; a scene that was read has nothing wrong, an edited one may.
+    pub fn faults(&self) -> Vec<Finding> {
+        let mut findings = Vec::new();
+        let mut add = |path: &[&str], faults: Vec<Fault>| {
+            findings.extend(faults.into_iter().map(|fault| {
+                let mut all = path.to_vec();
+                all.extend(fault.key.split('.').filter(|k| !k.is_empty()));
+                self.finding(&all, fault.found, format!("Expected {}.", fault.expected))
+            }));
+        };
+        add(&["film"], self.film.faults());
+        add(&["trace"], self.trace.faults());
+        add(&["camera"], self.camera.faults());
+        add(&["background"], self.background.faults());
+        add(&["ambient"], self.ambient.faults());
+        for (i, light) in self.lights.iter().enumerate() {
+            add(&["light", &i.to_string()], light.faults());
+        }
+        for (name, material) in &self.materials {
+            add(&["materials", name], material.faults());
+        }
+        for (i, object) in self.objects.iter().enumerate() {
+            add(&["object", &i.to_string()], object.faults());
+        }
+        self.missing_materials(&mut findings);
+        self.same_names("light", self.lights.iter().map(|l| &l.name), &mut findings);
+        self.same_names("object", self.objects.iter().map(|o| &o.name), &mut findings);
+        findings
+    }
+
+    fn missing_materials(&self, findings: &mut Vec<Finding>) {
+        for (i, object) in self.objects.iter().enumerate() {
+            if object.material.is_empty() || self.materials.contains_key(&object.material) {
+                continue;
+            }
+            let defined: Vec<_> =
+                self.materials.keys().take(20).map(|n| format!("\"{}\"", excerpt(n))).collect();
+            let mut help = match defined.as_slice() {
+                [] => "No material is defined; one begins with [materials.NAME].".to_string(),
+                names if names.len() < self.materials.len() => {
+                    format!("Defined: {}, and more.", names.join(", "))
+                }
+                names => format!("Defined: {}.", names.join(", ")),
+            };
+            let known = self.materials.keys().map(String::as_str);
+            if let Some(meant) = nearest(&object.material, known) {
+                help += &format!(" Did you mean \"{}\"?", excerpt(meant));
+            }
+            let found = format!("material \"{}\" is not defined", excerpt(&object.material));
+            findings.push(self.finding(&["object", &i.to_string(), "material"], found, help));
+        }
+    }
+
+    fn same_names<'a>(
+        &self,
+        list: &str,
+        names: impl Iterator<Item = &'a String>,
+        findings: &mut Vec<Finding>,
+    ) {
+        let mut first = HashMap::new();
+        for (i, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
+            if let Some(other) = first.get(name) {
+                let found = format!("{list} {} has the same name", other + 1);
+                let help = "Expected a name of its own, or none.".to_string();
+                findings.push(self.finding(&[list, &i.to_string(), "name"], found, help));
+            } else {
+                first.insert(name, i);
+            }
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! A scene file as text with its comments, beside the scene that it describes.
+
+use super::Scene;
+use super::locate::located;
+use super::message::{Message, SceneErrors};
+use super::read::read_text;
+use super::rewrite::rewrite;
+use std::path::Path;
+use toml_edit::DocumentMut;
+
+/// A scene file: its text, and the scene that it describes. Edits of the scene change only those
+/// values in the text that differ; comments, order and layout of everything else stay.
+#[derive(Clone, Debug)]
+pub struct Document {
+    name: String,
+    /// As read. Every edit starts from here, so that what is undone comes back with its comments.
+    origin: (String, Scene),
+    text: String,
+    scene: Scene,
+}
+
+impl Document {
+    /// Reads and checks the scene file at `path`.
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub fn read(path: &Path) -> Result<Self, SceneErrors> {
+        read_text(path).and_then(|text| Self::parse(text, &path.display().to_string()))
+    }
+
+    /// Reads and checks a scene from `text`; messages call it `name`.
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub fn parse(text: String, name: &str) -> Result<Self, SceneErrors> {
+        let scene = Scene::parse(&text, name)?;
+        Ok(Self { name: name.to_string(), origin: (text.clone(), scene.clone()), text, scene })
+    }
+
+    /// A new file for `scene`, which has no faults; messages call it `name`.
+    pub fn new(scene: &Scene, name: &str) -> Self {
+        let text = new_text(String::new(), &Scene::default(), scene);
+        Self {
+            name: name.to_string(),
+            origin: (text.clone(), scene.clone()),
+            text,
+            scene: scene.clone(),
+        }
+    }
+
+    /// Makes the text describe `scene`, which has no faults.
+    pub fn apply(&mut self, scene: &Scene) {
+        let (text, old) = &self.origin;
+        self.text = if scene == old { text.clone() } else { new_text(text.clone(), old, scene) };
+        self.scene = scene.clone();
+    }
+
+    /// What messages call the file.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The scene that the text describes.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The text, as it stands in the file.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// [`Scene::warnings`] with file, line and column, in the order of the file.
+    pub fn warnings(&self) -> Vec<Message> {
+        located(&self.name, &self.text, self.scene.warnings())
+    }
+}
+
+/// `text`, which describes `old`, made to describe `new`. Line ends stay what they are if they are all
+/// alike (a mixture becomes LF); a byte order mark and a missing line end at the end of the file stay.
+fn new_text(text: String, old: &Scene, new: &Scene) -> String {
+    let (mark, body) = match text.strip_prefix('\u{feff}') {
+        Some(body) => ("\u{feff}", body),
+        None => ("", text.as_str()),
+    };
+    let crlf = body.contains('\n') && body.matches('\n').count() == body.matches("\r\n").count();
+    let open_end = !body.is_empty() && !body.ends_with('\n');
+    // The text was read as a scene, and a scene has no value that TOML lacks: neither can fail.
+    let mut document: DocumentMut = body.replace("\r\n", "\n").parse().expect("text that was read");
+    let tree = |scene| toml::Table::try_from(scene).expect("a scene is a TOML table");
+    rewrite(&mut document, &tree(old), &tree(new));
+    let mut body = document.to_string();
+    if body.starts_with("\n[") {
+        body.remove(0);
+    }
+    if open_end && body.ends_with('\n') {
+        body.pop();
+    }
+    if crlf {
+        body = body.replace('\n', "\r\n");
+    }
+    mark.to_string() + &body
+}

@@ -1,0 +1,94 @@
+//! What people read when something about a scene file is wrong or dubious.
+
+use crate::value::printable;
+use std::fmt;
+
+/// One message: where, about what, what was found, what would be right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// The file, as the user named it.
+    pub file: String,
+    /// Line and column, from 1; columns count characters. `None`: the file as a whole.
+    pub place: Option<(usize, usize)>,
+    /// What it is about: `object "queen"`; empty: the scene.
+    pub subject: String,
+    /// What was found, as a phrase.
+    pub found: String,
+    /// What would be right, and the remedy, in sentences; may be empty.
+    pub help: String,
+}
+
+/// Widest indentation of the second line.
+const MAX_INDENT: usize = 24;
+
+impl fmt::Display for Message {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let mut head = printable(&self.file);
+        if let Some((line, column)) = self.place {
+            head += &format!(":{line}:{column}");
+        }
+        head += "  ";
+        let indent = head.chars().count().min(MAX_INDENT);
+        if !self.subject.is_empty() {
+            head += &printable(&self.subject);
+            head += ": ";
+        }
+        write!(f, "{head}{}.", printable(&self.found))?;
+        if !self.help.is_empty() {
+            write!(f, "\n{:indent$}{}", "", printable(&self.help))?;
+        }
+        Ok(())
+    }
+}
+
+/// Everything wrong with a scene file: one message at least, in the order of the file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SceneErrors {
+    messages: Vec<Message>,
+}
+
+/// More messages than this help nobody at once.
+const MAX_SHOWN: usize = 20;
+
+impl SceneErrors {
+    /// Sorts `messages` by place; there is at least one.
+    pub(super) fn new(mut messages: Vec<Message>) -> Self {
+        debug_assert!(!messages.is_empty(), "errors without a message");
+        messages.sort_by_key(|m| m.place);
+        messages.dedup();
+        Self { messages }
+    }
+
+    /// About the file as a whole.
+    pub(super) fn of_file(file: &str, found: String, help: &str) -> Self {
+        Self::at(file, None, found, help)
+    }
+
+    /// About one place in the file.
+    pub(super) fn at(file: &str, place: Option<(usize, usize)>, found: String, help: &str) -> Self {
+        let (file, help) = (file.to_string(), help.to_string());
+        Self { messages: vec![Message { file, place, subject: String::new(), found, help }] }
+    }
+
+    /// The messages, in the order of the file.
+    pub fn messages(&self) -> &[Message] {
+        &self.messages
+    }
+}
+
+impl fmt::Display for SceneErrors {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for (i, message) in self.messages.iter().take(MAX_SHOWN).enumerate() {
+            if i > 0 {
+                f.write_str("\n")?;
+            }
+            message.fmt(f)?;
+        }
+        match self.messages.len().saturating_sub(MAX_SHOWN) {
+            0 => Ok(()),
+            more => write!(f, "\n… and {more} more."),
+        }
+    }
+}
+
+impl std::error::Error for SceneErrors {}

@@ -1,0 +1,209 @@
+//! Transforms: steps that move, turn and scale an object, one after the other.
+
+use crate::value::{Checks, Fault, Field, Range, Takes, sin_cos_degrees};
+use glam::{DAffine3, DMat3, DVec3};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::fmt;
+
+/// One step. Angles are in degrees and turn counter-clockwise for one who looks against the axis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Step {
+    /// Moves by this vector.
+    Translate([f64; 3]),
+    /// Turns about the x axis.
+    RotateX(f64),
+    /// Turns about the y axis, the vertical: counter-clockwise seen from above.
+    RotateY(f64),
+    /// Turns about the z axis.
+    RotateZ(f64),
+    /// Turns about any axis through the origin.
+    Rotate(Rotate),
+    /// Scales away from the origin.
+    Scale(Scale),
+}
+
+/// A turn about an axis through the origin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rotate {
+    /// Direction of the axis; any length but 0.
+    pub axis: [f64; 3],
+    /// Angle [degrees].
+    pub degrees: f64,
+}
+
+/// Factors along x, y and z. In files one number stands for three that are equal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale(pub [f64; 3]);
+
+impl Serialize for Scale {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let [x, y, z] = self.0;
+        if x == y && y == z { serializer.serialize_f64(x) } else { self.0.serialize(serializer) }
+    }
+}
+
+struct ScaleVisitor;
+
+impl<'de> de::Visitor<'de> for ScaleVisitor {
+    type Value = Scale;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("a number or a list of three")
+    }
+
+    fn visit_f64<E: de::Error>(self, factor: f64) -> Result<Scale, E> {
+        Ok(Scale([factor; 3]))
+    }
+
+    fn visit_i64<E: de::Error>(self, factor: i64) -> Result<Scale, E> {
+        Ok(Scale([factor as f64; 3]))
+    }
+
+    fn visit_seq<A: de::SeqAccess<'de>>(self, seq: A) -> Result<Scale, A::Error> {
+        Deserialize::deserialize(de::value::SeqAccessDeserializer::new(seq)).map(Scale)
+    }
+}
+
+impl<'de> Deserialize<'de> for Scale {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ScaleVisitor)
+    }
+}
+
+/// The keys of a step; each step has exactly one.
+pub const STEP_FIELDS: &[Field] = &[
+    Field::required(
+        "translate",
+        Takes::Numbers(3, Range::COORDINATE),
+        "scene units",
+        "Moves by this vector.",
+    ),
+    Field::required("rotate_x", ANGLE, "degrees", "Turns about the x axis."),
+    Field::required(
+        "rotate_y",
+        ANGLE,
+        "degrees",
+        "Turns about the y axis, the vertical: counter-clockwise seen from above.",
+    ),
+    Field::required("rotate_z", ANGLE, "degrees", "Turns about the z axis."),
+    Field::required(
+        "rotate",
+        Takes::Table(ROTATE_FIELDS),
+        "",
+        "Turns about any axis through the origin.",
+    ),
+    Field::required("scale", Takes::Factor, "", "Scales away from the origin; negative: mirrors."),
+];
+
+const ANGLE: Takes = Takes::Number(Range::FINITE);
+const ROTATE_FIELDS: &[Field] = &[
+    Field::required("axis", Takes::Direction, "", "Direction of the axis."),
+    Field::required("degrees", ANGLE, "degrees", "Angle, counter-clockwise against the axis."),
+];
+
+impl Step {
+    /// The step as a map. Of a step without faults.
+    pub fn map(&self) -> DAffine3 {
+        match *self {
+            Self::Translate(by) => DAffine3::from_translation(DVec3::from_array(by)),
+            Self::RotateX(degrees) => turn(DVec3::X, degrees),
+            Self::RotateY(degrees) => turn(DVec3::Y, degrees),
+            Self::RotateZ(degrees) => turn(DVec3::Z, degrees),
+            Self::Rotate(Rotate { axis, degrees }) => {
+                let axis = DVec3::from_array(axis);
+                turn((axis / axis.abs().max_element()).normalize(), degrees)
+            }
+            Self::Scale(Scale(by)) => DAffine3::from_scale(DVec3::from_array(by)),
+        }
+    }
+
+    /// What is wrong with it.
+    pub fn faults(&self) -> Vec<Fault> {
+        let checks = Checks::new(STEP_FIELDS);
+        match self {
+            Self::Translate(by) => checks.numbers("translate", by),
+            Self::RotateX(degrees) => checks.numbers("rotate_x", &[*degrees]),
+            Self::RotateY(degrees) => checks.numbers("rotate_y", &[*degrees]),
+            Self::RotateZ(degrees) => checks.numbers("rotate_z", &[*degrees]),
+            Self::Rotate(Rotate { axis, degrees }) => checks.inner(
+                "rotate",
+                Checks::new(ROTATE_FIELDS)
+                    .numbers("axis", axis)
+                    .numbers("degrees", &[*degrees])
+                    .faults(),
+            ),
+            Self::Scale(Scale([x, y, z])) if x == y && y == z => checks.numbers("scale", &[*x]),
+            Self::Scale(Scale(by)) => checks.numbers("scale", by),
+        }
+        .faults()
+    }
+}
+
+/// Rodrigues' rotation about the unit vector `axis`: exact at quarter turns about the coordinate axes.
+fn turn(axis: DVec3, degrees: f64) -> DAffine3 {
+    let (sin, cos) = sin_cos_degrees(degrees);
+    let turned = |v: DVec3| v * cos + axis.cross(v) * sin + axis * (axis.dot(v) * (1.0 - cos));
+    DAffine3::from_mat3(DMat3::from_cols(turned(DVec3::X), turned(DVec3::Y), turned(DVec3::Z)))
+}
+
+/// Whether an affine map can be undone without losing all digits: finite, and no direction stretched
+/// more than 1e12 times as much as another.
+pub(super) fn is_sound(map: &DAffine3) -> bool {
+    let linear = map.matrix3;
+    let largest = linear.to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    if !map.is_finite() || !(1e-12..=1e12).contains(&largest) {
+        return false;
+    }
+    let inverse = (linear * largest.recip()).inverse();
+    inverse.is_finite() && inverse.to_cols_array().iter().all(|x| x.abs() <= 1e12)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(a: DVec3, b: DVec3) -> bool {
+        (a - b).length() < 1e-14
+    }
+
+    #[test]
+    fn turns_go_counter_clockwise_against_the_axis() {
+        assert_eq!(Step::RotateX(90.0).map().transform_point3(DVec3::Y), DVec3::Z);
+        assert_eq!(Step::RotateY(90.0).map().transform_point3(DVec3::Z), DVec3::X);
+        assert_eq!(Step::RotateZ(90.0).map().transform_point3(DVec3::X), DVec3::Y);
+        let third = Step::Rotate(Rotate { axis: [2.0; 3], degrees: 120.0 }).map();
+        assert!(near(third.transform_point3(DVec3::X), DVec3::Y));
+        let half = Step::RotateY(30.0).map().transform_point3(DVec3::X);
+        assert!(near(half, DVec3::new(0.75f64.sqrt(), 0.0, -0.5)), "{half}");
+    }
+
+    #[test]
+    fn zero_factors_and_axes_are_faults() {
+        for (step, key) in [
+            (Step::Scale(Scale([0.0; 3])), "scale"),
+            (Step::Scale(Scale([1.0, 0.0, 1.0])), "scale"),
+            (Step::Rotate(Rotate { axis: [0.0; 3], degrees: 1.0 }), "rotate.axis"),
+            (Step::Rotate(Rotate { axis: [1.0; 3], degrees: f64::NAN }), "rotate.degrees"),
+            (Step::Translate([1e10, 0.0, 0.0]), "translate"),
+            (Step::RotateX(f64::INFINITY), "rotate_x"),
+            (Step::RotateY(f64::NAN), "rotate_y"),
+            (Step::RotateZ(f64::NAN), "rotate_z"),
+        ] {
+            let keys: Vec<_> = step.faults().into_iter().map(|f| f.key).collect();
+            assert_eq!(keys, [key], "{step:?}");
+        }
+        assert!(Step::Scale(Scale([-1.0, 1.0, 2.0])).faults().is_empty());
+    }
+
+    #[test]
+    fn soundness_looks_at_ratios() {
+        let scaled = |x, y, z| DAffine3::from_scale(DVec3::new(x, y, z));
+        assert!(is_sound(&scaled(1e-6, 1e-6, 1e-6)));
+        assert!(is_sound(&scaled(1e5, 1e-5, -1.0)));
+        assert!(!is_sound(&scaled(1e7, 1e-7, 1.0)));
+        assert!(!is_sound(&scaled(1e-200, 1e-200, 1e-200)));
+        assert!(!is_sound(&scaled(1.0, 0.0, 1.0)));
+    }
+}

@@ -1,0 +1,62 @@
+//! Cube, standing upright.
+
+use super::upright::upright;
+use super::{Form, Kind};
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// A cube. Unturned it spans x to x + edge, y to y + edge and z - edge to z from its corner
+/// (x, y, z).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cube {
+    /// Lower left near corner before the rotation; near is +z.
+    pub corner: [f64; 3],
+    /// Length of an edge.
+    pub edge: f64,
+    /// Degrees about the vertical through the centre, counter-clockwise seen from above.
+    #[serde(default)]
+    pub rotation: f64,
+}
+
+impl Kind for Cube {
+    const DOC: &'static str = "A cube that stands upright.";
+    const EXAMPLE: &'static str =
+        "shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0, rotation = 30.0 }";
+    const FIELDS: &'static [Field] = &[
+        Field::required(
+            "corner",
+            Takes::Numbers(3, Range::COORDINATE),
+            "scene units",
+            "Lower left near corner, before the rotation (near is +z).",
+        ),
+        Field::required("edge", Takes::Number(Range::SIZE), "scene units", "Length of an edge."),
+        Field::preset(
+            "rotation",
+            Takes::Number(Range::FINITE),
+            "degrees",
+            "0.0",
+            "Turn about the vertical through the centre, counter-clockwise seen from above.",
+        ),
+    ];
+
+    fn form(&self) -> Form {
+        let e = self.edge;
+        upright(DVec3::from_array(self.corner), &square(e), e, 1.0, self.rotation)
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        Checks::new(Self::FIELDS)
+            .numbers("corner", &self.corner)
+            .numbers("edge", &[self.edge])
+            .numbers("rotation", &[self.rotation])
+            .ratio(&[("edge", self.edge)], &self.corner)
+            .faults()
+    }
+}
+
+/// A square base with its lower left near corner at the origin.
+pub(super) fn square(side: f64) -> [DVec2; 4] {
+    [(0.0, 0.0), (side, 0.0), (side, -side), (0.0, -side)].map(DVec2::from)
+}

@@ -1,0 +1,56 @@
+//! Box with sides parallel to the axes.
+//!
+//! Centre and sizes, like platform and rectangle: one key moves it, and no pair of corners can be
+//! given inside out. A `transform` turns it.
+
+use super::upright::upright;
+use super::{Form, Kind};
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// A box with sides parallel to the axes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cuboid {
+    /// Centre of the solid.
+    pub center: [f64; 3],
+    /// Lengths along x, y and z.
+    pub size: [f64; 3],
+}
+
+impl Kind for Cuboid {
+    const DOC: &'static str =
+        "A box with sides parallel to the axes; an object's `transform` can turn it.";
+    const EXAMPLE: &'static str =
+        "shape.box = { center = [0.0, 0.5, 0.0], size = [2.0, 1.0, 0.5] }";
+    const FIELDS: &'static [Field] = &[
+        Field::required(
+            "center",
+            Takes::Numbers(3, Range::COORDINATE),
+            "scene units",
+            "Centre of the solid.",
+        ),
+        Field::required(
+            "size",
+            Takes::Numbers(3, Range::SIZE),
+            "scene units",
+            "Lengths along x, y and z.",
+        ),
+    ];
+
+    fn form(&self) -> Form {
+        let [x, y, z] = self.size;
+        let corner = DVec3::from_array(self.center) + DVec3::new(-x, -y, z) / 2.0;
+        let base = [(0.0, 0.0), (x, 0.0), (x, -z), (0.0, -z)].map(DVec2::from);
+        upright(corner, &base, y, 1.0, 0.0)
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        Checks::new(Self::FIELDS)
+            .numbers("center", &self.center)
+            .numbers("size", &self.size)
+            .ratio(&self.size.map(|s| ("size", s)), &self.center)
+            .faults()
+    }
+}

@@ -1,0 +1,45 @@
+//! Infinite plane.
+
+use super::{Form, Kind};
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// A plane without end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// Any point of it.
+    pub point: [f64; 3],
+    /// Direction in which the front faces; any length but 0.
+    pub normal: [f64; 3],
+}
+
+impl Kind for Plane {
+    const DOC: &'static str = "A plane without end. Its front is the side that `normal` points to.";
+    const EXAMPLE: &'static str =
+        "shape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }";
+    const FIELDS: &'static [Field] = &[
+        Field::required(
+            "point",
+            Takes::Numbers(3, Range::COORDINATE),
+            "scene units",
+            "Any point of the plane.",
+        ),
+        Field::required("normal", Takes::Direction, "", "Direction in which the front faces."),
+    ];
+
+    fn form(&self) -> Form {
+        let normal = DVec3::from_array(self.normal);
+        // First to length about 1, so that the square of no length over- or underflows.
+        let normal = (normal / normal.abs().max_element()).normalize();
+        Form::Plane { normal, offset: normal.dot(DVec3::from_array(self.point)) }
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        Checks::new(Self::FIELDS)
+            .numbers("point", &self.point)
+            .numbers("normal", &self.normal)
+            .faults()
+    }
+}

@@ -1,0 +1,49 @@
+//! Platform: the ground that things stand on.
+
+use super::{Form, Kind};
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// A horizontal rectangle that faces up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Platform {
+    /// Centre.
+    pub center: [f64; 3],
+    /// Lengths along x and z.
+    pub size: [f64; 2],
+}
+
+impl Kind for Platform {
+    const DOC: &'static str =
+        "A horizontal rectangle that faces up: the ground that things stand on.";
+    const EXAMPLE: &'static str =
+        "shape.platform = { center = [0.0, 0.0, 0.0], size = [8.0, 8.0] }";
+    const FIELDS: &'static [Field] = &[
+        Field::required("center", Takes::Numbers(3, Range::COORDINATE), "scene units", "Centre."),
+        Field::required(
+            "size",
+            Takes::Numbers(2, Range::SIZE),
+            "scene units",
+            "Lengths along x and z.",
+        ),
+    ];
+
+    fn form(&self) -> Form {
+        let [x, z] = self.size;
+        Form::Parallelogram {
+            corner: DVec3::from_array(self.center) - DVec3::new(x, 0.0, z) / 2.0,
+            u: DVec3::new(0.0, 0.0, z),
+            v: DVec3::new(x, 0.0, 0.0),
+        }
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        Checks::new(Self::FIELDS)
+            .numbers("center", &self.center)
+            .numbers("size", &self.size)
+            .ratio(&self.size.map(|s| ("size", s)), &self.center)
+            .faults()
+    }
+}

@@ -1,0 +1,63 @@
+//! Right prism over a regular triangle.
+
+use super::upright::upright;
+use super::{Form, Kind};
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// A right prism. Unturned, an edge of its base runs from the corner along +x and the third vertex
+/// lies towards -z.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Prism {
+    /// Lower left near corner of the base before the rotation; near is +z.
+    pub corner: [f64; 3],
+    /// Side of the base.
+    pub side: f64,
+    /// Height.
+    pub height: f64,
+    /// Degrees about the vertical through the base's centroid, counter-clockwise seen from above.
+    #[serde(default)]
+    pub rotation: f64,
+}
+
+impl Kind for Prism {
+    const DOC: &'static str = "A right prism on a base with three equal sides. Unturned, the base has an edge along +x from \
+         `corner` and its third vertex towards -z.";
+    const EXAMPLE: &'static str =
+        "shape.prism = { corner = [-0.5, 0.0, 0.3], side = 1.0, height = 1.2 }";
+    const FIELDS: &'static [Field] = &[
+        Field::required(
+            "corner",
+            Takes::Numbers(3, Range::COORDINATE),
+            "scene units",
+            "Lower left near corner of the base, before the rotation (near is +z).",
+        ),
+        Field::required("side", Takes::Number(Range::SIZE), "scene units", "Side of the base."),
+        Field::required("height", Takes::Number(Range::SIZE), "scene units", "Height."),
+        Field::preset(
+            "rotation",
+            Takes::Number(Range::FINITE),
+            "degrees",
+            "0.0",
+            "Turn about the vertical through the base's centroid, counter-clockwise seen from above.",
+        ),
+    ];
+
+    fn form(&self) -> Form {
+        let s = self.side;
+        let base = [(0.0, 0.0), (s, 0.0), (s / 2.0, -s * 0.75f64.sqrt())].map(DVec2::from);
+        upright(DVec3::from_array(self.corner), &base, self.height, 1.0, self.rotation)
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        Checks::new(Self::FIELDS)
+            .numbers("corner", &self.corner)
+            .numbers("side", &[self.side])
+            .numbers("height", &[self.height])
+            .numbers("rotation", &[self.rotation])
+            .ratio(&[("side", self.side), ("height", self.height)], &self.corner)
+            .faults()
+    }
+}

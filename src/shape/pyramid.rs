@@ -1,0 +1,80 @@
+//! Regular pyramid with a square base, whole or truncated.
+
+use super::cube::square;
+use super::upright::upright;
+use super::{Form, Kind};
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// A pyramid of height `apex_height`, cut off at `height`. If `apex_height` is not larger than
+/// `height` nothing is cut off: an ordinary pyramid whose height is the smaller of the two.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pyramid {
+    /// Lower left near corner of the base before the rotation; near is +z.
+    pub corner: [f64; 3],
+    /// Side of the base.
+    pub side: f64,
+    /// Height of the untruncated pyramid.
+    pub apex_height: f64,
+    /// Height of the truncated one.
+    pub height: f64,
+    /// Degrees about the vertical through the base's centre, counter-clockwise seen from above.
+    #[serde(default)]
+    pub rotation: f64,
+}
+
+impl Kind for Pyramid {
+    const DOC: &'static str = "A regular pyramid on a square base, truncated at `height`. If `apex_height` is not larger \
+         than `height`, it is an ordinary pyramid whose height is the smaller of the two.";
+    const EXAMPLE: &'static str = "shape.pyramid = { corner = [-0.5, 0.0, 0.5], side = 1.0, apex_height = 1.5, height = 0.8 }";
+    const FIELDS: &'static [Field] = &[
+        Field::required(
+            "corner",
+            Takes::Numbers(3, Range::COORDINATE),
+            "scene units",
+            "Lower left near corner of the base, before the rotation (near is +z).",
+        ),
+        Field::required("side", Takes::Number(Range::SIZE), "scene units", "Side of the base."),
+        Field::required(
+            "apex_height",
+            Takes::Number(Range::SIZE),
+            "scene units",
+            "Height of the untruncated pyramid.",
+        ),
+        Field::required(
+            "height",
+            Takes::Number(Range::SIZE),
+            "scene units",
+            "Height of the truncated pyramid.",
+        ),
+        Field::preset(
+            "rotation",
+            Takes::Number(Range::FINITE),
+            "degrees",
+            "0.0",
+            "Turn about the vertical through the base's centre, counter-clockwise seen from above.",
+        ),
+    ];
+
+    fn form(&self) -> Form {
+        let height = self.height.min(self.apex_height);
+        let top_over_base = (self.apex_height - height) / self.apex_height;
+        let corner = DVec3::from_array(self.corner);
+        upright(corner, &square(self.side), height, top_over_base, self.rotation)
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        let sizes =
+            [("side", self.side), ("apex_height", self.apex_height), ("height", self.height)];
+        Checks::new(Self::FIELDS)
+            .numbers("corner", &self.corner)
+            .numbers("side", &[self.side])
+            .numbers("apex_height", &[self.apex_height])
+            .numbers("height", &[self.height])
+            .numbers("rotation", &[self.rotation])
+            .ratio(&sizes, &self.corner)
+            .faults()
+    }
+}

@@ -1,0 +1,37 @@
+//! Sphere: the points at distance `radius` from `center`.
+
+use super::{Form, Kind};
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// A sphere.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sphere {
+    /// Centre.
+    pub center: [f64; 3],
+    /// Radius.
+    pub radius: f64,
+}
+
+impl Kind for Sphere {
+    const DOC: &'static str = "A sphere.";
+    const EXAMPLE: &'static str = "shape.sphere = { center = [0.0, 1.0, 0.0], radius = 1.0 }";
+    const FIELDS: &'static [Field] = &[
+        Field::required("center", Takes::Numbers(3, Range::COORDINATE), "scene units", "Centre."),
+        Field::required("radius", Takes::Number(Range::SIZE), "scene units", "Radius."),
+    ];
+
+    fn form(&self) -> Form {
+        Form::Sphere { center: DVec3::from_array(self.center), radius: self.radius }
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        Checks::new(Self::FIELDS)
+            .numbers("center", &self.center)
+            .numbers("radius", &[self.radius])
+            .ratio(&[("radius", self.radius)], &self.center)
+            .faults()
+    }
+}

@@ -1,0 +1,158 @@
+//! Tables of what may be written: one [`Field`] a key. Reading, messages, range checks, the generated
+//! reference and every form that edits a description use the same tables.
+
+use super::Range;
+use std::fmt;
+
+/// One key of a description.
+#[derive(Clone, Copy, Debug)]
+pub struct Field {
+    /// The key.
+    pub name: &'static str,
+    /// What may stand behind it.
+    pub takes: Takes,
+    /// Unit of its numbers; empty: none.
+    pub unit: &'static str,
+    /// What holds if it is left out.
+    pub preset: Preset,
+    /// What it is, in a sentence.
+    pub doc: &'static str,
+}
+
+/// What holds if a key is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// It must not be left out.
+    Required,
+    /// This value, as TOML text.
+    Is(&'static str),
+    /// No value; the phrase says what happens then.
+    Without(&'static str),
+}
+
+/// A word out of a fixed set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// The word.
+    pub name: &'static str,
+    /// What it means.
+    pub doc: &'static str,
+}
+
+/// What may stand behind a key.
+#[derive(Clone, Copy, Debug)]
+pub enum Takes {
+    /// A string.
+    Text,
+    /// `true` or `false`.
+    Switch,
+    /// One of these words.
+    Choice(&'static [Choice]),
+    /// A whole number.
+    Whole(Range),
+    /// That many whole numbers.
+    Wholes(usize, Range),
+    /// A number.
+    Number(Range),
+    /// That many numbers, each in the range.
+    Numbers(usize, Range),
+    /// Three numbers that are not all zero; the length does not matter.
+    Direction,
+    /// A factor other than zero, or three.
+    Factor,
+    /// A linear colour or `"#rrggbb"`; each channel in the range.
+    Color(Range),
+    /// A table with these keys.
+    Table(&'static [Field]),
+    /// A table with exactly one of these keys.
+    OneOf(&'static [Field]),
+    /// A list of tables, each with exactly one of these keys.
+    ListOf(&'static [Field]),
+    /// `[[name]]` tables with these keys.
+    Tables(&'static [Field]),
+    /// `[name.ANY]` tables with these keys.
+    Named(&'static [Field]),
+}
+
+impl Field {
+    /// A key that must be given.
+    pub const fn required(
+        name: &'static str,
+        takes: Takes,
+        unit: &'static str,
+        doc: &'static str,
+    ) -> Self {
+        Self { name, takes, unit, preset: Preset::Required, doc }
+    }
+
+    /// A key with a default, given as TOML text.
+    pub const fn preset(
+        name: &'static str,
+        takes: Takes,
+        unit: &'static str,
+        value: &'static str,
+        doc: &'static str,
+    ) -> Self {
+        Self { name, takes, unit, preset: Preset::Is(value), doc }
+    }
+
+    /// A key that may be left out and has no value then.
+    pub const fn without(
+        name: &'static str,
+        takes: Takes,
+        unit: &'static str,
+        instead: &'static str,
+        doc: &'static str,
+    ) -> Self {
+        Self { name, takes, unit, preset: Preset::Without(instead), doc }
+    }
+}
+
+const COUNTS: [&str; 5] = ["no", "one", "two", "three", "four"];
+
+/// As the object of "Expected": `a number from 0 to 1`.
+impl fmt::Display for Takes {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Text => f.write_str("a string in quotes"),
+            Self::Switch => f.write_str("true or false"),
+            Self::Choice(choices) => {
+                let words: Vec<_> = choices.iter().map(|c| format!("\"{}\"", c.name)).collect();
+                write!(f, "{}", alternatives(&words))
+            }
+            Self::Whole(range) => write!(f, "a whole number {range}"),
+            Self::Wholes(n, range) => {
+                write!(f, "a list of {} whole numbers, each {range}", COUNTS[*n])
+            }
+            Self::Number(range) => write!(f, "a number {range}"),
+            Self::Numbers(n, range) => {
+                write!(f, "a list of {} numbers, each {range}", COUNTS[*n])
+            }
+            Self::Direction => f.write_str("a list of three numbers that are not all zero"),
+            Self::Factor => f.write_str("a number other than 0, or a list of three such numbers"),
+            Self::Color(range) => write!(
+                f,
+                "a linear colour [red, green, blue], each {range}, or an sRGB colour \"#rrggbb\""
+            ),
+            Self::Table(fields) => write!(f, "a table with the keys {}", names(fields)),
+            Self::OneOf(fields) => write!(f, "a table with exactly one of: {}", names(fields)),
+            Self::ListOf(fields) => {
+                write!(f, "a list of tables, each with exactly one of: {}", names(fields))
+            }
+            Self::Tables(_) => f.write_str("tables in double brackets"),
+            Self::Named(_) => f.write_str("named tables"),
+        }
+    }
+}
+
+fn names(fields: &[Field]) -> String {
+    fields.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
+}
+
+fn alternatives(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [only] => only.clone(),
+        [head @ .., last] => format!("{} or {last}", head.join(", ")),
+    }
+}

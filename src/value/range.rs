@@ -1,0 +1,112 @@
+//! Intervals that a number may lie in.
+
+use std::fmt;
+
+/// An interval of finite numbers. Neither NaN nor an infinity lies in any.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Lower end; negative infinity: none.
+    pub low: f64,
+    /// Whether `low` itself is in.
+    pub low_in: bool,
+    /// Upper end; infinity: none.
+    pub high: f64,
+    /// Whether `high` itself is in.
+    pub high_in: bool,
+}
+
+/// Largest coordinate and largest size that geometry is promised to be accurate for.
+const FARTHEST: f64 = 1e9;
+
+impl Range {
+    /// Any finite number.
+    pub const FINITE: Self =
+        Self { low: f64::NEG_INFINITY, low_in: false, high: f64::INFINITY, high_in: false };
+    /// A coordinate: from -1e9 to 1e9.
+    pub const COORDINATE: Self = Self::closed(-FARTHEST, FARTHEST);
+    /// A size: greater than 0, at most 1e9.
+    pub const SIZE: Self = Self::above(0.0, FARTHEST);
+    /// A share: from 0 to 1.
+    pub const SHARE: Self = Self::closed(0.0, 1.0);
+
+    /// A coefficient or a body colour: sums above 1 are legal.
+    pub const COEFFICIENT: Self = Self::closed(0.0, 1e6);
+    /// An amount of light.
+    pub const LIGHT: Self = Self::closed(0.0, 1e15);
+
+    /// From `low` to `high`, both in.
+    pub const fn closed(low: f64, high: f64) -> Self {
+        Self { low, low_in: true, high, high_in: true }
+    }
+
+    /// Greater than `low`, at most `high`.
+    pub const fn above(low: f64, high: f64) -> Self {
+        Self { low, low_in: false, high, high_in: true }
+    }
+
+    /// Between `low` and `high`, neither in.
+    pub const fn between(low: f64, high: f64) -> Self {
+        Self { low, low_in: false, high, high_in: false }
+    }
+
+    /// Whether `x` lies in it.
+    pub fn holds(&self, x: f64) -> bool {
+        x.is_finite()
+            && (x > self.low || self.low_in && x == self.low)
+            && (x < self.high || self.high_in && x == self.high)
+    }
+}
+
+/// As the end of a phrase: `a number` ... `from 0 to 1`.
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let (low, high) = (number(self.low), number(self.high));
+        match (self.low.is_finite(), self.low_in, self.high.is_finite(), self.high_in) {
+            (false, _, false, _) => f.write_str("(finite)"),
+            (true, true, true, true) => write!(f, "from {low} to {high}"),
+            (true, false, true, false) => {
+                write!(f, "between {low} and {high} ({low} and {high} are excluded)")
+            }
+            (true, false, true, true) => write!(f, "greater than {low}, at most {high}"),
+            (true, true, true, false) => write!(f, "at least {low}, less than {high}"),
+            (true, low_in, false, _) => {
+                write!(f, "{} {low}", if low_in { "of at least" } else { "greater than" })
+            }
+            (false, _, true, high_in) => {
+                write!(f, "{} {high}", if high_in { "of at most" } else { "less than" })
+            }
+        }
+    }
+}
+
+/// A number as people write it: `0.5`, `-3`, `1e9`, `NaN`, and never three hundred digits.
+pub fn number(x: f64) -> String {
+    let plain = x == 0.0 || !x.is_finite() || (1e-4..1e6).contains(&x.abs());
+    if plain { format!("{x}") } else { format!("{x:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Range, number};
+
+    #[test]
+    fn ends_count_as_told() {
+        for (range, inside, outside) in [
+            (Range::SHARE, vec![0.0, 0.5, 1.0], vec![-1e-300, 1.0 + 1e-15]),
+            (Range::SIZE, vec![5e-324, 1e9], vec![0.0, -1.0, 1.1e9]),
+            (Range::between(0.0, 180.0), vec![1e-9, 179.9], vec![0.0, 180.0]),
+            (Range::FINITE, vec![f64::MAX, f64::MIN], vec![]),
+        ] {
+            assert!(inside.iter().all(|x| range.holds(*x)), "{range}");
+            for x in outside.into_iter().chain([f64::NAN, f64::INFINITY, f64::NEG_INFINITY]) {
+                assert!(!range.holds(x), "{x} {range}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_read_well() {
+        let shown: Vec<_> = [0.5, -3.0, 1e9, f64::NAN, 1e-300, 0.0].map(number).into();
+        assert_eq!(shown, ["0.5", "-3", "1e9", "NaN", "1e-300", "0"]);
+    }
+}

@@ -1,0 +1,60 @@
+//! Text from outside on its way to a terminal.
+
+use std::fmt::Write as _;
+
+/// `text` with every character replaced that could steer a terminal or hide: control characters,
+/// line ends, directional and invisible formatting characters become `\u{..}` escapes.
+pub fn printable(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\n' => out.push_str("\\n"),
+            '\r' => out.push_str("\\r"),
+            '\t' => out.push_str("\\t"),
+            _ if c.is_control() || steers(c) => {
+                // Writing into a String cannot fail.
+                let _ = write!(out, "{}", c.escape_unicode());
+            }
+            _ => out.push(c),
+        }
+    }
+    out
+}
+
+/// Format characters (Unicode category Cf, and the line and paragraph separators): they reorder or
+/// vanish, so that a name on screen is not the name in the file.
+fn steers(c: char) -> bool {
+    matches!(c,
+        '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
+        | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}'
+        | '\u{e0000}'..='\u{e007f}')
+}
+
+/// The first 40 characters of `text`, printable, with an ellipsis if there was more.
+pub fn excerpt(text: &str) -> String {
+    let mut rest = text.char_indices().skip(40);
+    match rest.next() {
+        Some((end, _)) => printable(&text[..end]) + "…",
+        None => printable(text),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{excerpt, printable};
+
+    #[test]
+    fn nothing_that_steers_a_terminal_passes() {
+        assert_eq!(
+            printable("a\x1b[31mé\u{9b}\u{202e}\n\u{7f}"),
+            "a\\u{1b}[31mé\\u{9b}\\u{202e}\\n\\u{7f}"
+        );
+        assert_eq!(printable("Ölkanne \"x\" 鏡"), "Ölkanne \"x\" 鏡");
+    }
+
+    #[test]
+    fn excerpts_are_short() {
+        assert_eq!(excerpt("short"), "short");
+        assert_eq!(excerpt(&"ä".repeat(100)).chars().count(), 41);
+    }
+}

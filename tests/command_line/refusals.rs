@@ -1,0 +1,87 @@
+//! What the program refuses, with which status and words, and that it leaves everything as it was.
+
+use super::*;
+
+#[test]
+fn usage_errors_have_status_2_and_touch_nothing() {
+    let desk = Desk::new();
+    for (args, word) in [
+        (&["render", "scene.toml", "-o", "a.jpg"] as &[&str], ".png"),
+        (&["render", "scene.toml", "-o", "a"], ".png"),
+        (&["render", "scene.toml"], "--output"),
+        (&["render", "scene.toml", "-o", "a.png", "--size", "0x0"], "--size"),
+        (&["render", "scene.toml", "-o", "a.png", "--size", "99999x99999"], "--size"),
+        (&["render", "scene.toml", "-o", "a.png", "--noise", "-1"], "greater than 0"),
+        (&["render", "scene.toml", "-o", "a.png", "--tone", "film"], "neutral"),
+        (&["polish"], "zerkalo render polish"),
+        (&[], "zerkalo render"),
+    ] {
+        let run = desk.run(args);
+        assert_eq!(run.status, 2, "{args:?}: {}", run.err);
+        assert!(run.err.contains(word), "{args:?}: no {word:?} in {:?}", run.err);
+    }
+    assert_eq!(desk.files(), ["scene.toml"]);
+}
+
+#[test]
+fn failures_have_status_1_a_located_message_and_leave_the_old_picture() {
+    let desk = Desk::new();
+    fs::write(desk.path("old.png"), "precious").unwrap();
+    fs::write(desk.path("bad.toml"), SCENE.replace("radius = 0.5", "radius = -0.5")).unwrap();
+    fs::write(desk.path("file"), "").unwrap();
+    for (args, word) in [
+        (&["render", "bad.toml", "-o", "old.png"] as &[&str], "bad.toml:21:"),
+        (&["render", "none.toml", "-o", "old.png"], "none.toml"),
+        (&["render", ".", "-o", "old.png"], "directory"),
+        (&["render", "scene.toml", "-o", "none/a.png"], "none"),
+        (&["render", "scene.toml", "-o", "file/a.png"], "file"),
+        (&["render", "scene.toml", "-o", "old.png", "--stats", "none/s.json"], "none"),
+        (&["check", "bad.toml"], "bad.toml:21:"),
+        (&["new", "scene.toml"], "scene.toml exists"),
+        (&["new", "none/a.toml"], "none"),
+    ] {
+        let run = desk.run(args);
+        assert_eq!(run.status, 1, "{args:?}: {}", run.err);
+        assert!(run.err.contains(word), "{args:?}: no {word:?} in {:?}", run.err);
+        assert!(!run.err.contains("panicked") && run.out.is_empty(), "{args:?}: {:?}", run.err);
+    }
+    assert_eq!(fs::read_to_string(desk.path("old.png")).unwrap(), "precious");
+    assert_eq!(fs::read_to_string(desk.path("scene.toml")).unwrap(), SCENE);
+    assert_eq!(desk.files(), ["bad.toml", "file", "old.png", "scene.toml"]);
+}
+
+#[test]
+fn every_bad_scene_has_status_1_and_names_its_file() {
+    let desk = Desk::new();
+    fs::write(desk.path("old.png"), "precious").unwrap();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad-scenes");
+    let mut refused = 0;
+    for entry in fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "toml") {
+            continue;
+        }
+        let scene = path.to_str().unwrap();
+        let run = desk.run(&["render", scene, "-o", "old.png", "--spp", "2"]);
+        assert_eq!(run.status, 1, "{scene}: {}", run.err);
+        assert!(run.err.contains(path.file_name().unwrap().to_str().unwrap()), "{}", run.err);
+        assert!(!run.err.contains("panicked") && run.out.is_empty(), "{scene}: {}", run.err);
+        refused += 1;
+    }
+    assert!(refused >= 40, "only {refused} bad scenes");
+    assert_eq!(fs::read_to_string(desk.path("old.png")).unwrap(), "precious");
+}
+
+/// What happens on a processor that lacks what the program was built for, under an emulator.
+#[cfg(target_arch = "x86_64")]
+#[test]
+#[ignore = "needs qemu-x86_64 (Debian: qemu-user)"]
+fn an_old_processor_gets_a_message() {
+    for model in ["Westmere", "SandyBridge"] {
+        let mut command = Command::new("qemu-x86_64");
+        command.args(["-cpu", model, env!("CARGO_BIN_EXE_zerkalo"), "--help"]);
+        let run = Run::from(command.output().unwrap());
+        assert_eq!(run.status, 1, "{model}: {}", run.err);
+        assert!(run.err.contains("AVX2"), "{model}: {}", run.err);
+    }
+}

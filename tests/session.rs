@@ -1,0 +1,111 @@
+//! The film that a session fills is the same whatever happens meanwhile.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use zerkalo::film::Display;
+use zerkalo::render::schedule::{Criterion, Settings, Stop};
+use zerkalo::render::session::{Report, Session, State};
+use zerkalo::render::{Options, Rendering};
+use zerkalo::sampling::{SampleSettings, SamplerKind};
+use zerkalo::scene::Scene;
+use zerkalo::world;
+
+const SCENE: &str = r#"
+[film]
+size = [100, 70]
+[camera]
+eye = [0.0, 1.0, 4.0]
+target = [0.0, 0.5, 0.0]
+[[light]]
+point = { position = [2.0, 4.0, 3.0] }
+[materials.red]
+color = [0.8, 0.2, 0.1]
+[materials.mirror]
+diffuse = 0.0
+reflection = 0.9
+roughness = 0.3
+[[object]]
+material = "red"
+shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.5 }
+[[object]]
+material = "mirror"
+shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0, 0.0, 1.0] }
+"#;
+
+fn session(threads: usize, adaptive: bool) -> Session<Rendering> {
+    let options = Options {
+        world: world::Options::default(),
+        sampling: SampleSettings { seed: 3, kind: SamplerKind::Sobol },
+        display: Display::default(),
+    };
+    let stop = Stop { spp: Some(150), ..Stop::default() };
+    let settings = Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+    Session::new(threads, options, settings).unwrap()
+}
+
+fn scene() -> Arc<Scene> {
+    Arc::new(Scene::parse(SCENE, "test").unwrap())
+}
+
+/// Waits for the end of scene `generation`.
+fn finished(session: &Session<Rendering>, generation: u64) -> Report {
+    let end = Instant::now() + Duration::from_secs(60);
+    while Instant::now() < end {
+        let Some(snapshot) = session.wait(Duration::from_millis(100)) else { continue };
+        let resting = matches!(snapshot.report.state, State::Resting(_));
+        if resting && snapshot.report.generation == generation {
+            return snapshot.report;
+        }
+    }
+    panic!("not finished in time")
+}
+
+fn bytes(session: &Session<Rendering>) -> Vec<u8> {
+    session.with(|rendering, _| rendering.film.bytes()).expect("a film")
+}
+
+fn undisturbed(threads: usize, adaptive: bool) -> Vec<u8> {
+    let mut session = session(threads, adaptive);
+    let generation = session.set_scene(scene());
+    let report = finished(&session, generation);
+    assert_eq!(report.bad_samples, 0);
+    bytes(&session)
+}
+
+#[test]
+fn threads_do_not_change_the_film() {
+    for adaptive in [false, true] {
+        let one = undisturbed(1, adaptive);
+        for threads in [2, 7] {
+            assert!(
+                one == undisturbed(threads, adaptive),
+                "{threads} threads, adaptive {adaptive}"
+            );
+        }
+    }
+    assert!(undisturbed(1, false) != undisturbed(1, true), "adaptivity changes nothing");
+}
+
+#[test]
+fn interruptions_and_earlier_scenes_do_not_change_the_film() {
+    let expected = undisturbed(2, true);
+    let mut session = session(2, true);
+    let mut other = (*scene()).clone();
+    other.camera.eye[0] += 0.1;
+    let other = Arc::new(other);
+    for pause_us in [0, 50, 300, 2000] {
+        // Cut off in its compilation, its first picture, or later; its film is used again.
+        session.set_scene(Arc::clone(&other));
+        std::thread::sleep(Duration::from_micros(pause_us));
+        let generation = session.set_scene(scene());
+        let mut samples = 0;
+        for _ in 0..20 {
+            samples = session.with(|_, report| report.samples).unwrap().max(samples);
+            session.pause();
+            session.go_on();
+        }
+        let report = finished(&session, generation);
+        assert!(report.samples >= samples);
+        assert!(bytes(&session) == expected, "after {pause_us} us");
+    }
+}
