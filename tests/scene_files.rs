@@ -43,3 +43,35 @@ fn every_bad_scene_is_refused_with_its_words() {
         golden(&path.with_extension("txt"), &(error + "\n"));
     }
 }
+
+/// Scenes that are meant to be warned about, and the words of the warning.
+const WARNED: &[(&str, &str)] = &[("brighter-than-its-light.toml", "more than the light")];
+
+#[test]
+fn every_scene_can_be_read_and_says_what_it_shows() {
+    let paths = files("scenes");
+    assert!(paths.len() >= 30, "only {} scenes", paths.len());
+    for path in paths {
+        let document = Document::read(&path).unwrap_or_else(|e| panic!("{e}"));
+        let text = document.text();
+        assert!(text.starts_with("# "), "{} opens without a comment", path.display());
+        let file = path.file_name().unwrap().to_str().unwrap();
+        let expected = WARNED.iter().find(|(name, _)| *name == file).map(|(_, words)| *words);
+        let warnings: Vec<_> = document.warnings().iter().map(|w| w.to_string()).collect();
+        match expected {
+            None => assert_eq!(warnings, [] as [&str; 0]),
+            Some(words) => {
+                assert!(warnings.len() == 1 && warnings[0].contains(words), "{warnings:?}")
+            }
+        }
+        // Scenes that a comment refers to exist.
+        for word in text.split('`').filter(|w| w.ends_with(".toml")) {
+            assert!(Path::new("scenes").join(word).exists(), "{} names {word}", path.display());
+        }
+    }
+}
+
+#[test]
+fn the_reference_is_fresh() {
+    golden(Path::new("docs/scene-format.md"), &zerkalo::scene::reference());
+}
