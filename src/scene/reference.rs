@@ -12,26 +12,28 @@ const INTRODUCTION: &str = "\
 <!-- Generated from the tables in the program; do not edit.
      ZERKALO_BLESS=1 cargo test --test scene_files writes it anew. -->
 
-A scene file is [TOML](https://toml.io) text in UTF-8. Only objects are needed: every other table and
-every key with a default may be left out. Unknown keys are errors.
+A scene file is [TOML](https://toml.io) text in UTF-8. Only objects are needed: every other table
+and every key with a default may be left out. Unknown keys are errors.
 
 - The coordinate system is right-handed: x to the right, y up, z towards the viewer. *Near* is +z.
 - Lengths are in scene units, whatever those are; |coordinates| are at most 1e9.
-- Angles are in degrees. Turns are counter-clockwise for one who looks against the axis: from above, for
-  a turn about the vertical.
+- Angles are in degrees. Turns are counter-clockwise for one who looks against the axis: from
+  above, for a turn about the vertical.
 - A colour is `[red, green, blue]`, linear, or `\"#rrggbb\"`, sRGB. It may exceed 1.
-- What a surface shows is a sum: `ambient` x colour x ambient light, and for each light `diffuse` x
-  colour x cosine plus `specular` x highlight, and `reflection` x what is mirrored. The parts are not
-  weighted against each other, and the sum may exceed 1; it is clipped only when it is shown.
-- `roughness` is the radius of the cone's base at unit distance, the tangent of half its opening angle.
-  The square lobe has the side that gives the same area, sqrt(pi) x roughness; the microfacet lobes
-  take the slope of equal second moment, `alpha` = roughness / (2 sqrt 2), unless `alpha` is given. So
-  a change of the lobe keeps the blur comparable.
+- What a surface shows is a sum: `ambient` x colour x ambient light, and for each light `diffuse`
+  x colour x cosine plus `specular` x highlight, and `reflection` x what is mirrored. The parts
+  are not weighted against each other, and the sum may exceed 1; it is clipped only when it is
+  shown.
+- `roughness` is the radius of the cone's base at unit distance, the tangent of half its opening
+  angle. The square lobe has the side that gives the same area, sqrt(pi) x roughness; the
+  microfacet lobes take the slope of equal second moment, `alpha` = roughness / (2 sqrt 2), unless
+  `alpha` is given. So a change of the lobe keeps the blur comparable.
 - A light with falloff `none` gives a white matt surface that faces it the brightness `intensity`,
-  wherever it stands. With `inverse-square` the intensity is a radiant intensity [W/sr]: the irradiance
-  is intensity x cosine / distance squared.
+  wherever it stands. With `inverse-square` the intensity is a radiant intensity [W/sr]: the
+  irradiance is intensity x cosine / distance squared.
 
-`zerkalo new FILE` writes a small scene with comments, `zerkalo check FILE` tells what is wrong with one.
+`zerkalo new FILE` writes a small scene with comments, `zerkalo check FILE` tells what is wrong
+with one.
 ";
 
 /// The reference of the scene file format, as Markdown.

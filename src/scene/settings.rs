@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FilmSettings {
-    /// Width and height [pixels].
+    /// Width and height in pixels.
     pub size: [u32; 2],
     /// How samples spread over a pixel.
     pub filter: Filter,
