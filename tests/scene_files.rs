@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use zerkalo::scene::{Document, Scene};
+use zerkalo::shape::Form;
 
 fn files(folder: &str) -> Vec<PathBuf> {
     let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)
@@ -42,4 +43,115 @@ fn every_bad_scene_is_refused_with_its_words() {
         assert_eq!(error.chars().find(steering), None, "{error:?}");
         golden(&path.with_extension("txt"), &(error + "\n"));
     }
+}
+
+/// Scenes that are meant to be warned about, and the words of the warning.
+const WARNED: &[(&str, &str)] = &[("brighter-than-its-light.toml", "more than the light")];
+
+#[test]
+fn every_scene_can_be_read_and_says_what_it_shows() {
+    let paths = files("scenes");
+    assert!(paths.len() >= 30, "only {} scenes", paths.len());
+    for path in paths {
+        let document = Document::read(&path).unwrap_or_else(|e| panic!("{e}"));
+        let text = document.text();
+        assert!(text.starts_with("# "), "{} opens without a comment", path.display());
+        let file = path.file_name().unwrap().to_str().unwrap();
+        let expected = WARNED.iter().find(|(name, _)| *name == file).map(|(_, words)| *words);
+        let warnings: Vec<_> = document.warnings().iter().map(|w| w.to_string()).collect();
+        match expected {
+            None => assert_eq!(warnings, [] as [&str; 0]),
+            Some(words) => {
+                assert!(warnings.len() == 1 && warnings[0].contains(words), "{warnings:?}")
+            }
+        }
+        // Scenes that a comment refers to exist.
+        for word in text.split('`').filter(|w| w.ends_with(".toml")) {
+            assert!(Path::new("scenes").join(word).exists(), "{} names {word}", path.display());
+        }
+    }
+}
+
+#[test]
+fn the_reference_is_fresh() {
+    golden(Path::new("docs/scene-format.md"), &zerkalo::scene::reference());
+}
+
+/// The corners of an object of the mirror room.
+fn corners(scene: &Scene, name: &str) -> Vec<[f64; 3]> {
+    let object = scene.objects.iter().find(|o| o.name == name).unwrap();
+    match object.shape.form() {
+        Form::Convex { corners, .. } => corners.iter().map(|c| c.to_array()).collect(),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn the_mirror_room_is_the_one_that_is_measured() {
+    let physical = Scene::read("scenes/mirror-room-physical.toml".as_ref()).unwrap();
+    let beautiful = Scene::read("scenes/mirror-room.toml".as_ref()).unwrap();
+    let shapes = |scene: &Scene| scene.objects.iter().map(|o| o.shape.clone()).collect::<Vec<_>>();
+    assert_eq!(shapes(&physical), shapes(&beautiful));
+    assert_eq!(physical.camera, beautiful.camera);
+
+    let near = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
+    let has = |name, points: &[[f64; 3]]| {
+        let corners = corners(&physical, name);
+        for point in points {
+            assert!(corners.iter().any(|c| near(*c, *point)), "{name}: {point:?} {corners:?}");
+        }
+        corners
+    };
+    // Base vertices of the prism, to the nine digits in which they are published.
+    let base = [(-0.2, 1.561880215), (0.2, 0.869059892), (-0.6, 0.869059892)];
+    let prism: Vec<_> = base.iter().flat_map(|(x, z)| [[*x, 0.0, *z], [*x, 0.9, *z]]).collect();
+    assert_eq!(has("prism", &prism).len(), 6);
+    let pyramid = [[1.05, 0.0, 0.85], [1.95, 0.0, -0.05], [1.3, 0.7, 0.6], [1.7, 0.7, 0.2]];
+    assert_eq!(has("pyramid", &pyramid).len(), 8);
+    // The near right edge of the cube: (0.4, 0.4) turned by 30 degrees about the vertical.
+    let (sin, cos) = 30f64.to_radians().sin_cos();
+    let (x, z) = (0.5 + 0.4 * (cos + sin), -0.3 + 0.4 * (cos - sin));
+    assert_eq!(has("cube", &[[x, 0.0, z], [x, 0.8, z]]).len(), 8);
+}
+
+#[test]
+fn places_are_found_for_warnings() {
+    let text = "# Dubious.\n[[object]]\nname = \"ball\"\nshape.sphere = { center = [0, 0, 0], radius = 1 }\n\n\
+                [[light]]\nname = \"lamp\"\npoint.position = [0, 5, 0]\nintensity = 0\n\n\
+                [[light]]\npoint.position = [0, 5, 0]\nintensity = 0\n\n\
+                [materials.steep]\nlobe = \"ggx\"\nalpha = 3\n";
+    let document = Document::parse(text.to_string(), "dubious.toml").unwrap();
+    let warnings: Vec<_> = document.warnings().iter().map(|w| w.to_string()).collect();
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(warnings[0].starts_with(
+        "dubious.toml:9:13  light \"lamp\": intensity is 0, so that it gives no light (and one more like it)."
+    ));
+    assert!(warnings[1].starts_with("dubious.toml:17:9  material \"steep\": alpha is 3"));
+}
+
+#[test]
+fn what_cannot_be_read_is_told() {
+    let missing = Scene::read("scenes/no-such.toml".as_ref()).unwrap_err().to_string();
+    assert!(missing.starts_with("scenes/no-such.toml  there is no such file."), "{missing}");
+    let scene = |text: &str| Scene::parse(text, "s.toml");
+    let many: String = (0..50).map(|i| format!("key{i} = 0\n")).collect();
+    let many = scene(&many).unwrap_err();
+    assert_eq!(many.messages().len(), 50);
+    assert!(many.to_string().ends_with("… and 30 more."), "{many}");
+    // A byte order mark and Windows line ends are no faults, and do not count as columns.
+    let marked = "\u{feff}[[object]]\r\nshape.sphere = { center = [0, 0, 0], radius = 1 }\r\n";
+    assert!(scene(marked).is_ok());
+    let error = scene(&marked.replace("[[object]]", "wrong = 1")).unwrap_err();
+    assert_eq!(error.messages()[0].place, Some((1, 1)));
+    // Without a material, a camera, a light: the defaults.
+    let bare = scene(marked).unwrap();
+    assert_eq!(bare.objects[0].material, "");
+    assert_eq!(bare.faults(), []);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_endless_device_is_not_read_to_its_end() {
+    let error = Scene::read("/dev/zero".as_ref()).unwrap_err().to_string();
+    assert!(error.contains("larger than 64 MiB"), "{error}");
 }

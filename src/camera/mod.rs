@@ -28,7 +28,7 @@ pub struct Camera {
     pub near: f64,
 }
 
-/// Opening angle of the picture [degrees], between 0 and 180.
+/// Opening angle of the picture in degrees, between 0 and 180.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ViewAngle {
@@ -118,7 +118,7 @@ const VIEW_ANGLES: &[Field] = &[
 ];
 
 impl ViewAngle {
-    /// Its key and its angle [degrees].
+    /// Its key and its angle in degrees.
     pub fn key_degrees(&self) -> (&'static str, f64) {
         match *self {
             Self::Vertical(degrees) => ("vertical", degrees),
@@ -128,8 +128,8 @@ impl ViewAngle {
 }
 
 impl Camera {
-    /// Unit vector of the view direction; `None` if `target` is the eye itself, `direction` is zero,
-    /// or not exactly one of them is given.
+    /// Unit vector of the view direction; `None` if `target` is the eye itself, `direction` is
+    /// zero, or not exactly one of them is given.
     pub fn view(&self) -> Option<DVec3> {
         let look = match (self.target, self.direction) {
             (Some(target), None) => DVec3::from_array(target) - DVec3::from_array(self.eye),

@@ -18,7 +18,8 @@ pub struct Light {
     pub directional: Option<Directional>,
     /// Colour; multiplies the intensity.
     pub color: Color,
-    /// With falloff `inverse-square` the radiant intensity [W/sr]; otherwise normal irradiance / pi.
+    /// With falloff `inverse-square` the radiant intensity [W/sr]; otherwise normal irradiance /
+    /// pi.
     pub intensity: f64,
     /// How a point light weakens with distance.
     pub falloff: Falloff,
@@ -149,7 +150,7 @@ impl Light {
             (None, Some(_)) => (self.falloff == Falloff::InverseSquare).then(|| {
                 Fault::new(
                     "falloff",
-                    "a directional light cannot weaken with distance, but falloff is \"inverse-square\"",
+                    "falloff is \"inverse-square\", but a directional light has no distance",
                     "falloff \"none\", or a point light",
                 )
             }),

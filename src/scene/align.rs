@@ -2,8 +2,8 @@
 
 use toml::{Table, Value};
 
-/// For each entry of `new` the position of the entry of `old` that it was; none twice. Entries are the
-/// same if they have the same name, else if they are equal, else if they stand between the same
+/// For each entry of `new` the position of the entry of `old` that it was; none twice. Entries are
+/// the same if they have the same name, else if they are equal, else if they stand between the same
 /// neighbours and are alike.
 pub(super) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     let mut free = vec![true; old.len()];

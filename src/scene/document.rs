@@ -76,8 +76,9 @@ impl Document {
     }
 }
 
-/// `text`, which describes `old`, made to describe `new`. Line ends stay what they are if they are all
-/// alike (a mixture becomes LF); a byte order mark and a missing line end at the end of the file stay.
+/// `text`, which describes `old`, made to describe `new`. Line ends stay what they are if they are
+/// all alike (a mixture becomes LF); a byte order mark and a missing line end at the end of the
+/// file stay.
 fn new_text(text: String, old: &Scene, new: &Scene) -> String {
     let (mark, body) = match text.strip_prefix('\u{feff}') {
         Some(body) => ("\u{feff}", body),

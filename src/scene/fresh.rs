@@ -105,10 +105,9 @@ pub(super) fn leaf(value: &Value) -> toml_edit::Value {
 /// The shortest digits that read back as `number`, with an exponent where zeros would be many.
 fn float(number: f64) -> toml_edit::Value {
     let size = number.abs();
-    if number.is_finite() && size != 0.0 && !(1e-5..1e16).contains(&size) {
-        if let Ok(value) = format!("{number:e}").parse() {
-            return value;
-        }
+    let zeros = number.is_finite() && size != 0.0 && !(1e-5..1e16).contains(&size);
+    if zeros && let Ok(value) = format!("{number:e}").parse() {
+        return value;
     }
     number.into()
 }

@@ -106,8 +106,8 @@ fn put_above(table: &mut Table, comment: &str) {
     table.decor_mut().set_prefix(joined);
 }
 
-/// Gives `tables`, entry by entry the old ones `from` (or new), places in the file that follow their
-/// order. Nothing happens if the old ones kept theirs and the new ones come last.
+/// Gives `tables`, entry by entry the old ones `from` (or new), places in the file that follow
+/// their order. Nothing happens if the old ones kept theirs and the new ones come last.
 pub(super) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     let old: Vec<usize> = from.iter().flatten().copied().collect();
     let tail_only = from.iter().skip_while(|i| i.is_some()).all(Option::is_none);

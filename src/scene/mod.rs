@@ -4,11 +4,13 @@ mod align;
 mod check;
 mod document;
 mod fresh;
+mod included;
 mod keep;
 mod locate;
 mod message;
 mod object;
 mod read;
+mod reference;
 mod rewrite;
 mod schema;
 mod settings;
@@ -18,8 +20,10 @@ mod warn;
 
 pub use check::Finding;
 pub use document::Document;
+pub use included::{BUILT_IN, built_in, starter};
 pub use message::{Message, SceneErrors};
 pub use object::{OBJECT_FIELDS, Object};
+pub use reference::reference;
 pub use schema::FIELDS;
 pub use settings::{
     AMBIENT_FIELDS, Ambient, BACKGROUND_FIELDS, Background, FILM_FIELDS, FilmSettings, Filter,
@@ -56,3 +60,6 @@ pub struct Scene {
     #[serde(rename = "object")]
     pub objects: Vec<Object>,
 }
+
+#[cfg(test)]
+mod tables_test;

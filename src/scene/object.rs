@@ -2,7 +2,7 @@
 
 use super::transform::{STEP_FIELDS, Step, is_sound};
 use crate::shape::{Form, KINDS, Shape};
-use crate::value::{Checks, Fault, Field, Takes};
+use crate::value::{Checks, Fault, Field, Range, Takes};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 
@@ -80,7 +80,7 @@ impl Object {
             (Form::Plane { offset, .. }, None) => (offset.abs(), f64::INFINITY),
             (_, None) => (0.0, f64::INFINITY),
         };
-        if !(reach <= 1e9) {
+        if !Range::COORDINATE.holds(reach) {
             return Some(Fault::new(
                 "transform",
                 "transform moves the object to coordinates beyond 1e9",

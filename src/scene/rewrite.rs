@@ -1,7 +1,8 @@
 //! Carries the difference between two scenes into the text of a scene file, and nothing else.
 //!
-//! Scenes are compared as trees of TOML values. Where both trees agree the text is not touched. A key
-//! that is not in the text has its default; it is written only when its value differs from that.
+//! Scenes are compared as trees of TOML values. Where both trees agree the text is not touched. A
+//! key that is not in the text has its default; it is written only when its value differs from
+//! that.
 
 use super::align::align;
 use super::fresh::{fresh, fresh_entry, leaf};
@@ -83,8 +84,8 @@ impl Rewriter {
                 _ => {}
             }
         }
-        // One key in another's place (a shape of another kind, a direction instead of a target) takes
-        // over its comments.
+        // One key in another's place (a shape of another kind, a direction instead of a target)
+        // takes over its comments.
         let heir = if gone.len() == 1 { come.first().map(|(key, ..)| key.clone()) } else { None };
         for key in gone {
             let decor = table.key(&key).map(|k| k.leaf_decor().clone());
@@ -180,7 +181,8 @@ impl Rewriter {
             }
             Item::Value(toml_edit::Value::Array(list)) => {
                 let mut values: Vec<_> = list.iter().cloned().map(Some).collect();
-                let indent = values.iter().flatten().nth(1).map(spaces_before);
+                let before = values.iter().flatten().map(spaces_before).next_back();
+                let indent = before.filter(|spaces| !spaces.is_empty()).unwrap_or(" ".into());
                 list.clear();
                 for (j, origin) in from.iter().enumerate() {
                     match origin.and_then(|i| Some((i, values.get_mut(i)?.take()?))) {
@@ -192,10 +194,9 @@ impl Rewriter {
                         }
                         None => {
                             let mut value = fresh_entry(takes, &new[j]).into_inline_table();
-                            if let Some(indent) = &indent {
-                                value.decor_mut().set_prefix(indent.as_str());
-                            } else if j > 0 {
-                                value.decor_mut().set_prefix(" ");
+                            if j > 0 {
+                                let above = comment_of_the_last(list, j + 1 == new.len());
+                                value.decor_mut().set_prefix(above + &indent);
                             }
                             list.push_formatted(toml_edit::Value::InlineTable(value));
                         }
@@ -204,6 +205,19 @@ impl Rewriter {
             }
             _ => {}
         }
+    }
+}
+
+/// Takes away the comment behind the last entry of `list`, if another one comes behind that.
+fn comment_of_the_last(list: &mut toml_edit::Array, comes: bool) -> String {
+    let trailing = list.trailing().as_str().unwrap_or_default();
+    match trailing.rfind('\n') {
+        Some(end) if comes && list.trailing_comma() && trailing.contains('#') => {
+            let (comment, rest) = (trailing[..end].to_string(), trailing[end..].to_string());
+            list.set_trailing(rest);
+            comment
+        }
+        _ => String::new(),
     }
 }
 

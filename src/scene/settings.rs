@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FilmSettings {
-    /// Width and height [pixels].
+    /// Width and height in pixels.
     pub size: [u32; 2],
     /// How samples spread over a pixel.
     pub filter: Filter,
@@ -125,7 +125,7 @@ pub const FILM_FIELDS: &[Field] = &[
     ),
     Field::preset(
         "rays_per_pixel",
-        Takes::Whole(Range::closed(0.0, 4294967295.0)),
+        Takes::Whole(Range::closed(0.0, 1e9)),
         "samples",
         "0",
         "The most samples that a pixel with a glossy reflection gets; 0: no cap.",

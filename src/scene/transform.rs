@@ -29,7 +29,7 @@ pub enum Step {
 pub struct Rotate {
     /// Direction of the axis; any length but 0.
     pub axis: [f64; 3],
-    /// Angle [degrees].
+    /// Angle in degrees.
     pub degrees: f64,
 }
 
@@ -141,15 +141,16 @@ impl Step {
     }
 }
 
-/// Rodrigues' rotation about the unit vector `axis`: exact at quarter turns about the coordinate axes.
+/// Rodrigues' rotation about the unit vector `axis`: exact at quarter turns about the coordinate
+/// axes.
 fn turn(axis: DVec3, degrees: f64) -> DAffine3 {
     let (sin, cos) = sin_cos_degrees(degrees);
     let turned = |v: DVec3| v * cos + axis.cross(v) * sin + axis * (axis.dot(v) * (1.0 - cos));
     DAffine3::from_mat3(DMat3::from_cols(turned(DVec3::X), turned(DVec3::Y), turned(DVec3::Z)))
 }
 
-/// Whether an affine map can be undone without losing all digits: finite, and no direction stretched
-/// more than 1e12 times as much as another.
+/// Whether an affine map can be undone without losing all digits: finite, and no direction
+/// stretched more than 1e12 times as much as another.
 pub(super) fn is_sound(map: &DAffine3) -> bool {
     let linear = map.matrix3;
     let largest = linear.to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));

@@ -86,8 +86,9 @@ impl Scene {
     }
 }
 
-/// The parts of a material that answer one and the same ray of light: diffuse, highlight, reflection.
-/// A Cook-Torrance highlight is the reflection of a light in the surface, not a part beside it.
+/// The parts of a material that answer one and the same ray of light: diffuse, highlight,
+/// reflection. A Cook-Torrance highlight is the reflection of a light in the surface, not a part
+/// beside it.
 fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     let mirrored = match m.highlight {
         Highlight::Phong => m.specular + m.reflection,
@@ -98,7 +99,8 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     (sum > 1.0 + 1e-9).then(|| {
         let key = if m.reflection > 0.0 { "reflection" } else { "diffuse" };
         let found = format!(
-            "diffuse x color, specular and reflection add up to {}, more than the light that comes in",
+            "diffuse x color, specular and reflection add up to {}, more than the light that comes \
+             in",
             number((sum * 1000.0).round() / 1000.0)
         );
         (key, found)

@@ -23,8 +23,8 @@ pub struct Prism {
 }
 
 impl Kind for Prism {
-    const DOC: &'static str = "A right prism on a base with three equal sides. Unturned, the base has an edge along +x from \
-         `corner` and its third vertex towards -z.";
+    const DOC: &'static str = "A right prism on a base with three equal sides. Unturned, the base has an \
+         edge along +x from `corner` and its third vertex towards -z.";
     const EXAMPLE: &'static str =
         "shape.prism = { corner = [-0.5, 0.0, 0.3], side = 1.0, height = 1.2 }";
     const FIELDS: &'static [Field] = &[

@@ -26,9 +26,10 @@ pub struct Pyramid {
 }
 
 impl Kind for Pyramid {
-    const DOC: &'static str = "A regular pyramid on a square base, truncated at `height`. If `apex_height` is not larger \
-         than `height`, it is an ordinary pyramid whose height is the smaller of the two.";
-    const EXAMPLE: &'static str = "shape.pyramid = { corner = [-0.5, 0.0, 0.5], side = 1.0, apex_height = 1.5, height = 0.8 }";
+    const DOC: &'static str = "A regular pyramid on a square base, truncated at `height`. \
+         If `apex_height` is not larger than `height`, it is an ordinary pyramid whose height is the smaller of the two.";
+    const EXAMPLE: &'static str = "shape.pyramid = { corner = [-0.5, 0.0, 0.5], side = 1.0, \
+         apex_height = 1.5, height = 0.8 }";
     const FIELDS: &'static [Field] = &[
         Field::required(
             "corner",

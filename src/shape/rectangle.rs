@@ -25,8 +25,8 @@ fn up() -> [f64; 3] {
 }
 
 impl Rectangle {
-    /// Unit vectors to the right (seen from the front), up and to the front; `None` if `up` lies along
-    /// the normal.
+    /// Unit vectors to the right (seen from the front), up and to the front; `None` if `up` lies
+    /// along the normal.
     fn frame(&self) -> Option<[DVec3; 3]> {
         // First to length 1, so that no length that a file can hold over- or underflows below.
         let front = unit(self.normal)?;
@@ -47,7 +47,8 @@ fn unit(direction: [f64; 3]) -> Option<DVec3> {
 impl Kind for Rectangle {
     const DOC: &'static str =
         "A flat rectangle, such as a mirror. Its front is the side that `normal` points to.";
-    const EXAMPLE: &'static str = "shape.rectangle = { center = [0.0, 1.5, -2.0], size = [4.0, 3.0], normal = [0.0, 0.0, 1.0] }";
+    const EXAMPLE: &'static str = "shape.rectangle = { center = [0.0, 1.5, -2.0], size = [4.0, 3.0], \
+         normal = [0.0, 0.0, 1.0] }";
     const FIELDS: &'static [Field] = &[
         Field::required("center", Takes::Numbers(3, Range::COORDINATE), "scene units", "Centre."),
         Field::required(
@@ -85,9 +86,61 @@ impl Kind for Rectangle {
                 Fault::new(
                     "up",
                     "up is parallel to normal, so that the rectangle could lie any way round",
-                    "an `up` across the normal, such as [0.0, 0.0, -1.0] for a rectangle that lies flat",
+                    "an `up` across the normal, such as [0.0, 0.0, -1.0] for one that lies flat",
                 )
             }))
             .faults()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::Platform;
+
+    fn sides(form: Form) -> (DVec3, DVec3, DVec3) {
+        match form {
+            Form::Parallelogram { corner, u, v } => (corner, u, v),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_front_is_where_the_normal_points() {
+        for normal in
+            [[0.0, 0.0, 1.0], [0.3, -0.2, -1e-200], [-2e150, 1e150, 1e150], [0.0, 0.1, 3.0]]
+        {
+            let mirror = Rectangle { center: [1.0, 2.0, 3.0], size: [4.0, 3.0], normal, up: up() };
+            assert_eq!(mirror.faults(), []);
+            let (corner, u, v) = sides(mirror.form());
+            let front = unit(normal).unwrap();
+            assert!((u.cross(v) / 12.0 - front).length() < 1e-14, "{normal:?}");
+            assert!((u.length() - 4.0).abs() < 1e-14 && (v.length() - 3.0).abs() < 1e-14);
+            assert!(u.y.abs() < 1e-14 && v.y > 0.0, "{normal:?}: width is level, height goes up");
+            assert!((corner + (u + v) / 2.0 - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn an_up_along_the_normal_is_a_fault() {
+        for (normal, sound) in [
+            ([0.0, 1.0, 0.0], false),
+            ([0.0, -1e-300, 0.0], false),
+            ([1e-9, 1.0, 0.0], false),
+            ([1e-3, 1.0, 0.0], true),
+        ] {
+            let lying = Rectangle { center: [0.0; 3], size: [1.0; 2], normal, up: up() };
+            let keys: Vec<_> = lying.faults().into_iter().map(|f| f.key).collect();
+            assert_eq!(keys.is_empty(), sound, "{normal:?} {keys:?}");
+        }
+    }
+
+    #[test]
+    fn platforms_face_up() {
+        let platform = Platform { center: [1.0, 2.0, 3.0], size: [8.0, 6.0] };
+        let (corner, u, v) = sides(platform.form());
+        assert_eq!(u.cross(v), DVec3::new(0.0, 48.0, 0.0));
+        assert_eq!(corner, DVec3::new(-3.0, 2.0, 0.0));
+        assert_eq!(corner + u + v, DVec3::new(5.0, 2.0, 6.0));
     }
 }

@@ -72,8 +72,9 @@ impl Checks {
         }
     }
 
-    /// Checks that no number here is more than 1e12 times as large as the smallest of `sizes`: beyond
-    /// that a coordinate has no digits left for the size. Says nothing about values found wrong above.
+    /// Checks that no number here is more than 1e12 times as large as the smallest of `sizes`:
+    /// beyond that a coordinate has no digits left for the size. Says nothing about values found
+    /// wrong above.
     pub fn ratio(mut self, sizes: &[(&str, f64)], coordinates: &[f64]) -> Self {
         let smallest = sizes.iter().copied().reduce(|a, b| if b.1 < a.1 { b } else { a });
         let largest = sizes

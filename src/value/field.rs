@@ -1,5 +1,5 @@
-//! Tables of what may be written: one [`Field`] a key. Reading, messages, range checks, the generated
-//! reference and every form that edits a description use the same tables.
+//! Tables of what may be written: one [`Field`] a key. Reading, messages, range checks, the
+//! generated reference and every form that edits a description use the same tables.
 
 use super::Range;
 use std::fmt;

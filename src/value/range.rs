@@ -62,7 +62,7 @@ impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let (low, high) = (number(self.low), number(self.high));
         match (self.low.is_finite(), self.low_in, self.high.is_finite(), self.high_in) {
-            (false, _, false, _) => f.write_str("(finite)"),
+            (false, _, false, _) => f.write_str("other than inf and nan"),
             (true, true, true, true) => write!(f, "from {low} to {high}"),
             (true, false, true, false) => {
                 write!(f, "between {low} and {high} ({low} and {high} are excluded)")

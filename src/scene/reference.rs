@@ -1,0 +1,150 @@
+//! The reference of the scene file format, generated from the tables of fields.
+
+use super::schema::FIELDS;
+use super::transform::STEP_FIELDS;
+use crate::shape::{EXAMPLES, KINDS};
+use crate::value::{Field, Preset, Takes};
+use std::fmt::Write as _;
+
+const INTRODUCTION: &str = "\
+# Scene files
+
+<!-- Generated from the tables in the program; do not edit.
+     ZERKALO_BLESS=1 cargo test --test scene_files writes it anew. -->
+
+A scene file is [TOML](https://toml.io) text in UTF-8. Only objects are needed: every other table
+and every key with a default may be left out. Unknown keys are errors.
+
+- The coordinate system is right-handed: x to the right, y up, z towards the viewer. *Near* is +z.
+- Lengths are in scene units, whatever those are; |coordinates| are at most 1e9.
+- Angles are in degrees. Turns are counter-clockwise for one who looks against the axis: from
+  above, for a turn about the vertical.
+- A colour is `[red, green, blue]`, linear, or `\"#rrggbb\"`, sRGB. It may exceed 1.
+- What a surface shows is a sum: `ambient` x colour x ambient light, and for each light `diffuse`
+  x colour x cosine plus `specular` x highlight, and `reflection` x what is mirrored. The parts
+  are not weighted against each other, and the sum may exceed 1; it is clipped only when it is
+  shown.
+- `roughness` is the radius of the cone's base at unit distance, the tangent of half its opening
+  angle. The square lobe has the side that gives the same area, sqrt(pi) x roughness; the
+  microfacet lobes take the slope of equal second moment, `alpha` = roughness / (2 sqrt 2), unless
+  `alpha` is given. So a change of the lobe keeps the blur comparable.
+- A light with falloff `none` gives a white matt surface that faces it the brightness `intensity`,
+  wherever it stands. With `inverse-square` the intensity is a radiant intensity [W/sr]: the
+  irradiance is intensity x cosine / distance squared.
+
+`zerkalo new FILE` writes a small scene with comments, `zerkalo check FILE` tells what is wrong
+with one.
+";
+
+/// The reference of the scene file format, as Markdown.
+pub fn reference() -> String {
+    let mut out = INTRODUCTION.to_string();
+    for field in FIELDS {
+        let (title, fields): (String, &[Field]) = match field.takes {
+            Takes::Table(fields) => (format!("[{}]", field.name), fields),
+            Takes::Tables(fields) => (format!("[[{}]]", field.name), fields),
+            Takes::Named(fields) => (format!("[{}.NAME]", field.name), fields),
+            _ => continue,
+        };
+        push(&mut out, &format!("\n## `{title}`\n\n{}", field.doc));
+        if let Preset::Without(instead) = field.preset {
+            push(&mut out, &format!(" Without it {instead}."));
+        }
+        push(&mut out, "\n\n");
+        table(&mut out, fields);
+        for inner in fields {
+            nested(&mut out, inner);
+        }
+    }
+    out
+}
+
+fn push(out: &mut String, text: &str) {
+    out.push_str(text);
+}
+
+/// What does not fit into the table's row of `field`: its words, or its own keys.
+fn nested(out: &mut String, field: &Field) {
+    match field.takes {
+        Takes::Choice(choices) => {
+            push(out, &format!("\n`{}`:\n\n", field.name));
+            for choice in choices {
+                // Writing into a String cannot fail.
+                let _ = writeln!(out, "- `\"{}\"`: {}", choice.name, choice.doc);
+            }
+        }
+        Takes::Table(fields) => {
+            push(out, &format!("\n`{}`:\n\n", field.name));
+            table(out, fields);
+        }
+        Takes::OneOf(_) if field.name == "shape" => shapes(out),
+        Takes::OneOf(fields) => {
+            push(out, &format!("\n`{}`, exactly one of:\n\n", field.name));
+            kinds(out, fields);
+        }
+        Takes::ListOf(_) => steps(out),
+        _ => {}
+    }
+}
+
+fn shapes(out: &mut String) {
+    for (kind, (_, example)) in KINDS.iter().zip(EXAMPLES) {
+        push(out, &format!("\n### `shape.{}`\n\n{}\n\n", kind.name, kind.doc));
+        push(out, &format!("```toml\n{example}\n```\n\n"));
+        if let Takes::Table(fields) = kind.takes {
+            table(out, fields);
+        }
+    }
+}
+
+fn steps(out: &mut String) {
+    push(out, "\n### `transform`\n\n");
+    push(out, "A list of steps, carried out in order, each with exactly one of these keys:\n\n");
+    push(
+        out,
+        "```toml\ntransform = [{ rotate_y = 30.0 }, { translate = [0.0, 1.0, 0.0] }]\n```\n\n",
+    );
+    kinds(out, STEP_FIELDS);
+    for field in STEP_FIELDS {
+        nested(out, field);
+    }
+}
+
+/// Keys of which exactly one is given: no defaults.
+fn kinds(out: &mut String, fields: &[Field]) {
+    push(out, "| key | value | unit | meaning |\n|---|---|---|---|\n");
+    for field in fields {
+        row(out, &[&code(field.name), &value(field), field.unit, field.doc]);
+    }
+}
+
+fn table(out: &mut String, fields: &[Field]) {
+    push(out, "| key | value | unit | default | meaning |\n|---|---|---|---|---|\n");
+    for field in fields {
+        let default = match field.preset {
+            Preset::Required => "needed".to_string(),
+            Preset::Is(text) => code(text),
+            Preset::Without(instead) => format!("none: {instead}"),
+        };
+        row(out, &[&code(field.name), &value(field), field.unit, &default, field.doc]);
+    }
+}
+
+fn code(text: &str) -> String {
+    format!("`{text}`")
+}
+
+fn value(field: &Field) -> String {
+    match field.takes {
+        Takes::Table(_) => "a table, see below".to_string(),
+        Takes::OneOf(_) => "exactly one kind, see below".to_string(),
+        Takes::ListOf(_) => "a list of steps, see below".to_string(),
+        Takes::Choice(_) => "a word, see below".to_string(),
+        takes => takes.to_string(),
+    }
+}
+
+fn row(out: &mut String, cells: &[&str]) {
+    let cells: Vec<_> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
+    push(out, &format!("| {} |\n", cells.join(" | ")));
+}

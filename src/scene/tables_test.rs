@@ -1,0 +1,205 @@
+//! The tables of fields against what serde really reads and writes.
+
+use super::*;
+use crate::shape::{EXAMPLES, KINDS, Shape};
+use crate::value::{Field, Preset, Takes};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// The keys that serde names when it meets one that it does not know.
+fn keys_of<T: DeserializeOwned>() -> Vec<String> {
+    let error = match toml::from_str::<T>("\"no such key\" = 0") {
+        Ok(_) => panic!("an unknown key was taken"),
+        Err(error) => error.message().to_string(),
+    };
+    let list = error.split_once("expected").unwrap_or_else(|| panic!("{error}")).1;
+    list.split('`').skip(1).step_by(2).map(str::to_string).collect()
+}
+
+fn same_keys<T: DeserializeOwned>(what: &str, fields: &[Field]) {
+    let mut real = keys_of::<T>();
+    let mut told: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
+    real.sort();
+    told.sort();
+    assert_eq!(real, told, "{what}");
+}
+
+/// Documented defaults against what is read when only the keys in `needed` are given.
+fn same_defaults<T: DeserializeOwned + Serialize>(what: &str, fields: &[Field], needed: &str) {
+    let read: T = toml::from_str(needed).unwrap_or_else(|e| panic!("{what}: {e}"));
+    let written = toml::Table::try_from(&read).unwrap();
+    let given: toml::Table = needed.parse().unwrap();
+    for field in fields {
+        let value = written.get(field.name);
+        match field.preset {
+            Preset::Required => {
+                let mut without = given.clone();
+                assert!(
+                    without.remove(field.name).is_some(),
+                    "{what}.{} is not needed",
+                    field.name
+                );
+                let text = without.to_string();
+                assert!(toml::from_str::<T>(&text).is_err(), "{what} without {}", field.name);
+            }
+            Preset::Is(text) => {
+                let line = format!("value = {text}").parse::<toml::Table>().unwrap();
+                assert_eq!(value, line.get("value"), "{what}.{}", field.name);
+            }
+            Preset::Without(_) if given.contains_key(field.name) => {}
+            Preset::Without(_) => assert_eq!(value, None, "{what}.{}", field.name),
+        }
+    }
+}
+
+fn inner(fields: &[Field], name: &str) -> &'static [Field] {
+    match fields.iter().find(|f| f.name == name).unwrap().takes {
+        Takes::Table(fields) | Takes::OneOf(fields) => fields,
+        other => panic!("{name} takes {other:?}"),
+    }
+}
+
+#[test]
+fn tables_name_the_keys_that_are_read() {
+    same_keys::<Scene>("scene", FIELDS);
+    same_keys::<FilmSettings>("film", FILM_FIELDS);
+    same_keys::<Trace>("trace", TRACE_FIELDS);
+    same_keys::<Background>("background", BACKGROUND_FIELDS);
+    same_keys::<Ambient>("ambient", AMBIENT_FIELDS);
+    same_keys::<Camera>("camera", crate::camera::FIELDS);
+    same_keys::<crate::camera::ViewAngle>("view_angle", inner(crate::camera::FIELDS, "view_angle"));
+    same_keys::<Light>("light", crate::light::FIELDS);
+    same_keys::<crate::light::Point>("point", inner(crate::light::FIELDS, "point"));
+    same_keys::<crate::light::Directional>(
+        "directional",
+        inner(crate::light::FIELDS, "directional"),
+    );
+    same_keys::<Material>("material", crate::material::FIELDS);
+    same_keys::<Object>("object", OBJECT_FIELDS);
+    same_keys::<Shape>("shape", KINDS);
+    same_keys::<Step>("step", STEP_FIELDS);
+    same_keys::<Rotate>("rotate", inner(STEP_FIELDS, "rotate"));
+}
+
+#[test]
+fn tables_tell_the_defaults_that_hold() {
+    same_defaults::<FilmSettings>("film", FILM_FIELDS, "");
+    same_defaults::<Trace>("trace", TRACE_FIELDS, "");
+    same_defaults::<Background>("background", BACKGROUND_FIELDS, "");
+    same_defaults::<Ambient>("ambient", AMBIENT_FIELDS, "");
+    same_defaults::<Camera>("camera", crate::camera::FIELDS, "");
+    same_defaults::<Light>("light", crate::light::FIELDS, "");
+    same_defaults::<Material>("material", crate::material::FIELDS, "");
+    same_defaults::<Object>("object", OBJECT_FIELDS, EXAMPLES[0].1);
+    same_defaults::<Rotate>(
+        "rotate",
+        inner(STEP_FIELDS, "rotate"),
+        "axis = [0.0, 1.0, 0.0]\ndegrees = 1.0",
+    );
+}
+
+#[test]
+fn every_word_is_read() {
+    fn words<T: DeserializeOwned>(fields: &[Field]) {
+        for field in fields {
+            if let Takes::Choice(choices) = field.takes {
+                for choice in choices {
+                    let line = format!("{} = \"{}\"", field.name, choice.name);
+                    assert!(toml::from_str::<T>(&line).is_ok(), "{line}");
+                }
+                let line = format!("{} = \"no such word\"", field.name);
+                let error = toml::from_str::<T>(&line).err().map(|e| e.message().to_string());
+                let error = error.unwrap_or_else(|| panic!("{line} was read"));
+                let told = choices.iter().filter(|c| error.contains(&format!("`{}`", c.name)));
+                assert_eq!(told.count(), choices.len(), "{error}");
+                assert_eq!(error.matches('`').count(), 2 * choices.len() + 2, "{error}");
+            }
+        }
+    }
+    words::<FilmSettings>(FILM_FIELDS);
+    words::<Trace>(TRACE_FIELDS);
+    words::<Light>(crate::light::FIELDS);
+    words::<Material>(crate::material::FIELDS);
+}
+
+/// The example of each shape as a table of its own keys.
+fn example(kind: &Field, text: &str) -> toml::Table {
+    let table: toml::Table = text.parse().unwrap();
+    table["shape"][kind.name].as_table().unwrap().clone()
+}
+
+fn read(kind: &Field, values: &toml::Table) -> Result<Shape, toml::de::Error> {
+    let outer = toml::Table::from_iter([(kind.name.to_string(), values.clone().into())]);
+    outer.try_into()
+}
+
+#[test]
+fn shapes_have_sound_examples_and_honest_tables() {
+    for (kind, (key, text)) in KINDS.iter().zip(EXAMPLES) {
+        assert_eq!(kind.name, *key);
+        let Takes::Table(fields) = kind.takes else { panic!("{key}") };
+        let given = example(kind, text);
+        let shape = read(kind, &given).unwrap_or_else(|e| panic!("{key}: {e}"));
+        assert_eq!(shape.key(), *key);
+        assert_eq!(shape.faults(), [], "{key}");
+        let scene = Scene::parse(&format!("[[object]]\n{text}\n"), key);
+        assert!(scene.is_ok(), "{key}: {}", scene.unwrap_err());
+
+        let written = toml::Table::try_from(&shape).unwrap();
+        let mut real: Vec<_> = written[*key].as_table().unwrap().keys().cloned().collect();
+        let mut told: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
+        real.sort();
+        told.sort();
+        assert_eq!(real, told, "{key}");
+        for field in fields {
+            let mut without = given.clone();
+            without.remove(field.name);
+            let read = read(kind, &without);
+            match field.preset {
+                Preset::Required => assert!(read.is_err(), "{key} without {}", field.name),
+                Preset::Is(text) => {
+                    let line = format!("value = {text}").parse::<toml::Table>().unwrap();
+                    let written = toml::Table::try_from(read.unwrap()).unwrap();
+                    assert_eq!(written[*key][field.name], line["value"], "{key}.{}", field.name);
+                }
+                Preset::Without(_) => assert!(read.is_ok(), "{key} without {}", field.name),
+            }
+        }
+    }
+}
+
+#[test]
+fn every_number_of_every_shape_is_checked() {
+    for (kind, (key, text)) in KINDS.iter().zip(EXAMPLES) {
+        let Takes::Table(fields) = kind.takes else { panic!("{key}") };
+        for field in fields {
+            let bad: Vec<toml::Value> = match field.takes {
+                Takes::Number(range) if range.low == 0.0 => vec![0.0.into(), (-1.0).into()],
+                Takes::Number(_) => vec![f64::INFINITY.into()],
+                Takes::Numbers(n, range) => {
+                    let outside = if range.low == 0.0 { 0.0 } else { 1e10 };
+                    (0..n)
+                        .map(|i| {
+                            let mut list = vec![1.0; n];
+                            list[i] = outside;
+                            list.into()
+                        })
+                        .collect()
+                }
+                Takes::Direction => vec![vec![0.0; 3].into()],
+                other => panic!("{key}.{} takes {other:?}: test it", field.name),
+            };
+            let nan = match bad[0].as_array() {
+                Some(list) => vec![f64::NAN; list.len()].into(),
+                None => toml::Value::from(f64::NAN),
+            };
+            for value in bad.into_iter().chain([nan]) {
+                let mut values = example(kind, text);
+                values.insert(field.name.into(), value.clone());
+                let faults = read(kind, &values).unwrap().faults();
+                let at = format!("{key}.{}", field.name);
+                assert!(faults.len() == 1 && faults[0].key == at, "{at} = {value}: {faults:?}");
+            }
+        }
+    }
+}

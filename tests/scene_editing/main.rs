@@ -1,0 +1,236 @@
+//! Scene files after edits: only what changed is written, and what is written reads back.
+
+mod layouts;
+mod random;
+
+use layouts::LAYOUTS;
+use proptest::prelude::*;
+use zerkalo::camera::ViewAngle;
+use zerkalo::scene::{Document, Object, Scale, Scene, Step};
+use zerkalo::shape::{Plane, Shape, Sphere};
+use zerkalo::value::Color;
+
+fn document(text: &str) -> Document {
+    Document::parse(text.to_string(), "scene.toml").unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+/// Applies `edit` and returns the text, having checked that it reads back as the edited scene.
+fn edited(text: &str, edit: impl FnOnce(&mut Scene)) -> String {
+    let mut document = document(text);
+    let mut scene = document.scene().clone();
+    edit(&mut scene);
+    document.apply(&scene);
+    let again = self::document(document.text());
+    assert_eq!(again.scene(), &scene, "{}", document.text());
+    document.text().to_string()
+}
+
+/// The lines of `b` that are not in `a` and the lines of `a` that are not in `b`.
+fn difference<'a>(a: &'a str, b: &'a str) -> (Vec<&'a str>, Vec<&'a str>) {
+    let missing = |from: &'a str, other: &str| {
+        let mut others: Vec<&str> = other.lines().collect();
+        let gone = |line: &&str| match others.iter().position(|o| o == line) {
+            Some(at) => {
+                others.remove(at);
+                false
+            }
+            None => true,
+        };
+        from.lines().filter(gone).collect::<Vec<_>>()
+    };
+    (missing(b, a), missing(a, b))
+}
+
+#[test]
+fn layouts_describe_the_same_scene() {
+    let first = document(LAYOUTS[0]).scene().clone();
+    for text in &LAYOUTS[1..] {
+        assert_eq!(document(text).scene(), &first);
+    }
+}
+
+#[test]
+fn without_an_edit_the_text_stays() {
+    for text in LAYOUTS {
+        assert_eq!(edited(text, |_| {}), *text);
+        // There and back, too.
+        let mut document = document(text);
+        let origin = document.scene().clone();
+        document.apply(&Scene { objects: Vec::new(), ..origin.clone() });
+        assert_ne!(document.text(), *text);
+        document.apply(&origin);
+        assert_eq!(document.text(), *text);
+    }
+}
+
+#[test]
+fn a_number_changes_alone() {
+    let text = LAYOUTS[0];
+    let after = edited(text, |s| s.camera.target = Some([0.0, 0.25, 0.0]));
+    assert_eq!(
+        after,
+        text.replace("target = [0.0, 0.0, 0.0] # the", "target = [0.0, 0.25, 0.0] # the")
+    );
+    let after = edited(text, |s| match &mut s.objects[0].shape {
+        Shape::Sphere(sphere) => sphere.radius = 0.75,
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(after, text.replace("radius = 0.5 } # half", "radius = 0.75 } # half"));
+    let after = edited(text, |s| s.lights[0].intensity = 0.5);
+    let expected = "point = { position = [2.0, 4.0, 3.0] }\nintensity = 0.5\n";
+    assert_eq!(after, text.replace("point = { position = [2.0, 4.0, 3.0] }\n", expected));
+    let headers = LAYOUTS[1];
+    let after = edited(headers, |s| match &mut s.objects[0].shape {
+        Shape::Sphere(sphere) => sphere.center[1] = 1e-7,
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(after, headers.replace("  0.5, # y", "  1e-7, # y"));
+}
+
+#[test]
+fn colours_keep_their_notation_while_they_can() {
+    let red = |color| edited(LAYOUTS[0], |s| s.materials.get_mut("red").unwrap().color = color);
+    let after = red(Color::from_hex("#80ff00").unwrap());
+    assert_eq!(after, LAYOUTS[0].replace("\"#ff0000\" # pure", "\"#80ff00\" # pure"));
+    let after = red(Color([0.5, 0.25, 0.0]));
+    assert_eq!(after, LAYOUTS[0].replace("\"#ff0000\" # pure", "[0.5, 0.25, 0.0] # pure"));
+}
+
+#[test]
+fn removed_objects_take_their_comments_along_and_leave_the_files() {
+    let text = LAYOUTS[0];
+    let after = edited(text, |s| drop(s.objects.remove(0)));
+    let (new, gone) = difference(text, &after);
+    assert_eq!(new, [] as [&str; 0], "{after}");
+    for line in ["# A ball.", "name = \"ball\" # round"] {
+        assert!(gone.contains(&line), "{gone:?}");
+    }
+    assert!(after.contains("# --- objects ---\n\n# A cube,\n# turned.\n[[object]]"), "{after}");
+    let ball = "# Shows a ball.\n\n# The ball.\n[[object]]\n\
+                shape.sphere = { center = [0, 0, 0], radius = 1 }\n";
+    // The comment that opens the file stays although the first table goes.
+    let after = edited(&format!("{ball}\n[film]\nsize = [20, 20]\n"), |s| {
+        s.objects.clear();
+    });
+    assert_eq!(after, "# Shows a ball.\n\n[film]\nsize = [20, 20]\n");
+    let after = edited(ball, |s| {
+        s.objects.clear();
+    });
+    assert!(after.contains("# Shows a ball.") && !after.contains("# The ball."), "{after}");
+}
+
+#[test]
+fn added_objects_come_last_in_the_style_of_the_reference() {
+    let ball = Object {
+        name: "new".into(),
+        material: "red".into(),
+        shape: Shape::Sphere(Sphere { center: [1.0, 2.0, 3.0], radius: 0.25 }),
+        transform: vec![Step::RotateY(10.0), Step::Scale(Scale([1.0, 2.0, 1.0]))],
+    };
+    let written = "\n[[object]]\nname = \"new\"\nmaterial = \"red\"\n\
+        shape.sphere = { center = [1.0, 2.0, 3.0], radius = 0.25 }\n\
+        transform = [{ rotate_y = 10.0 }, { scale = [1.0, 2.0, 1.0] }]\n";
+    let after = edited(LAYOUTS[0], |s| s.objects.push(ball.clone()));
+    let end = "\n# The end.\n";
+    assert_eq!(after, LAYOUTS[0].strip_suffix(end).unwrap().to_string() + written + end);
+    let after = edited(LAYOUTS[1], |s| s.objects.push(ball.clone()));
+    assert_eq!(after, LAYOUTS[1].to_string() + "\n" + written.trim_end());
+    let after = edited(LAYOUTS[2], |s| s.objects.push(ball.clone()));
+    let (new, gone) = difference(LAYOUTS[2], &after);
+    assert_eq!((new.len(), gone.len()), (1, 0), "{after}");
+}
+
+#[test]
+fn kinds_and_keys_change_places_with_their_comments() {
+    let after = edited(LAYOUTS[0], |s| {
+        s.objects[0].shape = Shape::Plane(Plane { point: [0.0; 3], normal: [0.0, 1.0, 0.0] });
+        s.camera.target = None;
+        s.camera.direction = Some([0.0, 0.0, -1.0]);
+        s.camera.view_angle = ViewAngle::Horizontal(50.0);
+    });
+    for line in [
+        "shape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] } # half",
+        "# looks here\ndirection = [0.0, 0.0, -1.0] # the middle",
+        "view_angle.horizontal = 50.0",
+    ] {
+        assert!(after.contains(line), "{line}\n{after}");
+    }
+}
+
+#[test]
+fn moved_objects_keep_their_comments() {
+    for text in LAYOUTS {
+        let after = edited(text, |s| s.objects.rotate_left(1));
+        let (new, gone) = difference(text.trim_end(), after.trim_end());
+        let blank = |lines: &[&str]| lines.iter().all(|l| l.trim().is_empty());
+        assert!(blank(&new) && blank(&gone) || *text == LAYOUTS[2], "{new:?} {gone:?}\n{after}");
+    }
+}
+
+#[test]
+fn line_ends_and_marks_stay() {
+    let dos = LAYOUTS[0].replace('\n', "\r\n");
+    let after = edited(&dos, |s| s.film.size = [64, 48]);
+    assert_eq!(after, dos.replace("[320, 240]", "[64, 48]"));
+    let marked = format!("\u{feff}{}", LAYOUTS[1]);
+    let after = edited(&marked, |s| s.objects[0].name = "bowl".into());
+    assert_eq!(after, marked.replace("\"ball\"", "\"bowl\""));
+}
+
+#[test]
+fn the_emptiest_scene_can_be_written() {
+    let document = Document::new(&Scene::default(), "empty.toml");
+    assert_eq!(document.text(), "[film]\nsize = [640, 480]\n");
+    assert_eq!(self::document(document.text()).scene(), &Scene::default());
+    let after = edited("film.size = [640, 480]\n", |s| s.trace.depth = 3);
+    assert_eq!(after, "film.size = [640, 480]\n\n[trace]\ndepth = 3\n");
+}
+
+proptest! {
+    #[test]
+    fn any_scene_can_be_written_and_read(scene in random::scene()) {
+        prop_assert_eq!(scene.faults(), []);
+        let document = Document::new(&scene, "scene.toml");
+        let again = Scene::parse(document.text(), "scene.toml");
+        prop_assert!(again.is_ok(), "{}\n{}", again.unwrap_err(), document.text());
+        prop_assert_eq!(again.unwrap(), scene, "{}", document.text());
+    }
+
+    #[test]
+    fn any_edit_can_be_written_and_read(
+        layout in 0..4usize,
+        others in proptest::collection::vec(random::scene(), 2),
+        edits in proptest::collection::vec((0..16u8, 0..7usize), 1..8),
+    ) {
+        let text = match LAYOUTS.get(layout) {
+            Some(text) => text.to_string(),
+            None => Document::new(&others[1], "scene.toml").text().to_string(),
+        };
+        let mut document = document(&text);
+        let mut scene = document.scene().clone();
+        for step in edits {
+            random::edit(&mut scene, &others[0], step);
+            scene = random::tidy(scene);
+            document.apply(&scene);
+            let again = Scene::parse(document.text(), "scene.toml");
+            prop_assert!(again.is_ok(), "{}\n{}", again.unwrap_err(), document.text());
+            prop_assert_eq!(&again.unwrap(), &scene, "{}", document.text());
+        }
+    }
+
+    #[test]
+    fn no_text_makes_the_reader_panic(
+        text in "\\PC{0,80}",
+        cut in 0..2000usize,
+        at in 0..2000usize,
+    ) {
+        let _ = Scene::parse(&text, "scene.toml");
+        for layout in LAYOUTS {
+            let start = |n| layout.chars().take(n);
+            let inserted = start(at).chain(text.chars()).chain(layout.chars().skip(at));
+            for broken in [start(cut).collect::<String>(), inserted.collect()] {
+                let _ = Scene::parse(&broken, "scene.toml").map_err(|e| e.to_string());
+            }
+        }
+    }
+}
