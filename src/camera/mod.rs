@@ -1,5 +1,9 @@
 //! The camera: a pinhole.
 
+mod view;
+
+pub use view::View;
+
 use crate::value::{Checks, Fault, Field, Range, Takes};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,9 @@
 //! Lights.
 
+mod lamp;
+
+pub use lamp::{Arrival, Lamp};
+
 use crate::value::{Checks, Choice, Color, Fault, Field, Range, Takes};
 use serde::{Deserialize, Serialize};
 

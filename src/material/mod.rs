@@ -1,8 +1,14 @@
 //! Materials: how a surface answers light.
 
 mod fields;
+mod finish;
+mod fresnel;
+mod scatter;
 
 pub use fields::FIELDS;
+pub use finish::{Facets, Finish, SMOOTH_ALPHA, Shine, Spread, one_minus_cos_of_tan};
+pub use fresnel::{Reflectance, index_from_f0};
+pub use scatter::Reflected;
 
 use crate::value::{Checks, Color, Fault};
 use serde::{Deserialize, Serialize};
@@ -145,6 +151,22 @@ impl Default for Material {
 }
 
 impl Material {
+    /// Reflectance at normal incidence: the metal's, the given one, or white.
+    pub fn f0(&self) -> Color {
+        self.metal.map(Metal::f0).or(self.reflectance).unwrap_or(Color::WHITE)
+    }
+
+    /// How reflectance depends on the angle.
+    pub fn law(&self) -> Fresnel {
+        let usual = if self.metal.is_some() { Fresnel::Exact } else { Fresnel::Constant };
+        self.fresnel.unwrap_or(usual)
+    }
+
+    /// Slope alpha of the microfacets: the given one, or that with the second moment of the cone.
+    pub fn slope(&self) -> f64 {
+        self.alpha.unwrap_or(self.roughness / 8f64.sqrt())
+    }
+
     /// Whether a microfacet distribution is asked for, by the reflection or by the highlight.
     pub fn has_microfacets(&self) -> bool {
         matches!(self.lobe, Lobe::Beckmann | Lobe::Ggx)

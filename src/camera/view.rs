@@ -1,0 +1,122 @@
+//! The camera, compiled: rays from pixels.
+
+use super::{Camera, ViewAngle};
+use crate::lanes::{Lanes, Real, V3};
+use glam::DVec3;
+
+/// A pinhole camera with its raster. Directions of pixels are computed in double precision and
+/// rounded once; only the offset inside the pixel is computed in the kernel's.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    eye: DVec3,
+    /// Right, up and forward, orthonormal.
+    u: DVec3,
+    v: DVec3,
+    w: DVec3,
+    /// Per pixel to the right and downward, on the picture plane at unit distance.
+    right: DVec3,
+    down: DVec3,
+    /// The picture plane's corner above pixel (0, 0), seen from the eye.
+    corner: DVec3,
+    near: f64,
+}
+
+impl View {
+    /// Compiles `camera` for a film of `width` x `height` pixels, in a scene shifted so that `origin`
+    /// becomes zero.
+    ///
+    /// If `up` is parallel to the view direction (a scene file cannot say that), the axis least
+    /// parallel to it takes its place.
+    pub fn new(camera: &Camera, [width, height]: [u32; 2], origin: DVec3) -> Self {
+        let eye = DVec3::from(camera.eye);
+        let look = match (camera.direction, camera.target) {
+            (Some(direction), _) => DVec3::from(direction),
+            (None, Some(target)) => DVec3::from(target) - eye,
+            (None, None) => DVec3::NEG_Z,
+        };
+        let w = look.normalize();
+        let up = DVec3::from(camera.up).normalize();
+        let mut u = w.cross(up);
+        if !(u.length() > 1e-6) {
+            let a = w.abs();
+            let least = if a.x <= a.y && a.x <= a.z {
+                DVec3::X
+            } else if a.y <= a.z {
+                DVec3::Y
+            } else {
+                DVec3::Z
+            };
+            u = w.cross(least);
+        }
+        let u = u.normalize();
+        let v = u.cross(w);
+        let (width, height) = (f64::from(width), f64::from(height));
+        // Half the size of the picture at unit distance.
+        let (half_width, half_height) = match camera.view_angle {
+            ViewAngle::Vertical(degrees) => {
+                let half = (0.5 * degrees).to_radians().tan();
+                (half * width / height, half)
+            }
+            ViewAngle::Horizontal(degrees) => {
+                let half = (0.5 * degrees).to_radians().tan();
+                (half, half * height / width)
+            }
+        };
+        Self {
+            eye: eye - origin,
+            u,
+            v,
+            w,
+            right: u * (2.0 * half_width / width),
+            down: -v * (2.0 * half_height / height),
+            corner: w - u * half_width + v * half_height,
+            near: camera.near,
+        }
+    }
+
+    /// The eye.
+    pub fn eye(&self) -> DVec3 {
+        self.eye
+    }
+
+    /// Right, up and forward, orthonormal.
+    pub fn frame(&self) -> [DVec3; 3] {
+        [self.u, self.v, self.w]
+    }
+
+    /// Origins and unit directions of rays through the points `(x, y) + (dx, dy)` of the raster, in
+    /// pixels; `(x, y) = at(lane)`. They begin on the near plane.
+    #[inline(always)]
+    pub fn rays<L: Lanes>(
+        &self,
+        at: impl Fn(usize) -> (u32, u32),
+        (dx, dy): (L, L),
+    ) -> (V3<L>, V3<L>) {
+        let base = V3::from_fn(|lane| self.toward(at(lane)));
+        self.finish(base, dx, dy)
+    }
+
+    /// The same for one pixel in all lanes.
+    #[inline(always)]
+    pub fn rays_of<L: Lanes>(&self, at: (u32, u32), (dx, dy): (L, L)) -> (V3<L>, V3<L>) {
+        self.finish(V3::splat(self.toward(at)), dx, dy)
+    }
+
+    /// From the eye to the corner of a pixel, on the plane at unit distance.
+    #[inline(always)]
+    fn toward<S: Real>(&self, (x, y): (u32, u32)) -> [S; 3] {
+        let corner = self.corner + self.right * f64::from(x) + self.down * f64::from(y);
+        corner.to_array().map(S::of)
+    }
+
+    #[inline(always)]
+    fn finish<L: Lanes>(&self, base: V3<L>, dx: L, dy: L) -> (V3<L>, V3<L>) {
+        let right = V3::of(self.right.to_array());
+        let down = V3::of(self.down.to_array());
+        let toward = right.mul_add(dx, down.mul_add(dy, base));
+        let eye = V3::of(self.eye.to_array());
+        // At unit distance along w, `toward` reaches the plane at distance `near` after `near` steps.
+        let origin = if self.near > 0.0 { toward.mul_add(L::of(self.near), eye) } else { eye };
+        (origin, toward.normalize())
+    }
+}

@@ -1,0 +1,352 @@
+//! The synchronous core: traces the jobs of one wave into the film.
+
+use super::wave::{Job, JobReport, Wave, WaveReport};
+use crate::film::{BadSample, Estimator, Film, Slot, TILE, Tile, lattice_pixels};
+use crate::lanes::{Lanes, MAX_WIDTH, Mask, V3};
+use crate::sampling::{SampleSettings, Sampler};
+use crate::world::{AnyWorld, Counts, MAX_GROUPS, Radiance, World};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Traces the jobs of `wave` into `film`, on `pool`. A job that has not begun when `cancel` is raised
+/// is left out and says so.
+pub fn run(
+    world: &AnyWorld,
+    film: &mut Film,
+    wave: &Wave,
+    sampling: &SampleSettings,
+    estimator: &Estimator,
+    pool: &rayon::ThreadPool,
+    cancel: &AtomicBool,
+) -> WaveReport {
+    match world {
+        AnyWorld::Single(w) => run_in(w, film, wave, sampling, estimator, pool, cancel),
+        AnyWorld::Double(w) => run_in(w, film, wave, sampling, estimator, pool, cancel),
+    }
+}
+
+/// The same for one lane type.
+pub fn run_in<L: Lanes>(
+    world: &World<L>,
+    film: &mut Film,
+    wave: &Wave,
+    sampling: &SampleSettings,
+    estimator: &Estimator,
+    pool: &rayon::ThreadPool,
+    cancel: &AtomicBool,
+) -> WaveReport {
+    let tracer = Tracer::new(world, sampling);
+    let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
+    let slots = film.slots(&tiles);
+    let trace = |(slot, job): (Slot, &Job)| {
+        if cancel.load(Ordering::Relaxed) {
+            return None;
+        }
+        let origin = slot.origin;
+        let tile = slot.open();
+        let counts = tracer.job(tile, origin, wave.replicate, job);
+        let error = if wave.estimate { estimator.tile(tile) } else { None };
+        Some(JobReport { rays: counts.rays, glossy: counts.glossy, error })
+    };
+    // Without a pool's hand-over, one thread traces where it stands.
+    let reports = if pool.current_num_threads() == 1 && slots.len() == 1 {
+        slots.into_iter().zip(&wave.jobs).map(trace).collect()
+    } else {
+        pool.install(|| slots.into_par_iter().zip(&wave.jobs).with_max_len(1).map(trace).collect())
+    };
+    WaveReport { reports }
+}
+
+/// The first sample of replicate A in interleaved order: every 8th pixel in x and y, then the gaps in
+/// three stages, each over the whole picture; `shown` sees the film after the first. Once `abandon`
+/// is raised the later stages are left out, and there is no report.
+pub fn run_first(
+    world: &AnyWorld,
+    film: &mut Film,
+    wave: &Wave,
+    sampling: &SampleSettings,
+    pool: &rayon::ThreadPool,
+    abandon: &AtomicBool,
+    shown: &mut dyn FnMut(&Film),
+) -> Option<WaveReport> {
+    match world {
+        AnyWorld::Single(w) => first_in(w, film, wave, sampling, pool, abandon, shown),
+        AnyWorld::Double(w) => first_in(w, film, wave, sampling, pool, abandon, shown),
+    }
+}
+
+/// Tiles side by side that share packets while the lattice is coarse.
+const STRIP_TILES: usize = 8;
+
+fn first_in<L: Lanes>(
+    world: &World<L>,
+    film: &mut Film,
+    wave: &Wave,
+    sampling: &SampleSettings,
+    pool: &rayon::ThreadPool,
+    abandon: &AtomicBool,
+    shown: &mut dyn FnMut(&Film),
+) -> Option<WaveReport> {
+    let tracer = Tracer::new(world, sampling);
+    let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
+    let mut counts = vec![Counts::default(); tiles.len()];
+    let mut before = 0;
+    for step in [8, 4, 2, 1] {
+        let mut strips: Vec<(Vec<Slot>, &mut [Counts])> = Vec::new();
+        let mut slots = film.slots(&tiles).into_iter();
+        for counts in counts.chunks_mut(STRIP_TILES) {
+            strips.push((slots.by_ref().take(counts.len()).collect(), counts));
+        }
+        let complete = pool.install(|| {
+            strips
+                .into_par_iter()
+                .map(|(slots, counts)| {
+                    if step != 8 && abandon.load(Ordering::Relaxed) {
+                        return false;
+                    }
+                    tracer.lattice(slots, before, step, counts);
+                    true
+                })
+                .reduce(|| true, |a, b| a & b)
+        });
+        if step == 8 {
+            shown(film);
+        }
+        if !complete || (step != 1 && abandon.load(Ordering::Relaxed)) {
+            return None;
+        }
+        before = step;
+    }
+    let report = |c: Counts| Some(JobReport { rays: c.rays, glossy: c.glossy, error: None });
+    Some(WaveReport { reports: counts.into_iter().map(report).collect() })
+}
+
+/// A world with the sample sequence and what else all jobs share.
+struct Tracer<'a, L: Lanes> {
+    world: &'a World<L>,
+    sampler: Sampler<L>,
+    /// Radiance beyond this cannot be told from a fault, per group: 2^50 steps of the film.
+    limits: [L; MAX_GROUPS],
+}
+
+impl<'a, L: Lanes> Tracer<'a, L> {
+    fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
+        let mut limits = [L::zero(); MAX_GROUPS];
+        for (limit, scale) in limits.iter_mut().zip(world.scales()) {
+            *limit = L::of((50f64.exp2() / scale).min(L::MAX));
+        }
+        Self { world, sampler: Sampler::new(*sampling, world.jitter()), limits }
+    }
+
+    /// Samples of all pixels of a tile: packets of one pixel where enough aligned samples are asked
+    /// for, of several pixels at one index elsewhere.
+    fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
+        let mut counts = Counts::default();
+        let width = L::WIDTH as u32;
+        let end = job.first + job.count;
+        let pixels: Vec<(usize, usize)> = blocks(tile.extent());
+        let mut index = job.first;
+        while index < end {
+            if index % width == 0 && end - index >= width {
+                let aligned = end - end % width;
+                for pixel in &pixels {
+                    for first in (index..aligned).step_by(L::WIDTH) {
+                        self.pixel(tile, origin, *pixel, replicate, first, &mut counts);
+                    }
+                }
+                index = aligned;
+            } else {
+                for packet in pixels.chunks(L::WIDTH) {
+                    let at = |lane: usize| {
+                        let (x, y) = packet[lane.min(packet.len() - 1)];
+                        ((origin[0] + x) as u32, (origin[1] + y) as u32)
+                    };
+                    let radiance = self.pixels(packet.len(), at, replicate, index, &mut counts);
+                    let mut put = |lane, values: &[i64]| {
+                        let (x, y) = packet[lane];
+                        tile.add(replicate, y * TILE + x, values);
+                    };
+                    let bad = self.scatter(packet.len(), &radiance, &mut put);
+                    for (lane, _) in lanes_of(bad) {
+                        let (x, y) = at(lane);
+                        tile.record_bad(BadSample {
+                            index,
+                            replicate,
+                            y: y as usize,
+                            x: x as usize,
+                        });
+                    }
+                }
+                index += 1;
+            }
+        }
+        tile.advance(replicate, job.count);
+        counts
+    }
+
+    /// WIDTH samples of one pixel.
+    #[inline(always)]
+    fn pixel(
+        &self,
+        tile: &mut Tile,
+        origin: [usize; 2],
+        (x, y): (usize, usize),
+        replicate: usize,
+        first: u32,
+        counts: &mut Counts,
+    ) {
+        let at = ((origin[0] + x) as u32, (origin[1] + y) as u32);
+        let draws = self.sampler.of_pixel(at.0, at.1, replicate, first);
+        let half = L::of(0.5);
+        let jitter = if self.world.jitter() { draws.pixel() } else { (half, half) };
+        let rays = self.world.view().rays_of(at, jitter);
+        let mut radiance = black();
+        let cost = self.world.trace(rays, &draws, L::mask(true), &mut radiance);
+        counts.rays += cost.rays;
+        counts.glossy |= cost.glossy;
+        let bad = self.bad(&mut radiance);
+        let mut sums = [0i64; 3 * MAX_GROUPS];
+        let groups = self.world.groups();
+        for (g, sums) in sums.chunks_exact_mut(3).enumerate().take(groups) {
+            let (value, scale) = (radiance.groups[g], self.world.scales()[g]);
+            sums[0] = value.x.fixed_sum(scale);
+            sums[1] = value.y.fixed_sum(scale);
+            sums[2] = value.z.fixed_sum(scale);
+        }
+        tile.add(replicate, y * TILE + x, &sums[..3 * groups]);
+        for (lane, _) in lanes_of(bad) {
+            let index = first + lane as u32;
+            tile.record_bad(BadSample { index, replicate, y: at.1 as usize, x: at.0 as usize });
+        }
+    }
+
+    /// Sample `index` of the first `count` pixels that `at` names.
+    #[inline(always)]
+    fn pixels(
+        &self,
+        count: usize,
+        at: impl Fn(usize) -> (u32, u32),
+        replicate: usize,
+        index: u32,
+        counts: &mut Counts,
+    ) -> Radiance<L> {
+        let draws = self.sampler.of_pixels(&at, replicate, index);
+        let half = L::of(0.5);
+        let jitter = if self.world.jitter() { draws.pixel() } else { (half, half) };
+        let rays = self.world.view().rays(&at, jitter);
+        let lanes = L::from_fn(|lane| {
+            use crate::lanes::Real;
+            L::Scalar::of(if lane < count { 1.0 } else { 0.0 })
+        });
+        let mut radiance = black();
+        let cost = self.world.trace(rays, &draws, lanes.gt(L::zero()), &mut radiance);
+        counts.rays += cost.rays;
+        counts.glossy |= cost.glossy;
+        radiance
+    }
+
+    /// Gives the samples of the first `count` lanes to `put`, lane by lane; returns the bad ones.
+    #[inline(always)]
+    fn scatter(
+        &self,
+        count: usize,
+        radiance: &Radiance<L>,
+        put: &mut impl FnMut(usize, &[i64]),
+    ) -> u32 {
+        let mut radiance = Radiance { groups: radiance.groups };
+        let bad = self.bad(&mut radiance);
+        let groups = self.world.groups();
+        let mut columns = [[0i64; MAX_WIDTH]; 3 * MAX_GROUPS];
+        for (g, columns) in columns.chunks_exact_mut(3).enumerate().take(groups) {
+            let (value, scale) = (radiance.groups[g], self.world.scales()[g]);
+            value.x.fixed(scale, &mut columns[0]);
+            value.y.fixed(scale, &mut columns[1]);
+            value.z.fixed(scale, &mut columns[2]);
+        }
+        for lane in 0..count {
+            let values: [i64; 3 * MAX_GROUPS] = std::array::from_fn(|c| columns[c][lane]);
+            put(lane, &values[..3 * groups]);
+        }
+        bad
+    }
+
+    /// Blackens samples that are NaN, infinite, negative or beyond what the film holds; returns them
+    /// as bits by lane.
+    #[inline(always)]
+    fn bad(&self, radiance: &mut Radiance<L>) -> u32 {
+        let mut good = L::mask(true);
+        for (g, limit) in self.limits.iter().enumerate().take(self.world.groups()) {
+            let v = radiance.groups[g];
+            let (zero, limit) = (L::zero(), *limit);
+            good = good
+                & (v.x.ge(zero) & v.x.le(limit))
+                & (v.y.ge(zero) & v.y.le(limit))
+                & (v.z.ge(zero) & v.z.le(limit));
+        }
+        if good.all() {
+            return 0;
+        }
+        for group in &mut radiance.groups[..self.world.groups()] {
+            *group = group.only(good);
+        }
+        (!good).bits()
+    }
+
+    /// The first sample of the pixels that a lattice of `step` pixels adds to one of `before` (0:
+    /// none) in tiles side by side, whose pixels share packets.
+    fn lattice(&self, slots: Vec<Slot>, before: usize, step: usize, counts: &mut [Counts]) {
+        let mut tiles = Vec::new();
+        let mut pixels = Vec::new();
+        for (t, slot) in slots.into_iter().enumerate() {
+            let origin = slot.origin;
+            let tile = slot.open();
+            let extent = tile.extent();
+            let inside = |p: &usize| p % TILE < extent[0] && p / TILE < extent[1];
+            pixels.extend(lattice_pixels(before, step).filter(inside).map(|p| (t, origin, p)));
+            tiles.push(tile);
+        }
+        for packet in pixels.chunks(L::WIDTH) {
+            let at = |lane: usize| {
+                let (_, origin, p) = packet[lane.min(packet.len() - 1)];
+                ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
+            };
+            let mut cost = Counts::default();
+            let radiance = self.pixels(packet.len(), at, 0, 0, &mut cost);
+            // A packet's rays are shared out by pixels, so that the count is that of the jobs.
+            let share = cost.rays / packet.len() as u64;
+            let mut put = |lane: usize, values: &[i64]| {
+                let (t, _, p) = packet[lane];
+                tiles[t].add(0, p, values);
+                counts[t].rays += share;
+                counts[t].glossy |= cost.glossy;
+            };
+            let bad = self.scatter(packet.len(), &radiance, &mut put);
+            for (lane, _) in lanes_of(bad) {
+                let (x, y) = at(lane);
+                let sample = BadSample { index: 0, replicate: 0, y: y as usize, x: x as usize };
+                tiles[packet[lane].0].record_bad(sample);
+            }
+        }
+        for tile in tiles {
+            tile.set_lattice(step);
+        }
+    }
+}
+
+fn black<L: Lanes>() -> Radiance<L> {
+    Radiance { groups: [V3::zero(); MAX_GROUPS] }
+}
+
+/// The lanes whose bits are set.
+fn lanes_of(bits: u32) -> impl Iterator<Item = (usize, ())> {
+    (0..32).filter(move |i| bits >> i & 1 != 0).map(|i| (i, ()))
+}
+
+/// The pixels of a tile in an order in which neighbours in the list are neighbours in the picture:
+/// blocks of 4 x 2.
+fn blocks([width, height]: [usize; 2]) -> Vec<(usize, usize)> {
+    let mut out: Vec<(usize, usize)> =
+        (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
+    out.sort_by_key(|(x, y)| (y / 2, x / 4, y % 2, x % 4));
+    out
+}

@@ -1,0 +1,295 @@
+//! From a scene to a world.
+
+use super::groups::{Groups, Member};
+use super::inventory::Inventory;
+use super::limits;
+use crate::camera::View;
+use crate::lanes::{Double, Lanes, Real, Single};
+use crate::light::Lamp;
+use crate::material::{Finish, Material, Spread};
+use crate::scene::{Filter, Horizon, Level, Scene};
+use crate::shape::{Form, Geometry};
+use glam::{DAffine3, DVec3};
+
+/// The precision that a scene is traced in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Precision {
+    /// 24-bit significands, eight or sixteen lanes.
+    Single,
+    /// 53-bit significands, four or eight lanes.
+    Double,
+    /// Single where the scene's proportions allow it.
+    #[default]
+    Auto,
+}
+
+/// How scenes are compiled.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The precision.
+    pub precision: Precision,
+}
+
+/// Beyond this ratio of the scene's extent to its thinnest thing, `auto` takes double precision: the
+/// rays that leave a surface start 2^-20 of the extent above it, 1/128 of that thing.
+const SINGLE_RATIO: f64 = 8192.0;
+
+/// A light of the world: the lamp, its group, its weight in the group's samples.
+pub(super) struct Source<S> {
+    pub lamp: Lamp<S>,
+    pub group: usize,
+    /// `None`: 1 in every channel.
+    pub weight: Option<[S; 3]>,
+}
+
+/// A scene, compiled for the lane type `L`.
+pub struct World<L: Lanes> {
+    pub(super) geometry: Geometry<L>,
+    /// For each item of the geometry, its finish.
+    pub(super) finish_of: Vec<u32>,
+    pub(super) finishes: Vec<Finish<L::Scalar>>,
+    pub(super) sources: Vec<Source<L::Scalar>>,
+    pub(super) ambient: Option<usize>,
+    pub(super) background: Option<usize>,
+    pub(super) shadows: bool,
+    /// The most reflections of a path.
+    pub(super) depth: u32,
+    pub(super) min_weight: f64,
+    pub(super) fold: bool,
+    pub(super) view: View,
+    groups: Groups,
+    names: Vec<String>,
+    scales: Vec<f64>,
+    jitter: bool,
+    glossy: bool,
+    inventory: Inventory,
+    biases: Vec<String>,
+}
+
+/// Geometry of every object, in double precision, around the scene's centre.
+struct Placed {
+    origin: DVec3,
+    forms: Vec<Form>,
+}
+
+impl Placed {
+    fn new(scene: &Scene) -> Self {
+        let forms: Vec<Form> = scene
+            .objects
+            .iter()
+            .map(|o| o.shape.form().transformed(&o.scene_from_object()))
+            .collect();
+        let corners = || forms.iter().filter_map(Form::bounds);
+        let low = corners().map(|b| b.0).reduce(DVec3::min);
+        let high = corners().map(|b| b.1).reduce(DVec3::max);
+        let origin = match (low, high) {
+            (Some(low), Some(high)) => 0.5 * (low + high),
+            _ => DVec3::from(scene.camera.eye),
+        };
+        let back = DAffine3::from_translation(-origin);
+        Self { origin, forms: forms.into_iter().map(|f| f.transformed(&back)).collect() }
+    }
+
+    /// Largest magnitude of a coordinate of things and eye.
+    fn extent(&self, scene: &Scene) -> f64 {
+        let eye = DVec3::from(scene.camera.eye) - self.origin;
+        let things = self.forms.iter().filter_map(Form::bounds).map(|(l, h)| l.abs().max(h.abs()));
+        things.fold(eye.abs(), DVec3::max).max_element()
+    }
+
+    /// The smallest thickness of a solid, or the smaller edge of a flat thing.
+    fn thinnest(&self) -> f64 {
+        let thickness = |form: &Form| match form {
+            Form::Parallelogram { u, v, .. } => u.length().min(v.length()),
+            Form::Convex { faces, corners } => faces
+                .iter()
+                .map(|f| {
+                    let depths = corners.iter().map(|c| f.offset - f.normal.dot(*c));
+                    depths.fold(0.0, f64::max)
+                })
+                .fold(f64::INFINITY, f64::min),
+            Form::Plane { .. } => f64::INFINITY,
+            Form::Sphere { radius, .. } => 2.0 * radius,
+            Form::Ellipsoid { .. } => {
+                form.bounds().map_or(f64::INFINITY, |(l, h)| (h - l).min_element())
+            }
+        };
+        self.forms.iter().map(thickness).fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl<L: Lanes> World<L> {
+    /// Compiles a scene without faults.
+    pub fn new(scene: &Scene) -> Self {
+        Self::compile(scene, Placed::new(scene))
+    }
+
+    fn compile(scene: &Scene, placed: Placed) -> Self {
+        let level = scene.trace.level;
+        let reflects = level == Level::Full && scene.trace.depth > 0;
+        let default = Material::default();
+        let mut used: Vec<&Material> = Vec::new();
+        let mut finish_of_object = Vec::new();
+        for object in &scene.objects {
+            let material = scene.materials.get(&object.material).unwrap_or(&default);
+            let known = used.iter().position(|m| *m == material);
+            finish_of_object.push(known.unwrap_or(used.len()) as u32);
+            if known.is_none() {
+                used.push(material);
+            }
+        }
+        let finishes: Vec<Finish<L::Scalar>> =
+            used.iter().map(|m| Finish::new(m, reflects)).collect();
+        let geometry = Geometry::new(&placed.forms);
+        let finish_of =
+            geometry.sources().iter().map(|form| finish_of_object[*form as usize]).collect();
+
+        let lit = finishes.iter().any(|f| f.wants_light);
+        let ambient = used.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3]);
+        let groups = Groups::new(scene, lit, ambient);
+        let extent = placed.extent(scene);
+        let scales = groups.scales::<L::Scalar>(scene, placed.origin, 0.1 * extent);
+        let sources: Vec<_> = groups
+            .lights(scene)
+            .into_iter()
+            .filter_map(|(light, group, weight)| {
+                let lamp = Lamp::new(&scene.lights[light], placed.origin)?;
+                let weight = (weight != [1.0; 3]).then(|| weight.map(L::Scalar::of));
+                Some(Source { lamp, group, weight })
+            })
+            .collect();
+        let reflecting = finishes.iter().any(|f| f.reflection.is_some());
+        let glossy =
+            |f: &Finish<_>| matches!(f.reflection, Some((_, s)) if !matches!(s, Spread::Mirror));
+        let precision = if L::EPSILON > 1e-10 { "single" } else { "double" };
+        let inventory = Inventory::new(
+            scene,
+            geometry.to_string(),
+            &finishes,
+            &groups.members,
+            sources.len(),
+            precision,
+        );
+        Self {
+            ambient: groups.find(&Member::Ambient),
+            background: (scene.background.color.0 != [0.0; 3])
+                .then(|| groups.find(&Member::Background))
+                .flatten(),
+            shadows: level >= Level::Shadows && !geometry.is_empty(),
+            depth: if reflecting { scene.trace.depth } else { 0 },
+            min_weight: scene.trace.min_weight,
+            fold: scene.trace.horizon == Horizon::Fold,
+            view: View::new(&scene.camera, scene.film.size, placed.origin),
+            names: groups.names(scene),
+            jitter: scene.film.filter == Filter::Box,
+            glossy: finishes.iter().any(glossy),
+            biases: limits::biases(scene),
+            geometry,
+            finish_of,
+            finishes,
+            sources,
+            groups,
+            scales,
+            inventory,
+        }
+    }
+
+    /// Number of light groups.
+    pub fn groups(&self) -> usize {
+        self.scales.len()
+    }
+
+    /// Steps per unit of radiance in the film's integers, per group.
+    pub fn scales(&self) -> &[f64] {
+        &self.scales
+    }
+
+    /// Whether samples move inside their pixel.
+    pub fn jitter(&self) -> bool {
+        self.jitter
+    }
+
+    /// Whether any surface has a glossy lobe.
+    pub fn glossy(&self) -> bool {
+        self.glossy
+    }
+
+    /// The camera.
+    pub fn view(&self) -> &View {
+        &self.view
+    }
+
+    /// What it contains.
+    pub fn inventory(&self) -> &Inventory {
+        &self.inventory
+    }
+}
+
+/// A world in the precision that the scene or the user asked for.
+pub enum AnyWorld {
+    /// Single precision.
+    Single(World<Single>),
+    /// Double precision.
+    Double(World<Double>),
+}
+
+/// The same expression for either instance.
+macro_rules! either {
+    ($any:expr, $world:ident => $value:expr) => {
+        match $any {
+            AnyWorld::Single($world) => $value,
+            AnyWorld::Double($world) => $value,
+        }
+    };
+}
+
+impl AnyWorld {
+    /// Compiles a scene without faults.
+    pub fn compile(scene: &Scene, options: &Options) -> Self {
+        let placed = Placed::new(scene);
+        let single = match options.precision {
+            Precision::Single => true,
+            Precision::Double => false,
+            Precision::Auto => placed.extent(scene) <= SINGLE_RATIO * placed.thinnest(),
+        };
+        if single {
+            Self::Single(World::compile(scene, placed))
+        } else {
+            Self::Double(World::compile(scene, placed))
+        }
+    }
+
+    /// Name of the lane type.
+    pub fn lanes(&self) -> &'static str {
+        match self {
+            Self::Single(_) => Single::NAME,
+            Self::Double(_) => Double::NAME,
+        }
+    }
+
+    /// A name for each light group.
+    pub fn group_names(&self) -> Vec<String> {
+        either!(self, w => w.names.clone())
+    }
+
+    /// Steps per unit of radiance in the film's integers, per group: powers of two.
+    pub fn group_scales(&self) -> Vec<f64> {
+        either!(self, w => w.scales.clone())
+    }
+
+    /// Weight of each group in the picture of `scene`, which may differ from the compiled scene in
+    /// colours, intensities and switches of lights.
+    pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
+        either!(self, w => w.groups.mix(scene))
+    }
+
+    /// What it contains.
+    pub fn inventory(&self) -> &Inventory {
+        either!(self, w => &w.inventory)
+    }
+
+    /// What limits cut off, in words, one for each limit that does.
+    pub fn biases(&self) -> Vec<String> {
+        either!(self, w => w.biases.clone())
+    }
+}

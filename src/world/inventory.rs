@@ -1,0 +1,88 @@
+//! What a world contains, in words.
+
+use super::groups::Member;
+use crate::material::{Finish, Shine, Spread};
+use crate::scene::{Filter, Horizon, Level, Scene};
+use std::fmt;
+
+/// What a world contains; printing it gives one line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Inventory {
+    parts: Vec<String>,
+}
+
+impl Inventory {
+    /// Of a compiled scene.
+    pub(super) fn new<S>(
+        scene: &Scene,
+        geometry: String,
+        finishes: &[Finish<S>],
+        members: &[Member],
+        lamps: usize,
+        precision: &str,
+    ) -> Self {
+        let mut parts = vec![geometry];
+        let mut say = |present: bool, what: &str| {
+            if present {
+                parts.push(what.to_string());
+            }
+        };
+        let shine = |test: fn(&Shine<S>) -> bool| finishes.iter().any(|f| test(&f.shine));
+        say(shine(|s| matches!(s, Shine::Phong { .. })), "Phong");
+        say(shine(|s| matches!(s, Shine::Facets { .. })), "Cook-Torrance");
+        let spread = |test: fn(&Spread<S>) -> bool| {
+            finishes.iter().any(|f| f.reflection.as_ref().is_some_and(|r| test(&r.1)))
+        };
+        say(spread(|s| matches!(s, Spread::Mirror)), "perfect mirror");
+        say(spread(|s| matches!(s, Spread::Cone { .. })), "cone lobe");
+        say(spread(|s| matches!(s, Spread::Square { .. })), "square lobe");
+        say(spread(|s| matches!(s, Spread::Facets(f) if !f.ggx)), "Beckmann lobe");
+        say(spread(|s| matches!(s, Spread::Facets(f) if f.ggx)), "GGX lobe");
+        let absorbs = scene.trace.horizon == Horizon::Absorb;
+        say(absorbs && spread(|s| !matches!(s, Spread::Mirror)), "absorbing horizon");
+        let count = |n: usize, what: &str| match n {
+            0 => None,
+            1 => Some(format!("1 {what}")),
+            n => Some(format!("{n} {what}s")),
+        };
+        let kind = |directional: bool| {
+            let shining = |m: &Member| match m {
+                Member::Light(i) => vec![*i],
+                Member::Shared(list) => list.clone(),
+                _ => Vec::new(),
+            };
+            members
+                .iter()
+                .flat_map(shining)
+                .filter(|i| scene.lights[*i].directional.is_some() == directional)
+                .count()
+        };
+        parts.extend(count(kind(false), "point light"));
+        parts.extend(count(kind(true), "directional light"));
+        let mut say = |present: bool, what: &str| {
+            if present {
+                parts.push(what.to_string());
+            }
+        };
+        let shared = members.iter().any(|m| matches!(m, Member::Shared(_)));
+        say(shared, "shared light group");
+        say(members.contains(&Member::Ambient), "ambient");
+        say(members.contains(&Member::Background), "background");
+        say(scene.trace.level == Level::Primary, "no shadows");
+        say(scene.trace.level == Level::Shadows && lamps > 0, "shadows only");
+        say(scene.film.filter == Filter::Center, "no anti-aliasing");
+        parts.push(format!("{precision} precision"));
+        Self { parts }
+    }
+
+    /// Its parts, in order.
+    pub fn parts(&self) -> &[String] {
+        &self.parts
+    }
+}
+
+impl fmt::Display for Inventory {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.parts.join(", "))
+    }
+}

@@ -1,0 +1,13 @@
+//! The world: a scene compiled for one lane type, holding only what this scene requires, and the
+//! paths traced in it.
+
+mod compile;
+mod groups;
+mod inventory;
+mod limits;
+mod path;
+
+pub use compile::{AnyWorld, Options, Precision, World};
+pub use groups::MAX_GROUPS;
+pub use inventory::Inventory;
+pub use path::{Counts, Radiance};
