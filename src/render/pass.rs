@@ -167,14 +167,9 @@ impl<'a, L: Lanes> Tracer<'a, L> {
                         tile.add(replicate, y * TILE + x, values);
                     };
                     let bad = self.scatter(packet.len(), &radiance, &mut put);
-                    for (lane, _) in lanes_of(bad) {
+                    for lane in lanes_of(bad) {
                         let (x, y) = at(lane);
-                        tile.record_bad(BadSample {
-                            index,
-                            replicate,
-                            y: y as usize,
-                            x: x as usize,
-                        });
+                        tile.record_bad(BadSample { index, replicate: replicate as u8, y, x });
                     }
                 }
                 index += 1;
@@ -214,9 +209,9 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             sums[2] = value.z.fixed_sum(scale);
         }
         tile.add(replicate, y * TILE + x, &sums[..3 * groups]);
-        for (lane, _) in lanes_of(bad) {
+        for lane in lanes_of(bad) {
             let index = first + lane as u32;
-            tile.record_bad(BadSample { index, replicate, y: at.1 as usize, x: at.0 as usize });
+            tile.record_bad(BadSample { index, replicate: replicate as u8, y: at.1, x: at.0 });
         }
     }
 
@@ -321,9 +316,9 @@ impl<'a, L: Lanes> Tracer<'a, L> {
                 counts[t].glossy |= cost.glossy;
             };
             let bad = self.scatter(packet.len(), &radiance, &mut put);
-            for (lane, _) in lanes_of(bad) {
+            for lane in lanes_of(bad) {
                 let (x, y) = at(lane);
-                let sample = BadSample { index: 0, replicate: 0, y: y as usize, x: x as usize };
+                let sample = BadSample { index: 0, replicate: 0, y, x };
                 tiles[packet[lane].0].record_bad(sample);
             }
         }
@@ -338,8 +333,8 @@ fn black<L: Lanes>() -> Radiance<L> {
 }
 
 /// The lanes whose bits are set.
-fn lanes_of(bits: u32) -> impl Iterator<Item = (usize, ())> {
-    (0..32).filter(move |i| bits >> i & 1 != 0).map(|i| (i, ()))
+fn lanes_of(bits: u32) -> impl Iterator<Item = usize> {
+    (0..32).filter(move |i| bits >> i & 1 != 0)
 }
 
 /// The pixels of a tile in an order in which neighbours in the list are neighbours in the picture:
