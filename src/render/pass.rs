@@ -4,6 +4,7 @@ use super::wave::{Job, JobReport, Wave, WaveReport};
 use crate::film::{BadSample, Estimator, Film, Slot, TILE, Tile, lattice_pixels};
 use crate::lanes::{Lanes, MAX_WIDTH, Mask, V3};
 use crate::sampling::{SampleSettings, Sampler};
+use crate::shape::Seen;
 use crate::world::{AnyWorld, Counts, MAX_GROUPS, Radiance, World};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -143,6 +144,8 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let mut counts = Counts::default();
         let mut radiance = black();
+        let seen = self.world.seen_through(origin, tile.extent());
+        let seen = seen.as_ref();
         let width = L::WIDTH as u32;
         let end = job.first + job.count;
         let pixels: Vec<(usize, usize)> = blocks(tile.extent());
@@ -158,6 +161,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
                             *pixel,
                             replicate,
                             first,
+                            seen,
                             &mut radiance,
                             &mut counts,
                         );
@@ -170,7 +174,15 @@ impl<'a, L: Lanes> Tracer<'a, L> {
                         let (x, y) = packet[lane.min(packet.len() - 1)];
                         ((origin[0] + x) as u32, (origin[1] + y) as u32)
                     };
-                    self.pixels(packet.len(), at, replicate, index, &mut radiance, &mut counts);
+                    self.pixels(
+                        packet.len(),
+                        at,
+                        replicate,
+                        index,
+                        seen,
+                        &mut radiance,
+                        &mut counts,
+                    );
                     let mut put = |lane, values: &[i64]| {
                         let (x, y) = packet[lane];
                         tile.add(replicate, y * TILE + x, values);
@@ -197,6 +209,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         (x, y): (usize, usize),
         replicate: usize,
         first: u32,
+        seen: Option<&Seen>,
         radiance: &mut Radiance<L>,
         counts: &mut Counts,
     ) {
@@ -205,7 +218,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         let half = L::of(0.5);
         let jitter = if self.world.jitter() { draws.pixel() } else { (half, half) };
         let rays = self.world.view().rays_of(at, jitter);
-        let cost = self.world.trace(rays, &draws, L::mask(true), radiance);
+        let cost = self.world.trace(rays, seen, &draws, L::mask(true), radiance);
         counts.rays += cost.rays;
         counts.glossy |= cost.glossy;
         let bad = self.bad(radiance);
@@ -232,6 +245,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         at: impl Fn(usize) -> (u32, u32),
         replicate: usize,
         index: u32,
+        seen: Option<&Seen>,
         radiance: &mut Radiance<L>,
         counts: &mut Counts,
     ) {
@@ -243,7 +257,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             use crate::lanes::Real;
             L::Scalar::of(if lane < count { 1.0 } else { 0.0 })
         });
-        let cost = self.world.trace(rays, &draws, lanes.gt(L::zero()), radiance);
+        let cost = self.world.trace(rays, seen, &draws, lanes.gt(L::zero()), radiance);
         counts.rays += cost.rays;
         counts.glossy |= cost.glossy;
     }
@@ -314,7 +328,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
                 ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
             };
             let mut cost = Counts::default();
-            self.pixels(packet.len(), at, 0, 0, &mut radiance, &mut cost);
+            self.pixels(packet.len(), at, 0, 0, None, &mut radiance, &mut cost);
             // A packet's rays are shared out by pixels, so that the count is that of the jobs.
             let share = cost.rays / packet.len() as u64;
             let mut put = |lane: usize, values: &[i64]| {
