@@ -37,7 +37,7 @@ impl View {
         let w = look.normalize();
         let up = DVec3::from(camera.up).normalize();
         let mut u = w.cross(up);
-        if !(u.length() > 1e-6) {
+        if u.length() <= 1e-6 {
             let a = w.abs();
             let least = if a.x <= a.y && a.x <= a.z {
                 DVec3::X
