@@ -100,7 +100,8 @@ impl<L: Lanes> Geometry<L> {
         &self.source
     }
 
-    /// The nearest item in front of each ray.
+    /// The nearest item in front of each ray; of several at the same distance the one with the lowest
+    /// number, so that neither the order in the tree nor the other rays of the packet decide.
     #[inline]
     pub fn closest(&self, ray: &Ray<L>) -> Hit<L> {
         let mut hit = Hit::none();
@@ -111,7 +112,9 @@ impl<L: Lanes> Geometry<L> {
             tree.walk(ray, hit.t, |item, _| {
                 let (part, i) = self.tree_items[item];
                 let part = &self.parts[part as usize];
-                part.batch.closest(i as usize..i as usize + 1, part.base, ray, &mut hit);
+                let mut one = Hit::none();
+                part.batch.closest(i as usize..i as usize + 1, part.base, ray, &mut one);
+                hit.take(&one);
                 hit.t
             });
         }
