@@ -84,7 +84,11 @@ pub fn rendered(scene: &Scene, seed: u64, precision: Precision, count: u32) -> R
 }
 
 /// Follows a schedule that stops for anything but time.
-pub fn follow(rendering: &mut Rendering, settings: Settings, pool: &rayon::ThreadPool) -> StoppedBy {
+pub fn follow(
+    rendering: &mut Rendering,
+    settings: Settings,
+    pool: &rayon::ThreadPool,
+) -> StoppedBy {
     let mut schedule = rendering.schedule(settings);
     loop {
         match schedule.next(0.0) {
