@@ -241,18 +241,18 @@ pub trait Lanes:
     fn unit(bits: Self::Bits) -> Self;
 
     /// The sum over lanes of `round(lane * scale)`. Each lane is rounded by itself, so that the sum
-    /// is exact in any grouping; `|lane * scale|` must stay below 2^51.
+    /// is exact in any grouping; `|lane * scale|` must not exceed 2^49.
     fn fixed_sum(self, scale: f64) -> i64;
     /// `round(lane * scale)` of every lane, in `out[..WIDTH]`; the same bounds.
     fn fixed(self, scale: f64, out: &mut [i64; MAX_WIDTH]);
 }
 
-/// 1.5 x 2^52: adding it to a double below 2^51 in magnitude leaves the rounded integer in the low
-/// bits of the representation.
+/// 1.5 x 2^52: a double below 2^51 in magnitude plus this has no fraction bits left, so that adding
+/// and subtracting it rounds to the nearest integer.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// `round(x)` to nearest even, for `|x| < 2^51`.
 #[inline(always)]
 fn round_i64(x: f64) -> i64 {
-    (x + ROUNDER).to_bits().wrapping_sub(ROUNDER.to_bits()) as i64
+    ((x + ROUNDER) - ROUNDER) as i64
 }

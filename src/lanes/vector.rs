@@ -218,9 +218,15 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed_sum(self, scale: f64) -> i64 {
-                let rounded = self.as_array().map(|x| (f64::from(x) * scale + ROUNDER).to_bits());
-                let sum = rounded.iter().fold(0u64, |sum, x| sum.wrapping_add(*x));
-                sum.wrapping_sub(ROUNDER.to_bits().wrapping_mul($n)) as i64
+                // Integers below 2^49: the sum of up to sixteen is exact in a double.
+                let (scale, rounder) = (f64x4::splat(scale), f64x4::splat(ROUNDER));
+                let mut sum = f64x4::splat(0.0);
+                for four in self.as_array().chunks_exact(4) {
+                    let x = f64x4::new(std::array::from_fn(|i| f64::from(four[i])));
+                    sum += (x * scale + rounder) - rounder;
+                }
+                let [a, b, c, d] = sum.to_array();
+                ((a + b) + (c + d)) as i64
             }
             #[inline(always)]
             fn fixed(self, scale: f64, out: &mut [i64; MAX_WIDTH]) {

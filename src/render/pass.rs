@@ -125,7 +125,7 @@ fn first_in<L: Lanes>(
 struct Tracer<'a, L: Lanes> {
     world: &'a World<L>,
     sampler: Sampler<L>,
-    /// Radiance beyond this cannot be told from a fault, per group: 2^50 steps of the film.
+    /// Radiance beyond this cannot be told from a fault, per group: 2^49 steps of the film.
     limits: [L; MAX_GROUPS],
 }
 
@@ -133,7 +133,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
         let mut limits = [L::zero(); MAX_GROUPS];
         for (limit, scale) in limits.iter_mut().zip(world.scales()) {
-            *limit = L::of((50f64.exp2() / scale).min(L::MAX));
+            *limit = L::of((49f64.exp2() / scale).min(L::MAX));
         }
         Self { world, sampler: Sampler::new(*sampling, world.jitter()), limits }
     }
@@ -142,6 +142,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     /// for, of several pixels at one index elsewhere.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let mut counts = Counts::default();
+        let mut radiance = black();
         let width = L::WIDTH as u32;
         let end = job.first + job.count;
         let pixels: Vec<(usize, usize)> = blocks(tile.extent());
@@ -151,7 +152,15 @@ impl<'a, L: Lanes> Tracer<'a, L> {
                 let aligned = end - end % width;
                 for pixel in &pixels {
                     for first in (index..aligned).step_by(L::WIDTH) {
-                        self.pixel(tile, origin, *pixel, replicate, first, &mut counts);
+                        self.pixel(
+                            tile,
+                            origin,
+                            *pixel,
+                            replicate,
+                            first,
+                            &mut radiance,
+                            &mut counts,
+                        );
                     }
                 }
                 index = aligned;
@@ -161,12 +170,12 @@ impl<'a, L: Lanes> Tracer<'a, L> {
                         let (x, y) = packet[lane.min(packet.len() - 1)];
                         ((origin[0] + x) as u32, (origin[1] + y) as u32)
                     };
-                    let radiance = self.pixels(packet.len(), at, replicate, index, &mut counts);
+                    self.pixels(packet.len(), at, replicate, index, &mut radiance, &mut counts);
                     let mut put = |lane, values: &[i64]| {
                         let (x, y) = packet[lane];
                         tile.add(replicate, y * TILE + x, values);
                     };
-                    let bad = self.scatter(packet.len(), &radiance, &mut put);
+                    let bad = self.scatter(packet.len(), &mut radiance, &mut put);
                     for lane in lanes_of(bad) {
                         let (x, y) = at(lane);
                         tile.record_bad(BadSample { index, replicate: replicate as u8, y, x });
@@ -188,6 +197,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         (x, y): (usize, usize),
         replicate: usize,
         first: u32,
+        radiance: &mut Radiance<L>,
         counts: &mut Counts,
     ) {
         let at = ((origin[0] + x) as u32, (origin[1] + y) as u32);
@@ -195,11 +205,10 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         let half = L::of(0.5);
         let jitter = if self.world.jitter() { draws.pixel() } else { (half, half) };
         let rays = self.world.view().rays_of(at, jitter);
-        let mut radiance = black();
-        let cost = self.world.trace(rays, &draws, L::mask(true), &mut radiance);
+        let cost = self.world.trace(rays, &draws, L::mask(true), radiance);
         counts.rays += cost.rays;
         counts.glossy |= cost.glossy;
-        let bad = self.bad(&mut radiance);
+        let bad = self.bad(radiance);
         let mut sums = [0i64; 3 * MAX_GROUPS];
         let groups = self.world.groups();
         for (g, sums) in sums.chunks_exact_mut(3).enumerate().take(groups) {
@@ -223,8 +232,9 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         at: impl Fn(usize) -> (u32, u32),
         replicate: usize,
         index: u32,
+        radiance: &mut Radiance<L>,
         counts: &mut Counts,
-    ) -> Radiance<L> {
+    ) {
         let draws = self.sampler.of_pixels(&at, replicate, index);
         let half = L::of(0.5);
         let jitter = if self.world.jitter() { draws.pixel() } else { (half, half) };
@@ -233,11 +243,9 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             use crate::lanes::Real;
             L::Scalar::of(if lane < count { 1.0 } else { 0.0 })
         });
-        let mut radiance = black();
-        let cost = self.world.trace(rays, &draws, lanes.gt(L::zero()), &mut radiance);
+        let cost = self.world.trace(rays, &draws, lanes.gt(L::zero()), radiance);
         counts.rays += cost.rays;
         counts.glossy |= cost.glossy;
-        radiance
     }
 
     /// Gives the samples of the first `count` lanes to `put`, lane by lane; returns the bad ones.
@@ -245,11 +253,10 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     fn scatter(
         &self,
         count: usize,
-        radiance: &Radiance<L>,
+        radiance: &mut Radiance<L>,
         put: &mut impl FnMut(usize, &[i64]),
     ) -> u32 {
-        let mut radiance = Radiance { groups: radiance.groups };
-        let bad = self.bad(&mut radiance);
+        let bad = self.bad(radiance);
         let groups = self.world.groups();
         let mut columns = [[0i64; MAX_WIDTH]; 3 * MAX_GROUPS];
         for (g, columns) in columns.chunks_exact_mut(3).enumerate().take(groups) {
@@ -300,13 +307,14 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             pixels.extend(lattice_pixels(before, step).filter(inside).map(|p| (t, origin, p)));
             tiles.push(tile);
         }
+        let mut radiance = black();
         for packet in pixels.chunks(L::WIDTH) {
             let at = |lane: usize| {
                 let (_, origin, p) = packet[lane.min(packet.len() - 1)];
                 ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
             };
             let mut cost = Counts::default();
-            let radiance = self.pixels(packet.len(), at, 0, 0, &mut cost);
+            self.pixels(packet.len(), at, 0, 0, &mut radiance, &mut cost);
             // A packet's rays are shared out by pixels, so that the count is that of the jobs.
             let share = cost.rays / packet.len() as u64;
             let mut put = |lane: usize, values: &[i64]| {
@@ -315,7 +323,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
                 counts[t].rays += share;
                 counts[t].glossy |= cost.glossy;
             };
-            let bad = self.scatter(packet.len(), &radiance, &mut put);
+            let bad = self.scatter(packet.len(), &mut radiance, &mut put);
             for lane in lanes_of(bad) {
                 let (x, y) = at(lane);
                 let sample = BadSample { index: 0, replicate: 0, y, x };
@@ -333,15 +341,32 @@ fn black<L: Lanes>() -> Radiance<L> {
 }
 
 /// The lanes whose bits are set.
-fn lanes_of(bits: u32) -> impl Iterator<Item = usize> {
-    (0..32).filter(move |i| bits >> i & 1 != 0)
+fn lanes_of(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = bits.trailing_zeros() as usize;
+        (bits != 0).then(|| {
+            bits &= bits - 1;
+            lane
+        })
+    })
 }
 
 /// The pixels of a tile in an order in which neighbours in the list are neighbours in the picture:
 /// blocks of 4 x 2.
+const ORDER: [(u8, u8); TILE * TILE] = {
+    let mut order = [(0, 0); TILE * TILE];
+    let mut i = 0;
+    while i < order.len() {
+        let (block, within) = (i / 8, i % 8);
+        let (x, y) = (4 * (block % 4) + within % 4, 2 * (block / 4) + within / 4);
+        order[i] = (x as u8, y as u8);
+        i += 1;
+    }
+    order
+};
+
+/// The pixels of a tile of the given extent, in [`ORDER`].
 fn blocks([width, height]: [usize; 2]) -> Vec<(usize, usize)> {
-    let mut out: Vec<(usize, usize)> =
-        (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
-    out.sort_by_key(|(x, y)| (y / 2, x / 4, y % 2, x % 4));
-    out
+    let pixels = ORDER.iter().map(|(x, y)| (usize::from(*x), usize::from(*y)));
+    pixels.filter(|(x, y)| *x < width && *y < height).collect()
 }

@@ -35,6 +35,8 @@ pub struct SampleSettings {
 /// The numbers that samples of a lane type start from.
 pub struct Sampler<L: Lanes> {
     settings: SampleSettings,
+    /// Two words per replicate, from the seed.
+    seeds: [[u32; 2]; 2],
     /// Dimensions of the first lobe: after the two of the pixel, if these are used.
     first_lobe: usize,
     /// `low[d]`: Sobol points 0..WIDTH in dimension d.
@@ -47,20 +49,25 @@ impl<L: Lanes> Sampler<L> {
     /// `jitter`: samples move inside their pixel and use the first two dimensions for that;
     /// otherwise the lobes have them.
     pub fn new(settings: SampleSettings, jitter: bool) -> Self {
+        let word = |replicate: u32, use_: u32| {
+            fold(&[settings.seed as u32, (settings.seed >> 32) as u32, replicate, use_])
+        };
         let low = |d| L::Bits::from_fn(|lane| sobol::point(d, lane as u32));
         Self {
             settings,
+            seeds: [0, 1].map(|replicate| [word(replicate, 0), word(replicate, 1)]),
             first_lobe: if jitter { 2 } else { 0 },
             low: std::array::from_fn(low),
             ramp: L::Bits::from_fn(|lane| lane as u32),
         }
     }
 
-    /// The key of a pixel's samples in one replicate (0: A, 1: B).
+    /// The key of a pixel's samples in one replicate (0: A, 1: B). Distinct for all pixels of a
+    /// picture up to 65536 x 65536, since every step is a bijection of the packed coordinates.
     #[inline(always)]
     fn key(&self, x: u32, y: u32, replicate: usize) -> u32 {
-        let seed = self.settings.seed;
-        fold(&[seed as u32, (seed >> 32) as u32, x, y, replicate as u32])
+        let [before, after] = self.seeds[replicate];
+        mix1(mix1((x | y << 16) ^ before) ^ after)
     }
 
     /// Samples `first .. first + WIDTH` of one pixel; `first` is a multiple of WIDTH.

@@ -15,6 +15,7 @@ struct Part<L: Lanes> {
     batch: Box<dyn Batch<L>>,
     base: u32,
     end: u32,
+    len: usize,
     in_tree: bool,
 }
 
@@ -60,7 +61,7 @@ impl<L: Lanes> Geometry<L> {
             }
             out.source.extend(sources.iter().map(|s| *s as u32));
             let end = out.source.len() as u32;
-            out.parts.push(Part { batch, base, end, in_tree });
+            out.parts.push(Part { batch, base, end, len: sources.len(), in_tree });
         }
         out.tree = (!bounds.is_empty()).then(|| Tree::new(&bounds));
         out
@@ -86,7 +87,7 @@ impl<L: Lanes> Geometry<L> {
     pub fn closest(&self, ray: &Ray<L>) -> Hit<L> {
         let mut hit = Hit::none();
         for part in self.parts.iter().filter(|p| !p.in_tree) {
-            part.batch.closest(0..part.batch.len(), part.base, ray, &mut hit);
+            part.batch.closest(0..part.len, part.base, ray, &mut hit);
         }
         if let Some(tree) = &self.tree {
             tree.walk(ray, hit.t, |item, _| {
@@ -105,7 +106,7 @@ impl<L: Lanes> Geometry<L> {
         let mut blocked = L::mask(false);
         for part in self.parts.iter().filter(|p| !p.in_tree) {
             let open = wanted.and_not(blocked);
-            blocked = blocked | part.batch.blocked(0..part.batch.len(), ray, limit, open);
+            blocked = blocked | part.batch.blocked(0..part.len, ray, limit, open);
             if wanted.and_not(blocked).none() {
                 return blocked;
             }

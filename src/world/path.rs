@@ -5,7 +5,7 @@ use super::groups::MAX_GROUPS;
 use crate::lanes::{Lanes, MAX_WIDTH, Mask, V3};
 use crate::material::{Finish, Spread};
 use crate::sampling::Draws;
-use crate::shape::{Ray, Surface};
+use crate::shape::Ray;
 use std::f64::consts::FRAC_1_PI;
 
 /// The radiance of a packet's samples, per light group, for unit white light.
@@ -23,22 +23,27 @@ pub struct Counts {
     pub glossy: bool,
 }
 
-/// The finishes that a packet met: which, and in which lanes.
+/// The finishes that a packet met.
 struct Met<L: Lanes> {
-    entries: [(u32, L::Mask); MAX_WIDTH],
+    /// The finish of each lane.
+    finish: L,
+    /// Lanes that have one.
+    lanes: L::Mask,
+    /// The finishes that occur.
+    list: [u32; MAX_WIDTH],
     len: usize,
 }
 
 impl<L: Lanes> Met<L> {
+    /// Each finish that occurs with its lanes, never none.
     #[inline(always)]
-    fn entries(&self) -> &[(u32, L::Mask)] {
-        &self.entries[..self.len]
+    fn entries(&self) -> impl Iterator<Item = (u32, L::Mask)> {
+        self.list[..self.len].iter().map(|f| (*f, self.lanes & self.finish.has_tag(*f)))
     }
 }
 
 /// What of a surface the light part needs.
 struct Shaded<L> {
-    surface: Surface<L>,
     /// Normal on the viewer's side.
     normal: V3<L>,
     /// Origin of rays that leave on the viewer's side.
@@ -82,12 +87,8 @@ impl<L: Lanes> World<L> {
             let finishes = self.finishes_of(hit.item, active, front);
             // Start above the surface by a few roundings of the largest number involved.
             let lift = surface.reach.max(surface.point.max_abs()) * L::of(8.0 * L::EPSILON);
-            let shaded = Shaded {
-                start: normal.mul_add(lift, surface.point),
-                view: -ray.direction,
-                surface,
-                normal,
-            };
+            let shaded =
+                Shaded { start: normal.mul_add(lift, surface.point), view: -ray.direction, normal };
             self.light(&shaded, &finishes, weight, out, &mut counts);
             if bounce == self.depth {
                 return counts;
@@ -104,7 +105,8 @@ impl<L: Lanes> World<L> {
     /// Groups the active lanes by finish; backs of one-sided finishes drop out.
     #[inline(always)]
     fn finishes_of(&self, items: L, active: L::Mask, front: L::Mask) -> Met<L> {
-        let mut met = Met { entries: [(0, L::mask(false)); MAX_WIDTH], len: 0 };
+        let mut met =
+            Met { finish: L::tag(0), lanes: L::mask(false), list: [0; MAX_WIDTH], len: 0 };
         let mut left = active;
         loop {
             let bits = left.bits();
@@ -116,25 +118,26 @@ impl<L: Lanes> World<L> {
             left = left.and_not(here);
             let finish = self.finish_of[item as usize];
             let here = if self.finishes[finish as usize].two_sided { here } else { here & front };
-            let known = met.entries[..met.len].iter_mut().find(|e| e.0 == finish);
-            match known {
-                Some(entry) => entry.1 = entry.1 | here,
-                None => {
-                    met.entries[met.len] = (finish, here);
-                    met.len += 1;
-                }
+            if here.none() {
+                continue;
+            }
+            met.finish = L::select(here, L::tag(finish), met.finish);
+            met.lanes = met.lanes | here;
+            if !met.list[..met.len].contains(&finish) {
+                met.list[met.len] = finish;
+                met.len += 1;
             }
         }
     }
 
-    /// One value per lane, from the finish of each lane.
+    /// One value per lane, from the finish of each lane; zero in lanes without one.
     #[inline(always)]
     fn gather(&self, met: &Met<L>, of: impl Fn(&Finish<L::Scalar>) -> [L::Scalar; 3]) -> V3<L> {
-        let mut all = V3::zero();
-        for (finish, lanes) in met.entries() {
-            all = V3::select(*lanes, V3::splat(of(&self.finishes[*finish as usize])), all);
+        let value = |finish: u32| V3::splat(of(&self.finishes[finish as usize]));
+        if met.len == 1 {
+            return value(met.list[0]).only(met.lanes);
         }
-        all
+        met.entries().fold(V3::zero(), |all, (finish, lanes)| V3::select(lanes, value(finish), all))
     }
 
     /// Adds what the surfaces return of ambient light and of every lamp.
@@ -155,8 +158,8 @@ impl<L: Lanes> World<L> {
         }
         let mut wanting = L::mask(false);
         for (finish, lanes) in met.entries() {
-            if self.finishes[*finish as usize].wants_light {
-                wanting = wanting | *lanes;
+            if self.finishes[finish as usize].wants_light {
+                wanting = wanting | lanes;
             }
         }
         if wanting.none() {
@@ -180,13 +183,13 @@ impl<L: Lanes> World<L> {
             }
             let mut value = diffuse * (nl * L::of(FRAC_1_PI));
             for (finish, lanes) in met.entries() {
-                let finish = &self.finishes[*finish as usize];
-                if !finish.shines() || (*lanes & lit).none() {
+                let finish = &self.finishes[finish as usize];
+                if !finish.shines() || (lanes & lit).none() {
                     continue;
                 }
                 let nv = at.normal.dot(at.view);
                 let shine = finish.highlight(at.normal, at.view, arrival.towards, nl, nv);
-                value += shine.only(*lanes);
+                value += shine.only(lanes);
             }
             let mut value = weight.times(value) * arrival.irradiance;
             if let Some(strength) = source.weight {
@@ -213,11 +216,8 @@ impl<L: Lanes> World<L> {
         let mut numbers = None;
         let (incident, weight_in) = (ray.direction, *weight);
         for (finish, lanes) in met.entries() {
-            let finish = &self.finishes[*finish as usize];
+            let finish = &self.finishes[finish as usize];
             let Some((strength, spread)) = &finish.reflection else { continue };
-            if lanes.none() {
-                continue;
-            }
             let uv = if matches!(spread, Spread::Mirror) {
                 (L::zero(), L::zero())
             } else {
@@ -225,9 +225,9 @@ impl<L: Lanes> World<L> {
                 *numbers.get_or_insert_with(|| draws.lobe(bounce))
             };
             let r = finish.reflect(*strength, spread, incident, at.normal, uv, self.fold);
-            ray.direction = V3::select(*lanes, r.direction, ray.direction);
-            *weight = V3::select(*lanes, weight_in.times(r.weight), *weight);
-            going = going | *lanes;
+            ray.direction = V3::select(lanes, r.direction, ray.direction);
+            *weight = V3::select(lanes, weight_in.times(r.weight), *weight);
+            going = going | lanes;
         }
         ray.origin = at.start;
         let least = L::of(self.min_weight);

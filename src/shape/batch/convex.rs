@@ -124,10 +124,6 @@ impl<L: Lanes> Convexes<L> {
 }
 
 impl<L: Lanes> Batch<L> for Convexes<L> {
-    fn len(&self) -> usize {
-        self.solids.len()
-    }
-
     fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         for (item, solid) in range.clone().zip(&self.solids[range]) {
             if let Some((enter, leave)) = self.chord(solid, ray) {

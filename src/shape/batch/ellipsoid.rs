@@ -60,10 +60,6 @@ fn chord<L: Lanes>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::M
 }
 
 impl<L: Lanes> Batch<L> for Ellipsoids<L> {
-    fn len(&self) -> usize {
-        self.items.len()
-    }
-
     fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         for (item, e) in range.clone().zip(&self.items[range]) {
             if let Some((near, far, meets)) = chord(e, ray) {

@@ -61,10 +61,6 @@ fn crossing<L: Lanes>(p: &Parallelogram<L::Scalar>, ray: &Ray<L>) -> (L, L::Mask
 }
 
 impl<L: Lanes> Batch<L> for Parallelograms<L> {
-    fn len(&self) -> usize {
-        self.items.len()
-    }
-
     fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         for (item, p) in range.clone().zip(&self.items[range]) {
             let (t, inside) = crossing(p, ray);
@@ -131,10 +127,6 @@ impl<S: Real> Plane<S> {
 }
 
 impl<L: Lanes> Batch<L> for Planes<L> {
-    fn len(&self) -> usize {
-        self.items.len()
-    }
-
     fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         for (item, p) in range.clone().zip(&self.items[range]) {
             hit.narrow(L::mask(true), p.crossing(ray), base + item as u32);

@@ -66,9 +66,6 @@ pub struct Surface<L> {
 
 /// All items of one form.
 pub trait Batch<L: Lanes>: Send + Sync {
-    /// Number of items.
-    fn len(&self) -> usize;
-
     /// Narrows `hit` by the items in `range`; an item's tag is `base` + its number.
     fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>);
 

@@ -65,10 +65,6 @@ pub fn crossings<L: Lanes>(f: V3<L>, d: V3<L>, radius2: L) -> Option<(L, L, L::M
 }
 
 impl<L: Lanes> Batch<L> for Spheres<L> {
-    fn len(&self) -> usize {
-        self.items.len()
-    }
-
     fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         for (item, s) in range.clone().zip(&self.items[range]) {
             let f = ray.origin - V3::splat(s.center);
