@@ -5,6 +5,7 @@
 //! replicates, whose half difference is the picture's error; `light_NAME.R ..` what each light group
 //! contributes, summing up to the picture; `count` the samples of a pixel.
 
+use super::exr_header::Ordered;
 use super::mix::{Part, Sums};
 use super::target::{Picture, Sink};
 use exr::block::UncompressedBlock;
@@ -65,7 +66,7 @@ fn encode_to(picture: &Picture, sink: &mut dyn Sink) -> Result<(), Error> {
         .with_shared_attributes(image)
         .with_attributes(layer);
     let headers = Headers::from_elem(header, 1);
-    exr::block::write(sink, headers, true, |meta, writer| {
+    exr::block::write(Ordered::new(sink), headers, true, |meta, writer| {
         let mut rows = Rows::new(picture, channels.iter().map(|(_, source)| *source).collect());
         let mut compressor = writer.sequential_blocks_compressor(&meta);
         for (index, block) in exr::block::enumerate_ordered_header_block_indices(&meta.headers) {

@@ -10,6 +10,7 @@ mod bytes;
 mod curve;
 mod display;
 mod exr;
+mod exr_header;
 mod mix;
 mod noise;
 mod png;

@@ -1,0 +1,200 @@
+//! A sample is a pure function of seed, pixel, replicate and index: the film is the same bytes
+//! whichever thread traced it, in whatever order, in packets of whatever form, in whatever parts.
+
+mod support;
+
+use std::fs;
+use std::process::Command;
+use std::sync::atomic::AtomicBool;
+use support::{Rng, all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
+use zerkalo::film::Film;
+use zerkalo::render::Rendering;
+use zerkalo::render::session::Traced;
+use zerkalo::scene::Scene;
+use zerkalo::world::Precision;
+
+const PRECISIONS: [Precision; 2] = [Precision::Single, Precision::Double];
+const SEED: u64 = 29;
+/// Not a multiple of a tile: tiles at the edges are narrower than a packet.
+const SIZE: [u32; 2] = [37, 35];
+
+/// Scenes that between them have every lobe, highlight, kind of light, and several light groups.
+fn scenes() -> Vec<(String, Scene)> {
+    ["mirror-room.toml", "mirror-room-physical.toml", "light-groups.toml", "lobe-ggx.toml"]
+        .map(|name| (name.to_string(), sized(shipped(name), SIZE)))
+        .into()
+}
+
+/// The film of samples `0..count` of both replicates.
+fn whole(scene: &Scene, precision: Precision, count: u32) -> Film {
+    of_ranges(scene, precision, &[(0, count), (0, count)])
+}
+
+/// The film of one range (first, count) of each replicate.
+fn of_ranges(scene: &Scene, precision: Precision, ranges: &[(u32, u32)]) -> Film {
+    let mut rendering = begin(scene, SEED, precision);
+    let pool = pool(2);
+    for (replicate, (first, count)) in ranges.iter().enumerate() {
+        if *count > 0 {
+            let wave = wave(&rendering.film, replicate, *first, *count);
+            trace(&mut rendering, &wave, &pool);
+        }
+    }
+    rendering.film
+}
+
+#[test]
+fn extreme_29_threads_and_tile_orders_do_not_change_a_byte() {
+    for (name, scene) in scenes() {
+        for precision in PRECISIONS {
+            let expected = whole(&scene, precision, 19).bytes();
+            for threads in [1, 2, 7] {
+                let pool = pool(threads);
+                let mut rng = Rng(threads as u64);
+                let mut rendering = begin(&scene, SEED, precision);
+                for replicate in [1, 0] {
+                    let mut wave = wave(&rendering.film, replicate, 0, 19);
+                    rng.shuffle(&mut wave.jobs);
+                    trace(&mut rendering, &wave, &pool);
+                }
+                let same = rendering.film.bytes() == expected;
+                assert!(same, "{name} in {precision:?}, {threads} threads");
+            }
+        }
+    }
+}
+
+#[test]
+fn extreme_29_parts_added_in_any_order_are_the_whole() {
+    // Both replicates of each part; aligned to no packet, one empty in A, one empty in B.
+    let parts: [[(u32, u32); 2]; 4] =
+        [[(0, 3), (0, 13)], [(3, 18), (13, 1)], [(21, 0), (14, 16)], [(21, 9), (30, 0)]];
+    for (name, scene) in scenes() {
+        for precision in PRECISIONS {
+            let expected = whole(&scene, precision, 30).bytes();
+            let films = parts.map(|ranges| of_ranges(&scene, precision, &ranges));
+            let mut order = [0, 1, 2, 3];
+            for seed in 0..6 {
+                Rng(seed).shuffle(&mut order);
+                let mut sum = Film::new(films[0].header().clone());
+                order.iter().for_each(|i| sum.add(&films[*i]).unwrap());
+                assert!(sum.bytes() == expected, "{name} in {precision:?}, order {order:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn tiles_may_be_shared_out_among_films() {
+    let scene = &scenes()[2].1;
+    let expected = whole(scene, Precision::Single, 16).bytes();
+    let pool = pool(2);
+    let films: Vec<Film> = (0..3)
+        .map(|share| {
+            let mut rendering = begin(scene, SEED, Precision::Single);
+            for replicate in [0, 1] {
+                let mut wave = wave(&rendering.film, replicate, 0, 16);
+                wave.jobs.retain(|job| job.tile % 3 == share);
+                trace(&mut rendering, &wave, &pool);
+            }
+            rendering.film
+        })
+        .collect();
+    let mut sum = Film::new(films[0].header().clone());
+    [2, 0, 1].into_iter().for_each(|i| sum.add(&films[i]).unwrap());
+    assert!(sum.bytes() == expected);
+}
+
+/// Packets of one pixel and of several hold the same samples: eight waves of one sample, which are
+/// always packets of several pixels, equal one wave of sixteen, which is packets of one pixel.
+#[test]
+fn packets_of_one_pixel_and_of_many_agree_in_every_scene() {
+    let pool = pool(2);
+    let mut differing = Vec::new();
+    for (name, scene) in all_shipped() {
+        let scene = sized(scene, SIZE);
+        for precision in PRECISIONS {
+            let expected = whole(&scene, precision, 16).bytes();
+            for counts in [&[1u32; 16] as &[u32], &[1, 1, 2, 4, 8], &[8, 8], &[5, 11]] {
+                let mut rendering = begin(&scene, SEED, precision);
+                let mut first = 0;
+                for count in counts {
+                    uniform(&mut rendering, first, *count, &pool);
+                    first += count;
+                }
+                if rendering.film.bytes() != expected {
+                    differing.push(format!("{name} in {precision:?}, waves of {counts:?}"));
+                }
+            }
+        }
+    }
+    assert!(differing.is_empty(), "{}", differing.join("\n"));
+}
+
+#[test]
+fn the_interleaved_first_pass_is_a_plain_wave() {
+    let pool = pool(2);
+    for (name, scene) in scenes() {
+        for precision in PRECISIONS {
+            let mut rendering = begin(&scene, SEED, precision);
+            let first = wave(&rendering.film, 0, 0, 1);
+            let mut shown = 0;
+            let report = rendering.first(&first, &pool, &AtomicBool::new(false), &mut |film| {
+                assert!(film.samples() > 0);
+                shown += 1;
+            });
+            assert!(report.is_some() && shown > 0);
+            for (replicate, first, count) in [(1, 0, 1), (0, 1, 15), (1, 1, 15)] {
+                let wave = wave(&rendering.film, replicate, first, count);
+                trace(&mut rendering, &wave, &pool);
+            }
+            let expected = whole(&scene, precision, 16).bytes();
+            assert!(rendering.film.bytes() == expected, "{name} in {precision:?}");
+        }
+    }
+}
+
+#[test]
+fn a_film_used_before_is_as_good_as_new() {
+    let (_, scene) = &scenes()[0];
+    let mut other = scene.clone();
+    other.camera.eye[0] += 0.5;
+    let options = zerkalo::render::Options {
+        world: zerkalo::world::Options::default(),
+        sampling: zerkalo::sampling::SampleSettings {
+            seed: SEED,
+            kind: zerkalo::sampling::SamplerKind::Sobol,
+        },
+        display: zerkalo::film::Display::default(),
+    };
+    let mut rendering = Rendering::new(&other, &options, None);
+    uniform(&mut rendering, 0, 8, &pool(2));
+    let mut rendering = Rendering::new(scene, &options, Some(rendering));
+    uniform(&mut rendering, 0, 8, &pool(2));
+    assert!(rendering.film.bytes() == whole(scene, Precision::Auto, 8).bytes());
+}
+
+/// The program itself.
+#[test]
+fn extreme_29_picture_files_are_the_same_for_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/mirror-room.toml");
+    for (name, more) in [
+        ("adaptive.png", &["--noise", "1.5"] as &[&str]),
+        ("uniform.png", &["--spp", "30", "--uniform", "--bits", "16"]),
+        ("double.png", &["--spp", "40", "--precision", "double"]),
+        ("linear.exr", &["--rmse", "0.01"]),
+    ] {
+        let file = |threads: &str| {
+            let path = folder.path().join(format!("{threads}-{name}"));
+            let mut command = Command::new(env!("CARGO_BIN_EXE_zerkalo"));
+            command.args(["render", scene, "--size", "100x70", "--threads", threads]);
+            let run = command.args(more).arg("-o").arg(&path).output().unwrap();
+            assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+            fs::read(path).unwrap()
+        };
+        let one = file("1");
+        assert!(one == file("2"), "{name}: 2 threads change the file");
+        assert!(one == file("7"), "{name}: 7 threads change the file");
+    }
+}

@@ -1,0 +1,310 @@
+//! What changes a picture, and what only seems to: lights are mixed after tracing, their unit and the
+//! place of the scene do not matter, levels and limits of tracing do what they say.
+
+mod support;
+
+use support::{
+    all_shipped, begin, follow, parsed, picture, pool, rendered, settings, shipped, sized,
+};
+use zerkalo::film::{Display, Mix, Part};
+use zerkalo::render::schedule::{Stop, StoppedBy};
+use zerkalo::scene::{Horizon, Level, Scene, Step};
+use zerkalo::value::Color;
+use zerkalo::world::{self, AnyWorld, Precision};
+
+const SIZE: [u32; 2] = [48, 36];
+const PRECISIONS: [Precision; 2] = [Precision::Single, Precision::Double];
+
+fn small(name: &str) -> Scene {
+    sized(shipped(name), SIZE)
+}
+
+/// The picture of a scene with a few samples, radiance by channel.
+fn values(scene: &Scene, precision: Precision) -> Vec<f64> {
+    picture(&rendered(scene, 4, precision, 8), Part::Both).concat()
+}
+
+/// Largest difference, relative to the largest value.
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let largest = a.iter().chain(b).fold(0.0, |m: f64, x| m.max(x.abs()));
+    a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / largest
+}
+
+fn has(scene: &Scene, part: &str) -> bool {
+    let world = AnyWorld::compile(scene, &world::Options::default());
+    world.inventory().parts().iter().any(|p| p == part)
+}
+
+/// The scene of three lights, with a background.
+fn lit() -> Scene {
+    let mut scene = small("light-groups.toml");
+    scene.background.color = Color([0.1, 0.2, 0.3]);
+    scene
+}
+
+#[test]
+fn lights_are_changed_without_tracing_again() {
+    let before = lit();
+    let mut changes: Vec<(&str, Scene)> = Vec::new();
+    let mut change = |what, edit: &dyn Fn(&mut Scene)| {
+        let mut scene = before.clone();
+        edit(&mut scene);
+        changes.push((what, scene));
+    };
+    change("intensity", &|s| s.lights[0].intensity = 1.7);
+    change("colour", &|s| s.lights[1].color = Color([0.3, 0.3, 0.9]));
+    change("switch", &|s| s.lights[2].on = false);
+    change("ambient", &|s| s.ambient.color = Color([0.2, 0.1, 0.0]));
+    change("background", &|s| s.background.color = Color([0.0, 0.9, 0.1]));
+    change("darkness", &|s| {
+        s.lights.iter_mut().for_each(|l| l.on = false);
+        s.background.color = Color::BLACK;
+    });
+    change("all", &|s| {
+        s.lights[0].intensity = 0.01;
+        s.lights[1].intensity = 0.0;
+        s.lights[2].color = Color([1.0, 1.0, 0.0]);
+        s.background.color = Color::BLACK;
+    });
+    for precision in PRECISIONS {
+        let rendering = rendered(&before, 4, precision, 8);
+        let unchanged = picture(&rendering, Part::Both).concat();
+        for (what, after) in &changes {
+            let mix = Mix { weights: rendering.world.mix(after) };
+            let (mut mixed, mut row) = (Vec::new(), Vec::new());
+            for y in 0..rendering.film.height() {
+                rendering.film.row(y, Part::Both, &mix, &mut row);
+                mixed.extend(row.concat());
+            }
+            let fresh = values(after, precision);
+            let apart = difference(&mixed, &fresh);
+            assert!(apart < 1e-13, "{what} in {precision:?}: {apart:e}");
+            assert!(difference(&mixed, &unchanged) > 0.01, "{what} changes nothing");
+        }
+    }
+}
+
+/// A ball under lights of different colours and strengths, more than have groups
+/// of their own.
+fn many_lights() -> Scene {
+    let mut scene = lit();
+    let light = scene.lights[0].clone();
+    for i in 0..12 {
+        let mut light = light.clone();
+        let angle = f64::from(i);
+        light.point.as_mut().unwrap().position = [3.0 * angle.sin(), 3.0, 3.0 * angle.cos()];
+        light.color = Color([1.0, 0.1 * f64::from(i % 7), 0.5]);
+        light.intensity = 0.05 + 0.01 * f64::from(i);
+        scene.lights.push(light);
+    }
+    assert!(has(&scene, "shared light group"));
+    scene
+}
+
+#[test]
+fn the_unit_of_light_does_not_matter() {
+    let mut falloff = small("mirror-room-physical.toml");
+    falloff.background.color = Color([0.5, 0.25, 0.125]);
+    for (what, scene) in [("few", lit()), ("many", many_lights()), ("falloff", falloff)] {
+        for precision in PRECISIONS {
+            let expected = values(&scene, precision);
+            for ev in [-40, 40] {
+                let factor = f64::from(ev).exp2();
+                let mut other = scene.clone();
+                other.lights.iter_mut().for_each(|light| light.intensity *= factor);
+                other.ambient.color = other.ambient.color.scaled(factor);
+                other.background.color = other.background.color.scaled(factor);
+                let rendering = rendered(&other, 4, precision, 8);
+                let display = Display { exposure_ev: -f64::from(ev), ..Display::default() };
+                let shown = picture(&rendering, Part::Both).concat();
+                let undone: Vec<f64> = shown.iter().map(|x| x / factor).collect();
+                assert!(undone == expected, "{what}, 2^{ev} in {precision:?}");
+                for (other, original) in shown.chunks(3).zip(expected.chunks(3)) {
+                    let [other, original] = [other, original].map(|rgb| [rgb[0], rgb[1], rgb[2]]);
+                    assert_eq!(display.codes(other), Display::default().codes(original));
+                }
+            }
+        }
+    }
+}
+
+/// The same scene elsewhere.
+fn moved(scene: &Scene, by: [f64; 3]) -> Scene {
+    let mut scene = scene.clone();
+    let shift = |p: &mut [f64; 3]| (0..3).for_each(|i| p[i] += by[i]);
+    for object in &mut scene.objects {
+        object.transform.push(Step::Translate(by));
+    }
+    for point in scene.lights.iter_mut().filter_map(|light| light.point.as_mut()) {
+        shift(&mut point.position);
+    }
+    shift(&mut scene.camera.eye);
+    if let Some(target) = &mut scene.camera.target {
+        shift(target);
+    }
+    scene
+}
+
+#[test]
+fn a_million_units_away_the_picture_is_the_same() {
+    let by = [1e6, -1e6, 3e6];
+    // Coordinates of which no bit is lost there.
+    let dyadic = parsed(
+        r#"
+[film]
+size = [48, 36]
+[camera]
+eye = [0.5, 1.25, 4.0]
+target = [0.0, 0.5, 0.0]
+[background]
+color = [0.1, 0.2, 0.3]
+[[light]]
+point = { position = [2.0, 4.0, 3.0] }
+[materials.mirror]
+reflection = 0.9
+roughness = 0.1
+[[object]]
+shape.platform = { center = [0.0, 0.0, 0.0], size = [8.0, 8.0] }
+[[object]]
+material = "mirror"
+shape.rectangle = { center = [0.0, 1.5, -2.0], size = [4.0, 3.0], normal = [0.0, 0.0, 1.0] }
+[[object]]
+shape.sphere = { center = [-0.75, 0.5, 0.0], radius = 0.5 }
+[[object]]
+shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
+"#,
+    );
+    for precision in PRECISIONS {
+        let here = rendered(&dyadic, 4, precision, 8).film.bytes();
+        let there = rendered(&moved(&dyadic, by), 4, precision, 8).film.bytes();
+        assert!(here == there, "{precision:?}");
+    }
+    // Others are rounded there to 2^-32 of a unit, which single precision hides and double shows. A
+    // sample at an edge may fall to the other side, none of these does.
+    for (name, scene) in all_shipped() {
+        let scene = sized(scene, SIZE);
+        for precision in PRECISIONS {
+            let (here, there) = (values(&scene, precision), values(&moved(&scene, by), precision));
+            let apart = here.iter().zip(&there).map(|(a, b)| (a - b).abs()).sum::<f64>()
+                / here.iter().sum::<f64>();
+            assert!(apart < 1e-8, "{name} in {precision:?}: {apart:e}");
+        }
+    }
+}
+
+#[test]
+fn levels_add_shadows_and_reflections() {
+    for precision in PRECISIONS {
+        let [primary, shadows, full] =
+            ["primary", "shadows", "full"].map(|l| small(&format!("level-{l}.toml")));
+        let mut unreflected = full.clone();
+        unreflected.trace.depth = 0;
+        assert_eq!(primary.trace.level, Level::Primary);
+        let [lit, shadowed, reflected] = [&primary, &shadows, &full].map(|s| values(s, precision));
+        // Shadows only take light away, reflections only add it.
+        assert!(shadowed.iter().zip(&lit).all(|(s, l)| s <= l));
+        assert!(shadowed.iter().zip(&reflected).all(|(s, r)| s <= r));
+        assert!(difference(&shadowed, &lit) > 0.1 && difference(&shadowed, &reflected) > 0.1);
+        assert!(values(&unreflected, precision) == shadowed, "depth 0 is level `shadows`");
+    }
+    let [primary, shadows, full] =
+        ["primary", "shadows", "full"].map(|l| small(&format!("level-{l}.toml")));
+    assert!(has(&primary, "no shadows") && !has(&primary, "cone lobe"));
+    assert!(has(&shadows, "shadows only") && !has(&shadows, "cone lobe"));
+    assert!(!has(&full, "no shadows") && !has(&full, "shadows only") && has(&full, "cone lobe"));
+    assert!(!has(&Scene { lights: Vec::new(), ..shadows }, "shadows only"));
+}
+
+/// What deeper paths add is at most rho^(K+1) / (1 - rho) of the brightest surface.
+#[test]
+fn depth_is_honoured_and_what_it_cuts_is_bounded() {
+    const RHO: f64 = 0.9;
+    let with_depth = |depth: u32| {
+        let mut scene = small("facing-mirrors.toml");
+        (scene.trace.depth, scene.trace.min_weight) = (depth, 0.0);
+        scene
+    };
+    let all = values(&with_depth(400), Precision::Double);
+    // Surfaces return light of at most 0.8 + 0.2 and highlights of 0.2 x 0.8 besides.
+    let brightest = 1.2;
+    let mut before = 0.0;
+    for depth in [0, 1, 2, 5, 17, 60] {
+        let scene = with_depth(depth);
+        let cut = values(&scene, Precision::Double);
+        assert!(cut.iter().zip(&all).all(|(cut, all)| *cut <= all + 1e-7), "depth {depth}");
+        let missing = cut.iter().zip(&all).map(|(cut, all)| all - cut).fold(0.0, f64::max);
+        let bound = brightest * RHO.powi(depth as i32 + 1) / (1.0 - RHO);
+        assert!(missing <= bound + 1e-7, "depth {depth}: {missing} of {bound}");
+        let sum: f64 = cut.iter().sum();
+        assert!(sum > before || depth == 60, "depth {depth} adds nothing");
+        before = sum;
+        let world = AnyWorld::compile(&scene, &world::Options::default());
+        let told = world.biases().concat();
+        assert!(told.contains(&format!("depth {depth} cuts longer paths")), "{told}");
+    }
+}
+
+#[test]
+fn min_weight_is_honoured_and_what_it_cuts_is_bounded() {
+    const RHO: f64 = 0.9;
+    let with_least = |least: f64| {
+        let mut scene = small("facing-mirrors.toml");
+        (scene.trace.depth, scene.trace.min_weight) = (400, least);
+        scene
+    };
+    let all = values(&with_least(0.0), Precision::Double);
+    for least in [0.95, 0.89, 0.5, 0.01] {
+        // Paths of up to K reflections weigh at least as much: the same as this depth.
+        let depth = (f64::ln(least) / RHO.ln()).floor() as u32;
+        let mut by_depth = with_least(0.0);
+        by_depth.trace.depth = depth;
+        let scene = with_least(least);
+        let cut = values(&scene, Precision::Double);
+        assert!(cut == values(&by_depth, Precision::Double), "{least} is depth {depth}");
+        let missing = cut.iter().zip(&all).map(|(cut, all)| all - cut).fold(0.0, f64::max);
+        assert!(missing > 0.0 && missing <= 1.2 * least / (1.0 - RHO), "{least}: {missing}");
+        let world = AnyWorld::compile(&scene, &world::Options::default());
+        assert!(world.biases().concat().contains(&format!("min_weight {least} cuts")));
+    }
+}
+
+#[test]
+fn the_horizon_folds_or_absorbs() {
+    for precision in PRECISIONS {
+        let (fold, absorb) = (small("horizon-fold.toml"), small("horizon-absorb.toml"));
+        assert!(has(&absorb, "absorbing horizon") && !has(&fold, "absorbing horizon"));
+        assert_eq!(fold.trace, zerkalo::scene::Trace { horizon: Horizon::Fold, ..absorb.trace });
+        // The rays that do not dip are the same: absorbing only takes light away.
+        let [kept, lost] = [&fold, &absorb].map(|s| values(s, precision));
+        assert!(lost.iter().zip(&kept).all(|(lost, kept)| lost <= kept));
+        assert!(difference(&kept, &lost) > 0.2);
+        // Before an even background folding loses nothing: ice, and what it mirrors of the sky.
+        let mut sky = fold.clone();
+        sky.objects.truncate(1);
+        sky.background.color = Color([1.0; 3]);
+        assert!(values(&sky, precision).iter().all(|x| (x - 1.0).abs() < 1e-6));
+    }
+}
+
+#[test]
+fn rays_per_pixel_caps_glossy_tiles() {
+    let scene = sized(shipped("rays-per-pixel.toml"), [96, 64]);
+    assert_eq!(scene.film.rays_per_pixel, 16);
+    let stop = Stop { noise_codes: Some(0.3), ..Stop::default() };
+    for adaptive in [false, true] {
+        let mut rendering = begin(&scene, 1, Precision::Auto);
+        let reason =
+            follow(&mut rendering, settings(adaptive, scene.film.rays_per_pixel, stop), &pool(2));
+        assert_eq!(reason, StoppedBy::RaysPerPixel, "adaptive {adaptive}");
+        let counts: Vec<u32> =
+            rendering.film.touched().map(|(_, tile)| tile.counts().iter().sum()).collect();
+        let capped = counts.iter().filter(|n| **n == 16).count();
+        assert!(capped > counts.len() / 2, "adaptive {adaptive}: {counts:?}");
+        // Every other tile sees no lobe and goes on; none falls short of the cap.
+        assert!(counts.iter().all(|n| *n >= 16), "adaptive {adaptive}: {counts:?}");
+        let uncapped =
+            follow(&mut begin(&scene, 1, Precision::Auto), settings(adaptive, 0, stop), &pool(2));
+        assert_eq!(uncapped, StoppedBy::Noise);
+    }
+}

@@ -1,0 +1,239 @@
+//! Every scene of the folder `scenes`: what it is compiled to, and that its picture stays what it is.
+//! `ZERKALO_BLESS=1 cargo test --test scenes` writes the expected values anew.
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::fs;
+use std::path::PathBuf;
+use support::{all_shipped, begin, parsed, picture, pool, rendered, shipped, sized, uniform};
+use zerkalo::film::Part;
+use zerkalo::render::Rendering;
+use zerkalo::scene::{Filter, Scene};
+use zerkalo::world::{self, AnyWorld, Precision};
+
+/// Raster and samples per replicate of the pictures that are compared.
+const SIZE: [u32; 2] = [48, 32];
+const COUNT: u32 = 32;
+/// Side of the blocks whose mean colours are compared, in pixels.
+const BLOCK: usize = 8;
+/// The reference is the mean over renderings with these seeds.
+const REFERENCE_SEEDS: std::ops::Range<u64> = 1..65;
+/// Means are stored to this many decimals.
+const DECIMALS: usize = 6;
+
+fn golden(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name)
+}
+
+/// The expected text, after writing it if that is asked for.
+fn expected(name: &str, actual: impl FnOnce() -> String) -> String {
+    if std::env::var_os("ZERKALO_BLESS").is_some() {
+        fs::write(golden(name), actual()).unwrap();
+    }
+    fs::read_to_string(golden(name)).unwrap()
+}
+
+fn compiled(scene: &Scene) -> AnyWorld {
+    AnyWorld::compile(scene, &world::Options::default())
+}
+
+#[test]
+fn every_scene_is_compiled_to_what_it_requires() {
+    let mut actual = String::new();
+    for (name, scene) in all_shipped() {
+        writeln!(actual, "{name}: {}", compiled(&scene).inventory()).unwrap();
+    }
+    let expected = expected("inventories.txt", || actual.clone());
+    for (expected, actual) in expected.lines().zip(actual.lines()) {
+        assert_eq!(actual, expected);
+    }
+    assert_eq!(actual.lines().count(), expected.lines().count());
+}
+
+/// Mean colour of each block and the squared standard error of that mean, row by row. The pixels are
+/// independent, and the half difference of the replicates has the variance of their mean.
+fn blocks(rendering: &Rendering) -> Vec<[(f64, f64); 3]> {
+    let [columns, rows] = SIZE.map(|n| n as usize / BLOCK);
+    let [a, b] = [Part::A, Part::B].map(|part| picture(rendering, part));
+    let mut blocks = vec![[(0.0, 0.0); 3]; columns * rows];
+    let pixels = (BLOCK * BLOCK) as f64;
+    for (i, (a, b)) in a.iter().zip(&b).enumerate() {
+        let (x, y) = (i % SIZE[0] as usize, i / SIZE[0] as usize);
+        let block = &mut blocks[y / BLOCK * columns + x / BLOCK];
+        for c in 0..3 {
+            block[c].0 += 0.5 * (a[c] + b[c]) / pixels;
+            block[c].1 += (0.5 * (a[c] - b[c]) / pixels).powi(2);
+        }
+    }
+    blocks
+}
+
+/// The reference of a scene: for each block a line of three means and the three standard errors that
+/// one rendering's means have.
+fn reference(scene: &Scene) -> String {
+    let pool = pool(2);
+    let seeds = REFERENCE_SEEDS.count() as f64;
+    let mut sums: Vec<[(f64, f64); 3]> = Vec::new();
+    for seed in REFERENCE_SEEDS {
+        let mut rendering = begin(scene, seed, Precision::Auto);
+        uniform(&mut rendering, 0, COUNT, &pool);
+        let blocks = blocks(&rendering);
+        sums.resize(blocks.len(), [(0.0, 0.0); 3]);
+        for (sum, block) in sums.iter_mut().flatten().zip(blocks.iter().flatten()) {
+            sum.0 += block.0 / seeds;
+            sum.1 += block.1 / seeds;
+        }
+    }
+    let mut text = String::new();
+    for block in sums {
+        let means = block.map(|(mean, _)| format!("{mean:.DECIMALS$}")).join(" ");
+        let errors = block.map(|(_, variance)| format!("{:.1e}", variance.sqrt())).join(" ");
+        writeln!(text, "{means} {errors}").unwrap();
+    }
+    text
+}
+
+/// Means and standard errors of the blocks of each scene.
+type References = BTreeMap<String, Vec<[(f64, f64); 3]>>;
+
+fn parse_references(text: &str) -> References {
+    let mut references = References::new();
+    let mut name = String::new();
+    for line in text.lines() {
+        if let Some(scene) = line.strip_prefix("# ") {
+            name = scene.to_string();
+            continue;
+        }
+        let numbers: Vec<f64> = line.split(' ').map(|n| n.parse().unwrap()).collect();
+        let block = [0, 1, 2].map(|c| (numbers[c], numbers[c + 3]));
+        references.entry(name.clone()).or_default().push(block);
+    }
+    references
+}
+
+/// The two-sided chance that a standard normal number exceeds `z`, by its continued fraction.
+fn tail(z: f64) -> f64 {
+    let fraction = (1..60).rev().fold(z, |f, k| z + f64::from(k) / f);
+    2.0 * (-0.5 * z * z).exp() / (std::f64::consts::TAU.sqrt() * fraction)
+}
+
+/// The number of standard errors that the largest of `n` deviations exceeds as rarely as one deviation
+/// exceeds four (Sidak).
+fn threshold(n: usize) -> f64 {
+    let each = 1.0 - (1.0 - tail(4.0)).powf(1.0 / n as f64);
+    let (mut low, mut high) = (4.0, 20.0);
+    for _ in 0..60 {
+        let z = 0.5 * (low + high);
+        if tail(z) > each { low = z } else { high = z }
+    }
+    high
+}
+
+#[test]
+fn thresholds_are_those_of_the_normal_distribution() {
+    assert!((tail(4.0) / 6.334e-5 - 1.0).abs() < 1e-3);
+    assert!((threshold(1) - 4.0).abs() < 1e-9);
+    assert!((threshold(2880) - 5.59).abs() < 0.02, "{}", threshold(2880));
+}
+
+#[test]
+fn every_scene_renders_as_it_did() {
+    let scenes: Vec<_> =
+        all_shipped().into_iter().map(|(name, scene)| (name, sized(scene, SIZE))).collect();
+    let text = expected("scenes.txt", || {
+        let one = |(name, scene): &(String, Scene)| format!("# {name}\n{}", reference(scene));
+        scenes.iter().map(one).collect()
+    });
+    let references = parse_references(&text);
+    let values = references.values().flatten().count() * 3;
+    let threshold = threshold(values);
+    // The reference is a mean over so many renderings, rounded.
+    let with_reference = (1.0 + 1.0 / REFERENCE_SEEDS.count() as f64).sqrt();
+    let rounding = 10f64.powi(-(DECIMALS as i32));
+    let mut wrong = Vec::new();
+    let mut worst = 0.0f64;
+    for (name, scene) in &scenes {
+        let rendering = rendered(scene, 0, Precision::Auto, COUNT);
+        let bad = rendering.film.bad_samples();
+        assert_eq!(bad.count, 0, "{name}: {:?}", bad.first);
+        assert_eq!(rendering.film.saturated(), 0, "{name}");
+        let reference = references.get(name).unwrap_or_else(|| panic!("no reference of {name}"));
+        let blocks = blocks(&rendering);
+        assert_eq!(blocks.len(), reference.len(), "{name}");
+        for (i, (got, expected)) in blocks.iter().zip(reference).enumerate() {
+            for c in 0..3 {
+                let ((got, _), (mean, error)) = (got[c], expected[c]);
+                let deviation = (got - mean).abs();
+                let allowed = threshold * error * with_reference + rounding;
+                worst = worst.max((deviation - rounding) / (error * with_reference).max(1e-9));
+                if !(deviation <= allowed) {
+                    wrong.push(format!(
+                        "{name}, block {i}, channel {c}: {got:.6}, expected {mean:.6} +- {error:.1e}"
+                    ));
+                }
+            }
+        }
+    }
+    println!("largest deviation: {worst:.2} standard errors of {threshold:.2} allowed");
+    assert_eq!(references.len(), scenes.len(), "a reference without a scene");
+    assert!(wrong.is_empty(), "{} of {values}:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn the_furnace_is_exactly_1() {
+    let scene = shipped("furnace.toml");
+    for precision in [Precision::Single, Precision::Double] {
+        let rendering = rendered(&scene, 3, precision, 16);
+        assert_eq!(rendering.film.bad_samples().count, 0);
+        let picture = picture(&rendering, Part::Both);
+        let wrong = picture.iter().filter(|rgb| **rgb != [1.0; 3]).count();
+        assert_eq!(wrong, 0, "{precision:?}: of {} pixels, such as {:?}", picture.len(), {
+            picture.iter().find(|rgb| **rgb != [1.0; 3])
+        });
+    }
+}
+
+/// Without anti-aliasing and lobes nothing is left to chance.
+#[test]
+fn without_chance_both_replicates_are_equal() {
+    for (name, mut scene) in all_shipped() {
+        scene = sized(scene, SIZE);
+        scene.film.filter = Filter::Center;
+        for material in scene.materials.values_mut() {
+            (material.roughness, material.alpha) = (0.0, None);
+        }
+        for precision in [Precision::Single, Precision::Double] {
+            let rendering = rendered(&scene, 5, precision, 9);
+            let [a, b] = [Part::A, Part::B].map(|part| picture(&rendering, part));
+            assert!(a == b, "{name} in {precision:?}");
+            assert_eq!(rendering.film.bad_samples().count, 0, "{name}");
+        }
+    }
+}
+
+#[test]
+fn double_precision_is_chosen_where_the_proportions_need_it() {
+    let chosen = |scene: &Scene| match compiled(scene) {
+        AnyWorld::Single(_) => Precision::Single,
+        AnyWorld::Double(_) => Precision::Double,
+    };
+    for (name, scene) in all_shipped() {
+        assert_eq!(chosen(&scene), Precision::Single, "{name}");
+    }
+    // A floor of 10 x 10 and a ball on it, with the floor's corner 5 from the centre.
+    let with_ball = |radius: f64| {
+        parsed(&format!(
+            "[[object]]\n\
+             shape.platform = {{ center = [0.0, 0.0, 0.0], size = [10.0, 10.0] }}\n\
+             [[object]]\n\
+             shape.sphere = {{ center = [0.0, {radius}, 0.0], radius = {radius} }}\n\
+             [camera]\neye = [0.0, 0.1, 1.0]\ntarget = [0.0, 0.0, 0.0]\n"
+        ))
+    };
+    // 8192 balls side by side reach from the centre to the corner.
+    let limit = 5.0 / 8192.0 / 2.0;
+    assert_eq!(chosen(&with_ball(1.01 * limit)), Precision::Single);
+    assert_eq!(chosen(&with_ball(0.99 * limit)), Precision::Double);
+}

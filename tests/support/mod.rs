@@ -1,0 +1,137 @@
+//! Renderings that tests drive wave by wave, without clock or channels.
+#![allow(dead_code, reason = "each test file uses its part")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use zerkalo::film::{Display, Film, Part};
+use zerkalo::render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
+use zerkalo::render::session::Traced;
+use zerkalo::render::wave::{Job, Wave, WaveReport};
+use zerkalo::render::{Options, Rendering};
+use zerkalo::sampling::{SampleSettings, SamplerKind};
+use zerkalo::scene::Scene;
+use zerkalo::world::{self, Precision};
+
+/// A scene of the folder `scenes`.
+pub fn shipped(name: &str) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+    Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Every scene of the folder `scenes`, by name.
+pub fn all_shipped() -> Vec<(String, Scene)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut paths: Vec<PathBuf> =
+        files.filter(|p| p.extension().is_some_and(|e| e == "toml")).collect();
+    paths.sort();
+    assert!(paths.len() >= 30, "only {} scenes", paths.len());
+    let name = |path: &Path| path.file_name().unwrap().to_str().unwrap().to_string();
+    paths.iter().map(|path| (name(path), shipped(&name(path)))).collect()
+}
+
+/// Smaller, in another raster; the field of view stays as the scene has it.
+pub fn sized(mut scene: Scene, size: [u32; 2]) -> Scene {
+    scene.film.size = size;
+    scene
+}
+
+/// A scene in a text.
+pub fn parsed(text: &str) -> Scene {
+    Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A rendering without samples.
+pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> Rendering {
+    let options = Options {
+        world: world::Options { precision },
+        sampling: SampleSettings { seed, kind: SamplerKind::Sobol },
+        display: Display::default(),
+    };
+    Rendering::new(scene, &options, None)
+}
+
+/// A pool of `threads` threads.
+pub fn pool(threads: usize) -> rayon::ThreadPool {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
+}
+
+/// The same samples in every tile, in the film's order.
+pub fn wave(film: &Film, replicate: usize, first: u32, count: u32) -> Wave {
+    let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first, count }).collect();
+    Wave { replicate, jobs, estimate: false }
+}
+
+/// Traces a wave to its end.
+pub fn trace(rendering: &mut Rendering, wave: &Wave, pool: &rayon::ThreadPool) -> WaveReport {
+    rendering.run(wave, pool, &AtomicBool::new(false))
+}
+
+/// Samples `first .. first + count` of both replicates in every pixel.
+pub fn uniform(rendering: &mut Rendering, first: u32, count: u32, pool: &rayon::ThreadPool) {
+    for replicate in [0, 1] {
+        let wave = wave(&rendering.film, replicate, first, count);
+        trace(rendering, &wave, pool);
+    }
+}
+
+/// Both replicates of `scene`, `count` samples each.
+pub fn rendered(scene: &Scene, seed: u64, precision: Precision, count: u32) -> Rendering {
+    let mut rendering = begin(scene, seed, precision);
+    uniform(&mut rendering, 0, count, &pool(2));
+    rendering
+}
+
+/// Follows a schedule that stops for anything but time.
+pub fn follow(
+    rendering: &mut Rendering,
+    settings: Settings,
+    pool: &rayon::ThreadPool,
+) -> StoppedBy {
+    let mut schedule = rendering.schedule(settings);
+    loop {
+        match schedule.next(0.0) {
+            Step::Rest(reason) => return reason,
+            Step::Trace(wave) => {
+                let report = trace(rendering, &wave, pool);
+                schedule.complete(&wave, &report);
+            }
+        }
+    }
+}
+
+/// Settings that minimise the error in codes.
+pub fn settings(adaptive: bool, rays_per_pixel: u32, stop: Stop) -> Settings {
+    Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel, stop }
+}
+
+/// The radiance of every pixel, row by row.
+pub fn picture(rendering: &Rendering, part: Part) -> Vec<[f64; 3]> {
+    let mut row = Vec::new();
+    let mut all = Vec::new();
+    for y in 0..rendering.film.height() {
+        rendering.film.row(y, part, &rendering.mix, &mut row);
+        all.extend_from_slice(&row);
+    }
+    all
+}
+
+/// Numbers for tests (SplitMix64).
+pub struct Rng(pub u64);
+
+impl Rng {
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// `items` in a random order (Fisher-Yates).
+    pub fn shuffle<T>(&mut self, items: &mut [T]) {
+        for i in (1..items.len()).rev() {
+            items.swap(i, (self.bits() % (i as u64 + 1)) as usize);
+        }
+    }
+}
