@@ -128,7 +128,7 @@ pub fn trace<L: Lanes>(
     let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
     let all = L::mask(true);
     assert!(all.all());
-    world.trace(rays, &draws, all, &mut radiance);
+    world.trace(rays, None, &draws, all, &mut radiance);
     let groups = &radiance.groups[..world.groups()];
     let of_lane = |lane| groups.iter().map(|g| g.lane(lane).map(Real::to_f64)).collect();
     (0..L::WIDTH).map(of_lane).collect()
