@@ -1,0 +1,211 @@
+//! The kernel: intersection per kind and lane type, list against tree, whole paths of the physical
+//! mirror room per lane type, sampler, compilation of a scene, one wave of the pass.
+//!
+//! `cargo bench --bench kernel`. Throughput counts lanes, so that instances compare directly.
+
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use glam::DVec3;
+use std::hint::black_box;
+use std::sync::atomic::AtomicBool;
+use zerkalo::film::{Display, Estimator, Film, Header, Mix};
+use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
+use zerkalo::render::pass;
+use zerkalo::render::wave::{Job, Wave};
+use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo::scene::Scene;
+use zerkalo::shape::{Form, Geometry, Ray};
+use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Precision, Radiance, World};
+
+const SAMPLING: SampleSettings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
+
+fn physical() -> Scene {
+    let text = include_str!("../scenes/mirror-room-physical.toml");
+    Scene::parse(text, "mirror-room-physical.toml").expect("a shipped scene")
+}
+
+/// A small repeatable generator for test geometry (splitmix64), uniform in [0, 1).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn direction(&mut self) -> DVec3 {
+        loop {
+            let v = 2.0 * DVec3::new(self.next(), self.next(), self.next()) - 1.0;
+            if (0.01..1.0).contains(&v.length_squared()) {
+                return v.normalize();
+            }
+        }
+    }
+
+    /// A packet of rays from a sphere of radius 4 towards points within 1 of the origin, lanes
+    /// near each other.
+    fn rays<L: Lanes>(&mut self) -> Ray<L> {
+        let (from, to) = (4.0 * self.direction(), self.direction() * self.next());
+        let mut lane = || to + 0.02 * self.direction() - from;
+        let directions: Vec<DVec3> = (0..L::WIDTH).map(|_| lane().normalize()).collect();
+        Ray {
+            origin: V3::of(from.to_array()),
+            direction: V3::from_fn(|i| directions[i].to_array().map(L::Scalar::of)),
+        }
+    }
+}
+
+/// Name of a lane type in bench ids.
+fn name<L: Lanes>() -> &'static str {
+    L::NAME
+}
+
+fn intersect<L: Lanes>(c: &mut Criterion, kind: &str, form: &Form) {
+    let geometry = Geometry::<L>::new(std::slice::from_ref(form));
+    let mut random = Random(7);
+    let rays: Vec<Ray<L>> = (0..256).map(|_| random.rays()).collect();
+    let mut group = c.benchmark_group(format!("intersect {kind}"));
+    group.throughput(Throughput::Elements((rays.len() * L::WIDTH) as u64));
+    group.bench_function(name::<L>(), |b| {
+        b.iter(|| {
+            for ray in &rays {
+                black_box(geometry.closest(black_box(ray)));
+            }
+        })
+    });
+}
+
+fn kinds(c: &mut Criterion) {
+    for (key, example) in zerkalo::shape::EXAMPLES {
+        let text = format!("[[object]]\n{example}\n");
+        let Ok(scene) = Scene::parse(&text, key) else { continue };
+        let form = scene.objects[0].shape.form();
+        intersect::<Single>(c, key, &form);
+        intersect::<Double>(c, key, &form);
+        intersect::<f32>(c, key, &form);
+    }
+}
+
+/// `n` spheres in a unit ball: as a list and in a tree.
+fn list_or_tree(c: &mut Criterion) {
+    for n in [8, 16, 24, 32, 64, 256, 4096] {
+        let mut random = Random(n as u64);
+        let radius = 0.5 / (n as f64).cbrt();
+        let mut sphere = || Form::Sphere { center: random.direction() * random.next(), radius };
+        let forms: Vec<Form> = (0..n).map(|_| sphere()).collect();
+        let rays: Vec<Ray<Single>> = (0..256).map(|_| random.rays()).collect();
+        let mut group = c.benchmark_group(format!("list or tree, {n} spheres"));
+        group.throughput(Throughput::Elements((rays.len() * Single::WIDTH) as u64));
+        for (name, tree) in [("list", false), ("tree", true)] {
+            if n > 256 && !tree {
+                continue;
+            }
+            let geometry = Geometry::<Single>::with_tree(&forms, tree);
+            group.bench_function(name, |b| {
+                b.iter(|| {
+                    for ray in &rays {
+                        black_box(geometry.closest(black_box(ray)));
+                    }
+                })
+            });
+        }
+    }
+}
+
+/// Whole paths in every 8th pixel of the physical mirror room: what a packet costs without the film.
+fn paths<L: Lanes>(c: &mut Criterion) {
+    let scene = physical();
+    let world = World::<L>::new(&scene);
+    let sampler = Sampler::<L>::new(SAMPLING, true);
+    let pixels: Vec<(u32, u32)> =
+        (0..60).flat_map(|y| (0..80).map(move |x| (8 * x + 3, 8 * y + 3))).collect();
+    let all = L::zero().le(L::zero());
+    assert!(all.all());
+    let mut group = c.benchmark_group("paths");
+    let samples = 16;
+    group.throughput(Throughput::Elements((pixels.len() * samples) as u64));
+    group.bench_function(name::<L>(), |b| {
+        let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
+        b.iter(|| {
+            for at in &pixels {
+                let seen = world.seen_through([at.0 as usize, at.1 as usize], [1, 1]);
+                for first in (0..samples).step_by(L::WIDTH) {
+                    let draws = sampler.of_pixel(at.0, at.1, 0, first as u32);
+                    let rays = world.view().rays_of(*at, draws.pixel());
+                    black_box(world.trace(rays, seen.as_ref(), &draws, all, &mut radiance));
+                }
+            }
+        })
+    });
+}
+
+fn sampler(c: &mut Criterion) {
+    let mut group = c.benchmark_group("sampler, 4 dimensions of 8 samples");
+    group.throughput(Throughput::Elements(8));
+    for kind in [SamplerKind::Sobol, SamplerKind::Random] {
+        let sampler = Sampler::<Single>::new(SampleSettings { seed: 1, kind }, true);
+        group.bench_function(kind.name(), |b| {
+            b.iter(|| {
+                let draws = sampler.of_pixel(black_box(17), 23, 0, 64);
+                (draws.pixel(), draws.lobe(0))
+            })
+        });
+    }
+}
+
+fn compile(c: &mut Criterion) {
+    let scene = physical();
+    let options = Options { precision: Precision::Single };
+    c.bench_function("compile the mirror room", |b| b.iter(|| AnyWorld::compile(&scene, &options)));
+}
+
+/// One wave of 8 samples in every pixel of 640x480, on one thread.
+fn wave(c: &mut Criterion) {
+    let scene = physical();
+    let mut group = c.benchmark_group("wave of 8 samples, 640x480");
+    group.throughput(Throughput::Elements(640 * 480 * 8));
+    group.sample_size(10);
+    for precision in [Precision::Single, Precision::Double] {
+        let world = AnyWorld::compile(&scene, &Options { precision });
+        let (scales, mix) = (world.group_scales(), Mix { weights: world.mix(&scene) });
+        let estimator = Estimator::new(&scales, &mix, &Display::default());
+        let header = Header {
+            width: 640,
+            height: 480,
+            scales,
+            seed: 1,
+            precision: world.lanes().to_string(),
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+        let film = Film::new(header.clone());
+        let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first: 8, count: 8 });
+        let wave = Wave { replicate: 0, jobs: jobs.collect(), estimate: false };
+        group.bench_function(world.lanes(), |b| {
+            b.iter_batched_ref(
+                || Film::new(header.clone()),
+                |film| {
+                    let go = AtomicBool::new(false);
+                    pass::run(&world, film, &wave, &SAMPLING, &estimator, &pool, &go)
+                },
+                BatchSize::PerIteration,
+            )
+        });
+    }
+}
+
+fn all(c: &mut Criterion) {
+    paths::<Single>(c);
+    paths::<Double>(c);
+    paths::<f32>(c);
+    paths::<f64>(c);
+    wave(c);
+    kinds(c);
+    list_or_tree(c);
+    sampler(c);
+    compile(c);
+}
+
+criterion_group!(kernel, all);
+criterion_main!(kernel);
