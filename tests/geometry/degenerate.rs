@@ -111,8 +111,7 @@ fn check_lattice<L: Lanes>() -> [usize; 3] {
         let origin = [places[n % 13], places[n / 13 % 13], places[n / 169]];
         for k in 0..27 * 8 {
             let mut d = [k % 3, k / 3 % 3, k / 9 % 3].map(|x| x as i64 - 1);
-            let zeros =
-                [k / 27 & 1, k / 54 & 1, k / 108 & 1].map(|b| if b == 0 { 0.0 } else { -0.0 });
+            let zeros = [k / 27 % 2, k / 54 % 2, k / 108].map(|b| if b == 0 { 0.0 } else { -0.0 });
             // Directions with unequal parts too.
             d[0] *= 1 + (n % 3) as i64;
             d[2] *= 1 + (n % 4) as i64;

@@ -7,7 +7,7 @@ mod flat;
 mod sphere;
 
 use super::form::Form;
-use crate::lanes::{Lanes, V3};
+use crate::lanes::{Lanes, Mask, V3};
 use std::ops::Range;
 
 /// A packet of half-lines.
@@ -54,8 +54,12 @@ impl<L: Lanes> Hit<L> {
     /// Takes `other` where it is nearer, or as near with a lower tag.
     #[inline(always)]
     pub(super) fn take(&mut self, other: &Self) {
-        let tie = other.t.le(self.t) & other.item.lt(self.item);
-        let nearer = other.t.lt(self.t) | tie;
+        let mut nearer = other.t.lt(self.t);
+        let tie = (other.t.le(self.t) & other.t.lt(L::of(L::MAX))).and_not(nearer);
+        // Rare; and tags are subnormal as floats, which some processors compare slowly.
+        if tie.any() {
+            nearer = nearer | (tie & other.item.lt(self.item));
+        }
         self.t = L::select(nearer, other.t, self.t);
         self.item = L::select(nearer, other.item, self.item);
     }
