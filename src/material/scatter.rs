@@ -151,9 +151,9 @@ impl<S: Real> Finish<S> {
             return Reflected { direction, weight: V3::new(weight, weight, weight) };
         }
         // The facet that would send this ray: half-way between view and reflected direction, whose
-        // cosine with either is sqrt((1 + cos) / 2).
-        let cos = L::of(0.5) * (L::one() - incident.dot(direction));
-        let f = self.reflectance.at(cos.max(L::zero()).sqrt().min(L::one()));
+        // cosine with either is half the length of their sum (without cancellation at grazing angles).
+        let cos = (direction - incident).length2().sqrt() * L::of(0.5);
+        let f = self.reflectance.at(cos.min(L::one()));
         Reflected { direction, weight: f * weight }
     }
 

@@ -36,7 +36,10 @@ fn compare<L: Lanes>() {
         for (degrees, known) in DEGREES.into_iter().zip(known) {
             let found = albedo::<L>(Lobe::Beckmann, masking, alpha, degrees);
             let name = format!("{} {masking:?} {alpha} at {degrees}", L::NAME);
-            assert!((found - known).abs() <= 0.003, "{name}: {found} for {known}");
+            // Smith's Lambda is a rational fit, good to 0.35 %: that alone gives 0.9663 where the exact
+            // function gives 0.9633 (slope 0.7 at 85 degrees).
+            let limit = if masking == Masking::Smith { 0.0035 } else { 0.003 };
+            assert!((found - known).abs() <= limit, "{name}: {found} for {known}");
         }
     }
 }
@@ -55,7 +58,10 @@ fn extreme_23_microfacets_never_return_more_than_they_get() {
                 let found = albedo::<Double>(lobe, masking, alpha, degrees);
                 assert!(found <= 1.001, "{lobe:?} {masking:?} {alpha} at {degrees}: {found}");
                 let found = albedo::<Single>(lobe, masking, alpha, degrees);
-                assert!(found <= 1.001, "single {lobe:?} {masking:?} {alpha} at {degrees}: {found}");
+                assert!(
+                    found <= 1.001,
+                    "single {lobe:?} {masking:?} {alpha} at {degrees}: {found}"
+                );
             }
         }
     }

@@ -131,7 +131,7 @@ fn mirror_is_reciprocal(material: &Material) {
         let (there, weight) = reflect(combine(&[(-1.0, v)]));
         let (back, weight_back) = reflect(combine(&[(-1.0, there)]));
         assert!(dot(combine(&[(1.0, back), (-1.0, v)]), back).abs() < 1e-14);
-        assert!((weight[0] - weight_back[0]).abs() < 1e-14);
+        assert!((weight[0] - weight_back[0]).abs() < 1e-14, "{weight:?} {weight_back:?}");
     }
 }
 

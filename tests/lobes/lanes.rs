@@ -106,7 +106,7 @@ fn fixed_point<L: Lanes>() {
         }
         assert_eq!(x.fixed_sum(scale), (0..L::WIDTH).map(exact).sum::<i64>(), "{} {i}", L::NAME);
     }
-    let most = 2f64.powi(51) * (1.0 - L::EPSILON);
+    let most = 2f64.powi(51) * (1.0 - 2.0 * L::EPSILON);
     assert_eq!(L::of(most).fixed_sum(1.0), most as i64 * L::WIDTH as i64);
     assert_eq!(L::of(-most).fixed_sum(1.0), -(most as i64) * L::WIDTH as i64);
 }
@@ -179,8 +179,7 @@ fn tags<L: Lanes>() {
         for b in labels {
             for i in 0..8 {
                 let bits = noise(i ^ a ^ b.rotate_left(7)) & ((1 << L::WIDTH) - 1);
-                let mask =
-                    L::from_fn(|i| L::Scalar::of(f64::from(bits >> i & 1))).gt(L::zero());
+                let mask = L::from_fn(|i| L::Scalar::of(f64::from(bits >> i & 1))).gt(L::zero());
                 let mixed = L::select(mask, L::tag(a), L::tag(b));
                 for lane in 0..L::WIDTH {
                     let expected = if mask.lane(lane) { a } else { b };
