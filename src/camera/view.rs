@@ -37,7 +37,7 @@ impl View {
         let w = look.normalize();
         let up = DVec3::from(camera.up).normalize();
         let mut u = w.cross(up);
-        if !(u.length() > 1e-6) {
+        if u.length() <= 1e-6 {
             let a = w.abs();
             let least = if a.x <= a.y && a.x <= a.z {
                 DVec3::X
@@ -82,6 +82,16 @@ impl View {
     /// Right, up and forward, orthonormal.
     pub fn frame(&self) -> [DVec3; 3] {
         [self.u, self.v, self.w]
+    }
+
+    /// The cone about the rays through a rectangle of the raster: `(axis, half-angle)`, in radians.
+    pub fn cone(&self, [x, y]: [usize; 2], [width, height]: [usize; 2]) -> (DVec3, f64) {
+        let toward = |x: f64, y: f64| self.corner + self.right * x + self.down * y;
+        let (x0, y0) = (x as f64, y as f64);
+        let (x1, y1) = (x0 + width as f64, y0 + height as f64);
+        let axis = toward(0.5 * (x0 + x1), 0.5 * (y0 + y1)).normalize();
+        let corners = [toward(x0, y0), toward(x1, y0), toward(x0, y1), toward(x1, y1)];
+        (axis, corners.iter().map(|c| c.angle_between(axis)).fold(0.0, f64::max))
     }
 
     /// Origins and unit directions of rays through the points `(x, y) + (dx, dy)` of the raster, in

@@ -226,7 +226,9 @@ pub trait Lanes:
         Self::select(mask, self, Self::zero())
     }
 
-    /// A 32-bit label carried through [`Lanes::select`]; not a number to compute with.
+    /// A 32-bit label carried through [`Lanes::select`]; not a number to compute with. Labels below
+    /// 2^31 - 2^23 compare by [`Lanes::lt`] and [`Lanes::le`] like integers, as the bits of all
+    /// positive floats do.
     fn tag(label: u32) -> Self;
     /// The label in lane `i`.
     fn tag_lane(self, i: usize) -> u32;

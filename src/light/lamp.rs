@@ -62,13 +62,13 @@ impl<S: Real> Lamp<S> {
             },
             Self::Falling { position } | Self::Even { position } => {
                 let to = V3::splat(*position) - point;
-                let distance2 = to.length2();
-                let distance = distance2.sqrt();
+                let distance = to.length2().sqrt();
+                let inverse = L::one() / distance;
                 let irradiance = match self {
-                    Self::Falling { .. } => L::one() / distance2,
+                    Self::Falling { .. } => inverse * inverse,
                     _ => L::of(PI),
                 };
-                Arrival { towards: to * (L::one() / distance), distance, irradiance }
+                Arrival { towards: to * inverse, distance, irradiance }
             }
         }
     }

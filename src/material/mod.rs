@@ -1,10 +1,12 @@
 //! Materials: how a surface answers light.
 
+mod claims;
 mod fields;
 mod finish;
 mod fresnel;
 mod scatter;
 
+pub use claims::{Claims, Energy};
 pub use fields::FIELDS;
 pub use finish::{Facets, Finish, SMOOTH_ALPHA, Shine, Spread, one_minus_cos_of_tan};
 pub use fresnel::{Reflectance, index_from_f0};

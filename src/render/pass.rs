@@ -2,8 +2,9 @@
 
 use super::wave::{Job, JobReport, Wave, WaveReport};
 use crate::film::{BadSample, Estimator, Film, Slot, TILE, Tile, lattice_pixels};
-use crate::lanes::{Lanes, MAX_WIDTH, Mask, V3};
-use crate::sampling::{SampleSettings, Sampler};
+use crate::lanes::{Lanes, MAX_WIDTH, Mask, Real, V3};
+use crate::sampling::{Draws, SampleSettings, Sampler};
+use crate::shape::Seen;
 use crate::world::{AnyWorld, Counts, MAX_GROUPS, Radiance, World};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -141,135 +142,108 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     /// Samples of all pixels of a tile: packets of one pixel where enough aligned samples are asked
     /// for, of several pixels at one index elsewhere.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
-        let mut counts = Counts::default();
-        let mut radiance = black();
+        let mut work = Work::new(replicate, self.world.seen_through(origin, tile.extent()));
         let width = L::WIDTH as u32;
         let end = job.first + job.count;
-        let pixels: Vec<(usize, usize)> = blocks(tile.extent());
+        let aligned = end - end % width;
+        let pixels = blocks(tile.extent());
+        let place = |(x, y): (usize, usize)| ((origin[0] + x) as u32, (origin[1] + y) as u32);
         let mut index = job.first;
         while index < end {
-            if index % width == 0 && end - index >= width {
-                let aligned = end - end % width;
-                for pixel in &pixels {
+            if index.is_multiple_of(width) && index < aligned {
+                for (x, y) in &pixels {
                     for first in (index..aligned).step_by(L::WIDTH) {
-                        self.pixel(
-                            tile,
-                            origin,
-                            *pixel,
-                            replicate,
-                            first,
-                            &mut radiance,
-                            &mut counts,
-                        );
+                        let sums = self.pixel(&mut work, place((*x, *y)), first);
+                        tile.add(replicate, y * TILE + x, &sums[..3 * self.world.groups()]);
                     }
                 }
                 index = aligned;
             } else {
                 for packet in pixels.chunks(L::WIDTH) {
-                    let at = |lane: usize| {
-                        let (x, y) = packet[lane.min(packet.len() - 1)];
-                        ((origin[0] + x) as u32, (origin[1] + y) as u32)
-                    };
-                    self.pixels(packet.len(), at, replicate, index, &mut radiance, &mut counts);
-                    let mut put = |lane, values: &[i64]| {
+                    let at = |lane: usize| place(packet[lane.min(packet.len() - 1)]);
+                    self.pixels(&mut work, packet.len(), at, index);
+                    let mut put = |lane: usize, values: &[i64]| {
                         let (x, y) = packet[lane];
                         tile.add(replicate, y * TILE + x, values);
                     };
-                    let bad = self.scatter(packet.len(), &mut radiance, &mut put);
-                    for lane in lanes_of(bad) {
-                        let (x, y) = at(lane);
-                        tile.record_bad(BadSample { index, replicate: replicate as u8, y, x });
-                    }
+                    self.scatter(&mut work, packet.len(), at, index, &mut put);
                 }
                 index += 1;
             }
         }
+        work.bad.into_iter().for_each(|bad| tile.record_bad(bad));
         tile.advance(replicate, job.count);
-        counts
+        work.counts
     }
 
-    /// WIDTH samples of one pixel.
+    /// WIDTH samples of one pixel: their sums, by group and channel.
     #[inline(always)]
-    fn pixel(
-        &self,
-        tile: &mut Tile,
-        origin: [usize; 2],
-        (x, y): (usize, usize),
-        replicate: usize,
-        first: u32,
-        radiance: &mut Radiance<L>,
-        counts: &mut Counts,
-    ) {
-        let at = ((origin[0] + x) as u32, (origin[1] + y) as u32);
-        let draws = self.sampler.of_pixel(at.0, at.1, replicate, first);
-        let half = L::of(0.5);
-        let jitter = if self.world.jitter() { draws.pixel() } else { (half, half) };
-        let rays = self.world.view().rays_of(at, jitter);
-        let cost = self.world.trace(rays, &draws, L::mask(true), radiance);
-        counts.rays += cost.rays;
-        counts.glossy |= cost.glossy;
-        let bad = self.bad(radiance);
+    fn pixel(&self, work: &mut Work<L>, at: (u32, u32), first: u32) -> [i64; 3 * MAX_GROUPS] {
+        let draws = self.sampler.of_pixel(at.0, at.1, work.replicate, first);
+        let rays = self.world.view().rays_of(at, self.jitter(&draws));
+        work.trace(self.world, rays, &draws, L::mask(true));
+        let bad = self.bad(&mut work.radiance);
         let mut sums = [0i64; 3 * MAX_GROUPS];
         let groups = self.world.groups();
         for (g, sums) in sums.chunks_exact_mut(3).enumerate().take(groups) {
-            let (value, scale) = (radiance.groups[g], self.world.scales()[g]);
+            let (value, scale) = (work.radiance.groups[g], self.world.scales()[g]);
             sums[0] = value.x.fixed_sum(scale);
             sums[1] = value.y.fixed_sum(scale);
             sums[2] = value.z.fixed_sum(scale);
         }
-        tile.add(replicate, y * TILE + x, &sums[..3 * groups]);
         for lane in lanes_of(bad) {
-            let index = first + lane as u32;
-            tile.record_bad(BadSample { index, replicate: replicate as u8, y: at.1, x: at.0 });
+            work.record_bad(at, first + lane as u32);
         }
+        sums
     }
 
-    /// Sample `index` of the first `count` pixels that `at` names.
+    /// Sample `index` of the first `count` pixels that `at` names, into `work.radiance`.
     #[inline(always)]
     fn pixels(
         &self,
+        work: &mut Work<L>,
         count: usize,
         at: impl Fn(usize) -> (u32, u32),
-        replicate: usize,
         index: u32,
-        radiance: &mut Radiance<L>,
-        counts: &mut Counts,
     ) {
-        let draws = self.sampler.of_pixels(&at, replicate, index);
-        let half = L::of(0.5);
-        let jitter = if self.world.jitter() { draws.pixel() } else { (half, half) };
-        let rays = self.world.view().rays(&at, jitter);
-        let lanes = L::from_fn(|lane| {
-            use crate::lanes::Real;
-            L::Scalar::of(if lane < count { 1.0 } else { 0.0 })
-        });
-        let cost = self.world.trace(rays, &draws, lanes.gt(L::zero()), radiance);
-        counts.rays += cost.rays;
-        counts.glossy |= cost.glossy;
+        let draws = self.sampler.of_pixels(&at, work.replicate, index);
+        let rays = self.world.view().rays(&at, self.jitter(&draws));
+        let lanes = L::from_fn(|lane| L::Scalar::of(if lane < count { 1.0 } else { 0.0 }));
+        work.trace(self.world, rays, &draws, lanes.gt(L::zero()));
     }
 
-    /// Gives the samples of the first `count` lanes to `put`, lane by lane; returns the bad ones.
+    /// Where in their pixels the samples lie.
+    #[inline(always)]
+    fn jitter(&self, draws: &Draws<'_, L>) -> (L, L) {
+        if self.world.jitter() { draws.pixel() } else { (L::of(0.5), L::of(0.5)) }
+    }
+
+    /// Gives the samples of the first `count` lanes to `put`, lane by lane.
     #[inline(always)]
     fn scatter(
         &self,
+        work: &mut Work<L>,
         count: usize,
-        radiance: &mut Radiance<L>,
+        at: impl Fn(usize) -> (u32, u32),
+        index: u32,
         put: &mut impl FnMut(usize, &[i64]),
-    ) -> u32 {
-        let bad = self.bad(radiance);
+    ) {
+        let bad = self.bad(&mut work.radiance);
         let groups = self.world.groups();
         let mut columns = [[0i64; MAX_WIDTH]; 3 * MAX_GROUPS];
         for (g, columns) in columns.chunks_exact_mut(3).enumerate().take(groups) {
-            let (value, scale) = (radiance.groups[g], self.world.scales()[g]);
+            let (value, scale) = (work.radiance.groups[g], self.world.scales()[g]);
             value.x.fixed(scale, &mut columns[0]);
             value.y.fixed(scale, &mut columns[1]);
             value.z.fixed(scale, &mut columns[2]);
         }
-        for lane in 0..count {
-            let values: [i64; 3 * MAX_GROUPS] = std::array::from_fn(|c| columns[c][lane]);
+        (0..count).for_each(|lane| {
+            let values = columns.map(|column| column[lane]);
             put(lane, &values[..3 * groups]);
+        });
+        for lane in lanes_of(bad).take_while(|lane| *lane < count) {
+            work.record_bad(at(lane), index);
         }
-        bad
     }
 
     /// Blackens samples that are NaN, infinite, negative or beyond what the film holds; returns them
@@ -307,27 +281,29 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             pixels.extend(lattice_pixels(before, step).filter(inside).map(|p| (t, origin, p)));
             tiles.push(tile);
         }
-        let mut radiance = black();
         for packet in pixels.chunks(L::WIDTH) {
             let at = |lane: usize| {
                 let (_, origin, p) = packet[lane.min(packet.len() - 1)];
                 ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
             };
-            let mut cost = Counts::default();
-            self.pixels(packet.len(), at, 0, 0, &mut radiance, &mut cost);
-            // A packet's rays are shared out by pixels, so that the count is that of the jobs.
-            let share = cost.rays / packet.len() as u64;
+            let mut work = Work::new(0, None);
+            self.pixels(&mut work, packet.len(), at, 0);
+            // A packet's rays are shared out among its pixels' tiles, the remainder to the first.
+            let Counts { rays, glossy } = work.counts;
+            let share = rays / packet.len() as u64;
+            counts[packet[0].0].rays += rays - share * packet.len() as u64;
             let mut put = |lane: usize, values: &[i64]| {
                 let (t, _, p) = packet[lane];
                 tiles[t].add(0, p, values);
                 counts[t].rays += share;
-                counts[t].glossy |= cost.glossy;
+                counts[t].glossy |= glossy;
             };
-            let bad = self.scatter(packet.len(), &mut radiance, &mut put);
-            for lane in lanes_of(bad) {
-                let (x, y) = at(lane);
-                let sample = BadSample { index: 0, replicate: 0, y, x };
-                tiles[packet[lane].0].record_bad(sample);
+            self.scatter(&mut work, packet.len(), at, 0, &mut put);
+            for bad in work.bad {
+                let tile_of = |lane: &usize| at(*lane) == (bad.x, bad.y);
+                if let Some(lane) = (0..packet.len()).find(tile_of) {
+                    tiles[packet[lane].0].record_bad(bad);
+                }
             }
         }
         for tile in tiles {
@@ -336,8 +312,38 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     }
 }
 
-fn black<L: Lanes>() -> Radiance<L> {
-    Radiance { groups: [V3::zero(); MAX_GROUPS] }
+/// What the packets of one job share and fill.
+struct Work<L: Lanes> {
+    replicate: usize,
+    seen: Option<Seen>,
+    radiance: Radiance<L>,
+    counts: Counts,
+    bad: Vec<BadSample>,
+}
+
+impl<L: Lanes> Work<L> {
+    fn new(replicate: usize, seen: Option<Seen>) -> Self {
+        let radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
+        Self { replicate, seen, radiance, counts: Counts::default(), bad: Vec::new() }
+    }
+
+    #[inline(always)]
+    fn trace(
+        &mut self,
+        world: &World<L>,
+        rays: (V3<L>, V3<L>),
+        draws: &Draws<'_, L>,
+        active: L::Mask,
+    ) {
+        let cost = world.trace(rays, self.seen.as_ref(), draws, active, &mut self.radiance);
+        self.counts.rays += cost.rays;
+        self.counts.glossy |= cost.glossy;
+    }
+
+    #[cold]
+    fn record_bad(&mut self, (x, y): (u32, u32), index: u32) {
+        self.bad.push(BadSample { index, replicate: self.replicate as u8, y, x });
+    }
 }
 
 /// The lanes whose bits are set.

@@ -73,7 +73,7 @@ impl<L: Lanes> Sampler<L> {
     /// Samples `first .. first + WIDTH` of one pixel; `first` is a multiple of WIDTH.
     #[inline(always)]
     pub fn of_pixel(&self, x: u32, y: u32, replicate: usize, first: u32) -> Draws<'_, L> {
-        debug_assert!(first as usize % L::WIDTH == 0);
+        debug_assert!((first as usize).is_multiple_of(L::WIDTH));
         let key = L::Bits::splat(self.key(x, y, replicate));
         Draws { sampler: self, key, first, step: 1 }
     }

@@ -4,6 +4,7 @@ use super::batch::{Batch, Compiled, Hit, Ray, Surface, compile};
 use super::form::Form;
 use super::tree::Tree;
 use crate::lanes::{Lanes, Mask, V3};
+use glam::DVec3;
 use std::fmt;
 
 /// From this many bounded items a tree is faster than a list. Measured by `benches/kernel.rs`,
@@ -27,7 +28,21 @@ pub struct Geometry<L: Lanes> {
     tree_items: Vec<(u32, u32)>,
     /// `source[item]`: which form, in the order given to [`Geometry::new`].
     source: Vec<u32>,
+    /// Bounding spheres of the items; `None`: without an end.
+    spheres: Vec<Option<(DVec3, f64)>>,
     counts: Vec<String>,
+}
+
+/// Items that some rays can meet.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    /// `(part, number in the part)`.
+    items: Vec<(u32, u32)>,
+}
+
+/// The sphere around a box.
+fn around((low, high): (DVec3, DVec3)) -> (DVec3, f64) {
+    (0.5 * (low + high), 0.5 * low.distance(high))
 }
 
 impl<L: Lanes> Geometry<L> {
@@ -44,6 +59,7 @@ impl<L: Lanes> Geometry<L> {
             tree: None,
             tree_items: Vec::new(),
             source: Vec::new(),
+            spheres: Vec::new(),
             counts: Vec::new(),
         };
         let mut bounds = Vec::new();
@@ -59,6 +75,8 @@ impl<L: Lanes> Geometry<L> {
                     out.tree_items.push((out.parts.len() as u32, i as u32));
                 }
             }
+            let spheres = sources.iter().map(|s| forms[*s].bounds().map(around));
+            out.spheres.extend(spheres);
             out.source.extend(sources.iter().map(|s| *s as u32));
             let end = out.source.len() as u32;
             out.parts.push(Part { batch, base, end, len: sources.len(), in_tree });
@@ -82,7 +100,8 @@ impl<L: Lanes> Geometry<L> {
         &self.source
     }
 
-    /// The nearest item in front of each ray.
+    /// The nearest item in front of each ray; of several at the same distance the one with the lowest
+    /// number, so that neither the order in the tree nor the other rays of the packet decide.
     #[inline]
     pub fn closest(&self, ray: &Ray<L>) -> Hit<L> {
         let mut hit = Hit::none();
@@ -93,9 +112,50 @@ impl<L: Lanes> Geometry<L> {
             tree.walk(ray, hit.t, |item, _| {
                 let (part, i) = self.tree_items[item];
                 let part = &self.parts[part as usize];
-                part.batch.closest(i as usize..i as usize + 1, part.base, ray, &mut hit);
+                let mut one = Hit::none();
+                part.batch.closest(i as usize..i as usize + 1, part.base, ray, &mut one);
+                hit.take(&one);
                 hit.t
             });
+        }
+        hit
+    }
+
+    /// The items that rays inside a cone can meet: for many rays that leave one point, such as those
+    /// of a tile of the picture. With a tree the tree knows better: then there are none to name.
+    ///
+    /// `axis` is a unit vector, `spread` the half-angle in radians, below pi / 2.
+    pub fn seen_from(&self, apex: DVec3, axis: DVec3, spread: f64) -> Option<Seen> {
+        if self.tree.is_some() {
+            return None;
+        }
+        let sees = |(center, radius): &(DVec3, f64)| {
+            let to = *center - apex;
+            let distance = to.length();
+            // Inside the sphere, or the angle between axis and centre is at most that of the cone
+            // plus that of the sphere, with a little to spare for rounding.
+            distance <= *radius * 1.001
+                || to.angle_between(axis) <= spread + (*radius / distance).asin() + 1e-5
+        };
+        let mut items = Vec::new();
+        for (p, part) in self.parts.iter().enumerate() {
+            for i in 0..part.len {
+                if self.spheres[part.base as usize + i].as_ref().is_none_or(sees) {
+                    items.push((p as u32, i as u32));
+                }
+            }
+        }
+        Some(Seen { items })
+    }
+
+    /// The nearest item in front of each ray, of those in `seen`.
+    #[inline]
+    pub fn closest_seen(&self, ray: &Ray<L>, seen: &Seen) -> Hit<L> {
+        let mut hit = Hit::none();
+        for (part, i) in &seen.items {
+            let part = &self.parts[*part as usize];
+            let i = *i as usize;
+            part.batch.closest(i..i + 1, part.base, ray, &mut hit);
         }
         hit
     }
@@ -126,32 +186,9 @@ impl<L: Lanes> Geometry<L> {
         blocked
     }
 
-    /// The surfaces met: for each lane of `mask`, that of `hit`'s item at `hit`'s distance.
+    /// The surface of `item` near `point`.
     #[inline]
-    pub fn surface(&self, ray: &Ray<L>, hit: &Hit<L>, mask: L::Mask) -> Surface<L> {
-        let point = ray.at(hit.t);
-        let mut left = mask;
-        let mut all = Surface { point, normal: V3::zero(), reach: L::zero() };
-        loop {
-            let bits = left.bits();
-            if bits == 0 {
-                return all;
-            }
-            let item = hit.item.tag_lane(bits.trailing_zeros() as usize);
-            let here = hit.item.has_tag(item);
-            let one = self.surface_of(item, point);
-            if mask.and_not(here).none() {
-                return one;
-            }
-            all.point = V3::select(here, one.point, all.point);
-            all.normal = V3::select(here, one.normal, all.normal);
-            all.reach = L::select(here, one.reach, all.reach);
-            left = left.and_not(here);
-        }
-    }
-
-    #[inline]
-    fn surface_of(&self, item: u32, point: V3<L>) -> Surface<L> {
+    pub fn surface(&self, item: u32, point: V3<L>) -> Surface<L> {
         for part in &self.parts {
             if item < part.end {
                 return part.batch.surface((item - part.base) as usize, point);

@@ -19,7 +19,7 @@ pub use batch::{Hit, Ray, Surface};
 pub use cube::Cube;
 pub use cuboid::Cuboid;
 pub use form::{Form, HalfSpace};
-pub use geometry::{Geometry, TREE_FROM};
+pub use geometry::{Geometry, Seen, TREE_FROM};
 pub use kinds::{EXAMPLES, KINDS, Kind, Shape};
 pub use plane::Plane;
 pub use platform::Platform;

@@ -8,7 +8,7 @@ use crate::lanes::{Double, Lanes, Real, Single};
 use crate::light::Lamp;
 use crate::material::{Finish, Material, Spread};
 use crate::scene::{Filter, Horizon, Level, Scene};
-use crate::shape::{Form, Geometry};
+use crate::shape::{Form, Geometry, Seen};
 use glam::{DAffine3, DVec3};
 
 /// The precision that a scene is traced in.
@@ -217,6 +217,13 @@ impl<L: Lanes> World<L> {
     /// The camera.
     pub fn view(&self) -> &View {
         &self.view
+    }
+
+    /// The only items that camera rays through a rectangle of the raster can meet first; `None`:
+    /// not known.
+    pub fn seen_through(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Seen> {
+        let (axis, spread) = self.view.cone(origin, extent);
+        self.geometry.seen_from(self.view.eye(), axis, spread)
     }
 
     /// What it contains.

@@ -5,7 +5,7 @@ use super::groups::MAX_GROUPS;
 use crate::lanes::{Lanes, MAX_WIDTH, Mask, V3};
 use crate::material::{Finish, Spread};
 use crate::sampling::Draws;
-use crate::shape::Ray;
+use crate::shape::{Hit, Ray, Seen};
 use std::f64::consts::FRAC_1_PI;
 
 /// The radiance of a packet's samples, per light group, for unit white light.
@@ -42,7 +42,7 @@ impl<L: Lanes> Met<L> {
     }
 }
 
-/// What of a surface the light part needs.
+/// The surfaces that a packet met.
 struct Shaded<L> {
     /// Normal on the viewer's side.
     normal: V3<L>,
@@ -54,11 +54,13 @@ struct Shaded<L> {
 
 impl<L: Lanes> World<L> {
     /// Traces one packet of camera samples: `origin` and `direction` as [`crate::camera::View`] makes
-    /// them. Lanes outside `active` stay black.
+    /// them. Lanes outside `active` stay black. `seen`: the only items that these rays can meet first,
+    /// if that is known.
     #[inline]
     pub fn trace(
         &self,
         (origin, direction): (V3<L>, V3<L>),
+        seen: Option<&Seen>,
         draws: &Draws<'_, L>,
         mut active: L::Mask,
         out: &mut Radiance<L>,
@@ -72,7 +74,10 @@ impl<L: Lanes> World<L> {
         let mut bounce = 0;
         loop {
             counts.rays += u64::from(active.bits().count_ones());
-            let hit = self.geometry.closest(&ray);
+            let hit = match seen {
+                Some(seen) if bounce == 0 => self.geometry.closest_seen(&ray, seen),
+                _ => self.geometry.closest(&ray),
+            };
             let met = hit.t.lt(L::of(L::MAX));
             if let Some(group) = self.background {
                 out.groups[group] += weight.only(active.and_not(met));
@@ -81,14 +86,7 @@ impl<L: Lanes> World<L> {
             if active.none() {
                 return counts;
             }
-            let surface = self.geometry.surface(&ray, &hit, active);
-            let front = surface.normal.dot(ray.direction).lt(L::zero());
-            let normal = V3::select(front, surface.normal, -surface.normal);
-            let finishes = self.finishes_of(hit.item, active, front);
-            // Start above the surface by a few roundings of the largest number involved.
-            let lift = surface.reach.max(surface.point.max_abs()) * L::of(8.0 * L::EPSILON);
-            let shaded =
-                Shaded { start: normal.mul_add(lift, surface.point), view: -ray.direction, normal };
+            let (shaded, finishes) = self.meet(&ray, &hit, active);
             self.light(&shaded, &finishes, weight, out, &mut counts);
             if bounce == self.depth {
                 return counts;
@@ -102,20 +100,31 @@ impl<L: Lanes> World<L> {
         }
     }
 
-    /// Groups the active lanes by finish; backs of one-sided finishes drop out.
+    /// The surfaces where the active rays end, and their finishes; backs of one-sided finishes have
+    /// none.
     #[inline(always)]
-    fn finishes_of(&self, items: L, active: L::Mask, front: L::Mask) -> Met<L> {
+    fn meet(&self, ray: &Ray<L>, hit: &Hit<L>, active: L::Mask) -> (Shaded<L>, Met<L>) {
+        let point = ray.at(hit.t);
         let mut met =
             Met { finish: L::tag(0), lanes: L::mask(false), list: [0; MAX_WIDTH], len: 0 };
+        let mut at = Shaded { normal: V3::zero(), start: point, view: -ray.direction };
         let mut left = active;
         loop {
             let bits = left.bits();
             if bits == 0 {
-                return met;
+                return (at, met);
             }
-            let item = items.tag_lane(bits.trailing_zeros() as usize);
-            let here = left & items.has_tag(item);
+            let item = hit.item.tag_lane(bits.trailing_zeros() as usize);
+            let here = left & hit.item.has_tag(item);
             left = left.and_not(here);
+            let surface = self.geometry.surface(item, point);
+            let facing = surface.normal.dot(ray.direction);
+            let front = facing.lt(L::zero());
+            let normal = V3::select(front, surface.normal, -surface.normal);
+            // Start above the surface by a few roundings of the largest number involved.
+            let lift = surface.reach.max(surface.point.max_abs()) * L::of(8.0 * L::EPSILON);
+            at.normal = V3::select(here, normal, at.normal);
+            at.start = V3::select(here, normal.mul_add(lift, surface.point), at.start);
             let finish = self.finish_of[item as usize];
             let here = if self.finishes[finish as usize].two_sided { here } else { here & front };
             if here.none() {

@@ -86,24 +86,26 @@ impl<L: Lanes> Convexes<L> {
         &self.faces[solid.faces.0 as usize..solid.faces.1 as usize]
     }
 
-    /// Distances at which the line enters and leaves a solid; it meets it where enter <= leave.
+    /// Distances at which the line enters and leaves a solid, and where it meets it.
     #[inline(always)]
-    fn chord(&self, solid: &Solid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L)> {
+    fn chord(&self, solid: &Solid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
         let from_center = ray.origin - V3::splat(solid.center);
         let along = from_center.dot(ray.direction);
         let across = ray.direction.mul_add(-along, from_center);
-        if across.length2().le(L::splat(solid.radius2)).none() {
+        let near = across.length2().le(L::splat(solid.radius2));
+        if near.none() {
             return None;
         }
         let mut enter = L::of(-L::MAX);
         let mut leave = L::of(L::MAX);
-        // A direction parallel to a face becomes one that is so nearly: 0 / 0 cannot occur, a point
-        // on the face counts as inside, one beyond it has an empty chord.
+        // A direction parallel to a face becomes one that is so nearly, on the side of its zero's
+        // sign: 0 / 0 cannot occur, a line inside the face is not cut by it, one beyond it has an
+        // empty chord, and one in the face's plane touches the solid or not by that sign.
         let tiny = L::of(1e-30);
+        let steep = |speed: L| speed.abs().max(tiny).copysign(speed);
         for slab in self.slabs_of(solid) {
             let normal = V3::splat(slab.normal);
-            let speed = ray.direction.dot(normal);
-            let inverse = L::one() / speed.abs().max(tiny).copysign(speed);
+            let inverse = L::one() / steep(ray.direction.dot(normal));
             let height = from_center.dot(normal);
             let t0 = (L::splat(slab.low) - height) * inverse;
             let t1 = (L::splat(slab.high) - height) * inverse;
@@ -112,23 +114,23 @@ impl<L: Lanes> Convexes<L> {
         }
         for face in self.faces_of(solid) {
             let normal = V3::splat(face.normal);
-            let speed = ray.direction.dot(normal);
-            let t = (L::splat(face.high) - from_center.dot(normal))
-                / speed.abs().max(tiny).copysign(speed);
+            let speed = steep(ray.direction.dot(normal));
+            let t = (L::splat(face.high) - from_center.dot(normal)) / speed;
             let entering = speed.lt(L::zero());
             enter = L::select(entering, t.max(enter), enter);
             leave = L::select(entering, leave, t.min(leave));
         }
-        Some((enter, leave))
+        // Each lane by itself: company in the packet must not decide about a line past a corner.
+        Some((enter, leave, near & enter.le(leave)))
     }
 }
 
 impl<L: Lanes> Batch<L> for Convexes<L> {
     fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         for (item, solid) in range.clone().zip(&self.solids[range]) {
-            if let Some((enter, leave)) = self.chord(solid, ray) {
+            if let Some((enter, leave, meets)) = self.chord(solid, ray) {
                 let t = L::select(enter.gt(L::zero()), enter, leave);
-                hit.narrow(enter.le(leave), t, base + item as u32);
+                hit.narrow(meets, t, base + item as u32);
             }
         }
     }
@@ -136,9 +138,9 @@ impl<L: Lanes> Batch<L> for Convexes<L> {
     fn blocked(&self, range: Range<usize>, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let mut blocked = L::mask(false);
         for solid in &self.solids[range] {
-            if let Some((enter, leave)) = self.chord(solid, ray) {
+            if let Some((enter, leave, meets)) = self.chord(solid, ray) {
                 let t = L::select(enter.gt(L::zero()), enter, leave);
-                blocked = blocked | (enter.le(leave) & t.gt(L::zero()) & t.lt(limit));
+                blocked = blocked | (meets & t.gt(L::zero()) & t.lt(limit));
                 if wanted_done::<L>(wanted, blocked) {
                     break;
                 }

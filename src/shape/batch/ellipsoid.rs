@@ -4,7 +4,7 @@ use super::sphere::{crossings, wanted_done};
 use super::{Batch, Hit, Ray, Surface, reach};
 use crate::lanes::{Lanes, Real, V3};
 use crate::shape::form::Form;
-use glam::{DMat3, DVec3};
+use glam::DMat3;
 use std::ops::Range;
 
 /// One ellipsoid. Matrices by rows.
@@ -37,7 +37,7 @@ impl<L: Lanes> Ellipsoids<L> {
             .iter()
             .filter_map(|form| match form {
                 Form::Ellipsoid { scene_from_unit: m } => Some(Ellipsoid {
-                    center: DVec3::from(m.translation).to_array().map(L::Scalar::of),
+                    center: m.translation.to_array().map(L::Scalar::of),
                     unit_from_scene: rows(m.matrix3.inverse()),
                     scene_from_unit: rows(m.matrix3),
                     reach: L::Scalar::of(reach(form)),

@@ -50,6 +50,15 @@ impl<L: Lanes> Hit<L> {
         self.t = L::select(nearer, t, self.t);
         self.item = L::select(nearer, L::tag(item), self.item);
     }
+
+    /// Takes `other` where it is nearer, or as near with a lower tag.
+    #[inline(always)]
+    pub(super) fn take(&mut self, other: &Self) {
+        let tie = other.t.le(self.t) & other.item.lt(self.item);
+        let nearer = other.t.lt(self.t) | tie;
+        self.t = L::select(nearer, other.t, self.t);
+        self.item = L::select(nearer, other.item, self.item);
+    }
 }
 
 /// Where a ray meets a surface.

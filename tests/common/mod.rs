@@ -1,0 +1,50 @@
+//! Random numbers for tests: a fixed seed gives the same numbers everywhere.
+
+use glam::DVec3;
+
+/// SplitMix64 (Steele, Lea, Flood 2014).
+pub struct Numbers(u64);
+
+impl Numbers {
+    /// The sequence of `seed`.
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// 64 random bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = self.0;
+        let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Uniform between `low` and `high`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Uniform among 0 .. n.
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.bits() % n as u64) as usize
+    }
+
+    /// Uniform over the unit sphere.
+    pub fn direction(&mut self) -> DVec3 {
+        let z = self.between(-1.0, 1.0);
+        let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * cos, r * sin, z).normalize()
+    }
+
+    /// Uniform in the cube from -half to half.
+    pub fn in_cube(&mut self, half: f64) -> DVec3 {
+        DVec3::new(self.between(-half, half), self.between(-half, half), self.between(-half, half))
+    }
+}

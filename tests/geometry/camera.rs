@@ -1,0 +1,150 @@
+//! Cameras and frames at their extremes.
+
+use crate::common::Numbers;
+use crate::rays::to_dvec3;
+use glam::DVec3;
+use zerkalo::camera::{Camera, View, ViewAngle};
+use zerkalo::lanes::{Double, Frame, Lanes, Single, V3};
+use zerkalo::scene::Scene;
+
+fn check_finite<L: Lanes>(camera: &Camera, size: [u32; 2], name: &str) {
+    let view = View::new(camera, size, DVec3::ZERO);
+    let [u, v, w] = view.frame();
+    for (a, b, expected) in
+        [(u, u, 1.0), (v, v, 1.0), (w, w, 1.0), (u, v, 0.0), (v, w, 0.0), (w, u, 0.0)]
+    {
+        assert!((a.dot(b) - expected).abs() < 1e-15, "{name}: frame {u} {v} {w}");
+    }
+    let xs = [0, size[0] / 2, size[0] - 1];
+    let ys = [0, size[1] / 2, size[1] - 1];
+    for at in xs.into_iter().flat_map(|x| ys.map(|y| (x, y))) {
+        for offset in [0.0, 0.5, 1.0] {
+            let (o, d) = view.rays_of::<L>(at, (L::of(offset), L::of(offset)));
+            for lane in 0..L::WIDTH {
+                let (o, d) = (to_dvec3(o, lane), to_dvec3(d, lane));
+                assert!(o.is_finite() && d.is_finite(), "{name}: pixel {at:?}: {o} {d}");
+                assert!((d.length() - 1.0).abs() < 4.0 * L::EPSILON, "{name}: {at:?}: {d}");
+                assert!(d.dot(w) > 0.0, "{name}: pixel {at:?} looks back: {d}");
+            }
+        }
+    }
+}
+
+#[test]
+fn extreme_17_cameras_at_the_ends_give_finite_rays() {
+    let looks = [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1e-9, 1.0, 0.0]];
+    for direction in looks {
+        for degrees in [1e-3, 40.0, 179.9] {
+            for size in [[1, 1], [16384, 1], [1, 16384], [640, 480]] {
+                for view_angle in [ViewAngle::Vertical(degrees), ViewAngle::Horizontal(degrees)] {
+                    let camera = Camera {
+                        eye: [1.0, -2.0, 3.0],
+                        target: None,
+                        direction: Some(direction),
+                        view_angle,
+                        ..Camera::default()
+                    };
+                    let name = format!("{direction:?} {view_angle:?} {size:?}");
+                    check_finite::<Double>(&camera, size, &name);
+                    check_finite::<Single>(&camera, size, &name);
+                }
+            }
+        }
+    }
+}
+
+/// The angle between the outermost rays is the view angle.
+#[test]
+fn extreme_17_narrow_and_wide_angles_are_right() {
+    for degrees in [1e-3f64, 1.0, 90.0, 179.9] {
+        let camera = Camera { view_angle: ViewAngle::Horizontal(degrees), ..Camera::default() };
+        let view = View::new(&camera, [1000, 1], DVec3::ZERO);
+        let angle = |y: f64| {
+            let (_, left) = view.rays_of::<f64>((0, 0), (0.0, y));
+            let (_, right) = view.rays_of::<f64>((999, 0), (1.0, y));
+            let (a, b) =
+                (DVec3::new(left.x, left.y, left.z), DVec3::new(right.x, right.y, right.z));
+            a.cross(b).length().atan2(a.dot(b)).to_degrees()
+        };
+        let found = angle(0.5);
+        // Unit vectors are known to 1e-16: so is the angle, in radians.
+        let tolerance = 1e-13 + 1e-13 * degrees;
+        assert!((found - degrees).abs() < tolerance, "{degrees}: {found}");
+    }
+}
+
+#[test]
+fn extreme_17_impossible_views_are_located_errors() {
+    for (line, place) in [
+        ("target = [0.0, 1.0, 5.0]", "test:2:1"),
+        ("direction = [0.0, 0.0, 0.0]", "test:2:13"),
+        ("direction = [0.0, -3.0, 0.0]", "test:1:1"),
+        ("target = [0.0, 0.0, 0.0]\nview_angle.vertical = 0.0", "test:3:23"),
+        ("target = [0.0, 0.0, 0.0]\nview_angle.horizontal = 180.0", "test:3:25"),
+    ] {
+        let text = format!("[camera]\n{line}\n");
+        let told = match Scene::parse(&text, "test") {
+            Ok(_) => panic!("accepted: {text}"),
+            Err(errors) => errors.to_string(),
+        };
+        assert!(told.starts_with(place), "expected at {place}: {told}");
+    }
+}
+
+fn check_frames<L: Lanes>(bound: f64) {
+    let mut numbers = Numbers::new(18);
+    let mut worst: f64 = 0.0;
+    for round in 0..1_000_000 / L::WIDTH {
+        // Single precision's normals are rounded again: as far from unit length as it allows.
+        let mut normals = [[0.0; 3]; 16];
+        for n in &mut normals {
+            let around = match round % 4 {
+                0 => numbers.direction(),
+                // Towards the poles, down to differences that round away.
+                _ => {
+                    let tilt = 10f64.powf(numbers.between(-17.0, -3.0));
+                    let pole = if numbers.bits() & 1 == 0 { 1.0 } else { -1.0 };
+                    let side = numbers.direction();
+                    let d = DVec3::new(side.x * tilt, side.y * tilt, pole);
+                    match round % 4 {
+                        1 => d.normalize(),
+                        2 => {
+                            DVec3::new(0.0, side.y * tilt * 1e-6, pole * (1.0 - f64::EPSILON / 2.0))
+                        }
+                        // The equator, where the sign changes.
+                        _ => DVec3::new(side.x, side.y, pole * tilt).normalize(),
+                    }
+                }
+            };
+            *n = around.to_array();
+        }
+        if round == 0 {
+            let e = f64::EPSILON;
+            normals[0] = [0.0, 0.0, -1.0];
+            normals[1 % L::WIDTH] = [0.0, 0.0, -1.0 + e / 2.0];
+            normals[2 % L::WIDTH] = [0.0, 0.0, -1.0 - e];
+            normals[3 % L::WIDTH] = [0.0, -0.0, 1.0];
+        }
+        let n = V3::<L>::from_fn(|i| normals[i].map(zerkalo::lanes::Real::of));
+        let frame = Frame::around(n);
+        for i in 0..L::WIDTH {
+            let [t, b, n] = [frame.t, frame.b, frame.n].map(|v| to_dvec3(v, i));
+            for (a, b, expected) in
+                [(t, t, 1.0), (b, b, 1.0), (t, b, 0.0), (b, n, 0.0), (n, t, 0.0)]
+            {
+                let off = (a.dot(b) - expected).abs();
+                assert!(off <= bound, "{}: {n}: {t} {b}: {off}", L::NAME);
+                worst = worst.max(off);
+            }
+            assert!(t.cross(b).dot(n) > 0.0, "{}: {n}: left-handed", L::NAME);
+        }
+    }
+    assert!(worst > 0.0);
+}
+
+#[test]
+fn extreme_18_frames_are_orthonormal() {
+    check_frames::<Double>(1e-15);
+    check_frames::<f64>(1e-15);
+    check_frames::<Single>(1e-15 * (f64::from(f32::EPSILON) / f64::EPSILON));
+}

@@ -1,0 +1,277 @@
+//! Isotropic uniform lines: a convex body with surface S and volume V, inside a convex body with
+//! surface S', is met by the share S / S' of the lines that meet the outer one, and the mean chord
+//! is 4 V / S (Cauchy, Crofton). Every registered kind is tested.
+
+use crate::common::Numbers;
+use crate::rays::{Line, ball, closest, every_kind};
+use glam::{DMat3, DVec3};
+use std::f64::consts::{PI, TAU};
+use zerkalo::lanes::{Double, Lanes, Single};
+use zerkalo::shape::{Cuboid, Form, Geometry, HalfSpace, Kind, Prism, Pyramid};
+
+/// Area of one face: the corners on it, sorted around their middle.
+fn face_area(face: &HalfSpace, corners: &[DVec3], size: f64) -> f64 {
+    let near = |c: &&DVec3| (face.normal.dot(**c) - face.offset).abs() < 1e-12 * size;
+    let mut on: Vec<DVec3> = corners.iter().filter(near).copied().collect();
+    let middle = on.iter().sum::<DVec3>() / on.len() as f64;
+    let u = (on[0] - middle).normalize();
+    let v = face.normal.cross(u);
+    let angle = |c: &DVec3| (*c - middle).dot(v).atan2((*c - middle).dot(u));
+    on.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+    let wedges = (0..on.len()).map(|i| (on[i] - middle).cross(on[(i + 1) % on.len()] - middle));
+    0.5 * wedges.sum::<DVec3>().length()
+}
+
+/// Surface of the image of the unit sphere: the integral of |cofactor(M) n| over all n.
+fn ellipsoid_surface(m: DMat3) -> f64 {
+    let cofactor = m.inverse().transpose() * m.determinant().abs();
+    let (rows, columns) = (2000, 400);
+    let mut sum = 0.0;
+    for row in 0..rows {
+        let z = (f64::from(row) + 0.5) / f64::from(rows) * 2.0 - 1.0;
+        let r = (1.0 - z * z).sqrt();
+        for column in 0..columns {
+            let (sin, cos) = (f64::from(column) / f64::from(columns) * TAU).sin_cos();
+            sum += (cofactor * DVec3::new(r * cos, r * sin, z)).length();
+        }
+    }
+    sum * 4.0 * PI / f64::from(rows * columns)
+}
+
+/// Surface (both sides of flat things) and volume; `None`: it has no end.
+fn surface_and_volume(form: &Form) -> Option<(f64, f64)> {
+    match form {
+        Form::Sphere { radius: r, .. } => Some((4.0 * PI * r * r, 4.0 / 3.0 * PI * r.powi(3))),
+        Form::Ellipsoid { scene_from_unit: m } => {
+            let volume = 4.0 / 3.0 * PI * m.matrix3.determinant().abs();
+            Some((ellipsoid_surface(m.matrix3), volume))
+        }
+        Form::Convex { faces, corners } => {
+            let inside = corners.iter().sum::<DVec3>() / corners.len() as f64;
+            let size = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
+            let mut sums = (0.0, 0.0);
+            for face in faces {
+                let area = face_area(face, corners, size);
+                sums.0 += area;
+                sums.1 += area * (face.offset - face.normal.dot(inside)) / 3.0;
+            }
+            Some(sums)
+        }
+        Form::Parallelogram { u, v, .. } => Some((2.0 * u.cross(*v).length(), 0.0)),
+        Form::Plane { .. } => None,
+    }
+}
+
+/// What lines met.
+#[derive(Default)]
+struct Tally {
+    lines: f64,
+    hits: f64,
+    chord: f64,
+    chord2: f64,
+    /// Lines whose two ends contradict each other.
+    odd: usize,
+}
+
+impl Tally {
+    /// Each line from both of its ends: `(middle, direction)`, `far` away from the middle.
+    fn add<L: Lanes>(&mut self, geometry: &Geometry<L>, lines: &[Line], far: f64, flat: bool) {
+        let ends = |sign: f64| -> Vec<Line> {
+            lines.iter().map(|(p, d)| (*p - *d * (sign * far), *d * sign)).collect()
+        };
+        let (forward, backward) = (closest(geometry, &ends(1.0)), closest(geometry, &ends(-1.0)));
+        self.lines += lines.len() as f64;
+        for ((line, a), b) in lines.iter().zip(forward).zip(backward) {
+            let (Some(a), Some(b)) = (a, b) else {
+                self.odd += usize::from(a.is_some() || b.is_some());
+                continue;
+            };
+            let chord = 2.0 * far - a.t - b.t;
+            self.hits += 1.0;
+            self.chord += chord;
+            self.chord2 += chord * chord;
+            if !flat {
+                let proper = chord >= -16.0 * L::EPSILON * far
+                    && a.normal.dot(line.1) < 0.0
+                    && b.normal.dot(line.1) > 0.0;
+                self.odd += usize::from(!proper);
+            }
+        }
+    }
+
+    fn check(&self, name: &str, share: f64, mean_chord: f64) {
+        let found = self.hits / self.lines;
+        let sigma = (share * (1.0 - share) / self.lines).sqrt();
+        let z = (found - share) / sigma;
+        assert!(z.abs() < 4.0, "{name}: share {found}, expected {share}: {z} sigma");
+        let mean = self.chord / self.hits;
+        let variance = self.chord2 / self.hits - mean * mean;
+        let z = (mean - mean_chord) / (variance / self.hits).sqrt().max(1e-14);
+        assert!(z.abs() < 4.0, "{name}: chord {mean}, expected {mean_chord}: {z} sigma");
+    }
+}
+
+/// Lines through a ball: any direction, any place on the disc across it.
+fn through_ball(numbers: &mut Numbers, center: DVec3, radius: f64) -> Line {
+    let d = numbers.direction();
+    let (u, v) = d.any_orthonormal_pair();
+    let (sin, cos) = (TAU * numbers.unit()).sin_cos();
+    (center + (u * cos + v * sin) * (radius * numbers.unit().sqrt()), d)
+}
+
+/// Lines through a box: a uniform point of its surface and a direction inward by the cosine law.
+fn through_box(numbers: &mut Numbers, center: DVec3, half: DVec3) -> Line {
+    let areas = [half.y * half.z, half.z * half.x, half.x * half.y];
+    let mut pick = numbers.unit() * areas.iter().sum::<f64>();
+    let axis = areas.iter().position(|a| {
+        pick -= a;
+        pick < 0.0
+    });
+    let axis = axis.unwrap_or(2);
+    let sign = if numbers.bits() & 1 == 0 { 1.0 } else { -1.0 };
+    let mut p = DVec3::new(
+        numbers.between(-1.0, 1.0),
+        numbers.between(-1.0, 1.0),
+        numbers.between(-1.0, 1.0),
+    );
+    p[axis] = sign;
+    let sin = numbers.unit().sqrt();
+    let (a, b) = (TAU * numbers.unit()).sin_cos();
+    let mut d = DVec3::ZERO;
+    d[axis] = -sign * (1.0 - sin * sin).sqrt();
+    d[(axis + 1) % 3] = sin * a;
+    d[(axis + 2) % 3] = sin * b;
+    (center + p * half, d.normalize())
+}
+
+const LINES: usize = 1_000_000;
+const BLOCK: usize = 1 << 14;
+
+fn tally<L: Lanes>(
+    form: &Form,
+    far: f64,
+    seed: u64,
+    lines: usize,
+    mut line: impl FnMut(&mut Numbers) -> Line,
+) -> Tally {
+    let geometry = Geometry::<L>::new(std::slice::from_ref(form));
+    let flat = matches!(form, Form::Parallelogram { .. });
+    let mut numbers = Numbers::new(seed);
+    let mut tally = Tally::default();
+    for _ in 0..lines.div_ceil(BLOCK) {
+        let block: Vec<Line> = (0..BLOCK).map(|_| line(&mut numbers)).collect();
+        tally.add(&geometry, &block, far, flat);
+    }
+    tally
+}
+
+#[test]
+fn closed_form_08_extreme_07_cauchy_for_every_kind() {
+    for (i, (name, form)) in every_kind().into_iter().enumerate() {
+        let (Some((center, radius)), Some((surface, volume))) =
+            (ball(&form), surface_and_volume(&form))
+        else {
+            continue;
+        };
+        let share = surface / (4.0 * PI * radius * radius);
+        let chord = 4.0 * volume / surface;
+        let double = tally::<Double>(&form, 2.0 * radius, 80 + i as u64, LINES, |n| {
+            through_ball(n, center, radius)
+        });
+        double.check(name, share, chord);
+        assert_eq!(double.odd, 0, "{name}: both ends of a line must agree");
+        let single = tally::<Single>(&form, 2.0 * radius, 180 + i as u64, LINES, |n| {
+            through_ball(n, center, radius)
+        });
+        single.check(name, share, chord);
+        // A line that passes an edge nearer than rounding may be seen from one end only, or have its
+        // point on the next face: about a share of the rounding.
+        let limit = 100.0 * f64::from(f32::EPSILON) * single.lines;
+        assert!(single.odd as f64 <= limit, "{name}: {} lines of {LINES}", single.odd);
+    }
+}
+
+#[test]
+fn cauchy_for_ellipsoids_and_skewed_solids() {
+    let map = glam::DAffine3::from_mat3_translation(
+        DMat3::from_cols(
+            DVec3::new(1.5, 0.2, -0.1),
+            DVec3::new(0.3, 0.4, 0.2),
+            DVec3::new(-0.5, 0.1, 0.8),
+        ),
+        DVec3::new(2.0, -1.0, 3.0),
+    );
+    for (i, (name, form)) in every_kind().into_iter().enumerate() {
+        let form = form.transformed(&map);
+        let (Some((low, high)), Some((surface, volume))) =
+            (form.bounds(), surface_and_volume(&form))
+        else {
+            continue;
+        };
+        let half = 0.6 * (high - low);
+        let outer = 8.0 * (half.x * half.y + half.y * half.z + half.z * half.x);
+        let found = tally::<Double>(&form, 4.0 * half.length(), 280 + i as u64, LINES / 2, |n| {
+            through_box(n, 0.5 * (low + high), half)
+        });
+        found.check(name, surface / outer, 4.0 * volume / surface);
+        assert_eq!(found.odd, 0, "{name}");
+    }
+}
+
+#[test]
+fn an_endless_plane_is_met_by_one_half_of_every_line() {
+    let mut planes = 0;
+    for (name, form) in every_kind() {
+        let Form::Plane { normal, offset } = form else { continue };
+        planes += 1;
+        let geometry = Geometry::<Double>::new(std::slice::from_ref(&form));
+        let mut numbers = Numbers::new(8);
+        for _ in 0..50_000 {
+            let (p, d) = (numbers.in_cube(10.0), numbers.direction());
+            let ends = closest(&geometry, &[(p, d), (p, -d)]);
+            let t = (offset - normal.dot(p)) / normal.dot(d);
+            let (hit, miss) = if t > 0.0 { (ends[0], ends[1]) } else { (ends[1], ends[0]) };
+            assert!(miss.is_none(), "{name}: {p} {d}");
+            let hit = hit.unwrap_or_else(|| panic!("{name}: {p} {d}"));
+            assert!((hit.t - t.abs()).abs() <= 1e-14 * t.abs(), "{name}: {} {t}", hit.t);
+        }
+    }
+    let bounded = every_kind().iter().filter(|k| k.1.bounds().is_some()).count();
+    assert_eq!(bounded + planes, every_kind().len(), "every kind has a law");
+}
+
+/// Boxes, prisms and pyramids with sides one millionth of each other.
+fn slivers() -> Vec<(&'static str, Form)> {
+    let thin = 1e-6;
+    let corner = [-0.5, -0.5, 0.5];
+    let pyramid = |side, apex_height, height| {
+        Pyramid { corner, side, apex_height, height, rotation: 17.0 }.form()
+    };
+    vec![
+        ("plate", Cuboid { center: [0.1, 0.2, 0.3], size: [1.0, thin, 0.7] }.form()),
+        ("needle", Cuboid { center: [0.1, 0.2, 0.3], size: [thin, 1.0, thin] }.form()),
+        ("blade", Cuboid { center: [0.1, 0.2, 0.3], size: [thin, 1.0, 1e-3] }.form()),
+        ("tall prism", Prism { corner, side: thin, height: 1.0, rotation: 0.0 }.form()),
+        ("flat prism", Prism { corner, side: 1.0, height: thin, rotation: 31.0 }.form()),
+        ("tall pyramid", pyramid(thin, 1.0, 1.0)),
+        ("flat pyramid", pyramid(1.0, thin, thin)),
+        ("pyramid with a tiny top", pyramid(1.0, 1.0, 1.0 - thin)),
+        ("pyramid cut near its base", pyramid(1.0, 1.0, thin)),
+    ]
+}
+
+#[test]
+fn extreme_13_extreme_08_slivers() {
+    for (i, (name, form)) in slivers().into_iter().enumerate() {
+        let (low, high) = form.bounds().unwrap();
+        let (surface, volume) = surface_and_volume(&form).unwrap();
+        let half = 0.55 * (high - low);
+        let outer = 8.0 * (half.x * half.y + half.y * half.z + half.z * half.x);
+        let found = tally::<Double>(&form, 4.0, 1300 + i as u64, LINES, |n| {
+            through_box(n, 0.5 * (low + high), half)
+        });
+        found.check(name, surface / outer, 4.0 * volume / surface);
+        // Parity. Coordinates about 1 are known to 1e-16 x the distance of 4: 1e-9 of the thin side.
+        assert_eq!(found.odd, 0, "{name}: {} of {} lines", found.odd, found.lines);
+    }
+}

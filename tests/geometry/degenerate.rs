@@ -1,0 +1,228 @@
+//! Rays that start inside, on faces, in the planes of faces, along the axes.
+
+use crate::bits::{any_line, forms};
+use crate::common::Numbers;
+use crate::rays::{Line, ball, blocked, closest, every_kind};
+use glam::DVec3;
+use zerkalo::lanes::{Double, Lanes, Single};
+use zerkalo::shape::{Cuboid, Form, Geometry, Kind};
+
+fn is_solid(form: &Form) -> bool {
+    !matches!(form, Form::Parallelogram { .. } | Form::Plane { .. })
+}
+
+/// A point well inside a solid.
+fn inside(numbers: &mut Numbers, form: &Form) -> DVec3 {
+    match form {
+        Form::Sphere { center, radius } => {
+            *center + numbers.direction() * (0.99 * radius * numbers.unit().cbrt())
+        }
+        Form::Ellipsoid { scene_from_unit } => {
+            scene_from_unit.transform_point3(numbers.direction() * (0.99 * numbers.unit().cbrt()))
+        }
+        Form::Convex { corners, .. } => {
+            let weights: Vec<f64> =
+                corners.iter().map(|_| 1e-3 - (1.0 - numbers.unit()).ln()).collect();
+            let sum: f64 = weights.iter().sum();
+            corners.iter().zip(&weights).map(|(c, w)| *c * (w / sum)).sum()
+        }
+        _ => unreachable!("a flat thing has no inside"),
+    }
+}
+
+fn check_inside<L: Lanes>(name: &str, form: &Form, seed: u64, rays: usize) {
+    let geometry = Geometry::<L>::new(std::slice::from_ref(form));
+    let mut numbers = Numbers::new(seed);
+    let (_, radius) = ball(form).unwrap();
+    let lines: Vec<Line> =
+        (0..rays).map(|_| (inside(&mut numbers, form), numbers.direction())).collect();
+    let met = closest(&geometry, &lines);
+    let mut onward = Vec::new();
+    for (line, met) in lines.iter().zip(&met) {
+        let met = met.unwrap_or_else(|| panic!("{name}, {}: lost {line:?}", L::NAME));
+        assert!(met.normal.dot(line.1) > 0.0, "{name}, {}: {line:?} {met:?}", L::NAME);
+        // Past the exit there is nothing; back from there, the exit and then the entry.
+        onward.push((line.0 + line.1 * (met.t + 1e-3 * radius), line.1));
+    }
+    for (line, met) in onward.iter().zip(closest(&geometry, &onward)) {
+        assert!(met.is_none(), "{name}, {}: behind the exit {line:?} meets {met:?}", L::NAME);
+    }
+    assert!(blocked(&geometry, &onward, L::MAX).iter().all(|b| !b), "{name}, {}", L::NAME);
+    assert!(blocked(&geometry, &lines, L::MAX).iter().all(|b| *b), "{name}, {}", L::NAME);
+    let back: Vec<Line> = onward.iter().map(|(o, d)| (*o, -*d)).collect();
+    for ((line, first), exit) in back.iter().zip(closest(&geometry, &back)).zip(&met) {
+        let (Some(first), Some(exit)) = (first, exit) else {
+            panic!("{name}, {}: lost {line:?}", L::NAME)
+        };
+        // Along the surface the meeting point moves by rounding over the cosine.
+        let rounding = 64.0 * L::EPSILON * (radius + line.0.length());
+        let apart = (first.point - exit.point).length();
+        let grazing = exit.normal.dot(line.1).abs();
+        assert!(apart <= rounding / grazing, "{name}, {}: {line:?} {apart}", L::NAME);
+    }
+}
+
+#[test]
+fn extreme_04_from_inside_only_the_exit_is_met() {
+    for (i, (name, form)) in forms().into_iter().enumerate() {
+        if is_solid(&form) {
+            check_inside::<Double>(&name, &form, 40 + i as u64, 100_000);
+            check_inside::<Single>(&name, &form, 140 + i as u64, 100_000);
+        }
+    }
+    assert!(every_kind().iter().any(|k| is_solid(&k.1)));
+}
+
+/// Where a line meets the closed box from -1 to 1, in exact integers scaled by `UNIT`: `None` if it
+/// misses, `(enter, leave)` as fractions `n / d` with d > 0 of the length of `d`.
+fn slabs(origin: [i64; 3], d: [i64; 3]) -> Option<[(i64, i64); 2]> {
+    let less = |a: (i64, i64), b: (i64, i64)| a.0 * b.1 < b.0 * a.1;
+    let mut ends: Option<[(i64, i64); 2]> = None;
+    for i in 0..3 {
+        if d[i] == 0 {
+            if origin[i].abs() > UNIT {
+                return None;
+            }
+            continue;
+        }
+        let s = d[i].signum();
+        let pair =
+            [((-UNIT * s - origin[i]) * s, d[i].abs()), ((UNIT * s - origin[i]) * s, d[i].abs())];
+        ends = Some(match ends {
+            None => pair,
+            Some([enter, leave]) => [
+                if less(enter, pair[0]) { pair[0] } else { enter },
+                if less(pair[1], leave) { pair[1] } else { leave },
+            ],
+        });
+    }
+    ends.filter(|[enter, leave]| !less(*leave, *enter))
+}
+
+/// Steps of the lattice that ray origins lie on, per half side of the box.
+const UNIT: i64 = 2;
+
+fn check_lattice<L: Lanes>() -> [usize; 3] {
+    let form = Cuboid { center: [0.0; 3], size: [2.0; 3] }.form();
+    let geometry = Geometry::<L>::new(&[form]);
+    let mut counts = [0; 3];
+    let places: Vec<i64> = (-3 * UNIT..=3 * UNIT).collect();
+    for n in 0..13 * 13 * 13 {
+        let origin = [places[n % 13], places[n / 13 % 13], places[n / 169]];
+        for k in 0..27 * 8 {
+            let mut d = [k % 3, k / 3 % 3, k / 9 % 3].map(|x| x as i64 - 1);
+            let zeros =
+                [k / 27 & 1, k / 54 & 1, k / 108 & 1].map(|b| if b == 0 { 0.0 } else { -0.0 });
+            // Directions with unequal parts too.
+            d[0] *= 1 + (n % 3) as i64;
+            d[2] *= 1 + (n % 4) as i64;
+            if d == [0; 3] {
+                continue;
+            }
+            let real = DVec3::from_array(std::array::from_fn(|i| {
+                if d[i] == 0 { zeros[i] } else { d[i] as f64 }
+            }));
+            let length = real.length();
+            let line = (DVec3::from(origin.map(|x| x as f64 / UNIT as f64)), real / length);
+            let met = closest(&geometry, &[line])[0];
+            let blocked = blocked(&geometry, &[line], 100.0)[0];
+            let told = || format!("{}: {line:?}: {met:?}", L::NAME);
+            assert_eq!(met.is_some(), blocked, "{}", told());
+            let t = |f: (i64, i64)| f.0 as f64 / (f.1 * UNIT) as f64 * length;
+            let truth = slabs(origin, d).map(|ends| ends.map(t));
+            if let Some(met) = met {
+                assert!(met.t.is_finite() && met.point.is_finite(), "{}", told());
+                let Some([enter, leave]) = truth else { panic!("no box there: {}", told()) };
+                let near = |x: f64| (met.t - x).abs() <= 8.0 * L::EPSILON * (1.0 + x.abs());
+                assert!(near(enter) || near(leave), "{}, not {enter} or {leave}", told());
+            }
+            let Some([enter, leave]) = truth else {
+                counts[0] += 1;
+                continue;
+            };
+            // In the plane of a face or through an edge it touches the box: both answers are right.
+            let in_face = (0..3).any(|i| d[i] == 0 && origin[i].abs() == UNIT);
+            if in_face || leave - enter < 1e-9 {
+                counts[1] += 1;
+                continue;
+            }
+            counts[2] += 1;
+            // An origin on a face starts on either side of it.
+            let expected = if enter.abs() < 1e-9 || leave.abs() < 1e-9 {
+                continue;
+            } else if enter > 0.0 {
+                Some(enter)
+            } else {
+                Some(leave).filter(|t| *t > 0.0)
+            };
+            match (met, expected) {
+                (None, None) => {}
+                (Some(m), Some(t)) => {
+                    assert!((m.t - t).abs() <= 8.0 * L::EPSILON * (1.0 + t), "{} not {t}", told());
+                }
+                _ => panic!("expected {expected:?}: {}", told()),
+            }
+        }
+    }
+    counts
+}
+
+#[test]
+fn extreme_06_a_box_is_its_slabs_in_exact_numbers() {
+    let counts = check_lattice::<f64>();
+    assert_eq!(check_lattice::<f32>(), counts);
+    assert!(counts.iter().all(|c| *c > 1000), "misses, touches, hits: {counts:?}");
+}
+
+fn check_finite<L: Lanes>(name: &str, form: &Form, seed: u64) {
+    let geometry = Geometry::<L>::new(std::slice::from_ref(form));
+    let mut numbers = Numbers::new(seed);
+    let (center, radius) = ball(form).unwrap_or((DVec3::ZERO, f64::INFINITY));
+    let lines: Vec<Line> = (0..40_000).map(|_| any_line(&mut numbers, form)).collect();
+    for (n, (line, met)) in lines.iter().zip(closest(&geometry, &lines)).enumerate() {
+        let Some(met) = met else { continue };
+        let told = || format!("{name}, {}, ray {n} of seed {seed}: {line:?} {met:?}", L::NAME);
+        assert!(met.t.is_finite() && met.t > 0.0, "{}", told());
+        assert!((met.normal.length() - 1.0).abs() < 8.0 * L::EPSILON, "{}", told());
+        assert!((met.point - center).length() <= 1.001 * radius, "{}", told());
+    }
+}
+
+#[test]
+fn extreme_06_degenerate_rays_at_every_kind() {
+    for (i, (name, form)) in forms().into_iter().enumerate() {
+        check_finite::<Double>(&name, &form, 600 + i as u64);
+        check_finite::<Single>(&name, &form, 700 + i as u64);
+    }
+}
+
+/// A ray beside a solid, parallel to a face of it that has no opposite: the sign of a zero must not
+/// open that face.
+#[test]
+fn extreme_06_zeros_of_either_sign_beside_every_solid() {
+    for (name, form) in every_kind() {
+        let Some((low, high)) = form.bounds() else { continue };
+        let size = high - low;
+        let mut lines = Vec::new();
+        let mut numbers = Numbers::new(61);
+        for axis in 0..3 {
+            for n in 0..2000 {
+                let zero = |bit: i32| if n >> bit & 1 == 0 { 0.0 } else { -0.0 };
+                let mut d = DVec3::new(zero(0), zero(1), zero(2));
+                d[axis] = if n & 8 == 0 { 1.0 } else { -1.0 };
+                // Outside the box across the ray, within the ball around it.
+                let mut o = low + size * DVec3::new(numbers.unit(), numbers.unit(), numbers.unit());
+                let beside = (axis + 1 + (n >> 4 & 1) as usize) % 3;
+                let out = numbers.between(1e-3, 0.3) * (size[beside] + 0.1);
+                o[beside] = if n & 32 == 0 { low[beside] - out } else { high[beside] + out };
+                o[axis] -= d[axis] * 2.0 * (size[axis] + 1.0);
+                lines.push((o, d));
+            }
+        }
+        let double = closest(&Geometry::<Double>::new(std::slice::from_ref(&form)), &lines);
+        let single = closest(&Geometry::<Single>::new(std::slice::from_ref(&form)), &lines);
+        for (line, met) in lines.iter().zip(double).chain(lines.iter().zip(single)) {
+            assert!(met.is_none(), "{name}: {line:?} passes beside, but meets {met:?}");
+        }
+    }
+}

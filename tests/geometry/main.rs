@@ -1,0 +1,16 @@
+//! What rays meet, against closed forms, exact arithmetic and the extremes of sizes and places.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod bits;
+mod camera;
+mod cauchy;
+mod degenerate;
+mod light;
+mod mirror;
+mod rays;
+mod shadow;
+mod sphere;
+mod transforms;
+mod tree;

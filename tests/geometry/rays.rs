@@ -1,0 +1,139 @@
+//! Rays in double precision, traced in packets of any lane type.
+
+use glam::DVec3;
+use zerkalo::lanes::{Lanes, Mask, Real, V3};
+use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo::scene::Scene;
+use zerkalo::shape::{EXAMPLES, Form, Geometry, Ray};
+use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Precision, Radiance, World};
+
+/// Origin and unit direction.
+pub type Line = (DVec3, DVec3);
+
+/// Where a ray met something.
+#[derive(Clone, Copy, Debug)]
+pub struct Met {
+    pub t: f64,
+    /// Position of the form in the list that the geometry was made of.
+    pub form: usize,
+    pub point: DVec3,
+    pub normal: DVec3,
+}
+
+/// Packets of `lines`, the last one filled up with its last ray, and the range each is for.
+pub fn packets<L: Lanes>(lines: &[Line]) -> impl Iterator<Item = (Ray<L>, usize)> + '_ {
+    lines.chunks(L::WIDTH).map(|lines| {
+        let at = |i: usize| lines[i.min(lines.len() - 1)];
+        let real = |v: DVec3| v.to_array().map(L::Scalar::of);
+        let origin = V3::from_fn(|i| real(at(i).0));
+        let direction = V3::from_fn(|i| real(at(i).1));
+        (Ray { origin, direction }, lines.len())
+    })
+}
+
+pub fn to_dvec3<L: Lanes>(v: V3<L>, lane: usize) -> DVec3 {
+    DVec3::from(v.lane(lane).map(Real::to_f64))
+}
+
+/// The nearest things, ray by ray.
+pub fn closest<L: Lanes>(geometry: &Geometry<L>, lines: &[Line]) -> Vec<Option<Met>> {
+    let mut out = Vec::with_capacity(lines.len());
+    for (ray, count) in packets::<L>(lines) {
+        let hit = geometry.closest(&ray);
+        let met = hit.t.lt(L::of(L::MAX));
+        let surface = geometry.surface(&ray, &hit, met);
+        out.extend((0..count).map(|i| {
+            met.lane(i).then(|| Met {
+                t: hit.t.lane(i).to_f64(),
+                form: geometry.sources()[hit.item.tag_lane(i) as usize] as usize,
+                point: to_dvec3(surface.point, i),
+                normal: to_dvec3(surface.normal, i),
+            })
+        }));
+    }
+    out
+}
+
+/// Whether anything lies nearer than `limit`, ray by ray.
+pub fn blocked<L: Lanes>(geometry: &Geometry<L>, lines: &[Line], limit: f64) -> Vec<bool> {
+    let mut out = Vec::with_capacity(lines.len());
+    for (ray, count) in packets::<L>(lines) {
+        let blocked = geometry.blocked(&ray, L::of(limit), L::mask(true));
+        out.extend((0..count).map(|i| blocked.lane(i)));
+    }
+    out
+}
+
+/// One form of every registered kind, by its example.
+pub fn every_kind() -> Vec<(&'static str, Form)> {
+    let form = |text: &str| scene(&format!("[[object]]\n{text}")).objects[0].shape.form();
+    EXAMPLES.iter().map(|(key, example)| (*key, form(example))).collect()
+}
+
+/// A scene without faults.
+pub fn scene(text: &str) -> Scene {
+    Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+/// Centre and radius of a sphere around a bounded form's box.
+pub fn ball(form: &Form) -> Option<(DVec3, f64)> {
+    form.bounds().map(|(low, high)| (0.5 * (low + high), 0.5 * (high - low).length()))
+}
+
+/// A compiled scene that answers with radiance.
+pub struct Traced {
+    world: AnyWorld,
+    mix: Vec<[f64; 3]>,
+    /// What the compilation subtracted from every coordinate.
+    origin: DVec3,
+}
+
+impl Traced {
+    pub fn new(scene: &Scene, precision: Precision) -> Self {
+        let world = AnyWorld::compile(scene, &Options { precision });
+        let eye = match &world {
+            AnyWorld::Single(w) => w.view().eye(),
+            AnyWorld::Double(w) => w.view().eye(),
+        };
+        let mix = world.mix(scene);
+        Self { world, mix, origin: DVec3::from(scene.camera.eye) - eye }
+    }
+
+    /// Radiance along the lines, which are given in the scene's coordinates.
+    pub fn radiance(&self, lines: &[Line]) -> Vec<[f64; 3]> {
+        let lines: Vec<Line> = lines.iter().map(|(o, d)| (*o - self.origin, *d)).collect();
+        self.centered(&lines)
+    }
+
+    /// The same for lines around the scene's centre.
+    pub fn centered(&self, lines: &[Line]) -> Vec<[f64; 3]> {
+        match &self.world {
+            AnyWorld::Single(w) => self.of(w, lines),
+            AnyWorld::Double(w) => self.of(w, lines),
+        }
+    }
+
+    /// Where the scene's centre lies.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    fn of<L: Lanes>(&self, world: &World<L>, lines: &[Line]) -> Vec<[f64; 3]> {
+        let settings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
+        let sampler = Sampler::new(settings, world.jitter());
+        let mut out = Vec::with_capacity(lines.len());
+        let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
+        for (ray, count) in packets::<L>(lines) {
+            let draws = sampler.of_pixel(0, 0, 0, 0);
+            world.trace((ray.origin, ray.direction), &draws, L::mask(true), &mut radiance);
+            for i in 0..count {
+                let mut sum = DVec3::ZERO;
+                for (group, weight) in radiance.groups.iter().zip(&self.mix) {
+                    sum += to_dvec3(*group, i) * DVec3::from(*weight);
+                }
+                out.push(sum.to_array());
+            }
+        }
+        out
+    }
+}

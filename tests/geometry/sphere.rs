@@ -1,0 +1,313 @@
+//! Spheres from far, from inside, from their ground, at their limb.
+
+use crate::common::Numbers;
+use crate::rays::{Line, Traced, closest, scene};
+use glam::DVec3;
+use std::f64::consts::PI;
+use zerkalo::camera::{Camera, View, ViewAngle};
+use zerkalo::lanes::{Double, Lanes, Single};
+use zerkalo::shape::{Form, Geometry};
+use zerkalo::world::Precision;
+
+/// An unevaluated sum of two doubles: about 106 bits (Dekker 1971, Knuth).
+#[derive(Clone, Copy)]
+struct Dd(f64, f64);
+
+impl Dd {
+    fn sum(a: f64, b: f64) -> Self {
+        let s = a + b;
+        let c = s - a;
+        Self(s, (a - (s - c)) + (b - c))
+    }
+    fn product(a: f64, b: f64) -> Self {
+        let p = a * b;
+        Self(p, a.mul_add(b, -p))
+    }
+    fn plus(self, o: Self) -> Self {
+        let s = Self::sum(self.0, o.0);
+        Self::sum(s.0, s.1 + self.1 + o.1)
+    }
+    fn minus(self, o: Self) -> Self {
+        self.plus(Self(-o.0, -o.1))
+    }
+    fn times(self, o: Self) -> Self {
+        let p = Self::product(self.0, o.0);
+        Self::sum(p.0, p.1 + self.0 * o.1 + self.1 * o.0)
+    }
+    fn over(self, o: Self) -> Self {
+        let q = self.0 / o.0;
+        let rest = self.minus(o.times(Self(q, 0.0)));
+        Self::sum(q, rest.0 / o.0)
+    }
+}
+
+fn dot(a: [Dd; 3], b: [Dd; 3]) -> Dd {
+    a[0].times(b[0]).plus(a[1].times(b[1])).plus(a[2].times(b[2]))
+}
+
+/// Signed distance of the line beyond the sphere's limb, and the nearer meeting point seen from the
+/// centre (not finite for a miss), for exactly these numbers.
+fn exact((origin, d): Line, center: DVec3, radius: f64) -> (f64, DVec3) {
+    let f: [Dd; 3] = std::array::from_fn(|i| Dd::sum(origin[i], -center[i]));
+    let d: [Dd; 3] = std::array::from_fn(|i| Dd(d[i], 0.0));
+    let steps = dot(f, d).over(dot(d, d));
+    let across: [Dd; 3] = std::array::from_fn(|i| f[i].minus(d[i].times(steps)));
+    let across2 = dot(across, across);
+    let rest = Dd::product(radius, radius).minus(across2).0;
+    let back = rest.sqrt() / dot(d, d).0.sqrt();
+    let point = std::array::from_fn(|i| across[i].0 - d[i].0 * back);
+    (across2.0.sqrt() - radius, DVec3::from_array(point))
+}
+
+/// Rays at a unit sphere from the distance `far`: within 0.7 of the radius, and near the limb.
+fn check_far<L: Lanes>(far: f64, seed: u64) {
+    let mut numbers = Numbers::new(seed);
+    let rounded = |v: DVec3| if L::EPSILON > 1e-10 { v.as_vec3().as_dvec3() } else { v };
+    // What rounds is the ray: its direction is one of this precision, and so is f . d.
+    let tolerance = 4.0 * L::EPSILON * far.max(1.0);
+    for _ in 0..20 {
+        let center = rounded(numbers.in_cube(1.0));
+        let form = Form::Sphere { center, radius: 1.0 };
+        let geometry = Geometry::<L>::new(&[form]);
+        let lines: Vec<Line> = (0..5000)
+            .map(|i| {
+                let eye = rounded(numbers.direction() * far);
+                let toward = (center - eye).normalize();
+                let (u, v) = toward.any_orthonormal_pair();
+                let (sin, cos) = (2.0 * PI * numbers.unit()).sin_cos();
+                let reach = if i % 2 == 0 {
+                    0.7 * numbers.unit().sqrt()
+                } else {
+                    1.0 + tolerance * numbers.between(-20.0, 20.0)
+                };
+                let target = center + (u * cos + v * sin) * reach;
+                (eye, rounded((target - eye).normalize()))
+            })
+            .collect();
+        for (i, (line, met)) in lines.iter().zip(closest(&geometry, &lines)).enumerate() {
+            let (beyond, at) = exact(*line, center, 1.0);
+            let told = format!("{}, far {far}, seed {seed}: {line:?}", L::NAME);
+            if beyond.abs() > tolerance {
+                assert_eq!(met.is_some(), beyond < 0.0, "{told}: {beyond} beyond the limb");
+            }
+            let Some(met) = met else { continue };
+            let from_center = met.point - center;
+            let off = (from_center.length() - 1.0).abs();
+            assert!(off <= 8.0 * L::EPSILON, "{told}: {off} off the surface");
+            if i % 2 == 0 {
+                // Up to 0.7 of the radius the surface is inclined by at most 45 degrees.
+                let wrong = (from_center - at).length();
+                assert!(wrong <= 4.0 * tolerance, "{told}: {wrong} from the true point");
+            }
+        }
+    }
+}
+
+#[test]
+fn extreme_01_a_sphere_from_far() {
+    for (i, far) in [1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9].into_iter().enumerate() {
+        check_far::<Double>(far, 10 + i as u64);
+    }
+    // Single precision ends where a rounding of the distance is a thousandth of the radius; the
+    // choice of precision leaves it before.
+    for (i, far) in [1e2, 1e3, 8192.0].into_iter().enumerate() {
+        check_far::<Single>(far, 30 + i as u64);
+    }
+}
+
+#[test]
+fn extreme_02_a_sphere_as_ground() {
+    let (radius, height) = (1e9, 1.7);
+    let text = |light: &str| {
+        format!(
+            "[film]\nsize = [64, 480]\n[camera]\neye = [0.0, {height}, 0.0]\n\
+             direction = [0.0, 0.0, -1.0]\n[[light]]\ndirectional = {{ direction = {light} }}\n\
+             [[object]]\nshape.sphere = {{ center = [0.0, {}, 0.0], radius = {radius} }}\n",
+            -radius
+        )
+    };
+    // The horizon lies below the level by acos(r / (r + h)): tan = sqrt(h (2 r + h)) / r.
+    let dip = (height * (2.0 * radius + height)).sqrt() / radius;
+    let plane_height = 2.0 * 20f64.to_radians().tan();
+    let row = 240.0 + dip / plane_height * 480.0;
+    let ground = Geometry::<Double>::new(&[Form::Sphere {
+        center: DVec3::new(0.0, -radius, 0.0) + DVec3::Y * radius,
+        radius,
+    }]);
+    let eye = DVec3::Y * (radius + height);
+    let meets = |row: f64| {
+        let d = DVec3::new(0.0, (240.0 - row) / 480.0 * plane_height, -1.0).normalize();
+        closest(&ground, &[(eye, d)])[0].is_some()
+    };
+    let (mut above, mut below) = (230.0, 250.0);
+    assert!(!meets(above) && meets(below));
+    while below - above > 1e-9 {
+        let middle = 0.5 * (above + below);
+        if meets(middle) { below = middle } else { above = middle }
+    }
+    assert!((below - row).abs() < 0.01, "horizon in row {below}, expected {row}");
+
+    for light in ["[0.0, -1.0, 0.0]", "[0.3, -0.2, 0.1]", "[1.0, -0.001, 0.0]"] {
+        let scene = scene(&text(light));
+        let traced = Traced::new(&scene, Precision::Double);
+        let view = View::new(&scene.camera, scene.film.size, DVec3::ZERO);
+        let pixels: Vec<(u32, u32)> =
+            (242..480).flat_map(|y| (0..64).map(move |x| (x, y))).collect();
+        let lines: Vec<Line> = pixels
+            .iter()
+            .map(|at| {
+                let (o, d) = view.rays_of::<f64>(*at, (0.5, 0.5));
+                (DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z))
+            })
+            .collect();
+        let dark = traced.radiance(&lines).iter().filter(|l| l[0] <= 0.0).count();
+        assert_eq!(dark, 0, "light {light}: dark points on bare ground");
+    }
+}
+
+/// Share of the rays through points of the square around the image of `center` on z = -1 that meet
+/// the sphere, against pi r^2 sqrt(D^2 - r^2) / (c_z^2 - r^2)^(3/2); and the exact mask
+/// (v.c)^2 >= (c^2 - r^2) v^2.
+fn check_silhouette(center: DVec3, radius: f64, rays: usize, seed: u64) -> f64 {
+    let geometry = Geometry::<Double>::new(&[Form::Sphere { center, radius }]);
+    let distance = center.length();
+    let image = DVec3::new(center.x, center.y, 0.0) / -center.z;
+    let near = (center.z * center.z - radius * radius).sqrt();
+    let half = 1.5 * radius * distance / (near * near) + 0.1 * radius;
+    let mut numbers = Numbers::new(seed);
+    let lines: Vec<Line> = (0..rays)
+        .map(|_| {
+            let (x, y) = (numbers.between(-half, half), numbers.between(-half, half));
+            let d = DVec3::new(image.x + x, image.y + y, -1.0);
+            (DVec3::ZERO, d.normalize())
+        })
+        .collect();
+    let mut hits = 0;
+    for (line, met) in lines.iter().zip(closest(&geometry, &lines)) {
+        hits += usize::from(met.is_some());
+        let (beyond, _) = exact(*line, center, radius);
+        if beyond.abs() > 8.0 * f64::EPSILON * distance {
+            assert_eq!(met.is_some(), beyond < 0.0, "{line:?}: {beyond} beyond the limb");
+        }
+    }
+    let area = PI * radius * radius * (distance * distance - radius * radius).sqrt() / near.powi(3);
+    let share = area / (4.0 * half * half);
+    let found = hits as f64 / rays as f64;
+    let z = (found - share) / (share * (1.0 - share) / rays as f64).sqrt();
+    assert!(
+        z.abs() < 4.0,
+        "centre {center}, radius {radius}: share {found} not {share}, {z} sigma"
+    );
+    found / share
+}
+
+#[test]
+fn extreme_03_a_tiny_sphere() {
+    let center = DVec3::new(0.3, -0.2, -1.0).normalize();
+    let ratio = check_silhouette(center, 1e-6, 1_000_000, 3);
+    assert!((ratio - 1.0).abs() < 0.01, "silhouette {ratio} of the true one");
+}
+
+#[test]
+fn closed_form_10_silhouettes() {
+    for (i, (center, radius)) in [
+        (DVec3::new(0.0, 0.0, -5.0), 1.0),
+        (DVec3::new(2.0, 1.0, -3.0), 1.0),
+        (DVec3::new(-1.0, 4.0, -6.0), 2.5),
+        (DVec3::new(0.1, 0.0, -1.0), 0.9),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        check_silhouette(center, radius, 200_000, 10 + i as u64);
+    }
+}
+
+/// The mask of a whole picture, by the compiled camera.
+#[test]
+fn closed_form_10_every_pixel_of_a_sphere() {
+    let camera = Camera {
+        eye: [1.0, 2.0, 7.0],
+        target: Some([0.2, 0.3, 0.0]),
+        view_angle: ViewAngle::Horizontal(35.0),
+        ..Camera::default()
+    };
+    let (center, radius) = (DVec3::new(0.4, 0.1, -0.5), 1.3);
+    let view = View::new(&camera, [320, 200], DVec3::ZERO);
+    let geometry = Geometry::<Double>::new(&[Form::Sphere { center, radius }]);
+    let eye = DVec3::from(camera.eye);
+    let [u, v, w] = view.frame();
+    let c = center - eye;
+    let half = 17.5f64.to_radians().tan();
+    let mut covered = 0;
+    for y in 0..200 {
+        for x in 0..320 {
+            let (o, d) = view.rays_of::<f64>((x, y), (0.5, 0.5));
+            let line = (DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z));
+            let met = closest(&geometry, &[line])[0].is_some();
+            let step = 2.0 * half / 320.0;
+            let (i, j) = (f64::from(x) + 0.5 - 160.0, 100.0 - f64::from(y) - 0.5);
+            let ray = w + u * (i * step) + v * (j * step);
+            let along = ray.dot(c);
+            let inside =
+                along * along - (c.length_squared() - radius * radius) * ray.length_squared();
+            if inside.abs() > 1e-12 {
+                assert_eq!(met, inside > 0.0 && along > 0.0, "pixel {x} {y}");
+            }
+            covered += usize::from(met);
+        }
+    }
+    assert!((5_000..30_000).contains(&covered), "{covered} pixels covered");
+}
+
+/// A line 8 away is known to 4 x 8 roundings across; as much under the surface, a chord is this long.
+fn longest_touch<L: Lanes>() -> f64 {
+    2.0 * (2.0 * 32.0 * L::EPSILON).sqrt()
+}
+
+/// Lines that touch: either a miss or a chord no longer than rounding makes it.
+fn check_tangents<L: Lanes>() {
+    let mut numbers = Numbers::new(5);
+    let limit = longest_touch::<L>();
+    let geometry = Geometry::<L>::new(&[Form::Sphere { center: DVec3::ZERO, radius: 1.0 }]);
+    let signs = |bits: u64| {
+        DVec3::new(
+            if bits & 1 == 0 { 1.0 } else { -1.0 },
+            if bits & 2 == 0 { 1.0 } else { -1.0 },
+            if bits & 4 == 0 { 0.0 } else { -0.0 },
+        )
+    };
+    for n in 0..20_000 {
+        let (touching, d, ahead) = if n % 2 == 0 {
+            // Exact: along an axis past the end of another one.
+            let s = signs(numbers.bits());
+            let (a, b) = (numbers.below(3), 1 + numbers.below(2));
+            let (mut o, mut d) = (DVec3::splat(s.z), DVec3::splat(s.z));
+            o[a] = s.x;
+            d[(a + b) % 3] = s.y;
+            (o, d, [0.0, 2.0, 100.0][numbers.below(3)])
+        } else {
+            let p = numbers.direction();
+            let d = p.cross(numbers.direction()).normalize();
+            (p, d, numbers.between(0.0, 3.0))
+        };
+        let line = (touching - d * ahead, d);
+        let ends = closest(&geometry, &[line, (touching + d * 8.0, -d)]);
+        for met in ends.iter().flatten() {
+            assert!(met.t.is_finite() && met.t >= 0.0, "{line:?}: {met:?}");
+            assert!(met.point.is_finite() && met.normal.is_finite(), "{line:?}: {met:?}");
+        }
+        if let [Some(near), Some(back)] = ends[..] {
+            let chord = ahead + 8.0 - near.t - back.t;
+            assert!(chord.abs() <= limit, "{line:?}: chord {chord}");
+        }
+    }
+}
+
+#[test]
+fn extreme_05_tangent_rays() {
+    assert!(longest_touch::<Double>() < 1e-6);
+    check_tangents::<Double>();
+    // 5.5e-3 in single precision.
+    check_tangents::<Single>();
+}

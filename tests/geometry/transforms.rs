@@ -1,0 +1,113 @@
+//! Transformed objects against the definition: a point is on the image if its original is on the
+//! object.
+
+use crate::common::Numbers;
+use crate::rays::{Line, ball, closest, every_kind, scene};
+use glam::{DAffine3, DMat3, DQuat, DVec3};
+use zerkalo::lanes::Double;
+use zerkalo::shape::{Form, Geometry};
+
+fn random_map(numbers: &mut Numbers) -> DAffine3 {
+    let mut factor = || {
+        let size = 10f64.powf(numbers.between(-0.7, 0.7));
+        if numbers.below(4) == 0 { -size } else { size }
+    };
+    let scale = DVec3::new(factor(), factor(), factor());
+    let turn = |n: &mut Numbers| DQuat::from_axis_angle(n.direction(), n.between(0.0, 6.0));
+    let (first, last) = (turn(numbers), turn(numbers));
+    DAffine3::from_translation(numbers.in_cube(5.0))
+        * DAffine3::from_quat(last)
+        * DAffine3::from_scale(scale)
+        * DAffine3::from_quat(first)
+}
+
+#[test]
+fn objects_under_affine_maps_are_met_where_their_originals_are() {
+    for (i, (name, form)) in every_kind().into_iter().enumerate() {
+        let mut numbers = Numbers::new(400 + i as u64);
+        let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
+        let original = Geometry::<f64>::new(std::slice::from_ref(&form));
+        for round in 0..20 {
+            let map = random_map(&mut numbers);
+            let back = map.inverse();
+            let image = form.clone().transformed(&map);
+            let geometry = Geometry::<Double>::new(std::slice::from_ref(&image));
+            let (center, radius) = ball(&image).unwrap_or((map.translation, 3.0));
+            let lines: Vec<Line> = (0..2000)
+                .map(|_| {
+                    let from = center + numbers.direction() * (3.0 * radius);
+                    let to = center + numbers.in_cube(0.8 * radius);
+                    (from, (to - from).normalize())
+                })
+                .collect();
+            let originals: Vec<Line> = lines
+                .iter()
+                .map(|(o, d)| (back.transform_point3(*o), back.transform_vector3(*d).normalize()))
+                .collect();
+            let met = closest(&geometry, &lines);
+            let mut hits = 0;
+            for (n, (got, truth)) in met.iter().zip(closest(&original, &originals)).enumerate() {
+                let told = || format!("{name}, map {round}, ray {n}: {:?}", lines[n]);
+                let (Some(got), Some(truth)) = (got, truth) else {
+                    assert_eq!(got.is_some(), truth.is_some(), "{}", told());
+                    continue;
+                };
+                hits += 1;
+                let d = lines[n].1;
+                let point = map.transform_point3(truth.point);
+                let normals: DMat3 = map.matrix3.inverse().transpose();
+                let normal = (normals * truth.normal).normalize();
+                // Grazing rays move the point along the surface by rounding over the cosine.
+                let tolerance = 1e-12 * (radius + center.length()) / normal.dot(d).abs();
+                assert!((got.point - point).length() <= tolerance, "{}: {got:?} {point}", told());
+                assert!((got.normal - normal).length() <= 1e-9, "{}: {got:?} {normal}", told());
+                assert!(flat || got.normal.dot(d) < 0.0, "{}: {got:?}", told());
+            }
+            assert!(hits > 20, "{name}: only {hits} rays met it");
+        }
+    }
+}
+
+/// The steps of a scene file, against the implicit equation of an ellipsoid worked out by hand:
+/// a unit sphere at the origin scaled by (2, 0.5, 1), turned 90 degrees about z, moved by (1, 2, 3),
+/// is (x - 1)^2 / 0.25 + (y - 2)^2 / 4 + (z - 3)^2 = 1.
+#[test]
+fn a_stretched_sphere_solves_its_equation() {
+    let text = "[[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }\n\
+                transform = [ { scale = [2.0, 0.5, 1.0] }, { rotate_z = 90.0 }, \
+                { translate = [1.0, 2.0, 3.0] } ]\n";
+    let scene = scene(text);
+    let object = &scene.objects[0];
+    let form = object.shape.form().transformed(&object.scene_from_object());
+    let geometry = Geometry::<Double>::new(&[form]);
+    let center = DVec3::new(1.0, 2.0, 3.0);
+    let weights = DVec3::new(4.0, 0.25, 1.0);
+    let mut numbers = Numbers::new(6);
+    let lines: Vec<Line> = (0..20_000)
+        .map(|_| {
+            let from = center + numbers.direction() * 5.0;
+            (from, (center + numbers.in_cube(1.5) - from).normalize())
+        })
+        .collect();
+    let mut hits = 0;
+    for (line, met) in lines.iter().zip(closest(&geometry, &lines)) {
+        let f = line.0 - center;
+        let a = (line.1 * line.1).dot(weights);
+        let b = (f * line.1).dot(weights);
+        let c = (f * f).dot(weights) - 1.0;
+        let root = b * b - a * c;
+        if root.abs() > 1e-9 {
+            assert_eq!(met.is_some(), root > 0.0, "{line:?}");
+        }
+        let Some(met) = met else { continue };
+        hits += 1;
+        let p = met.point - center;
+        assert!(((p * p).dot(weights) - 1.0).abs() < 1e-13, "{line:?}: {met:?}");
+        assert!((met.normal - (p * weights).normalize()).length() < 1e-13, "{line:?}: {met:?}");
+        if root > 1e-6 {
+            let t = (-b - root.sqrt()) / a;
+            assert!((met.t - t).abs() < 1e-9, "{line:?}: {} not {t}", met.t);
+        }
+    }
+    assert!(hits > 2000, "{hits}");
+}

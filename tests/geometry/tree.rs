@@ -1,0 +1,117 @@
+//! A tree finds what a list finds.
+
+use crate::bits::{any_line, forms};
+use crate::common::Numbers;
+use crate::rays::{Line, packets};
+use glam::{DAffine3, DQuat, DVec3};
+use zerkalo::lanes::{Double, Lanes, Mask, Real, Single};
+use zerkalo::shape::{Form, Geometry};
+
+/// A random scene of `count` items of every kind, crowded in the ball of radius 10 or lined up on a
+/// lattice, where many faces lie in common planes.
+fn crowd(numbers: &mut Numbers, count: usize) -> Vec<Form> {
+    let kinds = forms();
+    let lattice = numbers.below(2) == 0;
+    (0..count)
+        .map(|_| {
+            let form = &kinds[numbers.below(kinds.len())].1;
+            if matches!(form, Form::Plane { .. }) && numbers.below(50) != 0 {
+                return kinds[0]
+                    .1
+                    .clone()
+                    .transformed(&DAffine3::from_translation(numbers.in_cube(10.0)));
+            }
+            let place = numbers.in_cube(10.0);
+            let map = if lattice {
+                DAffine3::from_translation(place.round())
+            } else {
+                let size = 10f64.powf(numbers.between(-2.0, 0.3));
+                let turn = DQuat::from_axis_angle(numbers.direction(), numbers.between(0.0, 3.0));
+                DAffine3::from_scale_rotation_translation(DVec3::splat(size), turn, place)
+            };
+            form.clone().transformed(&map)
+        })
+        .collect()
+}
+
+fn compare<L: Lanes>(seed: u64, count: usize, forms: &[Form], lines: &[Line]) {
+    let list = Geometry::<L>::with_tree(forms, false);
+    let tree = Geometry::<L>::with_tree(forms, true);
+    let mut numbers = Numbers::new(seed);
+    for (packet, lanes) in packets::<L>(lines) {
+        let (a, b) = (list.closest(&packet), tree.closest(&packet));
+        let limits: Vec<f64> = (0..L::WIDTH).map(|_| numbers.between(0.0, 20.0)).collect();
+        let wanted = L::from_fn(|_| L::Scalar::of(numbers.unit())).lt(L::of(0.8));
+        let limit = L::from_fn(|i| L::Scalar::of(limits[i]));
+        let (c, d) = (
+            list.blocked(&packet, limit, wanted) & wanted,
+            tree.blocked(&packet, limit, wanted) & wanted,
+        );
+        for i in 0..lanes {
+            let told = || {
+                let (o, d) = (packet.origin.lane(i), packet.direction.lane(i));
+                format!("{}, seed {seed}, {count} items, ray {o:?} {d:?}", L::NAME)
+            };
+            let (s, t) = (a.t.lane(i).to_f64(), b.t.lane(i).to_f64());
+            assert!(s == t, "{}: list {s}, tree {t}", told());
+            assert!(
+                s >= L::MAX || a.item.tag_lane(i) == b.item.tag_lane(i),
+                "{}: at {s} list meets {}, tree {}",
+                told(),
+                a.item.tag_lane(i),
+                b.item.tag_lane(i)
+            );
+        }
+        assert_eq!(c.bits(), d.bits(), "{}, seed {seed}, {count} items: blocked", L::NAME);
+    }
+}
+
+#[test]
+fn tree_and_list_give_identical_hits() {
+    for (seed, count) in
+        [5, 8, 13, 24, 25, 40, 64, 100, 100, 200, 400, 2000].into_iter().enumerate()
+    {
+        let seed = seed as u64;
+        let mut numbers = Numbers::new(seed);
+        let forms = crowd(&mut numbers, count);
+        let rays = if count > 300 { 8_000 } else { 20_000 };
+        let lines: Vec<Line> = (0..rays)
+            .map(|_| {
+                if numbers.below(2) == 0 {
+                    let form = &forms[numbers.below(forms.len())];
+                    any_line(&mut numbers, form)
+                } else {
+                    (numbers.in_cube(15.0), numbers.direction())
+                }
+            })
+            .collect();
+        compare::<Single>(seed, count, &forms, &lines);
+        compare::<Double>(seed, count, &forms, &lines);
+    }
+}
+
+/// Rays past the outermost points of spheres, where the sphere's own rounding decides.
+#[test]
+fn tree_and_list_agree_at_limbs() {
+    let mut numbers = Numbers::new(77);
+    let forms: Vec<Form> = (0..60)
+        .map(|_| Form::Sphere { center: numbers.in_cube(10.0), radius: numbers.between(0.1, 1.0) })
+        .collect();
+    let mut line = || {
+        let Form::Sphere { center, radius } = forms[numbers.below(forms.len())] else {
+            unreachable!("all are spheres")
+        };
+        let (axis, along) = (numbers.below(3), 1 + numbers.below(2));
+        let mut side = DVec3::ZERO;
+        side[axis] = if numbers.bits() & 1 == 0 { radius } else { -radius };
+        let mut d = numbers.direction() * 1e-3;
+        d[axis] = 0.0;
+        d[(axis + along) % 3] = 1.0;
+        let d = d.normalize();
+        let by = 1.0 + (numbers.below(9) as f64 - 4.0) * f64::from(f32::EPSILON) / 4.0;
+        (center + side * by - d * 30.0, d)
+    };
+    let lines: Vec<Line> = (0..100_000).map(|_| line()).collect();
+    compare::<Single>(77, 60, &forms, &lines);
+    compare::<Double>(77, 60, &forms, &lines);
+}

@@ -1,0 +1,62 @@
+//! Extreme test 23: Cook-Torrance in a white furnace.
+
+use crate::setup::*;
+use zerkalo::lanes::{Double, Lanes, Single};
+use zerkalo::material::{Lobe, Masking};
+
+const DEGREES: [f64; 5] = [0.0, 45.0, 75.0, 85.0, 89.0];
+
+/// Albedo of Beckmann microfacets with F = 1 at these angles, by quadrature of the closed formula,
+/// independent of this program.
+const KNOWN: [(Masking, f64, [f64; 5]); 7] = [
+    (Masking::VCavity, 0.2, [1.000, 0.992, 0.928, 0.960, 0.991]),
+    (Masking::VCavity, 0.4, [0.964, 0.912, 0.932, 0.975, 0.995]),
+    (Masking::VCavity, 0.7, [0.698, 0.782, 0.930, 0.977, 0.995]),
+    (Masking::VCavity, 1.0, [0.453, 0.640, 0.906, 0.970, 0.994]),
+    (Masking::Smith, 0.4, [0.990, 0.920, 0.903, 0.955, 0.990]),
+    (Masking::Smith, 0.7, [0.749, 0.792, 0.903, 0.963, 0.992]),
+    (Masking::Smith, 1.0, [0.462, 0.651, 0.881, 0.959, 0.991]),
+];
+
+fn albedo<L: Lanes>(lobe: Lobe, masking: Masking, alpha: f64, degrees: f64) -> f64 {
+    let n = tilted_normal();
+    let incident = combine(&[(-1.0, at_angle(n, degrees.to_radians(), 1.0))]);
+    let mut material = reflector(lobe, masking, 0.0);
+    material.alpha = Some(alpha);
+    let (mut sum, count) = (0.0, 1 << 16);
+    each_reflection::<L>(&material, (incident, n), true, Numbers::sobol(9), count, |_, w| {
+        assert!(w[0] >= 0.0 && w[0] == w[1] && w[1] == w[2]);
+        sum += w[0];
+    });
+    sum / f64::from(count)
+}
+
+fn compare<L: Lanes>() {
+    for (masking, alpha, known) in KNOWN {
+        for (degrees, known) in DEGREES.into_iter().zip(known) {
+            let found = albedo::<L>(Lobe::Beckmann, masking, alpha, degrees);
+            let name = format!("{} {masking:?} {alpha} at {degrees}", L::NAME);
+            assert!((found - known).abs() <= 0.003, "{name}: {found} for {known}");
+        }
+    }
+}
+
+#[test]
+fn extreme_23_albedo_of_cook_torrance() {
+    compare::<Double>();
+    compare::<Single>();
+}
+
+#[test]
+fn extreme_23_microfacets_never_return_more_than_they_get() {
+    for (lobe, masking) in every_lobe().into_iter().filter(|(l, _)| has_facets(*l)) {
+        for alpha in [1e-3, 0.01, 0.05, 0.2, 0.4, 0.7, 1.0, 2.0, 10.0] {
+            for degrees in [0.0, 10.0, 30.0, 45.0, 60.0, 75.0, 80.0, 85.0, 89.0, 89.9, 89.99] {
+                let found = albedo::<Double>(lobe, masking, alpha, degrees);
+                assert!(found <= 1.001, "{lobe:?} {masking:?} {alpha} at {degrees}: {found}");
+                let found = albedo::<Single>(lobe, masking, alpha, degrees);
+                assert!(found <= 1.001, "single {lobe:?} {masking:?} {alpha} at {degrees}: {found}");
+            }
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! What the models claim, held to it: every lobe, highlight and masking.
+
+use crate::setup::*;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use zerkalo::lanes::{Double, Frame, V3};
+use zerkalo::material::{
+    Claims, Energy, FIELDS, Finish, Fresnel, Highlight, Lobe, Masking, Material, Spread,
+};
+use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo::value::{Color, Takes};
+use zerkalo::world::World;
+
+/// The words of the field table and the lists of variants name the same things in the same order, so
+/// that what users can write is what these tests walk.
+#[test]
+fn every_word_is_walked() {
+    let words = |key: &str| -> Vec<&str> {
+        let field = FIELDS.iter().find(|f| f.name == key).unwrap();
+        let Takes::Choice(choices) = field.takes else { panic!("{key}") };
+        choices.iter().map(|c| c.name).collect()
+    };
+    let read = |key: &str| -> Vec<Material> {
+        let of = |word: &&str| toml::from_str(&format!("{key} = \"{word}\"")).unwrap();
+        words(key).iter().map(of).collect()
+    };
+    assert_eq!(read("lobe").iter().map(|m| m.lobe).collect::<Vec<_>>(), Lobe::ALL);
+    assert_eq!(read("highlight").iter().map(|m| m.highlight).collect::<Vec<_>>(), Highlight::ALL);
+    assert_eq!(read("masking").iter().map(|m| m.masking).collect::<Vec<_>>(), Masking::ALL);
+}
+
+/// Pairs of directions on the same side of a surface, at many angles.
+fn pairs() -> Vec<(Vector, Vector)> {
+    let n = tilted_normal();
+    let angles = [0.01, 0.3, 0.8, 1.2, 1.5, 1.57];
+    let mut pairs = Vec::new();
+    for a in angles {
+        for b in angles {
+            for phi in [0.0, 0.4, 2.0, 3.0, PI] {
+                pairs.push((at_angle(n, a, 0.3), at_angle(n, b, 0.3 + phi)));
+            }
+        }
+    }
+    pairs
+}
+
+/// f of the highlight for light from `l` seen from `v`.
+fn highlight_f(material: &Material, v: Vector, l: Vector) -> f64 {
+    let n = tilted_normal();
+    let finish = Finish::<f64>::new(material, true);
+    let (nl, nv) = (dot(n, l), dot(n, v));
+    finish.highlight(V3::of(n), V3::of(v), V3::of(l), nl, nv).x / nl
+}
+
+/// f of the reflected ray: weight x density / cos of the light.
+fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
+    let n = tilted_normal();
+    let finish = Finish::<f64>::new(material, true);
+    let (strength, spread) = finish.reflection.unwrap();
+    match spread {
+        Spread::Mirror => unreachable!(),
+        // That weight x density is this, is tested pointwise below.
+        Spread::Facets(_) => highlight_f(material, v, l),
+        _ => {
+            let incident = V3::of(combine(&[(-1.0, v)]));
+            let density = finish.density(&spread, incident, V3::of(n), V3::of(l)).unwrap();
+            strength * density / dot(n, l)
+        }
+    }
+}
+
+/// Largest relative difference between f(l, v) and f(v, l).
+fn asymmetry(f: impl Fn(Vector, Vector) -> f64) -> f64 {
+    let of = |(v, l): &(Vector, Vector)| {
+        let (there, back) = (f(*v, *l), f(*l, *v));
+        (there - back).abs() / there.max(back).max(1e-300)
+    };
+    pairs().iter().map(of).fold(0.0, f64::max)
+}
+
+fn check_reciprocity(name: &str, claims: Claims, asymmetry: f64) {
+    if claims.reciprocal {
+        assert!(asymmetry < 1e-10, "{name} is not reciprocal: {asymmetry:.1e}");
+    } else {
+        assert!(asymmetry > 0.5, "{name} is reciprocal after all: {asymmetry:.1e}");
+    }
+}
+
+#[test]
+fn closed_form_13_reciprocity_is_as_claimed() {
+    for (lobe, masking) in every_lobe() {
+        for roughness in [0.5, 2.0] {
+            let name = format!("{lobe:?} {masking:?} {roughness}");
+            let mut material = reflector(lobe, masking, roughness);
+            material.fresnel = Some(Fresnel::Schlick);
+            material.reflectance = Some(Color([0.3; 3]));
+            if lobe == Lobe::Mirror {
+                mirror_is_reciprocal(&material);
+                continue;
+            }
+            if !has_facets(lobe) {
+                // Its own property, without that of the reflectance.
+                material.reflectance = None;
+            }
+            check_reciprocity(&name, lobe.claims(), asymmetry(|v, l| lobe_f(&material, v, l)));
+        }
+    }
+    for highlight in Highlight::ALL {
+        for (lobe, masking) in every_lobe() {
+            let mut material = reflector(lobe, masking, 0.7);
+            material.highlight = highlight;
+            let name = format!("{highlight:?} {lobe:?} {masking:?}");
+            let asymmetry = asymmetry(|v, l| highlight_f(&material, v, l));
+            check_reciprocity(&name, highlight.claims(), asymmetry);
+        }
+    }
+}
+
+/// A mirror has no f; its ray comes back the way it went, with the same weight.
+fn mirror_is_reciprocal(material: &Material) {
+    assert!(material.lobe.claims().reciprocal);
+    let n = tilted_normal();
+    for (v, _) in pairs() {
+        let reflect = |incident: Vector| {
+            let mut out = None;
+            let numbers = Numbers::random(1);
+            each_reflection::<f64>(material, (incident, n), true, numbers, 1, |d, w| {
+                out = Some((d, w));
+            });
+            out.unwrap()
+        };
+        let (there, weight) = reflect(combine(&[(-1.0, v)]));
+        let (back, weight_back) = reflect(combine(&[(-1.0, there)]));
+        assert!(dot(combine(&[(1.0, back), (-1.0, v)]), back).abs() < 1e-14);
+        assert!((weight[0] - weight_back[0]).abs() < 1e-14);
+    }
+}
+
+/// Lambert's law as the paths apply it: exchanging light and eye changes nothing but the cosine of
+/// the light.
+#[test]
+fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
+    assert_eq!(Claims::LAMBERT, Claims { reciprocal: true, energy: Energy::Kept });
+    let n = tilted_normal();
+    let radiance = |v: Vector, l: Vector| {
+        let eye = combine(&[(5.0, v)]);
+        let text = format!(
+            "camera = {{ eye = {eye:?}, target = [0.0, 0.0, 0.0], up = [0.1, 1.0, 0.2] }}
+             film = {{ size = [1, 1], filter = \"center\" }}
+             light = [{{ directional = {{ direction = {:?} }}, intensity = 1.0 }}]
+             materials.m = {{ color = [0.5, 0.5, 0.5], ambient = 0.0 }}
+             [[object]]
+             material = \"m\"
+             shape.plane = {{ point = [0.0, 0.0, 0.0], normal = {n:?} }}",
+            combine(&[(-1.0, l)])
+        );
+        let world = World::<f64>::new(&scene(&text));
+        let settings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
+        trace(&world, &Sampler::new(settings, false), (0, 0), 0, 0)[0][0][0]
+    };
+    for (v, l) in pairs().into_iter().filter(|(v, l)| dot(*v, n).min(dot(*l, n)) > 0.1) {
+        // Irradiance of a surface that faces the light is pi: f = L / (pi cos).
+        let (there, back) = (radiance(v, l) / dot(n, l), radiance(l, v) / dot(n, v));
+        assert!((there - back).abs() < 1e-12, "{there} {back}");
+        // f = albedo / pi, whose integral with the cosine is the albedo.
+        assert!((there - 0.5).abs() < 1e-12, "{there}");
+    }
+}
+
+/// Mean weight of reflections at an angle, by a Sobol set.
+fn mean_weight(material: &Material, degrees: f64) -> f64 {
+    let n = tilted_normal();
+    let incident = combine(&[(-1.0, at_angle(n, degrees.to_radians(), 1.0))]);
+    let (mut sum, count) = (0.0, 1 << 16);
+    each_reflection::<Double>(material, (incident, n), true, Numbers::sobol(9), count, |_, w| {
+        sum += w[0];
+    });
+    sum / f64::from(count)
+}
+
+#[test]
+fn closed_form_7_energy_is_as_claimed() {
+    for (lobe, masking) in every_lobe() {
+        for alpha in [1e-3, 0.1, 0.4, 1.0, 2.0] {
+            for degrees in [0.0, 45.0, 75.0, 85.0, 89.0, 89.9] {
+                let mut material = reflector(lobe, masking, alpha * 8f64.sqrt());
+                material.alpha = Some(alpha);
+                let mean = mean_weight(&material, degrees);
+                let name = format!("{lobe:?} {masking:?} alpha {alpha} at {degrees}: {mean}");
+                match lobe.claims().energy {
+                    Energy::Kept => assert!(mean == 1.0, "{name}"),
+                    Energy::AtMost => assert!(mean <= 1.0 + 1e-3, "{name}"),
+                    Energy::Unbounded => unreachable!("no lobe is"),
+                }
+            }
+        }
+    }
+}
+
+/// Light of all directions that a highlight returns, by the midpoint rule.
+fn highlight_albedo(material: &Material, degrees: f64) -> f64 {
+    let n = tilted_normal();
+    let v = at_angle(n, degrees.to_radians(), 0.0);
+    let (rings, turns) = (400, 400);
+    let mut sum = 0.0;
+    for i in 0..rings {
+        let theta = (f64::from(i) + 0.5) / f64::from(rings) * FRAC_PI_2;
+        for j in 0..turns {
+            let l = at_angle(n, theta, (f64::from(j) + 0.5) / f64::from(turns) * TAU);
+            sum += highlight_f(material, v, l) * dot(n, l) * theta.sin();
+        }
+    }
+    sum * FRAC_PI_2 * TAU / f64::from(rings * turns)
+}
+
+#[test]
+fn closed_form_7_energy_of_highlights_is_as_claimed() {
+    for highlight in Highlight::ALL {
+        let mut largest: f64 = 0.0;
+        for (lobe, masking) in every_lobe() {
+            for degrees in [0.0, 45.0, 75.0] {
+                let mut material = reflector(lobe, masking, 0.3 * 8f64.sqrt());
+                material.highlight = highlight;
+                material.exponent = 0.5;
+                largest = largest.max(highlight_albedo(&material, degrees));
+            }
+        }
+        match highlight.claims().energy {
+            Energy::AtMost => assert!(largest <= 1.0 + 1e-3, "{highlight:?}: {largest}"),
+            Energy::Unbounded => assert!(largest > 1.2, "{highlight:?} is bounded: {largest}"),
+            Energy::Kept => unreachable!("no highlight is"),
+        }
+    }
+}
+
+/// weight x density = f cos at every sampled direction: the drawn reflection and the highlight of a
+/// light are one model.
+#[test]
+fn closed_form_13_weight_times_density_is_the_highlight() {
+    let n = tilted_normal();
+    let facets = every_lobe().into_iter().filter(|(l, _)| has_facets(*l));
+    let mut compared = 0;
+    for (lobe, masking) in facets {
+        for alpha in [1e-3, 0.05, 0.3, 1.0, 2.0] {
+            for degrees in [0.0f64, 30.0, 60.0, 85.0, 89.9] {
+                let mut material = reflector(lobe, masking, 0.0);
+                material.alpha = Some(alpha);
+                material.fresnel = Some(Fresnel::Exact);
+                material.reflectance = Some(Color([0.9, 0.5, 0.04]));
+                let finish = Finish::<f64>::new(&material, true);
+                let (_, spread) = finish.reflection.unwrap();
+                let v = at_angle(n, degrees.to_radians(), 2.0);
+                let incident = combine(&[(-1.0, v)]);
+                let draws = Numbers::sobol(3);
+                each_reflection::<f64>(&material, (incident, n), true, draws, 500, |d, weight| {
+                    if weight == [0.0; 3] {
+                        return;
+                    }
+                    let (vn, vd) = (V3::<f64>::of(n), V3::of(d));
+                    let density = finish.density(&spread, V3::of(incident), vn, vd).unwrap();
+                    let shine = finish.highlight(vn, V3::of(v), vd, dot(n, d), dot(n, v));
+                    for (w, f_cos) in weight.into_iter().zip(vector(shine)) {
+                        // exp(-tan^2 / alpha^2) of a slope recovered from rounded directions.
+                        let error = (w * density / f_cos - 1.0).abs();
+                        let limit = 1e-12 / (alpha * degrees.to_radians().cos());
+                        let name = format!("{lobe:?} {masking:?} {alpha} {degrees}");
+                        assert!(error < limit, "{name}: {} {f_cos}", w * density);
+                        compared += 1;
+                    }
+                });
+            }
+        }
+    }
+    assert!(compared > 50_000, "{compared}");
+    // The square's frame is the one in which densities are stated.
+    assert!(vector(Frame::around(V3::<f64>::of(n)).n) == n);
+}

@@ -1,0 +1,340 @@
+//! What a lobe sees of a half-space, in closed form, against the lobes themselves.
+
+use crate::setup::*;
+use crate::stats::slope;
+use std::f64::consts::{FRAC_PI_2, PI};
+use zerkalo::lanes::{Double, Frame, Lanes, Real, Single, V3};
+use zerkalo::material::{Finish, Lobe, Masking, Spread};
+use zerkalo::sampling::warp;
+
+/// Share of the uniform cone of half-angle `theta` in a half-space whose boundary contains the apex,
+/// at angle `delta` from the axis; delta > 0: the axis is inside. For |delta| < theta < pi / 2:
+///   f = [pi - acos(sin delta / sin theta) - cos theta acos(-tan delta / tan theta)]
+///       / [pi (1 - cos theta)],
+/// and for cones so narrow that this cancels the share of a flat disc, nearer than theta^2 / 20.
+pub fn cone_share(theta: f64, delta: f64) -> f64 {
+    if delta.abs() >= theta {
+        return if delta > 0.0 { 1.0 } else { 0.0 };
+    }
+    if theta < 1e-3 {
+        return disc_share(theta.tan(), delta.tan());
+    }
+    let a = (delta.sin() / theta.sin()).acos();
+    let b = (-delta.tan() / theta.tan()).acos();
+    (PI - a - theta.cos() * b) / (PI * 2.0 * (0.5 * theta).sin().powi(2))
+}
+
+/// Share of a disc of radius `r` within a straight edge at distance `d` from its centre; d > 0: the
+/// centre is inside. 1/2 + (d sqrt(r^2 - d^2) + r^2 asin(d / r)) / (pi r^2).
+fn disc_share(r: f64, d: f64) -> f64 {
+    let d = (d / r).clamp(-1.0, 1.0);
+    0.5 + (d * (1.0 - d * d).sqrt() + d.asin()) / PI
+}
+
+/// Share of the square of side `side`, at unit distance, within an edge at distance `d` in its plane,
+/// whose normal is turned by `phi` from a side.
+pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
+    let h = 0.5 * side;
+    let (c, s) = (phi.cos().abs(), phi.sin().abs());
+    let (u1, u2) = (h * (c + s), h * (c - s).abs());
+    if d.abs() <= u2 {
+        0.5 + d / (2.0 * h * c.max(s))
+    } else if d < 0.0 {
+        (d + u1).max(0.0).powi(2) / (8.0 * h * h * c * s)
+    } else {
+        1.0 - square_share(side, -d, phi)
+    }
+}
+
+/// A half-space for a lobe about the normal, seen from above: its inward normal and the share of the
+/// lobe within.
+struct Edge {
+    inward: Vector,
+    share: f64,
+}
+
+fn edge(spread: &Spread<f64>, n: Vector, theta: f64, delta: f64, phi: f64) -> Edge {
+    let (frame, share) = match spread {
+        Spread::Square { side } => {
+            let frame = Frame::around(V3::<f64>::of(n));
+            ([vector(frame.t), vector(frame.b)], square_share(*side, delta.tan(), phi))
+        }
+        _ => (across(n), cone_share(theta, delta)),
+    };
+    let e = combine(&[(phi.cos(), frame[0]), (phi.sin(), frame[1])]);
+    Edge { inward: combine(&[(delta.sin(), n), (delta.cos(), e)]), share }
+}
+
+/// Edges at all angles: `count` of them, by the golden ratio in two dimensions. `reach`: as far as
+/// the lobe goes [radians].
+fn edges(spread: &Spread<f64>, n: Vector, theta: f64, reach: f64, count: u32) -> Vec<Edge> {
+    (0..count)
+        .map(|i| {
+            let (a, b) = (f64::from(i) * 0.754_877_666 % 1.0, f64::from(i) * 0.569_840_29 % 1.0);
+            edge(spread, n, theta, (2.0 * a - 1.0) * 0.98 * reach, b * 2.0 * PI)
+        })
+        .collect()
+}
+
+/// Half-angles of the cone [radians].
+fn half_angles() -> [f64; 7] {
+    [1e-6, 1e-4, 1e-2, 0.1, 0.6, 1.3, FRAC_PI_2 - 1e-6]
+}
+
+/// Shares counted among `count` directions against closed forms: the worst deviation in standard
+/// deviations of the count.
+fn worst_z<L: Lanes>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) -> f64 {
+    let material = reflector(lobe, Masking::VCavity, roughness);
+    let count = 40_000;
+    let mut inside = vec![0u32; edges.len()];
+    let incident = combine(&[(-1.0, n)]);
+    each_reflection::<L>(&material, (incident, n), true, Numbers::random(11), count, |d, _| {
+        for (edge, inside) in edges.iter().zip(&mut inside) {
+            *inside += u32::from(dot(d, edge.inward) > 0.0);
+        }
+    });
+    let z = |(edge, inside): (&Edge, &u32)| {
+        let count = f64::from(count);
+        let variance = (edge.share * (1.0 - edge.share) / count).max(1.0 / count / count);
+        (f64::from(*inside) / count - edge.share).abs() / variance.sqrt()
+    };
+    edges.iter().zip(&inside).map(z).fold(0.0, f64::max)
+}
+
+/// Root mean square error of shares estimated with `count` Sobol points, an own set for each edge.
+fn rmse(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge], count: u32) -> f64 {
+    let material = reflector(lobe, Masking::VCavity, roughness);
+    let incident = combine(&[(-1.0, n)]);
+    let mut sum = 0.0;
+    for (i, edge) in edges.iter().enumerate() {
+        let mut inside = 0u32;
+        let numbers = Numbers { pixel: (i as u32, 7), ..Numbers::sobol(5) };
+        each_reflection::<Double>(&material, (incident, n), true, numbers, count, |d, _| {
+            inside += u32::from(dot(d, edge.inward) > 0.0);
+        });
+        sum += (f64::from(inside) / f64::from(count) - edge.share).powi(2);
+    }
+    (sum / edges.len() as f64).sqrt()
+}
+
+fn rmse_slope(lobe: Lobe, roughness: f64, edges: &[Edge]) -> f64 {
+    let n = tilted_normal();
+    let point = |k: i32| {
+        let error = rmse(lobe, roughness, n, edges, 1 << k);
+        (f64::from(k), error.log2())
+    };
+    slope(&(4..=10).map(point).collect::<Vec<_>>())
+}
+
+fn spread_of(lobe: Lobe, roughness: f64) -> Spread<f64> {
+    let material = reflector(lobe, Masking::VCavity, roughness);
+    Finish::new(&material, true).reflection.unwrap().1
+}
+
+/// Closed form 3 and its limit 4, over all half-angles, in both precisions. Single precision turns a
+/// direction by half a rounding, 6e-8, which is a share of 2e-6 of the cone of 0.01; for narrower
+/// cones the axis of a turned frame takes its place, and only a normal along z has digits for them.
+#[test]
+fn extreme_19_closed_form_3_cone_in_a_half_space() {
+    for theta in half_angles() {
+        let roughness = theta.tan().min(1e6);
+        let spread = spread_of(Lobe::Cone, roughness);
+        let n = tilted_normal();
+        let all = edges(&spread, n, theta, theta, 60);
+        let z = worst_z::<f64>(Lobe::Cone, roughness, n, &all);
+        assert!(z < 4.0, "double, {theta}: {z} sigma");
+        let z = worst_z::<Double>(Lobe::Cone, roughness, n, &all);
+        assert!(z < 4.0, "double lanes, {theta}: {z} sigma");
+        let n = if theta < 1e-2 { [0.0, 0.0, 1.0] } else { n };
+        let all = edges(&spread, n, theta, theta, 60);
+        let z = worst_z::<Single>(Lobe::Cone, roughness, n, &all);
+        assert!(z < 4.0, "single lanes, {theta}: {z} sigma");
+    }
+}
+
+#[test]
+fn extreme_19_the_error_falls_faster_than_that_of_random_numbers() {
+    for theta in half_angles() {
+        let roughness = theta.tan().min(1e6);
+        let spread = spread_of(Lobe::Cone, roughness);
+        let all = edges(&spread, tilted_normal(), theta, theta, 300);
+        let slope = rmse_slope(Lobe::Cone, roughness, &all);
+        assert!(slope <= -0.7, "{theta}: {slope}");
+    }
+}
+
+/// Closed form 4: the share of the flat disc is the limit of the cone's, nearer than theta^2 / 18.
+#[test]
+fn closed_form_04_the_narrow_cone_is_a_disc() {
+    for theta in [2e-3, 1e-2, 0.1] {
+        for i in -20..=20 {
+            let delta = theta * f64::from(i) / 20.5;
+            let difference = cone_share(theta, delta) - disc_share(theta.tan(), delta.tan());
+            assert!(difference.abs() < theta * theta / 18.0, "{theta} {delta}: {difference}");
+        }
+    }
+}
+
+/// Half the diagonal of the square as an angle.
+fn square_reach(roughness: f64) -> f64 {
+    (roughness * (0.5 * PI).sqrt()).atan()
+}
+
+#[test]
+fn extreme_20_closed_form_5_square_in_a_half_space() {
+    for roughness in [1e-6, 1e-3, 0.05, 0.3, 2.0, 100.0] {
+        let spread = spread_of(Lobe::Square, roughness);
+        let reach = square_reach(roughness);
+        let n = tilted_normal();
+        let all = edges(&spread, n, reach, reach, 60);
+        let z = worst_z::<Double>(Lobe::Square, roughness, n, &all);
+        assert!(z < 4.0, "double, {roughness}: {z} sigma");
+        let n = if roughness < 1e-2 { [0.0, 0.0, 1.0] } else { n };
+        let all = edges(&spread, n, reach, reach, 60);
+        let z = worst_z::<Single>(Lobe::Square, roughness, n, &all);
+        assert!(z < 4.0, "single, {roughness}: {z} sigma");
+        let all = edges(&spread, tilted_normal(), reach, reach, 300);
+        let slope = rmse_slope(Lobe::Square, roughness, &all);
+        assert!(slope <= -0.7, "{roughness}: {slope}");
+    }
+}
+
+/// Closed form 5: the direction density 1 / (side^2 cos^3) belongs to a uniform point of the square:
+/// it integrates to 1 and is larger towards the corners.
+#[test]
+fn closed_form_05_density_of_the_square() {
+    for side in [0.01, 0.5, 3.0] {
+        let (steps, mut sum) = (600, 0.0);
+        let half = 1.02 * (0.5 * side * 2f64.sqrt()).atan();
+        for i in 0..steps {
+            let theta = half * (f64::from(i) + 0.5) / f64::from(steps);
+            for j in 0..steps {
+                let (s, c) = (2.0 * PI * (f64::from(j) + 0.5) / f64::from(steps)).sin_cos();
+                let d = [theta.sin() * c, theta.sin() * s, theta.cos()];
+                sum += warp::square_pdf(d, side) * theta.sin();
+            }
+        }
+        let integral = sum * half * 2.0 * PI / f64::from(steps * steps);
+        assert!((integral - 1.0).abs() < 2e-3, "{side}: {integral}");
+        let corner = warp::square_pdf(vector(warp::square(0.999, 0.999, side)), side);
+        let middle = warp::square_pdf([0.0, 0.0, 1.0], side);
+        let expected = (1.0 + 2.0 * (0.499 * side).powi(2)).powf(1.5);
+        assert!((corner / middle / expected - 1.0).abs() < 1e-12);
+    }
+}
+
+/// Largest difference between the edge responses of square and cone at tan theta = 0.2, over all
+/// edges.
+fn largest_difference(side: f64) -> f64 {
+    let theta = 0.2f64.atan();
+    let mut largest: f64 = 0.0;
+    for i in 0..=90 {
+        for j in -400..=400 {
+            let (phi, d) = (f64::from(i).to_radians() * 0.5, f64::from(j) * 1e-3);
+            let difference = square_share(side, d, phi) - cone_share(theta, d.atan());
+            largest = largest.max(difference.abs());
+        }
+    }
+    largest
+}
+
+/// Closed form 6: why the square has the cone's area: no other usual choice comes as near.
+#[test]
+fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
+    let r = 0.2;
+    for (name, side, known) in [
+        ("inscribed", 2f64.sqrt() * r, 0.090),
+        ("circumscribed", 2.0 * r, 0.058),
+        ("equal variance", 3f64.sqrt() * r, 0.028),
+        ("equal area", PI.sqrt() * r, 0.023),
+    ] {
+        let found = largest_difference(side);
+        assert!((found - known).abs() < 1e-3, "{name}: {found}");
+    }
+    let Spread::Square { side } = spread_of(Lobe::Square, r) else { panic!() };
+    assert!((side - PI.sqrt() * r).abs() < 1e-15);
+}
+
+/// The same from the lobes themselves: the responses to one edge, 65 536 Sobol points each.
+#[test]
+fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
+    let (r, n) = (0.2f64, tilted_normal());
+    let square = spread_of(Lobe::Square, r);
+    let mut largest: f64 = 0.0;
+    for phi in [0.0, 0.2, 0.5, PI / 4.0] {
+        for i in -12..=12 {
+            let delta = (f64::from(i) * 0.02).atan();
+            let at = edge(&square, n, 0.0, delta, phi);
+            let response = |lobe| {
+                let (mut inside, count) = (0u32, 1 << 14);
+                let material = reflector(lobe, Masking::VCavity, r);
+                let (numbers, incident) = (Numbers::sobol(2), combine(&[(-1.0, n)]));
+                each_reflection::<Double>(&material, (incident, n), true, numbers, count, |d, _| {
+                    inside += u32::from(dot(d, at.inward) > 0.0);
+                });
+                f64::from(inside) / f64::from(count)
+            };
+            let (cone, square) = (response(Lobe::Cone), response(Lobe::Square));
+            assert!((cone - cone_share(r.atan(), delta)).abs() < 1e-3);
+            assert!((square - at.share).abs() < 1e-3);
+            largest = largest.max((cone - square).abs());
+        }
+    }
+    assert!((0.020..0.025).contains(&largest), "{largest}");
+}
+
+/// Extreme test 21: a lobe that half dips under the surface, seen at 89.999 degrees. Folded it keeps
+/// all light; absorbed it loses what the closed forms say.
+#[test]
+fn extreme_21_lobes_at_the_horizon() {
+    horizon::<f64>(1e-12);
+    horizon::<Double>(1e-12);
+    horizon::<Single>(1e-6);
+}
+
+fn horizon<L: Lanes>(tolerance: f64) {
+    let (rho, degrees) = (0.7, 89.999f64);
+    let delta = (90.0 - degrees).to_radians();
+    let n = tilted_normal();
+    for phi in [0.1, 1.0, 2.0, 4.5] {
+        let view = at_angle(n, degrees.to_radians(), phi);
+        let incident = combine(&[(-1.0, view)]);
+        let mirror = combine(&[(1.0, incident), (2.0 * dot(view, n), n)]);
+        for (lobe, roughness) in
+            [Lobe::Cone, Lobe::Square].into_iter().flat_map(|l| [0.001, 0.1, 1.5].map(|r| (l, r)))
+        {
+            let mut material = reflector(lobe, Masking::VCavity, roughness);
+            material.reflection = rho;
+            let share = match spread_of(lobe, roughness) {
+                Spread::Square { side } => {
+                    // The square lies as the frame about the kernel's own mirror direction does.
+                    let kernel = V3::<L>::of(incident).reflect(V3::of(n)).normalize();
+                    let frame = Frame::around(kernel);
+                    let up = [frame.t, frame.b].map(|v| dot(v.lane(0).map(Real::to_f64), n));
+                    square_share(side, delta.tan(), up[1].atan2(up[0]))
+                }
+                _ => cone_share(roughness.atan(), delta),
+            };
+            let count = 1 << 16;
+            for fold in [true, false] {
+                let (mut sum, mut under) = (0.0, 0);
+                let numbers = Numbers::random(21);
+                each_reflection::<L>(&material, (incident, n), fold, numbers, count, |d, w| {
+                    sum += w[0];
+                    under += u32::from(w[0] > 0.0 && dot(d, n) < -2.0 * L::EPSILON);
+                });
+                let mean = sum / f64::from(count);
+                let name = format!("{} {lobe:?} {roughness} fold {fold} phi {phi}", L::NAME);
+                assert_eq!(under, 0, "{name}");
+                if fold {
+                    assert!((mean - rho).abs() <= tolerance, "{name}: {mean}");
+                } else {
+                    let sigma = rho * (share * (1.0 - share) / f64::from(count)).sqrt();
+                    let z = (mean - rho * share).abs() / sigma;
+                    assert!(z < 4.0, "{name}: {mean} for {}, {z} sigma", rho * share);
+                }
+            }
+            assert!((dot(mirror, n) - delta.sin()).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! The lane types: what they promise beyond the operations that IEEE defines.
+
+use zerkalo::lanes::{Bits, Double, Lanes, MAX_WIDTH, Mask, Real, Single};
+
+/// A sequence of 32-bit numbers with nothing in common.
+fn noise(i: u32) -> u32 {
+    let x = (i ^ 0x9e37_79b9).wrapping_mul(0x85eb_ca6b);
+    let x = (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35);
+    (x ^ (x >> 16)).wrapping_mul(0x27d4_eb2f) ^ (x >> 15)
+}
+
+/// Uniform in [0, 1).
+fn uniform(i: u32) -> f64 {
+    f64::from(noise(i)) / 4_294_967_296.0
+}
+
+/// Calls `check` for the production vectors and the width-1 instances.
+macro_rules! for_every_instance {
+    ($check:ident) => {
+        $check::<f32>();
+        $check::<f64>();
+        $check::<Single>();
+        $check::<Double>();
+    };
+}
+
+/// The worst error of `f` against `exact` over `inputs`, in roundings of the result of this
+/// precision (of 1, if `of_one`). `exact` sees the input as rounded to this precision.
+fn worst_ulps<L: Lanes>(
+    inputs: impl Fn(u32) -> f64,
+    f: impl Fn(L) -> L,
+    exact: impl Fn(f64) -> f64,
+    of_one: bool,
+) -> f64 {
+    let mut worst: f64 = 0.0;
+    for first in (0..400_000).step_by(L::WIDTH) {
+        let x = L::from_fn(|lane| L::Scalar::of(inputs(first + lane as u32)));
+        let y = f(x);
+        for lane in 0..L::WIDTH {
+            let exact = exact(x.lane(lane).to_f64());
+            let ulp = L::EPSILON * if of_one { 1.0 } else { exact.abs().log2().floor().exp2() };
+            worst = worst.max((y.lane(lane).to_f64() - exact).abs() / ulp);
+        }
+    }
+    worst
+}
+
+/// Sine and cosine of what lobes ask for, 2 pi u with u in [0, 1): within 1.5 roundings of 1, which
+/// is what a direction needs (near a multiple of pi / 2 the smaller of the two is not better known).
+fn sine_and_cosine<L: Lanes>() {
+    let angle = |i: u32| std::f64::consts::TAU * uniform(i);
+    let sin = worst_ulps::<L>(angle, |x| x.sin_cos().0, f64::sin, true);
+    let cos = worst_ulps::<L>(angle, |x| x.sin_cos().1, f64::cos, true);
+    println!("{}: sin {sin:.2}, cos {cos:.2}", L::NAME);
+    assert!(sin <= 1.5 && cos <= 1.5, "{}: sin {sin}, cos {cos}", L::NAME);
+}
+
+/// Logarithms of what Beckmann's lobe (1 - u) and Phong's highlight (a cosine, at least 1e-30) ask
+/// for, exponentials of what both highlights ask for.
+fn logarithm_and_exponential<L: Lanes>() {
+    let small = |i: u32| 10f64.powf(-30.0 * uniform(i));
+    let share = |i: u32| 1.0 - f64::from(noise(i) >> 8) / 16_777_216.0;
+    let low = if L::EPSILON > 1e-10 { -87.0 } else { -700.0 };
+    let ln = worst_ulps::<L>(small, L::ln, f64::ln, false);
+    let ln_share = worst_ulps::<L>(share, L::ln, f64::ln, false);
+    let exp = worst_ulps::<L>(|i| low * uniform(i), L::exp, f64::exp, false);
+    let exp_near = worst_ulps::<L>(|i| -uniform(i).powi(4), L::exp, f64::exp, false);
+    println!("{}: ln {ln:.2} {ln_share:.2}, exp {exp:.2} {exp_near:.2}", L::NAME);
+    assert!(ln <= 1.5 && ln_share <= 1.5, "{}: ln {ln} {ln_share}", L::NAME);
+    assert!(exp <= 1.5 && exp_near <= 1.5, "{}: exp {exp} {exp_near}", L::NAME);
+    // ln 1 = 0 and exp 0 = 1 keep a mirror direction and the top of a highlight exact.
+    assert_eq!(L::of(1.0).ln().lane(0).to_f64(), 0.0);
+    assert_eq!(L::of(0.0).exp().lane(0).to_f64(), 1.0);
+    // What underflows is nothing: neither negative nor NaN.
+    for x in [-104.0, -800.0, -1e6, -1e30, -L::MAX, f64::NEG_INFINITY] {
+        let y = L::of(x).exp().lane(0).to_f64();
+        assert!((0.0..1e-44).contains(&y), "{}: exp {x} = {y}", L::NAME);
+    }
+}
+
+#[test]
+fn elementary_functions_are_good_to_stated_ulps() {
+    for_every_instance!(sine_and_cosine);
+    for_every_instance!(logarithm_and_exponential);
+}
+
+/// Sums of rounded lanes are exact: those of the lanes one by one, to nearest even.
+fn fixed_point<L: Lanes>() {
+    let halves = [0.5, 1.5, 2.5, -0.5, -1.5, -2.5, 0.0, -0.0];
+    for i in 0..20_000u32 {
+        // Powers of two as scales, as films have them, up to results of 2^50.
+        let scale = f64::from((i % 60) as i32 - 20).exp2();
+        let value = |lane: usize| {
+            let at = i * MAX_WIDTH as u32 + lane as u32;
+            let magnitude = 50.0 * uniform(at) - 10.0;
+            let x = (2.0 * uniform(!at) - 1.0) * magnitude.exp2() / scale;
+            if i % 7 == 0 { halves[lane % 8] / scale } else { x }
+        };
+        let x = L::from_fn(|lane| L::Scalar::of(value(lane)));
+        let exact = |lane| (x.lane(lane).to_f64() * scale).round_ties_even() as i64;
+        let mut each = [i64::MIN; MAX_WIDTH];
+        x.fixed(scale, &mut each);
+        for (lane, each) in each.iter().enumerate() {
+            let expected = if lane < L::WIDTH { exact(lane) } else { i64::MIN };
+            assert_eq!(*each, expected, "{} {i} {lane}", L::NAME);
+        }
+        assert_eq!(x.fixed_sum(scale), (0..L::WIDTH).map(exact).sum::<i64>(), "{} {i}", L::NAME);
+    }
+    let most = 2f64.powi(51) * (1.0 - L::EPSILON);
+    assert_eq!(L::of(most).fixed_sum(1.0), most as i64 * L::WIDTH as i64);
+    assert_eq!(L::of(-most).fixed_sum(1.0), -(most as i64) * L::WIDTH as i64);
+}
+
+#[test]
+fn fixed_point_sums_are_exact() {
+    for_every_instance!(fixed_point);
+}
+
+fn integers<L: Lanes>() {
+    for i in 0..10_000 {
+        let x = L::Bits::from_fn(|lane| noise(i * 16 + lane as u32));
+        for lane in 0..L::WIDTH {
+            let one = noise(i * 16 + lane as u32);
+            assert_eq!(x.lane(lane), one);
+            assert_eq!(x.reverse().lane(lane), one.reverse_bits(), "{} {one:x}", L::NAME);
+            let shift = i % 32;
+            assert_eq!((x << shift).lane(lane), one << shift);
+            assert_eq!((x >> shift).lane(lane), one >> shift);
+            assert_eq!((x * x + x).lane(lane), one.wrapping_mul(one).wrapping_add(one));
+            // Uniform numbers: never 1, the top bits kept.
+            let unit = L::unit(x).lane(lane).to_f64();
+            assert!((0.0..1.0).contains(&unit));
+            assert_eq!((unit * 16_777_216.0) as u32, one >> 8);
+        }
+    }
+    assert!(L::unit(L::Bits::splat(u32::MAX)).lane(0).to_f64() < 1.0);
+    assert!(L::unit(L::Bits::splat(0)).lane(0).to_f64() >= 0.0);
+}
+
+#[test]
+fn integers_are_those_of_the_processor() {
+    for_every_instance!(integers);
+}
+
+/// Every pattern of truth values.
+fn masks<L: Lanes>() {
+    let lane_of = |bits: u32| L::from_fn(|i| L::Scalar::of(f64::from(bits >> i & 1)));
+    for bits in 0..1u32 << L::WIDTH {
+        let mask = lane_of(bits).gt(L::zero());
+        assert_eq!(mask.bits(), bits);
+        assert_eq!(mask.any(), bits != 0);
+        assert_eq!(mask.none(), bits == 0);
+        assert_eq!(mask.all(), bits == (1 << L::WIDTH) - 1);
+        assert_eq!((!mask).bits(), !bits & ((1 << L::WIDTH) - 1));
+        let other_bits = noise(bits) & ((1 << L::WIDTH) - 1);
+        let other = lane_of(other_bits).gt(L::zero());
+        assert_eq!((mask & other).bits(), bits & other_bits);
+        assert_eq!((mask | other).bits(), bits | other_bits);
+        assert_eq!(mask.and_not(other).bits(), bits & !other_bits);
+        let (yes, no) = (L::of(2.0), L::of(-3.0));
+        for lane in 0..L::WIDTH {
+            let truth = bits >> lane & 1 == 1;
+            assert_eq!(mask.lane(lane), truth);
+            let chosen = L::select(mask, yes, no).lane(lane).to_f64();
+            assert_eq!(chosen, if truth { 2.0 } else { -3.0 });
+            // `only` clears what would poison a sum.
+            let nan = L::of(f64::NAN).only(mask).lane(lane).to_f64();
+            assert_eq!(nan.is_nan(), truth);
+            assert!(truth || nan == 0.0);
+        }
+    }
+    assert!(L::mask(true).all() && L::mask(false).none());
+}
+
+/// Labels pass through `select` unchanged, whatever number their bits would be.
+fn tags<L: Lanes>() {
+    let labels = [0, 1, 2, 0x7f80_0000, 0x7fa0_0001, 0x7fc0_0000, 0xff80_0001, u32::MAX];
+    for a in labels {
+        for b in labels {
+            for i in 0..8 {
+                let bits = noise(i ^ a ^ b.rotate_left(7)) & ((1 << L::WIDTH) - 1);
+                let mask =
+                    L::from_fn(|i| L::Scalar::of(f64::from(bits >> i & 1))).gt(L::zero());
+                let mixed = L::select(mask, L::tag(a), L::tag(b));
+                for lane in 0..L::WIDTH {
+                    let expected = if mask.lane(lane) { a } else { b };
+                    assert_eq!(mixed.tag_lane(lane), expected, "{} {a:x} {b:x}", L::NAME);
+                }
+                let has = if a == b { (1 << L::WIDTH) - 1 } else { bits };
+                assert_eq!(mixed.has_tag(a).bits(), has, "{} {a:x} {b:x}", L::NAME);
+                assert_eq!(mixed.same_tag(mask), (bits != 0).then_some(a));
+                let everywhere = mixed.same_tag(L::mask(true));
+                let one = a == b || bits == (1 << L::WIDTH) - 1;
+                let expected = if one { Some(a) } else { (bits == 0).then_some(b) };
+                assert_eq!(everywhere, expected, "{} {a:x} {b:x} {bits:b}", L::NAME);
+            }
+        }
+    }
+    assert_eq!(L::tag(3).same_tag(L::mask(false)), None);
+}
+
+#[test]
+fn masks_select_and_labels_survive() {
+    for_every_instance!(masks);
+    for_every_instance!(tags);
+}
+
+/// NaN on the left loses; comparisons with NaN are false.
+fn not_a_number<L: Lanes>() {
+    let nan = L::of(f64::NAN);
+    for x in [-1.0, 0.0, 2.5, f64::INFINITY, f64::NEG_INFINITY] {
+        let x = L::of(x);
+        let value = x.lane(0).to_f64();
+        assert_eq!(nan.min(x).lane(0).to_f64(), value, "{}", L::NAME);
+        assert_eq!(nan.max(x).lane(0).to_f64(), value, "{}", L::NAME);
+        for mask in [nan.lt(x), nan.le(x), nan.gt(x), nan.ge(x), x.lt(nan), x.le(nan), x.gt(nan)] {
+            assert!(mask.none());
+        }
+        for y in [-4.0, 0.5, 1e30] {
+            assert_eq!(x.min(L::of(y)).lane(0).to_f64(), value.min(L::of(y).lane(0).to_f64()));
+            assert_eq!(x.max(L::of(y)).lane(0).to_f64(), value.max(L::of(y).lane(0).to_f64()));
+        }
+    }
+    assert!(L::of(-1.0).sqrt().lane(0).to_f64().is_nan());
+    assert_eq!(L::of(3.0).copysign(L::of(-0.0)).lane(0).to_f64(), -3.0);
+    assert_eq!((-L::of(0.0)).lane(0).to_f64().to_bits(), (-0.0f64).to_bits());
+}
+
+#[test]
+fn nan_follows_the_stated_rule() {
+    for_every_instance!(not_a_number);
+}
+
+/// Arithmetic up to the square root and the fused product are the same bits at every width.
+fn same_bits<One: Lanes, Many: Lanes<Scalar = One::Scalar>>() {
+    let value = |i: u32| One::Scalar::of((uniform(i) - 0.5) * (60.0 * uniform(!i) - 30.0).exp2());
+    let bits = |x: One::Scalar| x.to_f64().to_bits();
+    for i in 0..20_000u32 {
+        let at = |k: u32| Many::from_fn(|lane| value(i * 64 + k * 16 + lane as u32));
+        let (a, b, c) = (at(0), at(1), at(2));
+        let results = [a + b, a - b, a * b, a / b, a.mul_add(b, c), a.abs().sqrt(), -a];
+        for lane in 0..Many::WIDTH {
+            let one = |x: Many| One::splat(x.lane(lane));
+            let (a, b, c) = (one(a), one(b), one(c));
+            let singles = [a + b, a - b, a * b, a / b, a.mul_add(b, c), a.abs().sqrt(), -a];
+            for (k, (many, single)) in results.iter().zip(singles).enumerate() {
+                assert_eq!(bits(many.lane(lane)), bits(single.lane(0)), "operation {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn ieee_operations_are_the_same_bits_at_every_width() {
+    same_bits::<f32, Single>();
+    same_bits::<f64, Double>();
+}

@@ -1,0 +1,12 @@
+//! Lobes, claims, samples, lanes and whole paths, against closed forms and statistics with fixed
+//! seeds.
+
+mod albedo;
+mod chi_square;
+mod claims;
+mod closed_forms;
+mod lanes;
+mod sampler;
+mod setup;
+mod stats;
+mod worlds;

@@ -1,0 +1,255 @@
+//! The numbers of samples: nets, independence, moments, order of convergence.
+
+use crate::stats::slope;
+use std::f64::consts::PI;
+use zerkalo::lanes::{Double, Lanes, Real, Single};
+use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+
+fn sampler<L: Lanes>(kind: SamplerKind, seed: u64, jitter: bool) -> Sampler<L> {
+    Sampler::new(SampleSettings { seed, kind }, jitter)
+}
+
+/// Pairs of numbers of `count` samples of a pixel: the pixel's place for `None`, else a bounce's.
+fn pairs<L: Lanes>(
+    sampler: &Sampler<L>,
+    (x, y): (u32, u32),
+    replicate: usize,
+    bounce: Option<u32>,
+    count: u32,
+) -> Vec<[f64; 2]> {
+    let mut out = Vec::new();
+    for first in (0..count).step_by(L::WIDTH) {
+        let draws = sampler.of_pixel(x, y, replicate, first);
+        let (u, v) = bounce.map_or_else(|| draws.pixel(), |b| draws.lobe(b));
+        out.extend((0..L::WIDTH).map(|i| [u.lane(i).to_f64(), v.lane(i).to_f64()]));
+    }
+    out
+}
+
+/// Of the first 2^m points, one lies in each elementary interval of area 2^-m of whatever shape.
+fn assert_net(points: &[[f64; 2]], name: &str) {
+    let m = points.len().ilog2();
+    assert_eq!(points.len(), 1 << m);
+    for split in 0..=m {
+        let mut seen = vec![false; points.len()];
+        for [u, v] in points {
+            let (i, j) = ((u * f64::from(1u32 << split)) as usize, v * f64::from(1u32 << (m - split)));
+            let cell = (i << (m - split)) + j as usize;
+            assert!(!seen[cell], "{name}: two points in cell {cell} of split {split}");
+            seen[cell] = true;
+        }
+    }
+}
+
+/// Scrambling keeps the net of the first two dimensions, in the joint set and in the padded ones,
+/// whose indices are shuffled besides; every other pair of one set is a net in each coordinate.
+fn nets<L: Lanes>() {
+    for seed in [0, 1, u64::MAX] {
+        for replicate in 0..2 {
+            for pixel in [(0, 0), (639, 479), (u32::MAX, 7)] {
+                let sampler = sampler::<L>(SamplerKind::Sobol, seed, true);
+                let plain = self::sampler::<L>(SamplerKind::Sobol, seed, false);
+                for m in [4, 8, 10] {
+                    let name = format!("{} seed {seed} pixel {pixel:?} m {m}", L::NAME);
+                    assert_net(&pairs(&sampler, pixel, replicate, None, 1 << m), &name);
+                    assert_net(&pairs(&plain, pixel, replicate, Some(0), 1 << m), &name);
+                    // The first pairs of the first two padded sets.
+                    for bounce in [2, 6] {
+                        assert_net(&pairs(&sampler, pixel, replicate, Some(bounce), 1 << m), &name);
+                    }
+                }
+                for bounce in 0..10 {
+                    let points = pairs(&sampler, pixel, replicate, Some(bounce), 1 << 10);
+                    for c in 0..2 {
+                        let mut seen = [false; 1 << 10];
+                        points.iter().for_each(|p| seen[(p[c] * 1024.0) as usize] = true);
+                        assert!(seen.iter().all(|s| *s), "bounce {bounce}, coordinate {c}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn scrambled_sets_remain_nets() {
+    nets::<f64>();
+    nets::<Double>();
+    nets::<f32>();
+    nets::<Single>();
+}
+
+/// Bit by bit the same numbers, whatever the width: one pixel at many indices, and many pixels at one
+/// index.
+fn packets_equal_singles<One: Lanes, Many: Lanes>() {
+    let bits = |x: f64| x.to_bits();
+    for kind in [SamplerKind::Sobol, SamplerKind::Random] {
+        for (jitter, seed) in [(true, 7), (false, u64::MAX)] {
+            let one = sampler::<One>(kind, seed, jitter);
+            let many = sampler::<Many>(kind, seed, jitter);
+            for replicate in 0..2 {
+                for first in [0u32, 16, 256, 65_536, 0x00ff_fff0, u32::MAX - 15] {
+                    for bounce in (0..10).map(Some).chain([None]) {
+                        let pair = |d: &zerkalo::sampling::Draws<'_, Many>| {
+                            bounce.map_or_else(|| d.pixel(), |b| d.lobe(b))
+                        };
+                        let single = |d: &zerkalo::sampling::Draws<'_, One>| {
+                            let (u, v) = bounce.map_or_else(|| d.pixel(), |b| d.lobe(b));
+                            (bits(u.lane(0).to_f64()), bits(v.lane(0).to_f64()))
+                        };
+                        let at = |lane: usize| (lane as u32 * 77, 1000 - lane as u32);
+                        let row = pair(&many.of_pixel(11, 13, replicate, first));
+                        let field = pair(&many.of_pixels(at, replicate, first));
+                        for lane in 0..Many::WIDTH {
+                            let index = first + lane as u32;
+                            let expected = single(&one.of_pixel(11, 13, replicate, index));
+                            let lane_of = |p: (Many, Many)| {
+                                (bits(p.0.lane(lane).to_f64()), bits(p.1.lane(lane).to_f64()))
+                            };
+                            assert_eq!(lane_of(row), expected, "{kind:?} {index} {bounce:?}");
+                            let (x, y) = at(lane);
+                            let expected = single(&one.of_pixel(x, y, replicate, first));
+                            assert_eq!(lane_of(field), expected, "{kind:?} {first} {bounce:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn packets_draw_what_single_samples_draw() {
+    packets_equal_singles::<f32, Single>();
+    packets_equal_singles::<f64, Double>();
+}
+
+/// All numbers that sample `index` of a pixel uses in ten bounces.
+fn numbers(sampler: &Sampler<f64>, pixel: (u32, u32), replicate: usize, index: u32) -> Vec<f64> {
+    let draws = sampler.of_pixel(pixel.0, pixel.1, replicate, index);
+    let place = draws.pixel();
+    let lobes = (0..10).flat_map(|b| <[f64; 2]>::from(draws.lobe(b)));
+    [place.0, place.1].into_iter().chain(lobes).collect()
+}
+
+/// Over pixels every dimension of every index is uniform: mean, variance, and no correlation with
+/// another dimension, with the other replicate, with the pixel beside it or with another seed. The
+/// limit is 4.8 sigma: one false alarm in a thousand runs of these 1300 tests.
+#[test]
+fn pixels_and_replicates_are_independent() {
+    const SIGMAS: f64 = 4.8;
+    let n: u32 = 64 * 64;
+    for kind in [SamplerKind::Sobol, SamplerKind::Random] {
+        for index in [0, 1, 37] {
+            let sampler = sampler::<f64>(kind, 20, true);
+            let other = self::sampler::<f64>(kind, 21, true);
+            let (mut mean, mut square) = ([0.0; 22], [0.0; 22]);
+            let mut product = [[0.0; 22]; 4];
+            for pixel in (0..64).flat_map(|y| (0..64).map(move |x| (x, y))) {
+                let a = numbers(&sampler, pixel, 0, index);
+                let b = numbers(&sampler, pixel, 1, index);
+                let beside = numbers(&sampler, (pixel.0 + 1, pixel.1), 0, index);
+                let seeded = numbers(&other, pixel, 0, index);
+                for d in 0..22 {
+                    let x = a[d] - 0.5;
+                    mean[d] += x;
+                    square[d] += x * x - 1.0 / 12.0;
+                    product[0][d] += x * (b[d] - 0.5);
+                    product[1][d] += x * (beside[d] - 0.5);
+                    product[2][d] += x * (seeded[d] - 0.5);
+                    product[3][d] += x * (a[(d + 1) % 22] - 0.5);
+                }
+            }
+            let n = f64::from(n);
+            for d in 0..22 {
+                let name = format!("{kind:?}, index {index}, dimension {d}");
+                let z = mean[d] / (n / 12.0).sqrt();
+                assert!(z.abs() < SIGMAS, "{name}: mean {z} sigma");
+                let z = square[d] / (n * (1.0 / 80.0 - 1.0 / 144.0)).sqrt();
+                assert!(z.abs() < SIGMAS, "{name}: variance {z} sigma");
+                for (what, product) in
+                    ["replicate", "pixel beside", "seed", "next dimension"].iter().zip(&product)
+                {
+                    let z = product[d] / (n / 144.0).sqrt();
+                    assert!(z.abs() < SIGMAS, "{name}: {what} {z} sigma");
+                }
+            }
+        }
+    }
+}
+
+/// An integrand in the pixel's place and the first lobe, with its integral.
+struct Integrand {
+    value: fn([f64; 4], f64) -> f64,
+    exact: fn(f64) -> f64,
+}
+
+/// A product of four smooth bumps.
+const SMOOTH: Integrand = Integrand {
+    value: |x, k| x.iter().map(|x| 1.0 + 0.5 * (PI * x * (1.0 + k)).sin()).product(),
+    exact: |k| {
+        let w = PI * (1.0 + k);
+        (1.0 + 0.5 * (1.0 - w.cos()) / w).powi(4)
+    },
+};
+
+/// An edge through the pixel, at slope k.
+const EDGE: Integrand = Integrand {
+    value: |x, k| f64::from(u8::from(x[1] < 0.25 + 0.5 * k * x[0])),
+    exact: |k| 0.25 + 0.25 * k,
+};
+
+/// Errors of the estimates in `pixels` pixels of one replicate.
+fn errors(kind: SamplerKind, f: &Integrand, replicate: usize, count: u32) -> Vec<f64> {
+    let sampler = sampler::<Double>(kind, 4, true);
+    (0..400)
+        .map(|i| {
+            let k = (f64::from(i) * 0.618_034) % 1.0;
+            let places = pairs(&sampler, (i, 3), replicate, None, count);
+            let lobes = pairs(&sampler, (i, 3), replicate, Some(0), count);
+            let sum: f64 = places
+                .iter()
+                .zip(&lobes)
+                .map(|(p, l)| (f.value)([p[0], p[1], l[0], l[1]], k))
+                .sum();
+            sum / f64::from(count) - (f.exact)(k)
+        })
+        .collect()
+}
+
+fn rmse_slope(kind: SamplerKind, f: &Integrand) -> f64 {
+    let point = |m: i32| {
+        let errors = errors(kind, f, 0, 1 << m);
+        let mean = errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64;
+        (f64::from(m), 0.5 * mean.log2())
+    };
+    slope(&(4..=10).map(point).collect::<Vec<_>>())
+}
+
+/// Smooth in four dimensions: nearly 1 / N; an edge in two: N^-3/4; random numbers: N^-1/2.
+#[test]
+fn errors_fall_at_the_known_rates() {
+    let smooth = rmse_slope(SamplerKind::Sobol, &SMOOTH);
+    assert!(smooth < -0.95, "{smooth}");
+    let edge = rmse_slope(SamplerKind::Sobol, &EDGE);
+    assert!((-0.9..-0.7).contains(&edge), "{edge}");
+    for integrand in [SMOOTH, EDGE] {
+        let random = rmse_slope(SamplerKind::Random, &integrand);
+        assert!((random + 0.5).abs() < 0.05, "{random}");
+    }
+}
+
+/// What the noise estimate rests on: the errors of the replicates have no common part.
+#[test]
+fn errors_of_the_replicates_are_uncorrelated() {
+    for integrand in [SMOOTH, EDGE] {
+        for count in [4, 16, 64, 256] {
+            let a = errors(SamplerKind::Sobol, &integrand, 0, count);
+            let b = errors(SamplerKind::Sobol, &integrand, 1, count);
+            let sum = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+            let correlation = sum(&a, &b) / (sum(&a, &a) * sum(&b, &b)).sqrt();
+            let z = correlation * (a.len() as f64).sqrt();
+            assert!(z.abs() < 4.0, "{count}: correlation {correlation}");
+        }
+    }
+}

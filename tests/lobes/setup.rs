@@ -1,0 +1,139 @@
+//! What the tests share: materials, vectors, reflections drawn, samples traced.
+
+use zerkalo::lanes::{Lanes, Mask, Real, V3};
+use zerkalo::material::{Finish, Lobe, Masking, Material, Spread};
+use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo::scene::Scene;
+use zerkalo::world::{MAX_GROUPS, Radiance, World};
+
+pub type Vector = [f64; 3];
+
+pub fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// a x + b y + c z.
+pub fn combine(terms: &[(f64, Vector)]) -> Vector {
+    std::array::from_fn(|i| terms.iter().map(|(k, v)| k * v[i]).sum())
+}
+
+pub fn unit(v: Vector) -> Vector {
+    combine(&[(1.0 / dot(v, v).sqrt(), v)])
+}
+
+/// Two unit vectors across `n` and across each other.
+pub fn across(n: Vector) -> [Vector; 2] {
+    let axis = if n[0].abs() < 0.5 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let t = unit(combine(&[(1.0, axis), (-dot(axis, n), n)]));
+    let b = [n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]];
+    [t, b]
+}
+
+/// A normal that is parallel to no axis.
+pub fn tilted_normal() -> Vector {
+    unit([0.3, -0.5, 0.8])
+}
+
+/// Direction at angle `theta` from `n` [radians], in a plane turned by `phi`.
+pub fn at_angle(n: Vector, theta: f64, phi: f64) -> Vector {
+    let [t, b] = across(n);
+    unit(combine(&[(theta.cos(), n), (theta.sin() * phi.cos(), t), (theta.sin() * phi.sin(), b)]))
+}
+
+pub fn vector(v: V3<f64>) -> Vector {
+    [v.x, v.y, v.z]
+}
+
+/// A white material that reflects everything in `lobe`, with a highlight of the same microfacets.
+pub fn reflector(lobe: Lobe, masking: Masking, roughness: f64) -> Material {
+    Material {
+        ambient: 0.0,
+        diffuse: 0.0,
+        specular: 1.0,
+        highlight: zerkalo::material::Highlight::CookTorrance,
+        reflection: 1.0,
+        roughness,
+        lobe,
+        masking,
+        ..Material::default()
+    }
+}
+
+/// Whether the lobe is one of microfacets, for which masking matters.
+pub fn has_facets(lobe: Lobe) -> bool {
+    let finish = Finish::<f64>::new(&reflector(lobe, Masking::Smith, 1.0), true);
+    matches!(finish.reflection, Some((_, Spread::Facets(_))))
+}
+
+/// Every lobe with every masking that makes a difference to it.
+pub fn every_lobe() -> Vec<(Lobe, Masking)> {
+    let maskings = |lobe| if has_facets(lobe) { &Masking::ALL[..] } else { &Masking::ALL[..1] };
+    Lobe::ALL.into_iter().flat_map(|l| maskings(l).iter().map(move |m| (l, *m))).collect()
+}
+
+/// Which numbers reflections are drawn with.
+#[derive(Clone, Copy)]
+pub struct Numbers {
+    pub kind: SamplerKind,
+    pub seed: u64,
+    pub pixel: (u32, u32),
+}
+
+impl Numbers {
+    pub fn random(seed: u64) -> Self {
+        Self { kind: SamplerKind::Random, seed, pixel: (3, 5) }
+    }
+
+    pub fn sobol(seed: u64) -> Self {
+        Self { kind: SamplerKind::Sobol, ..Self::random(seed) }
+    }
+}
+
+/// Draws `count` reflections of light seen along `incident` (towards the surface), as the kernel does
+/// in the lane type `L`; gives each direction and weight to `take`.
+pub fn each_reflection<L: Lanes>(
+    material: &Material,
+    (incident, n): (Vector, Vector),
+    fold: bool,
+    numbers: Numbers,
+    count: u32,
+    mut take: impl FnMut(Vector, Vector),
+) {
+    let finish = Finish::<L::Scalar>::new(material, true);
+    let (strength, spread) = finish.reflection.unwrap();
+    let (incident, n) = (V3::<L>::of(incident), V3::<L>::of(n));
+    let settings = SampleSettings { seed: numbers.seed, kind: numbers.kind };
+    let sampler = Sampler::<L>::new(settings, false);
+    for first in (0..count).step_by(L::WIDTH) {
+        let uv = sampler.of_pixel(numbers.pixel.0, numbers.pixel.1, 0, first).lobe(0);
+        let r = finish.reflect(strength, &spread, incident, n, uv, fold);
+        for lane in 0..L::WIDTH {
+            take(r.direction.lane(lane).map(Real::to_f64), r.weight.lane(lane).map(Real::to_f64));
+        }
+    }
+}
+
+/// The radiance of the sample `index` of a pixel in every group and channel, WIDTH samples at once.
+pub fn trace<L: Lanes>(
+    world: &World<L>,
+    sampler: &Sampler<L>,
+    (x, y): (u32, u32),
+    replicate: usize,
+    first: u32,
+) -> Vec<Vec<Vector>> {
+    let draws = sampler.of_pixel(x, y, replicate, first);
+    let half = L::of(0.5);
+    let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
+    let rays = world.view().rays_of((x, y), jitter);
+    let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
+    let all = L::mask(true);
+    assert!(all.all());
+    world.trace(rays, None, &draws, all, &mut radiance);
+    let groups = &radiance.groups[..world.groups()];
+    let of_lane = |lane| groups.iter().map(|g| g.lane(lane).map(Real::to_f64)).collect();
+    (0..L::WIDTH).map(of_lane).collect()
+}
+
+pub fn scene(text: &str) -> Scene {
+    Scene::parse(text, "test").unwrap()
+}

@@ -1,0 +1,199 @@
+//! Whole paths: furnaces, endless mirrors, the width-1 instances against the packets.
+
+use crate::setup::*;
+use zerkalo::lanes::{Double, Lanes, Single};
+use zerkalo::material::{Lobe, Masking};
+use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo::scene::Scene;
+use zerkalo::world::{AnyWorld, Options, Precision, World};
+
+const SETTINGS: SampleSettings = SampleSettings { seed: 3, kind: SamplerKind::Sobol };
+
+/// Sums over groups of the samples `0..count` of every pixel, white lights.
+fn picture<L: Lanes>(scene: &Scene, count: u32) -> Vec<Vector> {
+    let world = World::<L>::new(scene);
+    let sampler = Sampler::<L>::new(SETTINGS, world.jitter());
+    let [width, height] = scene.film.size;
+    let mut out = Vec::new();
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for first in (0..count).step_by(L::WIDTH) {
+            for groups in trace(&world, &sampler, (x, y), 0, first) {
+                let all: Vec<_> = groups.into_iter().map(|g| (1.0, g)).collect();
+                out.push(combine(&all));
+            }
+        }
+    }
+    out
+}
+
+/// A ball in a white furnace returns exactly rho, in every sample, by every lobe that claims to keep
+/// energy; at its silhouette lobes dip under the surface and are folded up.
+fn furnace<L: Lanes>() {
+    use zerkalo::material::Energy;
+    let rho = 0.75;
+    let text = "film = { size = [24, 24] }
+        camera = { eye = [0.0, 0.0, 3.0], target = [0.0, 0.0, 0.0], view_angle.vertical = 45.0 }
+        background.color = [1.0, 1.0, 1.0]
+        [[object]]
+        material = \"m\"
+        shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
+        [materials.m]";
+    let mut scene = scene(text);
+    for lobe in Lobe::ALL.into_iter().filter(|l| l.claims().energy == Energy::Kept) {
+        for roughness in [0.0, 1e-3, 0.3, 3.0, 1e4] {
+            let mut material = reflector(lobe, Masking::VCavity, roughness);
+            material.reflection = rho;
+            scene.materials.insert("m".to_string(), material);
+            let samples = picture::<L>(&scene, 16);
+            let on_ball = samples.iter().filter(|s| **s == [rho; 3]).count();
+            let beside = samples.iter().filter(|s| **s == [1.0; 3]).count();
+            assert_eq!(on_ball + beside, samples.len(), "{} {lobe:?} {roughness}", L::NAME);
+            assert!(on_ball > samples.len() / 3 && beside > samples.len() / 10);
+        }
+    }
+}
+
+#[test]
+fn closed_form_7_a_white_furnace_is_exact() {
+    furnace::<Single>();
+    furnace::<Double>();
+    furnace::<f64>();
+}
+
+/// At roughness 0 every lobe is the mirror, bit by bit; near 0 the square goes to it.
+#[test]
+fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
+    let mut scene = scene(&std::fs::read_to_string("scenes/lobe-square.toml").unwrap());
+    scene.film.size = [40, 30];
+    let with = |scene: &mut Scene, lobe: Lobe, roughness: f64| {
+        for material in scene.materials.values_mut().filter(|m| m.reflection > 0.0) {
+            (material.lobe, material.roughness) = (lobe, roughness);
+        }
+        picture::<Double>(scene, 4)
+    };
+    let mirror = with(&mut scene, Lobe::Mirror, 0.0);
+    assert!(mirror.iter().any(|s| s[0] > 0.0));
+    for lobe in Lobe::ALL {
+        assert!(with(&mut scene, lobe, 0.0) == mirror, "{lobe:?}");
+    }
+    let differing = |roughness: f64, scene: &mut Scene| {
+        let near = with(scene, Lobe::Square, roughness);
+        let far = |(a, b): &(&Vector, &Vector)| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-6);
+        near.iter().zip(&mirror).filter(far).count()
+    };
+    assert_eq!(differing(1e-9, &mut scene), 0);
+    assert!(differing(0.3, &mut scene) > 100);
+}
+
+fn parallel_mirrors(depth: u32) -> Scene {
+    scene(&format!(
+        "film = {{ size = [4, 4] }}
+        trace.depth = {depth}
+        camera = {{ eye = [0.0, 0.0, 0.0], target = [0.3, 0.2, -1.0] }}
+        ambient.color = [1.0, 1.0, 1.0]
+        [materials.m]
+        color = [1.0, 0.5, 0.25]
+        diffuse = 0.0
+        reflection = 0.999
+        [[object]]
+        material = \"m\"
+        shape.plane = {{ point = [0.0, 0.0, -1.0], normal = [0.0, 0.0, 1.0] }}
+        [[object]]
+        material = \"m\"
+        shape.plane = {{ point = [0.0, 0.0, 1.0], normal = [0.0, 0.0, -1.0] }}"
+    ))
+}
+
+/// Two parallel mirrors of rho = 0.999 that each shine: sum of rho^k over all images, 1000; the part
+/// beyond the depth limit is what the bias report says. In single precision rho itself is rounded by
+/// up to 3e-8, which 1000 images multiply, and so is each of the 10 000 terms of the sum.
+#[test]
+fn extreme_26_endless_mirrors() {
+    let rho: f64 = 0.999;
+    for depth in [16, 10_000] {
+        let scene = parallel_mirrors(depth);
+        let options = |precision| Options { precision };
+        let double = AnyWorld::compile(&scene, &options(Precision::Double));
+        let first = rho.powi(depth as i32 + 1);
+        let cut = first / (1.0 - rho);
+        let told = double.biases();
+        assert_eq!(told.len(), 1, "{told:?}");
+        assert!(told[0].contains(&format!("depth {depth} ")), "{told:?}");
+        assert!(told[0].contains(&format!("at most {cut:.2e}")), "{told:?}");
+        let (infinite, truncated) = (1.0 / (1.0 - rho), (1.0 - first) / (1.0 - rho));
+        for sample in picture::<Double>(&scene, 4) {
+            let [r, g, b] = sample;
+            assert!((r / truncated - 1.0).abs() < 1e-10, "{r} for {truncated}");
+            assert!(infinite - r <= cut * (1.0 + 1e-9), "more is missing than reported");
+            assert!((g / r - 0.5).abs() < 1e-12 && (b / r - 0.25).abs() < 1e-12);
+        }
+        for [r, ..] in picture::<Single>(&scene, 8) {
+            assert!((r / truncated - 1.0).abs() < 1e-4, "single: {r} for {truncated}");
+        }
+    }
+}
+
+/// Samples of the width-1 instance and of the packets, side by side: shares that differ at all and
+/// by more than 1e-3, largest difference of the others (both relative), relative difference of the means.
+fn compare<One: Lanes, Many: Lanes>(scene: &Scene) -> [f64; 4] {
+    let (one, many) = (picture::<One>(scene, 16), picture::<Many>(scene, 16));
+    assert_eq!(one.len(), many.len());
+    let (mut any, mut far, mut near) = (0.0, 0.0, 0.0f64);
+    let (mut sum, mut sum_many) = (0.0, 0.0);
+    for (a, b) in one.iter().zip(&many) {
+        let relative = (0..3)
+            .map(|c| (a[c] - b[c]).abs() / a[c].abs().max(b[c].abs()).max(1e-12))
+            .fold(0.0, f64::max);
+        any += f64::from(u8::from(relative > 0.0));
+        if relative > 1e-3 {
+            far += 1.0;
+        } else {
+            near = near.max(relative);
+        }
+        sum += a[0] + a[1] + a[2];
+        sum_many += b[0] + b[1] + b[2];
+    }
+    let n = one.len() as f64;
+    [any / n, far / n, near, (sum / sum_many - 1.0).abs()]
+}
+
+fn physical() -> Scene {
+    let text = std::fs::read_to_string("scenes/mirror-room-physical.toml").unwrap();
+    let mut scene = scene(&text);
+    scene.film.size = [96, 72];
+    scene
+}
+
+/// Only ln, sin and exp of the mirror differ between the widths; a path that they turn by a rounding
+/// may meet another thing's edge or fall into a shadow.
+#[test]
+fn packets_equal_single_samples_but_for_roundings_of_sin_and_ln() {
+    for [any, far, near, mean] in
+        [compare::<f32, Single>(&physical()), compare::<f64, Double>(&physical())]
+    {
+        println!("differ {any:.4}, far {far:.2e}, near {near:.2e}, mean {mean:.2e}");
+        assert!(far <= 1e-3, "{far}");
+        assert!(mean <= 1e-4, "{mean}");
+    }
+    let [_, far, near, mean] = compare::<f64, Double>(&physical());
+    assert!(far == 0.0 && near < 1e-9 && mean < 1e-12, "{far} {near} {mean}");
+}
+
+/// Where only IEEE operations take part, every bit is the same.
+#[test]
+fn packets_equal_single_samples_bit_by_bit_without_a_lobe() {
+    let mut lambert = physical();
+    let mut mirror = physical();
+    for (name, scene) in [("floor", &mut lambert), ("mirror", &mut mirror)] {
+        let floor = scene.materials["floor"].clone();
+        let material = scene.materials.get_mut("mirror").unwrap();
+        *material = floor;
+        if name == "mirror" {
+            (material.reflection, material.lobe) = (0.9, Lobe::Mirror);
+        }
+    }
+    for scene in [lambert, mirror] {
+        assert_eq!(compare::<f32, Single>(&scene), [0.0; 4]);
+        assert_eq!(compare::<f64, Double>(&scene), [0.0; 4]);
+    }
+}
