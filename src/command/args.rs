@@ -50,7 +50,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
     /// Stop at this many samples per pixel (the mean, if adaptive; rounds up to even)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     pub spp: Option<u32>,
     /// Stop at this noise: estimated RMSE of the picture as displayed, in 8-bit codes [default: 0.5]
     #[arg(long, value_name = "CODES", value_parser = positive, allow_negative_numbers = true)]
@@ -62,10 +62,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub time: Option<f64>,
     /// Threads that trace [default: one per processor]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
     pub threads: Option<u16>,
     /// Number that the random choices follow from; the same seed gives the same picture
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub seed: u64,
     /// Precision of the geometry; auto: double where the scene's proportions need it
     #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]

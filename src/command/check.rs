@@ -9,7 +9,7 @@ use crate::world::{self, AnyWorld};
 pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let document = Document::read(&args.scene).map_err(|e| Failure::Failed(e.to_string()))?;
     for warning in document.warnings() {
-        warn(&format!("{warning}"));
+        warn(&format!("warning: {warning}"));
     }
     let scene = document.scene();
     let world = AnyWorld::compile(scene, &world::Options::default());

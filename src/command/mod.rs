@@ -13,7 +13,8 @@ mod stats;
 pub use cpu::require as require_cpu;
 
 use args::{Cli, Command};
-use clap::Parser;
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
 use std::io::Write;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -35,7 +36,7 @@ enum Failure {
 #[inline(never)]
 pub fn main() -> ExitCode {
     let started = Instant::now();
-    let cli = Cli::parse();
+    let cli = understood();
     let result = match &cli.command {
         Some(Command::Render(args)) => render::run(args, started),
         Some(Command::Check(args)) => check::run(args),
@@ -50,6 +51,23 @@ pub fn main() -> ExitCode {
     };
     warn(&message);
     ExitCode::from(status)
+}
+
+/// The command line, or its end with exit status 2.
+fn understood() -> Cli {
+    Cli::try_parse().unwrap_or_else(|error| {
+        // Of `zerkalo rendr a.toml` clap takes the first word for a scene and refuses the second.
+        let first = std::env::args_os().nth(1).unwrap_or_default();
+        let first = first.to_string_lossy();
+        let unknown = !first.starts_with('-') && Cli::command().find_subcommand(&*first).is_none();
+        if error.kind() == ErrorKind::ArgumentConflict && unknown {
+            let names: Vec<_> =
+                Cli::command().get_subcommands().map(|c| c.get_name().to_string()).collect();
+            let why = format!("`{first}` is no command; commands: {}", names.join(", "));
+            Cli::command().error(ErrorKind::InvalidSubcommand, why).exit()
+        }
+        error.exit()
+    })
 }
 
 fn no_command(cli: &Cli) -> Failure {

@@ -64,7 +64,8 @@ impl Progress {
 }
 
 fn new_bar() -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:24} {percent:>3} %  {wide_msg}")
+    // Short, so that the time left has its place in 80 columns.
+    let style = ProgressStyle::with_template("{bar:10} {percent:>3} %  {wide_msg}")
         .expect("the template is well-formed");
     let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
     bar.with_style(style)

@@ -30,7 +30,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     // What cannot be written had better be known before the work than after it.
     target.check_writable().map_err(failed_write)?;
     if let Some(path) = &args.stats {
-        check_stats_path(path)?;
+        check_stats_path(path, &args.output)?;
     }
     for warning in document.warnings() {
         warn(&format!("warning: {warning}"));
@@ -168,7 +168,11 @@ fn sized(scene: &Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     Ok(scene)
 }
 
-fn check_stats_path(path: &Path) -> Result<(), Failure> {
+fn check_stats_path(path: &Path, output: &Path) -> Result<(), Failure> {
+    if path == output {
+        let path = path.display();
+        return Err(Failure::Usage(format!("--stats and --output name the same file, {path}")));
+    }
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let what = if path.is_dir() {
         "it is a directory"

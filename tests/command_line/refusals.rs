@@ -13,6 +13,10 @@ fn usage_errors_have_status_2_and_touch_nothing() {
         (&["render", "scene.toml", "-o", "a.png", "--size", "99999x99999"], "--size"),
         (&["render", "scene.toml", "-o", "a.png", "--noise", "-1"], "greater than 0"),
         (&["render", "scene.toml", "-o", "a.png", "--tone", "film"], "neutral"),
+        (&["render", "scene.toml", "-o", "a.png", "--spp", "-3"], "-3 is not in 1"),
+        (&["render", "scene.toml", "-o", "a.png", "--noise", "0"], "greater than 0"),
+        (&["render", "scene.toml", "-o", "a.png", "--stats", "a.png"], "same file"),
+        (&["rendr", "scene.toml"], "`rendr` is no command; commands: render, check, new"),
         (&["polish"], "zerkalo render polish"),
         (&[], "zerkalo render"),
     ] {
