@@ -125,7 +125,7 @@ impl Traced {
         let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
         for (ray, count) in packets::<L>(lines) {
             let draws = sampler.of_pixel(0, 0, 0, 0);
-            world.trace((ray.origin, ray.direction), &draws, L::mask(true), &mut radiance);
+            world.trace((ray.origin, ray.direction), None, &draws, L::mask(true), &mut radiance);
             for i in 0..count {
                 let mut sum = DVec3::ZERO;
                 for (group, weight) in radiance.groups.iter().zip(&self.mix) {
