@@ -30,8 +30,7 @@ impl Claims {
 
 impl Lobe {
     /// Every lobe, in the order of the field table.
-    pub const ALL: [Self; 5] =
-        [Self::Mirror, Self::Cone, Self::Square, Self::Beckmann, Self::Ggx];
+    pub const ALL: [Self; 5] = [Self::Mirror, Self::Cone, Self::Square, Self::Beckmann, Self::Ggx];
 
     /// What the reflection by this lobe promises.
     ///

@@ -55,7 +55,10 @@ fn extreme_23_microfacets_never_return_more_than_they_get() {
                 let found = albedo::<Double>(lobe, masking, alpha, degrees);
                 assert!(found <= 1.001, "{lobe:?} {masking:?} {alpha} at {degrees}: {found}");
                 let found = albedo::<Single>(lobe, masking, alpha, degrees);
-                assert!(found <= 1.001, "single {lobe:?} {masking:?} {alpha} at {degrees}: {found}");
+                assert!(
+                    found <= 1.001,
+                    "single {lobe:?} {masking:?} {alpha} at {degrees}: {found}"
+                );
             }
         }
     }

@@ -269,9 +269,16 @@ fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
                 let (mut inside, count) = (0u32, 1 << 14);
                 let material = reflector(lobe, Masking::VCavity, r);
                 let (numbers, incident) = (Numbers::sobol(2), combine(&[(-1.0, n)]));
-                each_reflection::<Double>(&material, (incident, n), true, numbers, count, |d, _| {
-                    inside += u32::from(dot(d, at.inward) > 0.0);
-                });
+                each_reflection::<Double>(
+                    &material,
+                    (incident, n),
+                    true,
+                    numbers,
+                    count,
+                    |d, _| {
+                        inside += u32::from(dot(d, at.inward) > 0.0);
+                    },
+                );
                 f64::from(inside) / f64::from(count)
             };
             let (cone, square) = (response(Lobe::Cone), response(Lobe::Square));

@@ -179,8 +179,7 @@ fn tags<L: Lanes>() {
         for b in labels {
             for i in 0..8 {
                 let bits = noise(i ^ a ^ b.rotate_left(7)) & ((1 << L::WIDTH) - 1);
-                let mask =
-                    L::from_fn(|i| L::Scalar::of(f64::from(bits >> i & 1))).gt(L::zero());
+                let mask = L::from_fn(|i| L::Scalar::of(f64::from(bits >> i & 1))).gt(L::zero());
                 let mixed = L::select(mask, L::tag(a), L::tag(b));
                 for lane in 0..L::WIDTH {
                     let expected = if mask.lane(lane) { a } else { b };

@@ -33,7 +33,8 @@ fn assert_net(points: &[[f64; 2]], name: &str) {
     for split in 0..=m {
         let mut seen = vec![false; points.len()];
         for [u, v] in points {
-            let (i, j) = ((u * f64::from(1u32 << split)) as usize, v * f64::from(1u32 << (m - split)));
+            let (i, j) =
+                ((u * f64::from(1u32 << split)) as usize, v * f64::from(1u32 << (m - split)));
             let cell = (i << (m - split)) + j as usize;
             assert!(!seen[cell], "{name}: two points in cell {cell} of split {split}");
             seen[cell] = true;
