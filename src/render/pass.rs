@@ -376,3 +376,36 @@ fn blocks([width, height]: [usize; 2]) -> Vec<(usize, usize)> {
     let pixels = ORDER.iter().map(|(x, y)| (usize::from(*x), usize::from(*y)));
     pixels.filter(|(x, y)| *x < width && *y < height).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{Header, Mix};
+    use crate::lanes::{Real, Single};
+    use crate::sampling::SamplerKind;
+    use crate::scene::built_in;
+
+    /// Samples that are no light count, add nothing, and leave the pixel finite.
+    #[test]
+    fn extreme_30_a_bad_sample_is_counted_and_leaves_the_pixel_finite() {
+        let world = World::<Single>::new(&built_in());
+        let tracer = Tracer::new(&world, &SampleSettings { seed: 0, kind: SamplerKind::Sobol });
+        for bad in [f64::NAN, f64::INFINITY, -1.0, 1e30] {
+            let (scales, precision) = (world.scales().to_vec(), Single::NAME.to_string());
+            let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
+            let tile = film.slots(&[0]).remove(0).open();
+            let mut work = Work::<Single>::new(0, None);
+            work.radiance.groups[0].x =
+                Single::from_fn(|i| Real::of(if i == 3 { bad } else { 0.5 }));
+            let at = |lane| (lane as u32, 0);
+            tracer.scatter(&mut work, 8, at, 0, &mut |lane, v: &[i64]| tile.add(0, lane, v));
+            assert_eq!(work.bad, [BadSample { index: 0, replicate: 0, y: 0, x: 3 }], "{bad}");
+            work.bad.into_iter().for_each(|bad| tile.record_bad(bad));
+            tile.advance(0, 1);
+            let mix = Mix::only(0, film.groups());
+            assert_eq!(film.bad_samples().count, 1);
+            assert_eq!(film.pixel(3, 0, &mix), [0.0; 3], "{bad}");
+            assert_eq!(film.pixel(4, 0, &mix), [0.5, 0.0, 0.0], "{bad}");
+        }
+    }
+}
