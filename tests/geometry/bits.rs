@@ -1,7 +1,7 @@
 //! The width-1 instances and the packets give the same bits.
 
 use crate::common::Numbers;
-use crate::rays::{Line, ball, every_kind, packets};
+use crate::rays::{Line, ball, every_kind, packets, surface};
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
 use zerkalo::shape::{Form, Geometry, Ray};
@@ -100,7 +100,7 @@ fn compare<L: Lanes<Scalar = S>, S: Real + Lanes<Scalar = S>>(
     for (n, (packet, count)) in packets::<L>(lines).enumerate() {
         let hit = wide.closest(&packet);
         let met = hit.t.lt(L::of(L::MAX));
-        let surface = wide.surface(&packet, &hit, met);
+        let surface = surface(&wide, &packet, &hit);
         let limit = 2.0;
         let blocked = wide.blocked(&packet, L::of(limit), L::mask(true));
         for i in 0..count {
@@ -124,7 +124,7 @@ fn compare<L: Lanes<Scalar = S>, S: Real + Lanes<Scalar = S>>(
                 continue;
             }
             assert!(hit.item.tag_lane(i) == one.item.tag_lane(0), "item: {}", told());
-            let s = narrow.surface(&ray, &one, S::mask(true));
+            let s = surface(&narrow, &ray, &one);
             let equal = same3(surface.point, s.point, i)
                 && same3(surface.normal, s.normal, i)
                 && same(surface.reach.lane(i).to_f64(), s.reach.lane(0).to_f64());

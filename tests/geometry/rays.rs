@@ -4,7 +4,7 @@ use glam::DVec3;
 use zerkalo::lanes::{Lanes, Mask, Real, V3};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
-use zerkalo::shape::{EXAMPLES, Form, Geometry, Ray};
+use zerkalo::shape::{EXAMPLES, Form, Geometry, Hit, Ray, Surface};
 use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Precision, Radiance, World};
 
 /// Origin and unit direction.
@@ -35,13 +35,29 @@ pub fn to_dvec3<L: Lanes>(v: V3<L>, lane: usize) -> DVec3 {
     DVec3::from(v.lane(lane).map(Real::to_f64))
 }
 
+/// The surfaces of all lanes, item by item.
+pub fn surface<L: Lanes>(geometry: &Geometry<L>, ray: &Ray<L>, hit: &Hit<L>) -> Surface<L> {
+    let mut all = Surface { point: ray.at(hit.t), normal: V3::zero(), reach: L::zero() };
+    let mut left = hit.t.lt(L::of(L::MAX));
+    while left.any() {
+        let item = hit.item.tag_lane(left.bits().trailing_zeros() as usize);
+        let here = left & hit.item.has_tag(item);
+        let one = geometry.surface(item, ray.at(hit.t));
+        all.point = V3::select(here, one.point, all.point);
+        all.normal = V3::select(here, one.normal, all.normal);
+        all.reach = L::select(here, one.reach, all.reach);
+        left = left.and_not(here);
+    }
+    all
+}
+
 /// The nearest things, ray by ray.
 pub fn closest<L: Lanes>(geometry: &Geometry<L>, lines: &[Line]) -> Vec<Option<Met>> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
         let hit = geometry.closest(&ray);
         let met = hit.t.lt(L::of(L::MAX));
-        let surface = geometry.surface(&ray, &hit, met);
+        let surface = surface(geometry, &ray, &hit);
         out.extend((0..count).map(|i| {
             met.lane(i).then(|| Met {
                 t: hit.t.lane(i).to_f64(),
