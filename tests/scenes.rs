@@ -168,7 +168,7 @@ fn every_scene_renders_as_it_did() {
                 let deviation = (got - mean).abs();
                 let allowed = threshold * error * with_reference + rounding;
                 worst = worst.max((deviation - rounding) / (error * with_reference).max(1e-9));
-                if !(deviation <= allowed) {
+                if deviation.is_nan() || deviation > allowed {
                     wrong.push(format!(
                         "{name}, block {i}, channel {c}: {got:.6}, expected {mean:.6} +- {error:.1e}"
                     ));

@@ -44,7 +44,7 @@ pub fn biases(scene: &Scene) -> Vec<String> {
     }
     let weight = |n: u32| {
         let pairs = pair.powi(i32::try_from(n / 2).unwrap_or(i32::MAX));
-        if n % 2 == 0 { pairs } else { pairs * first }
+        if n.is_multiple_of(2) { pairs } else { pairs * first }
     };
     let from = |n: u32| (weight(n) + weight(n.saturating_add(1))) / (1.0 - pair).max(0.0);
     let bound = |sum: f64| {
