@@ -100,7 +100,7 @@ fn compare<L: Lanes<Scalar = S>, S: Real + Lanes<Scalar = S>>(
     for (n, (packet, count)) in packets::<L>(lines).enumerate() {
         let hit = wide.closest(&packet);
         let met = hit.t.lt(L::of(L::MAX));
-        let surface = surface(&wide, &packet, &hit);
+        let here = surface(&wide, &packet, &hit);
         let limit = 2.0;
         let blocked = wide.blocked(&packet, L::of(limit), L::mask(true));
         for i in 0..count {
@@ -125,10 +125,10 @@ fn compare<L: Lanes<Scalar = S>, S: Real + Lanes<Scalar = S>>(
             }
             assert!(hit.item.tag_lane(i) == one.item.tag_lane(0), "item: {}", told());
             let s = surface(&narrow, &ray, &one);
-            let equal = same3(surface.point, s.point, i)
-                && same3(surface.normal, s.normal, i)
-                && same(surface.reach.lane(i).to_f64(), s.reach.lane(0).to_f64());
-            assert!(equal, "surface {surface:?}, not {s:?}: {}", told());
+            let equal = same3(here.point, s.point, i)
+                && same3(here.normal, s.normal, i)
+                && same(here.reach.lane(i).to_f64(), s.reach.lane(0).to_f64());
+            assert!(equal, "surface {here:?}, not {s:?}: {}", told());
         }
     }
 }
