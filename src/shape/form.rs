@@ -59,21 +59,6 @@ fn half_space(point: DVec3, normal: DVec3) -> HalfSpace {
 }
 
 impl Form {
-    /// A convex solid from its corners and its faces as lists of corner numbers (any winding; the
-    /// centroid is inside).
-    pub fn polyhedron(corners: Vec<DVec3>, faces: &[&[usize]]) -> Self {
-        let inside = corners.iter().sum::<DVec3>() / corners.len() as f64;
-        let faces = faces
-            .iter()
-            .map(|f| {
-                let [a, b, c] = [corners[f[0]], corners[f[1]], corners[f[2]]];
-                let normal = (b - a).cross(c - a);
-                half_space(a, if normal.dot(inside - a) > 0.0 { -normal } else { normal })
-            })
-            .collect();
-        Self::Convex { faces, corners }
-    }
-
     /// The form after the invertible affine map `map`. Similarities keep a sphere a sphere; any other
     /// map makes it an ellipsoid. The other forms stay what they are.
     pub fn transformed(self, map: &DAffine3) -> Self {
