@@ -2,6 +2,7 @@
 //!
 //! The map of the rooms, and who may import whom, stands in ARCHITECTURE.md; a test holds it.
 
+pub mod asset;
 pub mod camera;
 pub mod command;
 pub mod film;

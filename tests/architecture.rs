@@ -11,21 +11,25 @@ const ROOMS: &[(&str, &[&str])] = &[
     (
         "command",
         &[
-            "render", "world", "scene", "shape", "material", "light", "camera", "value", "film",
-            "sampling", "lanes",
+            "render", "world", "scene", "shape", "material", "asset", "light", "camera", "value",
+            "film", "sampling", "lanes",
         ],
     ),
     (
         "render",
         &[
-            "world", "scene", "shape", "material", "light", "camera", "value", "film", "sampling",
-            "lanes",
+            "world", "scene", "shape", "material", "asset", "light", "camera", "value", "film",
+            "sampling", "lanes",
         ],
     ),
-    ("world", &["scene", "shape", "material", "light", "camera", "value", "sampling", "lanes"]),
-    ("scene", &["shape", "material", "light", "camera", "value"]),
-    ("shape", &["value", "sampling", "lanes"]),
-    ("material", &["value", "sampling", "lanes"]),
+    (
+        "world",
+        &["scene", "shape", "material", "asset", "light", "camera", "value", "sampling", "lanes"],
+    ),
+    ("scene", &["shape", "material", "asset", "light", "camera", "value"]),
+    ("shape", &["asset", "value", "sampling", "lanes"]),
+    ("material", &["asset", "value", "sampling", "lanes"]),
+    ("asset", &["value"]),
     ("light", &["value", "lanes"]),
     ("camera", &["value", "lanes"]),
     ("value", &[]),
@@ -36,19 +40,26 @@ const ROOMS: &[(&str, &[&str])] = &[
 
 /// Crates that only some rooms know.
 const CRATES: &[(&str, &[&str])] = &[
+    ("base64", &["asset"]),
     ("clap", &["command"]),
     ("crossbeam_channel", &["render"]),
     ("exr", &["film"]),
+    ("gltf", &["asset"]),
+    ("image", &["asset"]),
     ("indicatif", &["command"]),
-    ("obvhs", &["shape", "world"]),
+    ("obvhs", &["asset", "shape", "world"]),
+    ("ply_rs_bw", &["asset"]),
     ("png", &["film"]),
     ("rayon", &["render"]),
     ("serde", &["command", "scene", "shape", "material", "light", "camera", "value"]),
     ("serde_json", &["command"]),
     ("signal_hook", &["command"]),
-    ("tempfile", &["film", "command"]),
+    ("stl_io", &["asset"]),
+    // In `asset` only tests do.
+    ("tempfile", &["film", "command", "asset"]),
     // Descriptions read their own examples in tests.
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),
+    ("tobj", &["asset"]),
     ("toml_edit", &["scene"]),
     ("wide", &["lanes"]),
 ];

@@ -54,7 +54,7 @@ fn srgb_from_linear(linear: f64) -> f64 {
 }
 
 /// sRGB (IEC 61966-2-1) code 0..1 to linear light 0..1.
-fn linear_from_srgb(code: f64) -> f64 {
+pub fn linear_from_srgb(code: f64) -> f64 {
     if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
 }
 

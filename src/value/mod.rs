@@ -10,7 +10,7 @@ mod range;
 mod text;
 
 pub use angle::sin_cos_degrees;
-pub use color::Color;
+pub use color::{Color, linear_from_srgb};
 pub use fault::{Checks, Fault};
 pub use field::{Choice, Field, Preset, Takes};
 pub use range::{Range, number};

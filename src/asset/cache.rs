@@ -1,0 +1,272 @@
+//! Files that were read, shared between compilations of a scene.
+
+use super::error::AssetError;
+use super::file::{MAX_BYTES, Source, unreadable};
+use super::image::Image;
+use super::mesh::{Mesh, TriangleMesh};
+use std::collections::HashMap;
+use std::fmt;
+use std::hash::Hash;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::SystemTime;
+
+/// Memory for what no scene uses any more, so that an undone edit finds it [bytes]: 256 MiB.
+const UNUSED_BYTES: usize = 256 << 20;
+
+/// Largest image file [bytes]: 512 MiB.
+const MAX_IMAGE_BYTES: u64 = 512 << 20;
+
+/// What takes time when a file is loaded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// A file is read.
+    Reading {
+        /// Its path.
+        file: PathBuf,
+        /// Its length.
+        bytes: u64,
+    },
+    /// The tree over a mesh is built.
+    Building {
+        /// The mesh's file.
+        file: PathBuf,
+        /// Number of triangles.
+        triangles: usize,
+    },
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let name =
+            |file: &Path| file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        match self {
+            Self::Reading { file, bytes } => {
+                write!(f, "reading {}: {:.1} MB", name(file), *bytes as f64 / 1e6)
+            }
+            Self::Building { file, triangles } => {
+                write!(f, "reading {}: a tree over {triangles} triangles", name(file))
+            }
+        }
+    }
+}
+
+/// A file at a moment: another time or length is another file.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Key {
+    path: PathBuf,
+    modified: Option<SystemTime>,
+    bytes: u64,
+}
+
+/// What became of a file, once somebody has read it.
+type Cell<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
+
+/// Files of one kind, with the count of askings at which each was last asked for.
+struct Shelf<T> {
+    files: HashMap<Key, (Cell<T>, u64)>,
+    asked: u64,
+}
+
+impl<T> Default for Shelf<T> {
+    fn default() -> Self {
+        Self { files: HashMap::new(), asked: 0 }
+    }
+}
+
+impl<T> Shelf<T> {
+    /// The cell of a file; older states of the same file are forgotten.
+    fn cell(&mut self, key: &Key) -> Cell<T> {
+        self.asked += 1;
+        self.files.retain(|k, _| k.path != key.path || k == key);
+        let entry = self.files.entry(key.clone()).or_default();
+        entry.1 = self.asked;
+        entry.0.clone()
+    }
+
+    /// Forgets what nobody holds, the longest unasked first, until at most [`UNUSED_BYTES`] of it
+    /// are left.
+    fn tidy(&mut self, bytes_of: impl Fn(&T) -> usize) {
+        let mut unused: Vec<(u64, usize, Key)> = self
+            .files
+            .iter()
+            .filter_map(|(key, (cell, asked))| {
+                let bytes = match cell.get()? {
+                    Ok(file) if Arc::strong_count(file) == 1 => bytes_of(file),
+                    Ok(_) => return None,
+                    Err(_) => 0,
+                };
+                Some((*asked, bytes, key.clone()))
+            })
+            .collect();
+        unused.sort_by_key(|(asked, ..)| std::cmp::Reverse(*asked));
+        let mut sum = 0usize;
+        for (_, bytes, key) in unused {
+            sum = sum.saturating_add(bytes);
+            if sum > UNUSED_BYTES {
+                self.files.remove(&key);
+            }
+        }
+    }
+}
+
+/// All files that scenes name. Each is read once, however many scenes and threads ask, until it
+/// changes on disk; what is wrong with a file is remembered as well. What no scene holds any more
+/// is forgotten when it takes too much memory.
+pub struct Assets {
+    meshes: Mutex<Shelf<Mesh>>,
+    images: Mutex<Shelf<Image>>,
+    progress: Box<dyn Fn(&Stage) + Send + Sync>,
+}
+
+impl Default for Assets {
+    fn default() -> Self {
+        Self::new(|_| {})
+    }
+}
+
+impl fmt::Debug for Assets {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.debug_struct("Assets")
+            .field("meshes", &locked(&self.meshes).files.len())
+            .field("images", &locked(&self.images).files.len())
+            .finish()
+    }
+}
+
+impl Assets {
+    /// With nothing read. `progress` is told at the beginning of each [`Stage`], on the thread that
+    /// asked for the file.
+    pub fn new(progress: impl Fn(&Stage) + Send + Sync + 'static) -> Self {
+        Self { meshes: Mutex::default(), images: Mutex::default(), progress: Box::new(progress) }
+    }
+
+    /// The mesh in the file at `path`.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the file.
+    pub fn mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetError> {
+        let read = |key: &Key| {
+            let triangles = TriangleMesh::parse(self.read(path, key, MAX_BYTES)?)?;
+            let count = triangles.triangles.len();
+            (self.progress)(&Stage::Building { file: path.to_path_buf(), triangles: count });
+            Ok(Mesh::new(triangles))
+        };
+        load(&self.meshes, path, read, Mesh::bytes)
+    }
+
+    /// The image in the file at `path`.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the file.
+    pub fn image(&self, path: &Path) -> Result<Arc<Image>, AssetError> {
+        let read = |key: &Key| Image::parse(&self.read(path, key, MAX_IMAGE_BYTES)?);
+        load(&self.images, path, read, Image::bytes)
+    }
+
+    fn read(&self, path: &Path, key: &Key, limit: u64) -> Result<Source, AssetError> {
+        (self.progress)(&Stage::Reading { file: path.to_path_buf(), bytes: key.bytes });
+        Source::read(path, limit)
+    }
+}
+
+/// Nothing of a shelf is half done when a thread dies: a poisoned lock is as good as any.
+fn locked<T>(shelf: &Mutex<Shelf<T>>) -> MutexGuard<'_, Shelf<T>> {
+    shelf.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What `shelf` has for the file at `path`, read if need be, without holding the shelf's lock.
+fn load<T>(
+    shelf: &Mutex<Shelf<T>>,
+    path: &Path,
+    read: impl FnOnce(&Key) -> Result<T, AssetError>,
+    bytes_of: impl Fn(&T) -> usize,
+) -> Result<Arc<T>, AssetError> {
+    let metadata = std::fs::metadata(path).map_err(|e| unreadable(path, &e))?;
+    let key = Key {
+        path: std::fs::canonicalize(path).map_err(|e| unreadable(path, &e))?,
+        modified: metadata.modified().ok(),
+        bytes: metadata.len(),
+    };
+    let cell = locked(shelf).cell(&key);
+    let file = cell.get_or_init(|| read(&key).map(Arc::new)).clone();
+    locked(shelf).tidy(bytes_of);
+    file
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+    fn counted() -> (Assets, Arc<AtomicUsize>) {
+        let count = Arc::new(AtomicUsize::new(0));
+        let counter = count.clone();
+        let assets = Assets::new(move |stage| {
+            if matches!(stage, Stage::Reading { .. }) {
+                counter.fetch_add(1, Ordering::SeqCst);
+            }
+        });
+        (assets, count)
+    }
+
+    #[test]
+    fn a_file_is_read_once_until_it_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        std::fs::write(&path, TRIANGLE).unwrap();
+        let (assets, reads) = counted();
+        let meshes: Vec<_> = std::thread::scope(|scope| {
+            let asked: Vec<_> =
+                (0..8).map(|_| scope.spawn(|| assets.mesh(&path).unwrap())).collect();
+            asked.into_iter().map(|thread| thread.join().unwrap()).collect()
+        });
+        assert!(meshes.iter().all(|m| Arc::ptr_eq(m, &meshes[0])));
+        assert_eq!(reads.load(Ordering::SeqCst), 1);
+        let other = folder.path().join(".").join("a.obj");
+        assert!(Arc::ptr_eq(&assets.mesh(&other).unwrap(), &meshes[0]));
+        std::fs::write(&path, format!("{TRIANGLE}f 3 2 1\n")).unwrap();
+        assert_eq!(assets.mesh(&path).unwrap().mesh().triangles.len(), 2);
+        assert_eq!(reads.load(Ordering::SeqCst), 2);
+        assert_eq!(locked(&assets.meshes).files.len(), 1);
+    }
+
+    #[test]
+    fn errors_are_remembered_and_missing_files_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        let (assets, reads) = counted();
+        assert!(assets.mesh(&path).unwrap_err().found.contains("no such file"));
+        std::fs::write(&path, "f 1 2 3\n").unwrap();
+        for _ in 0..3 {
+            assert!(assets.mesh(&path).unwrap_err().found.contains("vertex 1"));
+        }
+        assert_eq!(reads.load(Ordering::SeqCst), 1);
+        assert!(assets.mesh(folder.path()).unwrap_err().found.contains("no regular file"));
+    }
+
+    #[test]
+    fn what_nobody_holds_is_forgotten_the_oldest_first() {
+        let mut shelf = Shelf::<usize>::default();
+        let key = |name: &str| Key { path: name.into(), modified: None, bytes: 0 };
+        let put = |shelf: &mut Shelf<usize>, name| {
+            let file = Arc::new(UNUSED_BYTES / 2);
+            shelf.cell(&key(name)).set(Ok(file.clone())).unwrap();
+            file
+        };
+        let held = put(&mut shelf, "held");
+        for name in ["a", "b", "c"] {
+            drop(put(&mut shelf, name));
+        }
+        shelf.tidy(|bytes| *bytes);
+        let known = |shelf: &Shelf<usize>, name| shelf.files.contains_key(&key(name));
+        assert!(known(&shelf, "held") && !known(&shelf, "a"));
+        assert!(known(&shelf, "b") && known(&shelf, "c"));
+        drop(held);
+        shelf.cell(&key("b"));
+        shelf.tidy(|bytes| *bytes);
+        assert!(!known(&shelf, "held") && known(&shelf, "b") && known(&shelf, "c"));
+    }
+}

@@ -1,0 +1,53 @@
+//! What is wrong with a file.
+
+use crate::value::printable;
+use std::fmt;
+use std::path::PathBuf;
+
+/// Where in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The file as a whole.
+    Whole,
+    /// A line, from 1.
+    Line(usize),
+    /// A byte, from 0.
+    Byte(usize),
+    /// A named part: `vertex 17`, `accessors[3]`.
+    Part(String),
+}
+
+/// Something wrong with a file that a scene names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AssetError {
+    /// The file.
+    pub file: PathBuf,
+    /// Where in it.
+    pub place: Place,
+    /// What was found, as a phrase.
+    pub found: String,
+    /// What would be right, as a phrase.
+    pub expected: String,
+}
+
+impl AssetError {
+    /// File, place and what was found: `bunny.obj:12: face names vertex 9, of 8`.
+    pub fn what(&self) -> String {
+        let file = self.file.display();
+        let place = match &self.place {
+            Place::Whole => String::new(),
+            Place::Line(line) => format!(":{line}"),
+            Place::Byte(byte) => format!(", byte {byte}"),
+            Place::Part(part) => format!(", {part}"),
+        };
+        printable(&format!("{file}{place}: {}", self.found)).into()
+    }
+}
+
+impl fmt::Display for AssetError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}. Expected {}.", self.what(), self.expected)
+    }
+}
+
+impl std::error::Error for AssetError {}

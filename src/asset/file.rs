@@ -1,0 +1,102 @@
+//! Reading whole files within a limit, and finding those that a file names.
+
+use super::error::{AssetError, Place};
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::{Component, Path, PathBuf};
+
+/// Largest file that is read [bytes]: 2 GiB.
+pub const MAX_BYTES: u64 = 2 << 30;
+
+/// A file in memory.
+pub struct Source {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// All of it.
+    pub bytes: Vec<u8>,
+}
+
+impl Source {
+    /// Reads the file at `path`, at most `limit` bytes.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is no regular file, or is larger.
+    pub fn read(path: &Path, limit: u64) -> Result<Self, AssetError> {
+        let file = File::open(path).map_err(|e| unreadable(path, &e))?;
+        let metadata = file.metadata().map_err(|e| unreadable(path, &e))?;
+        let wrong = |found: String, expected: &str| {
+            Err(AssetError {
+                file: path.to_path_buf(),
+                place: Place::Whole,
+                found,
+                expected: expected.to_string(),
+            })
+        };
+        if !metadata.is_file() {
+            return wrong("this is no regular file".to_string(), "a file");
+        }
+        if metadata.len() > limit {
+            let found = format!("the file has {} MiB", metadata.len() >> 20);
+            return wrong(found, &format!("at most {} MiB", limit >> 20));
+        }
+        let mut bytes = Vec::with_capacity(metadata.len() as usize);
+        // One byte more than the limit tells of a file that grew meanwhile.
+        file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| unreadable(path, &e))?;
+        if bytes.len() as u64 > limit {
+            let found = "the file grew while it was read".to_string();
+            return wrong(found, &format!("at most {} MiB", limit >> 20));
+        }
+        Ok(Self { path: path.to_path_buf(), bytes })
+    }
+
+    /// An error at `place` of this file.
+    pub fn error(&self, place: Place, found: impl Into<String>, expected: &str) -> AssetError {
+        AssetError {
+            file: self.path.clone(),
+            place,
+            found: found.into(),
+            expected: expected.to_string(),
+        }
+    }
+
+    /// The path of a file that this one names as `name`: relative to this one's folder, in it or
+    /// below. `None`: `name` leads elsewhere (an absolute path, `..`, a URL).
+    pub fn beside(&self, name: &str) -> Option<PathBuf> {
+        let name = name.replace('\\', "/");
+        let inside = Path::new(&name)
+            .components()
+            .all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+        // `C:` and `http:` alike.
+        let drive = name.split('/').next().is_some_and(|first| first.contains(':'));
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        (inside && !drive && !name.is_empty()).then(|| folder.join(name))
+    }
+}
+
+/// Why a file cannot be read.
+pub fn unreadable(path: &Path, error: &std::io::Error) -> AssetError {
+    let (found, expected) = match error.kind() {
+        ErrorKind::NotFound => ("there is no such file".to_string(), "the path of a file"),
+        ErrorKind::PermissionDenied => {
+            ("permission to read the file is denied".to_string(), "a file that may be read")
+        }
+        _ => (format!("the file cannot be read: {error}"), "a file that can be read"),
+    };
+    let expected = expected.to_string();
+    AssetError { file: path.to_path_buf(), place: Place::Whole, found, expected }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_reaches_only_its_own_folder() {
+        let source = Source { path: PathBuf::from("meshes/a.obj"), bytes: Vec::new() };
+        assert_eq!(source.beside("a.mtl"), Some(PathBuf::from("meshes/a.mtl")));
+        assert_eq!(source.beside("./x\\b.mtl"), Some(PathBuf::from("meshes/./x/b.mtl")));
+        for name in ["", "../a.mtl", "x/../../a", "/etc/passwd", "C:\\a", "http://a/b", "file:a"] {
+            assert_eq!(source.beside(name), None, "{name}");
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Images for textures: PNG and JPEG.
+
+use super::error::{AssetError, Place};
+use super::file::Source;
+use crate::value::linear_from_srgb;
+use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
+use std::io::Cursor;
+use std::sync::LazyLock;
+
+/// The most pixels in a row or column.
+pub const MAX_SIDE: u32 = 32_768;
+
+/// The most pixels: 64 Mi, in at most 402 MB when decoded and 940 MB while it is read.
+pub const MAX_PIXELS: u64 = 1 << 26;
+
+/// The most pixels that a byte of a file can stand for: deflate shrinks 1032 times at most, to at
+/// least an eighth of a byte a pixel; a JPEG spends at least one bit on 64 pixels.
+const PIXELS_PER_BYTE: u64 = 8 * 1032;
+
+/// Pixels as they are kept: one number for a grey picture, three for a coloured one, of the size that
+/// the file has.
+#[derive(Clone, Debug, PartialEq)]
+enum Texels {
+    Bytes(Vec<u8>),
+    Words(Vec<u16>),
+}
+
+/// An image, kept as it was encoded: 1 to 6 bytes a pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    size: [u32; 2],
+    channels: usize,
+    texels: Texels,
+}
+
+/// Linear light of every code from 0 to `last`.
+fn table(last: u16) -> Vec<f32> {
+    let linear = |code| linear_from_srgb(f64::from(code) / f64::from(last)) as f32;
+    (0..=last).map(linear).collect()
+}
+
+static BYTES: LazyLock<Vec<f32>> = LazyLock::new(|| table(255));
+static WORDS: LazyLock<Vec<f32>> = LazyLock::new(|| table(65535));
+
+impl Image {
+    /// From a file in memory; its first bytes say what it is.
+    pub(super) fn parse(source: &Source) -> Result<Self, AssetError> {
+        let reader = ImageReader::new(Cursor::new(&source.bytes[..])).with_guessed_format();
+        let mut reader = reader.map_err(|e| wrong(source, &ImageError::IoError(e)))?;
+        if reader.format().is_none() {
+            let found = "this is neither a PNG nor a JPEG";
+            return Err(source.error(Place::Whole, found, "a PNG or JPEG image"));
+        }
+        let mut limits = Limits::default();
+        limits.max_alloc = Some(MAX_PIXELS * 8);
+        reader.limits(limits);
+        let mut decoder = reader.into_decoder().map_err(|e| wrong(source, &e))?;
+        let (width, height) = decoder.dimensions();
+        let pixels = u64::from(width) * u64::from(height);
+        let size = format!("the image has {width} x {height} pixels");
+        if width > MAX_SIDE || height > MAX_SIDE || pixels > MAX_PIXELS {
+            let expected = format!("at most {MAX_SIDE} a side and {MAX_PIXELS} altogether");
+            return Err(source.error(Place::Whole, size, &expected));
+        }
+        if pixels > PIXELS_PER_BYTE * source.bytes.len() as u64 {
+            let found = format!("{size}, more than its {} bytes can hold", source.bytes.len());
+            return Err(source.error(Place::Whole, found, "a whole image"));
+        }
+        let orientation = decoder.orientation().map_err(|e| wrong(source, &e))?;
+        let mut image = DynamicImage::from_decoder(decoder).map_err(|e| wrong(source, &e))?;
+        image.apply_orientation(orientation);
+        let size = [image.width(), image.height()];
+        let (channels, texels) = match image {
+            DynamicImage::ImageLuma8(i) => (1, Texels::Bytes(i.into_raw())),
+            DynamicImage::ImageLuma16(i) => (1, Texels::Words(i.into_raw())),
+            DynamicImage::ImageRgb8(i) => (3, Texels::Bytes(i.into_raw())),
+            DynamicImage::ImageRgb16(i) => (3, Texels::Words(i.into_raw())),
+            // Transparency is left out.
+            i @ DynamicImage::ImageLumaA8(_) => (1, Texels::Bytes(i.into_luma8().into_raw())),
+            i @ DynamicImage::ImageLumaA16(_) => (1, Texels::Words(i.into_luma16().into_raw())),
+            i @ DynamicImage::ImageRgba16(_) => (3, Texels::Words(i.into_rgb16().into_raw())),
+            i => (3, Texels::Bytes(i.into_rgb8().into_raw())),
+        };
+        Ok(Self { size, channels, texels })
+    }
+
+    /// Width and height in pixels, each at least 1.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Memory that the pixels take [bytes].
+    pub fn bytes(&self) -> usize {
+        match &self.texels {
+            Texels::Bytes(t) => t.len(),
+            Texels::Words(t) => 2 * t.len(),
+        }
+    }
+
+    /// Linear light of the pixel in column `x` and row `y` from the top, from 0 to 1: the file's
+    /// numbers are sRGB codes.
+    ///
+    /// # Panics
+    /// If the image has no such pixel.
+    pub fn color(&self, x: u32, y: u32) -> [f32; 3] {
+        let at = self.index(x, y);
+        let channel = |c: usize| match &self.texels {
+            Texels::Bytes(t) => BYTES[usize::from(t[at + c])],
+            Texels::Words(t) => WORDS[usize::from(t[at + c])],
+        };
+        if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
+    }
+
+    /// The number of the pixel in column `x` and row `y` from the top as a height, from 0 to 1: as it
+    /// stands in the file, of a coloured image the mean of the channels.
+    ///
+    /// # Panics
+    /// If the image has no such pixel.
+    pub fn height(&self, x: u32, y: u32) -> f32 {
+        let at = self.index(x, y);
+        let sum: f32 = match &self.texels {
+            Texels::Bytes(t) => {
+                t[at..at + self.channels].iter().map(|b| f32::from(*b) / 255.0).sum()
+            }
+            Texels::Words(t) => {
+                t[at..at + self.channels].iter().map(|b| f32::from(*b) / 65535.0).sum()
+            }
+        };
+        sum / self.channels as f32
+    }
+
+    fn index(&self, x: u32, y: u32) -> usize {
+        assert!(x < self.size[0] && y < self.size[1], "no pixel {x}, {y}");
+        (y as usize * self.size[0] as usize + x as usize) * self.channels
+    }
+}
+
+fn wrong(source: &Source, error: &ImageError) -> AssetError {
+    source.error(Place::Whole, format!("the image cannot be read: {error}"), "a PNG or JPEG image")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{ImageFormat, Luma, Rgba};
+    use std::path::PathBuf;
+
+    fn file(image: DynamicImage, format: ImageFormat) -> Source {
+        let mut bytes = Cursor::new(Vec::new());
+        image.write_to(&mut bytes, format).unwrap();
+        Source { path: PathBuf::from("a.png"), bytes: bytes.into_inner() }
+    }
+
+    #[test]
+    fn pixels_keep_their_numbers() {
+        let mut rgba = image::RgbaImage::from_pixel(3, 2, Rgba([255, 0, 0, 7]));
+        rgba.put_pixel(2, 1, Rgba([128, 255, 0, 255]));
+        let image = Image::parse(&file(rgba.into(), ImageFormat::Png)).unwrap();
+        assert_eq!(image.size(), [3, 2]);
+        assert_eq!(image.bytes(), 18);
+        assert_eq!(image.color(0, 0), [1.0, 0.0, 0.0]);
+        assert!((image.color(2, 1)[0] - 0.215_86).abs() < 1e-5);
+        assert!((image.height(2, 1) - (128.0 + 255.0) / 765.0).abs() < 1e-6);
+        let grey = image::ImageBuffer::from_fn(2, 2, |x, y| Luma([(x + 2 * y) as u16 * 1000]));
+        let image = Image::parse(&file(grey.into(), ImageFormat::Png)).unwrap();
+        assert_eq!(image.height(1, 1), 3000.0 / 65535.0);
+        assert_eq!(image.bytes(), 8);
+    }
+
+    #[test]
+    fn jpeg_is_read() {
+        let rgb = image::RgbImage::from_pixel(20, 10, image::Rgb([200, 100, 50]));
+        let image = Image::parse(&file(rgb.into(), ImageFormat::Jpeg)).unwrap();
+        assert_eq!(image.size(), [20, 10]);
+        let [r, g, b] = image.color(10, 5);
+        assert!((r - BYTES[200]).abs() < 0.02 && r > g && g > b);
+    }
+
+    /// A PNG header that announces so many pixels, with a right checksum and no pixels.
+    fn announced(side: u32) -> Source {
+        let mut source = file(image::GrayImage::new(1, 1).into(), ImageFormat::Png);
+        source.bytes[16..20].copy_from_slice(&side.to_be_bytes());
+        source.bytes[20..24].copy_from_slice(&side.to_be_bytes());
+        let crc = source.bytes[12..29].iter().fold(u32::MAX, |mut crc, byte| {
+            crc ^= u32::from(*byte);
+            for _ in 0..8 {
+                crc = crc >> 1 ^ (0xEDB8_8320 & (crc & 1).wrapping_neg());
+            }
+            crc
+        });
+        source.bytes[29..33].copy_from_slice(&(!crc).to_be_bytes());
+        source
+    }
+
+    #[test]
+    fn too_large_an_image_is_refused_before_it_is_decoded() {
+        for (side, words) in
+            [(60_000, "60000 x 60000"), (8_000, "more than its"), (u32::MAX >> 1, "cannot be read")]
+        {
+            let error = Image::parse(&announced(side)).unwrap_err();
+            assert!(error.found.contains(words), "{side}: {error}");
+        }
+        let text = Source { path: PathBuf::from("a.png"), bytes: b"no image".to_vec() };
+        assert!(Image::parse(&text).unwrap_err().found.contains("neither"));
+        let mut half = file(image::GrayImage::new(50, 50).into(), ImageFormat::Png);
+        half.bytes.truncate(60);
+        assert!(Image::parse(&half).is_err());
+    }
+}

@@ -1,0 +1,352 @@
+//! Collects the parts of a mesh as a reader finds them, then checks and compacts them.
+
+use super::normals::smooth;
+use super::{MAX_TRIANGLES, MAX_VERTICES, TriangleMesh};
+use crate::asset::error::{AssetError, Place};
+use crate::asset::file::Source;
+use std::collections::HashMap;
+
+/// Largest magnitude of a coordinate.
+const FARTHEST: f64 = 1e9;
+
+/// Smallest extent of a mesh: products of three single-precision coordinates stay normal numbers.
+const SMALLEST: f64 = 1e-9;
+
+/// A mesh so far off its origin that this many of its sizes lie between is moved there.
+const FAR_OFF: f64 = 16.0;
+
+/// A mesh under construction.
+pub struct Builder<'a> {
+    source: &'a Source,
+    positions: Vec<[f64; 3]>,
+    /// As long as `positions`, or shorter where the rest has none; zero: none.
+    normals: Vec<[f32; 3]>,
+    /// As long as `positions`, or shorter where the rest has none.
+    uvs: Vec<[f32; 2]>,
+    triangles: Vec<[u32; 3]>,
+    colors: Vec<[f32; 3]>,
+    color_of: Vec<u16>,
+    color: u16,
+    notes: Vec<String>,
+}
+
+impl<'a> Builder<'a> {
+    /// With nothing yet.
+    pub fn new(source: &'a Source) -> Self {
+        Self {
+            source,
+            positions: Vec::new(),
+            normals: Vec::new(),
+            uvs: Vec::new(),
+            triangles: Vec::new(),
+            colors: Vec::new(),
+            color_of: Vec::new(),
+            color: 0,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Makes room for so many more, which have been checked against the length of the file.
+    pub fn reserve(&mut self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
+        self.limits(vertices, triangles)?;
+        self.positions.reserve(vertices);
+        self.triangles.reserve(triangles);
+        Ok(())
+    }
+
+    /// Whether so many more would be too many.
+    pub fn limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
+        let checks = [
+            (self.positions.len().saturating_add(vertices), MAX_VERTICES, "vertices"),
+            (self.triangles.len().saturating_add(triangles), MAX_TRIANGLES, "triangles"),
+        ];
+        for (count, most, what) in checks {
+            if count > most {
+                let found = format!("the mesh has {count} {what}");
+                let expected = format!("at most {most}");
+                return Err(self.source.error(Place::Whole, found, &expected));
+            }
+        }
+        Ok(())
+    }
+
+    /// Says what was left out or replaced.
+    pub fn note(&mut self, note: String) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    /// Number of vertices so far.
+    pub fn vertices(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// One more vertex. Beyond [`MAX_VERTICES`] it is counted, and refused in the end.
+    pub fn vertex(&mut self, position: [f64; 3]) {
+        self.positions.push(position);
+    }
+
+    /// The normal of the last vertex.
+    pub fn normal(&mut self, normal: [f32; 3]) {
+        self.normals.resize(self.positions.len(), [0.0; 3]);
+        if let Some(last) = self.normals.last_mut() {
+            *last = normal;
+        }
+    }
+
+    /// The texture coordinates of the last vertex.
+    pub fn uv(&mut self, uv: [f32; 2]) {
+        self.uvs.resize(self.positions.len(), [0.0; 2]);
+        if let Some(last) = self.uvs.last_mut() {
+            *last = uv;
+        }
+    }
+
+    /// Whether a colour was named.
+    pub fn has_colors(&self) -> bool {
+        !self.colors.is_empty()
+    }
+
+    /// The linear base colour of the triangles that follow; those before the first are white.
+    pub fn color(&mut self, color: [f32; 3]) -> Result<(), AssetError> {
+        if self.colors.is_empty() && !self.triangles.is_empty() {
+            self.colors.push([1.0; 3]);
+        }
+        let found = self.colors.iter().rposition(|c| *c == color);
+        let index = found.unwrap_or(self.colors.len());
+        self.color = u16::try_from(index).map_err(|_| {
+            let found = "the mesh has more than 65536 different colours";
+            self.source.error(Place::Whole, found, "at most 65536")
+        })?;
+        if found.is_none() {
+            self.colors.push(color);
+        }
+        Ok(())
+    }
+
+    /// One more triangle; `place` says where it stands.
+    ///
+    /// # Errors
+    /// If it names a vertex that does not exist, or is one too many.
+    pub fn triangle(
+        &mut self,
+        corners: [u32; 3],
+        place: impl Fn() -> Place,
+    ) -> Result<(), AssetError> {
+        let vertices = self.positions.len();
+        if let Some(beyond) = corners.iter().find(|i| **i as usize >= vertices) {
+            let found = format!("the face names vertex {beyond}, counted from 0");
+            let expected = format!("a vertex below {vertices}, their number");
+            return Err(self.source.error(place(), found, &expected));
+        }
+        self.limits(0, 1)?;
+        self.triangles.push(corners);
+        if self.colors.len() > 1 {
+            // Triangles before the first change of colour.
+            self.color_of.resize(self.triangles.len() - 1, 0);
+            self.color_of.push(self.color);
+        }
+        Ok(())
+    }
+
+    /// The triangles of a polygon: a fan around its first corner.
+    pub fn polygon(
+        &mut self,
+        corners: &[u32],
+        place: impl Fn() -> Place,
+    ) -> Result<(), AssetError> {
+        for pair in corners.get(1..).unwrap_or_default().windows(2) {
+            self.triangle([corners[0], pair[0], pair[1]], &place)?;
+        }
+        Ok(())
+    }
+
+    /// Checks everything.
+    ///
+    /// # Errors
+    /// If there is no triangle with an area, or a coordinate is not finite or out of range.
+    pub fn finish(mut self) -> Result<TriangleMesh, AssetError> {
+        self.limits(0, 0)?;
+        let source = self.source;
+        if self.triangles.is_empty() {
+            return Err(source.error(Place::Whole, "the mesh has no triangles", "at least one"));
+        }
+        self.coordinates()?;
+        let center = self.center()?;
+        let positions: Vec<[f32; 3]> = self
+            .positions
+            .drain(..)
+            .map(|p| std::array::from_fn(|i| (p[i] - center[i]) as f32))
+            .collect();
+        self.positions = Vec::new();
+        self.drop_flat(&positions)?;
+        let mut bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+        for corner in self.triangles.iter().flatten() {
+            for (i, x) in positions[*corner as usize].into_iter().enumerate() {
+                bounds[0][i] = bounds[0][i].min(x);
+                bounds[1][i] = bounds[1][i].max(x);
+            }
+        }
+        let extent = (0..3).map(|i| f64::from(bounds[1][i]) - f64::from(bounds[0][i]));
+        let extent = extent.fold(0.0, f64::max);
+        if extent < SMALLEST {
+            let found = format!("the mesh is {extent:e} large");
+            return Err(source.error(Place::Whole, found, "a size from 1e-9 to 1e9"));
+        }
+        let normals = self.unit_normals(&positions);
+        let uvs = self.checked_uvs(positions.len())?;
+        self.triangles.shrink_to_fit();
+        let color_of = if self.colors.len() > 1 {
+            self.color_of.resize(self.triangles.len(), 0);
+            self.color_of
+        } else {
+            Vec::new()
+        };
+        Ok(TriangleMesh {
+            positions,
+            center,
+            triangles: self.triangles,
+            normals,
+            uvs,
+            colors: self.colors,
+            color_of,
+            bounds,
+            notes: self.notes,
+        })
+    }
+
+    /// All coordinates are finite and within range.
+    fn coordinates(&self) -> Result<(), AssetError> {
+        let bad = |p: &[f64; 3]| p.iter().any(|x| !(x.abs() <= FARTHEST));
+        match self.positions.iter().position(bad) {
+            None => Ok(()),
+            Some(i) => {
+                let [x, y, z] = self.positions[i];
+                let place = Place::Part(format!("vertex {i} (from 0)"));
+                let found = format!("a vertex lies at [{x}, {y}, {z}]");
+                Err(self.source.error(place, found, "coordinates from -1e9 to 1e9"))
+            }
+        }
+    }
+
+    /// The point that single-precision coordinates are relative to.
+    fn center(&self) -> Result<[f64; 3], AssetError> {
+        let mut low = [f64::INFINITY; 3];
+        let mut high = [f64::NEG_INFINITY; 3];
+        for p in &self.positions {
+            for i in 0..3 {
+                low[i] = low[i].min(p[i]);
+                high[i] = high[i].max(p[i]);
+            }
+        }
+        let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
+        let reach = (0..3).map(|i| low[i].abs().max(high[i].abs())).fold(0.0, f64::max);
+        let center: [f64; 3] = std::array::from_fn(|i| 0.5 * (low[i] + high[i]));
+        Ok(if reach > FAR_OFF * extent { center } else { [0.0; 3] })
+    }
+
+    /// Drops triangles without an area.
+    fn drop_flat(&mut self, positions: &[[f32; 3]]) -> Result<(), AssetError> {
+        let before = self.triangles.len();
+        let solid = |t: &[u32; 3]| {
+            let p = t.map(|i| positions[i as usize].map(f64::from));
+            let (a, b) = (minus(p[1], p[0]), minus(p[2], p[0]));
+            cross(a, b) != [0.0; 3]
+        };
+        if self.color_of.is_empty() {
+            self.triangles.retain(solid);
+        } else {
+            let keep: Vec<bool> = self.triangles.iter().map(solid).collect();
+            let mut kept = keep.iter();
+            self.triangles.retain(|_| *kept.next().unwrap_or(&true));
+            let mut kept = keep.iter();
+            self.color_of.retain(|_| *kept.next().unwrap_or(&true));
+        }
+        let dropped = before - self.triangles.len();
+        if self.triangles.is_empty() {
+            let found = format!("none of the {before} triangles has an area");
+            return Err(self.source.error(Place::Whole, found, "at least one that has"));
+        }
+        match dropped {
+            0 => {}
+            1 => self.notes.push("1 triangle without area was left out".to_string()),
+            n => self.notes.push(format!("{n} triangles without area were left out")),
+        }
+        Ok(())
+    }
+
+    /// Normals of length 1; those that are missing or have no direction from the triangles.
+    fn unit_normals(&mut self, positions: &[[f32; 3]]) -> Option<Vec<[f32; 3]>> {
+        let mut normals = std::mem::take(&mut self.normals);
+        if normals.is_empty() {
+            return None;
+        }
+        normals.resize(positions.len(), [0.0; 3]);
+        let mut without = 0;
+        for n in &mut normals {
+            let d = n.map(f64::from);
+            let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+            if length.is_finite() && length > 0.0 {
+                *n = d.map(|x| (x / length) as f32);
+            } else {
+                *n = [0.0; 3];
+                without += 1;
+            }
+        }
+        if without == normals.len() {
+            return None;
+        }
+        if without > 0 {
+            let computed = smooth(positions, &self.triangles);
+            for (n, c) in normals.iter_mut().zip(computed).filter(|(n, _)| **n == [0.0; 3]) {
+                *n = c;
+            }
+            self.notes.push(format!("{without} vertices have no normal in the file; computed"));
+        }
+        Some(normals)
+    }
+
+    /// Texture coordinates, all finite.
+    fn checked_uvs(&mut self, vertices: usize) -> Result<Option<Vec<[f32; 2]>>, AssetError> {
+        let mut uvs = std::mem::take(&mut self.uvs);
+        if uvs.is_empty() {
+            return Ok(None);
+        }
+        if let Some(i) = uvs.iter().position(|uv| uv.iter().any(|x| !x.is_finite())) {
+            let place = Place::Part(format!("vertex {i} (from 0)"));
+            let found = format!("texture coordinates are [{}, {}]", uvs[i][0], uvs[i][1]);
+            return Err(self.source.error(place, found, "finite numbers"));
+        }
+        uvs.resize(vertices, [0.0; 2]);
+        Ok(Some(uvs))
+    }
+}
+
+/// Joins vertices at the same place: for files that give each triangle its own.
+#[derive(Default)]
+pub struct Welder {
+    known: HashMap<[u32; 3], u32>,
+}
+
+impl Welder {
+    /// The number of the vertex at `position`, new or known.
+    pub fn index(&mut self, position: [f32; 3], builder: &mut Builder) -> u32 {
+        // Both zeros are one place.
+        let key = position.map(|x| if x == 0.0 { 0 } else { x.to_bits() });
+        *self.known.entry(key).or_insert_with(|| {
+            builder.vertex(position.map(f64::from));
+            (builder.vertices() - 1) as u32
+        })
+    }
+}
+
+/// a - b.
+pub fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+/// Vector product.
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}

@@ -1,0 +1,316 @@
+//! PLY, ASCII and binary of both byte orders: positions, normals, texture coordinates, polygons.
+
+use super::TriangleMesh;
+use super::builder::Builder;
+use crate::asset::error::{AssetError, Place};
+use crate::asset::file::Source;
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
+use ply_rs_bw::ply::{
+    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
+    ScalarType,
+};
+
+/// Elements are taken from the library in pieces of this many, so that they are never all in memory.
+const PIECE: usize = 4096;
+
+/// The numbers of a vertex that matter, by the names that writers give them.
+const NUMBERS: [&[&str]; 8] = [
+    &["x"],
+    &["y"],
+    &["z"],
+    &["nx"],
+    &["ny"],
+    &["nz"],
+    &["u", "s", "texture_u"],
+    &["v", "t", "texture_v"],
+];
+
+/// The lists of a face that name its corners.
+const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// One vertex or face as the library fills it in.
+struct Record {
+    numbers: [f64; 8],
+    corners: Vec<u32>,
+}
+
+impl PropertyAccess for Record {
+    fn new() -> Self {
+        Self { numbers: [0.0; 8], corners: Vec::new() }
+    }
+
+    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        let number = match value {
+            Property::Float(x) => f64::from(x),
+            Property::Double(x) => x,
+            Property::Char(x) => f64::from(x),
+            Property::UChar(x) => f64::from(x),
+            Property::Short(x) => f64::from(x),
+            Property::UShort(x) => f64::from(x),
+            Property::Int(x) => f64::from(x),
+            Property::UInt(x) => f64::from(x),
+            list => return self.set_list(name, list),
+        };
+        match NUMBERS.iter().position(|names| names.contains(&name)) {
+            Some(i) => {
+                self.numbers[i] = number;
+                PropertyAccessResult::Set
+            }
+            None => PropertyAccessResult::Ignored,
+        }
+    }
+}
+
+impl Record {
+    fn set_list(&mut self, name: &str, list: Property) -> PropertyAccessResult {
+        if !CORNERS.contains(&name) {
+            return PropertyAccessResult::Ignored;
+        }
+        // What is negative or no integer becomes an index that no mesh has.
+        const NONE: u32 = u32::MAX;
+        self.corners = match list {
+            Property::ListUInt(list) => list,
+            Property::ListInt(list) => {
+                list.into_iter().map(|i| u32::try_from(i).unwrap_or(NONE)).collect()
+            }
+            Property::ListShort(list) => {
+                list.into_iter().map(|i| u32::try_from(i).unwrap_or(NONE)).collect()
+            }
+            Property::ListChar(list) => {
+                list.into_iter().map(|i| u32::try_from(i).unwrap_or(NONE)).collect()
+            }
+            Property::ListUShort(list) => list.into_iter().map(u32::from).collect(),
+            Property::ListUChar(list) => list.into_iter().map(u32::from).collect(),
+            _ => return PropertyAccessResult::UnsupportedType,
+        };
+        PropertyAccessResult::Set
+    }
+}
+
+/// Reads a mesh.
+pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
+    let parser = Parser::<Record>::new();
+    let mut reader = Reader::new(&source.bytes[..]);
+    let header = parser.read_header(&mut reader).map_err(|e| wrong(source, &e, None))?;
+    check_header(source, &header, reader.get_ref().len())?;
+    let mut builder = Builder::new(source);
+    for element in header.elements.values() {
+        let has = |names: &[&str]| names.iter().any(|n| element.properties.contains_key(*n));
+        let (normals, uvs) =
+            (NUMBERS[3..6].iter().all(|n| has(n)), NUMBERS[6..].iter().all(|n| has(n)));
+        match element.name.as_str() {
+            "vertex" => builder.reserve(element.count, 0)?,
+            "face" => builder.reserve(0, element.count)?,
+            _ => {}
+        }
+        let mut piece = element.clone();
+        let mut done = 0;
+        while done < element.count {
+            piece.count = PIECE.min(element.count - done);
+            let records = parser.read_payload_for_element(&mut reader, &piece, &header);
+            let records = records.map_err(|e| {
+                let byte = source.bytes.len() - reader.get_ref().len();
+                wrong(source, &e, (header.encoding != Encoding::Ascii).then_some(byte))
+            })?;
+            for (i, record) in records.iter().enumerate() {
+                let n = &record.numbers;
+                match element.name.as_str() {
+                    "vertex" => {
+                        builder.vertex([n[0], n[1], n[2]]);
+                        if normals {
+                            builder.normal([n[3] as f32, n[4] as f32, n[5] as f32]);
+                        }
+                        if uvs {
+                            builder.uv([n[6] as f32, n[7] as f32]);
+                        }
+                    }
+                    "face" => {
+                        let place = || Place::Part(format!("face {} (from 0)", done + i));
+                        builder.polygon(&record.corners, place)?;
+                    }
+                    _ => {}
+                }
+            }
+            done += piece.count;
+        }
+    }
+    builder.finish()
+}
+
+/// What the library says of a file.
+fn wrong(source: &Source, error: &ParseError, byte: Option<usize>) -> AssetError {
+    let place = match (byte, error.line()) {
+        (Some(byte), _) => Place::Byte(byte),
+        (None, Some(line)) => Place::Line(line),
+        (None, None) => Place::Whole,
+    };
+    let message = error.to_string();
+    // The first line says what, the rest repeats the input.
+    let first = message.lines().next().unwrap_or_default();
+    let first =
+        first.split_once(": ").filter(|(l, _)| l.starts_with("Line ")).map_or(first, |p| p.1);
+    source.error(place, first.trim_end_matches(['.', ':']), "a PLY file")
+}
+
+/// Checks what the header announces against what there is: `left` bytes.
+fn check_header(source: &Source, header: &Header, left: usize) -> Result<(), AssetError> {
+    let missing = |what: &str| {
+        Err(source.error(Place::Whole, format!("the header names no {what}"), "a mesh"))
+    };
+    let Some(vertex) = header.elements.get("vertex") else { return missing("element vertex") };
+    for names in &NUMBERS[..3] {
+        if !vertex.properties.contains_key(names[0]) {
+            return missing(&format!("property {} of vertices", names[0]));
+        }
+    }
+    let Some(face) = header.elements.get("face") else { return missing("element face") };
+    if !CORNERS.iter().any(|name| face.properties.contains_key(*name)) {
+        return missing("list vertex_indices of faces");
+    }
+    let order = |name| header.elements.get_index_of(name);
+    if order("face") < order("vertex") {
+        let found = "the faces stand before the vertices";
+        return Err(source.error(Place::Whole, found, "vertices first"));
+    }
+    let mut least = 0u128;
+    for element in header.elements.values() {
+        let bytes = least_bytes(element, header.encoding);
+        if bytes == 0 && element.count > 0 {
+            let found = format!("the element {} has no properties", element.name);
+            return Err(source.error(Place::Whole, found, "at least one"));
+        }
+        least += bytes as u128 * element.count as u128;
+        if least > left as u128 + 1 {
+            let found = format!(
+                "the header announces {} times {}, more than the file holds",
+                element.count, element.name
+            );
+            return Err(source.error(Place::Whole, found, "as many as there are"));
+        }
+    }
+    Ok(())
+}
+
+/// The fewest bytes that an element takes; a digit and a separator in a text.
+fn least_bytes(element: &ElementDef, encoding: Encoding) -> usize {
+    let size = |scalar: &ScalarType| match scalar {
+        _ if encoding == Encoding::Ascii => 2,
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    };
+    let least = |p: &PropertyType| match p {
+        PropertyType::Scalar(scalar) | PropertyType::List(scalar, _) => size(scalar),
+    };
+    element.properties.values().map(|p| least(&p.data_type)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+
+    fn read(bytes: &[u8]) -> Result<TriangleMesh, AssetError> {
+        parse(&Source { path: PathBuf::from("a.ply"), bytes: bytes.to_vec() })
+    }
+
+    fn header(format: &str, vertices: &str, faces: &str) -> String {
+        format!(
+            "ply\nformat {format} 1.0\ncomment x\nelement vertex {vertices}\nproperty float x\n\
+             property double y\nproperty float z\nproperty float s\nproperty float t\n\
+             element face {faces}\nproperty list uchar int vertex_indices\nproperty uchar red\n\
+             end_header\n"
+        )
+    }
+
+    const TEXT: &str = "0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n4 0 1 2 3 255\n";
+
+    #[test]
+    fn three_encodings_give_the_same_mesh() {
+        let text = read((header("ascii", "4", "1") + TEXT).as_bytes()).unwrap();
+        assert_eq!(text.triangles, [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(text.uvs.as_ref().unwrap()[2], [1.0, 1.0]);
+        for big in [false, true] {
+            let format = if big { "binary_big_endian" } else { "binary_little_endian" };
+            let mut bytes = header(format, "4", "1").into_bytes();
+            let mut put = |mut b: Vec<u8>| {
+                if big {
+                    b.reverse();
+                }
+                bytes.extend(b);
+            };
+            for [x, y] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+                put(f32::to_le_bytes(x).to_vec());
+                put(f64::to_le_bytes(f64::from(y)).to_vec());
+                put(f32::to_le_bytes(0.0).to_vec());
+                put(f32::to_le_bytes(x).to_vec());
+                put(f32::to_le_bytes(y).to_vec());
+            }
+            put(vec![4]);
+            (0..4).for_each(|i: i32| put(i.to_le_bytes().to_vec()));
+            put(vec![255]);
+            assert_eq!(read(&bytes).unwrap(), text, "{format}");
+            bytes.truncate(bytes.len() - 3);
+            let error = read(&bytes).unwrap_err();
+            assert!(matches!(error.place, Place::Byte(_)), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        for (text, place, words) in [
+            (header("ascii", "9999999999", "1") + TEXT, Place::Whole, "9999999999 times vertex"),
+            (
+                header("ascii", "4", "1") + &TEXT.replace("4 0 1 2 3", "4 0 1 2 4"),
+                Place::Part("face 0 (from 0)".into()),
+                "vertex 4",
+            ),
+            (
+                header("ascii", "4", "1") + &TEXT.replace("4 0 1 2 3", "4 0 1 2 -3"),
+                Place::Part("face 0 (from 0)".into()),
+                "vertex 4294967295",
+            ),
+            (
+                header("ascii", "4", "1") + &TEXT.replace("1 1 0 1 1", "1 x 0 1 1"),
+                Place::Line(16),
+                "Couldn't",
+            ),
+            (header("ascii", "4", "0") + TEXT, Place::Whole, "no triangles"),
+            (
+                header("ascii", "4", "1").replace("float z", "float w") + TEXT,
+                Place::Whole,
+                "property z",
+            ),
+            (
+                "ply\nformat ascii 1.0\nelement nothing 4000000000\nend_header\n".into(),
+                Place::Whole,
+                "no element vertex",
+            ),
+            (
+                header("ascii", "4", "1").replace("end_header", "element n 4000000000\nend_header")
+                    + TEXT,
+                Place::Whole,
+                "no properties",
+            ),
+            ("plx\n".into(), Place::Line(1), "magic"),
+        ] {
+            let error = read(text.as_bytes()).unwrap_err();
+            assert!(error.found.contains(words), "{error}");
+            assert_eq!(error.place, place, "{error}");
+        }
+    }
+
+    #[test]
+    fn coordinates_far_from_the_origin_keep_their_shape() {
+        let text = TEXT
+            .replace("1 1 0 1 1", "1 100000000.125 0 1 1")
+            .replace("0 1 0 0 1", "0 100000001 0 0 1");
+        let text = text
+            .replace("0 0 0 0 0", "0 100000000 0 0 0")
+            .replace("1 0 0 1 0", "1 100000000 0 1 0");
+        let mesh = read((header("ascii", "4", "1") + &text).as_bytes()).unwrap();
+        let y: Vec<f64> = mesh.positions.iter().map(|p| f64::from(p[1]) + mesh.center[1]).collect();
+        assert_eq!(y, [1e8, 1e8, 1e8 + 0.125, 1e8 + 1.0]);
+    }
+}

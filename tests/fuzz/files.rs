@@ -1,0 +1,217 @@
+//! Good files of every kind, small, with everything that readers look at.
+
+use image::{DynamicImage, ImageFormat};
+use std::io::Cursor;
+
+/// A ball of triangles: corners, and the corners of each triangle.
+fn ball(rings: usize, sides: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    let mut points = Vec::new();
+    for ring in 0..=rings {
+        let polar = std::f32::consts::PI * ring as f32 / rings as f32;
+        for side in 0..sides {
+            let around = std::f32::consts::TAU * side as f32 / sides as f32;
+            points.push([polar.sin() * around.cos(), polar.cos(), polar.sin() * around.sin()]);
+        }
+    }
+    let index = |ring: usize, side: usize| (ring * sides + side % sides) as u32;
+    let mut triangles = Vec::new();
+    for ring in 0..rings {
+        for side in 0..sides {
+            let [a, b] = [index(ring, side), index(ring, side + 1)];
+            let [c, d] = [index(ring + 1, side), index(ring + 1, side + 1)];
+            triangles.extend([[a, b, c], [b, d, c]]);
+        }
+    }
+    (points, triangles)
+}
+
+/// Materials for [`obj`].
+pub const MTL: &str = "# colours\nnewmtl red\nKa 0 0 0\nKd 0.8 0.1 0.1\nNs 10\nillum 2\n\
+                       map_Kd a.png\nnewmtl grey\nKd 0.5\nd 1.0\n";
+
+/// With and without materials, normals and texture coordinates.
+pub fn obj() -> Vec<Vec<u8>> {
+    let (points, triangles) = ball(4, 6);
+    let mut plain = String::from("# a ball\no ball\n");
+    let mut full = String::from("mtllib a.mtl\n");
+    for [x, y, z] in &points {
+        plain += &format!("v {x} {y} {z}\n");
+        full += &format!("v {x} {y} {z} 1.0 0.5 0.0\nvn {x} {y} {z}\nvt {x} {y}\n");
+    }
+    full += "usemtl red\n";
+    for (n, t) in triangles.iter().enumerate() {
+        let [a, b, c] = t.map(|i| i + 1);
+        plain += &format!("f {a} {b} {c}\n");
+        if n == 20 {
+            full += "g second\nusemtl grey\ns off\nl 1 2\n";
+        }
+        full += &format!("f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}\n");
+    }
+    full += "f -1 -2 -3 -4\n";
+    vec![full.into(), plain.into()]
+}
+
+/// ASCII, little-endian and big-endian.
+pub fn ply() -> Vec<Vec<u8>> {
+    let (points, triangles) = ball(4, 6);
+    ["ascii", "binary_little_endian", "binary_big_endian"]
+        .iter()
+        .map(|format| {
+            let mut out = format!(
+                "ply\nformat {format} 1.0\ncomment made here\nelement vertex {}\nproperty float x\n\
+                 property float y\nproperty float z\nproperty float nx\nproperty float ny\n\
+                 property float nz\nproperty uchar red\nelement face {}\n\
+                 property list uchar int vertex_indices\nend_header\n",
+                points.len(),
+                triangles.len()
+            )
+            .into_bytes();
+            let mut put = |text: String, bytes: &[u8]| match *format {
+                "ascii" => out.extend(text.bytes()),
+                "binary_little_endian" => out.extend(bytes),
+                _ => out.extend(bytes.iter().rev()),
+            };
+            for p in &points {
+                for x in p.iter().chain(p) {
+                    put(format!("{x:.6} "), &x.to_le_bytes());
+                }
+                put("7\n".into(), &[7]);
+            }
+            for t in &triangles {
+                put("3".into(), &[3]);
+                t.iter().for_each(|i| put(format!(" {i}"), &i.to_le_bytes()));
+                put("\n".into(), &[]);
+            }
+            out
+        })
+        .collect()
+}
+
+/// ASCII and binary.
+pub fn stl() -> Vec<Vec<u8>> {
+    let (points, triangles) = ball(4, 6);
+    let mut text = String::from("solid ball\n");
+    let mut bytes = vec![b'x'; 80];
+    bytes.extend((triangles.len() as u32).to_le_bytes());
+    for t in &triangles {
+        text += "  facet normal 0 0 1\n    outer loop\n";
+        [0.0f32, 0.0, 1.0].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+        for [x, y, z] in t.map(|i| points[i as usize]) {
+            text += &format!("      vertex {x} {y} {z}\n");
+            [x, y, z].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+        }
+        text += "    endloop\n  endfacet\n";
+        bytes.extend([0, 0]);
+    }
+    text += "endsolid ball\n";
+    vec![text.into(), bytes]
+}
+
+/// The description and the buffer of a glTF file; `uri` is the entry that says where the buffer is.
+fn description(uri: &str) -> (String, Vec<u8>) {
+    let (points, triangles) = ball(4, 6);
+    let mut buffer = Vec::new();
+    points.iter().flatten().for_each(|x| buffer.extend(x.to_le_bytes()));
+    let uvs = buffer.len();
+    points.iter().flat_map(|p| &p[..2]).for_each(|x| buffer.extend(x.to_le_bytes()));
+    let faces = buffer.len();
+    triangles.iter().flatten().for_each(|i| buffer.extend((*i as u16).to_le_bytes()));
+    let text = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],
+"nodes":[{{"children":[1,2]}},{{"mesh":0,"translation":[1,2,3],"rotation":[0,0,0.6,0.8]}},
+{{"mesh":0,"matrix":[2,0,0,0,0,2,0,0,0,0,-2,0,5,0,0,1]}}],
+"materials":[{{"pbrMetallicRoughness":{{"baseColorFactor":[0.5,0.25,0,1]}}}}],
+"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"NORMAL":0,"TEXCOORD_0":1}},"indices":2,"material":0}},
+{{"attributes":{{"POSITION":0}},"mode":5}}]}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":{n},"type":"VEC3","min":[-1,-1,-1],"max":[1,1,1]}},
+{{"bufferView":1,"componentType":5126,"count":{n},"type":"VEC2"}},
+{{"bufferView":2,"componentType":5123,"count":{t},"type":"SCALAR"}}],
+"bufferViews":[{{"buffer":0,"byteLength":{uvs},"byteStride":12}},
+{{"buffer":0,"byteOffset":{uvs},"byteLength":{uv_bytes}}},
+{{"buffer":0,"byteOffset":{faces},"byteLength":{face_bytes}}}],
+"buffers":[{{{uri}"byteLength":{all}}}]}}"#,
+        n = points.len(),
+        t = 3 * triangles.len(),
+        uv_bytes = faces - uvs,
+        face_bytes = buffer.len() - faces,
+        all = buffer.len(),
+    );
+    (text, buffer)
+}
+
+/// Binary glTF.
+pub fn glb() -> Vec<Vec<u8>> {
+    let (mut text, mut buffer) = description("");
+    while text.len() % 4 != 0 {
+        text.push(' ');
+    }
+    buffer.resize(buffer.len().next_multiple_of(4), 0);
+    let mut out = b"glTF".to_vec();
+    let total = 12 + 8 + text.len() + 8 + buffer.len();
+    out.extend(2u32.to_le_bytes());
+    out.extend((total as u32).to_le_bytes());
+    out.extend((text.len() as u32).to_le_bytes());
+    out.extend(b"JSON");
+    out.extend(text.bytes());
+    out.extend((buffer.len() as u32).to_le_bytes());
+    out.extend(b"BIN\0");
+    out.extend(buffer);
+    vec![out]
+}
+
+/// A glTF with its buffer inside.
+pub fn gltf() -> Vec<Vec<u8>> {
+    let (_, buffer) = description("");
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut data = String::new();
+    for three in buffer.chunks(3) {
+        let word = (0..3).fold(0u32, |w, i| w << 8 | u32::from(*three.get(i).unwrap_or(&0)));
+        for digit in 0..4 {
+            let used = digit <= three.len();
+            let index = word >> (18 - 6 * digit) & 63;
+            data.push(if used { char::from(DIGITS[index as usize]) } else { '=' });
+        }
+    }
+    let uri = format!("\"uri\":\"data:application/octet-stream;base64,{data}\",");
+    vec![description(&uri).0.into()]
+}
+
+fn encoded(image: DynamicImage, format: ImageFormat) -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    image.write_to(&mut bytes, format).unwrap();
+    bytes.into_inner()
+}
+
+fn picture(width: u32, height: u32) -> image::RgbImage {
+    image::RgbImage::from_fn(width, height, |x, y| {
+        image::Rgb([(x * 37) as u8, (y * 91) as u8, (x * y) as u8])
+    })
+}
+
+/// Coloured, grey, deep, transparent.
+pub fn png() -> Vec<Vec<u8>> {
+    let image = DynamicImage::ImageRgb8(picture(33, 17));
+    [image.to_luma8().into(), image.to_rgba8().into(), image.to_luma16().into(), image]
+        .map(|i| encoded(i, ImageFormat::Png))
+        .into()
+}
+
+/// Coloured and grey.
+pub fn jpeg() -> Vec<Vec<u8>> {
+    let image = DynamicImage::ImageRgb8(picture(50, 40));
+    [image.to_luma8().into(), image].map(|i| encoded(i, ImageFormat::Jpeg)).into()
+}
+
+/// The scenes that come with the program.
+pub fn toml() -> Vec<Vec<u8>> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes");
+    let mut paths: Vec<_> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .filter(|p| p.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    paths.sort();
+    // Long ones would only make the same mistakes more slowly.
+    let texts = paths.iter().map(|p| std::fs::read(p).unwrap()).filter(|t| t.len() < 20_000);
+    texts.collect()
+}
