@@ -18,4 +18,4 @@ pub use cache::{Assets, Stage};
 pub use error::{AssetError, Place};
 pub use file::MAX_BYTES;
 pub use image::{Image, MAX_PIXELS, MAX_SIDE};
-pub use mesh::{MAX_TRIANGLES, MAX_VERTICES, Mesh, Node, TriangleMesh};
+pub use mesh::{Branch, Leaf, MAX_TRIANGLES, MAX_VERTICES, Mesh, TriangleMesh, WIDE};

@@ -3,6 +3,7 @@
 mod batch;
 mod cube;
 mod cuboid;
+pub mod facets;
 mod form;
 mod geometry;
 mod kinds;

@@ -196,6 +196,26 @@ pub fn png() -> Vec<Vec<u8>> {
         .into()
 }
 
+/// Makes the checksum of every chunk right that can be found (CRC-32 of type and data).
+pub fn repair_png(bytes: &mut [u8]) {
+    let mut at = 8;
+    while let Some(length) = bytes.get(at..at + 4) {
+        let length = u32::from_be_bytes([length[0], length[1], length[2], length[3]]) as usize;
+        let Some(end) = length.checked_add(at + 8) else { return };
+        let Some(data) = bytes.get(at + 4..end) else { return };
+        let crc = data.iter().fold(u32::MAX, |mut crc, byte| {
+            crc ^= u32::from(*byte);
+            for _ in 0..8 {
+                crc = crc >> 1 ^ (0xEDB8_8320 & (crc & 1).wrapping_neg());
+            }
+            crc
+        });
+        let Some(place) = bytes.get_mut(end..end + 4) else { return };
+        place.copy_from_slice(&(!crc).to_be_bytes());
+        at = end + 4;
+    }
+}
+
 /// Coloured and grey.
 pub fn jpeg() -> Vec<Vec<u8>> {
     let image = DynamicImage::ImageRgb8(picture(50, 40));

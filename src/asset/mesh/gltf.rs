@@ -19,12 +19,12 @@ use std::borrow::Cow;
 
 /// Reads a mesh.
 pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
-    let gltf = Gltf::from_slice(&source.bytes).map_err(|error| refused(source, &error))?;
-    let buffers = buffers(source, &gltf)?;
+    let (document, blob) = description(source)?;
+    let buffers = buffers(source, &document, blob.as_deref())?;
     let mut builder = Builder::new(source);
-    let mut met = vec![false; gltf.nodes().count()];
+    let mut met = vec![false; document.nodes().count()];
     let mut stack: Vec<(Node, DAffine3)> =
-        roots(&gltf.document).into_iter().map(|node| (node, DAffine3::IDENTITY)).collect();
+        roots(&document).into_iter().map(|node| (node, DAffine3::IDENTITY)).collect();
     stack.reverse();
     while let Some((node, outer)) = stack.pop() {
         let place = || Place::Part(format!("nodes[{}]", node.index()));
@@ -44,6 +44,31 @@ pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
         stack.extend(children.into_iter().rev());
     }
     builder.finish()
+}
+
+/// The description, validated, and the data behind it in a binary file.
+fn description(source: &Source) -> Result<(Document, Option<Vec<u8>>), AssetError> {
+    // The library subtracts the header's size from this length, whatever it is.
+    let length = source.bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    if source.bytes.starts_with(b"glTF") && length.is_none_or(|length| length < 12) {
+        return Err(source.error(Place::Byte(8), "the length is below 12", "the file's length"));
+    }
+    let gltf = Gltf::from_slice_without_validation(&source.bytes);
+    let gltf = gltf.map_err(|error| refused(source, &error))?;
+    let json = gltf.document.into_json();
+    // The library's validation looks these up before it checks them.
+    for (m, mesh) in json.meshes.iter().enumerate() {
+        for index in mesh.primitives.iter().flat_map(|p| p.attributes.values()) {
+            if index.value() >= json.accessors.len() {
+                let found = format!("an attribute names accessor {}", index.value());
+                let expected = format!("an accessor below {}, their number", json.accessors.len());
+                let place = Place::Part(format!("meshes[{m}]"));
+                return Err(source.error(place, found, &expected));
+            }
+        }
+    }
+    let document = Document::from_json(json).map_err(|error| refused(source, &error))?;
+    Ok((document, gltf.blob))
 }
 
 /// The nodes to begin with: of the default scene, else of the first, else those without a parent.
@@ -78,14 +103,18 @@ fn refused(source: &Source, error: &gltf::Error) -> AssetError {
 }
 
 /// The bytes of all buffers.
-fn buffers<'a>(source: &Source, gltf: &'a Gltf) -> Result<Vec<Cow<'a, [u8]>>, AssetError> {
+fn buffers<'a>(
+    source: &Source,
+    document: &Document,
+    blob: Option<&'a [u8]>,
+) -> Result<Vec<Cow<'a, [u8]>>, AssetError> {
     let mut all = Vec::new();
     let mut total = 0;
-    for buffer in gltf.buffers() {
+    for buffer in document.buffers() {
         let place = || Place::Part(format!("buffers[{}]", buffer.index()));
         let wrong = |found: String, expected: &str| Err(source.error(place(), found, expected));
         let bytes: Cow<[u8]> = match buffer.source() {
-            gltf::buffer::Source::Bin => match &gltf.blob {
+            gltf::buffer::Source::Bin => match blob {
                 Some(blob) => Cow::Borrowed(blob),
                 None => return wrong("the buffer has no data".to_string(), "a uri or a BIN chunk"),
             },

@@ -8,7 +8,7 @@ mod ply;
 mod stl;
 mod tree;
 
-pub use tree::{Mesh, Node};
+pub use tree::{Branch, Leaf, Mesh, WIDE};
 
 use super::error::{AssetError, Place};
 use super::file::Source;

@@ -1,32 +1,66 @@
-//! The tree of boxes over a mesh's triangles, built once per mesh.
+//! The tree of boxes over a mesh's triangles, built once per mesh: up to eight boxes a branch, up to
+//! eight triangles a leaf, each coordinate of the eight side by side, so that either one ray meets
+//! eight of them at once or a packet one after the other.
+//!
+//! A binary tree by a library, its nodes joined as long as a branch has room, the largest first
+//! (Wald, Benthin and Boulos 2008, *Getting Rid of Packets*).
 
 use super::TriangleMesh;
 use super::normals::smooth;
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use std::fmt;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-/// A box of the tree and what is in it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Node {
-    /// Corner with the smallest coordinates.
-    pub low: [f32; 3],
-    /// First of two neighbouring children, or first triangle of a leaf.
+/// Boxes of a branch, and triangles of a leaf.
+pub const WIDE: usize = 8;
+
+/// Eight boxes of the tree. Empty ones have their corners exchanged, at infinity.
+#[derive(Clone, Debug, PartialEq)]
+#[repr(align(32))]
+pub struct Branch {
+    /// Smallest coordinates of the boxes, by axis.
+    pub low: [[f32; WIDE]; 3],
+    /// Largest coordinates of the boxes, by axis.
+    pub high: [[f32; WIDE]; 3],
+    /// Number of the branch or leaf in each box.
+    pub child: [u32; WIDE],
+    /// Bit `i`: box `i` holds a leaf.
+    pub leaves: u8,
+    /// Number of boxes; the first ones.
+    pub count: u8,
+}
+
+/// Up to eight triangles. The places without one hold NaN.
+#[derive(Clone, Debug)]
+#[repr(align(32))]
+pub struct Leaf {
+    /// Corners, by number in the triangle and axis.
+    pub corners: [[[f32; WIDE]; 3]; 3],
+    /// Number of the first triangle in the mesh; the others follow it.
     pub first: u32,
-    /// Corner with the largest coordinates.
-    pub high: [f32; 3],
-    /// Number of triangles of a leaf; 0: an inner node.
+    /// Number of triangles.
     pub count: u32,
 }
 
-/// A mesh with the tree over it; about 60 bytes a triangle, and 12 a vertex for normals.
+const NO_BOX: Branch = Branch {
+    low: [[f32::INFINITY; WIDE]; 3],
+    high: [[f32::NEG_INFINITY; WIDE]; 3],
+    child: [0; WIDE],
+    leaves: 0,
+    count: 0,
+};
+
+/// A mesh with the tree over it: about 75 bytes a triangle for the tree, 12 for its indices, and 12
+/// to 32 for each vertex.
 pub struct Mesh {
     mesh: TriangleMesh,
-    nodes: Vec<Node>,
+    branches: Vec<Branch>,
+    leaves: Vec<Leaf>,
     depth: usize,
     smooth: OnceLock<Vec<[f32; 3]>>,
 }
@@ -51,26 +85,86 @@ impl Mesh {
                 Aabb::new(a.min(b).min(c), a.max(b).max(c))
             })
             .collect();
+        // Large leaves: a ray meets all of one at the price of one.
+        let params = BvhBuildParams {
+            max_prims_per_leaf: WIDE as u32,
+            collapse_traversal_cost: 8.0,
+            ..BvhBuildParams::fast_build()
+        };
         let mut spent = Duration::ZERO;
-        let bvh = build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut spent);
+        let binary = build_bvh2(&boxes, params, &mut spent);
         drop(boxes);
-        let order = &bvh.primitive_indices;
+        let order = &binary.primitive_indices;
         mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();
         if !mesh.color_of.is_empty() {
             mesh.color_of = order.iter().map(|i| mesh.color_of[*i as usize]).collect();
         }
-        let nodes: Vec<Node> = bvh
-            .nodes
-            .iter()
-            .map(|n| Node {
-                low: n.aabb().min.to_array(),
-                first: n.first_index,
-                high: n.aabb().max.to_array(),
-                count: n.prim_count,
-            })
-            .collect();
-        let depth = bvh.depth(0);
-        Self { mesh, nodes, depth, smooth: OnceLock::new() }
+        let mut out = Self {
+            mesh,
+            branches: Vec::new(),
+            leaves: Vec::new(),
+            depth: 0,
+            smooth: OnceLock::new(),
+        };
+        out.join(&binary);
+        out
+    }
+
+    /// Makes branches and leaves of the nodes of a binary tree.
+    fn join(&mut self, binary: &Bvh2) {
+        let nodes = &binary.nodes;
+        let mut todo = vec![(0usize, 0usize, 1usize)];
+        self.branches.push(NO_BOX);
+        let mut inside = Vec::with_capacity(WIDE);
+        while let Some((node, branch, depth)) = todo.pop() {
+            self.depth = self.depth.max(depth);
+            inside.clear();
+            inside.push(node);
+            while inside.len() < WIDE {
+                let area = |i: usize| nodes[i].aabb().half_area();
+                let opened = (0..inside.len())
+                    .filter(|k| !nodes[inside[*k]].is_leaf())
+                    .max_by(|a, b| area(inside[*a]).total_cmp(&area(inside[*b])));
+                let Some(opened) = opened else { break };
+                let first = nodes[inside[opened]].first_index as usize;
+                inside[opened] = first;
+                inside.push(first + 1);
+            }
+            let mut new = Branch { count: inside.len() as u8, ..NO_BOX };
+            for (i, node) in inside.iter().enumerate() {
+                let n = &nodes[*node];
+                let (low, high) = (n.aabb().min.to_array(), n.aabb().max.to_array());
+                for axis in 0..3 {
+                    new.low[axis][i] = low[axis];
+                    new.high[axis][i] = high[axis];
+                }
+                if n.is_leaf() {
+                    new.leaves |= 1 << i;
+                    new.child[i] = self.leaves.len() as u32;
+                    let leaf = self.leaf(n.first_index, n.prim_count);
+                    self.leaves.push(leaf);
+                } else {
+                    new.child[i] = self.branches.len() as u32;
+                    todo.push((*node, self.branches.len(), depth + 1));
+                    self.branches.push(NO_BOX);
+                }
+            }
+            self.branches[branch] = new;
+        }
+    }
+
+    fn leaf(&self, first: u32, count: u32) -> Leaf {
+        let mut leaf = Leaf { corners: [[[f32::NAN; WIDE]; 3]; 3], first, count };
+        let triangles = &self.mesh.triangles[first as usize..][..count as usize];
+        for (i, triangle) in triangles.iter().enumerate() {
+            for (corner, vertex) in leaf.corners.iter_mut().zip(triangle) {
+                let position = self.mesh.positions[*vertex as usize];
+                for (axis, x) in corner.iter_mut().zip(position) {
+                    axis[i] = x;
+                }
+            }
+        }
+        leaf
     }
 
     /// The triangles, in the order of the leaves.
@@ -78,12 +172,17 @@ impl Mesh {
         &self.mesh
     }
 
-    /// The boxes; the first is the root.
-    pub fn nodes(&self) -> &[Node] {
-        &self.nodes
+    /// The branches; the first is the root.
+    pub fn branches(&self) -> &[Branch] {
+        &self.branches
     }
 
-    /// The most nodes on a way from the root to a leaf.
+    /// The leaves.
+    pub fn leaves(&self) -> &[Leaf] {
+        &self.leaves
+    }
+
+    /// The most branches on a way from the root to a leaf.
     pub fn depth(&self) -> usize {
         self.depth
     }
@@ -100,7 +199,8 @@ impl Mesh {
     /// Memory that it takes [bytes].
     pub fn bytes(&self) -> usize {
         self.mesh.bytes()
-            + size_of::<Node>() * self.nodes.len()
+            + size_of::<Branch>() * self.branches.len()
+            + size_of::<Leaf>() * self.leaves.len()
             + self.smooth.get().map_or(0, |n| 12 * n.len())
     }
 }
