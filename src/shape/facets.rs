@@ -11,7 +11,7 @@ use crate::lanes::{Frame, Lanes, Mask, Real, V3};
 /// Packets whose directions differ by no more than this (length of the difference of unit vectors),
 /// and whose origins differ by no more than this share of the mesh's size, go together. Measured by
 /// `benches/mesh.rs`, group `together or apart`.
-const TOGETHER: f64 = 0.1;
+const TOGETHER: f64 = 0.05;
 
 /// Entries of the stack for trees of usual depth: seven a level, and the root.
 const STACK: usize = 96;
@@ -36,17 +36,32 @@ pub struct Facet<L> {
 #[derive(Clone, Copy)]
 struct Beam<L> {
     origin: V3<L>,
+    /// Origins, moved up and down by what the triangles' test rounds off.
+    above: V3<L>,
+    below: V3<L>,
     frame: Frame<L>,
     inverse: V3<L>,
 }
 
 impl<L: Lanes> Beam<L> {
     #[inline(always)]
-    fn new(ray: &Ray<L>) -> Self {
+    fn new(ray: &Ray<L>, mesh: &Mesh) -> Self {
         let safe = |d: L| L::one() / d.abs().max(L::of(1e-30)).copysign(d);
         let d = ray.direction;
         let inverse = V3::new(safe(d.x), safe(d.y), safe(d.z));
-        Self { origin: ray.origin, frame: Frame::around(d), inverse }
+        // A ray that passes a box's edge within the rounding of the frame and of the corners'
+        // distances may still meet a triangle there.
+        let [low, high] = mesh.mesh().bounds;
+        let reach = low.iter().chain(&high).fold(0.0f32, |m, x| m.max(x.abs()));
+        let pad = (ray.origin.max_abs() + all(reach)) * L::of(8.0 * L::EPSILON);
+        let pad = V3::new(pad, pad, pad);
+        Self {
+            origin: ray.origin,
+            above: ray.origin + pad,
+            below: ray.origin - pad,
+            frame: Frame::around(d),
+            inverse,
+        }
     }
 
     /// The ray of one lane in every lane.
@@ -55,6 +70,8 @@ impl<L: Lanes> Beam<L> {
         let all = |v: V3<L>| V3::splat(v.lane(lane));
         Self {
             origin: all(self.origin),
+            above: all(self.above),
+            below: all(self.below),
             frame: Frame { t: all(self.frame.t), b: all(self.frame.b), n: all(self.frame.n) },
             inverse: all(self.inverse),
         }
@@ -89,13 +106,6 @@ impl<L: Lanes> Beam<L> {
             V3::new(axis(0), axis(1), axis(2))
         })
     }
-
-    /// Where a box is entered and left.
-    #[inline(always)]
-    fn slab(&self, first: V3<L>, second: V3<L>) -> (V3<L>, V3<L>) {
-        let t = |corner: V3<L>| (corner - self.origin).times(self.inverse);
-        (t(first), t(second))
-    }
 }
 
 /// Part `part` of eight numbers, in lanes; lanes beyond them repeat.
@@ -122,8 +132,8 @@ fn push(stack: &mut [Entry], base: usize, top: &mut usize, entry: Entry) {
     *top += 1;
 }
 
-/// The far side of a box moves out by two roundings, so that no hit is lost (Ize 2013, *Robust BVH
-/// Ray Traversal*), and by two for the corners' distances from the origin.
+/// The far side of a box moves out by some roundings, so that no hit is lost (Ize 2013, *Robust BVH
+/// Ray Traversal*).
 fn grown<L: Lanes>() -> L {
     L::of(1.0 + 8.0 * L::EPSILON)
 }
@@ -168,8 +178,10 @@ impl<const ANY: bool> Walk<'_, ANY> {
             let branch: &Branch = &self.mesh.branches()[child as usize];
             let base = top;
             for i in 0..usize::from(branch.count) {
-                let corner = |c: &[[f32; WIDE]; 3]| V3::new(all(c[0][i]), all(c[1][i]), all(c[2][i]));
-                let (a, b) = beam.slab(corner(&branch.low), corner(&branch.high));
+                let corner =
+                    |c: &[[f32; WIDE]; 3]| V3::new(all(c[0][i]), all(c[1][i]), all(c[2][i]));
+                let a = (corner(&branch.low) - beam.above).times(beam.inverse);
+                let b = (corner(&branch.high) - beam.below).times(beam.inverse);
                 let near = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z)).max(L::zero());
                 let far = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z)) * grown::<L>();
                 let bits = (near.le(far) & near.le(found.t)).bits();
@@ -202,6 +214,12 @@ impl<const ANY: bool> Walk<'_, ANY> {
         stack[0] = (0, false, 0.0);
         let d = beam.inverse;
         let back = [d.x, d.y, d.z].map(|d| d.lane(0).to_f64() < 0.0);
+        let (up, down) = (beam.above, beam.below);
+        let origin = |far| {
+            let axis = |axis: usize, up, down| if back[axis] == far { up } else { down };
+            V3::new(axis(0, up.x, down.x), axis(1, up.y, down.y), axis(2, up.z, down.z))
+        };
+        let (near_origin, far_origin) = (origin(false), origin(true));
         while top > 0 {
             top -= 1;
             let (child, is_leaf, near) = stack[top];
@@ -238,7 +256,8 @@ impl<const ANY: bool> Walk<'_, ANY> {
                     let axis = |a| lanes_of(side(a, far), part);
                     V3::new(axis(0), axis(1), axis(2))
                 };
-                let (near, far) = beam.slab(corner(false), corner(true));
+                let near = (corner(false) - near_origin).times(d);
+                let far = (corner(true) - far_origin).times(d);
                 let near = near.x.max(near.y).max(near.z).max(L::zero());
                 let far = far.x.min(far.y).min(far.z) * grown::<L>();
                 let mut bits = (near.le(far) & near.le(L::splat(best))).bits();
@@ -249,7 +268,12 @@ impl<const ANY: bool> Walk<'_, ANY> {
                     bits &= bits - 1;
                     let i = part * L::WIDTH + lane;
                     let entry = below(near.lane(lane).to_f64());
-                    push(stack, base, &mut top, (branch.child[i], branch.leaves >> i & 1 != 0, entry));
+                    push(
+                        stack,
+                        base,
+                        &mut top,
+                        (branch.child[i], branch.leaves >> i & 1 != 0, entry),
+                    );
                 }
             }
         }
@@ -258,7 +282,7 @@ impl<const ANY: bool> Walk<'_, ANY> {
 
     #[inline(always)]
     fn go<L: Lanes>(&self, ray: &Ray<L>, limit: L, stack: &mut [Entry]) -> Facet<L> {
-        let beam = Beam::new(ray);
+        let beam = Beam::new(ray, self.mesh);
         let wanted = limit.gt(L::zero()).bits();
         if is_together(ray, wanted, self.mesh) {
             return self.together(&beam, limit, stack);
@@ -311,8 +335,8 @@ fn is_together<L: Lanes>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     let size = (0..3).map(|i| f64::from(high[i]) - f64::from(low[i])).fold(0.0, f64::max);
     let turn = ray.direction - V3::splat(ray.direction.lane(lane));
     let shift = ray.origin - V3::splat(ray.origin.lane(lane));
-    let near = turn.length2().le(L::of(TOGETHER * TOGETHER))
-        & shift.max_abs().le(L::of(TOGETHER * size));
+    let near =
+        turn.length2().le(L::of(TOGETHER * TOGETHER)) & shift.max_abs().le(L::of(TOGETHER * size));
     near.bits() & wanted == wanted
 }
 
@@ -349,7 +373,7 @@ pub fn blocked<L: Lanes>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
 /// As [`closest`], all lanes together or each by itself: for tests and benches.
 #[inline(never)]
 pub fn closest_by<L: Lanes>(mesh: &Mesh, ray: &Ray<L>, limit: L, together: bool) -> Facet<L> {
-    let beam = Beam::new(ray);
+    let beam = Beam::new(ray, mesh);
     let wanted = limit.gt(L::zero()).bits();
     with_stack!(mesh, stack => if together {
         Walk::<false> { mesh }.together(&beam, limit, stack)

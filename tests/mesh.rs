@@ -1,0 +1,149 @@
+//! Rays and triangle meshes: nothing slips through, and neither company nor vector width decides what
+//! is met.
+
+use std::sync::Arc;
+use zerkalo::asset::Assets;
+use zerkalo::asset::Mesh;
+use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
+use zerkalo::shape::{Ray, facets};
+
+/// Random numbers from 0 to 1 (xorshift: Marsaglia 2003).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.next() * n as f64) as usize
+    }
+}
+
+/// A closed ball around the origin, written as OBJ and read: with slivers round the poles, a
+/// thousand times as long as wide.
+fn ball(rings: usize, sides: usize) -> Arc<Mesh> {
+    let mut text = String::new();
+    for ring in 0..=rings {
+        let polar = std::f64::consts::PI * ring as f64 / rings as f64;
+        let around_of = |side: usize| std::f64::consts::TAU * side as f64 / sides as f64;
+        for around in (0..sides).map(around_of) {
+            // Both poles are one point each, given as often as there are sides.
+            let across = if ring % rings == 0 { 0.0 } else { polar.sin() };
+            let (x, z) = (across * around.cos(), across * around.sin());
+            text += &format!("v {x} {} {z}\n", polar.cos());
+        }
+    }
+    let index = |ring: usize, side: usize| ring * sides + side % sides + 1;
+    for ring in 0..rings {
+        for side in 0..sides {
+            let [a, b] = [index(ring, side), index(ring, side + 1)];
+            let [c, d] = [index(ring + 1, side), index(ring + 1, side + 1)];
+            if ring > 0 {
+                text += &format!("f {a} {b} {c}\n");
+            }
+            if ring + 1 < rings {
+                text += &format!("f {b} {d} {c}\n");
+            }
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ball.obj");
+    std::fs::write(&path, text).unwrap();
+    Assets::default().mesh(&path).unwrap()
+}
+
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    v.map(|x| x / length)
+}
+
+/// Rays from inside a closed mesh to its corners, to its edges and into its triangles: none may miss,
+/// together or apart.
+fn nothing_slips_through<L: Lanes>(mesh: &Mesh, rays: usize) {
+    let mut random = Random(0x5EED);
+    let triangles = &mesh.mesh().triangles;
+    let corner = |i: u32| mesh.mesh().positions[i as usize].map(f64::from);
+    let limit = L::of(L::MAX);
+    for packet in 0..rays / L::WIDTH {
+        let origin: [f64; 3] = std::array::from_fn(|_| 0.5 * (random.next() - 0.5));
+        // Half of the packets have their rays close together.
+        let near = random.below(triangles.len());
+        let directions: Vec<[f64; 3]> = (0..L::WIDTH)
+            .map(|_| {
+                let one = if packet % 2 == 0 { near } else { random.below(triangles.len()) };
+                let [a, b, c] = triangles[one].map(corner);
+                let (f, g) = (random.next(), random.next());
+                let to: [f64; 3] = match packet % 3 {
+                    0 => a,
+                    1 => std::array::from_fn(|i| a[i] + f * (b[i] - a[i])),
+                    _ => std::array::from_fn(|i| a[i] + f * (b[i] - a[i]) + f * g * (c[i] - b[i])),
+                };
+                unit(std::array::from_fn(|i| to[i] - origin[i]))
+            })
+            .collect();
+        let ray = Ray {
+            origin: V3::<L>::of(origin),
+            direction: V3::<L>::from_fn(|i| directions[i].map(L::Scalar::of)),
+        };
+        let found = facets::closest(mesh, &ray, limit);
+        let blocked = facets::blocked(mesh, &ray, limit);
+        let both = [true, false].map(|how| facets::closest_by(mesh, &ray, limit, how));
+        for (i, direction) in directions.iter().enumerate() {
+            let t = found.t.lane(i);
+            assert!(t < limit.lane(i), "missed from {origin:?} to {direction:?}");
+            assert!(blocked.lane(i), "not blocked from {origin:?} to {direction:?}");
+            for other in &both {
+                assert_eq!(other.t.lane(i), t, "{origin:?} {direction:?}");
+                assert_eq!(other.triangle.tag_lane(i), found.triangle.tag_lane(i));
+            }
+            let at: [f64; 3] = std::array::from_fn(|k| origin[k] + t.to_f64() * direction[k]);
+            let radius = at.iter().map(|x| x * x).sum::<f64>().sqrt();
+            assert!(radius < 1.0 + 1e-5 && radius > 0.9, "met at {at:?}");
+        }
+    }
+}
+
+#[test]
+fn no_ray_slips_between_triangles() {
+    let coarse = ball(8, 12);
+    nothing_slips_through::<Single>(&coarse, 300_000);
+    nothing_slips_through::<Double>(&coarse, 50_000);
+    nothing_slips_through::<f32>(&coarse, 20_000);
+    let fine = ball(60, 120);
+    nothing_slips_through::<Single>(&fine, 600_000);
+    nothing_slips_through::<Double>(&fine, 50_000);
+    nothing_slips_through::<Single>(&ball(12, 4_000), 300_000);
+}
+
+#[test]
+fn a_tree_finds_what_a_list_finds() {
+    let mesh = ball(12, 20);
+    let mut random = Random(77);
+    for _ in 0..2_000 {
+        let origin: [f64; 3] = std::array::from_fn(|_| 4.0 * (random.next() - 0.5));
+        let direction = unit(std::array::from_fn(|_| random.next() - 0.5));
+        let ray = Ray { origin: V3::<f64>::of(origin), direction: V3::<f64>::of(direction) };
+        let found = facets::closest(&mesh, &ray, f64::MAX);
+        // Möller and Trumbore's test of every triangle.
+        let mut best = f64::MAX;
+        for t in &mesh.mesh().triangles {
+            let p = t.map(|i| glam::DVec3::from(mesh.mesh().positions[i as usize].map(f64::from)));
+            let (o, d) = (glam::DVec3::from(origin), glam::DVec3::from(direction));
+            let (a, b) = (p[1] - p[0], p[2] - p[0]);
+            let s = d.cross(b) / d.cross(b).dot(a);
+            let u = s.dot(o - p[0]);
+            let q = (o - p[0]).cross(a) / d.cross(b).dot(a);
+            let v = q.dot(d);
+            let t = q.dot(b);
+            if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 {
+                best = best.min(t);
+            }
+        }
+        let same = found.t == best || (found.t - best).abs() < 1e-9 * best;
+        assert!(same, "{origin:?} {direction:?}: {} and {best}", found.t);
+    }
+}
