@@ -40,7 +40,7 @@ impl AssetError {
             Place::Byte(byte) => format!(", byte {byte}"),
             Place::Part(part) => format!(", {part}"),
         };
-        printable(&format!("{file}{place}: {}", self.found)).into()
+        printable(&format!("{file}{place}: {}", self.found))
     }
 }
 

@@ -218,7 +218,7 @@ impl<'a> Builder<'a> {
 
     /// All coordinates are finite and within range.
     fn coordinates(&self) -> Result<(), AssetError> {
-        let bad = |p: &[f64; 3]| p.iter().any(|x| !(x.abs() <= FARTHEST));
+        let bad = |p: &[f64; 3]| p.iter().any(|x| !(-FARTHEST..=FARTHEST).contains(x));
         match self.positions.iter().position(bad) {
             None => Ok(()),
             Some(i) => {

@@ -166,7 +166,7 @@ fn locate_vertex(source: &Source, error: AssetError) -> AssetError {
         words.next() == Some(b"v")
             && words.take(3).any(|w| {
                 let x = std::str::from_utf8(w).ok().and_then(|w| w.parse::<f64>().ok());
-                x.is_some_and(|x| !(x.abs() <= 1e9))
+                x.is_some_and(|x| !(-1e9..=1e9).contains(&x))
             })
     };
     let part = matches!(error.place, Place::Part(_));
