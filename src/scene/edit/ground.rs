@@ -114,23 +114,27 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
         let angle = f64::from(i) * 2.399_963_229_728_653;
         DVec2::from_angle(angle) * (0.45 * spread * f64::from(i).sqrt())
     });
-    let first = candidate(DVec2::ZERO);
     let reach = 6.0 * radius.max(spread);
-    spots
-        .take_while(|offset| offset.length() <= reach)
-        .map(candidate)
-        .find(|base| {
-            let half = DVec3::new(spread / 2.0, 0.0, spread / 2.0);
-            let extent = (*base - half, *base + half + DVec3::Y * size.y);
-            let center = *base + DVec3::Y * (size.y / 2.0);
-            let stands = |f: &Form| matches!(f, Form::Parallelogram { .. } | Form::Plane { .. });
-            let through = forms.iter().filter(|f| stands(f)).any(|form| cuts(form, extent));
-            !through
-                && !solids.iter().any(|solid| overlap(*solid, extent))
-                && in_view(&scene.camera, scene.film.size, center)
-                && is_visible(&forms, eye, center)
-        })
-        .unwrap_or(first)
+    let flat = |form: &&Form| !is_solid(form);
+    let free = spots.take_while(|offset| offset.length() <= reach).map(candidate).filter(|base| {
+        let half = DVec3::new(spread / 2.0, 0.0, spread / 2.0);
+        let room = (*base - half, *base + half + DVec3::Y * size.y);
+        !forms.iter().filter(flat).any(|wall| cuts(wall, room))
+            && !solids.iter().any(|solid| overlap(*solid, room))
+    });
+    // In full view, else hidden but in the picture, else anywhere.
+    let (mut hidden, mut outside) = (None, None);
+    for base in free {
+        let middle = base + DVec3::Y * (size.y / 2.0);
+        if !in_view(&scene.camera, scene.film.size, middle) {
+            outside = outside.or(Some(base));
+        } else if !is_visible(&forms, eye, middle) {
+            hidden = hidden.or(Some(base));
+        } else {
+            return base;
+        }
+    }
+    hidden.or(outside).unwrap_or_else(|| candidate(DVec2::ZERO))
 }
 
 /// Height of the highest surface below `at` that faces up or down enough to stand on: what is level

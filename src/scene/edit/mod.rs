@@ -15,6 +15,8 @@ mod names;
 mod rows;
 mod set;
 mod step;
+#[cfg(test)]
+mod step_test;
 mod subject;
 mod tree;
 mod turning;

@@ -189,18 +189,18 @@ impl Rule {
                     Self::Rungs { floor: 0.0, range }
                 } else if range == Range::COORDINATE {
                     Self::Units { unit: step_length(scene), range }
+                } else if matches!(field.name, "roughness" | "alpha") {
+                    // From 0 to what can just be told from it at the far end of a room.
+                    Self::Rungs { floor: 0.001, range }
                 } else if range == Range::SHARE || range == Range::COEFFICIENT {
                     Self::Units { unit: 0.05, range }
                 } else if field.unit == "scene units" {
                     Self::Rungs { floor: step_length(scene) / 10.0, range }
                 } else if range == Range::LIGHT {
                     Self::Rungs { floor: 0.01, range }
-                } else if range.high >= 1e9 {
+                } else {
                     // An exponent.
                     Self::Rungs { floor: 1.0, range }
-                } else {
-                    // A roughness: 0.001 can be told from 0 at the far end of a room.
-                    Self::Rungs { floor: 0.001, range }
                 }
             }
             Takes::Direction => Self::Direction,
@@ -333,10 +333,7 @@ fn rung(x: f64, up: bool, fine: bool) -> f64 {
         (true, false) => RUNGS.iter().copied().find(|r| *r > below).unwrap_or(1000),
         (false, false) => {
             let under = |r: &i64| if on { *r < below } else { *r <= below };
-            match RUNGS.iter().rev().copied().find(under) {
-                Some(rung) => rung,
-                None => 90,
-            }
+            RUNGS.iter().rev().copied().find(under).unwrap_or(90)
         }
     };
     format!("{hundredths}e{}", e - 2).parse().unwrap_or(x)
