@@ -130,8 +130,7 @@ fn a_key_that_is_left_out_starts_from_what_holds() {
     assert_eq!(after(&scene, &red, "reflectance", -1.0), "0.95, 0.95, 0.95");
 }
 
-/// Every number of every row, 200 steps up and down: never refused, never a fault, and both ends are
-/// reached or the value goes on.
+/// Every number of every row, many steps up and down: never refused, never a fault.
 #[test]
 fn no_step_is_refused_at_an_end() {
     let scene = built_in();
@@ -144,16 +143,8 @@ fn no_step_is_refused_at_an_end() {
                 for steps in [1.0, -1.0, 0.1, -0.1, 50.0, -50.0] {
                     let mut now = scene.clone();
                     for _ in 0..100 {
-                        match step(&now, &subject, &row.key, component, steps) {
-                            Ok(edit) => now = edit.scene,
-                            // What two keys together forbid is no end of a range.
-                            Err(e) => {
-                                let pairs = ["eye", "target", "up", "normal", "center", "size"];
-                                let last = row.key.rsplit('.').next().unwrap();
-                                assert!(pairs.contains(&last), "{subject:?} {}: {e}", row.key);
-                                break;
-                            }
-                        }
+                        let edit = step(&now, &subject, &row.key, component, steps);
+                        now = edit.unwrap_or_else(|e| panic!("{subject:?} {}: {e}", row.key)).scene;
                     }
                     assert_eq!(now.faults(), []);
                 }
