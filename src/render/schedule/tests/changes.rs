@@ -107,7 +107,7 @@ fn a_cap_may_rise_and_fall() {
     let mut model = Model::exact(mixed(), 6);
     let mut schedule = model.schedule(until(spp(100), false));
     schedule.set_rays_per_pixel(40);
-    assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::RaysPerPixel);
+    assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);
     assert_eq!((schedule.spp().min, schedule.spp().max), (40, 100));
     schedule.set_rays_per_pixel(0);
     assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);
