@@ -53,7 +53,7 @@ fn a_higher_aim_goes_on_where_the_lower_one_ended() {
             while let Step::Trace(wave) = schedule.next(0.0) {
                 let even = |j: &Job| {
                     let end = j.first + j.count;
-                    end % PACKET == 0 || (end < FLOOR && end.is_power_of_two())
+                    end.is_multiple_of(PACKET) || (end < FLOOR && end.is_power_of_two())
                 };
                 ends.push(wave.jobs.iter().all(even));
                 let report = model.run(&wave);
