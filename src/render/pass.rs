@@ -181,9 +181,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         let draws = points.of_pixel(at, work.replicate);
         let rays = self.world.view().rays_of(at, self.jitter(&draws));
         work.trace(self.world, rays, &draws, L::mask(true));
-        for lane in lanes_of(self.blacken_bad(&mut work.radiance)) {
-            work.record_bad(at, first + lane as u32);
-        }
+        self.take_out_bad(work, |lane| (at, first + lane as u32));
     }
 
     /// Sample `index` of the first `count` pixels that `at` names, into `work.radiance`.
@@ -200,9 +198,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         let rays = self.world.view().rays(&at, self.jitter(&draws));
         let lanes = L::from_fn(|lane| L::Scalar::of(if lane < count { 1.0 } else { 0.0 }));
         work.trace(self.world, rays, &draws, lanes.gt(L::zero()));
-        for lane in lanes_of(self.blacken_bad(&mut work.radiance)) {
-            work.record_bad(at(lane), index);
-        }
+        self.take_out_bad(work, |lane| (at(lane), index));
     }
 
     /// Where in their pixels the samples lie.
@@ -238,10 +234,11 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         }
     }
 
-    /// Blackens samples that are NaN, infinite, negative or beyond what the film holds; returns them
-    /// as bits by lane.
+    /// Blackens samples that are NaN, infinite, negative or beyond what the film holds, and records
+    /// them; `which` gives pixel and index of a lane.
     #[inline(always)]
-    fn blacken_bad(&self, radiance: &mut Radiance<L>) -> u32 {
+    fn take_out_bad(&self, work: &mut Work<L>, which: impl Fn(usize) -> ((u32, u32), u32)) {
+        let radiance = &mut work.radiance;
         let mut good = L::mask(true);
         for (g, limit) in self.limits.iter().enumerate().take(self.world.groups()) {
             let v = radiance.groups[g];
@@ -252,12 +249,15 @@ impl<'a, L: Lanes> Tracer<'a, L> {
                 & (v.z.ge(zero) & v.z.le(limit));
         }
         if good.all() {
-            return 0;
+            return;
         }
         for group in &mut radiance.groups[..self.world.groups()] {
             *group = group.only(good);
         }
-        (!good).bits()
+        for lane in (0..L::WIDTH).filter(|lane| !good.lane(*lane)) {
+            let ((x, y), index) = which(lane);
+            work.bad.push(BadSample { index, replicate: work.replicate as u8, y, x });
+        }
     }
 
     /// The first sample of the pixels that a lattice of `step` pixels adds to one of `before` (0:
@@ -333,22 +333,6 @@ impl<L: Lanes> Work<L> {
         self.counts.rays += cost.rays;
         self.counts.glossy |= cost.glossy;
     }
-
-    #[cold]
-    fn record_bad(&mut self, (x, y): (u32, u32), index: u32) {
-        self.bad.push(BadSample { index, replicate: self.replicate as u8, y, x });
-    }
-}
-
-/// The lanes whose bits are set.
-fn lanes_of(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = bits.trailing_zeros() as usize;
-        (bits != 0).then(|| {
-            bits &= bits - 1;
-            lane
-        })
-    })
 }
 
 /// The pixels of a tile in an order in which neighbours in the list are neighbours in the picture:
@@ -391,8 +375,9 @@ mod tests {
             let mut work = Work::<Single>::new(0, None);
             work.radiance.groups[0].x =
                 Single::from_fn(|i| Real::of(if i == 3 { bad } else { 0.5 }));
-            let at = |lane| (lane as u32, 0);
-            tracer.scatter(&mut work, 8, at, 0, &mut |lane, v: &[i64]| tile.add(0, lane, v));
+            tracer.take_out_bad(&mut work, |lane| ((lane as u32, 0), 0));
+            let put = |lane, group, values| tile.add_group(0, lane, group, values);
+            tracer.scatter(&work.radiance, 8, put);
             assert_eq!(work.bad, [BadSample { index: 0, replicate: 0, y: 0, x: 3 }], "{bad}");
             work.bad.into_iter().for_each(|bad| tile.record_bad(bad));
             tile.advance(0, 1);
