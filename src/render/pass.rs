@@ -1,7 +1,7 @@
 //! The synchronous core: traces the jobs of one wave into the film.
 
 use super::wave::{Job, JobReport, Wave, WaveReport};
-use crate::film::{BadSample, Estimator, Film, Slot, TILE, Tile, lattice_pixels};
+use crate::film::{BadSample, Estimator, Film, Slot, TILE, Tile};
 use crate::lanes::{Lanes, MAX_WIDTH, Mask, Real, V3};
 use crate::sampling::{Draws, Points, SampleSettings, Sampler};
 use crate::world::{AnyWorld, Counts, MAX_GROUPS, Outlook, Radiance, World};
@@ -57,85 +57,28 @@ pub fn run_in<L: Lanes>(
     WaveReport { reports }
 }
 
-/// The first sample of replicate A in interleaved order: every 8th pixel in x and y, then the gaps in
-/// three stages, each over the whole picture; `shown` sees the film after the first. Once `abandon`
-/// is raised the later stages are left out, and there is no report.
-pub fn run_first(
-    world: &AnyWorld,
-    film: &mut Film,
-    wave: &Wave,
-    sampling: &SampleSettings,
-    pool: &rayon::ThreadPool,
-    abandon: &AtomicBool,
-    shown: &mut dyn FnMut(&Film),
-) -> Option<WaveReport> {
-    match world {
-        AnyWorld::Single(w) => first_in(w, film, wave, sampling, pool, abandon, shown),
-        AnyWorld::Double(w) => first_in(w, film, wave, sampling, pool, abandon, shown),
-    }
-}
-
-/// Tiles side by side that share packets while the lattice is coarse.
-const STRIP_TILES: usize = 8;
-
-fn first_in<L: Lanes>(
-    world: &World<L>,
-    film: &mut Film,
-    wave: &Wave,
-    sampling: &SampleSettings,
-    pool: &rayon::ThreadPool,
-    abandon: &AtomicBool,
-    shown: &mut dyn FnMut(&Film),
-) -> Option<WaveReport> {
-    let tracer = Tracer::new(world, sampling);
-    let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
-    let mut counts = vec![Counts::default(); tiles.len()];
-    let mut before = 0;
-    for step in [8, 4, 2, 1] {
-        let mut strips: Vec<(Vec<Slot>, &mut [Counts])> = Vec::new();
-        let mut slots = film.slots(&tiles).into_iter();
-        for counts in counts.chunks_mut(STRIP_TILES) {
-            strips.push((slots.by_ref().take(counts.len()).collect(), counts));
-        }
-        let complete = pool.install(|| {
-            strips
-                .into_par_iter()
-                .map(|(slots, counts)| {
-                    if step != 8 && abandon.load(Ordering::Relaxed) {
-                        return false;
-                    }
-                    tracer.lattice(slots, before, step, counts);
-                    true
-                })
-                .reduce(|| true, |a, b| a & b)
-        });
-        if step == 8 {
-            shown(film);
-        }
-        if !complete || (step != 1 && abandon.load(Ordering::Relaxed)) {
-            return None;
-        }
-        before = step;
-    }
-    let report = |c: Counts| Some(JobReport { rays: c.rays, glossy: c.glossy, error: None });
-    Some(WaveReport { reports: counts.into_iter().map(report).collect() })
-}
-
 /// A world with the sample sequence and what else all jobs share.
-struct Tracer<'a, L: Lanes> {
-    world: &'a World<L>,
-    sampler: Sampler<L>,
+pub(super) struct Tracer<'a, L: Lanes> {
+    pub(super) world: &'a World<L>,
+    pub(super) sampler: Sampler<L>,
     /// Radiance beyond this cannot be told from a fault, per group: 2^49 steps of the film.
     limits: [L; MAX_GROUPS],
+    /// The pixels of a tile that lies inside the picture, see [`blocks`].
+    whole: Vec<(usize, usize)>,
 }
 
 impl<'a, L: Lanes> Tracer<'a, L> {
-    fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
+    pub(super) fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
         let mut limits = [L::zero(); MAX_GROUPS];
         for (limit, scale) in limits.iter_mut().zip(world.scales()) {
             *limit = L::of((49f64.exp2() / scale).min(L::MAX));
         }
-        Self { world, sampler: Sampler::new(*sampling, world.jitter()), limits }
+        Self {
+            world,
+            sampler: Sampler::new(*sampling, world.jitter()),
+            limits,
+            whole: blocks([TILE; 2]),
+        }
     }
 
     /// Samples of all pixels of a tile: packets of one pixel where enough aligned samples are asked
@@ -144,13 +87,19 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         let mut work = Work::new(replicate, self.world.outlook(origin, tile.extent()));
         let width = L::WIDTH as u32;
         let end = job.first + job.count;
-        let pixels = blocks(tile.extent());
+        let part: Vec<(usize, usize)>;
+        let pixels = if tile.extent() == [TILE; 2] {
+            &self.whole
+        } else {
+            part = blocks(tile.extent());
+            &part
+        };
         let place = |(x, y): (usize, usize)| ((origin[0] + x) as u32, (origin[1] + y) as u32);
         let mut index = job.first;
         while index < end {
             if index.is_multiple_of(width) && end - index >= width {
                 let points = self.sampler.aligned(index);
-                for (x, y) in &pixels {
+                for (x, y) in pixels {
                     self.pixel(&mut work, &points, place((*x, *y)), index);
                     self.sum(&work.radiance, |group, sums| {
                         tile.add_group(replicate, y * TILE + x, group, sums);
@@ -186,7 +135,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
 
     /// Sample `index` of the first `count` pixels that `at` names, into `work.radiance`.
     #[inline(always)]
-    fn pixels(
+    pub(super) fn pixels(
         &self,
         work: &mut Work<L>,
         points: &Points<'_, L>,
@@ -218,7 +167,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
 
     /// Gives the samples of the first `count` lanes to `put`, by lane and group.
     #[inline(always)]
-    fn scatter(
+    pub(super) fn scatter(
         &self,
         radiance: &Radiance<L>,
         count: usize,
@@ -259,64 +208,19 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             work.bad.push(BadSample { index, replicate: work.replicate as u8, y, x });
         }
     }
-
-    /// The first sample of the pixels that a lattice of `step` pixels adds to one of `before` (0:
-    /// none) in tiles side by side, whose pixels share packets.
-    fn lattice(&self, slots: Vec<Slot>, before: usize, step: usize, counts: &mut [Counts]) {
-        let mut tiles = Vec::new();
-        let mut pixels = Vec::new();
-        for (t, slot) in slots.into_iter().enumerate() {
-            let origin = slot.origin;
-            let tile = slot.open();
-            let extent = tile.extent();
-            let inside = |p: &usize| p % TILE < extent[0] && p / TILE < extent[1];
-            pixels.extend(lattice_pixels(before, step).filter(inside).map(|p| (t, origin, p)));
-            tiles.push(tile);
-        }
-        let points = self.sampler.at(0);
-        for packet in pixels.chunks(L::WIDTH) {
-            let at = |lane: usize| {
-                let (_, origin, p) = packet[lane.min(packet.len() - 1)];
-                ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
-            };
-            let mut work = Work::new(0, None);
-            self.pixels(&mut work, &points, packet.len(), at, 0);
-            // A packet's rays are shared out among its pixels' tiles, the remainder to the first.
-            let Counts { rays, glossy } = work.counts;
-            let share = rays / packet.len() as u64;
-            counts[packet[0].0].rays += rays - share * packet.len() as u64;
-            for (t, _, _) in packet {
-                counts[*t].rays += share;
-                counts[*t].glossy |= glossy;
-            }
-            self.scatter(&work.radiance, packet.len(), |lane, group, values| {
-                let (t, _, p) = packet[lane];
-                tiles[t].add_group(0, p, group, values);
-            });
-            for bad in work.bad {
-                let tile_of = |lane: &usize| at(*lane) == (bad.x, bad.y);
-                if let Some(lane) = (0..packet.len()).find(tile_of) {
-                    tiles[packet[lane].0].record_bad(bad);
-                }
-            }
-        }
-        for tile in tiles {
-            tile.set_lattice(step);
-        }
-    }
 }
 
 /// What the packets of one job share and fill.
-struct Work<L: Lanes> {
+pub(super) struct Work<L: Lanes> {
     replicate: usize,
     outlook: Option<Outlook>,
-    radiance: Radiance<L>,
-    counts: Counts,
-    bad: Vec<BadSample>,
+    pub(super) radiance: Radiance<L>,
+    pub(super) counts: Counts,
+    pub(super) bad: Vec<BadSample>,
 }
 
 impl<L: Lanes> Work<L> {
-    fn new(replicate: usize, outlook: Option<Outlook>) -> Self {
+    pub(super) fn new(replicate: usize, outlook: Option<Outlook>) -> Self {
         let radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
         Self { replicate, outlook, radiance, counts: Counts::default(), bad: Vec::new() }
     }
