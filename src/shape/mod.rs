@@ -1,6 +1,7 @@
 //! Shapes: what users describe, one kind a file, and what rays meet, one batch per form.
 
 mod batch;
+mod bound;
 mod cast;
 mod cube;
 mod cuboid;
@@ -17,10 +18,11 @@ mod tree;
 mod upright;
 
 pub use batch::{Hit, Ray, Surface};
+pub use bound::{Ball, Bound, Pencil, Towards};
 pub use cube::Cube;
 pub use cuboid::Cuboid;
 pub use form::{Form, HalfSpace};
-pub use geometry::{Geometry, Seen, TREE_FROM};
+pub use geometry::{Geometry, Selection, TREE_FROM};
 pub use kinds::{EXAMPLES, KINDS, Kind, Shape};
 pub use plane::Plane;
 pub use platform::Platform;
