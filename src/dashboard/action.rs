@@ -170,8 +170,10 @@ pub enum Action {
     NextChannel,
     /// The view before.
     PreviousChannel,
-    /// Follows the pixel under the cursor with numbers.
+    /// Shows a pixel in numbers, or ends that.
     Probe,
+    /// Moves the probe over the picture: by a cell, or by a pixel of the film.
+    MoveProbe(Way, Pace),
     /// Keeps the picture for comparison.
     Keep,
     /// Flips between the kept and the live picture.

@@ -22,6 +22,8 @@ pub enum Context {
     Turning,
     /// The camera flies.
     Flying,
+    /// The probe moves over the picture.
+    Probing,
     /// The outline has the focus.
     Outline,
     /// The inspector has the focus.
@@ -164,7 +166,7 @@ pub const KEYMAP: &[Row] = &[
 
     row(C::Panels, NextPanel, &[(Anywhere, &["Tab"]), (Overlay, &["Tab"])], "next panel or field"),
     row(C::Panels, PreviousPanel, &[(Anywhere, &["Shift-Tab"]), (Overlay, &["Shift-Tab"])], "panel or field before"),
-    row(C::Panels, Leave, &[(Anywhere, &["Esc"]), (Moving, &["Enter"]), (Turning, &["Enter"]), (Flying, &["Enter"]), (Overlay, &["Esc"])], "leave, back to the picture"),
+    row(C::Panels, Leave, &[(Anywhere, &["Esc"]), (Moving, &["Enter"]), (Turning, &["Enter"]), (Flying, &["Enter"]), (Probing, &["Enter"]), (Overlay, &["Esc"])], "leave, back to the picture"),
     row(C::Panels, Open, &[(Picture, &["Enter"]), (Outline, &["Enter", "Right"]), (Inspector, &["Enter", "0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "-", "+", ".", "#"]), (Overlay, &["Enter"])], "inspect, type a value, choose"),
     row(C::Panels, Cursor(Up), &[(Outline, &["Up"]), (Inspector, &["Up"]), (Overlay, &["Up"])], "line above"),
     row(C::Panels, Cursor(Down), &[(Outline, &["Down"]), (Inspector, &["Down"]), (Overlay, &["Down"])], "line below"),
@@ -197,6 +199,14 @@ pub const KEYMAP: &[Row] = &[
     row(C::Picture, NextChannel, &[(Anywhere, &["v"])], "next view: noise, samples, objects, …"),
     row(C::Picture, PreviousChannel, &[(Anywhere, &["V"])], "view before"),
     row(C::Picture, Probe, &[(Anywhere, &["i"])], "probe a pixel"),
+    row(C::Picture, MoveProbe(Left, Coarse), &[(Probing, &["Left"])], "probe left"),
+    row(C::Picture, MoveProbe(Right, Coarse), &[(Probing, &["Right"])], "probe right"),
+    row(C::Picture, MoveProbe(Up, Coarse), &[(Probing, &["Up"])], "probe up"),
+    row(C::Picture, MoveProbe(Down, Coarse), &[(Probing, &["Down"])], "probe down"),
+    row(C::Picture, MoveProbe(Left, Fine), &[(Probing, &["Shift-Left"])], "probe left by one pixel"),
+    row(C::Picture, MoveProbe(Right, Fine), &[(Probing, &["Shift-Right"])], "probe right by one pixel"),
+    row(C::Picture, MoveProbe(Up, Fine), &[(Probing, &["Shift-Up"])], "probe up by one pixel"),
+    row(C::Picture, MoveProbe(Down, Fine), &[(Probing, &["Shift-Down"])], "probe down by one pixel"),
     row(C::Picture, Keep, &[(Anywhere, &["k"])], "keep this picture"),
     row(C::Picture, Flip, &[(Anywhere, &["c"])], "flip between kept and live"),
     row(C::Picture, Difference, &[(Anywhere, &["C"])], "difference of kept and live"),
@@ -253,6 +263,7 @@ impl Context {
             Self::Moving => "while moving",
             Self::Turning => "while turning",
             Self::Flying => "while flying",
+            Self::Probing => "while probing",
             Self::Outline => "in the outline",
             Self::Inspector => "in the inspector",
             Self::Overlay => "in lists and forms",
@@ -267,6 +278,7 @@ impl Context {
             Self::Moving => &[Self::Moving, Self::Picture, Self::Anywhere],
             Self::Turning => &[Self::Turning, Self::Picture, Self::Anywhere],
             Self::Flying => &[Self::Flying, Self::Picture, Self::Anywhere],
+            Self::Probing => &[Self::Probing, Self::Picture, Self::Anywhere],
             Self::Outline => &[Self::Outline, Self::Anywhere],
             Self::Inspector => &[Self::Inspector, Self::Anywhere],
             Self::Overlay => &[Self::Overlay],
