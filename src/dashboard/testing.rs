@@ -24,5 +24,9 @@ pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
         eta_seconds: None,
         progress: None,
         bad_samples: 0,
+        recent_samples_per_second: 1e7,
+        threads: 2,
+        lanes: "f32x8",
+        inventory: "1 sphere (list)".into(),
     }
 }
