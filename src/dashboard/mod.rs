@@ -19,3 +19,4 @@ pub mod panels;
 pub mod places;
 #[cfg(test)]
 mod testing;
+pub mod update;
