@@ -73,6 +73,8 @@ pub struct Desk {
     pub fired: HashSet<Action>,
     pub document: Document,
     begun_with: Document,
+    /// Whether reading the file is answered: it begins another history of edits.
+    pub reads: bool,
 }
 
 fn parse(text: &str) -> Document {
@@ -97,8 +99,16 @@ impl Desk {
         let disk = [(PathBuf::from(FILE), text.to_string())].into();
         let (effects, fired) = (Vec::new(), HashSet::new());
         let begun_with = document.clone();
-        let mut desk =
-            Self { model, now: Duration::ZERO, effects, disk, fired, document, begun_with };
+        let mut desk = Self {
+            model,
+            now: Duration::ZERO,
+            effects,
+            disk,
+            fired,
+            document,
+            begun_with,
+            reads: true,
+        };
         desk.effects = begin(&mut desk.model);
         desk
     }
@@ -149,7 +159,7 @@ impl Desk {
                 };
                 Message::Saved(scene, result)
             }
-            Effect::Load => {
+            Effect::Load if self.reads => {
                 let text = self.disk.get(Path::new(FILE)).cloned().unwrap_or_default();
                 let read = Document::parse(text, FILE);
                 if let Ok(document) = &read {

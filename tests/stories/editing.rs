@@ -47,16 +47,15 @@ fn what_is_wrong_is_refused_where_it_is_typed() {
     for (typed, words) in [
         ("-1", "radius is -1"),
         ("1e12", "radius is 1e12"),
-        ("5 5", "needs 1 numbers"),
-        ("1x", "cannot be"),
+        ("5 5", "needs 1 number"),
+        ("one", "cannot be"),
         ("nan", "cannot be"),
         ("#ff0000", "cannot be"),
     ] {
         let mut desk = at_radius();
         desk.keys(&format!("Enter Ctrl-u `{typed}` Enter"));
         let problem = desk.problem().unwrap_or_default().to_string();
-        assert!(problem.contains(words) || words.starts_with("needs"), "{typed}: {problem}");
-        assert!(!problem.is_empty(), "{typed} is taken");
+        assert!(problem.contains(words), "{typed}: {problem}");
         assert_eq!(desk.text(), ROOM, "{typed}: the scene stays");
         // The reason goes with the next letter, the old value comes back with Esc.
         desk.keys("Backspace");

@@ -143,7 +143,7 @@ fn a_broken_file_is_told_and_work_begins_when_it_is_mended() {
     assert!(begun.iter().all(|e| !matches!(e, Effect::Show(_))), "{begun:?}");
     assert!(model.file.blank);
     let told = model.file.broken.as_ref().unwrap().to_string();
-    assert!(told.contains("room.toml:36") && told.contains("radius is -1"), "{told}");
+    assert!(told.contains("room.toml:33") && told.contains("radius is -1"), "{told}");
     let effects = press(&mut model, "Left a ] x m Ctrl-s Enter Tab Down Right p");
     assert!(effects.is_empty(), "{effects:?}");
     assert!(model.notice.as_ref().unwrap().text.contains("mend"));
@@ -155,6 +155,7 @@ fn a_broken_file_is_told_and_work_begins_when_it_is_mended() {
     assert!(!model.file.blank && model.file.broken.is_none() && !model.is_unsaved());
     assert!(!press(&mut model, "Left").is_empty());
     let mut model = start(Some(FILE), &broken);
+    begin(&mut model);
     assert_eq!(press(&mut model, "q"), [Effect::Quit]);
 }
 

@@ -89,6 +89,7 @@ fn event(desk: &mut Desk, rng: &mut Rng, keys: &[Key]) {
 fn play(name: &str, text: &str, seed: u64, fired: &mut HashSet<Action>) {
     let (keys, mut rng) = (keys(), Rng(seed));
     let mut desk = Desk::new(text);
+    desk.reads = false;
     for i in 0..EVENTS {
         event(&mut desk, &mut rng, &keys);
         // A question may lead to the end or to another file: that is told elsewhere.
