@@ -20,13 +20,16 @@ use zerkalo::shape::Shape;
 const BALL: Subject = Subject::Object(1);
 const GLASS: Subject = Subject::Object(2);
 
+/// The scene before, the desk afterwards.
+type Expect = dyn Fn(&Scene, &Desk) -> bool;
+
 /// What was pressed with what selected, and what must be so afterwards.
 struct Story {
     action: Action,
     select: Subject,
     /// Keys; `:` alone: the action is found in the palette.
     keys: String,
-    expect: Box<dyn Fn(&Scene, &Desk) -> bool>,
+    expect: Box<Expect>,
 }
 
 fn story(
