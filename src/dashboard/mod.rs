@@ -17,5 +17,7 @@ pub mod model;
 pub mod overlay;
 pub mod panels;
 pub mod places;
+pub mod raster;
 #[cfg(test)]
 mod testing;
+pub mod view;
