@@ -104,8 +104,7 @@ mod tests {
 
     #[test]
     fn pasted_text_is_one_line_of_what_could_be_typed() {
-        let mut editor = Editor::default();
-        editor.problem = Some("empty".into());
+        let mut editor = Editor { problem: Some("empty".into()), ..Editor::default() };
         editor.paste("\n1\t2\u{1b}[31m 3\nq\n");
         assert_eq!(editor.text(), "1 2[31m 3");
         assert_eq!(editor.problem, None);

@@ -20,4 +20,5 @@ pub mod places;
 pub mod raster;
 #[cfg(test)]
 mod testing;
+pub mod update;
 pub mod view;

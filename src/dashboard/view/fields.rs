@@ -15,6 +15,9 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::{Modifier, Style};
 
+/// The unit of lengths: told under the cursor only.
+const LENGTH: &str = "scene units";
+
 /// Fields in their area.
 pub struct Fields<'a> {
     /// The lines.
@@ -122,7 +125,10 @@ impl Fields<'_> {
             }
             given => to.put(given, value),
         };
-        if !field.unit.is_empty() && !field.value.is_empty() && to.left() > columns(field.unit) {
+        // A word that nearly every number has would only be noise.
+        let telling = chosen || field.unit != LENGTH;
+        let fits = to.left() >= columns(field.unit) + 2;
+        if telling && fits && !field.unit.is_empty() && !field.value.is_empty() {
             let unit = if chosen { name } else { theme.dim() };
             to.put(" ", unit).put(field.unit, unit);
         }

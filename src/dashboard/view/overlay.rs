@@ -2,7 +2,7 @@
 
 use super::fields::{Fields, typed};
 use super::frame::{overlay, scroll_mark};
-use super::text::{Row, columns};
+use super::text::{Row, columns, cut};
 use super::theme::Theme;
 use crate::dashboard::hints::{HelpLine, help};
 use crate::dashboard::keymap::KEYMAP;
@@ -47,11 +47,6 @@ fn keys(scroll: usize, place: &Place, theme: &Theme, buffer: &mut Buffer) {
     overlay(place.frame, "keys", theme, buffer);
     let lines = help();
     let (first, rows) = window(place, scroll, lines.len(), theme, buffer);
-    let labels = lines.iter().map(|line| match line {
-        HelpLine::Keys(_, label) => columns(label),
-        HelpLine::Heading(_) => 0,
-    });
-    let labels = labels.max().unwrap_or(0).min(usize::from(place.list.width) / 2);
     for (row, line) in (0..).zip(lines.iter().skip(first).take(rows)) {
         let mut to = Row::new(buffer, place.list, row);
         match line {
@@ -61,8 +56,10 @@ fn keys(scroll: usize, place: &Place, theme: &Theme, buffer: &mut Buffer) {
                 to.put(&"─".repeat(rest), theme.border(false));
             }
             HelpLine::Keys(keys, label) => {
-                to.skip(3).put_wide(label, labels, theme.text()).skip(2);
-                to.put(keys, theme.accent());
+                // Keys that are told for many places give way to the label.
+                let room = to.left().saturating_sub(3 + columns(label) + 2 + 1);
+                to.put_right(" ", 0, theme.text()).put_right(&cut(keys, room), 0, theme.accent());
+                to.skip(3).put(label, theme.text());
             }
         }
     }
@@ -115,7 +112,7 @@ fn palette(open: &Palette, place: &Place, theme: &Theme, buffer: &mut Buffer) ->
         let key = if i == open.cursor { name } else { theme.accent() };
         to.put_right(" ", 0, key).put_right(&keys, columns(action.label) + 2, key);
         to.put(action.label, name);
-        to.put_right(action.chapter.title(), 3, rest);
+        to.put_right("  ", 1, rest).put_right(action.chapter.title(), 1, rest);
     }
     cursor
 }

@@ -44,13 +44,13 @@ impl Theme {
     fn toned(&self, tone: Tone, plain: Modifier) -> Style {
         match self.color(tone) {
             Some(color) => Style::new().fg(color),
-            None => Style::new().add_modifier(plain),
+            None => Style::new().add_modifier(plain).remove_modifier(Modifier::DIM - plain),
         }
     }
 
-    /// Values and names.
+    /// Values and names, also over a border.
     pub fn text(&self) -> Style {
-        Style::new()
+        Style::new().fg(Color::Reset).remove_modifier(Modifier::DIM)
     }
 
     /// What may be overlooked: labels, units, defaults.

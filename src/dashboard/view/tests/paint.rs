@@ -46,12 +46,14 @@ fn paint() {
         ("16", Colors::Sixteen),
         ("mono", Colors::Mono),
     ];
-    for (name, make) in STATES {
-        for screen in [[200, 60], [120, 36], [80, 24], [40, 12]] {
+    for screen in [[200, 60], [120, 36], [80, 24], [40, 12]] {
+        let picture = rendered(&tracing(screen), 32);
+        for (name, make) in STATES {
             let mut model = tracing(screen);
             make(&mut model);
             if let Some(before) = &model.snapshot {
-                let mut snapshot = rendered(&model, 64);
+                let mut snapshot = picture.clone();
+                snapshot.probe = before.probe.clone();
                 snapshot.report = before.report.clone();
                 snapshot.report.inventory = "6 objects: 2 spheres (list), 3 convex solids, 1 rectangle, Phong, cone lobe, 1 point light, single precision".into();
                 model.snapshot = Some(Box::new(snapshot));

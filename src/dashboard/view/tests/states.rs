@@ -10,7 +10,7 @@ use crate::dashboard::model::{
 use crate::dashboard::overlay::{
     Answer, Form, Overlay, Palette, Pick, PickFor, Prompt, PromptFor, Question,
 };
-use crate::dashboard::panels::Line;
+use crate::dashboard::panels::{Line, scrolled};
 use crate::dashboard::testing::report;
 use crate::film::{Mix, Probe};
 use crate::render::schedule::{Spp, Stop, StoppedBy};
@@ -101,6 +101,10 @@ fn typing(model: &mut Model, text: &str, problem: Option<&str>) {
     let mut editor = Editor::new(text);
     editor.problem = problem.map(str::to_string);
     model.inspector.editor = Some(editor);
+    if let Some((list, _)) = model.inspector_rows() {
+        let (cursor, lines) = (model.inspector.cursor, model.field_lines().len());
+        model.inspector.scroll = scrolled(0, cursor, lines, list.height.into());
+    }
 }
 
 fn resting(model: &mut Model, by: StoppedBy) {

@@ -102,7 +102,7 @@ fn defaults_are_dimmed_and_refusals_are_red() {
     let (_, help) = model.inspector_rows().unwrap();
     assert!(row_text(&buffer, help.y).contains("is no colour"));
     let refusal = buffer[(help.x + 2, help.y)].fg;
-    let typed = cursor.map(|at| buffer[(at.x - 1, at.y)].fg).unwrap();
+    let typed = cursor.map(|at| buffer[(at.x - 1, at.y)].fg).expect("a cursor where text is typed");
     assert_eq!(refusal, typed, "the reason and what it is about have one colour");
 
     let model = state("inspector", [120, 36]);
