@@ -17,6 +17,8 @@ pub mod model;
 pub mod overlay;
 pub mod panels;
 pub mod places;
+pub mod raster;
 #[cfg(test)]
 mod testing;
 pub mod update;
+pub mod view;
