@@ -3,7 +3,6 @@
 mod args;
 mod check;
 mod cpu;
-mod metadata;
 mod new;
 mod progress;
 mod render;
