@@ -85,7 +85,7 @@ impl Tty {
     }
 
     /// Gives the terminal back. The second time nothing happens.
-    fn leave(&self) {
+    pub fn leave(&self) {
         if !self.entered.swap(false, Ordering::AcqRel) {
             return;
         }
