@@ -46,7 +46,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("serde", &["command", "scene", "shape", "material", "light", "camera", "value"]),
     ("serde_json", &["command"]),
     ("signal_hook", &["command"]),
-    ("tempfile", &["film", "command"]),
+    ("tempfile", &["film", "scene", "command"]),
     // Descriptions read their own examples in tests.
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),
     ("toml_edit", &["scene"]),

@@ -69,7 +69,8 @@ pub enum Action {
     TurnMode,
     /// Letters fly the camera.
     FlyMode,
-    /// Moves the selection: in the ground plane as the camera sees it; `In`, `Out`: up, down.
+    /// Moves the selection as the camera sees it: `Left`, `Right`, `In` (away) and `Out` (nearer) in
+    /// the ground plane, `Up` and `Down` in height.
     Move(Way, Pace),
     /// Turns the selection about the vertical.
     Turn(Way, Pace),
@@ -123,11 +124,11 @@ pub enum Action {
     Last,
     /// A page up or down.
     Page(Way),
-    /// Opens what is under the cursor: edits the field, chooses the entry.
+    /// Opens what is under the cursor: types into the field, chooses the entry, confirms.
     Open,
     /// Changes the field under the cursor by a step.
     Step(Change, Pace),
-    /// The field under the cursor as it is without being given.
+    /// The field under the cursor as it is when the file does not give it.
     ClearField,
 
     // History and file
@@ -169,8 +170,10 @@ pub enum Action {
     NextChannel,
     /// The view before.
     PreviousChannel,
-    /// Follows the pixel under the cursor with numbers.
+    /// Shows a pixel in numbers, or ends that.
     Probe,
+    /// Moves the probe over the picture: by a cell, or by a pixel of the film.
+    MoveProbe(Way, Pace),
     /// Keeps the picture for comparison.
     Keep,
     /// Flips between the kept and the live picture.

@@ -49,6 +49,14 @@ impl Object {
         self.transform.iter().fold(DAffine3::IDENTITY, |map, step| step.map() * map)
     }
 
+    /// Its geometry where it stands, in double precision. Of an object without faults.
+    pub fn form(&self) -> Form {
+        match self.transform.is_empty() {
+            true => self.shape.form(),
+            false => self.shape.form().transformed(&self.scene_from_object()),
+        }
+    }
+
     /// What is wrong with it (its material's name is the scene's business).
     pub fn faults(&self) -> Vec<Fault> {
         let mut checks = Checks::new(OBJECT_FIELDS).inner("shape", self.shape.faults());

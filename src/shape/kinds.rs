@@ -2,7 +2,8 @@
 
 use super::Form;
 use super::{Cube, Cuboid, Plane, Platform, Prism, Pyramid, Rectangle, Sphere};
-use crate::value::{Fault, Field, Takes};
+use crate::value::{Fault, Field, Takes, rounded_to};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// What every kind's description says of itself.
@@ -19,6 +20,23 @@ pub trait Kind {
 
     /// What is wrong with it.
     fn faults(&self) -> Vec<Fault>;
+
+    /// One of this kind that stands upright on `base`, the middle of its lower side, and fills about
+    /// a box with the lengths `size` along x, y and z, all greater than 0.
+    fn standing(base: DVec3, size: DVec3) -> Self;
+
+    /// The point that moves it: adding a vector to it moves the whole shape by that vector.
+    fn anchor(&mut self) -> &mut [f64; 3];
+
+    /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen from
+    /// above. `false`: it has no key for that, and nothing was done.
+    fn turn(&mut self, degrees: f64) -> bool;
+}
+
+/// The angle `rotation + degrees` as it is written in a file: above -180, at most 180.
+pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
+    let turn = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
+    if turn > 180.0 { rounded_to(turn - 360.0, -6) } else { turn }
 }
 
 macro_rules! kinds {
@@ -63,6 +81,29 @@ macro_rules! kinds {
                     $(Self::$kind(kind) => kind.faults(),)+
                 };
                 faults.into_iter().map(|f| f.under(self.key())).collect()
+            }
+
+            /// The kind with this key as [`Kind::standing`] makes it; `None`: no kind has it.
+            pub fn standing(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
+                match key {
+                    $($key => Some(Self::$kind($kind::standing(base, size))),)+
+                    _ => None,
+                }
+            }
+
+            /// The point that moves it: adding a vector to it moves the whole shape by that vector.
+            pub fn anchor(&mut self) -> &mut [f64; 3] {
+                match self {
+                    $(Self::$kind(kind) => kind.anchor(),)+
+                }
+            }
+
+            /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen
+            /// from above. `false`: its kind has no key for that, and nothing was done.
+            pub fn turn(&mut self, degrees: f64) -> bool {
+                match self {
+                    $(Self::$kind(kind) => kind.turn(degrees),)+
+                }
             }
         }
     };
