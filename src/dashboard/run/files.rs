@@ -48,7 +48,14 @@ impl Files {
     pub fn new(file: Result<SceneFile, PathBuf>, results: Sender<Message>) -> io::Result<Self> {
         let (jobs, inbox) = unbounded();
         let paper = Paper::default();
-        let clerk = Clerk { held: file, told: None, paper: paper.clone(), results };
+        let (path, file) = match file {
+            Ok(file) => (file.path().map(Path::to_path_buf), Some(file)),
+            Err(path) => (Some(path), None),
+        };
+        // A file that could be read is compared at the first look; what is wrong with another one is
+        // known already.
+        let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
+        let clerk = Clerk { path, file, seen, paper: paper.clone(), results };
         let thread = thread::Builder::new().name("files".into()).spawn(|| clerk.run(inbox))?;
         Ok(Self { jobs: Some(jobs), paper, thread: Some(thread) })
     }
@@ -95,10 +102,12 @@ fn stamp(path: &Path) -> Stamp {
 }
 
 struct Clerk {
-    /// The file; or where it is, as long as it cannot be read.
-    held: Result<SceneFile, PathBuf>,
-    /// The state of the file that was last told about.
-    told: Option<Stamp>,
+    /// Where it is, if it is anywhere yet.
+    path: Option<PathBuf>,
+    /// The file, once it could be read.
+    file: Option<SceneFile>,
+    /// The state of the file when it was last read, written or looked at.
+    seen: Stamp,
     paper: Paper,
     results: Sender<Message>,
 }
@@ -106,8 +115,6 @@ struct Clerk {
 impl Clerk {
     fn run(mut self, inbox: Receiver<Job>) {
         self.publish();
-        // What is there now was told by whoever opened the file.
-        self.told = self.path().map(|path| stamp(&path));
         loop {
             let message = match inbox.recv_timeout(CHECK_INTERVAL) {
                 Ok(Job::Save { scene, path, overwrite }) => {
@@ -123,26 +130,18 @@ impl Clerk {
         }
     }
 
-    fn path(&self) -> Option<PathBuf> {
-        match &self.held {
-            Ok(file) => file.path().map(Path::to_path_buf),
-            Err(path) => Some(path.clone()),
-        }
-    }
-
     /// Whether somebody has written the file since it was read, written or told about.
     fn changed(&mut self) -> bool {
-        let Some(path) = self.path() else { return false };
-        let now = stamp(&path);
-        let differs = match &self.held {
-            Ok(file) => file.on_disk() == DiskState::Changed,
-            Err(_) => now.is_some(),
-        };
-        let news = differs && self.told != Some(now);
-        if news {
-            self.told = Some(now);
+        let Some(path) = &self.path else { return false };
+        let now = stamp(path);
+        if self.seen == now {
+            return false;
         }
-        news
+        self.seen = now;
+        match &self.file {
+            Some(file) => file.on_disk() == DiskState::Changed,
+            None => now.is_some(),
+        }
     }
 
     fn save(
@@ -151,42 +150,119 @@ impl Clerk {
         path: Option<PathBuf>,
         overwrite: bool,
     ) -> Result<PathBuf, SaveError> {
-        let file = match &mut self.held {
-            Ok(file) => file,
-            // Nothing could be read: what is saved is a new file.
-            Err(broken) => {
-                let name = broken.display().to_string();
-                let text = Document::new(scene, &name).text().to_string();
-                let file = SceneFile::untitled(text, &name).map_err(|_| SaveError::Untitled)?;
-                self.held = Ok(file);
-                self.held.as_mut().expect("just put there")
-            }
+        let Some(file) = &mut self.file else {
+            let what = "it holds something that is no scene".to_string();
+            return Err(SaveError::Failed { path: self.path.clone().unwrap_or_default(), what });
         };
         match path {
             Some(path) => file.save_as(&path, scene, overwrite)?,
             None => file.save(scene, overwrite)?,
         }
+        let path = file.path().ok_or(SaveError::Untitled)?.to_path_buf();
+        self.seen = stamp(&path);
+        self.path = Some(path.clone());
         self.publish();
-        let path = self.path().ok_or(SaveError::Untitled)?;
-        self.told = Some(stamp(&path));
         Ok(path)
     }
 
     fn load(&mut self) -> Result<Arc<Scene>, SceneErrors> {
         // Before reading: what is written meanwhile is news.
-        self.told = self.path().map(|path| stamp(&path));
-        match &mut self.held {
-            Ok(file) => file.reload()?,
-            Err(path) => self.held = Ok(SceneFile::open(path)?),
-        }
+        self.seen = self.path.as_deref().and_then(stamp);
+        let file = match (self.file.take(), &self.path) {
+            (Some(file), _) => {
+                let file = self.file.insert(file);
+                file.reload()?;
+                file
+            }
+            (None, Some(path)) => self.file.insert(SceneFile::open(path)?),
+            (None, None) => return Ok(Arc::default()),
+        };
+        let scene = Arc::new(file.document().scene().clone());
         self.publish();
-        let scene = self.held.as_ref().map(|file| file.document().scene().clone());
-        Ok(Arc::new(scene.unwrap_or_default()))
+        Ok(scene)
     }
 
     fn publish(&self) {
-        if let Ok(file) = &self.held {
+        if let Some(file) = &self.file {
             self.paper.put(file.document());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::starter;
+
+    /// Long enough for any machine; reached only on failure.
+    const PATIENCE: Duration = Duration::from_secs(60);
+
+    fn opened(path: &Path) -> (Files, Receiver<Message>) {
+        let (results, inbox) = unbounded();
+        let file = SceneFile::open(path).map_err(|_| path.to_path_buf());
+        (Files::new(file, results).unwrap(), inbox)
+    }
+
+    fn loaded(message: Message) -> Result<Arc<Scene>, SceneErrors> {
+        match message {
+            Message::Loaded(result) => *result,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn what_others_write_is_told_once_and_what_is_saved_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.toml");
+        fs::write(&path, starter()).unwrap();
+        let (files, inbox) = opened(&path);
+        let mut scene = Scene::parse(starter(), "a").unwrap();
+        scene.film.size = [64, 48];
+        files.save(Arc::new(scene.clone()), None, false);
+        let saved = inbox.recv_timeout(PATIENCE).unwrap();
+        assert!(matches!(saved, Message::Saved(Ok(at)) if at == path));
+        assert_eq!(files.paper().document().unwrap().scene(), &scene);
+        let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL + CHECK_INTERVAL / 2);
+        assert!(quiet.is_err(), "{quiet:?}");
+        fs::write(&path, format!("{}\n# more\n", starter())).unwrap();
+        assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
+        let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL);
+        assert!(quiet.is_err(), "told once: {quiet:?}");
+        files.save(Arc::new(scene), None, false);
+        let refused = inbox.recv_timeout(PATIENCE).unwrap();
+        assert!(matches!(refused, Message::Saved(Err(SaveError::Changed(_)))), "{refused:?}");
+        files.load();
+        assert_eq!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).unwrap().film.size, [640, 480]);
+    }
+
+    #[test]
+    fn a_broken_file_is_read_once_it_is_mended() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.toml");
+        fs::write(&path, "[camera").unwrap();
+        let (files, inbox) = opened(&path);
+        files.load();
+        assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_err());
+        files.save(Arc::default(), None, true);
+        assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::Saved(Err(_))));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "[camera", "not ours to overwrite");
+        fs::write(&path, starter()).unwrap();
+        assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
+        files.load();
+        assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_ok());
+        assert!(files.paper().document().is_some());
+    }
+
+    #[test]
+    fn what_was_given_is_done_before_the_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new.toml");
+        let (results, _inbox) = unbounded();
+        let untitled = SceneFile::untitled(starter().to_string(), "starter").unwrap();
+        let files = Files::new(Ok(untitled), results).unwrap();
+        let scene = Scene::parse(starter(), "starter").unwrap();
+        files.save(Arc::new(scene), Some(path.clone()), false);
+        drop(files);
+        assert_eq!(fs::read_to_string(&path).unwrap(), starter());
     }
 }
