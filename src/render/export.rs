@@ -32,7 +32,7 @@ impl Rendering {
         target.write(&Picture {
             film: &self.film,
             mix: &self.mix,
-            group_names: &self.world.group_names(),
+            group_names: &self.group_names(),
             display,
             depth,
             metadata: &metadata(self, report, origin, &display),
