@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     fn press(editor: &mut Editor, keys: &str) {
-        keys.split(' ').for_each(|key| drop(editor.key(key.parse().unwrap())));
+        keys.split(' ').for_each(|key| assert!(editor.key(key.parse().unwrap()), "{key}"));
     }
 
     #[test]

@@ -50,11 +50,8 @@ const MOVING: &[Hint] = &[
     ("Esc", "Esc", "done"),
 ];
 
-const TURNING: &[Hint] = &[
-    ("Left Right", "Left", "turn 15°"),
-    ("Shift", "Shift-Left", "1°"),
-    ("Esc", "Esc", "done"),
-];
+const TURNING: &[Hint] =
+    &[("Left Right", "Left", "turn 15°"), ("Shift", "Shift-Left", "1°"), ("Esc", "Esc", "done")];
 
 const FLYING: &[Hint] = &[
     ("w s", "w", "forward, back"),

@@ -131,11 +131,9 @@ impl FromStr for Key {
     fn from_str(text: &str) -> Result<Self, String> {
         let mut key = Self { code: Code::Esc, ctrl: false, alt: false, shift: false };
         let mut rest = text;
-        for (prefix, flag) in [
-            ("Ctrl-", &mut key.ctrl),
-            ("Alt-", &mut key.alt),
-            ("Shift-", &mut key.shift),
-        ] {
+        for (prefix, flag) in
+            [("Ctrl-", &mut key.ctrl), ("Alt-", &mut key.alt), ("Shift-", &mut key.shift)]
+        {
             if let Some(after) = rest.strip_prefix(prefix) {
                 *flag = true;
                 rest = after;
@@ -164,8 +162,20 @@ mod tests {
     #[test]
     fn names_and_keys_are_each_others_inverse() {
         for name in [
-            "a", "A", "?", "Space", "Ctrl-s", "Shift-Left", "Alt-Up", "F1", "F12", "Shift-Tab",
-            "PageUp", "Esc", "-", "Ctrl-Alt-Delete",
+            "a",
+            "A",
+            "?",
+            "Space",
+            "Ctrl-s",
+            "Shift-Left",
+            "Alt-Up",
+            "F1",
+            "F12",
+            "Shift-Tab",
+            "PageUp",
+            "Esc",
+            "-",
+            "Ctrl-Alt-Delete",
         ] {
             assert_eq!(name.parse::<Key>().unwrap().to_string(), name);
         }

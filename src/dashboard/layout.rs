@@ -159,10 +159,8 @@ impl Layout {
         if !self.image.contains(column, row) {
             return None;
         }
-        let at = [
-            f64::from(column - self.image.x) + 0.5,
-            2.0 * f64::from(row - self.image.y) + 1.0,
-        ];
+        let at =
+            [f64::from(column - self.image.x) + 0.5, 2.0 * f64::from(row - self.image.y) + 1.0];
         let pixel = |i: usize| {
             let pixel = at[i] / self.raster[i] as f64 * f64::from(film[i]);
             (pixel as usize).min(film[i].saturating_sub(1) as usize)

@@ -1,7 +1,7 @@
 //! What comes in and what goes out: everything that `update` learns, and everything that it asks for.
 
 use super::input::{Key, Mouse};
-use crate::film::{Display, Linear, Probe};
+use crate::film::{Display, Linear};
 use crate::render::schedule::Stop;
 use crate::render::session::Snapshot;
 use crate::scene::{SaveError, Scene, SceneErrors};
@@ -21,13 +21,8 @@ pub enum Message {
     Resize([u16; 2]),
     /// The renderer has news.
     Snapshot(Box<Snapshot>),
-    /// The pixel that was asked for with [`Effect::Probe`].
-    Probed(Probe),
     /// The picture that was asked for with [`Effect::Keep`], and its samples per pixel.
     Kept(Arc<Linear>, f64),
-    /// What the compiled scene contains, asked for with [`Effect::Inventory`]; or why it cannot be
-    /// told. Lines.
-    Inventory(String),
     /// The scene was written to this path, or not, and why. After [`Effect::Save`].
     Saved(Result<PathBuf, SaveError>),
     /// The file was read. After [`Effect::Load`].
@@ -133,13 +128,10 @@ pub enum Effect {
     Threads(usize),
     /// Low priority of the tracing threads, or normal.
     LowPriority(bool),
-    /// Tell about this pixel of the film (column, row) now and whenever the picture grows; `None`: no
-    /// longer.
+    /// Snapshots tell about this pixel of the film (column, row); `None`: about none.
     Probe(Option<[usize; 2]>),
     /// Tell the picture as it is, for comparison.
     Keep,
-    /// Tell what the compiled scene contains.
-    Inventory,
     /// Write the scene to its file, or to `path`, which becomes its file.
     Save {
         /// What to write.

@@ -19,4 +19,3 @@ pub mod panels;
 pub mod places;
 #[cfg(test)]
 mod testing;
-pub mod update;

@@ -7,6 +7,7 @@ use super::keymap::Context;
 use super::layout::{Focus, Layout, Request, layout};
 use super::message::{Channel, Format};
 use super::overlay::Overlay;
+use super::places::wrapped;
 use crate::film::{Display, Linear, Probe};
 use crate::render::schedule::Stop;
 use crate::render::session::Snapshot;
@@ -186,8 +187,8 @@ pub struct Model {
     pub channel: Channel,
     /// Kept and live.
     pub comparison: Comparison,
-    /// The probed pixel of the film (column, row), and what is known about it.
-    pub probe: Option<([usize; 2], Option<Probe>)>,
+    /// The probed pixel of the film (column, row).
+    pub probe: Option<[usize; 2]>,
     /// The newest news of the renderer.
     pub snapshot: Option<Box<Snapshot>>,
     /// How the error has fallen.
@@ -214,6 +215,8 @@ pub struct Model {
     pub last_edit: Option<Duration>,
     /// A save that was asked for so as to quit afterwards.
     pub quit_when_saved: bool,
+    /// The raster that snapshots were last asked for.
+    pub raster: Option<[usize; 2]>,
     /// Counts up whenever the cells of the picture may have to be others.
     pub picture_version: u64,
 }
@@ -285,6 +288,7 @@ impl Model {
             drag: None,
             last_edit: None,
             quit_when_saved: false,
+            raster: None,
             picture_version: 0,
         }
     }
@@ -336,6 +340,22 @@ impl Model {
             Some(Overlay::Form(form)) => form.editor.as_ref(),
             Some(_) => None,
             None => self.inspector.editor.as_ref(),
+        }
+    }
+
+    /// What is known about the probed pixel.
+    pub fn probed(&self) -> Option<&Probe> {
+        let probe = self.snapshot.as_ref()?.probe.as_ref()?;
+        (Some(probe.pixel) == self.probe).then_some(probe)
+    }
+
+    /// What the compiled scene contains, in lines of at most `width` columns.
+    pub fn inventory(&self, width: u16) -> Vec<String> {
+        match &self.snapshot {
+            Some(snapshot) if !snapshot.report.inventory.is_empty() => {
+                wrapped(&snapshot.report.inventory, width)
+            }
+            _ => vec!["Nothing has been compiled yet.".to_string()],
         }
     }
 

@@ -9,15 +9,13 @@ use std::sync::Arc;
 /// What lies over the panels.
 #[derive(Clone, Debug)]
 pub enum Overlay {
-    /// All keys; see `panels::help`.
+    /// All keys: [`help`](super::hints::help).
     Help {
         /// First line shown.
         scroll: usize,
     },
-    /// What the compiled scene contains.
+    /// What the compiled scene contains: [`Model::inventory`](super::model::Model::inventory).
     Inventory {
-        /// The lines; empty while they are being found out.
-        lines: Vec<String>,
         /// First line shown.
         scroll: usize,
     },

@@ -98,7 +98,9 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
 
 /// Where `subject` stands in the outline.
 pub fn outline_position(lines: &[OutlineLine], subject: &Subject) -> Option<usize> {
-    lines.iter().position(|line| matches!(line, OutlineLine::Entry { subject: s, .. } if s == subject))
+    lines
+        .iter()
+        .position(|line| matches!(line, OutlineLine::Entry { subject: s, .. } if s == subject))
 }
 
 /// The fields of `subject`; below those of an object the ones of its material.

@@ -33,8 +33,10 @@ impl Model {
         };
         Some(match self.overlay.as_ref()? {
             Overlay::Help { .. } => whole(centred(84, height - 2)),
-            Overlay::Inventory { lines, .. } => {
-                whole(centred(84, (lines.len() as u16).max(3) + 2))
+            Overlay::Inventory { .. } => {
+                let columns = 84.min(width - 2);
+                let rows = self.inventory(columns - 2).len() as u16;
+                whole(centred(columns, rows.saturating_add(2)))
             }
             Overlay::Palette(_) => {
                 let frame = centred(72, height.min(26) - 2);
