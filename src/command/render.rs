@@ -4,7 +4,7 @@ use super::args::RenderArgs;
 use super::progress::Progress;
 use super::signals::Signals;
 use super::stats::{Stats, peak_rss_bytes};
-use super::{Failure, say, warn};
+use super::{Failure, all_threads, say, warn};
 use crate::film::{Depth, Display, Target, WriteError};
 use crate::render::export::{Origin, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};
@@ -38,10 +38,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
     let signals = Signals::watch().map_err(|e| Failure::Failed(format!("no signals: {e}")))?;
 
-    let threads = match args.threads {
-        Some(n) => usize::from(n),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
+    let threads = args.threads.map_or_else(all_threads, usize::from);
     let mut session: Session<Rendering> =
         Session::new(threads, options(args), schedule_settings(args)).map_err(|error| {
             Failure::Failed(format!(

@@ -66,7 +66,8 @@ fn metadata(
         None => "unknown".to_string(),
     };
     let biases = rendering.world.biases();
-    let tone = Tone::NAMED.iter().find(|(_, tone)| *tone == display.tone).map_or("", |(name, _)| name);
+    let tone =
+        Tone::NAMED.iter().find(|(_, tone)| *tone == display.tone).map_or("", |(name, _)| name);
     let header = rendering.film.header();
     let entries = [
         ("Software", format!("zerkalo {}", env!("CARGO_PKG_VERSION"))),

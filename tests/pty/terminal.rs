@@ -5,7 +5,7 @@ use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_p
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
 use std::path::Path;
-use std::sync::{Arc, Condvar, Mutex};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Long enough for any machine; reached only on failure.
@@ -20,15 +20,19 @@ struct Output {
     ended: bool,
 }
 
+/// One program at a time: each wants all processors.
+static TURN: Mutex<()> = Mutex::new(());
+
 /// A program in its terminal.
 pub struct Terminal {
     master: Box<dyn MasterPty + Send>,
     /// Kept open, so that the state of the terminal can be asked for after the program's end.
-    _slave: Box<dyn SlavePty + Send>,
+    slave: Option<Box<dyn SlavePty + Send>>,
     keyboard: Box<dyn Write + Send>,
     child: Box<dyn Child + Send + Sync>,
     output: Arc<(Mutex<Output>, Condvar)>,
     before: String,
+    _turn: MutexGuard<'static, ()>,
 }
 
 /// How a program is started.
@@ -46,6 +50,7 @@ pub struct Start<'a> {
 impl Terminal {
     /// Starts a program in a terminal of true colour.
     pub fn start(start: &Start) -> Self {
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let pair = native_pty_system().openpty(pty_size(start.size)).expect("a pseudo-terminal");
         let mut command = CommandBuilder::new(start.command[0]);
         command.args(&start.command[1..]);
@@ -83,10 +88,11 @@ impl Terminal {
         Self {
             keyboard: pair.master.take_writer().unwrap(),
             master: pair.master,
-            _slave: pair.slave,
+            slave: Some(pair.slave),
             child,
             output,
             before,
+            _turn: turn,
         }
     }
 
@@ -153,23 +159,24 @@ impl Terminal {
     /// Waits for the end of the program: its exit status, and everything that it has sent. Then the
     /// terminal has to be as it was before.
     pub fn end(mut self) -> (u32, String) {
+        let child = &mut self.child;
         let end = Instant::now() + PATIENCE;
         let status = loop {
-            match self.child.try_wait().unwrap() {
+            match child.try_wait().unwrap() {
                 Some(status) => break status.exit_code(),
                 None if Instant::now() > end => {
-                    let screen = self.screen(|screen| screen.contents());
-                    self.child.kill().unwrap();
+                    child.kill().unwrap();
+                    let screen = self.screen(vt100::Screen::contents);
                     panic!("the program does not end. The screen:\n{screen}");
                 }
                 None => std::thread::sleep(Duration::from_millis(5)),
             }
         };
         assert_eq!(state(&*self.master), self.before, "the modes of the terminal");
-        let Self { master, _slave, keyboard, output, .. } = self;
         // With the last of its ends the terminal itself ends, and with it the output.
-        drop((master, _slave, keyboard));
-        let (output, changed) = &*output;
+        let Self { slave, output, .. } = &mut self;
+        drop(slave.take());
+        let (output, changed) = &**output;
         let output = changed.wait_while(output.lock().unwrap(), |output| !output.ended).unwrap();
         let screen = output.parser.screen();
         let all = String::from_utf8_lossy(&output.bytes).into_owned();
@@ -183,6 +190,13 @@ impl Terminal {
             (vt100::Color::Default, vt100::Color::Default, false, false)
         );
         (status, all)
+    }
+}
+
+/// A test that fails leaves no program behind.
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
     }
 }
 

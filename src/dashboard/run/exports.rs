@@ -54,9 +54,8 @@ impl Studio {
         };
         let path = names::reserve(&self.folder, &self.stem, format.extension())
             .map_err(|e| format!("cannot write a picture of {}: {e}", self.stem))?;
-        let written = Target::from_path(&path)
-            .map_err(|error| error.to_string())
-            .and_then(|target| {
+        let written =
+            Target::from_path(&path).map_err(|error| error.to_string()).and_then(|target| {
                 let display = rendering.display();
                 let written = rendering.write(report, &origin, display, Depth::Eight, &target);
                 written.map_err(|error| error.to_string())

@@ -8,7 +8,7 @@ use crate::dashboard::view::View;
 use crossbeam_channel::Receiver;
 use ratatui::backend::{Backend, CrosstermBackend};
 use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
+use ratatui::layout::{Position, Rect};
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -19,6 +19,8 @@ pub struct Frames {
     pacing: Pacing,
     writer: Writer,
     wanted: Buffer,
+    /// Where the cursor is shown, if it is.
+    cursor: Option<Position>,
 }
 
 impl Frames {
@@ -32,6 +34,7 @@ impl Frames {
             pacing: Pacing::new(),
             writer: Writer::new(tty)?,
             wanted: Buffer::empty(Rect::ZERO),
+            cursor: None,
         })
     }
 
@@ -45,13 +48,18 @@ impl Frames {
         self.pacing.due(now, answers)
     }
 
-    /// Draws the model and sends what has to change. Only when [`Frames::ready`].
-    pub fn draw(&mut self, model: &Model, now: Duration) -> io::Result<()> {
+    /// Draws the model and sends what has to change, if anything has; whether that is so. Only when
+    /// [`Frames::ready`].
+    pub fn draw(&mut self, model: &Model, now: Duration) -> io::Result<bool> {
         let [width, height] = model.screen;
         self.wanted.resize(Rect { x: 0, y: 0, width, height });
         self.wanted.reset();
         let cursor = self.view.draw(model, &mut self.wanted);
         let outgoing = self.pacing.outgoing(&self.wanted, now);
+        if !outgoing.clear && outgoing.cells.is_empty() && cursor == self.cursor {
+            return Ok(false);
+        }
+        self.cursor = cursor;
         let mut bytes = self.writer.buffer();
         let mut encoder = CrosstermBackend::new(&mut bytes);
         encoder.hide_cursor()?;
@@ -64,7 +72,7 @@ impl Frames {
             encoder.show_cursor()?;
         }
         self.writer.send(bytes);
-        Ok(())
+        Ok(true)
     }
 
     /// Tells when the frame on its way has been written.

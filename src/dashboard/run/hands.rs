@@ -128,16 +128,6 @@ impl Hands {
                     }
                 });
             }
-            Effect::Inventory => {
-                let results = self.results.clone();
-                self.session.submit(move |film| {
-                    let inventory = match film {
-                        Some((rendering, _)) => rendering.world.inventory().to_string(),
-                        None => "there is no compiled scene".to_string(),
-                    };
-                    let _ = results.send(Message::Inventory(inventory));
-                });
-            }
             Effect::Save { scene, path, overwrite } => self.files.save(scene, path, overwrite),
             Effect::Load => self.files.load(),
             Effect::Export(format) => self.export(format),

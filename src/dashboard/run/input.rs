@@ -26,7 +26,9 @@ pub fn read() -> io::Result<Receiver<io::Result<Input>>> {
     thread::Builder::new().name("reader".into()).spawn(move || {
         loop {
             let input = match event::read() {
-                Ok(event) => message(event).map(|message| Ok(Input { at: Instant::now(), message })),
+                Ok(event) => {
+                    message(event).map(|message| Ok(Input { at: Instant::now(), message }))
+                }
                 Err(error) => Some(Err(error)),
             };
             let Some(input) = input else { continue };

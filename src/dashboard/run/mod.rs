@@ -236,8 +236,12 @@ impl Dashboard {
         if self.changed && self.frames.ready() && !self.quit {
             let at = self.frames.due(now, self.trace.answers(self.shown));
             if at <= now {
-                self.frames.draw(&self.model, now)?;
+                let sent = self.frames.draw(&self.model, now)?;
                 self.trace.sent(self.shown);
+                if !sent {
+                    // The screen was the answer already.
+                    self.trace.written(Instant::now());
+                }
                 self.changed = false;
             } else {
                 due = Some(at);

@@ -165,9 +165,13 @@ mod tests {
         trace.written(at(20));
         trace.sent(7);
         trace.written(at(30));
-        let answers: Vec<_> = trace.answered.as_ref().unwrap().iter().map(|a| {
-            (a.read.as_millis(), a.picture, a.after.as_millis())
-        }).collect();
+        let answers: Vec<_> = trace
+            .answered
+            .as_ref()
+            .unwrap()
+            .iter()
+            .map(|a| (a.read.as_millis(), a.picture, a.after.as_millis()))
+            .collect();
         assert_eq!(answers, [(6, false, 1), (0, true, 20), (5, true, 25), (9, false, 21)]);
         assert_eq!(
             trace.summary(),
