@@ -51,8 +51,13 @@ fn a_program_that_panics() {
 fn a_panic_is_told_on_a_restored_terminal() {
     let desk = Desk::new();
     let this = std::env::current_exe().unwrap();
-    let command =
-        [this.to_str().unwrap(), "life::a_program_that_panics", "--exact", "--ignored", "--nocapture"];
+    let command = [
+        this.to_str().unwrap(),
+        "life::a_program_that_panics",
+        "--exact",
+        "--ignored",
+        "--nocapture",
+    ];
     let start = Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &[] };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 0, "{bytes}");
@@ -99,17 +104,14 @@ fn the_picture_follows_the_size_of_the_terminal() {
     wait_for_picture(&terminal);
     let small = terminal.screen(picture_cells);
     terminal.resize([160, 45]);
-    terminal.wait_for("a larger picture", |screen| {
-        (picture_cells(screen) > 2 * small).then_some(())
-    });
+    terminal
+        .wait_for("a larger picture", |screen| (picture_cells(screen) > 2 * small).then_some(()));
     terminal.resize([30, 8]);
     terminal.wait_for("no picture, but a line", |screen| {
         (picture_cells(screen) == 0 && screen.contents().trim().lines().count() == 1).then_some(())
     });
     terminal.resize([80, 24]);
-    terminal.wait_for("the picture again", |screen| {
-        (picture_cells(screen) == small).then_some(())
-    });
+    terminal.wait_for("the picture again", |screen| (picture_cells(screen) == small).then_some(()));
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
 }

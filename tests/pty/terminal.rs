@@ -124,7 +124,9 @@ impl Terminal {
 
     /// Waits until `text` stands somewhere on the screen.
     pub fn wait_for_text(&self, text: &str) {
-        self.wait_for(&format!("{text:?}"), |screen| screen.contents().contains(text).then_some(()));
+        self.wait_for(&format!("{text:?}"), |screen| {
+            screen.contents().contains(text).then_some(())
+        });
     }
 
     /// Waits until `text` stands nowhere on the screen.
