@@ -17,6 +17,7 @@ use super::model::{Model, Start};
 use super::update::update;
 use crate::render::Options;
 use crate::render::schedule::{Settings, Stop};
+use crate::render::session::State;
 use crate::scene::{SceneErrors, SceneFile};
 use crossbeam_channel::{Receiver, after, never, select};
 use frames::Frames;
@@ -74,6 +75,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     };
     let hands = Hands::new(Tools { file, threads, options, settings })?;
     let screen = Screen::enter()?;
+    let signals = signals::watch(screen.tty())?;
     let (columns, rows) = crossterm::terminal::size()?;
     let model = Model::new(Start {
         path,
@@ -96,7 +98,6 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         quit: false,
     };
     dashboard.begin();
-    let signals = signals::watch(screen.tty())?;
     let result = dashboard.watch(&input::read()?, &signals, screen.left());
     // What is still to be written may take a while: it need not be waited for on an empty screen.
     drop(screen);
@@ -147,9 +148,17 @@ impl Dashboard {
         let bell = self.hands.session().bell().clone();
         let done = self.hands.done().clone();
         let written = self.frames.written().clone();
+        let silence = never();
         let mut waiting = Vec::new();
         while !self.quit {
-            let timer = match self.draw()? {
+            let wait = self.draw()?;
+            // A picture is made when the last one has been taken: not before it can be shown.
+            let (bell, hungry) = match self.hungry() {
+                None => (&silence, None),
+                Some(Duration::ZERO) => (&bell, None),
+                wait => (&silence, wait),
+            };
+            let timer = match wait.into_iter().chain(hungry).min() {
                 Some(wait) => after(wait),
                 None => never(),
             };
@@ -213,11 +222,20 @@ impl Dashboard {
 
     fn take_snapshot(&mut self) {
         if let Some(snapshot) = self.hands.session().take() {
-            if snapshot.picture.is_some() {
+            let failed = matches!(snapshot.report.state, State::Failed(_));
+            if snapshot.picture.is_some() || failed {
                 self.shown = snapshot.report.generation;
             }
             self.take(Message::Snapshot(Box::new(snapshot)));
         }
+    }
+
+    /// How long to wait before the next picture could be shown; `None`: until the terminal has taken
+    /// the last one.
+    fn hungry(&self) -> Option<Duration> {
+        let now = self.began.elapsed();
+        let due = self.frames.due(now, self.trace.answers(u64::MAX));
+        self.frames.ready().then(|| due.saturating_sub(now))
     }
 
     /// Time has passed: the model is told if it wanted to be.
