@@ -14,6 +14,8 @@ mod exr_header;
 mod linear;
 mod mix;
 mod noise;
+#[cfg(test)]
+mod noise_test;
 mod png;
 mod probe;
 mod raster;

@@ -157,9 +157,11 @@ impl Stale<'_> {
         part.sums.resize(down.len * width, 0.0);
         let per_unit: Vec<f64> = film.scales().iter().flat_map(|s| [1.0 / s; 3]).collect();
         let mut line = vec![0.0; width];
-        for (y, rows) in down.pixels.iter().enumerate() {
+        // Of a first sample on a lattice only the lattice has to be looked at.
+        let step = if tile.counts() == [0; 2] { tile.lattice_px() } else { 1 };
+        for (y, rows) in down.pixels.iter().enumerate().step_by(step) {
             line.fill(0.0);
-            add_row(tile, y, across, &per_unit, &mut line);
+            add_row(tile, y, step, across, &per_unit, &mut line);
             for (row, height) in rows {
                 let sums = &mut part.sums[row * width..][..width];
                 sums.iter_mut().zip(&line).for_each(|(sum, value)| *sum += height * value);
@@ -168,10 +170,10 @@ impl Stale<'_> {
     }
 }
 
-/// Adds the pixels of row `y` of a tile to a row of cells, as if they were of height 1.
-fn add_row(tile: &Tile, y: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
+/// Adds every `step`-th pixel of row `y` of a tile to a row of cells, as if they were of height 1.
+fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
-    for (x, columns) in across.pixels.iter().enumerate() {
+    for (x, columns) in across.pixels.iter().enumerate().step_by(step) {
         let sums = tile.sums(y * TILE + x);
         let count = sums.count(Part::Both);
         if count == 0 {

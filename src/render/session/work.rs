@@ -23,8 +23,8 @@ const JOB_SECONDS: f64 = 0.005;
 const PIXELS: f64 = crate::film::TILE_PIXELS as f64;
 /// The first picture waits for a guide that takes no longer than this.
 const GUIDE_SECONDS: f64 = 0.002;
-/// Seconds per ray of a guide, by one thread, before one has been made: that of a small scene.
-const GUIDE_RAY_SECONDS: f64 = 1e-7;
+/// Seconds per ray of a guide before one has been made: that of a small scene.
+const GUIDE_RAY_SECONDS: f64 = 5e-8;
 
 /// What the work is done with, and where snapshots go.
 pub(super) struct Site<'a> {
@@ -65,18 +65,21 @@ pub(super) struct Work<T> {
     inventory: Arc<str>,
     raster: Option<Raster>,
     guide: Option<Arc<Guide>>,
+    /// Seconds per ray of the latest guide.
+    guide_ray_seconds: f64,
 }
 
 impl<T: Traced> Work<T> {
-    /// Takes up a scene. `Err`: why it cannot be rendered.
+    /// Takes up a scene after another one. `Err`: why it cannot be rendered.
     pub fn begin(
         scene: &Arc<Scene>,
         options: &T::Options,
         settings: Settings,
-        before: Option<T>,
+        before: Option<Self>,
     ) -> Result<Self, String> {
         let begun = Instant::now();
-        let traced = T::begin(scene, options, before)?;
+        let guide_ray_seconds = before.as_ref().map_or(GUIDE_RAY_SECONDS, |b| b.guide_ray_seconds);
+        let traced = T::begin(scene, options, before.map(|b| b.traced))?;
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
         Ok(Self {
             schedule: traced.schedule(settings),
@@ -89,6 +92,7 @@ impl<T: Traced> Work<T> {
             inventory: Arc::from(traced.inventory()),
             raster: None,
             guide: None,
+            guide_ray_seconds,
             traced,
         })
     }
@@ -157,7 +161,11 @@ impl<T: Traced> Work<T> {
         let coarse = self.report(site, State::Tracing);
         let (frame, raster) = (self.frame(site), &mut self.raster);
         let start = Instant::now();
+        let mut first = true;
         let report = self.traced.first(&wave, site.pool, &marks.abandon, &mut |film| {
+            if !std::mem::take(&mut first) && !site.wants(false) {
+                return;
+            }
             site.put(frame.snapshot(film, Vec::new(), coarse.clone(), raster, site.pool));
         });
         self.traced_for += start.elapsed();
@@ -196,14 +204,16 @@ impl<T: Traced> Work<T> {
             return;
         }
         self.guide = None;
-        let rays = (columns * rows) as f64 / site.pool.current_num_threads() as f64;
-        if rays * GUIDE_RAY_SECONDS > limit {
+        let rays = (columns * rows) as f64;
+        if rays * self.guide_ray_seconds > limit {
             return;
         }
+        let start = Instant::now();
         let film = self.traced.film();
         let size = [film.width(), film.height()];
         let look = |points: &[[f64; 2]], seen: &mut [_]| self.traced.look(points, seen);
         self.guide = Some(Arc::new(Guide::new(size, [columns, rows], look, site.pool)));
+        self.guide_ray_seconds = start.elapsed().as_secs_f64() / rays.max(1.0);
     }
 
     fn frame(&self, site: &Site) -> Frame {

@@ -144,7 +144,7 @@ impl<T: Traced> Worker<T> {
         {
             return;
         }
-        let before = std::mem::replace(&mut self.work, Ok(None)).ok().flatten().map(|w| w.traced);
+        let before = std::mem::replace(&mut self.work, Ok(None)).ok().flatten();
         self.work = Work::begin(scene, &self.options, self.settings, before).map(Some);
     }
 
