@@ -66,6 +66,7 @@ mod tests {
     use super::*;
     use crate::shape::{EXAMPLES, Shape};
     use glam::{DAffine3, DQuat};
+    use std::f64::consts::FRAC_PI_4;
 
     /// What is met lies on the way between outside and inside, or on the surface's plane.
     #[test]
@@ -102,7 +103,7 @@ mod tests {
         assert_eq!(cube.cast(DVec3::Y * 3.0, DVec3::NEG_Y), Some(2.0));
         assert_eq!(cube.cast(DVec3::Y * 0.5, DVec3::NEG_Y), Some(0.5), "from inside");
         assert_eq!(cube.cast(DVec3::new(0.6, 3.0, 0.0), DVec3::NEG_Y), None);
-        let turned = cube.transformed(&DAffine3::from_quat(DQuat::from_rotation_y(0.5)));
+        let turned = cube.transformed(&DAffine3::from_quat(DQuat::from_rotation_y(FRAC_PI_4)));
         let t = turned.cast(DVec3::new(0.6, 3.0, 0.0), DVec3::NEG_Y).unwrap();
         assert!((t - 2.0).abs() < 1e-12, "a turned cube reaches further: {t}");
     }

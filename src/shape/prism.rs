@@ -64,8 +64,7 @@ impl Kind for Prism {
 
     fn standing(base: DVec3, size: DVec3) -> Self {
         let side = size.x;
-        // The centroid of the base lies a third of its height behind the front edge.
-        let corner = lower_left(base, side, side / 0.75f64.sqrt() / 2.0);
+        let corner = lower_left(base, side, side * 0.75f64.sqrt());
         Self { corner, side, height: size.y, rotation: 0.0 }
     }
 

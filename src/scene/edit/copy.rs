@@ -7,6 +7,7 @@ use super::names::{free_light, free_material, free_object, free_view};
 use super::typed::name;
 use super::{Edit, Refusal, Subject};
 use crate::scene::Scene;
+use crate::value::excerpt;
 use glam::DVec3;
 
 /// A copy, last in its list, under a name of its own (`cube 2`). The copy of an object stands beside
@@ -204,7 +205,8 @@ pub fn own_material(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
     next.materials.insert(new.clone(), old);
     next.objects[*index].material = new.clone();
     let label = format!("own material for {}", subject.label(scene));
-    Ok(Edit::checked(next, subject.clone(), label)?.noted(format!("Its material is {new} now.")))
+    Ok(Edit::checked(next, subject.clone(), label)?
+        .noted(format!("Its material is {} now.", excerpt(&new))))
 }
 
 #[cfg(test)]

@@ -102,10 +102,12 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let aim = eye + forward * super::focus_distance(scene);
     let solids: Vec<Extent> =
         forms.iter().filter(|f| is_solid(f)).filter_map(Form::bounds).collect();
+    let walls: Vec<&Form> = forms.iter().filter(|form| !is_solid(form)).collect();
+    let floors: Vec<&Form> = walls.iter().copied().filter(|form| is_level(form)).collect();
     let scale = size.min_element();
     let candidate = |offset: DVec2| {
         let at = DVec3::new(aim.x + offset.x, aim.y, aim.z + offset.y);
-        let ground = ground_under(&forms, at).unwrap_or(aim.y - size.y / 2.0);
+        let ground = ground_under(&floors, at).unwrap_or(aim.y - size.y / 2.0);
         DVec3::new(clean(at.x, scale), significant(ground, 13), clean(at.z, scale))
     };
     let spread = size.x.max(size.z);
@@ -114,39 +116,43 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
         let angle = f64::from(i) * 2.399_963_229_728_653;
         DVec2::from_angle(angle) * (0.45 * spread * f64::from(i).sqrt())
     });
-    let first = candidate(DVec2::ZERO);
     let reach = 6.0 * radius.max(spread);
-    spots
-        .take_while(|offset| offset.length() <= reach)
-        .map(candidate)
-        .find(|base| {
-            let half = DVec3::new(spread / 2.0, 0.0, spread / 2.0);
-            let extent = (*base - half, *base + half + DVec3::Y * size.y);
-            let center = *base + DVec3::Y * (size.y / 2.0);
-            let stands = |f: &Form| matches!(f, Form::Parallelogram { .. } | Form::Plane { .. });
-            let through = forms.iter().filter(|f| stands(f)).any(|form| cuts(form, extent));
-            !through
-                && !solids.iter().any(|solid| overlap(*solid, extent))
-                && in_view(&scene.camera, scene.film.size, center)
-                && is_visible(&forms, eye, center)
-        })
-        .unwrap_or(first)
+    let free = spots.take_while(|offset| offset.length() <= reach).map(candidate).filter(|base| {
+        let half = DVec3::new(spread / 2.0, 0.0, spread / 2.0);
+        let room = (*base - half, *base + half + DVec3::Y * size.y);
+        !walls.iter().any(|wall| cuts(wall, room))
+            && !solids.iter().any(|solid| overlap(*solid, room))
+    });
+    // In full view, else hidden but in the picture, else anywhere.
+    let (mut hidden, mut outside) = (None, None);
+    for base in free {
+        let middle = base + DVec3::Y * (size.y / 2.0);
+        if !in_view(&scene.camera, scene.film.size, middle) {
+            outside = outside.or(Some(base));
+        } else if !is_visible(&forms, eye, middle) {
+            hidden = hidden.or(Some(base));
+        } else {
+            return base;
+        }
+    }
+    hidden.or(outside).unwrap_or_else(|| candidate(DVec2::ZERO))
 }
 
-/// Height of the highest surface below `at` that faces up or down enough to stand on: what is level
-/// within 60 degrees. Of solids only what is not the thing's own place: they are found as obstacles.
-fn ground_under(forms: &[Form], at: DVec3) -> Option<f64> {
-    let level = |form: &&Form| match form {
+/// Whether a flat thing is level within 60 degrees, so that something can stand on it.
+fn is_level(form: &Form) -> bool {
+    match form {
         Form::Plane { normal, .. } => normal.y.abs() > 0.5,
         Form::Parallelogram { u, v, .. } => u.cross(*v).normalize().y.abs() > 0.5,
         _ => false,
-    };
+    }
+}
+
+/// Height of the highest of `floors` below `at`, else of the lowest above it.
+fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     let heights = |direction: DVec3| {
-        let cast = move |form: &Form| Some(at.y + direction.y * form.cast(at, direction)?);
-        forms.iter().filter(level).filter_map(cast).collect::<Vec<_>>()
+        floors.iter().filter_map(move |form| Some(at.y + direction.y * form.cast(at, direction)?))
     };
-    let below = heights(DVec3::NEG_Y).into_iter().reduce(f64::max);
-    below.or_else(|| heights(DVec3::Y).into_iter().reduce(f64::min))
+    heights(DVec3::NEG_Y).reduce(f64::max).or_else(|| heights(DVec3::Y).reduce(f64::min))
 }
 
 /// Whether a flat thing (a wall) goes through the inside of a box.

@@ -1,14 +1,14 @@
 //! Switching between kinds so that what can be kept is kept: place, size, direction, brightness.
 
 use super::extent::{is_solid, scene_bounds};
-use super::set::finish;
+use super::set::{finish, replace};
 use super::tree::{put, read};
 use super::{Edit, Refusal, Subject};
 use crate::camera::{Camera, ViewAngle};
 use crate::light::{Directional, Falloff, Light, Point};
 use crate::scene::Scene;
 use crate::shape::Shape;
-use crate::value::{Field, Takes, clean, number, rounded_to, significant};
+use crate::value::{Field, Range, Takes, clean, number, rounded_to, significant};
 use glam::DVec3;
 use toml::{Table, Value};
 
@@ -145,11 +145,33 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     }
 }
 
+/// A point light with another falloff stays as bright as it was in the middle of the scene.
+pub(super) fn switch_falloff(
+    scene: &Scene,
+    index: usize,
+    values: Table,
+    falloff: Value,
+) -> Result<Edit, Refusal> {
+    let subject = Subject::Light(index);
+    let mut edit = replace(scene, &subject, "falloff", values, falloff)?;
+    let old = &scene.lights[index];
+    let light = &mut edit.scene.lights[index];
+    if let Some(point) = light.point.filter(|_| light.falloff != old.falloff) {
+        let center = DVec3::from_array(scene_bounds(scene).center);
+        let squared = (DVec3::from_array(point.position) - center).length_squared();
+        // I / d^2 against pi times the intensity.
+        let factor = std::f64::consts::PI * squared;
+        let factor = if light.falloff == Falloff::None { factor.recip() } else { factor };
+        edit.note = Some(refit(light, factor));
+    }
+    Ok(edit)
+}
+
 /// Multiplies the intensity and says so.
 fn refit(light: &mut Light, factor: f64) -> String {
     let fitted = significant(light.intensity * factor, 3);
     let old = light.intensity;
-    if fitted.is_finite() && fitted <= 1e15 {
+    if Range::LIGHT.holds(fitted) {
         light.intensity = fitted;
     }
     let (old, new) = (number(old), number(light.intensity));
@@ -274,6 +296,10 @@ mod tests {
         let back = set(&edit.scene, &lamp, "kind", "p").unwrap().scene;
         let at = DVec3::from_array(back.lights[0].point.unwrap().position);
         assert!((center - at).angle_between(direction) < 1e-3);
+        let even = set(&scene, &lamp, "falloff", "none").unwrap();
+        assert!((even.scene.lights[0].intensity / expected - 1.0).abs() < 0.01);
+        let again = set(&even.scene, &lamp, "falloff", "inv").unwrap().scene;
+        assert!((again.lights[0].intensity / 40.0 - 1.0).abs() < 0.01);
         let keys: Vec<_> = rows(&edit.scene, &lamp).unwrap().into_iter().map(|r| r.key).collect();
         assert!(keys.contains(&"directional.direction".to_string()), "{keys:?}");
     }

@@ -15,6 +15,8 @@ mod names;
 mod rows;
 mod set;
 mod step;
+#[cfg(test)]
+mod step_test;
 mod subject;
 mod tree;
 mod turning;
@@ -35,6 +37,7 @@ pub use turning::turn;
 pub use views::{recall_view, store_view};
 
 use super::Scene;
+use crate::value::excerpt;
 use std::fmt;
 
 /// A scene after an edit.
@@ -76,8 +79,8 @@ impl Refusal {
 
     fn gone(subject: &Subject) -> Self {
         let what = match subject {
-            Subject::View(name) => format!("there is no view \"{name}\""),
-            Subject::Material(name) => format!("there is no material \"{name}\""),
+            Subject::View(name) => format!("there is no view \"{}\"", excerpt(name)),
+            Subject::Material(name) => format!("there is no material \"{}\"", excerpt(name)),
             Subject::Light(i) => format!("there is no light {}", i + 1),
             Subject::Object(i) => format!("there is no object {}", i + 1),
             _ => "it cannot be read".to_string(),

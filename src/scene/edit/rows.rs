@@ -11,7 +11,7 @@ use toml::{Table, Value};
 /// A word that may stand in a row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// The word.
+    /// The word; the name of a material may hold any character that a file may.
     pub name: String,
     /// What it means; may be empty.
     pub doc: String,
@@ -47,7 +47,7 @@ pub struct Row {
     pub depth: usize,
     /// What kind of value it holds.
     pub entry: Entry,
-    /// The value as it can be typed again; empty: none is given.
+    /// The value as it can be typed again, printable; empty: none is given.
     pub value: String,
     /// The numbers of the value one by one, as text; empty unless it holds numbers or a colour. A
     /// colour always has three.

@@ -49,6 +49,9 @@ pub fn set(scene: &Scene, subject: &Subject, key: &str, text: &str) -> Result<Ed
     } else {
         parse(field, text)?
     };
+    if let (Subject::Light(i), "falloff") = (subject, key) {
+        return kinds::switch_falloff(scene, *i, values, value);
+    }
     replace(scene, subject, key, values, value)
 }
 
@@ -148,9 +151,13 @@ pub(super) fn finish(
     values: Table,
 ) -> Result<Edit, Refusal> {
     let next = write(scene, subject, values)?;
+    Edit::checked(next, subject.clone(), label(scene, subject, key))
+}
+
+/// `radius of ball`.
+pub(super) fn label(scene: &Scene, subject: &Subject, key: &str) -> String {
     let last = key.rsplit('.').next().unwrap_or(key).replace('_', " ");
-    let label = format!("{last} of {}", subject.label(scene));
-    Edit::checked(next, subject.clone(), label)
+    format!("{last} of {}", subject.label(scene))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::extent::step_length;
 use super::kinds::{self, chosen};
 use super::rows::is_material;
-use super::set::{lookup, replace};
+use super::set::{label, lookup, replace};
 use super::tree::{get, read};
 use super::typed::floats;
 use super::{Edit, Refusal, Subject};
@@ -14,11 +14,12 @@ use toml::Value;
 /// Moves the numbers behind `key` by `steps`: a whole number of coarse steps, or otherwise of fine ones
 /// (0.1 is one, -0.3 three back). `component`: only that number, from 0; `None`: all together, of a
 /// colour its brightness. Sizes, intensities and roughness go by about a tenth (fine: a hundredth),
-/// coordinates by [`step_length`], angles by 5 degrees, shares by 0.05. At the end of a range the scene
-/// stays as it is. A key without numbers goes to the next or previous word ([`toggle`]).
+/// coordinates by [`step_length`], angles by 5 degrees, shares by 0.05. At the end of a range, and
+/// where other keys forbid the value (the note says so then), the scene stays as it is. A key without
+/// numbers goes to the next or previous word ([`toggle`]).
 ///
 /// # Errors
-/// If there is no such key, or a value together with others would be a fault.
+/// If there is no such key or number, or it has no value to start from.
 pub fn step(
     scene: &Scene,
     subject: &Subject,
@@ -61,7 +62,11 @@ pub fn step(
         Some(Value::Array(_)) => Value::Array(next.into_iter().map(one).collect()),
         _ => one(next[0]),
     };
-    replace(scene, subject, key, values, value)
+    replace(scene, subject, key, values, value).or_else(|refusal| {
+        let (scene, subject) = (scene.clone(), subject.clone());
+        let label = label(&scene, &subject, key);
+        Ok(Edit { scene, subject, label, note: Some(refusal.to_string()) })
+    })
 }
 
 /// Goes to the next word behind `key` (or the previous one), round and round: of a choice, a switch, a
@@ -189,18 +194,18 @@ impl Rule {
                     Self::Rungs { floor: 0.0, range }
                 } else if range == Range::COORDINATE {
                     Self::Units { unit: step_length(scene), range }
+                } else if matches!(field.name, "roughness" | "alpha") {
+                    // From 0 to what can just be told from it at the far end of a room.
+                    Self::Rungs { floor: 0.001, range }
                 } else if range == Range::SHARE || range == Range::COEFFICIENT {
                     Self::Units { unit: 0.05, range }
                 } else if field.unit == "scene units" {
                     Self::Rungs { floor: step_length(scene) / 10.0, range }
                 } else if range == Range::LIGHT {
                     Self::Rungs { floor: 0.01, range }
-                } else if range.high >= 1e9 {
+                } else {
                     // An exponent.
                     Self::Rungs { floor: 1.0, range }
-                } else {
-                    // A roughness: 0.001 can be told from 0 at the far end of a room.
-                    Self::Rungs { floor: 0.001, range }
                 }
             }
             Takes::Direction => Self::Direction,
@@ -333,10 +338,7 @@ fn rung(x: f64, up: bool, fine: bool) -> f64 {
         (true, false) => RUNGS.iter().copied().find(|r| *r > below).unwrap_or(1000),
         (false, false) => {
             let under = |r: &i64| if on { *r < below } else { *r <= below };
-            match RUNGS.iter().rev().copied().find(under) {
-                Some(rung) => rung,
-                None => 90,
-            }
+            RUNGS.iter().rev().copied().find(under).unwrap_or(90)
         }
     };
     format!("{hundredths}e{}", e - 2).parse().unwrap_or(x)

@@ -2,7 +2,7 @@
 
 use super::Refusal;
 use crate::scene::suggest::nearest;
-use crate::value::{Color, Field, Takes, excerpt, number};
+use crate::value::{Color, Field, Takes, excerpt, number, printable};
 use toml::Value;
 
 /// The value that `text` stands for behind the key `field`. Says nothing about ranges, except where
@@ -80,10 +80,12 @@ pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
 /// As `choose`, with the reason if there is none or more than one.
 pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, Refusal> {
     choose(text, words).ok_or_else(|| {
-        let quoted: Vec<_> = words.iter().map(|w| format!("\"{w}\"")).collect();
-        let mut help = format!("Expected one of {}.", quoted.join(", "));
+        let quote = |word: &str| format!("\"{}\"", excerpt(word));
+        let quoted: Vec<_> = words.iter().take(20).map(|w| quote(w)).collect();
+        let more = if quoted.len() < words.len() { ", …" } else { "" };
+        let mut help = format!("Expected one of {}{more}.", quoted.join(", "));
         if let Some(meant) = nearest(text, words.iter().copied()) {
-            help += &format!(" Did you mean \"{meant}\"?");
+            help += &format!(" Did you mean {}?", quote(meant));
         }
         Refusal::new(&format!("{} cannot be \"{}\"", field.name, excerpt(text)), &help)
     })
@@ -93,7 +95,7 @@ pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, R
 pub(super) fn name(what: &str, text: &str) -> Result<String, Refusal> {
     let text = text.trim();
     let help = "Expected at most 60 characters, none of them a control character.";
-    if text.chars().count() > 60 || crate::value::printable(text) != text {
+    if text.chars().count() > 60 || printable(text) != text {
         return Err(Refusal::new(&format!("{what} cannot be \"{}\"", excerpt(text)), help));
     }
     Ok(text.to_string())
@@ -132,7 +134,7 @@ pub(super) fn show(takes: Takes, value: &Value) -> String {
         Value::Float(x) => number(*x),
         Value::Integer(i) => i.to_string(),
         Value::Boolean(yes) => yes.to_string(),
-        Value::String(text) => text.clone(),
+        Value::String(text) => printable(text),
         other => other.to_string(),
     }
 }
