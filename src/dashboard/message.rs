@@ -23,8 +23,8 @@ pub enum Message {
     Snapshot(Box<Snapshot>),
     /// The picture that was asked for with [`Effect::Keep`], and its samples per pixel.
     Kept(Arc<Linear>, f64),
-    /// The scene was written to this path, or not, and why. After [`Effect::Save`].
-    Saved(Result<PathBuf, SaveError>),
+    /// This scene was written to this path, or not, and why. After [`Effect::Save`].
+    Saved(Arc<Scene>, Result<PathBuf, SaveError>),
     /// The file was read. After [`Effect::Load`].
     Loaded(Box<Result<Arc<Scene>, SceneErrors>>),
     /// Somebody else has written the file since it was last read or written.

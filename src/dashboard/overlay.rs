@@ -109,11 +109,8 @@ pub struct Prompt {
 /// What a typed line is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PromptFor {
-    /// A path to save to; quit afterwards?
-    SaveAs {
-        /// Whether saving was the answer to the question before quitting.
-        then_quit: bool,
-    },
+    /// A path to save to.
+    SaveAs,
     /// A new name.
     Rename(Subject),
     /// A name for the viewpoint.
@@ -146,11 +143,8 @@ pub enum Answer {
     Quit,
     /// Reads the file; unsaved edits are lost.
     Load,
-    /// Writes the file whatever stands there; then quits?
-    Overwrite {
-        /// Where, if not to the scene's own file.
-        path: Option<PathBuf>,
-        /// Whether to quit afterwards.
-        then_quit: bool,
-    },
+    /// Writes the file whatever stands there: the scene's own (`None`) or another.
+    Overwrite(Option<PathBuf>),
+    /// Asks for another name.
+    SaveAs,
 }
