@@ -118,7 +118,8 @@ impl Clerk {
         loop {
             let message = match inbox.recv_timeout(CHECK_INTERVAL) {
                 Ok(Job::Save { scene, path, overwrite }) => {
-                    Message::Saved(self.save(&scene, path, overwrite))
+                    let saved = self.save(&scene, path, overwrite);
+                    Message::Saved(scene, saved)
                 }
                 Ok(Job::Load) => Message::Loaded(Box::new(self.load())),
                 Err(RecvTimeoutError::Timeout) if self.changed() => Message::ChangedOnDisk,
@@ -220,7 +221,7 @@ mod tests {
         scene.film.size = [64, 48];
         files.save(Arc::new(scene.clone()), None, false);
         let saved = inbox.recv_timeout(PATIENCE).unwrap();
-        assert!(matches!(saved, Message::Saved(Ok(at)) if at == path));
+        assert!(matches!(saved, Message::Saved(_, Ok(at)) if at == path));
         assert_eq!(files.paper().document().unwrap().scene(), &scene);
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL + CHECK_INTERVAL / 2);
         assert!(quiet.is_err(), "{quiet:?}");
@@ -230,7 +231,7 @@ mod tests {
         assert!(quiet.is_err(), "told once: {quiet:?}");
         files.save(Arc::new(scene), None, false);
         let refused = inbox.recv_timeout(PATIENCE).unwrap();
-        assert!(matches!(refused, Message::Saved(Err(SaveError::Changed(_)))), "{refused:?}");
+        assert!(matches!(refused, Message::Saved(_, Err(SaveError::Changed(_)))), "{refused:?}");
         files.load();
         assert_eq!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).unwrap().film.size, [640, 480]);
     }
@@ -244,7 +245,7 @@ mod tests {
         files.load();
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_err());
         files.save(Arc::default(), None, true);
-        assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::Saved(Err(_))));
+        assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::Saved(_, Err(_))));
         assert_eq!(fs::read_to_string(&path).unwrap(), "[camera", "not ours to overwrite");
         fs::write(&path, starter()).unwrap();
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));

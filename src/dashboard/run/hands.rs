@@ -160,7 +160,7 @@ impl Hands {
 
     /// Takes note of what was done, before the model does.
     pub fn note(&mut self, message: &Message) {
-        if let Message::Saved(Ok(path)) = message {
+        if let Message::Saved(_, Ok(path)) = message {
             self.studio.stem = stem(Some(path), "");
         }
     }
