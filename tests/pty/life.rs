@@ -124,9 +124,9 @@ fn pasted_text_presses_no_keys() {
     terminal.send("\x1b[200~qqq]]]x\x1b[201~");
     // The program goes on, and nothing was edited: it ends without a question.
     terminal.send("?");
-    terminal.wait_for_text("all keys");
+    terminal.wait_for_text("orbit left");
     terminal.send("\x1b");
-    terminal.wait_until_gone("all keys");
+    terminal.wait_until_gone("orbit left");
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
 }
