@@ -8,6 +8,7 @@ use super::layout::{Focus, Layout, Request, layout};
 use super::message::{Channel, Format};
 use super::overlay::Overlay;
 use super::places::wrapped;
+pub use super::raster::Colors;
 use crate::film::{Display, Linear, Probe};
 use crate::render::schedule::Stop;
 use crate::render::session::Snapshot;
@@ -31,34 +32,6 @@ pub enum Mode {
     Fly,
     /// The probe moves.
     Probe,
-}
-
-/// How many colours the terminal has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Colors {
-    /// 24 bits.
-    True,
-    /// The 256 of xterm.
-    Indexed,
-    /// The 16 of every terminal.
-    Sixteen,
-    /// None.
-    Mono,
-}
-
-impl Colors {
-    /// All of them, in the order of the action that walks them.
-    pub const ALL: [Self; 4] = [Self::True, Self::Indexed, Self::Sixteen, Self::Mono];
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::True => "24-bit colour",
-            Self::Indexed => "256 colours",
-            Self::Sixteen => "16 colours",
-            Self::Mono => "no colour",
-        }
-    }
 }
 
 /// The file of the scene.

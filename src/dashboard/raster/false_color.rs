@@ -69,7 +69,7 @@ pub fn magnitude(part: f64) -> [u8; 3] {
 }
 
 /// The colour of no difference.
-pub const DIFFERENCE_MIDDLE: [u8; 3] = [24, 24, 27];
+const DIFFERENCE_MIDDLE: [u8; 3] = [24, 24, 27];
 
 /// The colour of a signed difference, -1 (blue: darker) over 0 (nearly black) to 1 (orange:
 /// brighter).

@@ -9,55 +9,35 @@ mod indexed;
 mod oklab;
 mod settle;
 
-pub use false_color::{
-    DIFFERENCE_MIDDLE, Scale, depth, difference, magnitude, normals, object_color, objects,
-};
+pub use false_color::{Scale, depth, difference, magnitude, normals, object_color, objects};
+pub use indexed::nearest as nearest_indexed;
 pub use oklab::Oklab;
-use std::fmt;
-use std::str::FromStr;
 
-/// How many colours a terminal shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+/// How many colours the terminal has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Colors {
     /// 24 bits.
-    #[default]
     True,
-    /// The cube of 216 and the 24 greys of xterm.
+    /// The 256 of xterm.
     Indexed,
-    /// The 16 of ANSI.
-    Ansi,
-    /// None: only the density of glyphs.
+    /// The 16 of every terminal.
+    Sixteen,
+    /// None.
     Mono,
 }
 
 impl Colors {
-    /// Every level and its name.
-    pub const NAMED: [(&'static str, Self); 4] =
-        [("true", Self::True), ("256", Self::Indexed), ("16", Self::Ansi), ("mono", Self::Mono)];
+    /// All of them, in the order of the action that walks them.
+    pub const ALL: [Self; 4] = [Self::True, Self::Indexed, Self::Sixteen, Self::Mono];
 
-    /// The next one, and after the last the first.
-    pub fn next(self) -> Self {
-        let at = Self::NAMED.iter().position(|(_, colors)| *colors == self).unwrap_or(0);
-        Self::NAMED[(at + 1) % Self::NAMED.len()].1
-    }
-}
-
-impl fmt::Display for Colors {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let named = Self::NAMED.iter().find(|(_, colors)| colors == self);
-        f.write_str(named.map_or("", |(name, _)| name))
-    }
-}
-
-impl FromStr for Colors {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let named = Self::NAMED.iter().find(|(name, _)| *name == text);
-        named.map(|(_, colors)| *colors).ok_or_else(|| {
-            let names: Vec<_> = Self::NAMED.iter().map(|(name, _)| *name).collect();
-            format!("colours `{text}` are not known; known: {}", names.join(", "))
-        })
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::True => "24-bit colour",
+            Self::Indexed => "256 colours",
+            Self::Sixteen => "16 colours",
+            Self::Mono => "no colour",
+        }
     }
 }
 
@@ -95,17 +75,6 @@ pub enum Ink {
     Indexed(u8),
 }
 
-impl Ink {
-    /// About how it looks, in a terminal of dark ground that follows xterm.
-    fn rgb(self, plain: [u8; 3]) -> [u8; 3] {
-        match self {
-            Self::Plain => plain,
-            Self::Rgb(rgb) => rgb,
-            Self::Indexed(index) => indexed::rgb(index),
-        }
-    }
-}
-
 /// What stands in one cell of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PictureCell {
@@ -123,27 +92,7 @@ impl Default for PictureCell {
     }
 }
 
-impl PictureCell {
-    /// How the upper and the lower half look, as mean colours.
-    pub fn halves(&self) -> [Oklab; 2] {
-        let (fg, bg) = (self.fg.rgb(PLAIN_FG), self.bg.rgb(PLAIN_BG));
-        match self.glyph {
-            '▀' => [Oklab::of(fg), Oklab::of(bg)],
-            '▄' => [Oklab::of(bg), Oklab::of(fg)],
-            glyph => [ansi::mixture(fg, bg, ansi::coverage(glyph)); 2],
-        }
-    }
-
-    /// How different two cells look: the larger of the distances of their halves in OKLab.
-    pub fn distance(&self, other: &Self) -> f32 {
-        if self == other {
-            return 0.0;
-        }
-        let (a, b) = (self.halves(), other.halves());
-        a[0].distance(b[0]).max(a[1].distance(b[1]))
-    }
-}
-
+/// What a glyph without colour is assumed to look like, and the ground behind it.
 const PLAIN_FG: [u8; 3] = [229; 3];
 const PLAIN_BG: [u8; 3] = [0; 3];
 
@@ -216,7 +165,7 @@ fn pair(upper: [u8; 3], lower: [u8; 3], colors: Colors) -> PictureCell {
             let index = |rgb| Ink::Indexed(indexed::nearest(rgb));
             joined(index(upper), Some(index(lower)))
         }
-        Colors::Ansi => ansi::pair(upper, lower),
+        Colors::Sixteen => ansi::pair(upper, lower),
         Colors::Mono => ansi::pair_mono(upper, lower),
     }
 }
@@ -225,7 +174,7 @@ fn half(glyph: char, rgb: [u8; 3], colors: Colors) -> PictureCell {
     let fg = match colors {
         Colors::True => Ink::Rgb(rgb),
         Colors::Indexed => Ink::Indexed(indexed::nearest(rgb)),
-        Colors::Ansi => Ink::Indexed(ansi::nearest(rgb)),
+        Colors::Sixteen => Ink::Indexed(ansi::nearest(rgb)),
         Colors::Mono if Oklab::of(rgb).l < 0.5 => return PictureCell::default(),
         Colors::Mono => Ink::Plain,
     };
