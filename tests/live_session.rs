@@ -186,19 +186,19 @@ fn a_mix_that_is_too_noisy_wakes_a_session_at_rest() {
     .report;
     assert!(report.samples > dim.samples, "the target was not met: {:?}", dim.noise);
     assert!(report.noise.unwrap().rmse_codes <= 0.15);
-    // The figure against that of a fresh render with as many samples.
-    let mut fresh = session_like(report.spp.mean);
+    // The figure is that of the film as it is, estimated from nothing, and about that of a fresh
+    // render, which gives as many samples to other tiles.
+    let film = session.with(|r, _| r.film.noise(&r.mix, &Display::default())).unwrap().unwrap();
+    assert_eq!(report.noise.unwrap(), film);
+    let mut fresh = self::session(spp(report.spp.mean.round() as u32), true);
     let expected = finish(&mut fresh, &bright).report.noise.unwrap();
-    let ratio = report.noise.unwrap().rmse_codes / expected.rmse_codes;
-    assert!((0.85..1.15).contains(&ratio), "{ratio}");
+    let ratio = film.rmse_codes / expected.rmse_codes;
+    println!("{film:?}, fresh {expected:?}");
+    assert!((0.75..1.33).contains(&ratio), "{ratio}");
     // Back to less noise: it stays at rest.
     let back = finish(&mut session, &scene()).report;
     assert_eq!(back.samples, report.samples);
     assert!(back.noise.unwrap().rmse_codes < 0.15);
-}
-
-fn session_like(mean: f64) -> Session<Rendering> {
-    session(spp(mean.round() as u32), true)
 }
 
 #[test]

@@ -228,7 +228,8 @@ impl<T: Traced> Work<T> {
 
     /// Shows where the work stands; see [`Site::wants`].
     pub fn publish(&mut self, site: &Site, state: State, newest: bool) {
-        if !site.wants(newest) {
+        // A film that was emptied for another start has nothing to show; its first picture was shown.
+        if !site.wants(newest) || self.first_picture.is_none() {
             return;
         }
         self.look(site, f64::INFINITY);

@@ -53,7 +53,7 @@ fn a_higher_aim_goes_on_where_the_lower_one_ended() {
             while let Step::Trace(wave) = schedule.next(0.0) {
                 let even = |j: &Job| {
                     let end = j.first + j.count;
-                    end % PACKET == 0 || (end < FLOOR && end.is_power_of_two())
+                    end.is_multiple_of(PACKET) || (end < FLOOR && end.is_power_of_two())
                 };
                 ends.push(wave.jobs.iter().all(even));
                 let report = model.run(&wave);
@@ -107,7 +107,7 @@ fn a_cap_may_rise_and_fall() {
     let mut model = Model::exact(mixed(), 6);
     let mut schedule = model.schedule(until(spp(100), false));
     schedule.set_rays_per_pixel(40);
-    assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::RaysPerPixel);
+    assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);
     assert_eq!((schedule.spp().min, schedule.spp().max), (40, 100));
     schedule.set_rays_per_pixel(0);
     assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);
