@@ -108,7 +108,8 @@ fn the_picture_follows_the_size_of_the_terminal() {
         .wait_for("a larger picture", |screen| (picture_cells(screen) > 2 * small).then_some(()));
     terminal.resize([30, 8]);
     terminal.wait_for("no picture, but a line", |screen| {
-        (picture_cells(screen) == 0 && screen.contents().trim().lines().count() == 1).then_some(())
+        let told = screen.contents().contains("at least");
+        (picture_cells(screen) == 0 && told).then_some(())
     });
     terminal.resize([80, 24]);
     terminal.wait_for("the picture again", |screen| (picture_cells(screen) == small).then_some(()));
