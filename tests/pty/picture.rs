@@ -97,8 +97,7 @@ fn the_cells_show_the_picture_that_render_writes() {
     let desk = Desk::with_room();
     let mut terminal = desk.open(&["room.toml"], SIZE);
     wait_for_picture(&terminal);
-    stop_at(&mut terminal, "spp 256");
-    terminal.wait_for_text("resting");
+    rendered_anew(&mut terminal, 256);
     let written = Picture::of_png(&desk.rendered(&["room.toml", "--spp", "256"], "room.png"));
     let found = terminal.wait_for("the picture of 256 samples", |screen| {
         distance(screen, &room_layout(), &written).filter(|d| *d <= 0.01)
@@ -117,8 +116,7 @@ fn an_export_is_the_file_that_render_writes() {
     let desk = Desk::with_room();
     let mut terminal = desk.open(&["room.toml"], SIZE);
     wait_for_picture(&terminal);
-    stop_at(&mut terminal, "spp 64");
-    terminal.wait_for_text("resting");
+    rendered_anew(&mut terminal, 64);
     terminal.send("p");
     terminal.wait_for_text("room-1.png");
     terminal.send("P");
@@ -127,8 +125,10 @@ fn an_export_is_the_file_that_render_writes() {
     terminal.wait_for_text("room-2.png");
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
+    // As in the dashboard, samples go where the displayed picture needs them, for linear files too.
+    let args = ["room.toml", "--spp", "64", "--noise", "1e-9"];
     for (exported, rendered) in [("room-1.png", "render.png"), ("room-1.exr", "render.exr")] {
-        let expected = desk.rendered(&["room.toml", "--spp", "64"], rendered);
+        let expected = desk.rendered(&args, rendered);
         assert!(fs::read(desk.path(exported)).unwrap() == expected, "{exported} differs");
     }
     let [first, second] = ["room-1.png", "room-2.png"].map(|f| fs::read(desk.path(f)).unwrap());
@@ -146,14 +146,22 @@ fn a_picture_that_was_asked_for_is_written_before_the_end() {
     Picture::of_png(&fs::read(desk.path("room-1.png")).unwrap());
 }
 
-/// Answers the question when to stop.
-pub fn stop_at(terminal: &mut Terminal, when: &str) {
+/// Begins the picture anew and waits until it has so many samples per pixel. What was traced before
+/// may have been more already.
+fn rendered_anew(terminal: &mut Terminal, spp: u32) {
+    let when = format!("spp {spp}");
     terminal.send("T");
-    terminal.wait_for_text("top at");
+    terminal.wait_for_text("stop at");
     // Whatever is proposed is replaced.
     terminal.send("\x15");
-    terminal.send(when);
-    terminal.wait_for_text(when);
+    terminal.send(&when);
+    terminal.wait_for_text(&when);
     terminal.send("\r");
-    terminal.wait_until_gone("top at");
+    terminal.wait_until_gone("stop at");
+    terminal.send("R");
+    let done = format!("{spp} of {spp} spp");
+    terminal.wait_for(&done, |screen| {
+        let text = screen.contents();
+        (text.contains("resting") && text.contains(&done)).then_some(())
+    });
 }
