@@ -48,7 +48,9 @@ impl Turn<'_> {
         if layout.picture.contains(mouse.column, mouse.row) {
             let in_picture = layout.image.contains(mouse.column, mouse.row);
             self.model.focus = Focus::Picture;
-            self.end_gesture();
+            if !self.moves_or_turns() {
+                self.end_gesture();
+            }
             let last = [mouse.column, mouse.row];
             let modified = mouse.modified;
             self.model.drag = Some(Drag { button, modified, last, moved: false, in_picture });
@@ -153,13 +155,17 @@ impl Turn<'_> {
     fn released(&mut self, mouse: Mouse) {
         let Some(drag) = self.model.drag.take() else { return };
         if drag.moved {
-            // While the selection moves or turns, drags and keys are one step.
-            if !matches!(self.model.mode, Mode::Move | Mode::Turn) {
+            if !self.moves_or_turns() {
                 self.end_gesture();
             }
         } else if self.model.overlay.is_none() {
             self.click(drag, mouse);
         }
+    }
+
+    /// Whether all drags and keys are one step, until the mode ends.
+    fn moves_or_turns(&self) -> bool {
+        matches!(self.model.mode, Mode::Move | Mode::Turn)
     }
 
     fn click(&mut self, drag: Drag, mouse: Mouse) {
