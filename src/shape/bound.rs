@@ -64,11 +64,19 @@ fn stray(point: DVec3) -> f64 {
 impl Bound {
     /// Of a form.
     pub fn new(form: &Form) -> Self {
-        let ball = match form.bounds() {
-            Some((low, high)) => {
-                Ball { center: 0.5 * (low + high), radius: 0.5 * low.distance(high) }
+        let ball = match form {
+            Form::Sphere { center, radius } => Ball { center: *center, radius: *radius },
+            Form::Convex { corners, .. } => Ball::around(corners),
+            Form::Parallelogram { corner, u, v } => {
+                Ball::around(&[*corner, corner + u, corner + v, corner + u + v])
             }
-            None => Ball { center: DVec3::ZERO, radius: f64::INFINITY },
+            Form::Ellipsoid { scene_from_unit: map } => {
+                let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis]
+                    .map(|a| a.length_squared());
+                // The largest singular value is at most the root of the sum of squares.
+                Ball { center: map.translation, radius: (x + y + z).sqrt() }
+            }
+            Form::Plane { .. } => Ball { center: DVec3::ZERO, radius: f64::INFINITY },
         };
         let plane = match form {
             Form::Parallelogram { corner, u, v } => {
@@ -179,13 +187,14 @@ struct Cone {
 }
 
 impl Cone {
-    /// Whether a ball may reach into the cone: its centre is no farther from the cone's side.
+    /// Whether a ball may reach into the cone: it is not all behind the apex, and its centre is no
+    /// farther from the cone's side than its radius.
     fn meets(&self, ball: &Ball) -> bool {
         let to = ball.center - self.apex;
         let along = to.dot(self.axis);
         let across = (to - self.axis * along).length();
-        let slack = stray(ball.center) + stray(self.apex);
-        across * self.cos - along * self.sin <= ball.radius * (1.0 + STRAY) + slack
+        let radius = ball.radius * (1.0 + STRAY) + stray(ball.center) + stray(self.apex);
+        along >= -radius && across * self.cos - along * self.sin <= radius
     }
 }
 

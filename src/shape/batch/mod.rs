@@ -141,12 +141,10 @@ impl<L: Lanes> Batch<L> {
 
 #[inline(always)]
 fn closest<L: Lanes>(items: &[impl Item<L>], first: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
-    let mut tag = first;
-    for item in items {
+    for (tag, item) in (first..).zip(items) {
         if let Some((t, meets)) = item.crossing(ray) {
             hit.narrow(meets, t, tag);
         }
-        tag += 1;
     }
 }
 
