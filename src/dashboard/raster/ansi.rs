@@ -1,6 +1,7 @@
 //! Few colours or none: the density of glyphs carries what colours cannot.
 
-use super::oklab::{Oklab, linear};
+use super::nearest::Choices;
+use super::oklab::{Oklab, code, linear};
 use super::{Ink, PLAIN_BG, PLAIN_FG, PictureCell, indexed};
 use std::sync::LazyLock;
 
@@ -36,18 +37,30 @@ pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
     Oklab::of_linear([0, 1, 2].map(|c| coverage * fg[c] + (1.0 - coverage) * bg[c]))
 }
 
-/// What 16 colours and shades of their pairs look like.
-static MIXTURES: LazyLock<Vec<(Oklab, PictureCell)>> = LazyLock::new(|| {
-    let plain = (0..16).map(|i| (Oklab::of(indexed::rgb(i)), flat(i)));
+/// The 16 colours, and shades of pairs of them.
+static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     let mixed = NEUTRAL.into_iter().flat_map(|bg| (0..16).map(move |fg| (fg, bg)));
     let mixed = mixed.filter(|(fg, bg)| fg != bg).flat_map(|(fg, bg)| {
-        SHADES.map(|glyph| {
-            let look = mixture(indexed::rgb(fg), indexed::rgb(bg), coverage(glyph));
-            (look, PictureCell { glyph, fg: Ink::Indexed(fg), bg: Ink::Indexed(bg) })
-        })
+        SHADES.map(|glyph| PictureCell { glyph, fg: Ink::Indexed(fg), bg: Ink::Indexed(bg) })
     });
-    plain.chain(mixed).collect()
+    (0..16).map(flat).chain(mixed).collect()
 });
+
+/// What [`CELLS`] look like.
+static SHADED: LazyLock<Choices> = LazyLock::new(|| {
+    let look = |cell: &PictureCell| match (cell.fg, cell.bg) {
+        (Ink::Indexed(fg), Ink::Indexed(bg)) => {
+            mixture(indexed::rgb(fg), indexed::rgb(bg), coverage(cell.glyph))
+        }
+        (_, Ink::Indexed(bg)) => Oklab::of(indexed::rgb(bg)),
+        _ => Oklab::of(PLAIN_BG),
+    };
+    Choices::new(CELLS.iter().map(look).collect())
+});
+
+/// What the 16 colours look like.
+static BARE: LazyLock<Choices> =
+    LazyLock::new(|| Choices::new((0..16).map(|index| Oklab::of(indexed::rgb(index))).collect()));
 
 fn flat(index: u8) -> PictureCell {
     PictureCell { glyph: ' ', fg: Ink::Plain, bg: Ink::Indexed(index) }
@@ -55,37 +68,25 @@ fn flat(index: u8) -> PictureCell {
 
 /// The nearest of the 16 colours.
 pub fn nearest(rgb: [u8; 3]) -> u8 {
-    let wanted = Oklab::of(rgb);
-    let distance = |index: u8| Oklab::of(indexed::rgb(index)).distance_squared(wanted);
-    (0..16).min_by(|a, b| distance(*a).total_cmp(&distance(*b))).unwrap_or(0)
+    BARE.nearest(rgb) as u8
 }
 
 /// Two halves in 16 colours: one shade of two colours for both, or a colour for each.
 pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     let wanted = [upper, lower].map(Oklab::of);
-    let both = mixture(upper, lower, 0.5);
-    let nearest_mixture = |wanted: Oklab| {
-        MIXTURES
-            .iter()
-            .min_by(|a, b| {
-                let [a, b] = [a, b].map(|(look, _)| look.distance_squared(wanted));
-                a.total_cmp(&b)
-            })
-            .map_or_else(|| (wanted, PictureCell::default()), |found| *found)
-    };
-    let (look, shade) = nearest_mixture(both);
-    let of_shade = wanted[0].distance(look) + wanted[1].distance(look);
+    let [a, b] = [upper, lower].map(linear);
+    let shade = SHADED.nearest([0, 1, 2].map(|c| code(0.5 * (a[c] + b[c]))));
     // Halves that look alike are never better apart.
     if wanted[0].distance(wanted[1]) < HALVES_GAIN {
-        return shade;
+        return CELLS[shade];
     }
     let [top, bottom] = [upper, lower].map(nearest);
-    let looks = [top, bottom].map(|index| Oklab::of(indexed::rgb(index)));
-    let of_halves = wanted[0].distance(looks[0]) + wanted[1].distance(looks[1]);
-    if top != bottom && of_halves + HALVES_GAIN < of_shade {
+    let error = |looks: [Oklab; 2]| wanted[0].distance(looks[0]) + wanted[1].distance(looks[1]);
+    let of_halves = error([top, bottom].map(|index| BARE.look(index.into())));
+    if top != bottom && of_halves + HALVES_GAIN < error([SHADED.look(shade); 2]) {
         return PictureCell { glyph: '▀', fg: Ink::Indexed(top), bg: Ink::Indexed(bottom) };
     }
-    shade
+    CELLS[shade]
 }
 
 /// Two halves without colours, by lightness.

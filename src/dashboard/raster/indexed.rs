@@ -1,8 +1,8 @@
 //! The 256 colours of xterm: 16 that users choose, a cube of 216, 24 greys.
 
+use super::nearest::Choices;
 use super::oklab::Oklab;
 use std::sync::LazyLock;
-use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Codes along each edge of the cube.
 const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
@@ -44,43 +44,18 @@ pub fn rgb(index: u8) -> [u8; 3] {
 }
 
 /// The colours from [`FIRST`] on.
-static PALETTE: LazyLock<Vec<Oklab>> =
-    LazyLock::new(|| (FIRST..=255).map(|index| Oklab::of(rgb(index))).collect());
+static CHOICES: LazyLock<Choices> =
+    LazyLock::new(|| Choices::new((FIRST..=255).map(|index| Oklab::of(rgb(index))).collect()));
 
-/// Bits of each channel that the table of nearest colours distinguishes.
-const BITS: usize = 6;
-
-/// The nearest colour of each of the 2^18 boxes; 0: not looked for yet.
-static NEAREST: LazyLock<Vec<AtomicU8>> =
-    LazyLock::new(|| (0..1 << (3 * BITS)).map(|_| AtomicU8::new(0)).collect());
-
-/// The colour of cube and greys that looks most like `rgb`, which is taken to 6 bits a channel. (That
-/// moves it by at most 2 codes; two neighbours in the table are 10 and more apart.)
+/// The colour of cube and greys that looks most like `rgb`, which is taken to 6 bits a channel. (Two
+/// neighbours in the table are 10 codes and more apart.)
 pub fn nearest(rgb: [u8; 3]) -> u8 {
-    let coarse = rgb.map(|c| usize::from(c) >> (8 - BITS));
-    let known = &NEAREST[(coarse[0] << (2 * BITS)) | (coarse[1] << BITS) | coarse[2]];
-    // Threads that meet here find the same answer.
-    match known.load(Ordering::Relaxed) {
-        0 => {
-            // Black and white stay what they are: boxes spread over the whole range.
-            let center = coarse.map(|c| ((c * 255 + 31) / 63) as u8);
-            let found = search(Oklab::of(center));
-            known.store(found, Ordering::Relaxed);
-            found
-        }
-        found => found,
-    }
+    FIRST + CHOICES.nearest(rgb) as u8
 }
 
-fn search(wanted: Oklab) -> u8 {
-    let mut best = (f32::INFINITY, FIRST);
-    for (index, color) in (FIRST..=255).zip(PALETTE.iter()) {
-        let distance = wanted.distance_squared(*color);
-        if distance < best.0 {
-            best = (distance, index);
-        }
-    }
-    best.1
+/// How light a colour of cube or greys looks, 0..=1.
+pub fn lightness(index: u8) -> f32 {
+    CHOICES.look(usize::from(index.saturating_sub(FIRST))).l
 }
 
 #[cfg(test)]
@@ -113,7 +88,7 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let [r, g, b, _] = state.to_be_bytes();
             let wanted = Oklab::of([r, g, b]);
-            let [found, best] = [nearest([r, g, b]), search(wanted)];
+            let [found, best] = [nearest([r, g, b]), FIRST + CHOICES.search(wanted) as u8];
             let distance = |index| Oklab::of(rgb(index)).distance(wanted);
             assert!(distance(found) < distance(best) + 0.02, "{:?}", [r, g, b]);
             exact_hits += u32::from(found == best);

@@ -6,6 +6,7 @@
 mod ansi;
 mod false_color;
 mod indexed;
+mod nearest;
 mod oklab;
 mod settle;
 

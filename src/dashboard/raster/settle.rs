@@ -6,7 +6,7 @@
 
 use super::Raster;
 use super::indexed;
-use super::oklab::{Oklab, code, linear};
+use super::oklab::{code, linear};
 
 /// Colours that are mixed: the cells of the pattern.
 const MIXED: usize = 4;
@@ -43,15 +43,13 @@ fn mixture(rgb: [u8; 3]) -> [u8; MIXED] {
         let got = linear(indexed::rgb(*index));
         (0..3).for_each(|c| missing[c] += wanted[c] - got[c]);
     }
-    mixed.sort_by(|a, b| {
-        let [a, b] = [a, b].map(|index| Oklab::of(indexed::rgb(*index)).l);
-        a.total_cmp(&b)
-    });
+    mixed.sort_by(|a, b| indexed::lightness(*a).total_cmp(&indexed::lightness(*b)));
     mixed
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::Oklab;
     use super::*;
 
     /// The mean over the pattern is closer to a colour between two of the table than either.
