@@ -21,7 +21,9 @@ const RED: [u8; 3] = [255, 0, 0];
 const SKY: [u8; 3] = [90, 140, 220];
 
 fn checker(width: usize, height: usize) -> Raster {
-    Raster::from_fn(width, height, |i| if (i % width + i / width) % 2 == 0 { RED } else { SKY })
+    Raster::from_fn(width, height, |i| {
+        if (i % width + i / width).is_multiple_of(2) { RED } else { SKY }
+    })
 }
 
 #[test]
