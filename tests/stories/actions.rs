@@ -20,13 +20,16 @@ use zerkalo::shape::Shape;
 const BALL: Subject = Subject::Object(1);
 const GLASS: Subject = Subject::Object(2);
 
+/// The scene before, the desk afterwards.
+type Expect = dyn Fn(&Scene, &Desk) -> bool;
+
 /// What was pressed with what selected, and what must be so afterwards.
 struct Story {
     action: Action,
     select: Subject,
     /// Keys; `:` alone: the action is found in the palette.
     keys: String,
-    expect: Box<dyn Fn(&Scene, &Desk) -> bool>,
+    expect: Box<Expect>,
 }
 
 fn story(
@@ -172,16 +175,16 @@ fn light_and_mirror_stories() -> Vec<Story> {
             d.scene().lights.len() == 2 && d.model.selection == Subject::Light(1)
         }),
         story(Roughness(Change::Up, Pace::Coarse), c(), "]", |_, d| {
-            mirror(d.scene()).roughness > 0.0575
+            mirror(d.scene()).roughness > 0.0525
         }),
         story(Roughness(Change::Down, Pace::Coarse), c(), ",", |_, d| {
-            mirror(d.scene()).roughness < 0.0425
+            mirror(d.scene()).roughness < 0.0475
         }),
         story(Roughness(Change::Up, Pace::Fine), c(), "}", |_, d| {
-            (0.0501..0.0575).contains(&mirror(d.scene()).roughness)
+            (0.0501..0.0525).contains(&mirror(d.scene()).roughness)
         }),
         story(Roughness(Change::Down, Pace::Fine), c(), "<", |_, d| {
-            (0.0425..0.0499).contains(&mirror(d.scene()).roughness)
+            (0.0475..0.0499).contains(&mirror(d.scene()).roughness)
         }),
         story(Reflection(Change::Up), c(), ")", |_, d| mirror(d.scene()).reflection > 0.5),
         story(Reflection(Change::Down), c(), "(", |_, d| mirror(d.scene()).reflection < 0.5),

@@ -139,7 +139,7 @@ impl Desk {
         let effects = update(&mut self.model, message, self.now);
         for effect in effects {
             self.effects.push(effect.clone());
-            for answer in self.answers(effect) {
+            if let Some(answer) = self.answers(effect) {
                 self.send(answer);
             }
         }
