@@ -54,6 +54,7 @@ const ROOMS: &[(&str, &[&str])] = &[
 /// Crates that only some rooms know.
 const CRATES: &[(&str, &[&str])] = &[
     ("clap", &["command"]),
+    ("colorous", &["dashboard"]),
     ("crossbeam_channel", &["render", "dashboard"]),
     ("crossterm", &["dashboard"]),
     ("exr", &["film"]),
@@ -72,6 +73,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),
     ("toml_edit", &["scene"]),
     ("tui_input", &["dashboard"]),
+    ("unicode_width", &["dashboard"]),
     ("wide", &["lanes"]),
 ];
 

@@ -11,7 +11,7 @@ use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier, Style};
 
 /// Columns of the box with its border.
-const WIDTH: u16 = 34;
+const WIDTH: u16 = 36;
 
 /// Draws both, while a pixel is probed.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {

@@ -53,7 +53,7 @@ fn paint() {
             make(&mut model);
             if let Some(before) = &model.snapshot {
                 let mut snapshot = picture.clone();
-                snapshot.probe = before.probe.clone();
+                snapshot.probe = before.probe;
                 snapshot.report = before.report.clone();
                 snapshot.report.inventory = "6 objects: 2 spheres (list), 3 convex solids, 1 rectangle, Phong, cone lobe, 1 point light, single precision".into();
                 model.snapshot = Some(Box::new(snapshot));
