@@ -1,8 +1,7 @@
 //! The reference of the scene file format, generated from the tables of fields.
 
 use super::schema::FIELDS;
-use super::transform::STEP_FIELDS;
-use crate::shape::{EXAMPLES, KINDS};
+use crate::shape::{EXAMPLES, KINDS, STEP_FIELDS};
 use crate::value::{Field, Preset, Takes};
 use std::fmt::Write as _;
 

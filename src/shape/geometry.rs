@@ -1,6 +1,6 @@
 //! All things of a scene, ready for rays: batches, and a tree over them where it pays.
 
-use super::batch::{Batch, Compiled, Hit, Ray, Surface, compile};
+use super::batch::{Batch, Compiled, Hit, Ray, Source, Surface, compile};
 use super::form::Form;
 use super::tree::Tree;
 use crate::lanes::{Lanes, Mask, V3};
@@ -27,8 +27,8 @@ pub struct Geometry<L: Lanes> {
     tree: Option<Tree<L>>,
     /// `(part, number in the part)` of the tree's items.
     tree_items: Vec<(u32, u32)>,
-    /// `source[item]`: which form, in the order given to [`Geometry::new`].
-    source: Vec<u32>,
+    /// `source[item]`: which form, in the order given to [`Geometry::new`], and which part of it.
+    source: Vec<Source>,
     /// Bounding spheres of the items; `None`: without an end.
     spheres: Vec<Option<(DVec3, f64)>>,
     counts: Vec<String>,
@@ -68,17 +68,19 @@ impl<L: Lanes> Geometry<L> {
             let base = out.source.len() as u32;
             let in_tree = tree && !infinite;
             let how = if in_tree { "tree" } else { "list" };
-            let name = if sources.len() == 1 { noun.0 } else { noun.1 };
-            out.counts.push(format!("{} {name} ({how})", sources.len()));
+            let whole = |source: &&Source| source.part == 0;
+            let count = sources.iter().filter(whole).count();
+            let name = if count == 1 { noun.0 } else { noun.1 };
+            out.counts.push(format!("{count} {name} ({how})"));
             if in_tree {
-                for (i, source) in sources.iter().enumerate() {
-                    bounds.extend(forms[*source].bounds());
+                for (i, source) in sources.iter().enumerate().filter(|(_, s)| s.part == 0) {
+                    bounds.extend(forms[source.form].bounds());
                     out.tree_items.push((out.parts.len() as u32, i as u32));
                 }
             }
-            let spheres = sources.iter().map(|s| forms[*s].bounds().map(around));
+            let spheres = sources.iter().map(|s| forms[s.form].bounds().map(around));
             out.spheres.extend(spheres);
-            out.source.extend(sources.iter().map(|s| *s as u32));
+            out.source.extend(&sources);
             let end = out.source.len() as u32;
             out.parts.push(Part { batch, base, end, len: sources.len(), in_tree });
         }
@@ -96,8 +98,8 @@ impl<L: Lanes> Geometry<L> {
         self.source.is_empty()
     }
 
-    /// For each item, which form it came from.
-    pub fn sources(&self) -> &[u32] {
+    /// For each item, which form it came from, and which part of it.
+    pub fn sources(&self) -> &[Source] {
         &self.source
     }
 
@@ -141,7 +143,8 @@ impl<L: Lanes> Geometry<L> {
         let mut items = Vec::new();
         for (p, part) in self.parts.iter().enumerate() {
             for i in 0..part.len {
-                if self.spheres[part.base as usize + i].as_ref().is_none_or(sees) {
+                let item = part.base as usize + i;
+                if self.source[item].part == 0 && self.spheres[item].as_ref().is_none_or(sees) {
                     items.push((p as u32, i as u32));
                 }
             }

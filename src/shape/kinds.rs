@@ -1,7 +1,11 @@
 //! The table of kinds. A new kind of shape is one file and one line here.
 
 use super::Form;
-use super::{Cube, Cuboid, Plane, Platform, Prism, Pyramid, Rectangle, Sphere};
+use super::compound::OF_FIELDS;
+use super::{
+    Cone, Cube, Cuboid, Cylinder, Difference, Intersection, Plane, Platform, Prism, Pyramid,
+};
+use super::{Rectangle, Sphere, TaperedCylinder, Union, UnitCylinder};
 use crate::value::{Fault, Field, Takes};
 use serde::{Deserialize, Serialize};
 
@@ -21,8 +25,19 @@ pub trait Kind {
     fn faults(&self) -> Vec<Fault>;
 }
 
+/// The keys of a kind; those of compounds by the name of their static, since a constant could not
+/// take part in a table that refers to itself.
+macro_rules! keys {
+    ($kind:ident) => {
+        $kind::FIELDS
+    };
+    ($kind:ident $fields:path) => {
+        &$fields
+    };
+}
+
 macro_rules! kinds {
-    ($($key:literal => $kind:ident),+ $(,)?) => {
+    ($($key:literal => $kind:ident $(with $fields:path)?),+ $(,)?) => {
         /// What an object looks like: one kind with its parameters. In files a table with one key.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         pub enum Shape {
@@ -33,10 +48,13 @@ macro_rules! kinds {
             )+
         }
 
-        /// Every kind: its key, its fields, what it is.
-        pub const KINDS: &[Field] = &[
-            $(Field::required($key, Takes::Table($kind::FIELDS), "", $kind::DOC),)+
+        // A static, since the parts of compounds have shapes, too: the table refers to itself.
+        pub(super) static KIND_TABLE: [Field; [$($key),+].len()] = [
+            $(Field::required($key, Takes::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
         ];
+
+        /// Every kind: its key, its fields, what it is.
+        pub const KINDS: &[Field] = &KIND_TABLE;
 
         /// Every kind's key with an example as it stands in an `[[object]]`.
         pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE),)+];
@@ -74,7 +92,14 @@ kinds! {
     "box" => Cuboid,
     "pyramid" => Pyramid,
     "prism" => Prism,
+    "cylinder" => Cylinder,
+    "cone" => Cone,
+    "tapered_cylinder" => TaperedCylinder,
+    "unit_cylinder" => UnitCylinder,
     "platform" => Platform,
     "rectangle" => Rectangle,
     "plane" => Plane,
+    "union" => Union with OF_FIELDS,
+    "intersection" => Intersection with OF_FIELDS,
+    "difference" => Difference with OF_FIELDS,
 }

@@ -1,8 +1,12 @@
 //! Shapes: what users describe, one kind a file, and what rays meet, one batch per form.
 
 mod batch;
+mod compound;
+mod cone;
+mod csg;
 mod cube;
 mod cuboid;
+mod cylinder;
 mod form;
 mod geometry;
 mod kinds;
@@ -12,12 +16,20 @@ mod prism;
 mod pyramid;
 mod rectangle;
 mod sphere;
+mod tapered;
+mod tapered_cylinder;
+mod transform;
 mod tree;
+mod unit_cylinder;
 mod upright;
 
-pub use batch::{Hit, Ray, Surface};
+pub use batch::{Hit, Ray, Source, Surface};
+pub use compound::{Difference, Intersection, MAX_DEPTH, Part, Union};
+pub use cone::Cone;
+pub use csg::{Compound, Tree as CompoundTree};
 pub use cube::Cube;
 pub use cuboid::Cuboid;
+pub use cylinder::Cylinder;
 pub use form::{Form, HalfSpace};
 pub use geometry::{Geometry, Seen, TREE_FROM};
 pub use kinds::{EXAMPLES, KINDS, Kind, Shape};
@@ -27,3 +39,6 @@ pub use prism::Prism;
 pub use pyramid::Pyramid;
 pub use rectangle::Rectangle;
 pub use sphere::Sphere;
+pub use tapered_cylinder::TaperedCylinder;
+pub use transform::{Rotate, STEP_FIELDS, Scale, Step, chained, misplaced};
+pub use unit_cylinder::UnitCylinder;

@@ -1,5 +1,6 @@
 //! Bounded convex solids as intersections of slabs (parallel pairs of faces) and half-spaces.
 
+use super::span::{Span, Spans};
 use super::sphere::wanted_done;
 use super::{Batch, Hit, Ray, Surface, reach};
 use crate::lanes::{Lanes, Mask, Real, V3};
@@ -174,5 +175,38 @@ impl<L: Lanes> Batch<L> for Convexes<L> {
             normal = V3::select(nearer, n, normal);
         }
         Surface { point: normal.mul_add(-outside, point), normal, reach: L::splat(solid.reach) }
+    }
+}
+
+impl<L: Lanes> Spans<L> for Convexes<L> {
+    fn span(&self, item: usize, ray: &Ray<L>) -> Option<Span<L>> {
+        let solid = &self.solids[item];
+        let (enter, leave, meets) = self.chord(solid, ray)?;
+        let from_center = ray.origin - V3::splat(solid.center);
+        // The face at an end is the one that is nearest there, of those that the line crosses in
+        // the right sense.
+        let mut best = (L::of(-L::MAX), L::of(-L::MAX));
+        let mut cosines = (L::one(), L::one());
+        let mut face = |normal: V3<L>, offset: L| {
+            let speed = normal.dot(ray.direction);
+            let height = from_center.dot(normal) - offset;
+            let above = |t: L| speed.mul_add(t, height);
+            let nearer = speed.lt(L::zero()) & above(enter).gt(best.0);
+            best.0 = L::select(nearer, above(enter), best.0);
+            cosines.0 = L::select(nearer, -speed, cosines.0);
+            let nearer = speed.gt(L::zero()) & above(leave).gt(best.1);
+            best.1 = L::select(nearer, above(leave), best.1);
+            cosines.1 = L::select(nearer, speed, cosines.1);
+        };
+        for slab in self.slabs_of(solid) {
+            let normal = V3::splat(slab.normal);
+            face(normal, L::splat(slab.high));
+            face(-normal, -L::splat(slab.low));
+        }
+        for half_space in self.faces_of(solid) {
+            face(V3::splat(half_space.normal), L::splat(half_space.high));
+        }
+        let (enter_cosine, leave_cosine) = cosines;
+        Some(Span { enter, leave, enter_cosine, leave_cosine, meets })
     }
 }

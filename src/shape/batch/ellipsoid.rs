@@ -1,5 +1,6 @@
 //! Images of the unit sphere under affine maps: the ray goes back to the unit sphere's space.
 
+use super::span::{Span, Spans};
 use super::sphere::{crossings, wanted_done};
 use super::{Batch, Hit, Ray, Surface, reach};
 use crate::lanes::{Lanes, Real, V3};
@@ -21,12 +22,14 @@ pub struct Ellipsoids<L: Lanes> {
     items: Vec<Ellipsoid<L::Scalar>>,
 }
 
-fn rows<S: Real>(m: DMat3) -> [[S; 3]; 3] {
+/// The rows of a matrix, rounded.
+pub(super) fn rows<S: Real>(m: DMat3) -> [[S; 3]; 3] {
     m.transpose().to_cols_array_2d().map(|row| row.map(S::of))
 }
 
+/// A matrix, given by rows, times a vector.
 #[inline(always)]
-fn times<L: Lanes>(m: &[[L::Scalar; 3]; 3], v: V3<L>) -> V3<L> {
+pub(super) fn times<L: Lanes>(m: &[[L::Scalar; 3]; 3], v: V3<L>) -> V3<L> {
     V3::new(V3::splat(m[0]).dot(v), V3::splat(m[1]).dot(v), V3::splat(m[2]).dot(v))
 }
 
@@ -96,5 +99,15 @@ impl<L: Lanes> Batch<L> for Ellipsoids<L> {
             normal: normal.normalize(),
             reach: L::splat(e.reach),
         }
+    }
+}
+
+impl<L: Lanes> Spans<L> for Ellipsoids<L> {
+    fn span(&self, item: usize, ray: &Ray<L>) -> Option<Span<L>> {
+        let e = &self.items[item];
+        let (enter, leave, meets) = chord(e, ray)?;
+        let cosine = |t: L| self.surface(item, ray.at(t)).normal.dot(ray.direction).abs();
+        let (enter_cosine, leave_cosine) = (cosine(enter), cosine(leave));
+        Some(Span { enter, leave, enter_cosine, leave_cosine, meets })
     }
 }

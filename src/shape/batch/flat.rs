@@ -1,5 +1,6 @@
 //! Flat shapes: parallelograms (rectangles, platforms) and infinite planes.
 
+use super::span::{Span, Spans};
 use super::sphere::wanted_done;
 use super::{Batch, Hit, Ray, Surface, reach};
 use crate::lanes::{Lanes, Real, V3};
@@ -150,5 +151,25 @@ impl<L: Lanes> Batch<L> for Planes<L> {
         let normal = V3::splat(p.normal);
         let above = point.dot(normal) - L::splat(p.offset);
         Surface { point: normal.mul_add(-above, point), normal, reach: L::splat(p.offset).abs() }
+    }
+}
+
+/// The half-spaces behind the planes.
+impl<L: Lanes> Spans<L> for Planes<L> {
+    fn span(&self, item: usize, ray: &Ray<L>) -> Option<Span<L>> {
+        let plane = &self.items[item];
+        let normal = V3::splat(plane.normal);
+        let speed = ray.direction.dot(normal);
+        let height = ray.origin.dot(normal) - L::splat(plane.offset);
+        let (all, none) = (L::of(L::MAX), L::of(-L::MAX));
+        let t = -height / speed;
+        let (enters, leaves) = (speed.lt(L::zero()), speed.gt(L::zero()));
+        // A line parallel to the plane is behind it or before it for ever. A crossing beyond all
+        // numbers is none.
+        let enter = L::select(enters, t.max(none).min(all), none);
+        let leave = L::select(leaves, t.max(none).min(all), all);
+        let meets = enters | leaves | height.le(L::zero());
+        let cosine = speed.abs();
+        Some(Span { enter, leave, enter_cosine: cosine, leave_cosine: cosine, meets })
     }
 }

@@ -1,10 +1,13 @@
 //! What rays meet: one batch per form, all items of a form side by side, so that a form that does
 //! not occur costs nothing.
 
+mod compound;
 mod convex;
 mod ellipsoid;
 mod flat;
+mod span;
 mod sphere;
+mod tapered;
 
 use super::form::Form;
 use crate::lanes::{Lanes, Mask, V3};
@@ -96,16 +99,28 @@ struct Sorted {
     spheres: Vec<(usize, Form)>,
     ellipsoids: Vec<(usize, Form)>,
     convex: Vec<(usize, Form)>,
+    tapered: Vec<(usize, Form)>,
+    compounds: Vec<(usize, Form)>,
     parallelograms: Vec<(usize, Form)>,
     planes: Vec<(usize, Form)>,
 }
 
-/// A compiled batch and the numbers of the forms its items came from.
+/// What an item came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// Position in the list given to [`compile`].
+    pub form: usize,
+    /// Which part of a compound; 0 for all other forms. Part 0 stands for the whole compound where
+    /// rays ask for items; its other parts never meet anything by themselves.
+    pub part: usize,
+}
+
+/// A compiled batch and what its items came from.
 pub struct Compiled<L: Lanes> {
     /// The batch.
     pub batch: Box<dyn Batch<L>>,
-    /// `sources[item]`: position in the list given to [`compile`].
-    pub sources: Vec<usize>,
+    /// `sources[item]`: which form, which part of it.
+    pub sources: Vec<Source>,
     /// How the inventory counts the items: singular and plural.
     pub noun: (&'static str, &'static str),
     /// Items without an end, which no tree can hold.
@@ -120,6 +135,8 @@ pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
             Form::Sphere { .. } => &mut sorted.spheres,
             Form::Ellipsoid { .. } => &mut sorted.ellipsoids,
             Form::Convex { .. } => &mut sorted.convex,
+            Form::Tapered { .. } => &mut sorted.tapered,
+            Form::Compound(_) => &mut sorted.compounds,
             Form::Parallelogram { .. } => &mut sorted.parallelograms,
             Form::Plane { .. } => &mut sorted.planes,
         };
@@ -129,7 +146,11 @@ pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
     let mut add =
         |list: Vec<(usize, Form)>, noun, infinite, batch: fn(&[Form]) -> Box<dyn Batch<L>>| {
             if !list.is_empty() {
-                let (sources, forms): (Vec<_>, Vec<_>) = list.into_iter().unzip();
+                let (numbers, forms): (Vec<_>, Vec<_>) = list.into_iter().unzip();
+                let mut sources = Vec::new();
+                for (source, form) in numbers.into_iter().zip(&forms) {
+                    sources.extend((0..form.parts()).map(|part| Source { form: source, part }));
+                }
                 out.push(Compiled { batch: batch(&forms), sources, noun, infinite });
             }
         };
@@ -143,6 +164,12 @@ pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
     });
     add(sorted.convex, ("convex solid", "convex solids"), false, |f| {
         Box::new(convex::Convexes::new(f))
+    });
+    add(sorted.tapered, ("tapered cylinder", "tapered cylinders"), false, |f| {
+        Box::new(tapered::Tapereds::new(f))
+    });
+    add(sorted.compounds, ("compound", "compounds"), false, |f| {
+        Box::new(compound::Compounds::new(f))
     });
     out
 }

@@ -1,5 +1,6 @@
 //! Spheres.
 
+use super::span::{Span, Spans};
 use super::{Batch, Hit, Ray, Surface, reach};
 use crate::lanes::{Lanes, Mask, Real, V3};
 use crate::shape::form::Form;
@@ -96,6 +97,17 @@ impl<L: Lanes> Batch<L> for Spheres<L> {
         let normal = (point - center).normalize();
         let point = normal.mul_add(L::splat(s.radius), center);
         Surface { point, normal, reach: L::splat(s.reach) }
+    }
+}
+
+impl<L: Lanes> Spans<L> for Spheres<L> {
+    fn span(&self, item: usize, ray: &Ray<L>) -> Option<Span<L>> {
+        let s = &self.items[item];
+        let f = ray.origin - V3::splat(s.center);
+        let (enter, leave, meets) = crossings(f, ray.direction, L::splat(s.radius2))?;
+        // Half the chord over the radius.
+        let cosine = (leave - enter) * (L::of(0.5) / L::splat(s.radius));
+        Some(Span { enter, leave, enter_cosine: cosine, leave_cosine: cosine, meets })
     }
 }
 

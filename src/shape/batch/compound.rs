@@ -1,0 +1,421 @@
+//! Compounds: unions, intersections and differences of convex solids, by intervals (Roth 1982, *Ray
+//! Casting for Modeling Solids*).
+//!
+//! Every part gives the span in which a line is inside it. The ends of all spans, sorted, cut the line
+//! into gaps; in each of them every part is either inside or outside, and so is the whole. Where that
+//! changes from one gap to the next there is a surface.
+//!
+//! Ends that are nearer to each other than [`TIE`] roundings across the surface have no gap between
+//! them: they happen at once. So a cut that is flush with a face leaves no skin, and parts that touch
+//! leave no crack, whichever of two equal faces rounding puts in front. What is thinner than that is
+//! nothing.
+
+use super::ellipsoid::Ellipsoids;
+use super::flat::Planes;
+use super::span::{Span, Spans};
+use super::sphere::Spheres;
+use super::tapered::Tapereds;
+use super::{Batch, Hit, Ray, Surface, convex::Convexes, reach};
+use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::shape::csg::{Compound, Tree};
+use crate::shape::form::Form;
+use std::ops::Range;
+
+/// Surfaces that are so many roundings of the largest coordinate apart lie on each other: two faces
+/// given four units of the last place apart, each met with a few roundings.
+const TIE: f64 = 16.0;
+
+/// The least cosine that a tie is widened for: what a line meets flatter than that is not told apart.
+const FLATTEST: f64 = 1e-9;
+
+/// A step of the computation of "inside the whole" from "inside a part", on a stack.
+#[derive(Clone, Copy, Debug)]
+enum Op {
+    /// Pushes a part.
+    Part(u32),
+    /// Replaces two entries by the one that is in either.
+    Or,
+    /// Replaces two entries by the one that is in both.
+    And,
+    /// Replaces two entries by the one that is in the lower, but not in the upper.
+    Minus,
+}
+
+/// A part: its solid, and whether the whole's outside is on the solid's inside.
+#[derive(Clone, Copy)]
+struct Part {
+    batch: u32,
+    item: u32,
+    reversed: bool,
+}
+
+/// One compound: a ball around it and the ranges of its parts and operations.
+struct One<S> {
+    center: [S; 3],
+    radius2: S,
+    reach: S,
+    parts: Range<usize>,
+    ops: Range<usize>,
+    /// Entries on the stack at most.
+    depth: usize,
+}
+
+/// All compounds of a scene. Every part is an item of its own, so that a hit tells the part; the
+/// first one of a compound stands for it where rays ask for items.
+pub struct Compounds<L: Lanes> {
+    solids: Vec<Box<dyn Spans<L>>>,
+    compounds: Vec<One<L::Scalar>>,
+    parts: Vec<Part>,
+    ops: Vec<Op>,
+    /// For each part the compound that begins with it.
+    first: Vec<Option<u32>>,
+}
+
+/// The end of a span: its distance, and how near another end must be to happen at once.
+#[derive(Clone, Copy)]
+struct End<L> {
+    t: L,
+    tie: L,
+}
+
+/// The span of a part as far as "inside" needs it.
+#[derive(Clone, Copy)]
+struct Inside<L> {
+    enter: L,
+    leave: L,
+}
+
+impl<L: Lanes> Inside<L> {
+    #[inline(always)]
+    fn at(&self, t: L) -> L::Mask {
+        self.enter.le(t) & self.leave.ge(t)
+    }
+}
+
+/// What happens to a part of the tree at a surface.
+#[derive(Clone, Copy)]
+struct Change<L: Lanes> {
+    before: L::Mask,
+    after: L::Mask,
+    /// Where, and which part is to be seen; if nothing changes it means nothing.
+    t: L,
+    tag: L,
+}
+
+impl<L: Lanes> Change<L> {
+    fn inverted(self) -> Self {
+        Self { before: !self.before, after: !self.after, ..self }
+    }
+
+    /// Both joined; of two that change in the right sense the first is to be seen.
+    fn joined(self, other: Self, before: L::Mask, after: L::Mask) -> Self {
+        let same = (self.after & after) | (!self.after & !after);
+        let first = same & ((self.before & !self.after) | (!self.before & self.after));
+        Self {
+            before,
+            after,
+            t: L::select(first, self.t, other.t),
+            tag: L::select(first, self.tag, other.tag),
+        }
+    }
+
+    fn or(self, other: Self) -> Self {
+        self.joined(other, self.before | other.before, self.after | other.after)
+    }
+
+    fn and(self, other: Self) -> Self {
+        self.joined(other, self.before & other.before, self.after & other.after)
+    }
+}
+
+/// Room for `n` values while `use_it` runs: on the stack if they are few.
+#[inline(always)]
+fn with_room<T: Copy, R>(n: usize, fill: T, use_it: impl FnOnce(&mut [T]) -> R) -> R {
+    const FEW: usize = 8;
+    if n <= FEW { use_it(&mut [fill; FEW][..n]) } else { use_it(&mut vec![fill; n]) }
+}
+
+impl<L: Lanes> Compounds<L> {
+    /// From forms that are all compounds.
+    pub fn new(forms: &[Form]) -> Self {
+        let compounds: Vec<&Compound> = forms
+            .iter()
+            .filter_map(|form| match form {
+                Form::Compound(compound) => Some(compound),
+                _ => None,
+            })
+            .collect();
+        let mut out = Self {
+            solids: Vec::new(),
+            compounds: Vec::new(),
+            parts: Vec::new(),
+            ops: Vec::new(),
+            first: Vec::new(),
+        };
+        let mut sorted: [Vec<Form>; 5] = Default::default();
+        for (n, compound) in compounds.iter().enumerate() {
+            let (first_part, first_op) = (out.parts.len(), out.ops.len());
+            for (i, part) in compound.parts.iter().enumerate() {
+                let batch = match part {
+                    Form::Sphere { .. } => 0,
+                    Form::Ellipsoid { .. } => 1,
+                    Form::Convex { .. } => 2,
+                    Form::Tapered { .. } => 3,
+                    Form::Plane { .. } => 4,
+                    Form::Parallelogram { .. } | Form::Compound(_) => {
+                        unreachable!("a part is a solid; a compound in a compound is flattened")
+                    }
+                };
+                let item = sorted[batch].len() as u32;
+                sorted[batch].push(part.clone());
+                out.parts.push(Part { batch: batch as u32, item, reversed: false });
+                out.first.push((i == 0).then_some(n as u32));
+            }
+            let depth = out.plan(&compound.tree, first_part, false);
+            let (low, high) = compound.bounds().unwrap_or_default();
+            let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * L::EPSILON);
+            let of = L::Scalar::of;
+            out.compounds.push(One {
+                center: (0.5 * (low + high)).to_array().map(of),
+                radius2: of(radius * radius),
+                reach: of(compound.parts.iter().map(reach).fold(0.0, f64::max)),
+                parts: first_part..out.parts.len(),
+                ops: first_op..out.ops.len(),
+                depth,
+            });
+        }
+        let [spheres, ellipsoids, convex, tapered, planes] = &sorted;
+        out.solids = vec![
+            Box::new(Spheres::new(spheres)),
+            Box::new(Ellipsoids::new(ellipsoids)),
+            Box::new(Convexes::new(convex)),
+            Box::new(Tapereds::new(tapered)),
+            Box::new(Planes::new(planes)),
+        ];
+        out
+    }
+
+    /// Appends the operations of `tree` and returns how high the stack grows; `reversed`: its inside
+    /// is outside the whole.
+    fn plan(&mut self, tree: &Tree, first_part: usize, reversed: bool) -> usize {
+        let (list, op) = match tree {
+            Tree::Part(i) => {
+                self.parts[first_part + i].reversed = reversed;
+                self.ops.push(Op::Part(*i as u32));
+                return 1;
+            }
+            Tree::Union(list) => (list, Op::Or),
+            Tree::Intersection(list) => (list, Op::And),
+            Tree::Difference(list) => (list, Op::Minus),
+        };
+        let mut depth = 0;
+        for (n, inner) in list.iter().enumerate() {
+            let cuts = matches!(op, Op::Minus) && n > 0;
+            let above = self.plan(inner, first_part, reversed ^ cuts);
+            depth = depth.max(above + usize::from(n > 0));
+            if n > 0 {
+                self.ops.push(op);
+            }
+        }
+        depth
+    }
+
+    /// Where the point at distance `t` of each line is inside the whole.
+    #[inline(always)]
+    fn inside(&self, one: &One<L::Scalar>, spans: &[Inside<L>], t: L) -> L::Mask {
+        with_room(one.depth, L::mask(false), |stack| {
+            let mut top = 0;
+            for op in &self.ops[one.ops.clone()] {
+                if let Op::Part(i) = op {
+                    stack[top] = spans[*i as usize].at(t);
+                    top += 1;
+                    continue;
+                }
+                top -= 1;
+                let (a, b) = (stack[top - 1], stack[top]);
+                stack[top - 1] = match op {
+                    Op::Or => a | b,
+                    Op::And => a & b,
+                    Op::Part(_) | Op::Minus => a.and_not(b),
+                };
+            }
+            stack[0]
+        })
+    }
+
+    /// What is to be seen of the surface between the distances `before` and `after`.
+    fn change(
+        &self,
+        one: &One<L::Scalar>,
+        spans: &[Inside<L>],
+        base: u32,
+        before: L,
+        after: L,
+    ) -> Change<L> {
+        let nothing =
+            Change { before: L::mask(false), after: L::mask(false), t: L::zero(), tag: L::tag(0) };
+        with_room(one.depth, nothing, |stack| {
+            let mut top = 0;
+            for op in &self.ops[one.ops.clone()] {
+                if let Op::Part(i) = op {
+                    let span = &spans[*i as usize];
+                    let (was, is) = (span.at(before), span.at(after));
+                    let t = L::select(is, span.enter, span.leave);
+                    let tag = L::tag(base + one.parts.start as u32 + i);
+                    stack[top] = Change { before: was, after: is, t, tag };
+                    top += 1;
+                    continue;
+                }
+                top -= 1;
+                let (a, b) = (stack[top - 1], stack[top]);
+                stack[top - 1] = match op {
+                    Op::Or => a.or(b),
+                    Op::And => a.and(b),
+                    Op::Part(_) | Op::Minus => a.and(b.inverted()),
+                };
+            }
+            stack[0]
+        })
+    }
+
+    /// Narrows `hit` by the lanes of `wanted`.
+    fn meet(
+        &self,
+        one: &One<L::Scalar>,
+        base: u32,
+        ray: &Ray<L>,
+        wanted: L::Mask,
+        hit: &mut Hit<L>,
+    ) {
+        let from_center = ray.origin - V3::splat(one.center);
+        let along = from_center.dot(ray.direction);
+        let across = ray.direction.mul_add(-along, from_center);
+        let radius2 = L::splat(one.radius2);
+        // Ahead, or around the origin.
+        let ahead = along.le(L::zero()) | from_center.length2().le(radius2);
+        let near = wanted & across.length2().le(radius2) & ahead;
+        if near.none() {
+            return;
+        }
+        let (never, always) = (L::of(L::MAX), L::of(-L::MAX));
+        let parts = &self.parts[one.parts.clone()];
+        let outside = Inside { enter: never, leave: always };
+        let end = End { t: never, tie: L::zero() };
+        with_room(parts.len(), outside, |spans| {
+            with_room(2 * parts.len(), end, |ends| {
+                let tie = ray.origin.max_abs().max(L::splat(one.reach)) * L::of(TIE * L::EPSILON);
+                let mut count = 0;
+                for (span, part) in spans.iter_mut().zip(parts) {
+                    let solid = &self.solids[part.batch as usize];
+                    let Some(found) = solid.span(part.item as usize, ray) else { continue };
+                    *span = Inside {
+                        enter: L::select(found.meets, found.enter, never),
+                        leave: L::select(found.meets, found.leave, always),
+                    };
+                    for end in both_ends(&found, tie) {
+                        insert(end, ends, count);
+                        count += 1;
+                    }
+                }
+                self.sweep(one, (&*spans, &ends[..count]), base, near, hit);
+            });
+        });
+    }
+
+    /// Narrows `hit` by the first surface of the lanes in `open`: from gap to gap along the lines.
+    #[inline(always)]
+    fn sweep(
+        &self,
+        one: &One<L::Scalar>,
+        (spans, ends): (&[Inside<L>], &[End<L>]),
+        base: u32,
+        mut open: L::Mask,
+        hit: &mut Hit<L>,
+    ) {
+        let last = End { t: L::of(L::MAX), tie: L::zero() };
+        let mut state = L::mask(false);
+        let mut before = L::of(-L::MAX);
+        for (i, end) in ends.iter().enumerate() {
+            let next = ends.get(i + 1).unwrap_or(&last);
+            let gap = open & (next.t - end.t).gt(end.tie.max(next.tie));
+            if gap.none() {
+                continue;
+            }
+            let middle = L::of(0.5) * end.t + L::of(0.5) * next.t;
+            let inside = self.inside(one, spans, middle);
+            let changed = gap & (inside.and_not(state) | state.and_not(inside));
+            if changed.any() {
+                let seen = self.change(one, spans, base, before, middle);
+                let ahead = changed & seen.t.gt(L::zero());
+                let nearer = ahead & seen.t.lt(hit.t);
+                hit.t = L::select(nearer, seen.t, hit.t);
+                hit.item = L::select(nearer, seen.tag, hit.item);
+                open = open.and_not(ahead);
+            }
+            // Everything behind this end is farther than what is known.
+            open = open.and_not(gap & next.t.gt(hit.t));
+            if open.none() {
+                return;
+            }
+            state = (inside & gap) | state.and_not(gap);
+            before = L::select(gap, middle, before);
+        }
+    }
+}
+
+/// The ends of a span; those of lines that do not meet the solid stand behind all others.
+#[inline(always)]
+fn both_ends<L: Lanes>(span: &Span<L>, tie: L) -> [End<L>; 2] {
+    let never = L::of(L::MAX);
+    let end = |t: L, cosine: L| {
+        let real = span.meets & t.abs().lt(never);
+        End {
+            t: L::select(span.meets, t, never),
+            tie: (tie / cosine.max(L::of(FLATTEST))).only(real),
+        }
+    };
+    [end(span.enter, span.enter_cosine), end(span.leave, span.leave_cosine)]
+}
+
+/// Puts `end` into the first `count` of `ends`, which are sorted in every lane.
+#[inline(always)]
+fn insert<L: Lanes>(mut end: End<L>, ends: &mut [End<L>], count: usize) {
+    for slot in &mut ends[..count] {
+        let sooner = end.t.lt(slot.t);
+        let old = *slot;
+        slot.t = L::select(sooner, end.t, old.t);
+        slot.tie = L::select(sooner, end.tie, old.tie);
+        end.t = L::select(sooner, old.t, end.t);
+        end.tie = L::select(sooner, old.tie, end.tie);
+    }
+    ends[count] = end;
+}
+
+impl<L: Lanes> Batch<L> for Compounds<L> {
+    fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
+        for compound in self.first[range].iter().flatten() {
+            self.meet(&self.compounds[*compound as usize], base, ray, L::mask(true), hit);
+        }
+    }
+
+    fn blocked(&self, range: Range<usize>, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+        let mut blocked = L::mask(false);
+        for compound in self.first[range].iter().flatten() {
+            let open = wanted.and_not(blocked);
+            if open.none() {
+                break;
+            }
+            let mut hit = Hit { t: limit, item: L::tag(0) };
+            self.meet(&self.compounds[*compound as usize], 0, ray, open, &mut hit);
+            blocked = blocked | hit.t.lt(limit);
+        }
+        blocked
+    }
+
+    fn surface(&self, item: usize, point: V3<L>) -> Surface<L> {
+        let part = &self.parts[item];
+        let surface = self.solids[part.batch as usize].surface(part.item as usize, point);
+        let normal = if part.reversed { -surface.normal } else { surface.normal };
+        Surface { normal, ..surface }
+    }
+}
