@@ -139,6 +139,7 @@ fn value(field: &Field) -> String {
         Takes::OneOf(_) => "exactly one kind, see below".to_string(),
         Takes::ListOf(_) => "a list of steps, see below".to_string(),
         Takes::Choice(_) => "a word, see below".to_string(),
+        Takes::Tables(_) => "a list of parts".to_string(),
         takes => takes.to_string(),
     }
 }

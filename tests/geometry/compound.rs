@@ -1,0 +1,555 @@
+//! Compound solids: algebra of intervals, volumes, faces that lie on each other, light.
+
+use crate::common::Numbers;
+use crate::rays::{Line, Met, Traced, blocked, closest, scene};
+use glam::{DAffine3, DQuat, DVec3};
+use std::f64::consts::PI;
+use zerkalo::lanes::{Double, Lanes, Single};
+use zerkalo::shape::{Compound, CompoundTree as Tree, Cuboid, Cylinder, Form, Geometry, Kind};
+use zerkalo::world::Precision;
+
+fn ball(x: f64, y: f64, z: f64, radius: f64) -> Form {
+    Form::Sphere { center: DVec3::new(x, y, z), radius }
+}
+
+fn block(center: [f64; 3], size: [f64; 3]) -> Form {
+    Cuboid { center, size }.form()
+}
+
+/// All parts joined in one way.
+fn joined(join: fn(Vec<Tree>) -> Tree, parts: Vec<Form>) -> Form {
+    let tree = join((0..parts.len()).map(Tree::Part).collect());
+    Form::Compound(Compound { parts, tree })
+}
+
+fn union(parts: Vec<Form>) -> Form {
+    joined(Tree::Union, parts)
+}
+
+fn intersection(parts: Vec<Form>) -> Form {
+    joined(Tree::Intersection, parts)
+}
+
+fn difference(parts: Vec<Form>) -> Form {
+    joined(Tree::Difference, parts)
+}
+
+fn geometry<L: Lanes>(form: &Form) -> Geometry<L> {
+    Geometry::new(std::slice::from_ref(form))
+}
+
+/// A line from outside the ball of radius 4 through a random point near the origin.
+fn line(numbers: &mut Numbers) -> Line {
+    let d = numbers.direction();
+    (numbers.in_cube(1.5) - d * 6.0, d)
+}
+
+fn lines(seed: u64, count: usize) -> Vec<Line> {
+    let mut numbers = Numbers::new(seed);
+    (0..count).map(|_| line(&mut numbers)).collect()
+}
+
+/// Every surface along each line, by going on from one to the next.
+fn surfaces<L: Lanes>(geometry: &Geometry<L>, lines: &[Line]) -> Vec<Vec<Met>> {
+    let mut out = vec![Vec::new(); lines.len()];
+    let mut open: Vec<(usize, f64)> = (0..lines.len()).map(|i| (i, 0.0)).collect();
+    while !open.is_empty() {
+        let starts: Vec<Line> =
+            open.iter().map(|(i, t)| (lines[*i].0 + lines[*i].1 * *t, lines[*i].1)).collect();
+        let mut next = Vec::new();
+        for ((i, t), met) in open.iter().zip(closest(geometry, &starts)) {
+            let Some(met) = met else { continue };
+            let t = t + met.t;
+            out[*i].push(Met { t, ..met });
+            // Past the surface by more than what it may be off, flat or not.
+            let cosine = met.normal.dot(lines[*i].1).abs().max(1e-7);
+            next.push((*i, t + 64.0 * L::EPSILON * 8.0 / cosine));
+            assert!(out[*i].len() < 200, "{:?} has no end", lines[*i]);
+        }
+        open = next;
+    }
+    out
+}
+
+/// The length of each line inside; every surface must be the right way round, in turn.
+fn chords<L: Lanes>(name: &str, form: &Form, lines: &[Line]) -> Vec<f64> {
+    let all = surfaces(&geometry::<L>(form), lines);
+    lines
+        .iter()
+        .zip(all)
+        .map(|(line, met)| {
+            let told = || format!("{name}, {}: {line:?} {met:?}", L::NAME);
+            assert!(met.len() % 2 == 0, "odd: {}", told());
+            for (i, met) in met.iter().enumerate() {
+                let cosine = met.normal.dot(line.1);
+                assert!(if i % 2 == 0 { cosine < 0.0 } else { cosine > 0.0 }, "{}", told());
+            }
+            met.chunks(2).map(|pair| pair[1].t - pair[0].t).sum()
+        })
+        .collect()
+}
+
+/// The volume of what stands in the cube from -half to half, by the chords of parallel lines, one in
+/// each cell of a lattice, and its standard error.
+fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
+    let mut numbers = Numbers::new(seed);
+    let side = 400;
+    let cell = 2.0 * half / f64::from(side);
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.5, 0.7);
+    // The cube's shadow along any direction fits into sqrt 3 times its side.
+    let reach = 3f64.sqrt();
+    let mut sum = 0.0;
+    let mut squares = 0.0;
+    for row in 0..side {
+        let lines: Vec<Line> = (0..side)
+            .map(|column| {
+                let at =
+                    |i: i32, n: &mut Numbers| reach * (cell * (f64::from(i) + n.unit()) - half);
+                let (u, v) = (at(row, &mut numbers), at(column, &mut numbers));
+                (turn * DVec3::new(u, v, -4.0 * half), turn * DVec3::Z)
+            })
+            .collect();
+        let found = chords::<Double>(name, form, &lines);
+        sum += found.iter().sum::<f64>();
+        squares += found.windows(2).map(|w| 0.5 * (w[0] - w[1]).powi(2)).sum::<f64>();
+    }
+    let area = (reach * cell).powi(2);
+    (sum * area, squares.sqrt() * area)
+}
+
+#[test]
+fn closed_form_09_volumes() {
+    let lens = |r: f64, s: f64, d: f64| {
+        PI * (r + s - d).powi(2) * (d * d + 2.0 * d * (r + s) - 3.0 * (r - s).powi(2)) / (12.0 * d)
+    };
+    let rod =
+        |end: [f64; 3], radius: f64| Cylinder { base: end.map(|x| -x), top: end, radius }.form();
+    let above = |height: f64| Form::Plane { normal: DVec3::Y, offset: height };
+    let below = |height: f64| Form::Plane { normal: DVec3::NEG_Y, offset: -height };
+    // A ball pierced by a rod so that a ring of height 1.2 is left.
+    let ring: f64 = 1.2;
+    let hole = (1.0 - ring * ring / 4.0).sqrt();
+    let cone = Form::tapered(DAffine3::from_translation(DVec3::new(0.0, 0.0, -0.5)), 0.0);
+    let half_space = |normal: DVec3, offset| Form::Plane { normal, offset };
+    for (n, (name, form, expected)) in [
+        (
+            "lens",
+            intersection(vec![ball(-0.3, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)]),
+            lens(1.0, 0.8, 0.8),
+        ),
+        (
+            "two balls",
+            union(vec![ball(-0.3, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)]),
+            4.0 / 3.0 * PI * (1.0 + 0.512) - lens(1.0, 0.8, 0.8),
+        ),
+        (
+            "cap",
+            intersection(vec![ball(0.0, 0.0, 0.0, 1.0), below(0.4)]),
+            PI * 0.36 * (3.0 - 0.6) / 3.0,
+        ),
+        (
+            "cap cut away",
+            difference(vec![ball(0.0, 0.0, 0.0, 1.0), below(0.4)]),
+            4.0 / 3.0 * PI - PI * 0.36 * (3.0 - 0.6) / 3.0,
+        ),
+        (
+            "slice",
+            intersection(vec![ball(0.0, 0.0, 0.0, 1.0), above(0.25), below(-0.25)]),
+            PI * (0.5 - 2.0 * 0.25f64.powi(3) / 3.0),
+        ),
+        (
+            "napkin ring",
+            difference(vec![ball(0.0, 0.0, 0.0, 1.0), rod([0.0, 2.0, 0.0], hole)]),
+            PI * ring.powi(3) / 6.0,
+        ),
+        (
+            "Steinmetz",
+            intersection(vec![rod([2.0, 0.0, 0.0], 0.7), rod([0.0, 2.0, 0.0], 0.7)]),
+            16.0 * 0.7f64.powi(3) / 3.0,
+        ),
+        (
+            "frustum",
+            intersection(vec![cone.clone(), half_space(DVec3::Z, 0.1)]),
+            PI * 0.6 * (1.0 + 0.4 + 0.16) / 3.0,
+        ),
+        (
+            "truncated pyramid",
+            difference(vec![
+                zerkalo::shape::Pyramid {
+                    corner: [-0.6, -0.5, 0.6],
+                    side: 1.2,
+                    apex_height: 1.5,
+                    height: 1.5,
+                    rotation: 20.0,
+                }
+                .form(),
+                below(0.1),
+            ]),
+            // The top at height 0.6 of 1.5 has side 0.72.
+            0.6 * (1.44 + 0.5184 + (1.44f64 * 0.5184).sqrt()) / 3.0,
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (found, error) = volume(name, &form, 1.4, 90 + n as u64);
+        let z = (found - expected) / error;
+        assert!(error < 2e-3 * expected, "{name}: {found} +- {error}");
+        assert!(z.abs() < 4.0, "{name}: {found} +- {error}, not {expected}: {z} sigma");
+    }
+}
+
+/// V(A or B) + V(A and B) = V(A) + V(B), on every line.
+#[test]
+fn closed_form_09_inclusion_and_exclusion_on_every_line() {
+    let solids = [
+        ball(0.2, -0.1, 0.0, 0.9),
+        block([-0.3, 0.2, 0.1], [1.1, 0.9, 1.5]),
+        Cylinder { base: [-0.8, -0.9, 0.3], top: [0.7, 0.8, -0.2], radius: 0.5 }.form(),
+        Form::tapered(DAffine3::from_scale(DVec3::new(0.7, 0.9, 1.1)), 0.2),
+        ball(0.0, 0.0, 0.0, 0.8).transformed(&DAffine3::from_scale(DVec3::new(1.0, 0.5, 1.6))),
+    ];
+    let lines = lines(91, 40_000);
+    let alone: Vec<Vec<f64>> = solids.iter().map(|s| chords::<Double>("one", s, &lines)).collect();
+    for i in 0..solids.len() {
+        for j in 0..i {
+            let pair = || vec![solids[i].clone(), solids[j].clone()];
+            let either = chords::<Double>("or", &union(pair()), &lines);
+            let both = chords::<Double>("and", &intersection(pair()), &lines);
+            let first = chords::<Double>("minus", &difference(pair()), &lines);
+            for n in 0..lines.len() {
+                let sum = alone[i][n] + alone[j][n];
+                let told = || format!("{i} {j} {:?}", lines[n]);
+                // What is thinner than a tie is nothing; along a flat line that is some length.
+                let close = |a: f64, b: f64| (a - b).abs() < 1e-5;
+                assert!(close(either[n] + both[n], sum), "{}: {}", told(), either[n] + both[n]);
+                assert!(close(first[n] + both[n], alone[i][n]), "{}", told());
+            }
+        }
+    }
+}
+
+fn random_solid(numbers: &mut Numbers) -> Form {
+    let place = numbers.in_cube(0.8);
+    let size = numbers.between(0.3, 1.2);
+    let form = match numbers.below(5) {
+        0 => return Form::Sphere { center: place, radius: size },
+        1 => block([0.0; 3], [1.3, 0.9, 1.1]),
+        2 => Form::tapered(DAffine3::IDENTITY, numbers.between(0.0, 2.0)),
+        3 => ball(0.0, 0.0, 0.0, 1.0),
+        _ => Form::tapered(DAffine3::IDENTITY, [0.0, 1.0][numbers.below(2)]),
+    };
+    let turn = DQuat::from_axis_angle(numbers.direction(), numbers.between(0.0, 3.0));
+    let scale = size * DVec3::new(1.0, numbers.between(0.5, 1.5), numbers.between(0.5, 1.5));
+    form.transformed(&DAffine3::from_scale_rotation_translation(scale, turn, place))
+}
+
+/// A random tree of this depth; some parts are used again, so that faces lie on each other.
+fn random_tree(numbers: &mut Numbers, depth: usize, parts: &mut Vec<Form>) -> Tree {
+    if depth == 0 || numbers.below(6) == 0 {
+        let part = match numbers.below(4) {
+            0 if !parts.is_empty() => parts[numbers.below(parts.len())].clone(),
+            _ => random_solid(numbers),
+        };
+        parts.push(part);
+        return Tree::Part(parts.len() - 1);
+    }
+    let count = 2 + usize::from(numbers.below(4) == 0);
+    let list = (0..count).map(|_| random_tree(numbers, depth - 1, parts)).collect();
+    match numbers.below(3) {
+        0 => Tree::Union(list),
+        1 => Tree::Intersection(list),
+        _ => Tree::Difference(list),
+    }
+}
+
+fn contains(part: &Form, p: DVec3) -> bool {
+    match part {
+        Form::Sphere { center, radius } => p.distance(*center) <= *radius,
+        Form::Ellipsoid { scene_from_unit } => {
+            scene_from_unit.inverse().transform_point3(p).length() <= 1.0
+        }
+        Form::Convex { faces, .. } => faces.iter().all(|f| f.normal.dot(p) <= f.offset),
+        Form::Tapered { scene_from_unit, top } => {
+            let q = scene_from_unit.inverse().transform_point3(p);
+            (0.0..=1.0).contains(&q.z) && q.truncate().length() <= 1.0 + (top - 1.0) * q.z
+        }
+        Form::Plane { normal, offset } => normal.dot(p) <= *offset,
+        _ => unreachable!("no solid"),
+    }
+}
+
+fn tree_contains(tree: &Tree, parts: &[Form], p: DVec3) -> bool {
+    let inside = |t: &Tree| tree_contains(t, parts, p);
+    match tree {
+        Tree::Part(i) => contains(&parts[*i], p),
+        Tree::Union(list) => list.iter().any(inside),
+        Tree::Intersection(list) => list.iter().all(inside),
+        Tree::Difference(list) => inside(&list[0]) && !list[1..].iter().any(inside),
+    }
+}
+
+/// Random trees of depth 8: surfaces in turn, and between them what the points themselves say. Half a
+/// million rays each way.
+#[test]
+fn extreme_08_extreme_04_parity_of_random_trees() {
+    let mut seen = 0;
+    for seed in 0..100 {
+        let mut numbers = Numbers::new(800 + seed);
+        let mut parts = Vec::new();
+        let tree = random_tree(&mut numbers, 1 + (seed as usize) % 8, &mut parts);
+        let form = Form::Compound(Compound { parts: parts.clone(), tree: tree.clone() });
+        if form.bounds().is_none() {
+            continue;
+        }
+        let double = geometry::<Double>(&form);
+        let lines: Vec<Line> = (0..5_000).map(|_| line(&mut numbers)).collect();
+        let all = surfaces(&double, &lines);
+        let name = format!("tree {seed}");
+        chords::<Double>(&name, &form, &lines);
+        for (line, met) in lines.iter().zip(&all) {
+            seen += met.len();
+            let mut ends = vec![0.0];
+            ends.extend(met.iter().map(|m| m.t));
+            ends.push(ends[ends.len() - 1] + 1.0);
+            for (n, gap) in ends.windows(2).enumerate() {
+                if gap[1] - gap[0] < 1e-6 {
+                    continue;
+                }
+                let t = gap[0] + numbers.between(0.01, 0.99) * (gap[1] - gap[0]);
+                let inside = tree_contains(&tree, &parts, line.0 + line.1 * t);
+                // A random point lies in a sliver that a tie hides as rarely as that is thin.
+                assert_eq!(inside, n % 2 == 1, "{name}: {line:?} at {t} of {ends:?}");
+            }
+        }
+        // Inside, in cavities and outside: the first surface ahead tells where the origin is.
+        let starts: Vec<Line> =
+            (0..5_000).map(|_| (numbers.in_cube(1.5), numbers.direction())).collect();
+        for (line, met) in starts.iter().zip(closest(&double, &starts)) {
+            let inside = tree_contains(&tree, &parts, line.0);
+            let told = || format!("{name}: {line:?} {met:?}");
+            match met {
+                Some(met) => assert_eq!(met.normal.dot(line.1) > 0.0, inside, "{}", told()),
+                None => assert!(!inside, "{}", told()),
+            }
+        }
+    }
+    assert!(seen > 200_000, "{seen} surfaces");
+}
+
+/// The same surfaces, to 1e-12 of the distance; beside a tie's width at flat ends.
+fn same_surfaces(name: &str, a: &Form, b: &Form, lines: &[Line]) {
+    let (a, b) = (geometry::<Double>(a), geometry::<Double>(b));
+    for ((line, a), b) in lines.iter().zip(surfaces(&a, lines)).zip(surfaces(&b, lines)) {
+        let flat = |m: &Met| m.normal.dot(line.1).abs() < 1e-5;
+        if a.iter().chain(&b).any(flat) {
+            continue;
+        }
+        assert_eq!(a.len(), b.len(), "{name}: {line:?}: {a:?} {b:?}");
+        for (a, b) in a.iter().zip(&b) {
+            assert!((a.t - b.t).abs() <= 1e-12 * a.t, "{name}: {line:?}: {a:?} {b:?}");
+            assert!((a.normal - b.normal).length() < 1e-6, "{name}: {line:?}: {a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn extreme_09_algebra() {
+    let lines = lines(9, 20_000);
+    let mut numbers = Numbers::new(90);
+    for n in 0..12 {
+        let (a, b) = (random_solid(&mut numbers), random_solid(&mut numbers));
+        let (a, b, c) = (|| a.clone(), || b.clone(), random_solid(&mut numbers));
+        let told = |what: &str| format!("{what}, pair {n}");
+        same_surfaces(&told("A or A = A"), &union(vec![a(), a()]), &a(), &lines);
+        same_surfaces(&told("A and A = A"), &intersection(vec![a(), a()]), &a(), &lines);
+        let nothing = geometry::<Double>(&difference(vec![a(), a()]));
+        assert!(closest(&nothing, &lines).iter().all(Option::is_none), "A - A, pair {n}");
+        assert!(blocked(&nothing, &lines, 100.0).iter().all(|b| !b), "A - A, pair {n}");
+        // A - B = A and not B, where not B = everything - B.
+        let all = block([0.0; 3], [20.0; 3]);
+        let not_b = Tree::Difference(vec![Tree::Part(1), Tree::Part(2)]);
+        let tree = Tree::Intersection(vec![Tree::Part(0), not_b]);
+        let and_not = Form::Compound(Compound { parts: vec![a(), all, b()], tree });
+        same_surfaces(&told("A - B = A and not B"), &difference(vec![a(), b()]), &and_not, &lines);
+        let swapped = (union(vec![a(), b()]), union(vec![b(), a()]));
+        same_surfaces(&told("A or B = B or A"), &swapped.0, &swapped.1, &lines);
+        // (A - B) - C = A - (B or C)
+        let tree = Tree::Difference(vec![
+            Tree::Difference(vec![Tree::Part(0), Tree::Part(1)]),
+            Tree::Part(2),
+        ]);
+        let steps = Form::Compound(Compound { parts: vec![a(), b(), c.clone()], tree });
+        let at_once = difference(vec![a(), b(), c]);
+        same_surfaces(&told("(A - B) - C"), &steps, &at_once, &lines);
+    }
+}
+
+/// `x` moved by so many units of the last place of the precision's numbers near 1.
+fn nudged(x: f64, units: i32, epsilon: f64) -> f64 {
+    x * (1.0 + f64::from(units) * epsilon)
+}
+
+/// A box with a hole from its top: the cutter's top lies on the box's, or some ulps beside it. Seen
+/// from above no ray may meet the opening.
+fn check_flush<L: Lanes>(units: i32, rays: usize) {
+    let top = nudged(1.0, units, L::EPSILON);
+    let cutter = block([0.0, (top + 0.3) / 2.0, 0.0], [1.0, top - 0.3, 1.0]);
+    let pot = difference(vec![block([0.0, 0.5, 0.0], [2.0, 1.0, 2.0]), cutter]);
+    let geometry = geometry::<L>(&pot);
+    let mut numbers = Numbers::new(1000);
+    // Through a point of the opening, from any side, also flat.
+    let lines: Vec<Line> = (0..rays)
+        .map(|_| {
+            let at = DVec3::new(numbers.between(-0.49, 0.49), 1.0, numbers.between(-0.49, 0.49));
+            let (sin, cos) = numbers.between(0.0, 2.0 * PI).sin_cos();
+            let down = 10f64.powf(numbers.between(-3.0, 0.0));
+            let flat = (1.0 - down * down).max(0.0).sqrt();
+            let d = DVec3::new(cos * flat, -down, sin * flat);
+            (at - d * 0.4, d)
+        })
+        .collect();
+    let unit = 32.0 * L::EPSILON;
+    for (line, met) in lines.iter().zip(closest(&geometry, &lines)) {
+        let told = || format!("{units} ulp, {}: {line:?} {met:?}", L::NAME);
+        let met = met.unwrap_or_else(|| panic!("through: {}", told()));
+        let in_opening = met.point.y > 1.0 - unit
+            && met.point.x.abs() < 0.5 - unit
+            && met.point.z.abs() < 0.5 - unit;
+        assert!(!in_opening, "skin: {}", told());
+    }
+    // From the bottom of the hole light gets out, and from outside none through the walls.
+    let up: Vec<Line> =
+        lines.iter().map(|(o, d)| (*o + *d * 0.45, -*d)).filter(|l| l.0.y > 0.31).collect();
+    let out = |l: &Line| {
+        let t = (1.0 - l.0.y) / l.1.y;
+        let at = l.0 + l.1 * t;
+        at.x.abs() < 0.499 && at.z.abs() < 0.499 && l.0.x.abs() < 0.499 && l.0.z.abs() < 0.499
+    };
+    let up: Vec<Line> = up.into_iter().filter(out).collect();
+    assert!(up.len() > rays / 4, "{} of {rays}", up.len());
+    for (line, blocked) in up.iter().zip(blocked(&geometry, &up, 50.0)) {
+        assert!(!blocked, "a lid: {units} ulp, {}: {line:?}", L::NAME);
+    }
+}
+
+#[test]
+fn extreme_10_no_skin_where_a_cut_is_flush() {
+    for units in -4..=4 {
+        check_flush::<Double>(units, 60_000);
+        check_flush::<Single>(units, 60_000);
+    }
+}
+
+/// Two boxes side by side are one: no crack lets a ray in between, and no wall stands inside.
+fn check_fused<L: Lanes>(units: i32) {
+    let seam = nudged(0.3, units, L::EPSILON);
+    let right = block([(seam + 1.0) / 2.0, 0.0, 0.0], [1.0 - seam, 1.0, 1.0]);
+    let left = block([-0.35, 0.0, 0.0], [1.3, 1.0, 1.0]);
+    let both = geometry::<L>(&union(vec![left, right]));
+    let mut numbers = Numbers::new(1001);
+    // From inside the left one through the seam, nearly along it and across.
+    let lines: Vec<Line> = (0..60_000)
+        .map(|_| {
+            let at = DVec3::new(0.3, numbers.between(-0.4, 0.4), numbers.between(-0.4, 0.4));
+            let across = 10f64.powf(numbers.between(-3.0, 0.0));
+            let (sin, cos) = numbers.between(0.0, 2.0 * PI).sin_cos();
+            let along = (1.0 - across * across).max(0.0).sqrt();
+            let d = DVec3::new(across, along * sin, along * cos);
+            (at - d * 0.05, d)
+        })
+        .collect();
+    for (line, met) in lines.iter().zip(closest(&both, &lines)) {
+        let met = met.unwrap_or_else(|| panic!("{units}, {}: lost {line:?}", L::NAME));
+        let outer = met.point.abs().max_element() > 0.49;
+        assert!(outer && met.normal.dot(line.1) > 0.0, "{units}, {}: {line:?} {met:?}", L::NAME);
+    }
+    // From outside straight at the seam.
+    let lines: Vec<Line> = (0..60_000)
+        .map(|n| {
+            let off = numbers.between(-40.0, 40.0) * L::EPSILON;
+            let z = numbers.between(-0.4, 0.4);
+            let lean = if n % 2 == 0 { 0.0 } else { 1e-6 * numbers.between(-1.0, 1.0) };
+            (DVec3::new(0.3 + off, 3.0, z), DVec3::new(lean, -1.0, 0.0).normalize())
+        })
+        .collect();
+    for (line, met) in lines.iter().zip(closest(&both, &lines)) {
+        let met = met.unwrap_or_else(|| panic!("{units}, {}: crack {line:?}", L::NAME));
+        assert!((met.t - 2.5).abs() < 1e-5, "{units}, {}: {line:?} {met:?}", L::NAME);
+    }
+}
+
+#[test]
+fn extreme_10_no_crack_where_parts_touch() {
+    for units in -4..=4 {
+        check_fused::<Double>(units);
+        check_fused::<Single>(units);
+    }
+}
+
+/// Where faces of two materials lie on each other, the part that is listed first is seen, not a
+/// mixture by rounding.
+#[test]
+fn faces_on_each_other_show_the_first_part() {
+    let parts =
+        || vec![block([0.2, 0.0, 0.0], [2.0, 1.0, 1.0]), block([-0.2, 0.0, 0.0], [2.0, 1.0, 1.0])];
+    let geometry = geometry::<Single>(&union(parts()));
+    let mut numbers = Numbers::new(5);
+    for _ in 0..20_000 {
+        let at = DVec3::new(numbers.between(-0.7, 0.7), 0.5, numbers.between(-0.4, 0.4));
+        let from = at + DVec3::new(numbers.between(-1.0, 1.0), 1.0, numbers.between(-1.0, 1.0));
+        let line = (from, (at - from).normalize());
+        let (ray, _) = crate::rays::packets::<Single>(&[line]).next().unwrap();
+        let hit = geometry.closest(&ray);
+        let item = geometry.sources()[hit.item.tag_lane(0) as usize];
+        assert_eq!((item.form, item.part), (0, 0), "{line:?}");
+    }
+}
+
+/// A lamp in a hollow ball lights its inside and nothing else, unless there is a window.
+#[test]
+fn light_inside() {
+    let room = |window: &str| {
+        scene(&format!(
+            "[camera]\neye = [0, 0, 9]\ntarget = [0, 0, 0]\n\
+             [[light]]\npoint = {{ position = [0.1, 0.0, 0.1] }}\n\
+             [[object]]\nshape.platform = {{ center = [0, -3, 0], size = [20, 20] }}\n\
+             [[object]]\nshape.difference.of = [\n\
+             {{ shape.sphere = {{ center = [0, 0, 0], radius = 1 }} }},\n\
+             {{ shape.sphere = {{ center = [0, 0, 0], radius = 0.9 }} }},\n{window}]\n"
+        ))
+    };
+    let window = "{ shape.cylinder = { base = [0, 0, 0], top = [0, -2, 0], radius = 0.3 } },\n";
+    let mut numbers = Numbers::new(4);
+    let inward: Vec<Line> =
+        (0..5000).map(|_| (numbers.in_cube(0.4), numbers.direction())).collect();
+    let down: Vec<Line> = (0..5000)
+        .map(|_| {
+            (DVec3::new(numbers.between(-6.0, 6.0), -2.0, numbers.between(-6.0, 6.0)), DVec3::NEG_Y)
+        })
+        .collect();
+    for precision in [Precision::Single, Precision::Double] {
+        let closed = Traced::new(&room(""), precision);
+        assert!(closed.radiance(&inward).iter().all(|l| l[0] > 0.0), "{precision:?}");
+        assert!(closed.radiance(&down).iter().all(|l| l[0] == 0.0), "{precision:?}");
+        let open = Traced::new(&room(window), precision);
+        // Through the lower rim of the window, at y = -0.954 and 0.3 from the axis: from the lamp
+        // at (0.1, 0, 0.1) the light falls into a disc about its mirror point.
+        for (line, light) in down.iter().zip(open.radiance(&down)) {
+            // The line from the lamp to the floor point passes the planes of both rims.
+            let at = DVec3::new(line.0.x, -3.0, line.0.z);
+            let lamp = DVec3::new(0.1, 0.0, 0.1);
+            let off_axis = |y: f64| {
+                let p = lamp + (at - lamp) * (y / -3.0);
+                p.x.hypot(p.z)
+            };
+            let (inner, outer) =
+                (off_axis(-(0.81f64 - 0.09).sqrt()), off_axis(-(1.0f64 - 0.09).sqrt()));
+            if inner < 0.299 && outer < 0.299 {
+                assert!(light[0] > 0.0, "{precision:?}: dark at {at}");
+            } else if inner.max(outer) > 0.301 {
+                assert!(light[0] == 0.0, "{precision:?}: lit at {at}");
+            }
+        }
+    }
+}
