@@ -323,6 +323,9 @@ impl<L: Lanes> Compounds<L> {
     }
 
     /// Narrows `hit` by the first surface of the lanes in `open`: from gap to gap along the lines.
+    ///
+    /// Faces that lie on each other are met at the same angle, so both ends must be as near as their
+    /// ties: a face that is met flatly does not swallow others that are not.
     #[inline(always)]
     fn sweep(
         &self,
@@ -337,7 +340,7 @@ impl<L: Lanes> Compounds<L> {
         let mut before = L::of(-L::MAX);
         for (i, end) in ends.iter().enumerate() {
             let next = ends.get(i + 1).unwrap_or(&last);
-            let gap = open & (next.t - end.t).gt(end.tie.max(next.tie));
+            let gap = open & (next.t - end.t).gt(end.tie.min(next.tie));
             if gap.none() {
                 continue;
             }
