@@ -43,10 +43,11 @@ const CRATES: &[(&str, &[&str])] = &[
     ("obvhs", &["shape", "world"]),
     ("png", &["film"]),
     ("rayon", &["render"]),
+    ("rustix", &["render"]),
     ("serde", &["command", "scene", "shape", "material", "light", "camera", "value"]),
     ("serde_json", &["command"]),
     ("signal_hook", &["command"]),
-    ("tempfile", &["film", "command"]),
+    ("tempfile", &["film", "scene", "command"]),
     // Descriptions read their own examples in tests.
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),
     ("toml_edit", &["scene"]),

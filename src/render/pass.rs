@@ -59,7 +59,7 @@ pub fn run_in<L: Lanes>(
 }
 
 /// The first sample of replicate A in interleaved order: every 8th pixel in x and y, then the gaps in
-/// three stages, each over the whole picture; `shown` sees the film after the first. Once `abandon`
+/// three stages, each over the whole picture; `shown` sees the film after all but the last. Once `abandon`
 /// is raised the later stages are left out, and there is no report.
 pub fn run_first(
     world: &AnyWorld,
@@ -110,7 +110,7 @@ fn first_in<L: Lanes>(
                 })
                 .reduce(|| true, |a, b| a & b)
         });
-        if step == 8 {
+        if complete && step != 1 {
             shown(film);
         }
         if !complete || (step != 1 && abandon.load(Ordering::Relaxed)) {

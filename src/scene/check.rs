@@ -42,6 +42,7 @@ pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<Stri
             }
         }
         [list, name, ..] if list == "materials" => format!("material \"{}\"", excerpt(name)),
+        [list, name, ..] if list == "views" => format!("view \"{}\"", excerpt(name)),
         [first, ..] => first.clone(),
         [] => String::new(),
     }
@@ -78,6 +79,9 @@ impl Scene {
         add(&["film"], self.film.faults());
         add(&["trace"], self.trace.faults());
         add(&["camera"], self.camera.faults());
+        for (name, view) in &self.views {
+            add(&["views", name], view.faults());
+        }
         add(&["background"], self.background.faults());
         add(&["ambient"], self.ambient.faults());
         for (i, light) in self.lights.iter().enumerate() {

@@ -1,6 +1,6 @@
 //! Objects: a shape, where it stands, what it is made of.
 
-use crate::shape::{KINDS, STEP_FIELDS, Shape, Step, chained, misplaced};
+use crate::shape::{Form, KINDS, STEP_FIELDS, Shape, Step, chained, misplaced};
 use crate::value::{Checks, Fault, Field, Takes};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
@@ -46,6 +46,14 @@ impl Object {
     /// The transform's steps in order, as one map.
     pub fn scene_from_object(&self) -> DAffine3 {
         chained(&self.transform)
+    }
+
+    /// Its geometry where it stands, in double precision. Of an object without faults.
+    pub fn form(&self) -> Form {
+        match self.transform.is_empty() {
+            true => self.shape.form(),
+            false => self.shape.form().transformed(&self.scene_from_object()),
+        }
     }
 
     /// What is wrong with it (its material's name is the scene's business).

@@ -24,6 +24,13 @@ pub const FIELDS: &[Field] = &[
         "it stands at [0.0, 1.0, 5.0] and looks at the origin",
         "The view: a pinhole camera.",
     ),
+    Field::without(
+        "views",
+        Takes::Named(camera::FIELDS),
+        "",
+        "there are none",
+        "Other viewpoints by name, to come back to. The picture is taken from `[camera]`.",
+    ),
     table("background", BACKGROUND_FIELDS, "What a ray sees that meets nothing."),
     table("ambient", AMBIENT_FIELDS, "Light from everywhere, without shadows."),
     Field::without("light", Takes::Tables(light::FIELDS), "", "there are none", "The lights."),
@@ -89,7 +96,7 @@ impl Walk<'_> {
     /// The keys below the thing that the subject names: `shape.sphere`.
     fn inner(&self) -> String {
         let above = match self.path.first().map(String::as_str) {
-            Some("object" | "light" | "materials") => 2,
+            Some("object" | "light" | "materials" | "views") => 2,
             _ => 1,
         };
         phrase(self.path.get(above..).unwrap_or_default())

@@ -6,8 +6,9 @@
 use super::csg::{Compound, Tree};
 use super::kinds::KIND_TABLE;
 use super::transform::{STEP_FIELDS, Step, chained, misplaced};
-use super::{Form, Kind, Shape};
+use super::{Cuboid, Form, Kind, Shape, Sphere};
 use crate::value::{Checks, Fault, Field, Takes};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// The deepest nesting of compounds in compounds.
@@ -88,6 +89,18 @@ macro_rules! compounds {
                     "a solid with an end: planes can be taken from one, or intersected with one",
                 )]
             }
+
+            fn standing(base: DVec3, size: DVec3) -> Self {
+                Self { of: standing(base, size).map(Part::new).into() }
+            }
+
+            fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+                Vec::new()
+            }
+
+            fn turn(&mut self, _: f64) -> bool {
+                false
+            }
         }
     )+};
 }
@@ -112,6 +125,22 @@ compounds! {
     { shape.box = { center = [0.0, 0.5, 0.0], size = [1.0, 1.0, 1.0] } },
     { shape.sphere = { center = [0.5, 1.0, 0.5], radius = 0.6 } },
 ]";
+}
+
+/// A block of this size on `base`, and a ball that reaches out of it at its upper right near corner.
+fn standing(base: DVec3, size: DVec3) -> [Shape; 2] {
+    let block = Cuboid::standing(base, size * 0.9);
+    let radius = 0.4 * size.min_element();
+    let corner = base + DVec3::new(0.5 * size.x, size.y, 0.5 * size.z) - radius;
+    let ball = Sphere { center: corner.to_array(), radius };
+    [Shape::Cuboid(block), Shape::Sphere(ball)]
+}
+
+impl Part {
+    /// A shape as it is, of the material of the whole.
+    pub fn new(shape: Shape) -> Self {
+        Self { shape, material: String::new(), transform: Vec::new() }
+    }
 }
 
 /// The parts of a compound kind; `None`: the shape is a simple one.

@@ -1,8 +1,9 @@
 //! Cone: from a disc to its apex.
 
-use super::tapered::{between, height, no_axis};
+use super::tapered::{between, height, is_upright, no_axis};
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// A right circular cone with its base closed.
@@ -45,5 +46,20 @@ impl Kind for Cone {
             .and(no_axis(self.base, self.apex, "apex"))
             .ratio(&sizes, &[self.base, self.apex].concat())
             .faults()
+    }
+
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        let top = base + DVec3::Y * size.y;
+        let radius = size.x.min(size.z) / 2.0;
+        Self { base: base.to_array(), apex: top.to_array(), radius }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.base, &mut self.apex]
+    }
+
+    /// Upright it looks the same from all sides.
+    fn turn(&mut self, _: f64) -> bool {
+        is_upright(self.base, self.apex)
     }
 }

@@ -1,8 +1,9 @@
 //! Cylinder: the points within `radius` of the axis between two points, with flat ends.
 
-use super::tapered::{between, height, no_axis};
+use super::tapered::{between, height, is_upright, no_axis};
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// A circular cylinder with its ends closed.
@@ -50,5 +51,20 @@ impl Kind for Cylinder {
             .and(no_axis(self.base, self.top, "top"))
             .ratio(&sizes, &[self.base, self.top].concat())
             .faults()
+    }
+
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        let top = base + DVec3::Y * size.y;
+        let radius = size.x.min(size.z) / 2.0;
+        Self { base: base.to_array(), top: top.to_array(), radius }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.base, &mut self.top]
+    }
+
+    /// Upright it looks the same from all sides.
+    fn turn(&mut self, _: f64) -> bool {
+        is_upright(self.base, self.top)
     }
 }

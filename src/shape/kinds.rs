@@ -6,7 +6,8 @@ use super::{
     Cone, Cube, Cuboid, Cylinder, Difference, Intersection, Plane, Platform, Prism, Pyramid,
 };
 use super::{Rectangle, Sphere, TaperedCylinder, Union, UnitCylinder};
-use crate::value::{Fault, Field, Takes};
+use crate::value::{Fault, Field, Takes, rounded_to};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// What every kind's description says of itself.
@@ -23,6 +24,24 @@ pub trait Kind {
 
     /// What is wrong with it.
     fn faults(&self) -> Vec<Fault>;
+
+    /// One of this kind that stands upright on `base`, the middle of its lower side, and fills about
+    /// a box with the lengths `size` along x, y and z, all greater than 0.
+    fn standing(base: DVec3, size: DVec3) -> Self;
+
+    /// The points that move it: adding a vector to all of them moves the whole shape by that vector.
+    /// Empty: only a transform moves it.
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]>;
+
+    /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen from
+    /// above. `false`: it has no key for that, and nothing was done.
+    fn turn(&mut self, degrees: f64) -> bool;
+}
+
+/// The angle `rotation + degrees` as it is written in a file: above -180, at most 180.
+pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
+    let turn = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
+    if turn > 180.0 { rounded_to(turn - 360.0, -6) } else { turn }
 }
 
 /// The keys of a kind; those of compounds by the name of their static, since a constant could not
@@ -82,6 +101,30 @@ macro_rules! kinds {
                 };
                 faults.into_iter().map(|f| f.under(self.key())).collect()
             }
+
+            /// The kind with this key as [`Kind::standing`] makes it; `None`: no kind has it.
+            pub fn standing(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
+                match key {
+                    $($key => Some(Self::$kind($kind::standing(base, size))),)+
+                    _ => None,
+                }
+            }
+
+            /// The points that move it: adding a vector to all of them moves the whole shape by that
+            /// vector. Empty: only a transform moves it.
+            pub fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+                match self {
+                    $(Self::$kind(kind) => kind.anchors(),)+
+                }
+            }
+
+            /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen
+            /// from above. `false`: its kind has no key for that, and nothing was done.
+            pub fn turn(&mut self, degrees: f64) -> bool {
+                match self {
+                    $(Self::$kind(kind) => kind.turn(degrees),)+
+                }
+            }
         }
     };
 }
@@ -102,4 +145,11 @@ kinds! {
     "union" => Union with OF_FIELDS,
     "intersection" => Intersection with OF_FIELDS,
     "difference" => Difference with OF_FIELDS,
+}
+
+impl Shape {
+    /// The first of the points that move it; the origin if there is none.
+    pub fn place(&self) -> DVec3 {
+        self.clone().anchors().first().map_or(DVec3::ZERO, |at| DVec3::from_array(**at))
+    }
 }

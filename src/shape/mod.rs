@@ -1,6 +1,7 @@
 //! Shapes: what users describe, one kind a file, and what rays meet, one batch per form.
 
 mod batch;
+mod cast;
 mod compound;
 mod cone;
 mod csg;

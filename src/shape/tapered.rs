@@ -28,6 +28,11 @@ pub(super) fn no_axis(base: [f64; 3], top: [f64; 3], name: &str) -> Option<Fault
     })
 }
 
+/// Whether the axis is vertical.
+pub(super) fn is_upright(base: [f64; 3], top: [f64; 3]) -> bool {
+    base[0] == top[0] && base[2] == top[2]
+}
+
 /// Distance of the ends of the axis: a size of the solid.
 pub(super) fn height(base: [f64; 3], top: [f64; 3]) -> f64 {
     DVec3::from_array(base).distance(DVec3::from_array(top))

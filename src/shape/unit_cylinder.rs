@@ -3,7 +3,7 @@
 
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// The canonical tapered cylinder, to be placed by a transform: its axis runs from the origin to
@@ -32,5 +32,18 @@ impl Kind for UnitCylinder {
 
     fn faults(&self) -> Vec<Fault> {
         Checks::new(Self::FIELDS).numbers("s", &[self.s]).faults()
+    }
+
+    /// A cylinder at the origin: only a transform places it.
+    fn standing(_: DVec3, _: DVec3) -> Self {
+        Self { s: 1.0 }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        Vec::new()
+    }
+
+    fn turn(&mut self, _: f64) -> bool {
+        false
     }
 }

@@ -208,7 +208,7 @@ fn material() -> impl Strategy<Value = Material> {
         })
 }
 
-fn camera() -> impl Strategy<Value = Camera> {
+pub fn camera() -> impl Strategy<Value = Camera> {
     (point(), direction(), 1.0..179.0f64, any::<(bool, bool)>())
         .prop_map(|(eye, direction, degrees, (aim, across))| {
             let [x, y, z] = eye;
@@ -254,9 +254,10 @@ pub fn scene() -> impl Strategy<Value = Scene> {
         proptest::collection::btree_map("\\PC{1,6}", material(), 0..4),
         proptest::collection::vec(object(), 0..6),
     );
-    (camera(), [1u32..2000, 1..2000], any::<bool>(), color(), lists).prop_map(
-        |(camera, size, center, background, (lights, materials, objects))| {
-            let mut scene = Scene { camera, lights, materials, objects, ..Scene::default() };
+    let views = proptest::collection::btree_map("\\PC{1,6}", camera(), 0..3);
+    (camera(), views, [1u32..2000, 1..2000], any::<bool>(), color(), lists).prop_map(
+        |(camera, views, size, center, background, (lights, materials, objects))| {
+            let mut scene = Scene { camera, views, lights, materials, objects, ..Scene::default() };
             scene.film.size = size;
             scene.film.filter = if center { Filter::Center } else { Filter::Box };
             scene.background.color = background;
@@ -308,6 +309,12 @@ pub fn edit(scene: &mut Scene, other: &Scene, (what, at): (u8, usize)) {
             }
         }
         15 => *scene = other.clone(),
+        16 => scene.views = other.views.clone(),
+        17 => {
+            if let Some((name, view)) = scene.views.pop_first() {
+                scene.views.insert(name + "'", view);
+            }
+        }
         _ => {}
     }
 }
