@@ -110,7 +110,7 @@ compounds! {
      the material of the part that cut it.",
     "shape.difference.of = [
     { shape.box = { center = [0.0, 0.5, 0.0], size = [1.0, 1.0, 1.0] } },
-    { shape.sphere = { center = [0.5, 1.0, 0.5], radius = 0.6 }, material = \"gold\" },
+    { shape.sphere = { center = [0.5, 1.0, 0.5], radius = 0.6 } },
 ]";
 }
 

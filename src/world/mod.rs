@@ -5,9 +5,11 @@ mod compile;
 mod groups;
 mod inventory;
 mod limits;
+mod outlook;
 mod path;
 
 pub use compile::{AnyWorld, Options, Precision, World};
 pub use groups::MAX_GROUPS;
 pub use inventory::Inventory;
+pub use outlook::Outlook;
 pub use path::{Counts, Radiance};
