@@ -13,5 +13,6 @@ mod mirror;
 mod rays;
 mod shadow;
 mod sphere;
+mod tapered;
 mod transforms;
 mod tree;
