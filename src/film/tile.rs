@@ -180,9 +180,18 @@ impl Tile {
     /// the same sums in any order even then.
     #[inline(always)]
     pub fn add(&mut self, replicate: usize, pixel: usize, values: &[i64]) {
+        for (group, values) in values.chunks_exact(3).enumerate() {
+            self.add_group(replicate, pixel, group, [values[0], values[1], values[2]]);
+        }
+    }
+
+    /// The same for one group.
+    #[inline(always)]
+    pub fn add_group(&mut self, replicate: usize, pixel: usize, group: usize, values: [i64; 3]) {
+        let sums = &mut self.pixel_mut(replicate, pixel)[3 * group..][..3];
         let mut overflowed = false;
-        for (sum, value) in self.pixel_mut(replicate, pixel).iter_mut().zip(values) {
-            overflowed |= add_saturating(sum, *value);
+        for (sum, value) in sums.iter_mut().zip(values) {
+            overflowed |= add_saturating(sum, value);
         }
         self.saturated |= overflowed;
     }

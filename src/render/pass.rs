@@ -3,9 +3,8 @@
 use super::wave::{Job, JobReport, Wave, WaveReport};
 use crate::film::{BadSample, Estimator, Film, Slot, TILE, Tile, lattice_pixels};
 use crate::lanes::{Lanes, MAX_WIDTH, Mask, Real, V3};
-use crate::sampling::{Draws, SampleSettings, Sampler};
-use crate::shape::Seen;
-use crate::world::{AnyWorld, Counts, MAX_GROUPS, Radiance, World};
+use crate::sampling::{Draws, Points, SampleSettings, Sampler};
+use crate::world::{AnyWorld, Counts, MAX_GROUPS, Outlook, Radiance, World};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -142,31 +141,31 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     /// Samples of all pixels of a tile: packets of one pixel where enough aligned samples are asked
     /// for, of several pixels at one index elsewhere.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
-        let mut work = Work::new(replicate, self.world.seen_through(origin, tile.extent()));
+        let mut work = Work::new(replicate, self.world.outlook(origin, tile.extent()));
         let width = L::WIDTH as u32;
         let end = job.first + job.count;
-        let aligned = end - end % width;
         let pixels = blocks(tile.extent());
         let place = |(x, y): (usize, usize)| ((origin[0] + x) as u32, (origin[1] + y) as u32);
         let mut index = job.first;
         while index < end {
-            if index.is_multiple_of(width) && index < aligned {
+            if index.is_multiple_of(width) && end - index >= width {
+                let points = self.sampler.aligned(index);
                 for (x, y) in &pixels {
-                    for first in (index..aligned).step_by(L::WIDTH) {
-                        let sums = self.pixel(&mut work, place((*x, *y)), first);
-                        tile.add(replicate, y * TILE + x, &sums[..3 * self.world.groups()]);
-                    }
+                    self.pixel(&mut work, &points, place((*x, *y)), index);
+                    self.sum(&work.radiance, |group, sums| {
+                        tile.add_group(replicate, y * TILE + x, group, sums);
+                    });
                 }
-                index = aligned;
+                index += width;
             } else {
+                let points = self.sampler.at(index);
                 for packet in pixels.chunks(L::WIDTH) {
                     let at = |lane: usize| place(packet[lane.min(packet.len() - 1)]);
-                    self.pixels(&mut work, packet.len(), at, index);
-                    let mut put = |lane: usize, values: &[i64]| {
+                    self.pixels(&mut work, &points, packet.len(), at, index);
+                    self.scatter(&work.radiance, packet.len(), |lane, group, values| {
                         let (x, y) = packet[lane];
-                        tile.add(replicate, y * TILE + x, values);
-                    };
-                    self.scatter(&mut work, packet.len(), at, index, &mut put);
+                        tile.add_group(replicate, y * TILE + x, group, values);
+                    });
                 }
                 index += 1;
             }
@@ -176,25 +175,15 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         work.counts
     }
 
-    /// WIDTH samples of one pixel: their sums, by group and channel.
+    /// The samples `first ..` of one pixel, into `work.radiance`.
     #[inline(always)]
-    fn pixel(&self, work: &mut Work<L>, at: (u32, u32), first: u32) -> [i64; 3 * MAX_GROUPS] {
-        let draws = self.sampler.of_pixel(at.0, at.1, work.replicate, first);
+    fn pixel(&self, work: &mut Work<L>, points: &Points<'_, L>, at: (u32, u32), first: u32) {
+        let draws = points.of_pixel(at, work.replicate);
         let rays = self.world.view().rays_of(at, self.jitter(&draws));
         work.trace(self.world, rays, &draws, L::mask(true));
-        let bad = self.bad(&mut work.radiance);
-        let mut sums = [0i64; 3 * MAX_GROUPS];
-        let groups = self.world.groups();
-        for (g, sums) in sums.chunks_exact_mut(3).enumerate().take(groups) {
-            let (value, scale) = (work.radiance.groups[g], self.world.scales()[g]);
-            sums[0] = value.x.fixed_sum(scale);
-            sums[1] = value.y.fixed_sum(scale);
-            sums[2] = value.z.fixed_sum(scale);
-        }
-        for lane in lanes_of(bad) {
+        for lane in lanes_of(self.blacken_bad(&mut work.radiance)) {
             work.record_bad(at, first + lane as u32);
         }
-        sums
     }
 
     /// Sample `index` of the first `count` pixels that `at` names, into `work.radiance`.
@@ -202,14 +191,18 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     fn pixels(
         &self,
         work: &mut Work<L>,
+        points: &Points<'_, L>,
         count: usize,
         at: impl Fn(usize) -> (u32, u32),
         index: u32,
     ) {
-        let draws = self.sampler.of_pixels(&at, work.replicate, index);
+        let draws = points.of_pixels(&at, work.replicate);
         let rays = self.world.view().rays(&at, self.jitter(&draws));
         let lanes = L::from_fn(|lane| L::Scalar::of(if lane < count { 1.0 } else { 0.0 }));
         work.trace(self.world, rays, &draws, lanes.gt(L::zero()));
+        for lane in lanes_of(self.blacken_bad(&mut work.radiance)) {
+            work.record_bad(at(lane), index);
+        }
     }
 
     /// Where in their pixels the samples lie.
@@ -218,38 +211,37 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         if self.world.jitter() { draws.pixel() } else { (L::of(0.5), L::of(0.5)) }
     }
 
-    /// Gives the samples of the first `count` lanes to `put`, lane by lane.
+    /// Gives the sums over the lanes to `put`, by group.
+    #[inline(always)]
+    fn sum(&self, radiance: &Radiance<L>, mut put: impl FnMut(usize, [i64; 3])) {
+        for (group, scale) in self.world.scales().iter().enumerate() {
+            let value = radiance.groups[group];
+            put(group, [value.x, value.y, value.z].map(|channel| channel.fixed_sum(*scale)));
+        }
+    }
+
+    /// Gives the samples of the first `count` lanes to `put`, by lane and group.
     #[inline(always)]
     fn scatter(
         &self,
-        work: &mut Work<L>,
+        radiance: &Radiance<L>,
         count: usize,
-        at: impl Fn(usize) -> (u32, u32),
-        index: u32,
-        put: &mut impl FnMut(usize, &[i64]),
+        mut put: impl FnMut(usize, usize, [i64; 3]),
     ) {
-        let bad = self.bad(&mut work.radiance);
-        let groups = self.world.groups();
-        let mut columns = [[0i64; MAX_WIDTH]; 3 * MAX_GROUPS];
-        for (g, columns) in columns.chunks_exact_mut(3).enumerate().take(groups) {
-            let (value, scale) = (work.radiance.groups[g], self.world.scales()[g]);
-            value.x.fixed(scale, &mut columns[0]);
-            value.y.fixed(scale, &mut columns[1]);
-            value.z.fixed(scale, &mut columns[2]);
-        }
-        (0..count).for_each(|lane| {
-            let values = columns.map(|column| column[lane]);
-            put(lane, &values[..3 * groups]);
-        });
-        for lane in lanes_of(bad).take_while(|lane| *lane < count) {
-            work.record_bad(at(lane), index);
+        for (group, scale) in self.world.scales().iter().enumerate() {
+            let value = radiance.groups[group];
+            let mut channels = [[0; MAX_WIDTH]; 3];
+            value.x.fixed(*scale, &mut channels[0]);
+            value.y.fixed(*scale, &mut channels[1]);
+            value.z.fixed(*scale, &mut channels[2]);
+            (0..count).for_each(|lane| put(lane, group, channels.map(|channel| channel[lane])));
         }
     }
 
     /// Blackens samples that are NaN, infinite, negative or beyond what the film holds; returns them
     /// as bits by lane.
     #[inline(always)]
-    fn bad(&self, radiance: &mut Radiance<L>) -> u32 {
+    fn blacken_bad(&self, radiance: &mut Radiance<L>) -> u32 {
         let mut good = L::mask(true);
         for (g, limit) in self.limits.iter().enumerate().take(self.world.groups()) {
             let v = radiance.groups[g];
@@ -281,24 +273,26 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             pixels.extend(lattice_pixels(before, step).filter(inside).map(|p| (t, origin, p)));
             tiles.push(tile);
         }
+        let points = self.sampler.at(0);
         for packet in pixels.chunks(L::WIDTH) {
             let at = |lane: usize| {
                 let (_, origin, p) = packet[lane.min(packet.len() - 1)];
                 ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
             };
             let mut work = Work::new(0, None);
-            self.pixels(&mut work, packet.len(), at, 0);
+            self.pixels(&mut work, &points, packet.len(), at, 0);
             // A packet's rays are shared out among its pixels' tiles, the remainder to the first.
             let Counts { rays, glossy } = work.counts;
             let share = rays / packet.len() as u64;
             counts[packet[0].0].rays += rays - share * packet.len() as u64;
-            let mut put = |lane: usize, values: &[i64]| {
+            for (t, _, _) in packet {
+                counts[*t].rays += share;
+                counts[*t].glossy |= glossy;
+            }
+            self.scatter(&work.radiance, packet.len(), |lane, group, values| {
                 let (t, _, p) = packet[lane];
-                tiles[t].add(0, p, values);
-                counts[t].rays += share;
-                counts[t].glossy |= glossy;
-            };
-            self.scatter(&mut work, packet.len(), at, 0, &mut put);
+                tiles[t].add_group(0, p, group, values);
+            });
             for bad in work.bad {
                 let tile_of = |lane: &usize| at(*lane) == (bad.x, bad.y);
                 if let Some(lane) = (0..packet.len()).find(tile_of) {
@@ -315,16 +309,16 @@ impl<'a, L: Lanes> Tracer<'a, L> {
 /// What the packets of one job share and fill.
 struct Work<L: Lanes> {
     replicate: usize,
-    seen: Option<Seen>,
+    outlook: Option<Outlook>,
     radiance: Radiance<L>,
     counts: Counts,
     bad: Vec<BadSample>,
 }
 
 impl<L: Lanes> Work<L> {
-    fn new(replicate: usize, seen: Option<Seen>) -> Self {
+    fn new(replicate: usize, outlook: Option<Outlook>) -> Self {
         let radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
-        Self { replicate, seen, radiance, counts: Counts::default(), bad: Vec::new() }
+        Self { replicate, outlook, radiance, counts: Counts::default(), bad: Vec::new() }
     }
 
     #[inline(always)]
@@ -335,7 +329,7 @@ impl<L: Lanes> Work<L> {
         draws: &Draws<'_, L>,
         active: L::Mask,
     ) {
-        let cost = world.trace(rays, self.seen.as_ref(), draws, active, &mut self.radiance);
+        let cost = world.trace(rays, self.outlook.as_ref(), draws, active, &mut self.radiance);
         self.counts.rays += cost.rays;
         self.counts.glossy |= cost.glossy;
     }

@@ -1,6 +1,7 @@
 //! Shapes: what users describe, one kind a file, and what rays meet, one batch per form.
 
 mod batch;
+mod bound;
 mod cast;
 mod compound;
 mod cone;
@@ -25,6 +26,7 @@ mod unit_cylinder;
 mod upright;
 
 pub use batch::{Hit, Ray, Source, Surface};
+pub use bound::{Ball, Bound, Pencil, Towards};
 pub use compound::{Difference, Intersection, MAX_DEPTH, Part, Union};
 pub use cone::Cone;
 pub use csg::{Compound, Tree as CompoundTree};
@@ -32,7 +34,7 @@ pub use cube::Cube;
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use form::{Form, HalfSpace};
-pub use geometry::{Geometry, Seen, TREE_FROM};
+pub use geometry::{Geometry, Selection, TREE_FROM};
 pub use kinds::{EXAMPLES, KINDS, Kind, Shape};
 pub use plane::Plane;
 pub use platform::Platform;

@@ -4,12 +4,13 @@ use super::groups::{Groups, Member};
 use super::guide::Sight;
 use super::inventory::Inventory;
 use super::limits;
+use super::outlook::{Outlook, Surroundings};
 use crate::camera::View;
 use crate::lanes::{Double, Lanes, Real, Single};
 use crate::light::Lamp;
 use crate::material::{Finish, Material, Spread};
 use crate::scene::{Filter, Horizon, Level, Scene};
-use crate::shape::{Form, Geometry, Seen};
+use crate::shape::{Form, Geometry, Pencil};
 use glam::{DAffine3, DVec3};
 
 /// The precision that a scene is traced in.
@@ -58,6 +59,8 @@ pub struct World<L: Lanes> {
     pub(super) min_weight: f64,
     pub(super) fold: bool,
     pub(super) view: View,
+    pub(super) panorama: Outlook,
+    surroundings: Surroundings,
     groups: Groups,
     names: Vec<String>,
     scales: Vec<f64>,
@@ -189,7 +192,15 @@ impl<L: Lanes> World<L> {
             sources.len(),
             precision,
         );
+        let view = View::new(&scene.camera, scene.film.size, placed.origin);
+        // Rays that begin on the near plane may begin inside a thing.
+        let eye = (scene.camera.near == 0.0).then(|| view.eye());
+        let forms = geometry.sources().iter().map(|s| &placed.forms[s.form]).collect();
+        let lamps: Vec<_> = sources.iter().map(|s| s.lamp).collect();
+        let surroundings = Surroundings::new(forms, eye, &lamps);
         Self {
+            panorama: surroundings.outlook(&geometry, None),
+            surroundings,
             ambient: groups.find(&Member::Ambient),
             background: (scene.background.color.0 != [0.0; 3])
                 .then(|| groups.find(&Member::Background))
@@ -198,7 +209,7 @@ impl<L: Lanes> World<L> {
             depth: if reflecting { scene.trace.depth } else { 0 },
             min_weight: scene.trace.min_weight,
             fold: scene.trace.horizon == Horizon::Fold,
-            view: View::new(&scene.camera, scene.film.size, placed.origin),
+            view,
             names: groups.names(scene),
             jitter: scene.film.filter == Filter::Box,
             glossy: finishes.iter().any(glossy),
@@ -238,11 +249,15 @@ impl<L: Lanes> World<L> {
         &self.view
     }
 
-    /// The only items that camera rays through a rectangle of the raster can meet first; `None`:
-    /// not known.
-    pub fn seen_through(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Seen> {
-        let (axis, spread) = self.view.cone(origin, extent);
-        self.geometry.seen_from(self.view.eye(), axis, spread)
+    /// What camera rays through a rectangle of the raster may meet; `None`: a tree knows better.
+    pub fn outlook(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Outlook> {
+        if self.geometry.has_tree() {
+            return None;
+        }
+        let [_, _, forward] = self.view.frame();
+        let corners = self.view.corners(origin, extent);
+        let pencil = Pencil { apex: self.view.eye(), forward, corners };
+        Some(self.surroundings.outlook(&self.geometry, Some(&pencil)))
     }
 
     /// What it contains.

@@ -503,7 +503,7 @@ fn faces_on_each_other_show_the_first_part() {
         let from = at + DVec3::new(numbers.between(-1.0, 1.0), 1.0, numbers.between(-1.0, 1.0));
         let line = (from, (at - from).normalize());
         let (ray, _) = crate::rays::packets::<Single>(&[line]).next().unwrap();
-        let hit = geometry.closest(&ray);
+        let hit = geometry.closest(&ray, geometry.all());
         let item = geometry.sources()[hit.item.tag_lane(0) as usize];
         assert_eq!((item.form, item.part), (0, 0), "{line:?}");
     }

@@ -10,12 +10,13 @@
 //! leave no crack, whichever of two equal faces rounding puts in front. What is thinner than that is
 //! nothing.
 
-use super::ellipsoid::Ellipsoids;
-use super::flat::Planes;
+use super::convex::Convex;
+use super::ellipsoid::Ellipsoid;
+use super::flat::Plane;
 use super::span::{Span, Spans};
-use super::sphere::Spheres;
-use super::tapered::Tapereds;
-use super::{Batch, Hit, Ray, Surface, convex::Convexes, reach};
+use super::sphere::Sphere;
+use super::tapered::Tapered;
+use super::{Hit, Item, Ray, Surface, reach};
 use crate::lanes::{Lanes, Mask, Real, V3};
 use crate::shape::csg::{Compound, Tree};
 use crate::shape::form::Form;
@@ -41,11 +42,43 @@ enum Op {
     Minus,
 }
 
+/// What a part is.
+enum Solid<S> {
+    Sphere(Sphere<S>),
+    Ellipsoid(Ellipsoid<S>),
+    Convex(Convex<S>),
+    Tapered(Tapered<S>),
+    /// The half-space behind it.
+    Plane(Plane<S>),
+}
+
+/// The same expression for a solid of any form.
+macro_rules! each {
+    ($solid:expr, $item:ident => $value:expr) => {
+        match $solid {
+            Solid::Sphere($item) => $value,
+            Solid::Ellipsoid($item) => $value,
+            Solid::Convex($item) => $value,
+            Solid::Tapered($item) => $value,
+            Solid::Plane($item) => $value,
+        }
+    };
+}
+
+impl<S: Real> Solid<S> {
+    /// `None`: the form is no convex solid.
+    fn new(form: &Form) -> Option<Self> {
+        (Sphere::new(form).map(Self::Sphere))
+            .or_else(|| Ellipsoid::new(form).map(Self::Ellipsoid))
+            .or_else(|| Convex::new(form).map(Self::Convex))
+            .or_else(|| Tapered::new(form).map(Self::Tapered))
+            .or_else(|| Plane::new(form).map(Self::Plane))
+    }
+}
+
 /// A part: its solid, and whether the whole's outside is on the solid's inside.
-#[derive(Clone, Copy)]
-struct Part {
-    batch: u32,
-    item: u32,
+struct Part<S> {
+    solid: Solid<S>,
     reversed: bool,
 }
 
@@ -62,10 +95,9 @@ struct One<S> {
 
 /// All compounds of a scene. Every part is an item of its own, so that a hit tells the part; the
 /// first one of a compound stands for it where rays ask for items.
-pub struct Compounds<L: Lanes> {
-    solids: Vec<Box<dyn Spans<L>>>,
-    compounds: Vec<One<L::Scalar>>,
-    parts: Vec<Part>,
+pub struct Compounds<S> {
+    compounds: Vec<One<S>>,
+    parts: Vec<Part<S>>,
     ops: Vec<Op>,
     /// For each part the compound that begins with it.
     first: Vec<Option<u32>>,
@@ -135,64 +167,37 @@ fn with_room<T: Copy, R>(n: usize, fill: T, use_it: impl FnOnce(&mut [T]) -> R) 
     if n <= FEW { use_it(&mut [fill; FEW][..n]) } else { use_it(&mut vec![fill; n]) }
 }
 
-impl<L: Lanes> Compounds<L> {
-    /// From forms that are all compounds.
+impl<S: Real> Compounds<S> {
+    /// Those of `forms` that are compounds, in order.
     pub fn new(forms: &[Form]) -> Self {
-        let compounds: Vec<&Compound> = forms
-            .iter()
-            .filter_map(|form| match form {
-                Form::Compound(compound) => Some(compound),
-                _ => None,
-            })
-            .collect();
-        let mut out = Self {
-            solids: Vec::new(),
-            compounds: Vec::new(),
-            parts: Vec::new(),
-            ops: Vec::new(),
-            first: Vec::new(),
-        };
-        let mut sorted: [Vec<Form>; 5] = Default::default();
-        for (n, compound) in compounds.iter().enumerate() {
-            let (first_part, first_op) = (out.parts.len(), out.ops.len());
-            for (i, part) in compound.parts.iter().enumerate() {
-                let batch = match part {
-                    Form::Sphere { .. } => 0,
-                    Form::Ellipsoid { .. } => 1,
-                    Form::Convex { .. } => 2,
-                    Form::Tapered { .. } => 3,
-                    Form::Plane { .. } => 4,
-                    Form::Parallelogram { .. } | Form::Compound(_) => {
-                        unreachable!("a part is a solid; a compound in a compound is flattened")
-                    }
-                };
-                let item = sorted[batch].len() as u32;
-                sorted[batch].push(part.clone());
-                out.parts.push(Part { batch: batch as u32, item, reversed: false });
-                out.first.push((i == 0).then_some(n as u32));
+        let mut out =
+            Self { compounds: Vec::new(), parts: Vec::new(), ops: Vec::new(), first: Vec::new() };
+        for form in forms {
+            if let Form::Compound(compound) = form {
+                out.add(compound);
             }
-            let depth = out.plan(&compound.tree, first_part, false);
-            let (low, high) = compound.bounds().unwrap_or_default();
-            let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * L::EPSILON);
-            let of = L::Scalar::of;
-            out.compounds.push(One {
-                center: (0.5 * (low + high)).to_array().map(of),
-                radius2: of(radius * radius),
-                reach: of(compound.parts.iter().map(reach).fold(0.0, f64::max)),
-                parts: first_part..out.parts.len(),
-                ops: first_op..out.ops.len(),
-                depth,
-            });
         }
-        let [spheres, ellipsoids, convex, tapered, planes] = &sorted;
-        out.solids = vec![
-            Box::new(Spheres::new(spheres)),
-            Box::new(Ellipsoids::new(ellipsoids)),
-            Box::new(Convexes::new(convex)),
-            Box::new(Tapereds::new(tapered)),
-            Box::new(Planes::new(planes)),
-        ];
         out
+    }
+
+    fn add(&mut self, compound: &Compound) {
+        let (first_part, first_op) = (self.parts.len(), self.ops.len());
+        for (i, part) in compound.parts.iter().enumerate() {
+            let solid = Solid::new(part).expect("parts are convex solids");
+            self.parts.push(Part { solid, reversed: false });
+            self.first.push((i == 0).then_some(self.compounds.len() as u32));
+        }
+        let depth = self.plan(&compound.tree, first_part, false);
+        let (low, high) = compound.bounds().unwrap_or_default();
+        let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * S::EPSILON);
+        self.compounds.push(One {
+            center: (0.5 * (low + high)).to_array().map(S::of),
+            radius2: S::of(radius * radius),
+            reach: S::of(compound.parts.iter().map(reach).fold(0.0, f64::max)),
+            parts: first_part..self.parts.len(),
+            ops: first_op..self.ops.len(),
+            depth,
+        });
     }
 
     /// Appends the operations of `tree` and returns how high the stack grows; `reversed`: its inside
@@ -222,7 +227,7 @@ impl<L: Lanes> Compounds<L> {
 
     /// Where the point at distance `t` of each line is inside the whole.
     #[inline(always)]
-    fn inside(&self, one: &One<L::Scalar>, spans: &[Inside<L>], t: L) -> L::Mask {
+    fn inside<L: Lanes<Scalar = S>>(&self, one: &One<S>, spans: &[Inside<L>], t: L) -> L::Mask {
         with_room(one.depth, L::mask(false), |stack| {
             let mut top = 0;
             for op in &self.ops[one.ops.clone()] {
@@ -244,9 +249,9 @@ impl<L: Lanes> Compounds<L> {
     }
 
     /// What is to be seen of the surface between the distances `before` and `after`.
-    fn change(
+    fn change<L: Lanes<Scalar = S>>(
         &self,
-        one: &One<L::Scalar>,
+        one: &One<S>,
         spans: &[Inside<L>],
         base: u32,
         before: L,
@@ -279,9 +284,9 @@ impl<L: Lanes> Compounds<L> {
     }
 
     /// Narrows `hit` by the lanes of `wanted`.
-    fn meet(
+    fn meet<L: Lanes<Scalar = S>>(
         &self,
-        one: &One<L::Scalar>,
+        one: &One<S>,
         base: u32,
         ray: &Ray<L>,
         wanted: L::Mask,
@@ -306,8 +311,8 @@ impl<L: Lanes> Compounds<L> {
                 let tie = ray.origin.max_abs().max(L::splat(one.reach)) * L::of(TIE * L::EPSILON);
                 let mut count = 0;
                 for (span, part) in spans.iter_mut().zip(parts) {
-                    let solid = &self.solids[part.batch as usize];
-                    let Some(found) = solid.span(part.item as usize, ray) else { continue };
+                    let found = each!(&part.solid, solid => solid.span(ray));
+                    let Some(found) = found else { continue };
                     *span = Inside {
                         enter: L::select(found.meets, found.enter, never),
                         leave: L::select(found.meets, found.leave, always),
@@ -327,9 +332,9 @@ impl<L: Lanes> Compounds<L> {
     /// Faces that lie on each other are met at the same angle, so both ends must be as near as their
     /// ties: a face that is met flatly does not swallow others that are not.
     #[inline(always)]
-    fn sweep(
+    fn sweep<L: Lanes<Scalar = S>>(
         &self,
-        one: &One<L::Scalar>,
+        one: &One<S>,
         (spans, ends): (&[Inside<L>], &[End<L>]),
         base: u32,
         mut open: L::Mask,
@@ -394,14 +399,31 @@ fn insert<L: Lanes>(mut end: End<L>, ends: &mut [End<L>], count: usize) {
     ends[count] = end;
 }
 
-impl<L: Lanes> Batch<L> for Compounds<L> {
-    fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
+impl<S: Real> Compounds<S> {
+    /// Narrows `hit` by the compounds that begin in `range`; a part's tag is `base` + its number.
+    #[inline(never)]
+    pub fn closest<L: Lanes<Scalar = S>>(
+        &self,
+        range: Range<usize>,
+        base: u32,
+        ray: &Ray<L>,
+        hit: &mut Hit<L>,
+    ) {
         for compound in self.first[range].iter().flatten() {
             self.meet(&self.compounds[*compound as usize], base, ray, L::mask(true), hit);
         }
     }
 
-    fn blocked(&self, range: Range<usize>, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+    /// Where a surface of the compounds that begin in `range` lies at a distance in (0, limit) of the
+    /// ray, of the lanes in `wanted`.
+    #[inline(never)]
+    pub fn blocked<L: Lanes<Scalar = S>>(
+        &self,
+        range: Range<usize>,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+    ) -> L::Mask {
         let mut blocked = L::mask(false);
         for compound in self.first[range].iter().flatten() {
             let open = wanted.and_not(blocked);
@@ -415,9 +437,11 @@ impl<L: Lanes> Batch<L> for Compounds<L> {
         blocked
     }
 
-    fn surface(&self, item: usize, point: V3<L>) -> Surface<L> {
-        let part = &self.parts[item];
-        let surface = self.solids[part.batch as usize].surface(part.item as usize, point);
+    /// The surface of a part at `point`, outward of the whole.
+    #[inline(never)]
+    pub fn surface<L: Lanes<Scalar = S>>(&self, part: usize, point: V3<L>) -> Surface<L> {
+        let part = &self.parts[part];
+        let surface: Surface<L> = each!(&part.solid, solid => solid.surface(point));
         let normal = if part.reversed { -surface.normal } else { surface.normal };
         Surface { normal, ..surface }
     }

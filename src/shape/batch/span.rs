@@ -1,6 +1,6 @@
 //! Where lines are inside convex solids: what compounds are computed from.
 
-use super::{Batch, Ray};
+use super::{Item, Ray};
 use crate::lanes::Lanes;
 
 /// The part of a packet's lines inside a convex solid.
@@ -18,8 +18,8 @@ pub struct Span<L: Lanes> {
     pub meets: L::Mask,
 }
 
-/// Convex solids of one form.
-pub trait Spans<L: Lanes>: Batch<L> {
-    /// The span of a solid; `None`: no line of the packet meets it.
-    fn span(&self, item: usize, ray: &Ray<L>) -> Option<Span<L>>;
+/// A convex solid.
+pub trait Spans<L: Lanes>: Item<L> {
+    /// Where lines are inside it; `None`: no line of the packet meets it.
+    fn span(&self, ray: &Ray<L>) -> Option<Span<L>>;
 }

@@ -4,16 +4,14 @@
 
 use super::ellipsoid::{rows, times};
 use super::span::{Span, Spans};
-use super::sphere::wanted_done;
-use super::{Batch, Hit, Ray, Surface, reach};
+use super::{Item, Ray, Surface, reach};
 use crate::lanes::{Lanes, Mask, Real, V3};
 use crate::shape::form::Form;
 use glam::DVec3;
-use std::ops::Range;
 
 /// One solid. Matrices by rows.
 #[derive(Clone, Copy)]
-struct Tapered<S> {
+pub struct Tapered<S> {
     /// Image of the middle of the axis.
     center: [S; 3],
     unit_from_scene: [[S; 3]; 3],
@@ -28,40 +26,26 @@ struct Tapered<S> {
     reach: S,
 }
 
-/// All tapered cylinders of a scene.
-pub struct Tapereds<L: Lanes> {
-    items: Vec<Tapered<L::Scalar>>,
-}
-
 /// Squared radius of the ball about the middle of the axis that holds the canonical solid, and a
 /// little more: what is cut off by rounding must not be cut off for good.
 const AROUND2: f64 = 1.26;
 
-impl<L: Lanes> Tapereds<L> {
-    /// From forms that are all tapered cylinders.
-    pub fn new(forms: &[Form]) -> Self {
-        let of = L::Scalar::of;
-        let items = forms
-            .iter()
-            .filter_map(|form| match form {
-                Form::Tapered { scene_from_unit: m, top } => {
-                    let inverse = m.matrix3.inverse();
-                    let up = inverse.transpose() * DVec3::Z;
-                    let center = m.transform_point3(DVec3::new(0.0, 0.0, 0.5));
-                    Some(Tapered {
-                        center: center.to_array().map(of),
-                        unit_from_scene: rows(inverse),
-                        slope: of(top - 1.0),
-                        middle: of(0.5 * (1.0 + top)),
-                        cap_normal: up.normalize().to_array().map(of),
-                        height: of(up.length().recip()),
-                        reach: of(reach(form)),
-                    })
-                }
-                _ => None,
-            })
-            .collect();
-        Self { items }
+impl<S: Real> Tapered<S> {
+    /// `None`: the form is another.
+    pub fn new(form: &Form) -> Option<Self> {
+        let Form::Tapered { scene_from_unit: m, top } = form else { return None };
+        let inverse = m.matrix3.inverse();
+        let up = inverse.transpose() * DVec3::Z;
+        let center = m.transform_point3(DVec3::new(0.0, 0.0, 0.5));
+        Some(Self {
+            center: center.to_array().map(S::of),
+            unit_from_scene: rows(inverse),
+            slope: S::of(top - 1.0),
+            middle: S::of(0.5 * (1.0 + top)),
+            cap_normal: up.normalize().to_array().map(S::of),
+            height: S::of(up.length().recip()),
+            reach: S::of(reach(form)),
+        })
     }
 }
 
@@ -171,35 +155,18 @@ fn side_normal<L: Lanes>(s: &Tapered<L::Scalar>, x: L, y: L) -> (V3<L>, L) {
     (V3::splat(m[0]) * nx + V3::splat(m[1]) * ny + V3::splat(m[2]) * nz, rho)
 }
 
-impl<L: Lanes> Batch<L> for Tapereds<L> {
-    fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
-        for (item, s) in range.clone().zip(&self.items[range]) {
-            if let Some(chord) = chord(s, ray) {
-                let (enter, leave) = chord.distances();
-                let t = L::select(enter.gt(L::zero()), enter, leave);
-                hit.narrow(chord.meets, t, base + item as u32);
-            }
-        }
-    }
-
-    fn blocked(&self, range: Range<usize>, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
-        let mut blocked = L::mask(false);
-        for s in &self.items[range] {
-            if let Some(chord) = chord(s, ray) {
-                let (enter, leave) = chord.distances();
-                let t = L::select(enter.gt(L::zero()), enter, leave);
-                blocked = blocked | (chord.meets & t.gt(L::zero()) & t.lt(limit));
-                if wanted_done::<L>(wanted, blocked) {
-                    break;
-                }
-            }
-        }
-        blocked
+impl<L: Lanes> Item<L> for Tapered<L::Scalar> {
+    #[inline(always)]
+    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+        let chord = chord(self, ray)?;
+        let (enter, leave) = chord.distances();
+        Some((L::select(enter.gt(L::zero()), enter, leave), chord.meets))
     }
 
     /// Side, base or cap: the one that is nearest, outside by most or inside by least.
-    fn surface(&self, item: usize, point: V3<L>) -> Surface<L> {
-        let s = &self.items[item];
+    #[inline(always)]
+    fn surface(&self, point: V3<L>) -> Surface<L> {
+        let s = self;
         let p = times(&s.unit_from_scene, point - V3::splat(s.center));
         let (side, rho) = side_normal(s, p.x, p.y);
         let steepness = L::one() / side.length2().sqrt();
@@ -215,9 +182,9 @@ impl<L: Lanes> Batch<L> for Tapereds<L> {
     }
 }
 
-impl<L: Lanes> Spans<L> for Tapereds<L> {
-    fn span(&self, item: usize, ray: &Ray<L>) -> Option<Span<L>> {
-        let s = &self.items[item];
+impl<L: Lanes> Spans<L> for Tapered<L::Scalar> {
+    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+        let s = self;
         let chord = chord(s, ray)?;
         let (enter, leave) = chord.distances();
         let cap = V3::splat(s.cap_normal).dot(ray.direction).abs();
