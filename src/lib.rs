@@ -4,6 +4,7 @@
 
 pub mod camera;
 pub mod command;
+pub mod dashboard;
 pub mod film;
 pub mod lanes;
 pub mod light;

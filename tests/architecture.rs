@@ -11,6 +11,23 @@ const ROOMS: &[(&str, &[&str])] = &[
     (
         "command",
         &[
+            "dashboard",
+            "render",
+            "world",
+            "scene",
+            "shape",
+            "material",
+            "light",
+            "camera",
+            "value",
+            "film",
+            "sampling",
+            "lanes",
+        ],
+    ),
+    (
+        "dashboard",
+        &[
             "render", "world", "scene", "shape", "material", "light", "camera", "value", "film",
             "sampling", "lanes",
         ],
@@ -37,11 +54,14 @@ const ROOMS: &[(&str, &[&str])] = &[
 /// Crates that only some rooms know.
 const CRATES: &[(&str, &[&str])] = &[
     ("clap", &["command"]),
-    ("crossbeam_channel", &["render"]),
+    ("crossbeam_channel", &["render", "dashboard"]),
+    ("crossterm", &["dashboard", "command"]),
     ("exr", &["film"]),
     ("indicatif", &["command"]),
+    ("nucleo_matcher", &["dashboard"]),
     ("obvhs", &["shape", "world"]),
     ("png", &["film"]),
+    ("ratatui", &["dashboard", "command"]),
     ("rayon", &["render"]),
     ("rustix", &["render"]),
     ("serde", &["command", "scene", "shape", "material", "light", "camera", "value"]),
@@ -51,6 +71,7 @@ const CRATES: &[(&str, &[&str])] = &[
     // Descriptions read their own examples in tests.
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),
     ("toml_edit", &["scene"]),
+    ("tui_input", &["dashboard"]),
     ("wide", &["lanes"]),
 ];
 

@@ -1,5 +1,6 @@
 //! From a scene to a growing film: what to trace next, and the threads that do it.
 
+mod first;
 mod guide;
 mod lighting;
 pub mod pass;

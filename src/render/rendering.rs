@@ -2,10 +2,10 @@
 
 use crate::film::{Display, Estimator, Film, Header, Mix, TILE};
 use crate::render::lighting::Lighting;
-use crate::render::pass;
 use crate::render::schedule::{Schedule, Settings};
 use crate::render::session::Traced;
 use crate::render::wave::{Wave, WaveReport};
+use crate::render::{first, pass};
 use crate::sampling::SampleSettings;
 use crate::scene::Scene;
 use crate::world::{self, AnyWorld, Sight};
@@ -129,7 +129,7 @@ impl Traced for Rendering {
         abandon: &AtomicBool,
         shown: &mut dyn FnMut(&Film),
     ) -> Option<WaveReport> {
-        pass::run_first(&self.world, &mut self.film, wave, &self.sampling, pool, abandon, shown)
+        first::run(&self.world, &mut self.film, wave, &self.sampling, pool, abandon, shown)
     }
 
     fn run(&mut self, wave: &Wave, pool: &rayon::ThreadPool, interrupt: &AtomicBool) -> WaveReport {

@@ -109,9 +109,9 @@ impl History {
         self.future.last().map(|entry| entry.label.as_str())
     }
 
-    /// The scene of now has been written to the file.
-    pub fn mark_saved(&mut self) {
-        self.saved = Arc::clone(&self.now);
+    /// `scene`, the one of now or an earlier one, has been written to the file.
+    pub fn mark_saved(&mut self, scene: Arc<Scene>) {
+        self.saved = scene;
         self.open = false;
     }
 
@@ -208,7 +208,7 @@ mod tests {
     fn saved_is_what_the_scene_says_not_how_it_came() {
         let mut history = History::new(scene(0));
         history.record(scene(1), "one", true);
-        history.mark_saved();
+        history.mark_saved(Arc::clone(history.scene()));
         history.record(scene(2), "one", true);
         assert!(!history.is_saved());
         history.record(scene(1), "back", false);

@@ -50,7 +50,8 @@ impl Form {
                 let length = direction.length();
                 let vector = |v: DVec3| V3::<f64>::of(v.to_array());
                 let ray = Ray { origin: vector(origin), direction: vector(direction / length) };
-                let t = Geometry::with_tree(std::slice::from_ref(self), false).closest(&ray).t;
+                let alone = Geometry::with_tree(std::slice::from_ref(self), false);
+                let t = alone.closest(&ray, alone.all()).t;
                 (t < f64::MAX).then_some(t / length)
             }
             Self::Plane { normal, offset } => {

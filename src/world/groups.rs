@@ -109,8 +109,17 @@ impl Groups {
     /// background that have groups, in names, in materials that nothing is made of, and in the cap on
     /// rays per pixel, which only says how many samples there are to be.
     pub fn serve(&self, compiled: &Scene, scene: &Scene) -> bool {
-        let Scene { film, trace, camera, background, ambient, lights: _, materials: _, objects } =
-            scene;
+        let Scene {
+            film,
+            trace,
+            camera,
+            views: _,
+            background,
+            ambient,
+            lights: _,
+            materials: _,
+            objects,
+        } = scene;
         let default = Material::default();
         let same_object = |(a, b): (&Object, &Object)| {
             a.shape == b.shape

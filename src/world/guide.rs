@@ -41,7 +41,7 @@ impl<L: Lanes> World<L> {
         };
         let (origin, direction) = self.view.rays(pixel, (within(0), within(1)));
         let ray = Ray { origin, direction };
-        let hit = self.geometry.closest(&ray);
+        let hit = self.geometry.closest(&ray, self.geometry.all());
         let at = ray.at(hit.t);
         let eye = V3::of(self.view.eye().to_array());
         let from_eye = at - eye;

@@ -6,6 +6,7 @@ mod common;
 mod bits;
 mod camera;
 mod cauchy;
+mod coincident;
 mod compound;
 mod degenerate;
 mod light;

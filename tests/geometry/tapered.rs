@@ -66,11 +66,11 @@ fn spans_are_those_of_the_plain_formula() {
         for line in lines(11, 20_000) {
             let Some((low, high)) = plain(s, line) else { continue };
             let form = canonical(s);
-            let found = meet::<Double>(&form, &[line])[0];
-            let found = found.unwrap_or_else(|| panic!("s = {s}: lost {line:?}"));
-            assert!((found.t - low).abs() < 1e-7, "s = {s}, {line:?}: {} {low}", found.t);
-            let back = meet::<Double>(&form, &[(line.0 + line.1 * 60.0, -line.1)])[0].unwrap();
-            assert!((60.0 - back.t - high).abs() < 1e-7, "s = {s}, {line:?}");
+            // From far outside, on both sides: a wide solid reaches round the line's origin.
+            let (enter, leave) =
+                ends(&form, line, 60.0).unwrap_or_else(|| panic!("s = {s}: lost {line:?}"));
+            let error = (enter - low).abs().max((leave - high).abs());
+            assert!(error < 1e-7, "s = {s}, {line:?}: {enter} {leave}, not {low} {high}");
             counted += 1;
         }
         assert!(counted > 10_000, "s = {s}: {counted}");

@@ -13,7 +13,8 @@
 use super::convex::Convex;
 use super::ellipsoid::Ellipsoid;
 use super::flat::Plane;
-use super::span::{Span, Spans};
+use super::interval::{Change, End, Inside, both_ends, insert, with_room};
+use super::span::Spans;
 use super::sphere::Sphere;
 use super::tapered::Tapered;
 use super::{Hit, Item, Ray, Surface, reach};
@@ -25,9 +26,6 @@ use std::ops::Range;
 /// Surfaces that are so many roundings of the largest coordinate apart lie on each other: two faces
 /// given four units of the last place apart, each met with a few roundings.
 const TIE: f64 = 16.0;
-
-/// The least cosine that a tie is widened for: what a line meets flatter than that is not told apart.
-const FLATTEST: f64 = 1e-9;
 
 /// A step of the computation of "inside the whole" from "inside a part", on a stack.
 #[derive(Clone, Copy, Debug)]
@@ -101,70 +99,6 @@ pub struct Compounds<S> {
     ops: Vec<Op>,
     /// For each part the compound that begins with it.
     first: Vec<Option<u32>>,
-}
-
-/// The end of a span: its distance, and how near another end must be to happen at once.
-#[derive(Clone, Copy)]
-struct End<L> {
-    t: L,
-    tie: L,
-}
-
-/// The span of a part as far as "inside" needs it.
-#[derive(Clone, Copy)]
-struct Inside<L> {
-    enter: L,
-    leave: L,
-}
-
-impl<L: Lanes> Inside<L> {
-    #[inline(always)]
-    fn at(&self, t: L) -> L::Mask {
-        self.enter.le(t) & self.leave.ge(t)
-    }
-}
-
-/// What happens to a part of the tree at a surface.
-#[derive(Clone, Copy)]
-struct Change<L: Lanes> {
-    before: L::Mask,
-    after: L::Mask,
-    /// Where, and which part is to be seen; if nothing changes it means nothing.
-    t: L,
-    tag: L,
-}
-
-impl<L: Lanes> Change<L> {
-    fn inverted(self) -> Self {
-        Self { before: !self.before, after: !self.after, ..self }
-    }
-
-    /// Both joined; of two that change in the right sense the first is to be seen.
-    fn joined(self, other: Self, before: L::Mask, after: L::Mask) -> Self {
-        let same = (self.after & after) | (!self.after & !after);
-        let first = same & ((self.before & !self.after) | (!self.before & self.after));
-        Self {
-            before,
-            after,
-            t: L::select(first, self.t, other.t),
-            tag: L::select(first, self.tag, other.tag),
-        }
-    }
-
-    fn or(self, other: Self) -> Self {
-        self.joined(other, self.before | other.before, self.after | other.after)
-    }
-
-    fn and(self, other: Self) -> Self {
-        self.joined(other, self.before & other.before, self.after & other.after)
-    }
-}
-
-/// Room for `n` values while `use_it` runs: on the stack if they are few.
-#[inline(always)]
-fn with_room<T: Copy, R>(n: usize, fill: T, use_it: impl FnOnce(&mut [T]) -> R) -> R {
-    const FEW: usize = 8;
-    if n <= FEW { use_it(&mut [fill; FEW][..n]) } else { use_it(&mut vec![fill; n]) }
 }
 
 impl<S: Real> Compounds<S> {
@@ -369,34 +303,6 @@ impl<S: Real> Compounds<S> {
             before = L::select(gap, middle, before);
         }
     }
-}
-
-/// The ends of a span; those of lines that do not meet the solid stand behind all others.
-#[inline(always)]
-fn both_ends<L: Lanes>(span: &Span<L>, tie: L) -> [End<L>; 2] {
-    let never = L::of(L::MAX);
-    let end = |t: L, cosine: L| {
-        let real = span.meets & t.abs().lt(never);
-        End {
-            t: L::select(span.meets, t, never),
-            tie: (tie / cosine.max(L::of(FLATTEST))).only(real),
-        }
-    };
-    [end(span.enter, span.enter_cosine), end(span.leave, span.leave_cosine)]
-}
-
-/// Puts `end` into the first `count` of `ends`, which are sorted in every lane.
-#[inline(always)]
-fn insert<L: Lanes>(mut end: End<L>, ends: &mut [End<L>], count: usize) {
-    for slot in &mut ends[..count] {
-        let sooner = end.t.lt(slot.t);
-        let old = *slot;
-        slot.t = L::select(sooner, end.t, old.t);
-        slot.tie = L::select(sooner, end.tie, old.tie);
-        end.t = L::select(sooner, old.t, end.t);
-        end.tie = L::select(sooner, old.tie, end.tie);
-    }
-    ends[count] = end;
 }
 
 impl<S: Real> Compounds<S> {

@@ -5,6 +5,7 @@ mod compound;
 mod convex;
 mod ellipsoid;
 mod flat;
+mod interval;
 mod span;
 mod sphere;
 mod tapered;
