@@ -2,7 +2,7 @@
 //! from one to the next.
 
 use super::span::Span;
-use crate::lanes::{Lanes, Mask};
+use crate::lanes::Lanes;
 
 /// The least cosine that a tie is widened for: what a line meets flatter than that is not told apart.
 const FLATTEST: f64 = 1e-9;
