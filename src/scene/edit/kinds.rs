@@ -254,7 +254,8 @@ mod tests {
         let scene = built_in();
         for object in 0..scene.objects.len() {
             let subject = Subject::Object(object);
-            for kind in KINDS {
+            // The canonical cylinder is placed by a transform alone.
+            for kind in KINDS.iter().filter(|kind| kind.name != "unit_cylinder") {
                 let edit = set(&scene, &subject, "shape", kind.name);
                 let edit = edit.unwrap_or_else(|e| panic!("{object} -> {}: {e}", kind.name));
                 let (old, new) = (&scene.objects[object], &edit.scene.objects[object]);
