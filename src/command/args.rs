@@ -11,16 +11,40 @@ use std::path::PathBuf;
 #[derive(Debug, Parser)]
 #[command(version, about, args_conflicts_with_subcommands = true)]
 #[command(
-    after_help = "Exit status: 0 done, 1 failed, 2 wrong usage, 130 or 143 stopped by a signal \
-                        after writing the picture so far."
+    after_help = "Without a command the dashboard opens: edit the scene, watch it converge.\n\n\
+                        Exit status: 0 done, 1 failed, 2 wrong usage, 129, 130 or 143 stopped by a \
+                        signal (`render` then writes the picture so far)."
 )]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// A scene file.
-    #[arg(hide = true)]
+    /// What the dashboard is opened with.
+    #[command(flatten)]
+    pub edit: EditArgs,
+}
+
+/// Arguments of `zerkalo` without a command.
+#[derive(Clone, Debug, Args)]
+pub struct EditArgs {
+    /// A scene file [default: the built-in mirror room]
     pub scene: Option<PathBuf>,
+    /// Threads that trace [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
+    pub threads: Option<u16>,
+    /// Number that the random choices follow from; the same seed gives the same picture
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// Precision of the geometry; auto: double where the scene's proportions need it
+    #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]
+    pub precision: PrecisionArg,
+    /// Colours of the terminal: 24-bit, 256, 16 or none; auto: as the environment tells
+    #[arg(long, value_enum, default_value_t = ColorArg::Auto)]
+    pub color: ColorArg,
+    /// Write how long the answers to keys and mouse took, as CSV, and print the distribution at the
+    /// end
+    #[arg(long, value_name = "FILE.csv", hide = true)]
+    pub trace: Option<PathBuf>,
 }
 
 /// What to do.
@@ -113,6 +137,23 @@ pub enum PrecisionArg {
     Double,
     /// As the scene's proportions need it
     Auto,
+}
+
+/// Values of `--color`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ColorArg {
+    /// As the environment tells
+    Auto,
+    /// 24-bit
+    True,
+    /// The 256 of xterm
+    #[value(name = "256")]
+    Indexed,
+    /// The 16 of every terminal
+    #[value(name = "16")]
+    Sixteen,
+    /// None
+    None,
 }
 
 /// Values of `--sampler`.
@@ -227,6 +268,10 @@ mod tests {
     fn a_scene_alone_is_understood() {
         assert!(Cli::try_parse_from(["zerkalo"]).unwrap().command.is_none());
         let cli = Cli::try_parse_from(["zerkalo", "a.toml"]).unwrap();
-        assert_eq!(cli.scene, Some(PathBuf::from("a.toml")));
+        assert_eq!(cli.edit.scene, Some(PathBuf::from("a.toml")));
+        let cli = Cli::try_parse_from(["zerkalo", "a.toml", "--color", "256", "--threads", "2"]);
+        let edit = cli.unwrap().edit;
+        assert_eq!((edit.color, edit.threads), (ColorArg::Indexed, Some(2)));
+        assert!(Cli::try_parse_from(["zerkalo", "--color", "17"]).is_err());
     }
 }

@@ -15,9 +15,11 @@ pub mod layout;
 pub mod message;
 pub mod model;
 pub mod overlay;
+pub mod pacing;
 pub mod panels;
 pub mod places;
 pub mod raster;
+pub mod run;
 #[cfg(test)]
 mod testing;
 pub mod update;

@@ -1,5 +1,6 @@
 //! From a scene to a growing film: what to trace next, and the threads that do it.
 
+pub mod export;
 mod first;
 mod guide;
 mod lighting;

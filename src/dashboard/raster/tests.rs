@@ -92,3 +92,25 @@ fn fewer_colours_are_further_off_but_not_far() {
         assert!(error > 0.01 && error < most, "{errors:?}");
     }
 }
+
+/// `cargo test --release --lib how_long -- --ignored --nocapture`
+#[test]
+#[ignore = "a measurement"]
+fn how_long_a_picture_takes() {
+    let (width, height) = (160, 90);
+    for colors in Colors::ALL {
+        for settled in [false, true] {
+            let mut best = f64::INFINITY;
+            for seed in 0..20 {
+                let raster = Raster::from_fn(width, height, |i| {
+                    let noise = (i.wrapping_mul(2_654_435_761).wrapping_add(seed) >> 7) as u8 / 8;
+                    [noise + (i % width) as u8, noise + (i / width) as u8, 100 + noise]
+                });
+                let start = std::time::Instant::now();
+                std::hint::black_box(PictureCells::new(&raster, colors, settled));
+                best = best.min(start.elapsed().as_secs_f64());
+            }
+            println!("{colors:?} settled {settled}: {:.2} ms", 1e3 * best);
+        }
+    }
+}

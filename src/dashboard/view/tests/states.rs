@@ -250,7 +250,7 @@ pub const STATES: &[Named] = &[
     }),
     ("save-as", |m| {
         let words = ["save as", "A file name ending in .toml.", "rooms/mirror-room-2.toml"];
-        prompt(m, PromptFor::SaveAs { then_quit: false }, words, None);
+        prompt(m, PromptFor::SaveAs, words, None);
     }),
     ("stop-at-refused", |m| {
         let help = "noise 0.5, spp 1000, time 60, or none.";

@@ -105,7 +105,7 @@ fn defaults_are_dimmed_and_refusals_are_red() {
     let typed = cursor.map(|at| buffer[(at.x - 1, at.y)].fg).expect("a cursor where text is typed");
     assert_eq!(refusal, typed, "the reason and what it is about have one colour");
 
-    let model = state("inspector", [120, 36]);
+    let model = state("inspector", [200, 60]);
     let lines = model.field_lines();
     let (buffer, _) = drawn(&model);
     let (list, _) = model.inspector_rows().unwrap();
@@ -116,7 +116,7 @@ fn defaults_are_dimmed_and_refusals_are_red() {
             continue;
         }
         let row: Vec<_> = (list.x..list.x + list.width).map(|x| buffer[(x, y)].symbol()).collect();
-        let at = row.concat().find(&field.value).map(|byte| row.concat()[..byte].chars().count());
+        let at = row.concat().rfind(&field.value).map(|byte| row.concat()[..byte].chars().count());
         if let Some(at) = at {
             looks[usize::from(field.is_default)].push(buffer[(list.x + at as u16, y)].fg);
         }
