@@ -18,9 +18,9 @@ mod rewrite;
 mod schema;
 mod settings;
 mod suggest;
-mod transform;
 mod warn;
 
+pub use crate::shape::{Rotate, STEP_FIELDS, Scale, Step};
 pub use check::Finding;
 pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};
@@ -34,7 +34,6 @@ pub use settings::{
     AMBIENT_FIELDS, Ambient, BACKGROUND_FIELDS, Background, FILM_FIELDS, FilmSettings, Filter,
     Horizon, Level, MAX_PIXELS, TRACE_FIELDS, Trace,
 };
-pub use transform::{Rotate, STEP_FIELDS, Scale, Step};
 
 use crate::camera::Camera;
 use crate::light::Light;

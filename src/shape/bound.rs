@@ -42,6 +42,8 @@ pub struct Bound {
     ball: Ball,
     /// Unit normal and offset of the plane that a flat thing lies in.
     plane: Option<(DVec3, f64)>,
+    /// It does not see itself from outside.
+    convex: bool,
 }
 
 impl Ball {
@@ -86,7 +88,7 @@ impl Bound {
             Form::Plane { normal, offset } => Some((*normal, *offset)),
             _ => None,
         };
-        Self { ball, plane }
+        Self { ball, plane, convex: !matches!(form, Form::Compound(_)) }
     }
 
     /// A ball around it.
@@ -97,6 +99,11 @@ impl Bound {
     /// Whether it is flat: a ray that leaves it does not meet it again.
     pub fn is_flat(&self) -> bool {
         self.plane.is_some()
+    }
+
+    /// Whether it is convex: its outside does not see itself.
+    pub fn is_convex(&self) -> bool {
+        self.convex
     }
 
     /// A ball around all of it that the pencil's lines meet in front of the apex; `None`: nothing.

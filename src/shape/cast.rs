@@ -1,6 +1,7 @@
 //! Single rays against single forms, in double precision: for placing things, not for pictures.
 
-use super::Form;
+use super::{Form, Geometry, Ray};
+use crate::lanes::V3;
 use glam::DVec3;
 
 impl Form {
@@ -44,6 +45,14 @@ impl Form {
                 let b = u.cross(at).dot(normal) / area;
                 let inside = (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b);
                 (t > 0.0 && t.is_finite() && inside).then_some(t)
+            }
+            Self::Tapered { .. } | Self::Compound(_) => {
+                let length = direction.length();
+                let vector = |v: DVec3| V3::<f64>::of(v.to_array());
+                let ray = Ray { origin: vector(origin), direction: vector(direction / length) };
+                let alone = Geometry::with_tree(std::slice::from_ref(self), false);
+                let t = alone.closest(&ray, alone.all()).t;
+                (t < f64::MAX).then_some(t / length)
             }
             Self::Plane { normal, offset } => {
                 let t = (offset - normal.dot(origin)) / normal.dot(direction);

@@ -58,8 +58,8 @@ impl Kind for Cuboid {
         Self { center: [base.x, base.y + size.y / 2.0, base.z], size: size.to_array() }
     }
 
-    fn anchor(&mut self) -> &mut [f64; 3] {
-        &mut self.center
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.center]
     }
 
     fn turn(&mut self, _: f64) -> bool {

@@ -1,6 +1,6 @@
 //! All things of a scene, ready for rays: batches, and a tree over them where it pays.
 
-use super::batch::{Batch, Compiled, Hit, Ray, Surface, compile};
+use super::batch::{Batch, Compiled, Hit, Ray, Source, Surface, compile};
 use super::form::Form;
 use super::tree::Tree;
 use crate::lanes::{Lanes, Mask, V3};
@@ -26,8 +26,8 @@ pub struct Geometry<L: Lanes> {
     tree: Option<Tree<L>>,
     /// `(part, number in the part)` of the tree's items.
     tree_items: Vec<(u32, u32)>,
-    /// `source[item]`: which form, in the order given to [`Geometry::new`].
-    source: Vec<u32>,
+    /// `source[item]`: which form, in the order given to [`Geometry::new`], and which part of it.
+    source: Vec<Source>,
     counts: Vec<String>,
 }
 
@@ -62,18 +62,19 @@ impl<L: Lanes> Geometry<L> {
             let base = out.source.len() as u32;
             let in_tree = tree && !infinite;
             let how = if in_tree { "tree" } else { "list" };
-            let name = if sources.len() == 1 { noun.0 } else { noun.1 };
-            out.counts.push(format!("{} {name} ({how})", sources.len()));
+            let count = sources.iter().filter(|s| s.part == 0).count();
+            let name = if count == 1 { noun.0 } else { noun.1 };
+            out.counts.push(format!("{count} {name} ({how})"));
             let part = out.parts.len() as u32;
             if in_tree {
-                for (i, source) in sources.iter().enumerate() {
-                    bounds.extend(forms[*source].bounds());
+                for (i, source) in sources.iter().enumerate().filter(|(_, s)| s.part == 0) {
+                    bounds.extend(forms[source.form].bounds());
                     out.tree_items.push((part, i as u32));
                 }
             } else {
                 out.all.runs.push((part, 0..sources.len() as u32));
             }
-            out.source.extend(sources.iter().map(|s| *s as u32));
+            out.source.extend(&sources);
             out.parts.push(Part { batch, base, end: out.source.len() as u32 });
         }
         out.tree = (!bounds.is_empty()).then(|| Tree::new(&bounds));
@@ -116,8 +117,8 @@ impl<L: Lanes> Geometry<L> {
         self.source.is_empty()
     }
 
-    /// For each item, which form it came from.
-    pub fn sources(&self) -> &[u32] {
+    /// For each item, which form it came from, and which part of it.
+    pub fn sources(&self) -> &[Source] {
         &self.source
     }
 

@@ -1,7 +1,11 @@
 //! The table of kinds. A new kind of shape is one file and one line here.
 
 use super::Form;
-use super::{Cube, Cuboid, Plane, Platform, Prism, Pyramid, Rectangle, Sphere};
+use super::compound::OF_FIELDS;
+use super::{
+    Cone, Cube, Cuboid, Cylinder, Difference, Intersection, Plane, Platform, Prism, Pyramid,
+};
+use super::{Rectangle, Sphere, TaperedCylinder, Union, UnitCylinder};
 use crate::value::{Fault, Field, Takes, rounded_to};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -25,8 +29,9 @@ pub trait Kind {
     /// a box with the lengths `size` along x, y and z, all greater than 0.
     fn standing(base: DVec3, size: DVec3) -> Self;
 
-    /// The point that moves it: adding a vector to it moves the whole shape by that vector.
-    fn anchor(&mut self) -> &mut [f64; 3];
+    /// The points that move it: adding a vector to all of them moves the whole shape by that vector.
+    /// Empty: only a transform moves it.
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]>;
 
     /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen from
     /// above. `false`: it has no key for that, and nothing was done.
@@ -39,8 +44,19 @@ pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
     if turn > 180.0 { rounded_to(turn - 360.0, -6) } else { turn }
 }
 
+/// The keys of a kind; those of compounds by the name of their static, since a constant could not
+/// take part in a table that refers to itself.
+macro_rules! keys {
+    ($kind:ident) => {
+        $kind::FIELDS
+    };
+    ($kind:ident $fields:path) => {
+        &$fields
+    };
+}
+
 macro_rules! kinds {
-    ($($key:literal => $kind:ident),+ $(,)?) => {
+    ($($key:literal => $kind:ident $(with $fields:path)?),+ $(,)?) => {
         /// What an object looks like: one kind with its parameters. In files a table with one key.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         pub enum Shape {
@@ -51,10 +67,13 @@ macro_rules! kinds {
             )+
         }
 
-        /// Every kind: its key, its fields, what it is.
-        pub const KINDS: &[Field] = &[
-            $(Field::required($key, Takes::Table($kind::FIELDS), "", $kind::DOC),)+
+        // A static, since the parts of compounds have shapes, too: the table refers to itself.
+        pub(super) static KIND_TABLE: [Field; [$($key),+].len()] = [
+            $(Field::required($key, Takes::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
         ];
+
+        /// Every kind: its key, its fields, what it is.
+        pub const KINDS: &[Field] = &KIND_TABLE;
 
         /// Every kind's key with an example as it stands in an `[[object]]`.
         pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE),)+];
@@ -91,10 +110,11 @@ macro_rules! kinds {
                 }
             }
 
-            /// The point that moves it: adding a vector to it moves the whole shape by that vector.
-            pub fn anchor(&mut self) -> &mut [f64; 3] {
+            /// The points that move it: adding a vector to all of them moves the whole shape by that
+            /// vector. Empty: only a transform moves it.
+            pub fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
                 match self {
-                    $(Self::$kind(kind) => kind.anchor(),)+
+                    $(Self::$kind(kind) => kind.anchors(),)+
                 }
             }
 
@@ -115,7 +135,21 @@ kinds! {
     "box" => Cuboid,
     "pyramid" => Pyramid,
     "prism" => Prism,
+    "cylinder" => Cylinder,
+    "cone" => Cone,
+    "tapered_cylinder" => TaperedCylinder,
+    "unit_cylinder" => UnitCylinder,
     "platform" => Platform,
     "rectangle" => Rectangle,
     "plane" => Plane,
+    "union" => Union with OF_FIELDS,
+    "intersection" => Intersection with OF_FIELDS,
+    "difference" => Difference with OF_FIELDS,
+}
+
+impl Shape {
+    /// The first of the points that move it; the origin if there is none.
+    pub fn place(&self) -> DVec3 {
+        self.clone().anchors().first().map_or(DVec3::ZERO, |at| DVec3::from_array(**at))
+    }
 }

@@ -48,8 +48,8 @@ impl Kind for Plane {
         Self { point: base.to_array(), normal: [0.0, 1.0, 0.0] }
     }
 
-    fn anchor(&mut self) -> &mut [f64; 3] {
-        &mut self.point
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.point]
     }
 
     fn turn(&mut self, degrees: f64) -> bool {

@@ -52,8 +52,8 @@ impl Kind for Platform {
         Self { center: [base.x, base.y + size.y, base.z], size: [size.x, size.z] }
     }
 
-    fn anchor(&mut self) -> &mut [f64; 3] {
-        &mut self.center
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.center]
     }
 
     fn turn(&mut self, _: f64) -> bool {

@@ -86,8 +86,8 @@ impl Kind for Pyramid {
         Self { corner, side, apex_height: size.y, height: size.y, rotation: 0.0 }
     }
 
-    fn anchor(&mut self) -> &mut [f64; 3] {
-        &mut self.corner
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.corner]
     }
 
     fn turn(&mut self, degrees: f64) -> bool {

@@ -101,8 +101,8 @@ impl Kind for Rectangle {
         }
     }
 
-    fn anchor(&mut self) -> &mut [f64; 3] {
-        &mut self.center
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.center]
     }
 
     fn turn(&mut self, degrees: f64) -> bool {

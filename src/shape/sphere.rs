@@ -40,8 +40,8 @@ impl Kind for Sphere {
         Self { center: [base.x, base.y + radius, base.z], radius }
     }
 
-    fn anchor(&mut self) -> &mut [f64; 3] {
-        &mut self.center
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.center]
     }
 
     /// It looks the same from all sides.

@@ -103,22 +103,36 @@ impl Placed {
 
     /// The smallest thickness of a solid, or the smaller edge of a flat thing.
     fn thinnest(&self) -> f64 {
-        let thickness = |form: &Form| match form {
-            Form::Parallelogram { u, v, .. } => u.length().min(v.length()),
-            Form::Convex { faces, corners } => faces
-                .iter()
-                .map(|f| {
-                    let depths = corners.iter().map(|c| f.offset - f.normal.dot(*c));
-                    depths.fold(0.0, f64::max)
-                })
-                .fold(f64::INFINITY, f64::min),
-            Form::Plane { .. } => f64::INFINITY,
-            Form::Sphere { radius, .. } => 2.0 * radius,
-            Form::Ellipsoid { .. } => {
-                form.bounds().map_or(f64::INFINITY, |(l, h)| (h - l).min_element())
-            }
-        };
         self.forms.iter().map(thickness).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// The smallest thickness of a solid, or the smaller edge of a flat thing. Of a compound that of its
+/// thinnest part: what is left between cuts may be thinner.
+fn thickness(form: &Form) -> f64 {
+    match form {
+        Form::Parallelogram { u, v, .. } => u.length().min(v.length()),
+        Form::Convex { faces, corners } => faces
+            .iter()
+            .map(|f| {
+                let depths = corners.iter().map(|c| f.offset - f.normal.dot(*c));
+                depths.fold(0.0, f64::max)
+            })
+            .fold(f64::INFINITY, f64::min),
+        Form::Plane { .. } => f64::INFINITY,
+        Form::Sphere { radius, .. } => 2.0 * radius,
+        Form::Ellipsoid { .. } => {
+            form.bounds().map_or(f64::INFINITY, |(l, h)| (h - l).min_element())
+        }
+        Form::Tapered { scene_from_unit: m, .. } => {
+            // Between the faces of the box around the canonical solid: 2 by 2 by 1.
+            let rows = m.matrix3.inverse().transpose();
+            let across = rows.x_axis.length().max(rows.y_axis.length());
+            (2.0 / across).min(rows.z_axis.length().recip())
+        }
+        Form::Compound(compound) => {
+            compound.parts.iter().map(thickness).fold(f64::INFINITY, f64::min)
+        }
     }
 }
 
@@ -135,18 +149,22 @@ impl<L: Lanes> World<L> {
         let mut used: Vec<&Material> = Vec::new();
         let mut finish_of_object = Vec::new();
         for object in &scene.objects {
-            let material = scene.materials.get(&object.material).unwrap_or(&default);
-            let known = used.iter().position(|m| *m == material);
-            finish_of_object.push(known.unwrap_or(used.len()) as u32);
-            if known.is_none() {
-                used.push(material);
-            }
+            let mut finish = |name: &str| {
+                let material = scene.materials.get(name).unwrap_or(&default);
+                let known = used.iter().position(|m| *m == material);
+                if known.is_none() {
+                    used.push(material);
+                }
+                known.unwrap_or(used.len() - 1) as u32
+            };
+            let parts = object.shape.part_materials(&object.material);
+            finish_of_object.push(parts.into_iter().map(&mut finish).collect::<Vec<_>>());
         }
         let finishes: Vec<Finish<L::Scalar>> =
             used.iter().map(|m| Finish::new(m, reflects)).collect();
         let geometry = Geometry::new(&placed.forms);
         let finish_of =
-            geometry.sources().iter().map(|form| finish_of_object[*form as usize]).collect();
+            geometry.sources().iter().map(|item| finish_of_object[item.form][item.part]).collect();
 
         let lit = finishes.iter().any(|f| f.wants_light);
         let ambient = used.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3]);
@@ -177,7 +195,7 @@ impl<L: Lanes> World<L> {
         let view = View::new(&scene.camera, scene.film.size, placed.origin);
         // Rays that begin on the near plane may begin inside a thing.
         let eye = (scene.camera.near == 0.0).then(|| view.eye());
-        let forms = geometry.sources().iter().map(|form| &placed.forms[*form as usize]).collect();
+        let forms = geometry.sources().iter().map(|s| &placed.forms[s.form]).collect();
         let lamps: Vec<_> = sources.iter().map(|s| s.lamp).collect();
         let surroundings = Surroundings::new(forms, eye, &lamps);
         Self {

@@ -60,7 +60,7 @@ impl<L: Lanes> World<L> {
                 let side = if front { 1.0 } else { -1.0 };
                 let axis = |c: L| (side * c.lane(lane).to_f64()) as f32;
                 *sight = Sight {
-                    object: Some(self.geometry.sources()[item as usize]),
+                    object: Some(self.geometry.sources()[item as usize].form as u32),
                     depth: depth.lane(lane).to_f64() as f32,
                     normal: [axis(normal.x), axis(normal.y), axis(normal.z)],
                     reflects: self.depth > 0

@@ -37,9 +37,10 @@ impl Surroundings {
             }
             Lamp::Directional { towards } => Towards::Direction(vector(towards)),
         });
-        // Every thing is convex: its outside does not see itself, and only paths that begin inside get
+        // The outside of a convex thing does not see itself, and only paths that begin inside get
         // inside.
-        let hollow = |b: &Bound| !b.is_flat() && eye.is_none_or(|eye| b.ball().holds(eye));
+        let hollow =
+            |b: &Bound| !b.is_convex() || !b.is_flat() && eye.is_none_or(|eye| b.ball().holds(eye));
         Self { towards: towards.collect(), hollow: bounds.iter().map(hollow).collect(), bounds }
     }
 

@@ -6,6 +6,7 @@ mod answers;
 #[path = "../common/mod.rs"]
 mod common;
 mod compare;
+mod compounds;
 #[path = "../support/mod.rs"]
 mod support;
 mod surfaces;

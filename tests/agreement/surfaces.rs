@@ -1,8 +1,8 @@
-//! Shapes as the plainest things that rays can meet: spheres, polygons and infinite planes, each in
-//! the space that its description uses. Nothing here is fast, and nothing is shared with the program.
+//! Shapes as the plainest things that rays can meet: spheres, polygons, infinite planes, discs and the
+//! sides of cones, each in the space that its description uses. Nothing here is fast, and nothing is shared with the program.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
-use zerkalo::scene::{Object, Step};
+use zerkalo::scene::Step;
 use zerkalo::shape::Shape;
 
 /// What a ray can meet, before the object's transform.
@@ -13,44 +13,17 @@ pub enum Piece {
     Polygon(Vec<DVec3>, DVec3),
     /// A point and the front's normal.
     Plane(DVec3, DVec3),
-}
-
-/// An object: its pieces, and the maps between their space and the scene's.
-pub struct Body {
-    pieces: Vec<Piece>,
-    object_from_scene: DAffine3,
-    /// Normals are mapped by the inverse transpose.
-    scene_from_object_normals: DMat3,
-}
-
-impl Body {
-    /// `None`: a shape that this tracer does not know.
-    pub fn new(object: &Object) -> Option<Self> {
-        let scene_from_object =
-            object.transform.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all);
-        Some(Self {
-            pieces: pieces(&object.shape)?,
-            object_from_scene: scene_from_object.inverse(),
-            scene_from_object_normals: scene_from_object.matrix3.inverse().transpose(),
-        })
-    }
-
-    /// Nearest distance beyond `from` (in lengths of `direction`) at which the ray meets the body, and
-    /// the unit normal there on the front or outside.
-    pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<(f64, DVec3)> {
-        let origin = self.object_from_scene.transform_point3(origin);
-        let direction = self.object_from_scene.transform_vector3(direction);
-        let hits = self.pieces.iter().flat_map(|piece| piece.meet(origin, direction)).flatten();
-        let (t, normal) = hits.filter(|(t, _)| *t > from).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some((t, (self.scene_from_object_normals * normal).normalize()))
-    }
+    /// Centre, normal, radius.
+    Disc(DVec3, DVec3, f64),
+    /// The side around an axis: where it begins, its direction, its length, the radii at both ends.
+    Side(DVec3, DVec3, f64, [f64; 2]),
 }
 
 /// Distance in lengths of the direction, and normal.
 type Meeting = Option<(f64, DVec3)>;
 
 impl Piece {
-    fn meet(&self, origin: DVec3, direction: DVec3) -> [Meeting; 2] {
+    pub fn meet(&self, origin: DVec3, direction: DVec3) -> [Meeting; 2] {
         match self {
             Self::Sphere(center, radius) => {
                 let f = origin - center;
@@ -64,6 +37,29 @@ impl Piece {
                 let normal = |t: f64| (origin + direction * t - center) / *radius;
                 let at = |sign: f64| (-b + sign * root.sqrt()) / a;
                 [at(-1.0), at(1.0)].map(|t| Some((t, normal(t))))
+            }
+            Self::Disc(center, normal, radius) => {
+                let hit = flat(*center, *normal, origin, direction);
+                [hit.filter(|(t, _)| (origin + direction * *t).distance(*center) <= *radius), None]
+            }
+            Self::Side(base, axis, height, [r0, r1]) => {
+                let across = |v: DVec3| v - *axis * v.dot(*axis);
+                let f = origin - base;
+                let (p, d) = (across(f), across(direction));
+                let slope = (r1 - r0) / height;
+                let (r, widening) = (r0 + slope * f.dot(*axis), slope * direction.dot(*axis));
+                let a = d.dot(d) - widening * widening;
+                let b = p.dot(d) - r * widening;
+                let c = p.dot(p) - r * r;
+                let root = (b * b - a * c).sqrt();
+                let at = |t: f64| {
+                    let from_axis = across(f + direction * t);
+                    let z = (f + direction * t).dot(*axis);
+                    let normal = (from_axis.normalize() - *axis * slope).normalize();
+                    // Without a crossing t is NaN.
+                    (z >= 0.0 && z <= *height).then_some((t, normal))
+                };
+                [at((-b - root) / a), at((-b + root) / a)]
             }
             Self::Plane(point, normal) => [flat(*point, *normal, origin, direction), None],
             Self::Polygon(corners, normal) => {
@@ -84,12 +80,28 @@ impl Piece {
     }
 }
 
+impl Piece {
+    /// Whether a point is inside, as far as this piece of a convex solid knows.
+    pub fn is_behind(&self, point: DVec3) -> bool {
+        match self {
+            Self::Sphere(center, radius) => point.distance(*center) <= *radius,
+            Self::Polygon(corners, normal) => normal.dot(point - corners[0]) <= 0.0,
+            Self::Plane(on, normal) | Self::Disc(on, normal, _) => normal.dot(point - on) <= 0.0,
+            Self::Side(base, axis, height, [r0, r1]) => {
+                let z = axis.dot(point - base);
+                (point - base - *axis * z).length() <= r0 + (r1 - r0) * z / height
+            }
+        }
+    }
+}
+
 fn flat(point: DVec3, normal: DVec3, origin: DVec3, direction: DVec3) -> Meeting {
     let speed = normal.dot(direction);
     (speed != 0.0).then(|| (normal.dot(point - origin) / speed, normal))
 }
 
-fn map(step: &Step) -> DAffine3 {
+/// A step of a transform.
+pub fn map(step: &Step) -> DAffine3 {
     let turn = |axis: DVec3, degrees: f64| {
         DAffine3::from_axis_angle(axis.normalize(), degrees.to_radians())
     };
@@ -103,8 +115,9 @@ fn map(step: &Step) -> DAffine3 {
     }
 }
 
+/// The pieces of a simple shape; `None`: a shape that this tracer does not know.
 #[allow(unreachable_patterns, reason = "kinds that this tracer does not know may be added")]
-fn pieces(shape: &Shape) -> Option<Vec<Piece>> {
+pub fn pieces(shape: &Shape) -> Option<Vec<Piece>> {
     let v = |a: [f64; 3]| DVec3::from(a);
     let square = |side: f64| vec![[0.0, 0.0], [side, 0.0], [side, -side], [0.0, -side]];
     Some(match shape {
@@ -128,6 +141,10 @@ fn pieces(shape: &Shape) -> Option<Vec<Piece>> {
                 vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
             vec![Piece::Polygon(corners, front)]
         }
+        Shape::Cylinder(c) => round(v(c.base), v(c.top), [c.radius; 2]),
+        Shape::Cone(c) => round(v(c.base), v(c.apex), [c.radius, 0.0]),
+        Shape::TaperedCylinder(c) => round(v(c.base), v(c.top), [c.base_radius, c.top_radius]),
+        Shape::UnitCylinder(c) => round(DVec3::ZERO, DVec3::Z, [1.0, c.s]),
         Shape::Cuboid(b) => {
             let [x, y, z] = b.size;
             let base = vec![[0.0, 0.0], [x, 0.0], [x, -z], [0.0, -z]];
@@ -147,6 +164,16 @@ fn pieces(shape: &Shape) -> Option<Vec<Piece>> {
         }
         _ => return None,
     })
+}
+
+/// Both ends and the side of a solid around an axis.
+fn round(base: DVec3, top: DVec3, radii: [f64; 2]) -> Vec<Piece> {
+    let axis = (top - base).normalize();
+    vec![
+        Piece::Disc(base, -axis, radii[0]),
+        Piece::Disc(top, axis, radii[1]),
+        Piece::Side(base, axis, base.distance(top), radii),
+    ]
 }
 
 /// Base, top and sides of an upright solid whose base has these corners (x and z from `corner`); the

@@ -2,7 +2,7 @@
 
 use crate::answers::{highlight, reflect};
 use crate::common::Numbers;
-use crate::surfaces::Body;
+use crate::compounds::Body;
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::camera::ViewAngle;
@@ -139,11 +139,11 @@ impl<'a> Tracer<'a> {
     fn meet(&self, origin: DVec3, direction: DVec3) -> Option<Hit<'_>> {
         let from = Self::clearance(origin);
         let hits = self.bodies.iter().enumerate().filter_map(|(i, body)| {
-            let (t, normal) = body.meet(origin, direction, from)?;
-            Some((t, normal, i))
+            let (t, normal, leaf) = body.meet(origin, direction, from)?;
+            Some((t, normal, i, leaf))
         });
-        let (t, normal, i) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let name = &self.scene.objects[i].material;
+        let (t, normal, i, leaf) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let name = &self.bodies[i].leaves[leaf].material;
         let material = self.scene.materials.get(name).unwrap_or(&self.plain);
         let front = normal.dot(direction) < 0.0;
         Some(Hit {
@@ -181,7 +181,7 @@ impl<'a> Tracer<'a> {
         let offset = if self.mutation == Mutation::ShadowOffset { 1e-3 } else { 0.0 };
         let from = Self::clearance(point) + offset;
         self.bodies.iter().any(|body| {
-            body.meet(point, towards, from).is_some_and(|(t, _)| t < distance * (1.0 - 1e-12))
+            body.meet(point, towards, from).is_some_and(|(t, ..)| t < distance * (1.0 - 1e-12))
         })
     }
 }

@@ -61,7 +61,7 @@ pub fn closest<L: Lanes>(geometry: &Geometry<L>, lines: &[Line]) -> Vec<Option<M
         out.extend((0..count).map(|i| {
             met.lane(i).then(|| Met {
                 t: hit.t.lane(i).to_f64(),
-                form: geometry.sources()[hit.item.tag_lane(i) as usize] as usize,
+                form: geometry.sources()[hit.item.tag_lane(i) as usize].form,
                 point: to_dvec3(surface.point, i),
                 normal: to_dvec3(surface.normal, i),
             })

@@ -64,7 +64,8 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
         // Under everything, so that it does not lie in a ground that is there already.
         let lows = scene.objects.iter().filter_map(|o| Some(o.form().bounds()?.0.y));
         if let Some(lowest) = lows.reduce(f64::min) {
-            shape.anchor()[1] = clean(lowest - 0.1 * size, size);
+            let under = clean(lowest - 0.1 * size, size);
+            shape.anchors().into_iter().for_each(|anchor| anchor[1] = under);
         }
     }
     let mut next = scene.clone();

@@ -27,7 +27,7 @@ pub fn bounds(scene: &Scene, subject: &Subject) -> Option<Ball> {
             Some(match object.form().bounds() {
                 Some(extent) => ball(extent),
                 None => {
-                    let point = DVec3::from_array(*object.shape.clone().anchor());
+                    let point = object.shape.place();
                     let at = object.scene_from_object().transform_point3(point);
                     Ball { center: at.to_array(), radius: scene_bounds(scene).radius }
                 }

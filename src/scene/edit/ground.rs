@@ -67,9 +67,11 @@ fn lift(object: &mut Object, by: f64) {
         return;
     }
     match object.transform.last_mut() {
-        None => object.shape.anchor()[1] += by,
+        None if !object.shape.anchors().is_empty() => {
+            object.shape.anchors().into_iter().for_each(|anchor| anchor[1] += by);
+        }
         Some(Step::Translate(last)) => last[1] += by,
-        Some(_) => object.transform.push(Step::Translate([0.0, by, 0.0])),
+        _ => object.transform.push(Step::Translate([0.0, by, 0.0])),
     }
 }
 

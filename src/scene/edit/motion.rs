@@ -55,9 +55,10 @@ pub(super) fn moved(at: [f64; 3], by: [f64; 3]) -> [f64; 3] {
 
 pub(super) fn move_object(object: &mut Object, by: [f64; 3]) {
     match object.transform.last_mut() {
-        None => {
-            let anchor = object.shape.anchor();
-            *anchor = moved(*anchor, by);
+        None if !object.shape.anchors().is_empty() => {
+            for anchor in object.shape.anchors() {
+                *anchor = moved(*anchor, by);
+            }
         }
         Some(Step::Translate(last)) => {
             *last = moved(*last, by);
@@ -65,8 +66,8 @@ pub(super) fn move_object(object: &mut Object, by: [f64; 3]) {
                 object.transform.pop();
             }
         }
-        Some(_) if by == [0.0; 3] => {}
-        Some(_) => object.transform.push(Step::Translate(moved([0.0; 3], by))),
+        _ if by == [0.0; 3] => {}
+        _ => object.transform.push(Step::Translate(moved([0.0; 3], by))),
     }
 }
 

@@ -62,7 +62,7 @@ fn turn_by_steps(object: &mut Object, degrees: f64) {
     let (middle, scale) = match form.bounds() {
         Some((low, high)) => (low + (high - low) / 2.0, (high - low).max_element()),
         None => {
-            let point = DVec3::from_array(*object.shape.clone().anchor());
+            let point = object.shape.place();
             (object.scene_from_object().transform_point3(point), 1.0)
         }
     };

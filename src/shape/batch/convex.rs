@@ -1,5 +1,6 @@
 //! Bounded convex solids as intersections of slabs (parallel pairs of faces) and half-spaces.
 
+use super::span::{Span, Spans};
 use super::{Item, Ray, Surface, reach};
 use crate::lanes::{Lanes, Mask, Real, V3};
 use crate::shape::form::Form;
@@ -65,9 +66,10 @@ impl<S: Real> Convex<S> {
     }
 }
 
-impl<L: Lanes> Item<L> for Convex<L::Scalar> {
+impl<S: Real> Convex<S> {
+    /// Distances at which the line enters and leaves, and where it meets the solid.
     #[inline(always)]
-    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+    fn chord<L: Lanes<Scalar = S>>(&self, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
         let from_center = ray.origin - V3::splat(self.center);
         let along = from_center.dot(ray.direction);
         let across = ray.direction.mul_add(-along, from_center);
@@ -100,7 +102,14 @@ impl<L: Lanes> Item<L> for Convex<L::Scalar> {
             leave = L::select(entering, leave, t.min(leave));
         }
         // Each lane by itself: company in the packet must not decide about a line past a corner.
-        let meets = near & enter.le(leave);
+        Some((enter, leave, near & enter.le(leave)))
+    }
+}
+
+impl<L: Lanes> Item<L> for Convex<L::Scalar> {
+    #[inline(always)]
+    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+        let (enter, leave, meets) = self.chord(ray)?;
         Some((L::select(enter.gt(L::zero()), enter, leave), meets))
     }
 
@@ -129,5 +138,37 @@ impl<L: Lanes> Item<L> for Convex<L::Scalar> {
             normal = V3::select(nearer, n, normal);
         }
         Surface { point: normal.mul_add(-outside, point), normal, reach: L::splat(self.reach) }
+    }
+}
+
+impl<L: Lanes> Spans<L> for Convex<L::Scalar> {
+    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+        let (enter, leave, meets) = self.chord(ray)?;
+        let from_center = ray.origin - V3::splat(self.center);
+        // The face at an end is the one that is nearest there, of those that the line crosses in
+        // the right sense.
+        let mut best = (L::of(-L::MAX), L::of(-L::MAX));
+        let mut cosines = (L::one(), L::one());
+        let mut face = |normal: V3<L>, offset: L| {
+            let speed = normal.dot(ray.direction);
+            let height = from_center.dot(normal) - offset;
+            let above = |t: L| speed.mul_add(t, height);
+            let nearer = speed.lt(L::zero()) & above(enter).gt(best.0);
+            best.0 = L::select(nearer, above(enter), best.0);
+            cosines.0 = L::select(nearer, -speed, cosines.0);
+            let nearer = speed.gt(L::zero()) & above(leave).gt(best.1);
+            best.1 = L::select(nearer, above(leave), best.1);
+            cosines.1 = L::select(nearer, speed, cosines.1);
+        };
+        for slab in &self.slabs {
+            let normal = V3::splat(slab.normal);
+            face(normal, L::splat(slab.high));
+            face(-normal, -L::splat(slab.low));
+        }
+        for half_space in &self.faces {
+            face(V3::splat(half_space.normal), L::splat(half_space.high));
+        }
+        let (enter_cosine, leave_cosine) = cosines;
+        Some(Span { enter, leave, enter_cosine, leave_cosine, meets })
     }
 }

@@ -1,5 +1,6 @@
 //! Images of the unit sphere under affine maps: the ray goes back to the unit sphere's space.
 
+use super::span::{Span, Spans};
 use super::sphere::crossings;
 use super::{Item, Ray, Surface, reach};
 use crate::lanes::{Lanes, Real, V3};
@@ -15,12 +16,14 @@ pub struct Ellipsoid<S> {
     reach: S,
 }
 
-fn rows<S: Real>(m: DMat3) -> [[S; 3]; 3] {
+/// The rows of a matrix, rounded.
+pub(super) fn rows<S: Real>(m: DMat3) -> [[S; 3]; 3] {
     m.transpose().to_cols_array_2d().map(|row| row.map(S::of))
 }
 
+/// A matrix, given by rows, times a vector.
 #[inline(always)]
-fn times<L: Lanes>(m: &[[L::Scalar; 3]; 3], v: V3<L>) -> V3<L> {
+pub(super) fn times<L: Lanes>(m: &[[L::Scalar; 3]; 3], v: V3<L>) -> V3<L> {
     V3::new(V3::splat(m[0]).dot(v), V3::splat(m[1]).dot(v), V3::splat(m[2]).dot(v))
 }
 
@@ -37,15 +40,20 @@ impl<S: Real> Ellipsoid<S> {
     }
 }
 
+/// Ends of the chord in the scene's distances, and where there is one.
+#[inline(always)]
+fn chord<L: Lanes>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
+    let f = times(&e.unit_from_scene, ray.origin - V3::splat(e.center));
+    let d = times(&e.unit_from_scene, ray.direction);
+    let scale = L::one() / d.length2().sqrt();
+    let (near, far, meets) = crossings(f, d * scale, L::one())?;
+    Some((near * scale, far * scale, meets))
+}
+
 impl<L: Lanes> Item<L> for Ellipsoid<L::Scalar> {
     #[inline(always)]
     fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
-        let f = times(&self.unit_from_scene, ray.origin - V3::splat(self.center));
-        let d = times(&self.unit_from_scene, ray.direction);
-        let scale = L::one() / d.length2().sqrt();
-        let (near, far, meets) = crossings(f, d * scale, L::one())?;
-        // Back to the scene's distances.
-        let (near, far) = (near * scale, far * scale);
+        let (near, far, meets) = chord(self, ray)?;
         Some((L::select(near.gt(L::zero()), near, far), meets))
     }
 
@@ -62,5 +70,14 @@ impl<L: Lanes> Item<L> for Ellipsoid<L::Scalar> {
             normal: normal.normalize(),
             reach: L::splat(self.reach),
         }
+    }
+}
+
+impl<L: Lanes> Spans<L> for Ellipsoid<L::Scalar> {
+    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+        let (enter, leave, meets) = chord(self, ray)?;
+        let cosine = |t: L| self.surface(ray.at(t)).normal.dot(ray.direction).abs();
+        let (enter_cosine, leave_cosine) = (cosine(enter), cosine(leave));
+        Some(Span { enter, leave, enter_cosine, leave_cosine, meets })
     }
 }

@@ -1,5 +1,6 @@
 //! Flat shapes: parallelograms (rectangles, platforms) and infinite planes.
 
+use super::span::{Span, Spans};
 use super::{Item, Ray, Surface, reach};
 use crate::lanes::{Lanes, Real, V3};
 use crate::shape::form::Form;
@@ -85,5 +86,24 @@ impl<L: Lanes> Item<L> for Plane<L::Scalar> {
         let above = point.dot(normal) - L::splat(self.offset);
         let reach = L::splat(self.offset).abs();
         Surface { point: normal.mul_add(-above, point), normal, reach }
+    }
+}
+
+/// The half-spaces behind the planes.
+impl<L: Lanes> Spans<L> for Plane<L::Scalar> {
+    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+        let normal = V3::splat(self.normal);
+        let speed = ray.direction.dot(normal);
+        let height = ray.origin.dot(normal) - L::splat(self.offset);
+        let (all, none) = (L::of(L::MAX), L::of(-L::MAX));
+        let t = -height / speed;
+        let (enters, leaves) = (speed.lt(L::zero()), speed.gt(L::zero()));
+        // A line parallel to the plane is behind it or before it for ever. A crossing beyond all
+        // numbers is none.
+        let enter = L::select(enters, t.max(none).min(all), none);
+        let leave = L::select(leaves, t.max(none).min(all), all);
+        let meets = enters | leaves | height.le(L::zero());
+        let cosine = speed.abs();
+        Some(Span { enter, leave, enter_cosine: cosine, leave_cosine: cosine, meets })
     }
 }

@@ -1,18 +1,24 @@
 //! What rays meet: one batch per form, all items of a form side by side, so that a form that does
 //! not occur costs nothing.
 
+mod compound;
 mod convex;
 mod ellipsoid;
 mod flat;
+mod interval;
+mod span;
 mod sphere;
+mod tapered;
 
 use super::form::Form;
 use crate::lanes::{Lanes, Mask, V3};
+use compound::Compounds;
 use convex::Convex;
 use ellipsoid::Ellipsoid;
 use flat::{Parallelogram, Plane};
 use sphere::Sphere;
 use std::ops::Range;
+use tapered::Tapered;
 
 /// A packet of half-lines.
 #[derive(Clone, Copy, Debug)]
@@ -103,17 +109,23 @@ pub enum Batch<L: Lanes> {
     Ellipsoids(Vec<Ellipsoid<L::Scalar>>),
     /// Convex solids.
     Convex(Vec<Convex<L::Scalar>>),
+    /// Tapered cylinders.
+    Tapered(Vec<Tapered<L::Scalar>>),
+    /// Compounds, whose items are parts.
+    Compounds(Compounds<L::Scalar>),
 }
 
-/// The same expression for the items of any form.
+/// The same expression for the items of any form but compounds, and one for those.
 macro_rules! each {
-    ($batch:expr, $items:ident => $value:expr) => {
+    ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr) => {
         match $batch {
             Batch::Parallelograms($items) => $value,
             Batch::Planes($items) => $value,
             Batch::Spheres($items) => $value,
             Batch::Ellipsoids($items) => $value,
             Batch::Convex($items) => $value,
+            Batch::Tapered($items) => $value,
+            Batch::Compounds($compounds) => $other,
         }
     };
 }
@@ -122,20 +134,26 @@ impl<L: Lanes> Batch<L> {
     /// Narrows `hit` by the items in `range`; an item's tag is `base` + its number.
     #[inline(always)]
     pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
-        each!(self, items => closest(&items[range.clone()], base + range.start as u32, ray, hit));
+        each!(self,
+            items => closest(&items[range.clone()], base + range.start as u32, ray, hit),
+            compounds => compounds.closest(range, base, ray, hit));
     }
 
     /// Where a surface of the items in `range` lies at a distance in (0, limit) of the ray. May stop
     /// early once all lanes of `wanted` are blocked.
     #[inline(always)]
     pub fn blocked(&self, range: Range<usize>, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
-        each!(self, items => blocked(&items[range], ray, limit, wanted))
+        each!(self,
+            items => blocked(&items[range], ray, limit, wanted),
+            compounds => compounds.blocked(range, ray, limit, wanted))
     }
 
     /// The surface of `item` at `point` (near it, from `ray.at(t)`).
     #[inline(always)]
     pub fn surface(&self, item: usize, point: V3<L>) -> Surface<L> {
-        each!(self, items => items[item].surface(point))
+        each!(self,
+            items => items[item].surface(point),
+            compounds => compounds.surface(item, point))
     }
 }
 
@@ -162,12 +180,22 @@ fn blocked<L: Lanes>(items: &[impl Item<L>], ray: &Ray<L>, limit: L, wanted: L::
     blocked
 }
 
-/// A compiled batch and the numbers of the forms its items came from.
+/// What an item came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// Position in the list given to [`compile`].
+    pub form: usize,
+    /// Which part of a compound; 0 for all other forms. Part 0 stands for the whole compound where
+    /// rays ask for items; its other parts never meet anything by themselves.
+    pub part: usize,
+}
+
+/// A compiled batch and what its items came from.
 pub struct Compiled<L: Lanes> {
     /// The batch.
     pub batch: Batch<L>,
-    /// `sources[item]`: position in the list given to [`compile`].
-    pub sources: Vec<usize>,
+    /// `sources[item]`: which form, which part of it.
+    pub sources: Vec<Source>,
     /// How the inventory counts the items: singular and plural.
     pub noun: (&'static str, &'static str),
     /// Items without an end, which no tree can hold.
@@ -180,7 +208,10 @@ pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
     /// The items that `new` makes of some forms, as one batch.
     macro_rules! add {
         ($batch:ident, $item:ident, $noun:expr, $infinite:expr) => {
-            let made = forms.iter().enumerate().filter_map(|(i, f)| Some((i, $item::new(f)?)));
+            let made = forms
+                .iter()
+                .enumerate()
+                .filter_map(|(form, f)| Some((Source { form, part: 0 }, $item::new(f)?)));
             let (sources, items): (Vec<_>, Vec<_>) = made.unzip();
             if !items.is_empty() {
                 let batch = Batch::$batch(items);
@@ -193,6 +224,15 @@ pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
     add!(Spheres, Sphere, ("sphere", "spheres"), false);
     add!(Ellipsoids, Ellipsoid, ("ellipsoid", "ellipsoids"), false);
     add!(Convex, Convex, ("convex solid", "convex solids"), false);
+    add!(Tapered, Tapered, ("tapered cylinder", "tapered cylinders"), false);
+    let compounds = forms.iter().enumerate().filter(|(_, f)| matches!(f, Form::Compound(_)));
+    let sources: Vec<_> = compounds
+        .flat_map(|(form, f)| (0..f.parts()).map(move |part| Source { form, part }))
+        .collect();
+    if !sources.is_empty() {
+        let batch = Batch::Compounds(Compounds::new(forms));
+        out.push(Compiled { batch, sources, noun: ("compound", "compounds"), infinite: false });
+    }
     out
 }
 

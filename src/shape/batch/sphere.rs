@@ -1,5 +1,6 @@
 //! Spheres.
 
+use super::span::{Span, Spans};
 use super::{Item, Ray, Surface, reach};
 use crate::lanes::{Lanes, Mask, Real, V3};
 use crate::shape::form::Form;
@@ -66,5 +67,15 @@ impl<L: Lanes> Item<L> for Sphere<L::Scalar> {
         let normal = (point - center).normalize();
         let point = normal.mul_add(L::splat(self.radius), center);
         Surface { point, normal, reach: L::splat(self.reach) }
+    }
+}
+
+impl<L: Lanes> Spans<L> for Sphere<L::Scalar> {
+    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+        let f = ray.origin - V3::splat(self.center);
+        let (enter, leave, meets) = crossings(f, ray.direction, L::splat(self.radius2))?;
+        // Half the chord over the radius.
+        let cosine = (leave - enter) * (L::of(0.5) / L::splat(self.radius));
+        Some(Span { enter, leave, enter_cosine: cosine, leave_cosine: cosine, meets })
     }
 }
