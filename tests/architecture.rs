@@ -43,6 +43,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("obvhs", &["shape", "world"]),
     ("png", &["film"]),
     ("rayon", &["render"]),
+    ("rustix", &["render"]),
     ("serde", &["command", "scene", "shape", "material", "light", "camera", "value"]),
     ("serde_json", &["command"]),
     ("signal_hook", &["command"]),

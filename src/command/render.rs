@@ -143,7 +143,7 @@ fn write(
         let picture = Picture {
             film: &rendering.film,
             mix: &rendering.mix,
-            group_names: &rendering.world.group_names(),
+            group_names: &rendering.group_names(),
             display: display(&args),
             depth: if args.bits == 16 { Depth::Sixteen } else { Depth::Eight },
             metadata: &metadata,

@@ -11,9 +11,12 @@ mod curve;
 mod display;
 mod exr;
 mod exr_header;
+mod linear;
 mod mix;
 mod noise;
 mod png;
+mod probe;
+mod raster;
 mod resample;
 mod storage;
 mod target;
@@ -23,12 +26,15 @@ mod tile;
 
 pub use bad::{BAD_REMEMBERED, BadSample, BadSamples};
 pub use display::{Display, Tone, quantised_8, quantised_16};
+pub use linear::Linear;
 pub use mix::{Mix, Part};
 pub use noise::{Estimator, Noise, TileNoise};
+pub use probe::Probe;
+pub use raster::{Raster, Stale};
 pub use resample::Thumbnail;
 pub use storage::{Film, Header, Mismatch, Slot};
 pub use target::{Depth, Picture, Target, WriteError};
-pub use tile::{TILE_PIXELS, Tile, lattice_pixels};
+pub use tile::{MAX_FILM_GROUPS, TILE_PIXELS, Tile, lattice_pixels};
 
 /// Side of a tile, in pixels.
 pub const TILE: usize = 16;

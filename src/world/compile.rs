@@ -1,6 +1,7 @@
 //! From a scene to a world.
 
 use super::groups::{Groups, Member};
+use super::guide::Sight;
 use super::inventory::Inventory;
 use super::limits;
 use crate::camera::View;
@@ -277,6 +278,17 @@ impl AnyWorld {
     /// A name for each light group.
     pub fn group_names(&self) -> Vec<String> {
         either!(self, w => w.names.clone())
+    }
+
+    /// The light groups.
+    pub fn light_groups(&self) -> &Groups {
+        either!(self, w => &w.groups)
+    }
+
+    /// What the camera sees through each of `points` of the raster (columns and rows in pixels, with
+    /// fractions), into `seen` of the same length.
+    pub fn look(&self, points: &[[f64; 2]], seen: &mut [Sight]) {
+        either!(self, w => w.look(points, seen))
     }
 
     /// Steps per unit of radiance in the film's integers, per group: powers of two.

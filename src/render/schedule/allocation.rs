@@ -1,7 +1,7 @@
 //! Adaptive sampling: the next samples go where they lower the picture's error most per ray.
 
 use super::tile::Tile;
-use super::{Criterion, FULL, PACKET, Schedule};
+use super::{Criterion, FULL, PACKET, Schedule, to_packet};
 use crate::render::wave::Job;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -58,7 +58,7 @@ impl Law {
 /// of two and at least a packet, so that blocks stay aligned to what makes the sequence even.
 fn block(count: u32) -> u32 {
     let quarter = (count / 4).max(PACKET);
-    1 << quarter.ilog2()
+    (1 << quarter.ilog2()) + to_packet(count)
 }
 
 impl Schedule {
