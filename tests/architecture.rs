@@ -11,10 +11,11 @@ const ROOMS: &[(&str, &[&str])] = &[
     (
         "command",
         &[
-            "render", "world", "scene", "shape", "material", "light", "camera", "value", "film",
-            "sampling", "lanes",
+            "measure", "render", "world", "scene", "shape", "material", "light", "camera", "value",
+            "film", "sampling", "lanes",
         ],
     ),
+    ("measure", &["render", "world", "scene", "material", "film", "sampling"]),
     (
         "render",
         &[
@@ -38,9 +39,12 @@ const ROOMS: &[(&str, &[&str])] = &[
 const CRATES: &[(&str, &[&str])] = &[
     ("clap", &["command"]),
     ("crossbeam_channel", &["render"]),
+    ("csv", &["command"]),
+    ("epaint_default_fonts", &["measure"]),
     ("exr", &["film"]),
     ("indicatif", &["command"]),
     ("obvhs", &["shape", "world"]),
+    ("plotters", &["measure"]),
     ("png", &["film"]),
     ("rayon", &["render"]),
     ("rustix", &["render"]),
