@@ -9,6 +9,7 @@ pub mod film;
 pub mod lanes;
 pub mod light;
 pub mod material;
+pub mod measure;
 pub mod render;
 pub mod sampling;
 pub mod scene;

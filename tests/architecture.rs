@@ -12,6 +12,7 @@ const ROOMS: &[(&str, &[&str])] = &[
         "command",
         &[
             "dashboard",
+            "measure",
             "render",
             "world",
             "scene",
@@ -32,6 +33,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "sampling", "lanes",
         ],
     ),
+    ("measure", &["render", "world", "scene", "material", "film", "sampling"]),
     (
         "render",
         &[
@@ -57,10 +59,13 @@ const CRATES: &[(&str, &[&str])] = &[
     ("colorous", &["dashboard"]),
     ("crossbeam_channel", &["render", "dashboard"]),
     ("crossterm", &["dashboard"]),
+    ("csv", &["command"]),
+    ("epaint_default_fonts", &["measure"]),
     ("exr", &["film"]),
     ("indicatif", &["command"]),
     ("nucleo_matcher", &["dashboard"]),
     ("obvhs", &["shape", "world"]),
+    ("plotters", &["measure"]),
     ("png", &["film"]),
     ("ratatui", &["dashboard"]),
     ("rayon", &["render"]),

@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::film::Tone;
+use crate::measure::Topic;
 use crate::sampling::SamplerKind;
 use crate::world::Precision;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -52,6 +53,8 @@ pub struct EditArgs {
 pub enum Command {
     /// Render a scene to a picture file
     Render(Box<RenderArgs>),
+    /// Measure what accuracy costs on a scene: seconds to a given noise, what settings give and cost
+    Measure(Box<MeasureArgs>),
     /// Validate a scene and say what it contains
     Check(CheckArgs),
     /// Write a commented starter scene
@@ -112,6 +115,55 @@ pub struct RenderArgs {
     /// Write statistics of the run as JSON
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
+}
+
+/// Arguments of `zerkalo measure`.
+#[derive(Clone, Debug, Args)]
+pub struct MeasureArgs {
+    /// The scene file
+    pub scene: PathBuf,
+    /// Noise levels to reach, in 8-bit codes
+    #[arg(long, value_name = "CODES,..", value_parser = positive, value_delimiter = ',', default_value = "2,1,0.5,0.25")]
+    pub noise: Vec<f64>,
+    /// Compare only these settings, such as: adaptivity,precision,threads,sampler,lobe,level,depth,min-weight,rays-per-pixel
+    #[arg(long, value_name = "SETTING,..", value_delimiter = ',', conflicts_with = "full")]
+    pub only: Vec<Topic>,
+    /// Compare all settings, which takes about five minutes
+    #[arg(long)]
+    pub full: bool,
+    /// About so many seconds in all [default: 50, with --full 300]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
+    pub seconds: Option<f64>,
+    /// Time everything at least so many times
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub repetitions: u16,
+    /// Compare with this picture instead of one made with another seed
+    #[arg(long, value_name = "FILE.exr")]
+    pub reference: Option<PathBuf>,
+    /// Width and height in pixels, instead of the scene's
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// Threads that trace [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
+    pub threads: Option<u16>,
+    /// Number that the random choices follow from
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// Exposure, in stops, at which codes are told
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, allow_negative_numbers = true)]
+    pub exposure: f64,
+    /// Tone curve with which codes are told
+    #[arg(long, value_parser = tone(), default_value = "clip")]
+    pub tone: Tone,
+    /// Write everything as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub json: Option<PathBuf>,
+    /// Write the errors against samples and seconds as CSV
+    #[arg(long, value_name = "FILE.csv")]
+    pub csv: Option<PathBuf>,
+    /// Draw error against time
+    #[arg(long, value_name = "FILE.svg|png")]
+    pub plot: Option<PathBuf>,
 }
 
 /// Arguments of `zerkalo check`.

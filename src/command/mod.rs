@@ -4,6 +4,7 @@ mod args;
 mod check;
 mod cpu;
 mod edit;
+mod measure;
 mod new;
 mod progress;
 mod render;
@@ -39,6 +40,7 @@ pub fn main() -> ExitCode {
     let cli = understood();
     let result = match &cli.command {
         Some(Command::Render(args)) => render::run(args, started),
+        Some(Command::Measure(args)) => measure::run(args),
         Some(Command::Check(args)) => check::run(args),
         Some(Command::New(args)) => new::run(args),
         None => edit::run(&cli.edit),

@@ -1,5 +1,6 @@
 //! From a scene to a growing film: what to trace next, and the threads that do it.
 
+mod course;
 pub mod export;
 mod first;
 mod guide;
@@ -10,6 +11,7 @@ pub mod schedule;
 pub mod session;
 pub mod wave;
 
+pub use course::Course;
 pub use guide::Guide;
 pub use lighting::Lighting;
 pub use rendering::{Options, Rendering};
