@@ -71,7 +71,7 @@ fn intersect<L: Lanes>(c: &mut Criterion, kind: &str, form: &Form) {
     group.bench_function(name::<L>(), |b| {
         b.iter(|| {
             for ray in &rays {
-                black_box(geometry.closest(black_box(ray)));
+                black_box(geometry.closest(black_box(ray), geometry.all()));
             }
         })
     });
@@ -106,7 +106,7 @@ fn list_or_tree(c: &mut Criterion) {
             group.bench_function(name, |b| {
                 b.iter(|| {
                     for ray in &rays {
-                        black_box(geometry.closest(black_box(ray)));
+                        black_box(geometry.closest(black_box(ray), geometry.all()));
                     }
                 })
             });
@@ -130,11 +130,12 @@ fn paths<L: Lanes>(c: &mut Criterion) {
         let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
         b.iter(|| {
             for at in &pixels {
-                let seen = world.seen_through([at.0 as usize, at.1 as usize], [1, 1]);
+                let outlook = world.outlook([at.0 as usize, at.1 as usize], [1, 1]);
                 for first in (0..samples).step_by(L::WIDTH) {
-                    let draws = sampler.of_pixel(at.0, at.1, 0, first as u32);
+                    let points = sampler.aligned(first as u32);
+                    let draws = points.of_pixel(*at, 0);
                     let rays = world.view().rays_of(*at, draws.pixel());
-                    black_box(world.trace(rays, seen.as_ref(), &draws, all, &mut radiance));
+                    black_box(world.trace(rays, outlook.as_ref(), &draws, all, &mut radiance));
                 }
             }
         })
@@ -148,7 +149,8 @@ fn sampler(c: &mut Criterion) {
         let sampler = Sampler::<Single>::new(SampleSettings { seed: 1, kind }, true);
         group.bench_function(kind.name(), |b| {
             b.iter(|| {
-                let draws = sampler.of_pixel(black_box(17), 23, 0, 64);
+                let points = sampler.aligned(64);
+                let draws = points.of_pixel((black_box(17), 23), 0);
                 (draws.pixel(), draws.lobe(0))
             })
         });

@@ -5,10 +5,12 @@
 pub mod asset;
 pub mod camera;
 pub mod command;
+pub mod dashboard;
 pub mod film;
 pub mod lanes;
 pub mod light;
 pub mod material;
+pub mod measure;
 pub mod render;
 pub mod sampling;
 pub mod scene;

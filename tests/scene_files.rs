@@ -46,7 +46,12 @@ fn every_bad_scene_is_refused_with_its_words() {
 }
 
 /// Scenes that are meant to be warned about, and the words of the warning.
-const WARNED: &[(&str, &str)] = &[("brighter-than-its-light.toml", "more than the light")];
+const WARNED: &[(&str, &str)] = &[
+    ("brighter-than-its-light.toml", "more than the light"),
+    // Colours up to 7, as its formula has them.
+    ("reflecting-tracks.toml", "more than the light"),
+    ("reflecting-tracks-lit.toml", "more than the light"),
+];
 
 #[test]
 fn every_scene_can_be_read_and_says_what_it_shows() {
@@ -154,4 +159,31 @@ fn what_cannot_be_read_is_told() {
 fn an_endless_device_is_not_read_to_its_end() {
     let error = Scene::read("/dev/zero".as_ref()).unwrap_err().to_string();
     assert!(error.contains("larger than 64 MiB"), "{error}");
+}
+
+#[test]
+fn the_tracks_are_where_their_formula_puts_them() {
+    for file in ["scenes/reflecting-tracks.toml", "scenes/reflecting-tracks-lit.toml"] {
+        let scene = Scene::read(file.as_ref()).unwrap();
+        assert_eq!(scene.objects.len(), 401);
+        let mirror = &scene.materials[&scene.objects[0].material];
+        assert_eq!(scene.objects[0].shape.form(), ball([20.0, 0.0, -40.0], 15.0));
+        assert_eq!((mirror.color.0, mirror.reflection), ([0.6, 0.6, 0.4], 1.0));
+        for (n, object) in scene.objects[1..].iter().enumerate() {
+            let (i, j) = ((n / 10) as f64, (n % 10) as f64);
+            let center = [i - 9.0, 7.0 - 5.0 * i.sqrt(), 6.0 - j * j];
+            assert_eq!(object.shape.form(), ball(center, 0.8), "{i} {j}");
+            let m = &scene.materials[&object.material];
+            let color = [0.02 * i * j, 0.7, 0.01 * i * j];
+            assert!(m.color.0.iter().zip(color).all(|(a, b)| (a - b).abs() < 1e-9), "{i} {j}");
+            assert_eq!((m.diffuse, m.specular, m.exponent, m.reflection), (0.4, 0.4, 10.0, 0.0));
+        }
+        assert_eq!(scene.film.size, [640, 480]);
+        assert_eq!((scene.camera.eye, scene.camera.target), ([5.0, 0.0, 40.0], Some([0.0; 3])));
+        assert_eq!(scene.lights.iter().filter(|l| l.point.is_some()).count(), 2);
+    }
+}
+
+fn ball(center: [f64; 3], radius: f64) -> Form {
+    Form::Sphere { center: center.into(), radius }
 }

@@ -1,5 +1,6 @@
 //! The camera: a pinhole.
 
+mod navigate;
 mod view;
 
 pub use view::View;

@@ -84,14 +84,12 @@ impl View {
         [self.u, self.v, self.w]
     }
 
-    /// The cone about the rays through a rectangle of the raster: `(axis, half-angle)`, in radians.
-    pub fn cone(&self, [x, y]: [usize; 2], [width, height]: [usize; 2]) -> (DVec3, f64) {
-        let toward = |x: f64, y: f64| self.corner + self.right * x + self.down * y;
+    /// From the eye to the corners of a rectangle of the raster, on the picture plane at unit distance.
+    pub fn corners(&self, [x, y]: [usize; 2], [width, height]: [usize; 2]) -> [DVec3; 4] {
         let (x0, y0) = (x as f64, y as f64);
         let (x1, y1) = (x0 + width as f64, y0 + height as f64);
-        let axis = toward(0.5 * (x0 + x1), 0.5 * (y0 + y1)).normalize();
-        let corners = [toward(x0, y0), toward(x1, y0), toward(x0, y1), toward(x1, y1)];
-        (axis, corners.iter().map(|c| c.angle_between(axis)).fold(0.0, f64::max))
+        [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+            .map(|(x, y)| self.corner + self.right * x + self.down * y)
     }
 
     /// Origins and unit directions of rays through the points `(x, y) + (dx, dy)` of the raster, in

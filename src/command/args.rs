@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::film::Tone;
+use crate::measure::Topic;
 use crate::sampling::SamplerKind;
 use crate::world::Precision;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -11,16 +12,40 @@ use std::path::PathBuf;
 #[derive(Debug, Parser)]
 #[command(version, about, args_conflicts_with_subcommands = true)]
 #[command(
-    after_help = "Exit status: 0 done, 1 failed, 2 wrong usage, 130 or 143 stopped by a signal \
-                        after writing the picture so far."
+    after_help = "Without a command the dashboard opens: edit the scene, watch it converge.\n\n\
+                        Exit status: 0 done, 1 failed, 2 wrong usage, 129, 130 or 143 stopped by a \
+                        signal (`render` then writes the picture so far)."
 )]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// A scene file.
-    #[arg(hide = true)]
+    /// What the dashboard is opened with.
+    #[command(flatten)]
+    pub edit: EditArgs,
+}
+
+/// Arguments of `zerkalo` without a command.
+#[derive(Clone, Debug, Args)]
+pub struct EditArgs {
+    /// A scene file [default: the built-in mirror room]
     pub scene: Option<PathBuf>,
+    /// Threads that trace [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
+    pub threads: Option<u16>,
+    /// Number that the random choices follow from; the same seed gives the same picture
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// Precision of the geometry; auto: double where the scene's proportions need it
+    #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]
+    pub precision: PrecisionArg,
+    /// Colours of the terminal: 24-bit, 256, 16 or none; auto: as the environment tells
+    #[arg(long, value_enum, default_value_t = ColorArg::Auto)]
+    pub color: ColorArg,
+    /// Write how long the answers to keys and mouse took, as CSV, and print the distribution at the
+    /// end
+    #[arg(long, value_name = "FILE.csv", hide = true)]
+    pub trace: Option<PathBuf>,
 }
 
 /// What to do.
@@ -28,6 +53,8 @@ pub struct Cli {
 pub enum Command {
     /// Render a scene to a picture file
     Render(Box<RenderArgs>),
+    /// Measure what accuracy costs on a scene: seconds to a given noise, what settings give and cost
+    Measure(Box<MeasureArgs>),
     /// Validate a scene and say what it contains
     Check(CheckArgs),
     /// Write a commented starter scene
@@ -90,6 +117,55 @@ pub struct RenderArgs {
     pub stats: Option<PathBuf>,
 }
 
+/// Arguments of `zerkalo measure`.
+#[derive(Clone, Debug, Args)]
+pub struct MeasureArgs {
+    /// The scene file
+    pub scene: PathBuf,
+    /// Noise levels to reach, in 8-bit codes
+    #[arg(long, value_name = "CODES,..", value_parser = positive, value_delimiter = ',', default_value = "2,1,0.5,0.25")]
+    pub noise: Vec<f64>,
+    /// Compare only these settings, such as: adaptivity,precision,threads,sampler,lobe,level,depth,min-weight,rays-per-pixel
+    #[arg(long, value_name = "SETTING,..", value_delimiter = ',', conflicts_with = "full")]
+    pub only: Vec<Topic>,
+    /// Compare all settings, which takes about five minutes
+    #[arg(long)]
+    pub full: bool,
+    /// About so many seconds in all [default: 50, with --full 300]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
+    pub seconds: Option<f64>,
+    /// Time everything at least so many times
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub repetitions: u16,
+    /// Compare with this picture instead of one made with another seed
+    #[arg(long, value_name = "FILE.exr")]
+    pub reference: Option<PathBuf>,
+    /// Width and height in pixels, instead of the scene's
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// Threads that trace [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
+    pub threads: Option<u16>,
+    /// Number that the random choices follow from
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// Exposure, in stops, at which codes are told
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, allow_negative_numbers = true)]
+    pub exposure: f64,
+    /// Tone curve with which codes are told
+    #[arg(long, value_parser = tone(), default_value = "clip")]
+    pub tone: Tone,
+    /// Write everything as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub json: Option<PathBuf>,
+    /// Write the errors against samples and seconds as CSV
+    #[arg(long, value_name = "FILE.csv")]
+    pub csv: Option<PathBuf>,
+    /// Draw error against time
+    #[arg(long, value_name = "FILE.svg|png")]
+    pub plot: Option<PathBuf>,
+}
+
 /// Arguments of `zerkalo check`.
 #[derive(Debug, Args)]
 pub struct CheckArgs {
@@ -113,6 +189,23 @@ pub enum PrecisionArg {
     Double,
     /// As the scene's proportions need it
     Auto,
+}
+
+/// Values of `--color`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ColorArg {
+    /// As the environment tells
+    Auto,
+    /// 24-bit
+    True,
+    /// The 256 of xterm
+    #[value(name = "256")]
+    Indexed,
+    /// The 16 of every terminal
+    #[value(name = "16")]
+    Sixteen,
+    /// None
+    None,
 }
 
 /// Values of `--sampler`.
@@ -227,6 +320,10 @@ mod tests {
     fn a_scene_alone_is_understood() {
         assert!(Cli::try_parse_from(["zerkalo"]).unwrap().command.is_none());
         let cli = Cli::try_parse_from(["zerkalo", "a.toml"]).unwrap();
-        assert_eq!(cli.scene, Some(PathBuf::from("a.toml")));
+        assert_eq!(cli.edit.scene, Some(PathBuf::from("a.toml")));
+        let cli = Cli::try_parse_from(["zerkalo", "a.toml", "--color", "256", "--threads", "2"]);
+        let edit = cli.unwrap().edit;
+        assert_eq!((edit.color, edit.threads), (ColorArg::Indexed, Some(2)));
+        assert!(Cli::try_parse_from(["zerkalo", "--color", "17"]).is_err());
     }
 }

@@ -3,7 +3,8 @@
 mod args;
 mod check;
 mod cpu;
-mod metadata;
+mod edit;
+mod measure;
 mod new;
 mod progress;
 mod render;
@@ -28,7 +29,7 @@ enum Failure {
     Failed(String),
     /// Exit status 2, and why.
     Usage(String),
-    /// Ended by a signal after saving what there is: the exit status, 130 or 143.
+    /// Ended by a signal after saving what there is: the exit status, 129, 130 or 143.
     Signalled(u8),
 }
 
@@ -39,9 +40,10 @@ pub fn main() -> ExitCode {
     let cli = understood();
     let result = match &cli.command {
         Some(Command::Render(args)) => render::run(args, started),
+        Some(Command::Measure(args)) => measure::run(args),
         Some(Command::Check(args)) => check::run(args),
         Some(Command::New(args)) => new::run(args),
-        None => Err(no_command(&cli)),
+        None => edit::run(&cli.edit),
     };
     let (status, message) = match result {
         Ok(()) => return ExitCode::SUCCESS,
@@ -70,11 +72,9 @@ fn understood() -> Cli {
     })
 }
 
-fn no_command(cli: &Cli) -> Failure {
-    let scene = cli.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
-    Failure::Usage(format!(
-        "nothing to do: `zerkalo render {scene} -o PICTURE.png` renders a scene, `zerkalo --help` tells more"
-    ))
+/// One thread per processor.
+fn all_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// A line on stderr; if nobody can read it, that is no reason to fail.

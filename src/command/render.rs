@@ -4,8 +4,9 @@ use super::args::RenderArgs;
 use super::progress::Progress;
 use super::signals::Signals;
 use super::stats::{Stats, peak_rss_bytes};
-use super::{Failure, metadata, say, warn};
-use crate::film::{Depth, Display, Picture, Target, WriteError};
+use super::{Failure, all_threads, say, warn};
+use crate::film::{Depth, Display, Target, WriteError};
+use crate::render::export::{Origin, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use crate::render::session::{Report, Session, State};
 use crate::render::{Options, Rendering};
@@ -37,10 +38,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
     let signals = Signals::watch().map_err(|e| Failure::Failed(format!("no signals: {e}")))?;
 
-    let threads = match args.threads {
-        Some(n) => usize::from(n),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
+    let threads = args.threads.map_or_else(all_threads, usize::from);
     let mut session: Session<Rendering> =
         Session::new(threads, options(args), schedule_settings(args)).map_err(|error| {
             Failure::Failed(format!(
@@ -53,7 +51,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let end = watch(&session, &signals)?;
 
     let writing = Instant::now();
-    let hash = metadata::scene_hash(document.text());
+    let hash = scene_hash(document.text());
     let (report, lanes, written) = write(&session, args, &target, hash.clone())
         .ok_or_else(|| Failure::Failed("the renderer has no picture".to_string()))?;
     written.map_err(failed_write)?;
@@ -137,18 +135,17 @@ fn write(
     target: &Target,
     hash: String,
 ) -> Option<Written> {
-    let (args, target) = (args.clone(), target.clone());
+    let origin = Origin {
+        source: args.scene.display().to_string(),
+        scene_hash: hash,
+        sampler: args.sampler.kind(),
+        adaptive: !args.uniform,
+    };
+    let depth = if args.bits == 16 { Depth::Sixteen } else { Depth::Eight };
+    let (display, target) = (display(args), target.clone());
     session.with(move |rendering, report| {
-        let metadata = metadata::of_picture(&args, &hash, rendering, report);
-        let picture = Picture {
-            film: &rendering.film,
-            mix: &rendering.mix,
-            group_names: &rendering.world.group_names(),
-            display: display(&args),
-            depth: if args.bits == 16 { Depth::Sixteen } else { Depth::Eight },
-            metadata: &metadata,
-        };
-        (report.clone(), rendering.world.lanes(), target.write(&picture))
+        let written = rendering.write(report, &origin, display, depth, &target);
+        (report.clone(), rendering.world.lanes(), written)
     })
 }
 

@@ -11,9 +11,15 @@ mod curve;
 mod display;
 mod exr;
 mod exr_header;
+mod exr_read;
+mod linear;
 mod mix;
 mod noise;
+#[cfg(test)]
+mod noise_test;
 mod png;
+mod probe;
+mod raster;
 mod resample;
 mod storage;
 mod target;
@@ -23,12 +29,17 @@ mod tile;
 
 pub use bad::{BAD_REMEMBERED, BadSample, BadSamples};
 pub use display::{Display, Tone, quantised_8, quantised_16};
+pub use exr_read::{ReadPicture, read_exr};
+pub use linear::Linear;
 pub use mix::{Mix, Part};
 pub use noise::{Estimator, Noise, TileNoise};
+pub use png::png_of_rgb;
+pub use probe::Probe;
+pub use raster::{Raster, Stale};
 pub use resample::Thumbnail;
 pub use storage::{Film, Header, Mismatch, Slot};
 pub use target::{Depth, Picture, Target, WriteError};
-pub use tile::{TILE_PIXELS, Tile, lattice_pixels};
+pub use tile::{MAX_FILM_GROUPS, TILE_PIXELS, Tile, lattice_pixels};
 
 /// Side of a tile, in pixels.
 pub const TILE: usize = 16;

@@ -51,6 +51,22 @@ fn encode_to(picture: &Picture, sink: &mut dyn Sink) -> Result<(), EncodingError
     writer.finish()
 }
 
+/// A PNG of rows of red, green, blue, 8 bits each, sRGB.
+///
+/// # Errors
+/// The bytes are not as many as the size says.
+pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, width, height);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(rgb)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
 /// The picture's bytes: rows of red, green, blue; 16-bit values big end first, as PNG has them.
 fn pixels(picture: &Picture) -> Vec<u8> {
     let (film, mut row) = (picture.film, Vec::new());

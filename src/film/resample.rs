@@ -1,6 +1,7 @@
 //! The film at another resolution, for displays: box averages of whatever samples exist.
 
-use super::mix::{Mix, Part};
+use super::mix::Mix;
+use super::raster::{Raster, Stale};
 use super::storage::Film;
 
 /// Means of the film over the cells of a raster, for each light group by itself, so that lights can
@@ -17,6 +18,16 @@ pub struct Thumbnail {
 }
 
 impl Thumbnail {
+    /// From means in `[row][column][group][channel]`.
+    pub(super) fn new([cols, rows]: [usize; 2], means: Vec<f32>, groups: usize) -> Self {
+        Self { cols, rows, means, groups }
+    }
+
+    /// Number of light groups: what a [`Mix`] for it needs weights for.
+    pub fn groups(&self) -> usize {
+        self.groups
+    }
+
     /// Radiance, `[row][column]`.
     pub fn mixed(&self, mix: &Mix) -> Vec<[f32; 3]> {
         assert_eq!(mix.weights.len(), self.groups, "weights for the groups of the film");
@@ -33,15 +44,15 @@ impl Thumbnail {
 }
 
 /// Which pixels a cell covers in one direction, and how much of each.
-struct Cover {
+pub(super) struct Cover {
     /// First pixel.
-    first: usize,
+    pub first: usize,
     /// Covered part of each pixel, from `first` on; 0..=1.
-    parts: Vec<f64>,
+    pub parts: Vec<f64>,
 }
 
 /// Divides `pixels` into `cells` of equal width.
-fn covers(pixels: usize, cells: usize) -> Vec<Cover> {
+pub(super) fn covers(pixels: usize, cells: usize) -> Vec<Cover> {
     let edge = |cell: usize| cell as f64 * pixels as f64 / cells as f64;
     let cover = |cell: usize| {
         let (from, to) = (edge(cell), edge(cell + 1));
@@ -65,83 +76,21 @@ impl Film {
     /// looks like the nearest one of its row that has some, a row without samples like the nearest
     /// row; a film without samples is black.
     pub fn thumbnail(&self, cols: usize, rows: usize) -> Thumbnail {
-        let stride = 3 * self.groups();
-        let mut means = vec![0.0f32; cols * rows * stride];
-        let mut known = vec![false; cols * rows];
-        if cols > 0 && rows > 0 {
-            self.average(
-                &covers(self.width(), cols),
-                &covers(self.height(), rows),
-                &mut means,
-                &mut known,
-            );
-            spread(&mut means, &mut known, cols, rows, stride);
-        }
-        Thumbnail { cols, rows, means, groups: self.groups() }
-    }
-
-    fn average(&self, xs: &[Cover], ys: &[Cover], means: &mut [f32], known: &mut [bool]) {
-        let stride = 3 * self.groups();
-        let inverse: Vec<f64> = self.scales().iter().flat_map(|s| [1.0 / s; 3]).collect();
-        // One row of pixels: means, and 1 for pixels with samples. Reused while cells share it.
-        let mut line = vec![0.0; self.width() * stride];
-        let mut has = vec![0.0; self.width()];
-        let mut loaded = usize::MAX;
-        let mut sums = vec![0.0; xs.len() * stride];
-        let mut areas = vec![0.0; xs.len()];
-        for (row, cover) in ys.iter().enumerate() {
-            sums.fill(0.0);
-            areas.fill(0.0);
-            for (y, height) in (cover.first..).zip(&cover.parts) {
-                if loaded != y {
-                    self.load_row(y, &inverse, &mut line, &mut has);
-                    loaded = y;
-                }
-                for (col, cover) in xs.iter().enumerate() {
-                    let sum = &mut sums[col * stride..][..stride];
-                    for (x, width) in (cover.first..).zip(&cover.parts) {
-                        let area = width * height * has[x];
-                        areas[col] += area;
-                        for (sum, mean) in sum.iter_mut().zip(&line[x * stride..]) {
-                            *sum += area * mean;
-                        }
-                    }
-                }
-            }
-            for col in 0..xs.len() {
-                let cell = row * xs.len() + col;
-                known[cell] = areas[col] > 0.0;
-                if known[cell] {
-                    for i in 0..stride {
-                        means[cell * stride + i] = (sums[col * stride + i] / areas[col]) as f32;
-                    }
-                }
-            }
-        }
-    }
-
-    fn load_row(&self, y: usize, inverse: &[f64], line: &mut [f64], has: &mut [f64]) {
-        line.fill(0.0);
-        has.fill(0.0);
-        let stride = inverse.len();
-        self.visit_row(y, |x, sums| {
-            let count = sums.count(Part::Both);
-            if count > 0 {
-                has[x] = 1.0;
-                let per_sample = 1.0 / f64::from(count);
-                let [a, b] = sums.values;
-                let means = &mut line[x * stride..][..stride];
-                for (((mean, a), b), inverse) in means.iter_mut().zip(a).zip(b).zip(inverse) {
-                    *mean = (*a as f64 + *b as f64) * (inverse * per_sample);
-                }
-            }
-        });
+        let mut raster = Raster::new(self, cols, rows);
+        raster.stale(self).into_iter().for_each(Stale::refresh);
+        raster.thumbnail()
     }
 }
 
 /// Gives cells without samples the means of the nearest known cell of their row, then rows without
 /// any the means of the nearest row.
-fn spread(means: &mut [f32], known: &mut [bool], cols: usize, rows: usize, stride: usize) {
+pub(super) fn spread(
+    means: &mut [f32],
+    known: &mut [bool],
+    cols: usize,
+    rows: usize,
+    stride: usize,
+) {
     let mut row_known = vec![false; rows];
     for row in 0..rows {
         let known = &known[row * cols..][..cols];
@@ -158,7 +107,7 @@ fn spread(means: &mut [f32], known: &mut [bool], cols: usize, rows: usize, strid
 }
 
 /// For each place the nearest known one (the lower of two); itself if none is known.
-fn nearest(known: &[bool]) -> Vec<usize> {
+pub(super) fn nearest(known: &[bool]) -> Vec<usize> {
     let mut below: Vec<Option<usize>> = Vec::with_capacity(known.len());
     for (i, k) in known.iter().enumerate() {
         below.push(if *k { Some(i) } else { below.last().copied().flatten() });

@@ -2,7 +2,7 @@
 
 use super::TILE;
 use super::bad::BadSamples;
-use super::tile::Tile;
+use super::tile::{MAX_FILM_GROUPS, Tile};
 use std::fmt;
 
 /// What two films must share to be added.
@@ -81,11 +81,13 @@ impl Film {
     /// A film without samples.
     ///
     /// # Panics
-    /// If width, height or the number of groups is 0, or a scale is not a power of two.
+    /// If width, height or the number of groups is 0, there are more than [`MAX_FILM_GROUPS`], or a
+    /// scale is not a power of two.
     pub fn new(header: Header) -> Self {
         let Header { width, height, scales, .. } = &header;
         assert!(*width > 0 && *height > 0, "a film of {width} x {height} pixels");
         assert!(!scales.is_empty(), "a film without light groups");
+        assert!(scales.len() <= MAX_FILM_GROUPS, "a film of {} light groups", scales.len());
         for scale in scales {
             let power_of_two = scale.is_normal() && *scale > 0.0 && scale.to_bits() << 12 == 0;
             assert!(power_of_two, "a film scale of {scale}, which is not a power of two");
@@ -97,6 +99,28 @@ impl Film {
             .map(|extent| Tile::untouched(scales.len(), extent))
             .collect();
         Self { epoch: 1, tiles, header }
+    }
+
+    /// A film without samples in the memory of this one, which may be of another kind.
+    ///
+    /// # Panics
+    /// As [`Film::new`].
+    pub fn renewed(mut self, header: Header) -> Self {
+        if header == self.header {
+            self.restart();
+            return self;
+        }
+        let mut film = Self::new(header);
+        // Beyond every epoch of the old tiles.
+        film.epoch = self.epoch + 1;
+        let memory = self.tiles.into_iter().map(Tile::into_memory);
+        film.tiles = film
+            .tiles
+            .into_iter()
+            .zip(memory.chain(std::iter::repeat(Vec::new())))
+            .map(|(tile, memory)| tile.with_memory(memory))
+            .collect();
+        film
     }
 
     /// Columns, in pixels.
@@ -124,7 +148,13 @@ impl Film {
         &self.header
     }
 
-    /// Forgets all samples. Tiles are cleared when they are next touched.
+    /// Changes whenever samples are forgotten. Within one epoch, equal counts of a tile mean equal
+    /// contents.
+    pub(super) fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// Forgets all samples. Tiles are cleared when they are next touched, pixel by pixel.
     pub fn restart(&mut self) {
         self.epoch += 1;
     }
@@ -280,6 +310,27 @@ mod tests {
         assert_eq!((film.samples(), film.bytes()), (0, empty));
         fill(&mut film, 2, |x, _, _| vec![x as f64; 3]);
         assert_eq!(film.bytes(), full);
+    }
+
+    #[test]
+    fn memory_used_again_holds_nothing() {
+        let value = |x: usize| vec![x as f64 + 1.0; 3];
+        let mut old = film(40, 40, &[1.0]);
+        fill(&mut old, 2, |x, _, _| value(x));
+        let wanted = |width, height, groups: usize| {
+            let header = film(width, height, &vec![4.0; groups]).header().clone();
+            let mut fresh = Film::new(header.clone());
+            fill(&mut fresh, 1, |x, _, _| value(x).repeat(groups));
+            (header, fresh.bytes())
+        };
+        // Fewer, more and equally many tiles; more and fewer groups.
+        for (width, height, groups) in [(20, 20, 1), (70, 30, 3), (70, 30, 2), (40, 40, 1)] {
+            let (header, bytes) = wanted(width, height, groups);
+            old = old.renewed(header);
+            assert_eq!((old.samples(), old.touched().count()), (0, 0));
+            fill(&mut old, 1, |x, _, _| value(x).repeat(groups));
+            assert_eq!(old.bytes(), bytes, "{width} x {height}, {groups} groups");
+        }
     }
 
     #[test]

@@ -6,6 +6,12 @@ use super::{BadSample, TILE};
 /// Number of pixels in a tile.
 pub const TILE_PIXELS: usize = TILE * TILE;
 
+/// The most light groups of a film.
+pub const MAX_FILM_GROUPS: usize = 16;
+
+/// The sums of a pixel that has none.
+static NOTHING: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
+
 /// The sums of one 16x16 square of pixels. Pixels are numbered `y * 16 + x` inside the tile; the
 /// tiles at the right and lower edge have pixels that lie outside the picture (see
 /// [`Tile::extent`]) and stay zero.
@@ -26,6 +32,10 @@ pub struct Tile {
     bad: BadSamples,
     /// `[replicate][pixel][group][channel]`; empty until the first touch.
     sums: Vec<i64>,
+    /// Bit `p % 64` of `[replicate][p / 64]`: the sums of pixel p are of this epoch. Those of other
+    /// pixels are zero, whatever is stored: so a restart costs nothing per pixel, and the first few
+    /// samples of a large film touch only a few of its pages of memory.
+    written: [[u64; TILE_PIXELS / 64]; 2],
 }
 
 impl Tile {
@@ -39,7 +49,18 @@ impl Tile {
             saturated: false,
             bad: BadSamples::default(),
             sums: Vec::new(),
+            written: Default::default(),
         }
+    }
+
+    /// The tile's memory for another film; its contents mean nothing there.
+    pub(super) fn into_memory(self) -> Vec<i64> {
+        self.sums
+    }
+
+    /// Gives an untouched tile memory to use again.
+    pub(super) fn with_memory(self, sums: Vec<i64>) -> Self {
+        Self { sums, ..self }
     }
 
     /// Makes the tile one of `epoch`: allocates or clears it if it is not one yet.
@@ -47,11 +68,14 @@ impl Tile {
         if self.epoch == epoch {
             return;
         }
-        if self.sums.is_empty() {
-            self.sums = vec![0; 2 * TILE_PIXELS * self.stride];
+        let len = 2 * TILE_PIXELS * self.stride;
+        if self.sums.capacity() >= len {
+            self.sums.resize(len, 0);
         } else {
-            self.sums.fill(0);
+            // Not by growing, which would copy what means nothing any more.
+            self.sums = vec![0; len];
         }
+        self.written = Default::default();
         self.epoch = epoch;
         self.counts = [0; 2];
         self.lattice_px = 0;
@@ -126,14 +150,29 @@ impl Tile {
     #[inline(always)]
     pub fn pixel_mut(&mut self, replicate: usize, pixel: usize) -> &mut [i64] {
         let start = (replicate * TILE_PIXELS + pixel) * self.stride;
-        &mut self.sums[start..start + self.stride]
+        let sums = &mut self.sums[start..start + self.stride];
+        let (word, bit) = (&mut self.written[replicate][pixel / 64], 1 << (pixel % 64));
+        if *word & bit == 0 {
+            *word |= bit;
+            sums.fill(0);
+        }
+        sums
     }
 
     /// The sums of one pixel and replicate: `[group][channel]`.
     #[inline(always)]
     pub fn pixel(&self, replicate: usize, pixel: usize) -> &[i64] {
+        if self.written[replicate][pixel / 64] >> (pixel % 64) & 1 == 0 {
+            return &NOTHING[..self.stride];
+        }
         let start = (replicate * TILE_PIXELS + pixel) * self.stride;
         &self.sums[start..start + self.stride]
+    }
+
+    /// Every replicate and pixel whose sums can be other than zero.
+    fn written(&self) -> impl Iterator<Item = (usize, usize)> {
+        let all = (0..2).flat_map(|r| (0..TILE_PIXELS).map(move |p| (r, p)));
+        all.filter(|(r, p)| self.written[*r][p / 64] >> (p % 64) & 1 != 0)
     }
 
     /// Adds non-negative `values` (`[group][channel]`, length `groups * 3`) to a pixel. A sum that
@@ -141,9 +180,18 @@ impl Tile {
     /// the same sums in any order even then.
     #[inline(always)]
     pub fn add(&mut self, replicate: usize, pixel: usize, values: &[i64]) {
+        for (group, values) in values.chunks_exact(3).enumerate() {
+            self.add_group(replicate, pixel, group, [values[0], values[1], values[2]]);
+        }
+    }
+
+    /// The same for one group.
+    #[inline(always)]
+    pub fn add_group(&mut self, replicate: usize, pixel: usize, group: usize, values: [i64; 3]) {
+        let sums = &mut self.pixel_mut(replicate, pixel)[3 * group..][..3];
         let mut overflowed = false;
-        for (sum, value) in self.pixel_mut(replicate, pixel).iter_mut().zip(values) {
-            overflowed |= add_saturating(sum, *value);
+        for (sum, value) in sums.iter_mut().zip(values) {
+            overflowed |= add_saturating(sum, value);
         }
         self.saturated |= overflowed;
     }
@@ -153,7 +201,8 @@ impl Tile {
         if !self.saturated {
             return 0;
         }
-        self.sums.iter().filter(|sum| **sum == i64::MAX).count() as u64
+        let full = |(r, p)| self.pixel(r, p).iter().filter(|sum| **sum == i64::MAX).count() as u64;
+        self.written().map(full).sum()
     }
 
     /// Records a sample that was NaN, infinite or negative. It counts as a sample of value 0.
@@ -171,11 +220,10 @@ impl Tile {
         if self.lattice_px != 0 && other.lattice_px != 0 {
             return Err(());
         }
-        let mut overflowed = false;
-        for (sum, value) in self.sums.iter_mut().zip(&other.sums) {
-            overflowed |= add_saturating(sum, *value);
+        for (replicate, pixel) in other.written() {
+            self.add(replicate, pixel, other.pixel(replicate, pixel));
         }
-        self.saturated |= overflowed | other.saturated;
+        self.saturated |= other.saturated;
         self.lattice_px = self.lattice_px.max(other.lattice_px);
         for replicate in 0..2 {
             self.advance(replicate, other.counts[replicate]);
@@ -268,5 +316,16 @@ mod tests {
         assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (1, [1, 0]));
         tile.touch(2);
         assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (0, [0, 0]));
+        // Also where the first thing that happens is a write, and in memory of another stride.
+        tile.add(0, 0, &[2; 6]);
+        assert_eq!((tile.pixel(0, 0), tile.pixel(1, 0)), (&[2; 6][..], &[0; 6][..]));
+        for groups in [1, 3] {
+            let memory = std::mem::replace(&mut tile, Tile::untouched(groups, [16, 16]));
+            tile = tile.with_memory(memory.into_memory());
+            tile.touch(7);
+            tile.add(1, 255, &vec![5; 3 * groups]);
+            assert_eq!(tile.pixel(1, 255), vec![5; 3 * groups]);
+            assert!((0..255).all(|p| tile.pixel(1, p) == vec![0; 3 * groups]));
+        }
     }
 }

@@ -43,6 +43,8 @@ pub const MAX_WIDTH: usize = 16;
 
 /// One lane: `f32` or `f64`.
 pub trait Real: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
+    /// Distance from 1 to the next larger number of this precision.
+    const EPSILON: f64;
     /// Nearest value of this precision.
     fn of(x: f64) -> Self;
     /// Exact.
@@ -50,6 +52,7 @@ pub trait Real: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
 }
 
 impl Real for f32 {
+    const EPSILON: f64 = f32::EPSILON as f64;
     #[inline(always)]
     fn of(x: f64) -> Self {
         x as f32
@@ -61,6 +64,7 @@ impl Real for f32 {
 }
 
 impl Real for f64 {
+    const EPSILON: f64 = f64::EPSILON;
     #[inline(always)]
     fn of(x: f64) -> Self {
         x
@@ -151,7 +155,7 @@ pub trait Lanes:
     /// Name for statistics and file headers, such as `f32x8`.
     const NAME: &'static str;
     /// Distance from 1 to the next larger number of this precision.
-    const EPSILON: f64;
+    const EPSILON: f64 = Self::Scalar::EPSILON;
     /// Largest finite number of this precision.
     const MAX: f64;
     /// One lane.
@@ -234,9 +238,6 @@ pub trait Lanes:
     fn tag_lane(self, i: usize) -> u32;
     /// Where the label is `label`.
     fn has_tag(self, label: u32) -> Self::Mask;
-    /// The label of all lanes in which `mask` is true, if it is one and the same (`None`: they
-    /// differ, or the mask is empty).
-    fn same_tag(self, mask: Self::Mask) -> Option<u32>;
 
     /// Uniform in [0, 1) from 32 random bits: 24 of them in single precision, all in double (there
     /// in the middle of its step).
@@ -249,12 +250,12 @@ pub trait Lanes:
     fn fixed(self, scale: f64, out: &mut [i64; MAX_WIDTH]);
 }
 
-/// 1.5 x 2^52: a double below 2^51 in magnitude plus this has no fraction bits left, so that adding
-/// and subtracting it rounds to the nearest integer.
+/// 1.5 x 2^52: a double below 2^51 in magnitude plus this has no fraction bits left: it is rounded to
+/// the nearest integer, which is the difference of the bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// `round(x)` to nearest even, for `|x| < 2^51`.
 #[inline(always)]
 fn round_i64(x: f64) -> i64 {
-    ((x + ROUNDER) - ROUNDER) as i64
+    ((x + ROUNDER).to_bits() as i64).wrapping_sub(ROUNDER.to_bits() as i64)
 }

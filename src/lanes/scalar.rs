@@ -82,7 +82,6 @@ macro_rules! scalar_lanes {
         impl Lanes for $float {
             const WIDTH: usize = 1;
             const NAME: &'static str = stringify!($float);
-            const EPSILON: f64 = $float::EPSILON as f64;
             const MAX: f64 = $float::MAX as f64;
             type Scalar = $float;
             type Mask = bool;
@@ -169,10 +168,6 @@ macro_rules! scalar_lanes {
             #[inline(always)]
             fn has_tag(self, label: u32) -> bool {
                 self.tag_lane(0) == label
-            }
-            #[inline(always)]
-            fn same_tag(self, mask: bool) -> Option<u32> {
-                mask.then(|| self.tag_lane(0))
             }
             #[inline(always)]
             fn unit(bits: One) -> Self {

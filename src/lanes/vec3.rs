@@ -69,6 +69,12 @@ impl<L: Lanes> V3<L> {
     pub fn normalize(self) -> Self {
         self * (L::one() / self.length2().sqrt())
     }
+    /// The vector divided by its length, if that is 1 but for a few roundings: one step of Newton's
+    /// method takes the place of the root.
+    #[inline(always)]
+    pub fn renormalize(self) -> Self {
+        self * self.length2().mul_add(L::of(-0.5), L::of(1.5))
+    }
     /// `self * t + b`.
     #[inline(always)]
     pub fn mul_add(self, t: L, b: Self) -> Self {

@@ -2,7 +2,7 @@
 
 use super::{Bits, Lanes, MAX_WIDTH, Mask, ROUNDER, round_i64};
 use wide::bytemuck::cast;
-use wide::{f32x8, f64x4, i32x4, i32x8, u32x4, u32x8};
+use wide::{f32x8, f64x4, i32x4, i32x8, i64x4, u32x4, u32x8};
 #[cfg(target_feature = "avx512f")]
 use wide::{f32x16, f64x8, i32x16, u32x16};
 
@@ -42,16 +42,16 @@ fn reverse_by_shifts<B: Bits>(x: B) -> B {
     (x >> 16) | (x << 16)
 }
 
-/// The reversed bits of each nibble, shifted up: `HIGH[n] = reverse4(n) << 4`.
-const HIGH: [i8; 16] = {
+/// The reversed bits of each nibble, shifted up by `SHIFT`.
+const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     let mut table = [0i8; 16];
     let mut n = 0;
     while n < 16 {
-        table[n] = (n as u8).reverse_bits() as i8;
+        table[n] = ((n as u8).reverse_bits() >> 4 << SHIFT) as i8;
         n += 1;
     }
     table
-};
+}
 
 /// Reverses the bits of each 32-bit lane by byte shuffles: a table look-up per nibble, then the bytes
 /// of each word in reverse order.
@@ -67,13 +67,13 @@ fn reverse8(x: u32x8) -> u32x8 {
         }
         out
     }
-    const TABLE: [i8; 32] = twice(HIGH);
+    const HIGH: [i8; 32] = twice(nibbles::<4>());
+    const LOW: [i8; 32] = twice(nibbles::<0>());
     const ORDER: [i8; 32] = twice([3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12]);
     let nibble = u32x8::splat(0x0f0f_0f0f);
-    let table = i8x32::new(TABLE);
-    let low: u32x8 = cast(table.swizzle_half_relaxed(cast(x & nibble)));
-    let high: u32x8 = cast(table.swizzle_half_relaxed(cast((x >> 4u32) & nibble)));
-    let bytes = low | ((high >> 4u32) & nibble);
+    let high: u32x8 = cast(i8x32::new(HIGH).swizzle_half_relaxed(cast(x & nibble)));
+    let low: u32x8 = cast(i8x32::new(LOW).swizzle_half_relaxed(cast((x >> 4u32) & nibble)));
+    let bytes = high | low;
     cast(i8x32::swizzle_half_relaxed(cast(bytes), i8x32::new(ORDER)))
 }
 
@@ -82,10 +82,9 @@ fn reverse8(x: u32x8) -> u32x8 {
 fn reverse4(x: u32x4) -> u32x4 {
     use wide::i8x16;
     let nibble = u32x4::splat(0x0f0f_0f0f);
-    let table = i8x16::new(HIGH);
-    let low: u32x4 = cast(table.shuffle(cast(x & nibble)));
-    let high: u32x4 = cast(table.shuffle(cast((x >> 4u32) & nibble)));
-    let bytes = low | ((high >> 4u32) & nibble);
+    let high: u32x4 = cast(i8x16::new(nibbles::<4>()).shuffle(cast(x & nibble)));
+    let low: u32x4 = cast(i8x16::new(nibbles::<0>()).shuffle(cast((x >> 4u32) & nibble)));
+    let bytes = high | low;
     let order = wide::u8x16::new([3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12]);
     cast(i8x16::shuffle(cast(bytes), order))
 }
@@ -115,7 +114,6 @@ macro_rules! vector_lanes {
         impl Lanes for $vector {
             const WIDTH: usize = $n;
             const NAME: &'static str = stringify!($vector);
-            const EPSILON: f64 = $scalar::EPSILON as f64;
             const MAX: f64 = $scalar::MAX as f64;
             type Scalar = $scalar;
             type Mask = $vector;
@@ -203,30 +201,23 @@ macro_rules! vector_lanes {
                 $vector::from_bits(self.to_bits().simd_eq(Self::tag(label).to_bits()))
             }
             #[inline(always)]
-            fn same_tag(self, mask: Self) -> Option<u32> {
-                let members = Mask::bits(mask);
-                if members == 0 {
-                    return None;
-                }
-                let label = self.tag_lane(members.trailing_zeros() as usize);
-                (Mask::bits(self.has_tag(label)) & members == members).then_some(label)
-            }
-            #[inline(always)]
             fn unit(bits: $bits) -> Self {
                 let unit: fn($bits) -> $vector = $unit;
                 unit(bits)
             }
             #[inline(always)]
             fn fixed_sum(self, scale: f64) -> i64 {
-                // Integers below 2^49: the sum of up to sixteen is exact in a double.
+                // The bits of a double plus ROUNDER, less those of ROUNDER, are the integer that it
+                // is rounded to.
                 let (scale, rounder) = (f64x4::splat(scale), f64x4::splat(ROUNDER));
-                let mut sum = f64x4::splat(0.0);
+                let mut sum = i64x4::splat(0);
                 for four in self.as_array().chunks_exact(4) {
                     let x = f64x4::new(std::array::from_fn(|i| f64::from(four[i])));
-                    sum += (x * scale + rounder) - rounder;
+                    sum += cast::<f64x4, i64x4>(x * scale + rounder);
                 }
                 let [a, b, c, d] = sum.to_array();
-                ((a + b) + (c + d)) as i64
+                let all = (a.wrapping_add(b)).wrapping_add(c.wrapping_add(d));
+                all.wrapping_sub((ROUNDER.to_bits() as i64).wrapping_mul($n))
             }
             #[inline(always)]
             fn fixed(self, scale: f64, out: &mut [i64; MAX_WIDTH]) {

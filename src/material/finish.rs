@@ -14,8 +14,21 @@ pub struct Facets<S> {
     pub ggx: bool,
     /// Slope, at least [`SMOOTH_ALPHA`].
     pub alpha: S,
+    /// Its square.
+    pub alpha2: S,
+    /// One over its square.
+    pub inverse_alpha2: S,
     /// How facets hide each other.
     pub masking: Masking,
+}
+
+impl<S: Real> Facets<S> {
+    /// Of slope `alpha`.
+    pub fn new(ggx: bool, alpha: f64, masking: Masking) -> Self {
+        let alpha2 = alpha * alpha;
+        let [alpha, alpha2, inverse_alpha2] = [alpha, alpha2, 1.0 / alpha2].map(S::of);
+        Self { ggx, alpha, alpha2, inverse_alpha2, masking }
+    }
 }
 
 /// How a light's highlight is computed.
@@ -86,11 +99,8 @@ pub fn one_minus_cos_of_tan(r: f64) -> f64 {
 impl<S: Real> Finish<S> {
     /// Compiles `material`; `reflects`: the scene traces reflections at all.
     pub fn new(material: &Material, reflects: bool) -> Self {
-        let facets = |ggx| Facets {
-            ggx,
-            alpha: S::of(material.slope().max(SMOOTH_ALPHA)),
-            masking: material.masking,
-        };
+        let slope = material.slope().max(SMOOTH_ALPHA);
+        let facets = |ggx| Facets::new(ggx, slope, material.masking);
         let strength = S::of(material.specular);
         let shine = match material.highlight {
             _ if material.specular == 0.0 => Shine::None,

@@ -38,9 +38,13 @@ impl<S: Real> Reflectance<S> {
         }
     }
 
-    /// Whether it takes nothing at any angle.
-    pub fn is_white(&self) -> bool {
-        self.f0.iter().all(|f| f.to_f64() == 1.0)
+    /// `value` times the share of the light reflected at the cosine that `c` gives, if that matters.
+    #[inline(always)]
+    pub fn times<L: Lanes<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> V3<L> {
+        match self.law {
+            Fresnel::Constant => V3::splat(self.f0) * value,
+            Fresnel::Schlick | Fresnel::Exact => self.at(c()) * value,
+        }
     }
 
     /// Share of the light reflected at cosine `c` (0..1) between light and facet normal.

@@ -2,9 +2,9 @@
 
 use super::Masking;
 use super::finish::{Facets, Finish, Shine, Spread};
-use crate::lanes::{Frame, Lanes, Real, V3};
+use crate::lanes::{Frame, Lanes, Mask, Real, V3};
 use crate::sampling::warp;
-use std::f64::consts::FRAC_1_PI;
+use std::f64::consts::{FRAC_1_PI, PI};
 
 /// A reflected ray's direction and what its radiance counts.
 #[derive(Clone, Copy, Debug)]
@@ -15,57 +15,93 @@ pub struct Reflected<L> {
     pub weight: V3<L>,
 }
 
-/// Cosine and squared tangent of the angle between two unit vectors, the tangent from the part of
-/// `h` across `n`, so that small angles keep their digits.
+/// Component along the unit vector `n` of `h`, of any length, and the squared tangent of the angle
+/// between them, from the part of `h` across `n`, so that small angles keep their digits. The tangent
+/// is bounded, so that what is computed from it stays finite.
 #[inline(always)]
-fn cos_tan2<L: Lanes>(h: V3<L>, n: V3<L>) -> (L, L) {
-    let cos = h.dot(n);
-    let across = h - n * cos;
-    (cos, across.length2() / (cos * cos))
+fn along_tan2<L: Lanes>(h: V3<L>, n: V3<L>) -> (L, L) {
+    let along = h.dot(n);
+    let across = h - n * along;
+    (along, (across.length2() / (along * along)).min(L::of(1e15)))
 }
 
 /// Microfacet terms in a lane type.
 pub trait FacetsOf<L: Lanes> {
-    /// D [1/sr] for a facet normal at `cos`, `tan2` from the surface normal.
-    fn density(&self, cos: L, tan2: L) -> L;
-    /// G: the share of facets with normal h that both directions see. `nh`, `nv`, `nl`, `vh` are
-    /// cosines, all positive.
-    fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> L;
+    /// D [1/sr] for a facet normal at `tan2` from the surface normal.
+    fn density(&self, tan2: L) -> L;
+    /// G, the share of facets with normal h that both directions see, as numerator and denominator.
+    /// `nh`, `nv`, `nl`, `vh` are cosines, all positive; `nh` and `vh` may have a factor in common.
+    fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L);
     /// Smith's Lambda at cosine `c` > 0 from the normal.
     fn lambda(&self, c: L) -> L;
 }
 
+/// Beckmann's Lambda is below 3e-10 from here on.
+const STEEP: f64 = 4.0;
+
+/// Beckmann's Lambda (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)) for 0 < a < [`STEEP`]; beyond,
+/// anything. Heitz 2014, eq. 57.
+///
+/// It is exp(-a^2) k(a) / (2 a sqrt(pi) (1 + 2 a^2)) with a smooth k between 0.6 and 1, here the
+/// Chebyshev fit of degree 10 in 2 - 6 / (a + 2). Error below 1e-8 (1 + Lambda).
+#[inline(always)]
+fn beckmann_lambda<L: Lanes>(a: L) -> L {
+    const K: [f64; 11] = [
+        0.726_383_531_676_393_2,
+        0.221_492_853_638_683_35,
+        0.159_588_281_416_975_67,
+        -0.247_616_611_436_622_9,
+        0.093_493_669_224_564_09,
+        -0.000_193_709_867_889_302_33,
+        -0.006_363_589_005_963_344,
+        -0.000_203_411_755_586_691,
+        0.000_456_536_003_607_954_65,
+        5.661_643_591_547_971e-5,
+        -2.270_107_819_080_595_3e-5,
+    ];
+    let x = L::of(2.0) - L::of(6.0) / (a + L::of(2.0));
+    let k = K.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::of(*k)));
+    let a2 = a * a;
+    let below = a * a2.mul_add(L::of(4.0 * PI.sqrt()), L::of(2.0 * PI.sqrt()));
+    (-a2).exp() * k / below
+}
+
 impl<L: Lanes> FacetsOf<L> for Facets<L::Scalar> {
     #[inline(always)]
-    fn density(&self, cos: L, tan2: L) -> L {
-        let alpha = L::splat(self.alpha);
-        if self.ggx { warp::ggx_d(cos, tan2, alpha) } else { warp::beckmann_d(cos, tan2, alpha) }
-    }
-
-    /// Torrance and Sparrow 1967 (V-cavities); Heitz 2014, *Understanding the Masking-Shadowing
-    /// Function* (height-correlated Smith).
-    #[inline(always)]
-    fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> L {
-        match self.masking {
-            Masking::VCavity => (L::of(2.0) * nh * nv.min(nl) / vh.max(L::of(1e-30))).min(L::one()),
-            Masking::Smith => L::one() / (L::one() + self.lambda(nv) + self.lambda(nl)),
+    fn density(&self, tan2: L) -> L {
+        let inverse_alpha2 = L::splat(self.inverse_alpha2);
+        if self.ggx {
+            warp::ggx_d(tan2, inverse_alpha2)
+        } else {
+            warp::beckmann_d(tan2, inverse_alpha2)
         }
     }
 
-    /// GGX exactly; Beckmann by the rational fit of Walter et al. 2007, eq. 27 (relative error below
-    /// 0.35 %).
+    /// Torrance and Sparrow 1967 (V-cavities): min(1, 2 N.H min(N.V, N.L) / V.H); Heitz 2014,
+    /// *Understanding the Masking-Shadowing Function* (height-correlated Smith): 1 / (1 + Lambda(V) +
+    /// Lambda(L)).
+    #[inline(always)]
+    fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L) {
+        match self.masking {
+            Masking::VCavity => ((L::of(2.0) * nh * nv.min(nl)).min(vh), vh),
+            Masking::Smith => (L::one(), L::one() + self.lambda(nv) + self.lambda(nl)),
+        }
+    }
+
+    /// With a = 1 / (alpha tan).
     #[inline(always)]
     fn lambda(&self, c: L) -> L {
-        let alpha = L::splat(self.alpha);
-        let tan2 = ((L::one() - c * c) / (c * c)).max(L::zero());
+        let alpha2 = L::splat(self.alpha2);
+        let (cos2, sin2) = (c * c, (L::one() - c * c).max(L::zero()));
         if self.ggx {
-            ((alpha * alpha).mul_add(tan2, L::one()).sqrt() - L::one()) * L::of(0.5)
-        } else {
-            let a = L::one() / (alpha * tan2.sqrt()).max(L::of(1e-18));
-            let numerator = a.mul_add(a.mul_add(L::of(0.396), L::of(-1.259)), L::one());
-            let fit = numerator / (a * a.mul_add(L::of(2.181), L::of(3.535)));
-            L::select(a.lt(L::of(1.6)), fit, L::zero())
+            return ((alpha2 * sin2 / cos2 + L::one()).sqrt() - L::one()) * L::of(0.5);
         }
+        // Seen steeply by all lanes, as most surfaces are: nothing is hidden.
+        let flat = cos2.lt(sin2 * alpha2 * L::of(STEEP * STEEP));
+        if flat.none() {
+            return L::zero();
+        }
+        beckmann_lambda(c / (alpha2 * sin2).sqrt()).only(flat)
     }
 }
 
@@ -100,15 +136,17 @@ impl<S: Real> Finish<S> {
                 V3::new(value, value, value)
             }
             Shine::Facets { strength, facets } => {
-                let h = (view + light).normalize();
-                let (nh, tan2) = cos_tan2(h, n);
-                let vh = view.dot(h);
-                let d = facets.density(nh, tan2);
-                let g: L = facets.masking(nh, nv, nl, vh);
+                // The half vector, not of unit length: its square is twice its product with either.
+                let h = view + light;
+                let (nh, tan2) = along_tan2(h, n);
+                let h2 = h.length2();
+                let (seen, all) = facets.masking(nh, nv, nl, h2 * L::of(0.5));
                 // f N.L = D G F / (4 N.V): the light's cosine cancels.
-                let value = L::splat(*strength) * d * g / (L::of(4.0) * nv);
-                let valid = nh.gt(L::zero()) & vh.gt(L::zero()) & nv.gt(L::zero());
-                (self.reflectance.at(vh) * value).only(valid)
+                let d: L = facets.density(tan2);
+                let k = L::of(0.25 * strength.to_f64());
+                let value = d * seen * k / (nv * all);
+                let valid = nh.gt(L::zero()) & nv.gt(L::zero());
+                self.reflectance.times(|| h2.sqrt() * L::of(0.5), value).only(valid)
             }
         }
     }
@@ -132,11 +170,11 @@ impl<S: Real> Finish<S> {
             Spread::Mirror => (mirror, k),
             Spread::Cone { one_minus_cos } => {
                 let local = warp::cone(u, v, L::splat(*one_minus_cos));
-                (Frame::around(mirror.normalize()).to_world(local), k)
+                (Frame::around(mirror.renormalize()).to_world(local), k)
             }
             Spread::Square { side } => {
                 let local = warp::square(u, v, L::splat(*side));
-                (Frame::around(mirror.normalize()).to_world(local), k)
+                (Frame::around(mirror.renormalize()).to_world(local), k)
             }
             Spread::Facets(facets) => return self.facet(k, facets, incident, n, (u, v)),
         };
@@ -147,14 +185,10 @@ impl<S: Real> Finish<S> {
         } else {
             (direction, L::select(below, L::zero(), weight))
         };
-        if self.reflectance.is_white() {
-            return Reflected { direction, weight: V3::new(weight, weight, weight) };
-        }
         // The facet that would send this ray: half-way between view and reflected direction, whose
         // cosine with either is half the length of their sum (without cancellation at grazing angles).
-        let cos = (direction - incident).length2().sqrt() * L::of(0.5);
-        let f = self.reflectance.at(cos.min(L::one()));
-        Reflected { direction, weight: f * weight }
+        let cos = || ((direction - incident).length2().sqrt() * L::of(0.5)).min(L::one());
+        Reflected { direction, weight: self.reflectance.times(cos, weight) }
     }
 
     /// Reflection at a sampled microfacet. Below the surface G is zero, and so is the weight.
@@ -177,18 +211,18 @@ impl<S: Real> Finish<S> {
         };
         let vh = view.dot(h);
         let light = h * (vh + vh) - view;
-        let g: L = facets.masking(h.z, view.z, light.z, vh);
-        let weight = if facets.ggx {
+        let (seen, all) = facets.masking(h.z, view.z, light.z, vh);
+        let weight: L = if facets.ggx {
             // Visible normals: density D G1 V.H / N.V, so that f N.L / density = F G / G1.
-            k * g * (L::one() + FacetsOf::<L>::lambda(facets, view.z))
+            k * seen * (L::one() + FacetsOf::<L>::lambda(facets, view.z)) / all
         } else {
             // Normals by D N.H: f N.L / density = F G V.H / (N.V N.H).
-            k * g * vh / (view.z * h.z)
+            k * seen * vh / (all * view.z * h.z)
         };
         let valid = vh.gt(L::zero()) & light.z.gt(L::zero()) & view.z.gt(L::zero());
         Reflected {
-            direction: frame.to_world(light).normalize(),
-            weight: (self.reflectance.at(vh) * weight).only(valid),
+            direction: frame.to_world(light).renormalize(),
+            weight: self.reflectance.times(|| vh, weight).only(valid),
         }
     }
 
@@ -212,19 +246,15 @@ impl<S: Real> Finish<S> {
                 Some(warp::square_pdf([local.x, local.y, local.z], side.to_f64()))
             }
             Spread::Facets(facets) => {
-                let facets = Facets {
-                    ggx: facets.ggx,
-                    alpha: facets.alpha.to_f64(),
-                    masking: facets.masking,
-                };
+                let facets = Facets::<f64>::new(facets.ggx, facets.alpha.to_f64(), facets.masking);
                 let view = -incident;
                 let h = (view + direction).normalize();
-                let (nh, tan2) = cos_tan2(h, n);
+                let (nh, tan2) = along_tan2(h, n);
                 let vh = view.dot(h);
                 if nh <= 0.0 || vh <= 0.0 {
                     return Some(0.0);
                 }
-                let d = facets.density(nh, tan2);
+                let d = facets.density(tan2);
                 let nv = view.dot(n);
                 Some(if facets.ggx {
                     d / ((1.0 + FacetsOf::<f64>::lambda(&facets, nv)) * 4.0 * nv)

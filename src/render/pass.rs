@@ -1,11 +1,10 @@
 //! The synchronous core: traces the jobs of one wave into the film.
 
 use super::wave::{Job, JobReport, Wave, WaveReport};
-use crate::film::{BadSample, Estimator, Film, Slot, TILE, Tile, lattice_pixels};
+use crate::film::{BadSample, Estimator, Film, Slot, TILE, Tile};
 use crate::lanes::{Lanes, MAX_WIDTH, Mask, Real, V3};
-use crate::sampling::{Draws, SampleSettings, Sampler};
-use crate::shape::Seen;
-use crate::world::{AnyWorld, Counts, MAX_GROUPS, Radiance, World};
+use crate::sampling::{Draws, Points, SampleSettings, Sampler};
+use crate::world::{AnyWorld, Counts, MAX_GROUPS, Outlook, Radiance, World};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -58,115 +57,64 @@ pub fn run_in<L: Lanes>(
     WaveReport { reports }
 }
 
-/// The first sample of replicate A in interleaved order: every 8th pixel in x and y, then the gaps in
-/// three stages, each over the whole picture; `shown` sees the film after the first. Once `abandon`
-/// is raised the later stages are left out, and there is no report.
-pub fn run_first(
-    world: &AnyWorld,
-    film: &mut Film,
-    wave: &Wave,
-    sampling: &SampleSettings,
-    pool: &rayon::ThreadPool,
-    abandon: &AtomicBool,
-    shown: &mut dyn FnMut(&Film),
-) -> Option<WaveReport> {
-    match world {
-        AnyWorld::Single(w) => first_in(w, film, wave, sampling, pool, abandon, shown),
-        AnyWorld::Double(w) => first_in(w, film, wave, sampling, pool, abandon, shown),
-    }
-}
-
-/// Tiles side by side that share packets while the lattice is coarse.
-const STRIP_TILES: usize = 8;
-
-fn first_in<L: Lanes>(
-    world: &World<L>,
-    film: &mut Film,
-    wave: &Wave,
-    sampling: &SampleSettings,
-    pool: &rayon::ThreadPool,
-    abandon: &AtomicBool,
-    shown: &mut dyn FnMut(&Film),
-) -> Option<WaveReport> {
-    let tracer = Tracer::new(world, sampling);
-    let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
-    let mut counts = vec![Counts::default(); tiles.len()];
-    let mut before = 0;
-    for step in [8, 4, 2, 1] {
-        let mut strips: Vec<(Vec<Slot>, &mut [Counts])> = Vec::new();
-        let mut slots = film.slots(&tiles).into_iter();
-        for counts in counts.chunks_mut(STRIP_TILES) {
-            strips.push((slots.by_ref().take(counts.len()).collect(), counts));
-        }
-        let complete = pool.install(|| {
-            strips
-                .into_par_iter()
-                .map(|(slots, counts)| {
-                    if step != 8 && abandon.load(Ordering::Relaxed) {
-                        return false;
-                    }
-                    tracer.lattice(slots, before, step, counts);
-                    true
-                })
-                .reduce(|| true, |a, b| a & b)
-        });
-        if step == 8 {
-            shown(film);
-        }
-        if !complete || (step != 1 && abandon.load(Ordering::Relaxed)) {
-            return None;
-        }
-        before = step;
-    }
-    let report = |c: Counts| Some(JobReport { rays: c.rays, glossy: c.glossy, error: None });
-    Some(WaveReport { reports: counts.into_iter().map(report).collect() })
-}
-
 /// A world with the sample sequence and what else all jobs share.
-struct Tracer<'a, L: Lanes> {
-    world: &'a World<L>,
-    sampler: Sampler<L>,
+pub(super) struct Tracer<'a, L: Lanes> {
+    pub(super) world: &'a World<L>,
+    pub(super) sampler: Sampler<L>,
     /// Radiance beyond this cannot be told from a fault, per group: 2^49 steps of the film.
     limits: [L; MAX_GROUPS],
+    /// The pixels of a tile that lies inside the picture, see [`blocks`].
+    whole: Vec<(usize, usize)>,
 }
 
 impl<'a, L: Lanes> Tracer<'a, L> {
-    fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
+    pub(super) fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
         let mut limits = [L::zero(); MAX_GROUPS];
         for (limit, scale) in limits.iter_mut().zip(world.scales()) {
             *limit = L::of((49f64.exp2() / scale).min(L::MAX));
         }
-        Self { world, sampler: Sampler::new(*sampling, world.jitter()), limits }
+        Self {
+            world,
+            sampler: Sampler::new(*sampling, world.jitter()),
+            limits,
+            whole: blocks([TILE; 2]),
+        }
     }
 
     /// Samples of all pixels of a tile: packets of one pixel where enough aligned samples are asked
     /// for, of several pixels at one index elsewhere.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
-        let mut work = Work::new(replicate, self.world.seen_through(origin, tile.extent()));
+        let mut work = Work::new(replicate, self.world.outlook(origin, tile.extent()));
         let width = L::WIDTH as u32;
         let end = job.first + job.count;
-        let aligned = end - end % width;
-        let pixels = blocks(tile.extent());
+        let part: Vec<(usize, usize)>;
+        let pixels = if tile.extent() == [TILE; 2] {
+            &self.whole
+        } else {
+            part = blocks(tile.extent());
+            &part
+        };
         let place = |(x, y): (usize, usize)| ((origin[0] + x) as u32, (origin[1] + y) as u32);
         let mut index = job.first;
         while index < end {
-            if index.is_multiple_of(width) && index < aligned {
-                for (x, y) in &pixels {
-                    for first in (index..aligned).step_by(L::WIDTH) {
-                        let sums = self.pixel(&mut work, place((*x, *y)), first);
-                        tile.add(replicate, y * TILE + x, &sums[..3 * self.world.groups()]);
-                    }
+            if index.is_multiple_of(width) && end - index >= width {
+                let points = self.sampler.aligned(index);
+                for (x, y) in pixels {
+                    self.pixel(&mut work, &points, place((*x, *y)), index);
+                    self.sum(&work.radiance, |group, sums| {
+                        tile.add_group(replicate, y * TILE + x, group, sums);
+                    });
                 }
-                index = aligned;
+                index += width;
             } else {
+                let points = self.sampler.at(index);
                 for packet in pixels.chunks(L::WIDTH) {
                     let at = |lane: usize| place(packet[lane.min(packet.len() - 1)]);
-                    self.pixels(&mut work, packet.len(), at, index);
-                    let mut put = |lane: usize, values: &[i64]| {
+                    self.pixels(&mut work, &points, packet.len(), at, index);
+                    self.scatter(&work.radiance, packet.len(), |lane, group, values| {
                         let (x, y) = packet[lane];
-                        tile.add(replicate, y * TILE + x, values);
-                    };
-                    self.scatter(&mut work, packet.len(), at, index, &mut put);
+                        tile.add_group(replicate, y * TILE + x, group, values);
+                    });
                 }
                 index += 1;
             }
@@ -176,40 +124,30 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         work.counts
     }
 
-    /// WIDTH samples of one pixel: their sums, by group and channel.
+    /// The samples `first ..` of one pixel, into `work.radiance`.
     #[inline(always)]
-    fn pixel(&self, work: &mut Work<L>, at: (u32, u32), first: u32) -> [i64; 3 * MAX_GROUPS] {
-        let draws = self.sampler.of_pixel(at.0, at.1, work.replicate, first);
+    fn pixel(&self, work: &mut Work<L>, points: &Points<'_, L>, at: (u32, u32), first: u32) {
+        let draws = points.of_pixel(at, work.replicate);
         let rays = self.world.view().rays_of(at, self.jitter(&draws));
         work.trace(self.world, rays, &draws, L::mask(true));
-        let bad = self.bad(&mut work.radiance);
-        let mut sums = [0i64; 3 * MAX_GROUPS];
-        let groups = self.world.groups();
-        for (g, sums) in sums.chunks_exact_mut(3).enumerate().take(groups) {
-            let (value, scale) = (work.radiance.groups[g], self.world.scales()[g]);
-            sums[0] = value.x.fixed_sum(scale);
-            sums[1] = value.y.fixed_sum(scale);
-            sums[2] = value.z.fixed_sum(scale);
-        }
-        for lane in lanes_of(bad) {
-            work.record_bad(at, first + lane as u32);
-        }
-        sums
+        self.take_out_bad(work, |lane| (at, first + lane as u32));
     }
 
     /// Sample `index` of the first `count` pixels that `at` names, into `work.radiance`.
     #[inline(always)]
-    fn pixels(
+    pub(super) fn pixels(
         &self,
         work: &mut Work<L>,
+        points: &Points<'_, L>,
         count: usize,
         at: impl Fn(usize) -> (u32, u32),
         index: u32,
     ) {
-        let draws = self.sampler.of_pixels(&at, work.replicate, index);
+        let draws = points.of_pixels(&at, work.replicate);
         let rays = self.world.view().rays(&at, self.jitter(&draws));
         let lanes = L::from_fn(|lane| L::Scalar::of(if lane < count { 1.0 } else { 0.0 }));
         work.trace(self.world, rays, &draws, lanes.gt(L::zero()));
+        self.take_out_bad(work, |lane| (at(lane), index));
     }
 
     /// Where in their pixels the samples lie.
@@ -218,38 +156,38 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         if self.world.jitter() { draws.pixel() } else { (L::of(0.5), L::of(0.5)) }
     }
 
-    /// Gives the samples of the first `count` lanes to `put`, lane by lane.
+    /// Gives the sums over the lanes to `put`, by group.
     #[inline(always)]
-    fn scatter(
-        &self,
-        work: &mut Work<L>,
-        count: usize,
-        at: impl Fn(usize) -> (u32, u32),
-        index: u32,
-        put: &mut impl FnMut(usize, &[i64]),
-    ) {
-        let bad = self.bad(&mut work.radiance);
-        let groups = self.world.groups();
-        let mut columns = [[0i64; MAX_WIDTH]; 3 * MAX_GROUPS];
-        for (g, columns) in columns.chunks_exact_mut(3).enumerate().take(groups) {
-            let (value, scale) = (work.radiance.groups[g], self.world.scales()[g]);
-            value.x.fixed(scale, &mut columns[0]);
-            value.y.fixed(scale, &mut columns[1]);
-            value.z.fixed(scale, &mut columns[2]);
-        }
-        (0..count).for_each(|lane| {
-            let values = columns.map(|column| column[lane]);
-            put(lane, &values[..3 * groups]);
-        });
-        for lane in lanes_of(bad).take_while(|lane| *lane < count) {
-            work.record_bad(at(lane), index);
+    fn sum(&self, radiance: &Radiance<L>, mut put: impl FnMut(usize, [i64; 3])) {
+        for (group, scale) in self.world.scales().iter().enumerate() {
+            let value = radiance.groups[group];
+            put(group, [value.x, value.y, value.z].map(|channel| channel.fixed_sum(*scale)));
         }
     }
 
-    /// Blackens samples that are NaN, infinite, negative or beyond what the film holds; returns them
-    /// as bits by lane.
+    /// Gives the samples of the first `count` lanes to `put`, by lane and group.
     #[inline(always)]
-    fn bad(&self, radiance: &mut Radiance<L>) -> u32 {
+    pub(super) fn scatter(
+        &self,
+        radiance: &Radiance<L>,
+        count: usize,
+        mut put: impl FnMut(usize, usize, [i64; 3]),
+    ) {
+        for (group, scale) in self.world.scales().iter().enumerate() {
+            let value = radiance.groups[group];
+            let mut channels = [[0; MAX_WIDTH]; 3];
+            value.x.fixed(*scale, &mut channels[0]);
+            value.y.fixed(*scale, &mut channels[1]);
+            value.z.fixed(*scale, &mut channels[2]);
+            (0..count).for_each(|lane| put(lane, group, channels.map(|channel| channel[lane])));
+        }
+    }
+
+    /// Blackens samples that are NaN, infinite, negative or beyond what the film holds, and records
+    /// them; `which` gives pixel and index of a lane.
+    #[inline(always)]
+    fn take_out_bad(&self, work: &mut Work<L>, which: impl Fn(usize) -> ((u32, u32), u32)) {
+        let radiance = &mut work.radiance;
         let mut good = L::mask(true);
         for (g, limit) in self.limits.iter().enumerate().take(self.world.groups()) {
             let v = radiance.groups[g];
@@ -260,71 +198,31 @@ impl<'a, L: Lanes> Tracer<'a, L> {
                 & (v.z.ge(zero) & v.z.le(limit));
         }
         if good.all() {
-            return 0;
+            return;
         }
         for group in &mut radiance.groups[..self.world.groups()] {
             *group = group.only(good);
         }
-        (!good).bits()
-    }
-
-    /// The first sample of the pixels that a lattice of `step` pixels adds to one of `before` (0:
-    /// none) in tiles side by side, whose pixels share packets.
-    fn lattice(&self, slots: Vec<Slot>, before: usize, step: usize, counts: &mut [Counts]) {
-        let mut tiles = Vec::new();
-        let mut pixels = Vec::new();
-        for (t, slot) in slots.into_iter().enumerate() {
-            let origin = slot.origin;
-            let tile = slot.open();
-            let extent = tile.extent();
-            let inside = |p: &usize| p % TILE < extent[0] && p / TILE < extent[1];
-            pixels.extend(lattice_pixels(before, step).filter(inside).map(|p| (t, origin, p)));
-            tiles.push(tile);
-        }
-        for packet in pixels.chunks(L::WIDTH) {
-            let at = |lane: usize| {
-                let (_, origin, p) = packet[lane.min(packet.len() - 1)];
-                ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
-            };
-            let mut work = Work::new(0, None);
-            self.pixels(&mut work, packet.len(), at, 0);
-            // A packet's rays are shared out among its pixels' tiles, the remainder to the first.
-            let Counts { rays, glossy } = work.counts;
-            let share = rays / packet.len() as u64;
-            counts[packet[0].0].rays += rays - share * packet.len() as u64;
-            let mut put = |lane: usize, values: &[i64]| {
-                let (t, _, p) = packet[lane];
-                tiles[t].add(0, p, values);
-                counts[t].rays += share;
-                counts[t].glossy |= glossy;
-            };
-            self.scatter(&mut work, packet.len(), at, 0, &mut put);
-            for bad in work.bad {
-                let tile_of = |lane: &usize| at(*lane) == (bad.x, bad.y);
-                if let Some(lane) = (0..packet.len()).find(tile_of) {
-                    tiles[packet[lane].0].record_bad(bad);
-                }
-            }
-        }
-        for tile in tiles {
-            tile.set_lattice(step);
+        for lane in (0..L::WIDTH).filter(|lane| !good.lane(*lane)) {
+            let ((x, y), index) = which(lane);
+            work.bad.push(BadSample { index, replicate: work.replicate as u8, y, x });
         }
     }
 }
 
 /// What the packets of one job share and fill.
-struct Work<L: Lanes> {
+pub(super) struct Work<L: Lanes> {
     replicate: usize,
-    seen: Option<Seen>,
-    radiance: Radiance<L>,
-    counts: Counts,
-    bad: Vec<BadSample>,
+    outlook: Option<Outlook>,
+    pub(super) radiance: Radiance<L>,
+    pub(super) counts: Counts,
+    pub(super) bad: Vec<BadSample>,
 }
 
 impl<L: Lanes> Work<L> {
-    fn new(replicate: usize, seen: Option<Seen>) -> Self {
+    pub(super) fn new(replicate: usize, outlook: Option<Outlook>) -> Self {
         let radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
-        Self { replicate, seen, radiance, counts: Counts::default(), bad: Vec::new() }
+        Self { replicate, outlook, radiance, counts: Counts::default(), bad: Vec::new() }
     }
 
     #[inline(always)]
@@ -335,26 +233,10 @@ impl<L: Lanes> Work<L> {
         draws: &Draws<'_, L>,
         active: L::Mask,
     ) {
-        let cost = world.trace(rays, self.seen.as_ref(), draws, active, &mut self.radiance);
+        let cost = world.trace(rays, self.outlook.as_ref(), draws, active, &mut self.radiance);
         self.counts.rays += cost.rays;
         self.counts.glossy |= cost.glossy;
     }
-
-    #[cold]
-    fn record_bad(&mut self, (x, y): (u32, u32), index: u32) {
-        self.bad.push(BadSample { index, replicate: self.replicate as u8, y, x });
-    }
-}
-
-/// The lanes whose bits are set.
-fn lanes_of(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = bits.trailing_zeros() as usize;
-        (bits != 0).then(|| {
-            bits &= bits - 1;
-            lane
-        })
-    })
 }
 
 /// The pixels of a tile in an order in which neighbours in the list are neighbours in the picture:
@@ -397,8 +279,9 @@ mod tests {
             let mut work = Work::<Single>::new(0, None);
             work.radiance.groups[0].x =
                 Single::from_fn(|i| Real::of(if i == 3 { bad } else { 0.5 }));
-            let at = |lane| (lane as u32, 0);
-            tracer.scatter(&mut work, 8, at, 0, &mut |lane, v: &[i64]| tile.add(0, lane, v));
+            tracer.take_out_bad(&mut work, |lane| ((lane as u32, 0), 0));
+            let put = |lane, group, values| tile.add_group(0, lane, group, values);
+            tracer.scatter(&work.radiance, 8, put);
             assert_eq!(work.bad, [BadSample { index: 0, replicate: 0, y: 0, x: 3 }], "{bad}");
             work.bad.into_iter().for_each(|bad| tile.record_bad(bad));
             tile.advance(0, 1);

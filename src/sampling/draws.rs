@@ -1,6 +1,6 @@
 //! The random numbers of a packet of samples.
 
-use super::hash::{fold, mix, mix1, owen};
+use super::hash::{fold, mix, mix1, owen, owen_begin, owen_factor, owen_rest};
 use super::sobol::{self, DIMENSIONS};
 use crate::lanes::{Bits, Lanes, MAX_WIDTH};
 
@@ -43,6 +43,17 @@ pub struct Sampler<L: Lanes> {
     low: [L::Bits; DIMENSIONS],
     /// 0, 1, 2, ... in the lanes.
     ramp: L::Bits,
+    /// A constant per dimension that sets its scrambling apart.
+    apart: [u32; DIMENSIONS],
+}
+
+/// The part of a packet's numbers that depends on the samples' indices alone.
+pub struct Points<'a, L: Lanes> {
+    sampler: &'a Sampler<L>,
+    /// Index in each lane.
+    index: L::Bits,
+    /// `begun[d]`: the Sobol points of the indices in dimension d, their scrambling begun.
+    begun: [L::Bits; DIMENSIONS],
 }
 
 impl<L: Lanes> Sampler<L> {
@@ -59,50 +70,58 @@ impl<L: Lanes> Sampler<L> {
             first_lobe: if jitter { 2 } else { 0 },
             low: std::array::from_fn(low),
             ramp: L::Bits::from_fn(|lane| lane as u32),
+            apart: std::array::from_fn(|d| mix1(d as u32 + 1)),
         }
+    }
+
+    /// Lane i has index `first + i`; `first` is a multiple of WIDTH.
+    pub fn aligned(&self, first: u32) -> Points<'_, L> {
+        debug_assert!((first as usize).is_multiple_of(L::WIDTH));
+        // Aligned points are one point XOR constants.
+        let point = |d| L::Bits::splat(sobol::point(d, first)) ^ self.low[d];
+        let begun = std::array::from_fn(|d| owen_begin(point(d)));
+        Points { sampler: self, index: L::Bits::splat(first) + self.ramp, begun }
+    }
+
+    /// The same index in all lanes.
+    pub fn at(&self, index: u32) -> Points<'_, L> {
+        let begun = |d| owen_begin(L::Bits::splat(sobol::point(d, index)));
+        Points { sampler: self, index: L::Bits::splat(index), begun: std::array::from_fn(begun) }
     }
 
     /// The key of a pixel's samples in one replicate (0: A, 1: B). Distinct for all pixels of a
     /// picture up to 65536 x 65536, since every step is a bijection of the packed coordinates.
     #[inline(always)]
-    fn key(&self, x: u32, y: u32, replicate: usize) -> u32 {
+    fn key(&self, (x, y): (u32, u32), replicate: usize) -> u32 {
         let [before, after] = self.seeds[replicate];
         mix1(mix1((x | y << 16) ^ before) ^ after)
     }
+}
 
-    /// Samples `first .. first + WIDTH` of one pixel; `first` is a multiple of WIDTH.
+impl<L: Lanes> Points<'_, L> {
+    /// Samples of one pixel.
     #[inline(always)]
-    pub fn of_pixel(&self, x: u32, y: u32, replicate: usize, first: u32) -> Draws<'_, L> {
-        debug_assert!((first as usize).is_multiple_of(L::WIDTH));
-        let key = L::Bits::splat(self.key(x, y, replicate));
-        Draws { sampler: self, key, first, step: 1 }
+    pub fn of_pixel(&self, pixel: (u32, u32), replicate: usize) -> Draws<'_, L> {
+        let key = self.sampler.key(pixel, replicate);
+        let seeds = self.sampler.apart.map(|apart| mix1(key ^ apart));
+        Draws { points: self, key: L::Bits::splat(key), seeds: Some(seeds) }
     }
 
-    /// Sample `index` of the pixels `(x, y) = at(lane)`.
+    /// Samples of the pixels `at(lane)`.
     #[inline(always)]
-    pub fn of_pixels(
-        &self,
-        at: impl Fn(usize) -> (u32, u32),
-        replicate: usize,
-        index: u32,
-    ) -> Draws<'_, L> {
-        let key = L::Bits::from_fn(|lane| {
-            let (x, y) = at(lane);
-            self.key(x, y, replicate)
-        });
-        Draws { sampler: self, key, first: index, step: 0 }
+    pub fn of_pixels(&self, at: impl Fn(usize) -> (u32, u32), replicate: usize) -> Draws<'_, L> {
+        let key = L::Bits::from_fn(|lane| self.sampler.key(at(lane), replicate));
+        Draws { points: self, key, seeds: None }
     }
 }
 
 /// The random numbers of one packet.
 pub struct Draws<'a, L: Lanes> {
-    sampler: &'a Sampler<L>,
+    points: &'a Points<'a, L>,
     /// Key of the pixel in each lane.
     key: L::Bits,
-    /// Index of lane 0.
-    first: u32,
-    /// 1: lane i has index first + i; 0: all lanes have index first.
-    step: u32,
+    /// Seed of each dimension's scrambling, if all lanes have the same pixel.
+    seeds: Option<[u32; DIMENSIONS]>,
 }
 
 impl<L: Lanes> Draws<'_, L> {
@@ -115,27 +134,22 @@ impl<L: Lanes> Draws<'_, L> {
     /// Two numbers in [0, 1) for the lobe of the surface met after `bounce` reflections.
     #[inline(always)]
     pub fn lobe(&self, bounce: u32) -> (L, L) {
-        let d = self.sampler.first_lobe + 2 * bounce as usize;
+        let d = self.points.sampler.first_lobe + 2 * bounce as usize;
         if bounce < 2 { (self.joint(d), self.joint(d + 1)) } else { self.padded(bounce - 2) }
-    }
-
-    /// The index in each lane.
-    #[inline(always)]
-    fn indices(&self) -> L::Bits {
-        let ramp = self.sampler.ramp * L::Bits::splat(self.step);
-        L::Bits::splat(self.first) + ramp
     }
 
     /// Dimension `d` of the joint set.
     #[inline(always)]
     fn joint(&self, d: usize) -> L {
-        let seed = mix(self.key ^ L::Bits::splat(mix1(d as u32 + 1)));
-        match self.sampler.settings.kind {
-            SamplerKind::Random => L::unit(mix(mix(self.indices() ^ seed) + self.key)),
+        let points = self.points;
+        let seed = match &self.seeds {
+            Some(seeds) => L::Bits::splat(seeds[d]),
+            None => mix(self.key ^ L::Bits::splat(points.sampler.apart[d])),
+        };
+        match points.sampler.settings.kind {
+            SamplerKind::Random => L::unit(mix(mix(points.index ^ seed) + self.key)),
             SamplerKind::Sobol => {
-                let low = self.sampler.low[d] * L::Bits::splat(self.step);
-                let x = L::Bits::splat(sobol::point(d, self.first)) ^ low;
-                L::unit(owen(x, seed).reverse())
+                L::unit(owen_rest(points.begun[d], seed, owen_factor(seed)).reverse())
             }
         }
     }
@@ -146,16 +160,17 @@ impl<L: Lanes> Draws<'_, L> {
     fn padded(&self, pair: u32) -> (L, L) {
         let set = pair / 4 + 1;
         let d = 2 * (pair % 4) as usize;
+        let Points { sampler, index, .. } = self.points;
         let key = mix(self.key + L::Bits::splat(mix1(set ^ 0x5bd1_e995)));
-        let shuffled = owen(self.indices().reverse(), key).reverse();
+        let shuffled = owen(index.reverse(), key).reverse();
         let mut at = [0; MAX_WIDTH];
         for (lane, at) in at.iter_mut().enumerate().take(L::WIDTH) {
             *at = shuffled.lane(lane);
         }
         let number = |d: usize| {
-            let seed = mix(key ^ L::Bits::splat(mix1(d as u32 + 1)));
-            match self.sampler.settings.kind {
-                SamplerKind::Random => L::unit(mix(mix(self.indices() ^ seed) + key)),
+            let seed = mix(key ^ L::Bits::splat(sampler.apart[d]));
+            match sampler.settings.kind {
+                SamplerKind::Random => L::unit(mix(mix(*index ^ seed) + key)),
                 SamplerKind::Sobol => {
                     let x = L::Bits::from_fn(|lane| sobol::point(d, at[lane]));
                     L::unit(owen(x, seed).reverse())

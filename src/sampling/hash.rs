@@ -31,9 +31,25 @@ pub fn fold(words: &[u32]) -> u32 {
 /// The Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
 #[inline(always)]
 pub fn owen<B: Bits>(x: B, seed: B) -> B {
-    let x = x ^ (x * B::splat(0x3d20_adea));
-    let x = x + seed;
-    let x = x * ((seed >> 16) | B::splat(1));
+    owen_rest(owen_begin(x), seed, owen_factor(seed))
+}
+
+/// The part of [`owen`] before the seed takes part.
+#[inline(always)]
+pub fn owen_begin<B: Bits>(x: B) -> B {
+    x ^ (x * B::splat(0x3d20_adea))
+}
+
+/// What [`owen`] multiplies with.
+#[inline(always)]
+pub fn owen_factor<B: Bits>(seed: B) -> B {
+    (seed >> 16) | B::splat(1)
+}
+
+/// What is left of [`owen`] after [`owen_begin`].
+#[inline(always)]
+pub fn owen_rest<B: Bits>(begun: B, seed: B, factor: B) -> B {
+    let x = (begun + seed) * factor;
     let x = x ^ (x * B::splat(0x0552_6c56));
     x ^ (x * B::splat(0x53a2_2864))
 }

@@ -6,4 +6,4 @@ mod hash;
 mod sobol;
 pub mod warp;
 
-pub use draws::{Draws, SampleSettings, Sampler, SamplerKind};
+pub use draws::{Draws, Points, SampleSettings, Sampler, SamplerKind};

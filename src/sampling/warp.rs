@@ -5,7 +5,7 @@
 //! square, the normal for microfacets).
 
 use crate::lanes::{Lanes, V3};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_1_PI, TAU};
 
 /// A uniform direction in the cone of half-angle theta about z.
 ///
@@ -63,20 +63,17 @@ pub fn ggx_visible<L: Lanes>(u: L, v: L, alpha: L, view: V3<L>) -> V3<L> {
     V3::new(h.x * alpha, h.y * alpha, h.z.max(L::zero())).normalize()
 }
 
-/// Beckmann's distribution D [1/sr] of microfacet normals at cosine `cos` and squared tangent `tan2`
-/// from the surface normal: exp(-tan2 / alpha^2) / (pi alpha^2 cos^4).
+/// Beckmann's distribution D [1/sr] of microfacet normals at squared tangent `tan2` from the surface
+/// normal: exp(-tan2 / alpha^2) / (pi alpha^2 cos^4), with 1 / cos^2 = 1 + tan2.
 #[inline(always)]
-pub fn beckmann_d<L: Lanes>(cos: L, tan2: L, alpha: L) -> L {
-    let a2 = alpha * alpha;
-    let c2 = cos * cos;
-    (-(tan2 / a2)).exp() / (L::of(PI) * a2 * c2 * c2)
+pub fn beckmann_d<L: Lanes>(tan2: L, inverse_alpha2: L) -> L {
+    let secant2 = tan2 + L::one();
+    (-(tan2 * inverse_alpha2)).exp() * (secant2 * secant2) * (inverse_alpha2 * L::of(FRAC_1_PI))
 }
 
 /// The GGX distribution D [1/sr]: 1 / (pi alpha^2 cos^4 (1 + tan2 / alpha^2)^2).
 #[inline(always)]
-pub fn ggx_d<L: Lanes>(cos: L, tan2: L, alpha: L) -> L {
-    let a2 = alpha * alpha;
-    let c2 = cos * cos;
-    let k = L::one() + tan2 / a2;
-    L::one() / (L::of(PI) * a2 * c2 * c2 * k * k)
+pub fn ggx_d<L: Lanes>(tan2: L, inverse_alpha2: L) -> L {
+    let ratio = (tan2 + L::one()) / (tan2 * inverse_alpha2 + L::one());
+    ratio * ratio * (inverse_alpha2 * L::of(FRAC_1_PI))
 }

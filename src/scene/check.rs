@@ -42,6 +42,7 @@ pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<Stri
             }
         }
         [list, name, ..] if list == "materials" => format!("material \"{}\"", excerpt(name)),
+        [list, name, ..] if list == "views" => format!("view \"{}\"", excerpt(name)),
         [first, ..] => first.clone(),
         [] => String::new(),
     }
@@ -78,6 +79,9 @@ impl Scene {
         add(&["film"], self.film.faults());
         add(&["trace"], self.trace.faults());
         add(&["camera"], self.camera.faults());
+        for (name, view) in &self.views {
+            add(&["views", name], view.faults());
+        }
         add(&["background"], self.background.faults());
         add(&["ambient"], self.ambient.faults());
         for (i, light) in self.lights.iter().enumerate() {
@@ -96,8 +100,14 @@ impl Scene {
     }
 
     fn missing_materials(&self, findings: &mut Vec<Finding>) {
+        let mut named = Vec::new();
         for (i, object) in self.objects.iter().enumerate() {
-            if object.material.is_empty() || self.materials.contains_key(&object.material) {
+            named.push((format!("object.{i}.material"), object.material.as_str()));
+            let parts = object.shape.named_materials().into_iter();
+            named.extend(parts.map(|(key, name)| (format!("object.{i}.shape.{key}"), name)));
+        }
+        for (key, name) in named {
+            if name.is_empty() || self.materials.contains_key(name) {
                 continue;
             }
             let defined: Vec<_> =
@@ -110,11 +120,11 @@ impl Scene {
                 names => format!("Defined: {}.", names.join(", ")),
             };
             let known = self.materials.keys().map(String::as_str);
-            if let Some(meant) = nearest(&object.material, known) {
+            if let Some(meant) = nearest(name, known) {
                 help += &format!(" Did you mean \"{}\"?", excerpt(meant));
             }
-            let found = format!("material \"{}\" is not defined", excerpt(&object.material));
-            findings.push(self.finding(&["object", &i.to_string(), "material"], found, help));
+            let found = format!("material \"{}\" is not defined", excerpt(name));
+            findings.push(self.finding(&key.split('.').collect::<Vec<_>>(), found, help));
         }
     }
 

@@ -55,6 +55,12 @@ impl Document {
         self.scene = scene.clone();
     }
 
+    /// The same document under another name.
+    pub(super) fn renamed(mut self, name: &str) -> Self {
+        self.name = name.to_string();
+        self
+    }
+
     /// What messages call the file.
     pub fn name(&self) -> &str {
         &self.name

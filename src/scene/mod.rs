@@ -3,7 +3,10 @@
 mod align;
 mod check;
 mod document;
+pub mod edit;
+mod file;
 mod fresh;
+mod history;
 mod included;
 mod keep;
 mod locate;
@@ -15,11 +18,13 @@ mod rewrite;
 mod schema;
 mod settings;
 mod suggest;
-mod transform;
 mod warn;
 
+pub use crate::shape::{Rotate, STEP_FIELDS, Scale, Step};
 pub use check::Finding;
 pub use document::Document;
+pub use file::{DiskState, SaveError, SceneFile};
+pub use history::History;
 pub use included::{BUILT_IN, built_in, starter};
 pub use message::{Message, SceneErrors};
 pub use object::{OBJECT_FIELDS, Object};
@@ -29,7 +34,6 @@ pub use settings::{
     AMBIENT_FIELDS, Ambient, BACKGROUND_FIELDS, Background, FILM_FIELDS, FilmSettings, Filter,
     Horizon, Level, MAX_PIXELS, TRACE_FIELDS, Trace,
 };
-pub use transform::{Rotate, STEP_FIELDS, Scale, Step};
 
 use crate::camera::Camera;
 use crate::light::Light;
@@ -47,6 +51,8 @@ pub struct Scene {
     pub trace: Trace,
     /// The view.
     pub camera: Camera,
+    /// Other viewpoints by name, to come back to. The picture is taken from `camera`.
+    pub views: BTreeMap<String, Camera>,
     /// What a ray sees that meets nothing.
     pub background: Background,
     /// Light from everywhere.
@@ -61,5 +67,7 @@ pub struct Scene {
     pub objects: Vec<Object>,
 }
 
+#[cfg(test)]
+mod file_test;
 #[cfg(test)]
 mod tables_test;

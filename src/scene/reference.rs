@@ -1,8 +1,7 @@
 //! The reference of the scene file format, generated from the tables of fields.
 
 use super::schema::FIELDS;
-use super::transform::STEP_FIELDS;
-use crate::shape::{EXAMPLES, KINDS};
+use crate::shape::{EXAMPLES, KINDS, STEP_FIELDS};
 use crate::value::{Field, Preset, Takes};
 use std::fmt::Write as _;
 
@@ -140,6 +139,7 @@ fn value(field: &Field) -> String {
         Takes::OneOf(_) => "exactly one kind, see below".to_string(),
         Takes::ListOf(_) => "a list of steps, see below".to_string(),
         Takes::Choice(_) => "a word, see below".to_string(),
+        Takes::Tables(_) => "a list of parts".to_string(),
         takes => takes.to_string(),
     }
 }

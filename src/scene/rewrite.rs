@@ -72,6 +72,14 @@ impl Rewriter {
         new: &toml::Table,
         keys: &Keys,
     ) {
+        let renamed;
+        let old = match keys {
+            Keys::Any(_) => {
+                renamed = rename(table, old, new);
+                &renamed
+            }
+            Keys::These(_) => old,
+        };
         let mut gone = Vec::new();
         let mut come = Vec::new();
         for (key, takes) in keys.of(old, new) {
@@ -206,6 +214,28 @@ impl Rewriter {
             _ => {}
         }
     }
+}
+
+/// Gives named tables their new names, in their place and with their comments: one that is gone and one
+/// that has come are the same if their values are. Returns `old` under the new names.
+fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
+    let mut renamed = old.clone();
+    for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {
+        let mut come = new.iter().filter(|(key, _)| !renamed.contains_key(*key));
+        let Some((is, _)) = come.find(|(_, other)| *other == value) else { continue };
+        let decor =
+            table.key(was).map(|key| (key.leaf_decor().clone(), key.dotted_decor().clone()));
+        let Some(item) = table.remove(was) else { continue };
+        table.insert(is, item);
+        if let (Some((leaf, dotted)), Some(mut key)) = (decor, table.key_mut(is)) {
+            *key.leaf_decor_mut() = leaf;
+            *key.dotted_decor_mut() = dotted;
+        }
+        if let Some(value) = renamed.remove(was) {
+            renamed.insert(is.clone(), value);
+        }
+    }
+    renamed
 }
 
 /// Takes away the comment behind the last entry of `list`, if another one comes behind that.

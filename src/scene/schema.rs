@@ -24,6 +24,13 @@ pub const FIELDS: &[Field] = &[
         "it stands at [0.0, 1.0, 5.0] and looks at the origin",
         "The view: a pinhole camera.",
     ),
+    Field::without(
+        "views",
+        Takes::Named(camera::FIELDS),
+        "",
+        "there are none",
+        "Other viewpoints by name, to come back to. The picture is taken from `[camera]`.",
+    ),
     table("background", BACKGROUND_FIELDS, "What a ray sees that meets nothing."),
     table("ambient", AMBIENT_FIELDS, "Light from everywhere, without shadows."),
     Field::without("light", Takes::Tables(light::FIELDS), "", "there are none", "The lights."),
@@ -49,6 +56,25 @@ pub(super) fn check(file: &str, text: &str, root: &Spanned<DeTable>) -> Vec<Mess
     walk.messages
 }
 
+/// Keys as people name them: `shape.sphere`, `step 2 of transform`, `shape.cube of part 1 of
+/// shape.union`.
+fn phrase(keys: &[String]) -> String {
+    let number = |position: &String| position.parse().map_or(0, |i: usize| i + 1);
+    if let Some(of) = keys.iter().rposition(|key| key == "of")
+        && let [position, inner @ ..] = &keys[of + 1..]
+    {
+        let part = format!("part {} of {}", number(position), phrase(&keys[..of]));
+        return if inner.is_empty() { part } else { format!("{} of {part}", phrase(inner)) };
+    }
+    match keys {
+        [transform, step, rest @ ..] if transform == "transform" => {
+            let rest: String = rest.iter().map(|key| format!(".{key}")).collect();
+            format!("step {} of transform{rest}", number(step))
+        }
+        keys => keys.join("."),
+    }
+}
+
 struct Walk<'a> {
     file: &'a str,
     text: &'a str,
@@ -70,17 +96,10 @@ impl Walk<'_> {
     /// The keys below the thing that the subject names: `shape.sphere`.
     fn inner(&self) -> String {
         let above = match self.path.first().map(String::as_str) {
-            Some("object" | "light" | "materials") => 2,
+            Some("object" | "light" | "materials" | "views") => 2,
             _ => 1,
         };
-        match self.path.get(above..).unwrap_or_default() {
-            [transform, step, rest @ ..] if transform == "transform" => {
-                let step = step.parse().map_or(0, |i: usize| i + 1);
-                let rest: String = rest.iter().map(|key| format!(".{key}")).collect();
-                format!("step {step} of transform{rest}")
-            }
-            keys => keys.join("."),
-        }
+        phrase(self.path.get(above..).unwrap_or_default())
     }
 
     /// `radius`, or `shape.sphere` for what has no key of its own.
@@ -214,7 +233,7 @@ impl Walk<'_> {
                 }
                 self.add(span, format!("{} is {}", self.inner(), describe(value)), help);
             }
-            (Takes::Tables(_), _) => {
+            (Takes::Tables(_), _) if self.path.len() == 1 => {
                 let expected = format!("tables that begin with [[{}]]", field.name);
                 self.wrong(span, value, &expected);
             }

@@ -1,7 +1,7 @@
 //! The tables of fields against what serde really reads and writes.
 
 use super::*;
-use crate::shape::{EXAMPLES, KINDS, Shape};
+use crate::shape::{EXAMPLES, KINDS, MAX_DEPTH, Part, Shape};
 use crate::value::{Field, Preset, Takes};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -54,7 +54,7 @@ fn same_defaults<T: DeserializeOwned + Serialize>(what: &str, fields: &[Field], 
 
 fn inner(fields: &[Field], name: &str) -> &'static [Field] {
     match fields.iter().find(|f| f.name == name).unwrap().takes {
-        Takes::Table(fields) | Takes::OneOf(fields) => fields,
+        Takes::Table(fields) | Takes::OneOf(fields) | Takes::Tables(fields) => fields,
         other => panic!("{name} takes {other:?}"),
     }
 }
@@ -77,6 +77,7 @@ fn tables_name_the_keys_that_are_read() {
     same_keys::<Material>("material", crate::material::FIELDS);
     same_keys::<Object>("object", OBJECT_FIELDS);
     same_keys::<Shape>("shape", KINDS);
+    same_keys::<Part>("part", inner(inner(KINDS, "union"), "of"));
     same_keys::<Step>("step", STEP_FIELDS);
     same_keys::<Rotate>("rotate", inner(STEP_FIELDS, "rotate"));
 }
@@ -174,6 +175,7 @@ fn every_number_of_every_shape_is_checked() {
         let Takes::Table(fields) = kind.takes else { panic!("{key}") };
         for field in fields {
             let bad: Vec<toml::Value> = match field.takes {
+                Takes::Number(range) if range.low == 0.0 && range.low_in => vec![(-1.0).into()],
                 Takes::Number(range) if range.low == 0.0 => vec![0.0.into(), (-1.0).into()],
                 Takes::Number(_) => vec![f64::INFINITY.into()],
                 Takes::Numbers(n, range) => {
@@ -187,6 +189,8 @@ fn every_number_of_every_shape_is_checked() {
                         .collect()
                 }
                 Takes::Direction => vec![vec![0.0; 3].into()],
+                // Parts: their faults are tested below.
+                Takes::Tables(_) => continue,
                 other => panic!("{key}.{} takes {other:?}: test it", field.name),
             };
             let nan = match bad[0].as_array() {
@@ -201,5 +205,66 @@ fn every_number_of_every_shape_is_checked() {
                 assert!(faults.len() == 1 && faults[0].key == at, "{at} = {value}: {faults:?}");
             }
         }
+    }
+}
+
+/// The faults of a union of a ball and `part`.
+fn faults_of(part: &str) -> Vec<(String, String)> {
+    let ball = "{ shape.sphere = { center = [0, 0, 0], radius = 1 } }";
+    let shape: Shape = toml::from_str(&format!("union.of = [{ball}, {part}]")).unwrap();
+    shape.faults().into_iter().map(|f| (f.key, f.found)).collect()
+}
+
+#[test]
+fn faults_of_parts_say_which_part() {
+    for (part, key, words) in [
+        ("{ shape.sphere = { center = [0, 0, 0], radius = -1 } }", "shape.sphere.radius", "-1"),
+        ("{ shape.platform = { center = [0, 0, 0], size = [1, 1] } }", "shape", "flat"),
+        (
+            "{ shape.cube = { corner = [0, 0, 0], edge = 1 }, transform = [{ scale = 0 }] }",
+            "transform.0.scale",
+            "0",
+        ),
+        (
+            "{ shape.cube = { corner = [0, 0, 0], edge = 1 }, transform = [{ translate = [1e9, 0, 0] }, { scale = 2 }] }",
+            "transform",
+            "beyond 1e9",
+        ),
+        ("{ shape.union = { of = [] } }", "shape.union.of", "empty"),
+        (
+            "{ shape.union.of = [{ shape.cube = { corner = [0, 0, 0], edge = 1 } }] }",
+            "shape.union.of",
+            "one part",
+        ),
+        (
+            "{ shape.intersection.of = [{ shape.unit_cylinder = { s = 1 } }, \
+               { shape.unit_cylinder = { s = -1 } }] }",
+            "shape.intersection.of.1.shape.unit_cylinder.s",
+            "-1",
+        ),
+    ] {
+        let faults = faults_of(part);
+        assert_eq!(faults.len(), 1, "{part}: {faults:?}");
+        assert_eq!(faults[0].0, format!("union.of.1.{key}"), "{part}");
+        assert!(faults[0].1.contains(words), "{part}: {faults:?}");
+    }
+    // A half-space is no part of a union, unless something gives it an end.
+    let plane = "{ shape.plane = { point = [0, 0, 0], normal = [0, 1, 0] } }";
+    let faults = faults_of(plane);
+    assert!(faults.len() == 1 && faults[0].0 == "union.of", "{faults:?}");
+    let cut = "{ shape.sphere = { center = [0, 0, 0], radius = 1 } }";
+    assert_eq!(faults_of(&format!("{{ shape.intersection.of = [{cut}, {plane}] }}")), []);
+    assert_eq!(faults_of(&format!("{{ shape.difference.of = [{cut}, {plane}] }}")), []);
+}
+
+#[test]
+fn compounds_may_be_nested_so_deep_and_no_deeper() {
+    let sphere =
+        || -> Shape { toml::from_str("sphere = { center = [0, 0, 0], radius = 1 }").unwrap() };
+    let part = |shape| Part { shape, material: String::new(), transform: Vec::new() };
+    let mut shape = sphere();
+    for depth in 1..=MAX_DEPTH + 1 {
+        shape = Shape::Union(crate::shape::Union { of: vec![part(shape), part(sphere())] });
+        assert_eq!(shape.faults().is_empty(), depth <= MAX_DEPTH, "{depth}");
     }
 }

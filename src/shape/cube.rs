@@ -1,6 +1,7 @@
 //! Cube, standing upright.
 
-use super::upright::upright;
+use super::kinds::turned_rotation;
+use super::upright::{lower_left, upright};
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
 use glam::{DVec2, DVec3};
@@ -53,6 +54,21 @@ impl Kind for Cube {
             .numbers("rotation", &[self.rotation])
             .ratio(&[("edge", self.edge)], &self.corner)
             .faults()
+    }
+
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        let edge = size.min_element();
+        let corner = lower_left(base, edge, edge);
+        Self { corner, edge, rotation: 0.0 }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.corner]
+    }
+
+    fn turn(&mut self, degrees: f64) -> bool {
+        self.rotation = turned_rotation(self.rotation, degrees);
+        true
     }
 }
 

@@ -53,4 +53,16 @@ impl Kind for Cuboid {
             .ratio(&self.size.map(|s| ("size", s)), &self.center)
             .faults()
     }
+
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        Self { center: [base.x, base.y + size.y / 2.0, base.z], size: size.to_array() }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.center]
+    }
+
+    fn turn(&mut self, _: f64) -> bool {
+        false
+    }
 }

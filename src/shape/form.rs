@@ -1,6 +1,7 @@
 //! What a description becomes before it is compiled for a lane type: a few geometric forms into
 //! which every kind of shape and every transform collapses.
 
+use super::csg::Compound;
 use glam::{DAffine3, DMat3, DVec3};
 
 /// One side of a plane: the points p with `normal . p <= offset`.
@@ -34,6 +35,16 @@ pub enum Form {
         /// The corners (for bounds and faces' sanity).
         corners: Vec<DVec3>,
     },
+    /// The image under an invertible affine map of the solid with x^2 + y^2 <= (1 + (top - 1) z)^2 and
+    /// 0 <= z <= 1. [`Form::tapered`] makes one of any proportions.
+    Tapered {
+        /// From that solid's space to the scene's.
+        scene_from_unit: DAffine3,
+        /// Radius at z = 1 over radius at z = 0: from 0, a cone, to 1, a cylinder.
+        top: f64,
+    },
+    /// Solids joined, intersected, cut out of each other.
+    Compound(Compound),
     /// The flat parallelogram `corner + a u + b v`, 0 <= a, b <= 1. Its front is the side of u x v.
     Parallelogram {
         /// The corner that both edges leave.
@@ -59,6 +70,18 @@ fn half_space(point: DVec3, normal: DVec3) -> HalfSpace {
 }
 
 impl Form {
+    /// The image under `scene_from_canonical` of the solid with x^2 + y^2 <= (1 + (s - 1) z)^2 and
+    /// 0 <= z <= 1, for any s >= 0.
+    pub fn tapered(scene_from_canonical: DAffine3, s: f64) -> Self {
+        if s <= 1.0 {
+            return Self::Tapered { scene_from_unit: scene_from_canonical, top: s };
+        }
+        // Upside down, with the wider end as the base.
+        let flip =
+            DAffine3::from_mat3_translation(DMat3::from_diagonal(DVec3::new(s, s, -1.0)), DVec3::Z);
+        Self::Tapered { scene_from_unit: scene_from_canonical * flip, top: 1.0 / s }
+    }
+
     /// The form after the invertible affine map `map`. Similarities keep a sphere a sphere; any other
     /// map makes it an ellipsoid. The other forms stay what they are.
     pub fn transformed(self, map: &DAffine3) -> Self {
@@ -88,6 +111,10 @@ impl Form {
                     .collect(),
                 corners: corners.iter().map(|c| map.transform_point3(*c)).collect(),
             },
+            Self::Tapered { scene_from_unit, top } => {
+                Self::Tapered { scene_from_unit: *map * scene_from_unit, top }
+            }
+            Self::Compound(compound) => Self::Compound(compound.transformed(map)),
             Self::Parallelogram { corner, u, v } => {
                 let (u, v) = (linear * u, linear * v);
                 let corner = map.transform_point3(corner);
@@ -105,7 +132,15 @@ impl Form {
         }
     }
 
-    /// Corners of the smallest axis-parallel box around the form; `None` if it has no end.
+    /// Number of parts that can have a finish of their own: 1 but for compounds.
+    pub fn parts(&self) -> usize {
+        match self {
+            Self::Compound(compound) => compound.parts.len(),
+            _ => 1,
+        }
+    }
+
+    /// Corners of an axis-parallel box around the form, the smallest but for compounds; `None` if it has no end.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let around = |points: &[DVec3]| {
             let low = points.iter().copied().reduce(DVec3::min)?;
@@ -122,6 +157,19 @@ impl Form {
                 Some((m.translation - half, m.translation + half))
             }
             Self::Convex { corners, .. } => around(corners),
+            Self::Tapered { scene_from_unit: m, top } => {
+                // Half-widths of the base's disc: lengths of the rows of the first two columns.
+                let rows = m.matrix3.transpose();
+                let half = DVec3::new(
+                    rows.x_axis.truncate().length(),
+                    rows.y_axis.truncate().length(),
+                    rows.z_axis.truncate().length(),
+                );
+                let (base, cap) = (m.translation, m.translation + m.matrix3.z_axis);
+                let narrow = half * *top;
+                around(&[base - half, base + half, cap - narrow, cap + narrow])
+            }
+            Self::Compound(compound) => compound.bounds(),
             Self::Parallelogram { corner, u, v } => {
                 around(&[*corner, corner + u, corner + v, corner + u + v])
             }

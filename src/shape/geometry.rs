@@ -1,11 +1,11 @@
 //! All things of a scene, ready for rays: batches, and a tree over them where it pays.
 
-use super::batch::{Batch, Compiled, Hit, Ray, Surface, compile};
+use super::batch::{Batch, Compiled, Hit, Ray, Source, Surface, compile};
 use super::form::Form;
 use super::tree::Tree;
 use crate::lanes::{Lanes, Mask, V3};
-use glam::DVec3;
 use std::fmt;
+use std::ops::Range;
 
 /// From this many bounded items a tree is faster than a list. Measured by `benches/kernel.rs`,
 /// group `list or tree`: spheres in a ball cross over between 64 (list 1.35 times faster) and 256 (tree
@@ -14,36 +14,30 @@ pub const TREE_FROM: usize = 96;
 
 /// One batch and where its items stand in the numbering of all items.
 struct Part<L: Lanes> {
-    batch: Box<dyn Batch<L>>,
+    batch: Batch<L>,
     base: u32,
     end: u32,
-    len: usize,
-    in_tree: bool,
 }
 
 /// The things of a scene, compiled for one lane type.
 pub struct Geometry<L: Lanes> {
     parts: Vec<Part<L>>,
+    all: Selection,
     tree: Option<Tree<L>>,
     /// `(part, number in the part)` of the tree's items.
     tree_items: Vec<(u32, u32)>,
-    /// `source[item]`: which form, in the order given to [`Geometry::new`].
-    source: Vec<u32>,
-    /// Bounding spheres of the items; `None`: without an end.
-    spheres: Vec<Option<(DVec3, f64)>>,
+    /// `source[item]`: which form, in the order given to [`Geometry::new`], and which part of it.
+    source: Vec<Source>,
     counts: Vec<String>,
 }
 
-/// Items that some rays can meet.
+/// Some items of a geometry.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
-    /// `(part, number in the part)`.
-    items: Vec<(u32, u32)>,
-}
-
-/// The sphere around a box.
-fn around((low, high): (DVec3, DVec3)) -> (DVec3, f64) {
-    (0.5 * (low + high), 0.5 * low.distance(high))
+pub struct Selection {
+    /// Items that are no tree's, by part and number in the part.
+    runs: Vec<(u32, Range<u32>)>,
+    /// All items of the tree.
+    tree: bool,
 }
 
 impl<L: Lanes> Geometry<L> {
@@ -57,10 +51,10 @@ impl<L: Lanes> Geometry<L> {
     pub fn with_tree(forms: &[Form], tree: bool) -> Self {
         let mut out = Self {
             parts: Vec::new(),
+            all: Selection::default(),
             tree: None,
             tree_items: Vec::new(),
             source: Vec::new(),
-            spheres: Vec::new(),
             counts: Vec::new(),
         };
         let mut bounds = Vec::new();
@@ -68,22 +62,49 @@ impl<L: Lanes> Geometry<L> {
             let base = out.source.len() as u32;
             let in_tree = tree && !infinite;
             let how = if in_tree { "tree" } else { "list" };
-            let name = if sources.len() == 1 { noun.0 } else { noun.1 };
-            out.counts.push(format!("{} {name} ({how})", sources.len()));
+            let count = sources.iter().filter(|s| s.part == 0).count();
+            let name = if count == 1 { noun.0 } else { noun.1 };
+            out.counts.push(format!("{count} {name} ({how})"));
+            let part = out.parts.len() as u32;
             if in_tree {
-                for (i, source) in sources.iter().enumerate() {
-                    bounds.extend(forms[*source].bounds());
-                    out.tree_items.push((out.parts.len() as u32, i as u32));
+                for (i, source) in sources.iter().enumerate().filter(|(_, s)| s.part == 0) {
+                    bounds.extend(forms[source.form].bounds());
+                    out.tree_items.push((part, i as u32));
                 }
+            } else {
+                out.all.runs.push((part, 0..sources.len() as u32));
             }
-            let spheres = sources.iter().map(|s| forms[*s].bounds().map(around));
-            out.spheres.extend(spheres);
-            out.source.extend(sources.iter().map(|s| *s as u32));
-            let end = out.source.len() as u32;
-            out.parts.push(Part { batch, base, end, len: sources.len(), in_tree });
+            out.source.extend(&sources);
+            out.parts.push(Part { batch, base, end: out.source.len() as u32 });
         }
         out.tree = (!bounds.is_empty()).then(|| Tree::new(&bounds));
+        out.all.tree = out.tree.is_some();
         out
+    }
+
+    /// Those items for which `wanted` is true; all of those in a tree, which knows better.
+    pub fn select(&self, wanted: impl Fn(u32) -> bool) -> Selection {
+        let mut runs: Vec<(u32, Range<u32>)> = Vec::new();
+        for (part, range) in &self.all.runs {
+            let base = self.parts[*part as usize].base;
+            for i in range.clone().filter(|i| wanted(base + i)) {
+                match runs.last_mut() {
+                    Some((last, run)) if last == part && run.end == i => run.end += 1,
+                    _ => runs.push((*part, i..i + 1)),
+                }
+            }
+        }
+        Selection { runs, tree: self.all.tree }
+    }
+
+    /// Whether the bounded items stand in a tree.
+    pub fn has_tree(&self) -> bool {
+        self.tree.is_some()
+    }
+
+    /// All items.
+    pub fn all(&self) -> &Selection {
+        &self.all
     }
 
     /// Number of items.
@@ -96,99 +117,78 @@ impl<L: Lanes> Geometry<L> {
         self.source.is_empty()
     }
 
-    /// For each item, which form it came from.
-    pub fn sources(&self) -> &[u32] {
+    /// For each item, which form it came from, and which part of it.
+    pub fn sources(&self) -> &[Source] {
         &self.source
     }
 
-    /// The nearest item in front of each ray; of several at the same distance the one with the lowest
-    /// number, so that neither the order in the tree nor the other rays of the packet decide.
-    #[inline]
-    pub fn closest(&self, ray: &Ray<L>) -> Hit<L> {
+    /// The nearest of some items in front of each ray; of several at the same distance the one with
+    /// the lowest number, so that neither the order in the tree nor the other rays of the packet decide.
+    pub fn closest(&self, ray: &Ray<L>, of: &Selection) -> Hit<L> {
         let mut hit = Hit::none();
-        for part in self.parts.iter().filter(|p| !p.in_tree) {
-            part.batch.closest(0..part.len, part.base, ray, &mut hit);
-        }
-        if let Some(tree) = &self.tree {
-            tree.walk(ray, hit.t, |item, _| {
-                let (part, i) = self.tree_items[item];
-                let part = &self.parts[part as usize];
-                let mut one = Hit::none();
-                part.batch.closest(i as usize..i as usize + 1, part.base, ray, &mut one);
-                hit.take(&one);
-                hit.t
-            });
-        }
-        hit
-    }
-
-    /// The items that rays inside a cone can meet: for many rays that leave one point, such as those
-    /// of a tile of the picture. With a tree the tree knows better: then there are none to name.
-    ///
-    /// `axis` is a unit vector, `spread` the half-angle in radians, below pi / 2.
-    pub fn seen_from(&self, apex: DVec3, axis: DVec3, spread: f64) -> Option<Seen> {
-        if self.tree.is_some() {
-            return None;
-        }
-        let sees = |(center, radius): &(DVec3, f64)| {
-            let to = *center - apex;
-            let distance = to.length();
-            // Inside the sphere, or the angle between axis and centre is at most that of the cone
-            // plus that of the sphere, with a little to spare for rounding.
-            distance <= *radius * 1.001
-                || to.angle_between(axis) <= spread + (*radius / distance).asin() + 1e-5
-        };
-        let mut items = Vec::new();
-        for (p, part) in self.parts.iter().enumerate() {
-            for i in 0..part.len {
-                if self.spheres[part.base as usize + i].as_ref().is_none_or(sees) {
-                    items.push((p as u32, i as u32));
-                }
-            }
-        }
-        Some(Seen { items })
-    }
-
-    /// The nearest item in front of each ray, of those in `seen`.
-    #[inline]
-    pub fn closest_seen(&self, ray: &Ray<L>, seen: &Seen) -> Hit<L> {
-        let mut hit = Hit::none();
-        for (part, i) in &seen.items {
+        for (part, range) in &of.runs {
             let part = &self.parts[*part as usize];
-            let i = *i as usize;
-            part.batch.closest(i..i + 1, part.base, ray, &mut hit);
+            part.batch.closest(indices(range), part.base, ray, &mut hit);
         }
+        match &self.tree {
+            Some(tree) if of.tree => self.closest_in(tree, ray, hit),
+            _ => hit,
+        }
+    }
+
+    #[inline(never)]
+    fn closest_in(&self, tree: &Tree<L>, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
+        tree.walk(ray, hit.t, |item, _| {
+            let (part, i) = self.tree_items[item];
+            let part = &self.parts[part as usize];
+            let mut one = Hit::none();
+            part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut one);
+            hit.take(&one);
+            hit.t
+        });
         hit
     }
 
-    /// Which lanes of `wanted` meet anything at a distance in (0, limit).
-    #[inline]
-    pub fn blocked(&self, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+    /// Which lanes of `wanted` meet any of some items at a distance in (0, limit).
+    pub fn blocked(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, by: &Selection) -> L::Mask {
         let mut blocked = L::mask(false);
-        for part in self.parts.iter().filter(|p| !p.in_tree) {
+        for (part, range) in &by.runs {
             let open = wanted.and_not(blocked);
-            blocked = blocked | part.batch.blocked(0..part.len, ray, limit, open);
+            let batch = &self.parts[*part as usize].batch;
+            blocked = blocked | batch.blocked(indices(range), ray, limit, open);
             if wanted.and_not(blocked).none() {
                 return blocked;
             }
         }
-        if let Some(tree) = &self.tree {
-            let limit_of = |blocked| L::select(wanted.and_not(blocked), limit, L::of(-1.0));
-            tree.walk(ray, limit_of(blocked), |item, left| {
-                let (part, i) = self.tree_items[item];
-                let i = i as usize;
-                let open = wanted.and_not(blocked);
-                let batch = &self.parts[part as usize].batch;
-                let new = batch.blocked(i..i + 1, ray, left, open);
-                blocked = blocked | (new & open);
-                limit_of(blocked)
-            });
+        match &self.tree {
+            Some(tree) if by.tree => self.blocked_in(tree, ray, limit, wanted, blocked),
+            _ => blocked,
         }
+    }
+
+    #[inline(never)]
+    fn blocked_in(
+        &self,
+        tree: &Tree<L>,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+        mut blocked: L::Mask,
+    ) -> L::Mask {
+        let limit_of = |blocked| L::select(wanted.and_not(blocked), limit, L::of(-1.0));
+        tree.walk(ray, limit_of(blocked), |item, left| {
+            let (part, i) = self.tree_items[item];
+            let open = wanted.and_not(blocked);
+            let batch = &self.parts[part as usize].batch;
+            let new = batch.blocked(indices(&(i..i + 1)), ray, left, open);
+            blocked = blocked | (new & open);
+            limit_of(blocked)
+        });
         blocked
     }
 
     /// The surface of `item` near `point`.
-    #[inline]
+    #[inline(always)]
     pub fn surface(&self, item: u32, point: V3<L>) -> Surface<L> {
         for part in &self.parts {
             if item < part.end {
@@ -197,6 +197,10 @@ impl<L: Lanes> Geometry<L> {
         }
         unreachable!("every item belongs to a part")
     }
+}
+
+fn indices(range: &Range<u32>) -> Range<usize> {
+    range.start as usize..range.end as usize
 }
 
 impl<L: Lanes> fmt::Display for Geometry<L> {

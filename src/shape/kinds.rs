@@ -1,8 +1,13 @@
 //! The table of kinds. A new kind of shape is one file and one line here.
 
 use super::Form;
-use super::{Cube, Cuboid, Plane, Platform, Prism, Pyramid, Rectangle, Sphere};
-use crate::value::{Fault, Field, Takes};
+use super::compound::OF_FIELDS;
+use super::{
+    Cone, Cube, Cuboid, Cylinder, Difference, Intersection, Plane, Platform, Prism, Pyramid,
+};
+use super::{Rectangle, Sphere, TaperedCylinder, Union, UnitCylinder};
+use crate::value::{Fault, Field, Takes, rounded_to};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// What every kind's description says of itself.
@@ -19,10 +24,39 @@ pub trait Kind {
 
     /// What is wrong with it.
     fn faults(&self) -> Vec<Fault>;
+
+    /// One of this kind that stands upright on `base`, the middle of its lower side, and fills about
+    /// a box with the lengths `size` along x, y and z, all greater than 0.
+    fn standing(base: DVec3, size: DVec3) -> Self;
+
+    /// The points that move it: adding a vector to all of them moves the whole shape by that vector.
+    /// Empty: only a transform moves it.
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]>;
+
+    /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen from
+    /// above. `false`: it has no key for that, and nothing was done.
+    fn turn(&mut self, degrees: f64) -> bool;
+}
+
+/// The angle `rotation + degrees` as it is written in a file: above -180, at most 180.
+pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
+    let turn = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
+    if turn > 180.0 { rounded_to(turn - 360.0, -6) } else { turn }
+}
+
+/// The keys of a kind; those of compounds by the name of their static, since a constant could not
+/// take part in a table that refers to itself.
+macro_rules! keys {
+    ($kind:ident) => {
+        $kind::FIELDS
+    };
+    ($kind:ident $fields:path) => {
+        &$fields
+    };
 }
 
 macro_rules! kinds {
-    ($($key:literal => $kind:ident),+ $(,)?) => {
+    ($($key:literal => $kind:ident $(with $fields:path)?),+ $(,)?) => {
         /// What an object looks like: one kind with its parameters. In files a table with one key.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         pub enum Shape {
@@ -33,10 +67,13 @@ macro_rules! kinds {
             )+
         }
 
-        /// Every kind: its key, its fields, what it is.
-        pub const KINDS: &[Field] = &[
-            $(Field::required($key, Takes::Table($kind::FIELDS), "", $kind::DOC),)+
+        // A static, since the parts of compounds have shapes, too: the table refers to itself.
+        pub(super) static KIND_TABLE: [Field; [$($key),+].len()] = [
+            $(Field::required($key, Takes::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
         ];
+
+        /// Every kind: its key, its fields, what it is.
+        pub const KINDS: &[Field] = &KIND_TABLE;
 
         /// Every kind's key with an example as it stands in an `[[object]]`.
         pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE),)+];
@@ -64,6 +101,30 @@ macro_rules! kinds {
                 };
                 faults.into_iter().map(|f| f.under(self.key())).collect()
             }
+
+            /// The kind with this key as [`Kind::standing`] makes it; `None`: no kind has it.
+            pub fn standing(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
+                match key {
+                    $($key => Some(Self::$kind($kind::standing(base, size))),)+
+                    _ => None,
+                }
+            }
+
+            /// The points that move it: adding a vector to all of them moves the whole shape by that
+            /// vector. Empty: only a transform moves it.
+            pub fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+                match self {
+                    $(Self::$kind(kind) => kind.anchors(),)+
+                }
+            }
+
+            /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen
+            /// from above. `false`: its kind has no key for that, and nothing was done.
+            pub fn turn(&mut self, degrees: f64) -> bool {
+                match self {
+                    $(Self::$kind(kind) => kind.turn(degrees),)+
+                }
+            }
         }
     };
 }
@@ -74,7 +135,21 @@ kinds! {
     "box" => Cuboid,
     "pyramid" => Pyramid,
     "prism" => Prism,
+    "cylinder" => Cylinder,
+    "cone" => Cone,
+    "tapered_cylinder" => TaperedCylinder,
+    "unit_cylinder" => UnitCylinder,
     "platform" => Platform,
     "rectangle" => Rectangle,
     "plane" => Plane,
+    "union" => Union with OF_FIELDS,
+    "intersection" => Intersection with OF_FIELDS,
+    "difference" => Difference with OF_FIELDS,
+}
+
+impl Shape {
+    /// The first of the points that move it; the origin if there is none.
+    pub fn place(&self) -> DVec3 {
+        self.clone().anchors().first().map_or(DVec3::ZERO, |at| DVec3::from_array(**at))
+    }
 }

@@ -1,8 +1,14 @@
 //! Shapes: what users describe, one kind a file, and what rays meet, one batch per form.
 
 mod batch;
+mod bound;
+mod cast;
+mod compound;
+mod cone;
+mod csg;
 mod cube;
 mod cuboid;
+mod cylinder;
 pub mod facets;
 mod form;
 mod geometry;
@@ -13,14 +19,23 @@ mod prism;
 mod pyramid;
 mod rectangle;
 mod sphere;
+mod tapered;
+mod tapered_cylinder;
+mod transform;
 mod tree;
+mod unit_cylinder;
 mod upright;
 
-pub use batch::{Hit, Ray, Surface};
+pub use batch::{Hit, Ray, Source, Surface};
+pub use bound::{Ball, Bound, Pencil, Towards};
+pub use compound::{Difference, Intersection, MAX_DEPTH, Part, Union};
+pub use cone::Cone;
+pub use csg::{Compound, Tree as CompoundTree};
 pub use cube::Cube;
 pub use cuboid::Cuboid;
+pub use cylinder::Cylinder;
 pub use form::{Form, HalfSpace};
-pub use geometry::{Geometry, Seen, TREE_FROM};
+pub use geometry::{Geometry, Selection, TREE_FROM};
 pub use kinds::{EXAMPLES, KINDS, Kind, Shape};
 pub use plane::Plane;
 pub use platform::Platform;
@@ -28,3 +43,6 @@ pub use prism::Prism;
 pub use pyramid::Pyramid;
 pub use rectangle::Rectangle;
 pub use sphere::Sphere;
+pub use tapered_cylinder::TaperedCylinder;
+pub use transform::{Rotate, STEP_FIELDS, Scale, Step, chained, misplaced};
+pub use unit_cylinder::UnitCylinder;

@@ -1,7 +1,7 @@
 //! Infinite plane.
 
 use super::{Form, Kind};
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Checks, Fault, Field, Range, Takes, turned};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -41,5 +41,19 @@ impl Kind for Plane {
             .numbers("point", &self.point)
             .numbers("normal", &self.normal)
             .faults()
+    }
+
+    /// The ground, through `base`.
+    fn standing(base: DVec3, _: DVec3) -> Self {
+        Self { point: base.to_array(), normal: [0.0, 1.0, 0.0] }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.point]
+    }
+
+    fn turn(&mut self, degrees: f64) -> bool {
+        self.normal = turned(self.normal, degrees);
+        true
     }
 }

@@ -46,4 +46,17 @@ impl Kind for Platform {
             .ratio(&self.size.map(|s| ("size", s)), &self.center)
             .faults()
     }
+
+    /// A table top: at the height of the box's upper side.
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        Self { center: [base.x, base.y + size.y, base.z], size: [size.x, size.z] }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.center]
+    }
+
+    fn turn(&mut self, _: f64) -> bool {
+        false
+    }
 }

@@ -1,6 +1,7 @@
 //! Right prism over a regular triangle.
 
-use super::upright::upright;
+use super::kinds::turned_rotation;
+use super::upright::{lower_left, upright};
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
 use glam::{DVec2, DVec3};
@@ -59,5 +60,20 @@ impl Kind for Prism {
             .numbers("rotation", &[self.rotation])
             .ratio(&[("side", self.side), ("height", self.height)], &self.corner)
             .faults()
+    }
+
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        let side = size.x;
+        let corner = lower_left(base, side, side * 0.75f64.sqrt());
+        Self { corner, side, height: size.y, rotation: 0.0 }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.corner]
+    }
+
+    fn turn(&mut self, degrees: f64) -> bool {
+        self.rotation = turned_rotation(self.rotation, degrees);
+        true
     }
 }

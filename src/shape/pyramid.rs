@@ -1,7 +1,8 @@
 //! Regular pyramid with a square base, whole or truncated.
 
 use super::cube::square;
-use super::upright::upright;
+use super::kinds::turned_rotation;
+use super::upright::{lower_left, upright};
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
 use glam::DVec3;
@@ -77,5 +78,20 @@ impl Kind for Pyramid {
             .numbers("rotation", &[self.rotation])
             .ratio(&sizes, &self.corner)
             .faults()
+    }
+
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        let side = size.x.min(size.z);
+        let corner = lower_left(base, side, side);
+        Self { corner, side, apex_height: size.y, height: size.y, rotation: 0.0 }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.corner]
+    }
+
+    fn turn(&mut self, degrees: f64) -> bool {
+        self.rotation = turned_rotation(self.rotation, degrees);
+        true
     }
 }

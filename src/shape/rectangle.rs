@@ -1,7 +1,7 @@
 //! Rectangle anywhere: the flat mirror.
 
 use super::{Form, Kind};
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Checks, Fault, Field, Range, Takes, turned};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -90,6 +90,25 @@ impl Kind for Rectangle {
                 )
             }))
             .faults()
+    }
+
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        Self {
+            center: [base.x, base.y + size.y / 2.0, base.z],
+            size: [size.x, size.y],
+            normal: [0.0, 0.0, 1.0],
+            up: up(),
+        }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.center]
+    }
+
+    fn turn(&mut self, degrees: f64) -> bool {
+        self.normal = turned(self.normal, degrees);
+        self.up = turned(self.up, degrees);
+        true
     }
 }
 

@@ -1,7 +1,7 @@
 //! Sphere: the points at distance `radius` from `center`.
 
 use super::{Form, Kind};
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Checks, Fault, Field, Range, Takes, clean};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -33,5 +33,19 @@ impl Kind for Sphere {
             .numbers("radius", &[self.radius])
             .ratio(&[("radius", self.radius)], &self.center)
             .faults()
+    }
+
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        let radius = clean(size.min_element() / 2.0, size.min_element());
+        Self { center: [base.x, base.y + radius, base.z], radius }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.center]
+    }
+
+    /// It looks the same from all sides.
+    fn turn(&mut self, _: f64) -> bool {
+        true
     }
 }

@@ -1,7 +1,7 @@
 //! Solids that stand on a regular base: what cube, box, pyramid and prism have in common.
 
 use super::{Form, HalfSpace};
-use crate::value::sin_cos_degrees;
+use crate::value::{clean, sin_cos_degrees};
 use glam::{DVec2, DVec3};
 
 /// A convex solid over a horizontal base.
@@ -51,6 +51,13 @@ pub(super) fn upright(
         faces.push(through(corners[i], normal));
     }
     Form::Convex { faces, corners }
+}
+
+/// The corner of a base whose middle is `base`, `width` wide and `depth` deep: half of both away
+/// towards -x and +z, in numbers that read well.
+pub(super) fn lower_left(base: DVec3, width: f64, depth: f64) -> [f64; 3] {
+    let scale = width.min(depth);
+    [clean(base.x - width / 2.0, scale), base.y, clean(base.z + depth / 2.0, scale)]
 }
 
 #[cfg(test)]

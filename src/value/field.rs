@@ -139,7 +139,7 @@ impl fmt::Display for Takes {
             Self::ListOf(fields) => {
                 write!(f, "a list of tables, each with exactly one of: {}", names(fields))
             }
-            Self::Tables(_) => f.write_str("tables in double brackets"),
+            Self::Tables(_) => f.write_str("a list of tables"),
             Self::Named(_) => f.write_str("named tables"),
         }
     }

@@ -7,6 +7,7 @@ mod color;
 mod fault;
 mod field;
 mod range;
+mod round;
 mod text;
 
 pub use angle::sin_cos_degrees;
@@ -14,4 +15,5 @@ pub use color::{Color, linear_from_srgb};
 pub use fault::{Checks, Fault};
 pub use field::{Choice, Field, Preset, Takes};
 pub use range::{Range, number};
+pub use round::{clean, decade, rounded_to, significant, turned};
 pub use text::{excerpt, printable};

@@ -1,14 +1,16 @@
 //! From a scene to a world.
 
 use super::groups::{Groups, Member};
+use super::guide::Sight;
 use super::inventory::Inventory;
 use super::limits;
+use super::outlook::{Outlook, Surroundings};
 use crate::camera::View;
 use crate::lanes::{Double, Lanes, Real, Single};
 use crate::light::Lamp;
 use crate::material::{Finish, Material, Spread};
 use crate::scene::{Filter, Horizon, Level, Scene};
-use crate::shape::{Form, Geometry, Seen};
+use crate::shape::{Form, Geometry, Pencil};
 use glam::{DAffine3, DVec3};
 
 /// The precision that a scene is traced in.
@@ -57,6 +59,8 @@ pub struct World<L: Lanes> {
     pub(super) min_weight: f64,
     pub(super) fold: bool,
     pub(super) view: View,
+    pub(super) panorama: Outlook,
+    surroundings: Surroundings,
     groups: Groups,
     names: Vec<String>,
     scales: Vec<f64>,
@@ -99,22 +103,36 @@ impl Placed {
 
     /// The smallest thickness of a solid, or the smaller edge of a flat thing.
     fn thinnest(&self) -> f64 {
-        let thickness = |form: &Form| match form {
-            Form::Parallelogram { u, v, .. } => u.length().min(v.length()),
-            Form::Convex { faces, corners } => faces
-                .iter()
-                .map(|f| {
-                    let depths = corners.iter().map(|c| f.offset - f.normal.dot(*c));
-                    depths.fold(0.0, f64::max)
-                })
-                .fold(f64::INFINITY, f64::min),
-            Form::Plane { .. } => f64::INFINITY,
-            Form::Sphere { radius, .. } => 2.0 * radius,
-            Form::Ellipsoid { .. } => {
-                form.bounds().map_or(f64::INFINITY, |(l, h)| (h - l).min_element())
-            }
-        };
         self.forms.iter().map(thickness).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// The smallest thickness of a solid, or the smaller edge of a flat thing. Of a compound that of its
+/// thinnest part: what is left between cuts may be thinner.
+fn thickness(form: &Form) -> f64 {
+    match form {
+        Form::Parallelogram { u, v, .. } => u.length().min(v.length()),
+        Form::Convex { faces, corners } => faces
+            .iter()
+            .map(|f| {
+                let depths = corners.iter().map(|c| f.offset - f.normal.dot(*c));
+                depths.fold(0.0, f64::max)
+            })
+            .fold(f64::INFINITY, f64::min),
+        Form::Plane { .. } => f64::INFINITY,
+        Form::Sphere { radius, .. } => 2.0 * radius,
+        Form::Ellipsoid { .. } => {
+            form.bounds().map_or(f64::INFINITY, |(l, h)| (h - l).min_element())
+        }
+        Form::Tapered { scene_from_unit: m, .. } => {
+            // Between the faces of the box around the canonical solid: 2 by 2 by 1.
+            let rows = m.matrix3.inverse().transpose();
+            let across = rows.x_axis.length().max(rows.y_axis.length());
+            (2.0 / across).min(rows.z_axis.length().recip())
+        }
+        Form::Compound(compound) => {
+            compound.parts.iter().map(thickness).fold(f64::INFINITY, f64::min)
+        }
     }
 }
 
@@ -131,18 +149,22 @@ impl<L: Lanes> World<L> {
         let mut used: Vec<&Material> = Vec::new();
         let mut finish_of_object = Vec::new();
         for object in &scene.objects {
-            let material = scene.materials.get(&object.material).unwrap_or(&default);
-            let known = used.iter().position(|m| *m == material);
-            finish_of_object.push(known.unwrap_or(used.len()) as u32);
-            if known.is_none() {
-                used.push(material);
-            }
+            let mut finish = |name: &str| {
+                let material = scene.materials.get(name).unwrap_or(&default);
+                let known = used.iter().position(|m| *m == material);
+                if known.is_none() {
+                    used.push(material);
+                }
+                known.unwrap_or(used.len() - 1) as u32
+            };
+            let parts = object.shape.part_materials(&object.material);
+            finish_of_object.push(parts.into_iter().map(&mut finish).collect::<Vec<_>>());
         }
         let finishes: Vec<Finish<L::Scalar>> =
             used.iter().map(|m| Finish::new(m, reflects)).collect();
         let geometry = Geometry::new(&placed.forms);
         let finish_of =
-            geometry.sources().iter().map(|form| finish_of_object[*form as usize]).collect();
+            geometry.sources().iter().map(|item| finish_of_object[item.form][item.part]).collect();
 
         let lit = finishes.iter().any(|f| f.wants_light);
         let ambient = used.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3]);
@@ -170,7 +192,15 @@ impl<L: Lanes> World<L> {
             sources.len(),
             precision,
         );
+        let view = View::new(&scene.camera, scene.film.size, placed.origin);
+        // Rays that begin on the near plane may begin inside a thing.
+        let eye = (scene.camera.near == 0.0).then(|| view.eye());
+        let forms = geometry.sources().iter().map(|s| &placed.forms[s.form]).collect();
+        let lamps: Vec<_> = sources.iter().map(|s| s.lamp).collect();
+        let surroundings = Surroundings::new(forms, eye, &lamps);
         Self {
+            panorama: surroundings.outlook(&geometry, None),
+            surroundings,
             ambient: groups.find(&Member::Ambient),
             background: (scene.background.color.0 != [0.0; 3])
                 .then(|| groups.find(&Member::Background))
@@ -179,7 +209,7 @@ impl<L: Lanes> World<L> {
             depth: if reflecting { scene.trace.depth } else { 0 },
             min_weight: scene.trace.min_weight,
             fold: scene.trace.horizon == Horizon::Fold,
-            view: View::new(&scene.camera, scene.film.size, placed.origin),
+            view,
             names: groups.names(scene),
             jitter: scene.film.filter == Filter::Box,
             glossy: finishes.iter().any(glossy),
@@ -219,11 +249,15 @@ impl<L: Lanes> World<L> {
         &self.view
     }
 
-    /// The only items that camera rays through a rectangle of the raster can meet first; `None`:
-    /// not known.
-    pub fn seen_through(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Seen> {
-        let (axis, spread) = self.view.cone(origin, extent);
-        self.geometry.seen_from(self.view.eye(), axis, spread)
+    /// What camera rays through a rectangle of the raster may meet; `None`: a tree knows better.
+    pub fn outlook(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Outlook> {
+        if self.geometry.has_tree() {
+            return None;
+        }
+        let [_, _, forward] = self.view.frame();
+        let corners = self.view.corners(origin, extent);
+        let pencil = Pencil { apex: self.view.eye(), forward, corners };
+        Some(self.surroundings.outlook(&self.geometry, Some(&pencil)))
     }
 
     /// What it contains.
@@ -277,6 +311,17 @@ impl AnyWorld {
     /// A name for each light group.
     pub fn group_names(&self) -> Vec<String> {
         either!(self, w => w.names.clone())
+    }
+
+    /// The light groups.
+    pub fn light_groups(&self) -> &Groups {
+        either!(self, w => &w.groups)
+    }
+
+    /// What the camera sees through each of `points` of the raster (columns and rows in pixels, with
+    /// fractions), into `seen` of the same length.
+    pub fn look(&self, points: &[[f64; 2]], seen: &mut [Sight]) {
+        either!(self, w => w.look(points, seen))
     }
 
     /// Steps per unit of radiance in the film's integers, per group: powers of two.

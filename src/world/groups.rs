@@ -3,7 +3,8 @@
 
 use crate::lanes::Real;
 use crate::light::{Lamp, Light};
-use crate::scene::Scene;
+use crate::material::Material;
+use crate::scene::{Object, Scene};
 use crate::value::Color;
 use glam::DVec3;
 
@@ -33,10 +34,14 @@ pub enum Member {
 }
 
 /// The groups of a scene: those that can be other than black.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Groups {
     /// In the order of the film.
     pub members: Vec<Member>,
+    /// Some surface answers lights.
+    lit: bool,
+    /// Some surface answers ambient light.
+    ambient: bool,
 }
 
 impl Groups {
@@ -64,7 +69,7 @@ impl Groups {
             // A black picture is a picture too: it needs one group to hold it.
             members.push(Member::Background);
         }
-        Self { members }
+        Self { members, lit, ambient }
     }
 
     /// Position of a member, if there is such a group.
@@ -99,13 +104,79 @@ impl Groups {
         self.members.iter().map(weight).collect()
     }
 
+    /// Whether the samples of the world compiled from `compiled` (whose groups these are) are samples
+    /// of `scene` too, mixed otherwise: they differ in nothing but the strength of lights, ambient and
+    /// background that have groups, in names, in materials that nothing is made of, and in the cap on
+    /// rays per pixel, which only says how many samples there are to be.
+    pub fn serve(&self, compiled: &Scene, scene: &Scene) -> bool {
+        let Scene {
+            film,
+            trace,
+            camera,
+            views: _,
+            background,
+            ambient,
+            lights: _,
+            materials: _,
+            objects,
+        } = scene;
+        let default = Material::default();
+        let same_object = |(a, b): (&Object, &Object)| {
+            a.shape == b.shape
+                && a.transform == b.transform
+                && compiled.materials.get(&a.material).unwrap_or(&default)
+                    == scene.materials.get(&b.material).unwrap_or(&default)
+        };
+        film.size == compiled.film.size
+            && film.filter == compiled.film.filter
+            && *trace == compiled.trace
+            && *camera == compiled.camera
+            && (background.color == Color::BLACK || compiled.background.color != Color::BLACK)
+            && (ambient.color == Color::BLACK
+                || !self.ambient
+                || self.members.contains(&Member::Ambient))
+            && objects.len() == compiled.objects.len()
+            && compiled.objects.iter().zip(objects).all(same_object)
+            && self.serve_lights(compiled, scene)
+    }
+
+    /// The part of [`Groups::serve`] that is about lights. One that does not shine may stand anywhere.
+    fn serve_lights(&self, compiled: &Scene, scene: &Scene) -> bool {
+        let is_compiled = |i: usize| {
+            let of = |m: &Member| match m {
+                Member::Light(own) => *own == i,
+                Member::Shared(list) => list.contains(&i),
+                Member::Ambient | Member::Background => false,
+            };
+            self.members.iter().any(of)
+        };
+        let same_place = |i: usize, light: &Light| {
+            let before = &compiled.lights[i];
+            before.point == light.point
+                && before.directional == light.directional
+                && before.falloff == light.falloff
+        };
+        let mut shining = scene.lights.iter().enumerate().filter(|(_, light)| shines(light));
+        let shared = |member: &Member| match member {
+            Member::Shared(list) => list.iter().all(|i| {
+                scene.lights.get(*i).is_some_and(|l| strength(l) == strength(&compiled.lights[*i]))
+            }),
+            Member::Ambient | Member::Background | Member::Light(_) => true,
+        };
+        !self.lit
+            || shining.all(|(i, light)| is_compiled(i) && same_place(i, light))
+                && self.members.iter().all(shared)
+    }
+
     /// A name for each group, for layers of files.
     pub fn names(&self, scene: &Scene) -> Vec<String> {
         let name = |member: &Member| match member {
             Member::Ambient => "ambient".to_string(),
             Member::Background => "background".to_string(),
-            Member::Light(i) if scene.lights[*i].name.is_empty() => format!("light {}", i + 1),
-            Member::Light(i) => scene.lights[*i].name.clone(),
+            Member::Light(i) => match scene.lights.get(*i) {
+                Some(light) if !light.name.is_empty() => light.name.clone(),
+                _ => format!("light {}", i + 1),
+            },
             Member::Shared(list) => format!("{} lights", list.len()),
         };
         self.members.iter().map(name).collect()
@@ -142,4 +213,111 @@ fn strength(light: &Light) -> [f64; 3] {
 
 fn shines(light: &Light) -> bool {
     strength(light) != [0.0; 3]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIGHTS: &str = "
+        [ambient]
+        color = [0.1, 0.1, 0.1]
+        [[light]]
+        name = \"lamp\"
+        point = { position = [0.0, 3.0, 0.0] }
+        [[light]]
+        point = { position = [1.0, 3.0, 0.0] }
+        on = false
+        [materials.red]
+        color = [1.0, 0.0, 0.0]
+        [materials.spare]
+        [[object]]
+        material = \"red\"
+        shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
+    ";
+
+    fn scene(text: &str) -> Scene {
+        Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn serves(groups: &Groups, scene: &Scene, change: impl Fn(&mut Scene)) -> bool {
+        let mut changed = scene.clone();
+        change(&mut changed);
+        groups.serve(scene, &changed)
+    }
+
+    #[test]
+    fn samples_serve_scenes_that_differ_in_the_mix_only() {
+        let scene = scene(LIGHTS);
+        let groups = Groups::new(&scene, true, true);
+        let serves = |change: fn(&mut Scene)| serves(&groups, &scene, change);
+        assert!(serves(|_| ()));
+        assert!(serves(|s| s.lights[0].intensity = 7.0));
+        assert!(serves(|s| s.lights[0].color = Color([0.0, 0.5, 1.0])));
+        assert!(serves(|s| s.lights[0].on = false));
+        assert!(serves(|s| s.ambient.color = Color::BLACK));
+        assert!(serves(|s| s.ambient.color = Color::WHITE));
+        assert!(serves(|s| s.film.rays_per_pixel = 9));
+        assert!(serves(|s| s.lights[0].name = "sun".to_string()));
+        assert!(serves(|s| s.objects[0].name = "ball".to_string()));
+        assert!(serves(|s| s.materials.retain(|name, _| name != "spare")));
+        // A material under another name is the same material.
+        assert!(serves(|s| {
+            let red = s.materials.remove("red").unwrap();
+            s.materials.insert("crimson".to_string(), red);
+            s.objects[0].material = "crimson".to_string();
+        }));
+        // What does not shine may be anywhere, or nowhere.
+        assert!(serves(|s| s.lights[1].intensity = 9.0));
+        assert!(serves(|s| s.lights[1].point.as_mut().unwrap().position[0] = 5.0));
+        assert!(serves(|s| s.lights.truncate(s.lights.len() - 1)));
+        assert!(serves(|s| s.lights.clear()));
+        assert!(serves(|s| {
+            s.lights[0].on = false;
+            s.lights[0].point.as_mut().unwrap().position[0] = 5.0;
+        }));
+    }
+
+    #[test]
+    fn other_scenes_need_samples_of_their_own() {
+        let scene = scene(LIGHTS);
+        let groups = Groups::new(&scene, true, true);
+        let serves = |change: fn(&mut Scene)| serves(&groups, &scene, change);
+        assert!(!serves(|s| s.lights[1].on = true));
+        assert!(!serves(|s| s.background.color = Color::WHITE));
+        assert!(!serves(|s| s.lights[0].point.as_mut().unwrap().position[0] = 5.0));
+        assert!(!serves(|s| s.lights[0].falloff = crate::light::Falloff::InverseSquare));
+        assert!(!serves(|s| s.lights.push(s.lights[0].clone())));
+        assert!(!serves(|s| s.camera.eye[0] += 0.5));
+        assert!(!serves(|s| s.film.size = [641, 480]));
+        assert!(!serves(|s| s.trace.depth = 3));
+        assert!(!serves(|s| s.materials.get_mut("red").unwrap().ambient = 0.5));
+        assert!(!serves(|s| s.objects[0].material = "spare".to_string()));
+        assert!(!serves(|s| s.objects.push(s.objects[0].clone())));
+    }
+
+    #[test]
+    fn without_surfaces_that_answer_them_lights_do_not_matter() {
+        let scene = scene(LIGHTS);
+        let groups = Groups::new(&scene, false, false);
+        assert!(serves(&groups, &scene, |s| s.lights[1].on = true));
+        assert!(serves(&groups, &scene, |s| s.lights.push(s.lights[0].clone())));
+        assert!(serves(&groups, &scene, |s| s.ambient.color = Color::WHITE));
+        // The group of a black picture stands for no background.
+        assert_eq!(groups.members, [Member::Background]);
+        assert!(!serves(&groups, &scene, |s| s.background.color = Color::WHITE));
+    }
+
+    #[test]
+    fn lights_that_share_a_group_keep_their_strength() {
+        let lamp = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
+        let scene = scene(&lamp.repeat(MAX_LIGHT_GROUPS + 2));
+        let groups = Groups::new(&scene, true, false);
+        let own = MAX_LIGHT_GROUPS - 1;
+        assert_eq!(groups.members[own], Member::Shared((own..own + 3).collect()));
+        assert!(serves(&groups, &scene, |s| s.lights[own - 1].intensity = 3.0));
+        assert!(!serves(&groups, &scene, |s| s.lights[own].intensity = 3.0));
+        assert!(!serves(&groups, &scene, |s| s.lights[own + 1].on = false));
+        assert!(!serves(&groups, &scene, |s| s.lights.truncate(s.lights.len() - 1)));
+    }
 }

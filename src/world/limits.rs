@@ -9,10 +9,13 @@ fn strongest(material: &Material) -> f64 {
     material.reflection * material.f0().0.into_iter().fold(0.0, f64::max).min(1.0)
 }
 
-/// Whether a path may meet `object` twice in a row. Every thing is convex, so only its inside sees
-/// itself, and only paths that begin inside get there.
+/// Whether a path may meet `object` twice in a row. Every thing but a compound is convex, so only its
+/// inside sees itself, and only paths that begin inside get there.
 fn sees_itself(object: &Object, material: &Material, scene: &Scene) -> bool {
     let form = object.shape.form().transformed(&object.scene_from_object());
+    if matches!(form, Form::Compound(_)) {
+        return true;
+    }
     let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
     let eye = scene.camera.eye.into();
     let within =
@@ -30,13 +33,15 @@ pub fn biases(scene: &Scene) -> Vec<String> {
     let default = Material::default();
     let (mut first, mut second, mut pair) = (0.0f64, 0.0f64, 0.0f64);
     for object in &scene.objects {
-        let material = scene.materials.get(&object.material).unwrap_or(&default);
-        let rho = strongest(material);
-        if rho > 0.0 && sees_itself(object, material, scene) {
-            pair = pair.max(rho * rho);
+        for name in object.shape.part_materials(&object.material) {
+            let material = scene.materials.get(name).unwrap_or(&default);
+            let rho = strongest(material);
+            if rho > 0.0 && sees_itself(object, material, scene) {
+                pair = pair.max(rho * rho);
+            }
+            second = second.max(rho.min(first));
+            first = first.max(rho);
         }
-        second = second.max(rho.min(first));
-        first = first.max(rho);
     }
     pair = pair.max(first * second);
     if scene.trace.level < Level::Full || first == 0.0 {

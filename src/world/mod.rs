@@ -3,11 +3,15 @@
 
 mod compile;
 mod groups;
+mod guide;
 mod inventory;
 mod limits;
+mod outlook;
 mod path;
 
 pub use compile::{AnyWorld, Options, Precision, World};
-pub use groups::MAX_GROUPS;
+pub use groups::{Groups, MAX_GROUPS, Member};
+pub use guide::Sight;
 pub use inventory::Inventory;
+pub use outlook::Outlook;
 pub use path::{Counts, Radiance};

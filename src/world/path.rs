@@ -2,10 +2,11 @@
 
 use super::compile::World;
 use super::groups::MAX_GROUPS;
-use crate::lanes::{Lanes, MAX_WIDTH, Mask, V3};
-use crate::material::{Finish, Spread};
+use super::outlook::Outlook;
+use crate::lanes::{Lanes, Mask, V3};
+use crate::material::Spread;
 use crate::sampling::Draws;
-use crate::shape::{Hit, Ray, Seen};
+use crate::shape::{Hit, Ray};
 use std::f64::consts::FRAC_1_PI;
 
 /// The radiance of a packet's samples, per light group, for unit white light.
@@ -23,44 +24,79 @@ pub struct Counts {
     pub glossy: bool,
 }
 
-/// The finishes that a packet met.
-struct Met<L: Lanes> {
-    /// The finish of each lane.
-    finish: L,
-    /// Lanes that have one.
-    lanes: L::Mask,
-    /// The finishes that occur.
-    list: [u32; MAX_WIDTH],
-    len: usize,
-}
-
-impl<L: Lanes> Met<L> {
-    /// Each finish that occurs with its lanes, never none.
-    #[inline(always)]
-    fn entries(&self) -> impl Iterator<Item = (u32, L::Mask)> {
-        self.list[..self.len].iter().map(|f| (*f, self.lanes & self.finish.has_tag(*f)))
-    }
+/// Where a packet's paths are.
+struct Path<L> {
+    ray: Ray<L>,
+    /// What radiance from along the ray counts.
+    weight: V3<L>,
 }
 
 /// The surfaces that a packet met.
-struct Shaded<L> {
+struct Met<L: Lanes> {
     /// Normal on the viewer's side.
     normal: V3<L>,
     /// Origin of rays that leave on the viewer's side.
     start: V3<L>,
-    /// Unit vector to the viewer.
-    view: V3<L>,
+    /// Tag of the finish.
+    finish: L,
+    /// k_d x colour.
+    diffuse: V3<L>,
+    /// Lanes with a finish: all but those that met the back of a one-sided one.
+    finished: L::Mask,
+    /// Lanes whose finish answers lights.
+    lit: L::Mask,
+    /// Lanes whose finish has highlights.
+    shining: L::Mask,
+    /// Lanes whose finish reflects.
+    reflecting: L::Mask,
+}
+
+/// The first lane's tag, and the lanes of `mask` that share it; `None`: the mask is empty.
+#[inline(always)]
+fn first_tag<L: Lanes>(tags: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
+    let bits = mask.bits();
+    if bits == 0 {
+        return None;
+    }
+    let tag = tags.tag_lane(bits.trailing_zeros() as usize);
+    Some((tag, mask & tags.has_tag(tag)))
+}
+
+impl<L: Lanes> Met<L> {
+    /// Each finish that occurs among `lanes`, with its lanes.
+    #[inline(always)]
+    fn finishes(&self, lanes: L::Mask) -> impl Iterator<Item = (usize, L::Mask)> {
+        let (finish, mut left) = (self.finish, lanes);
+        std::iter::from_fn(move || {
+            let (tag, here) = first_tag(finish, left)?;
+            left = left.and_not(here);
+            Some((tag as usize, here))
+        })
+    }
+
+    /// Takes what is `other`'s in `lanes`, which have nothing yet.
+    #[inline(always)]
+    fn take(&mut self, lanes: L::Mask, other: &Self) {
+        self.normal = V3::select(lanes, other.normal, self.normal);
+        self.start = V3::select(lanes, other.start, self.start);
+        self.finish = L::select(lanes, other.finish, self.finish);
+        self.diffuse = V3::select(lanes, other.diffuse, self.diffuse);
+        self.finished = self.finished | other.finished;
+        self.lit = self.lit | other.lit;
+        self.shining = self.shining | other.shining;
+        self.reflecting = self.reflecting | other.reflecting;
+    }
 }
 
 impl<L: Lanes> World<L> {
     /// Traces one packet of camera samples: `origin` and `direction` as [`crate::camera::View`] makes
-    /// them. Lanes outside `active` stay black. `seen`: the only items that these rays can meet first,
-    /// if that is known.
+    /// them. Lanes outside `active` stay black. `outlook`: what these rays and the shadow rays from
+    /// where they end may meet, if that is known.
     #[inline]
     pub fn trace(
         &self,
         (origin, direction): (V3<L>, V3<L>),
-        seen: Option<&Seen>,
+        outlook: Option<&Outlook>,
         draws: &Draws<'_, L>,
         mut active: L::Mask,
         out: &mut Radiance<L>,
@@ -69,138 +105,117 @@ impl<L: Lanes> World<L> {
             *group = V3::zero();
         }
         let mut counts = Counts::default();
-        let mut ray = Ray { origin, direction };
-        let mut weight = V3::of([1.0; 3]);
+        let mut path = Path { ray: Ray { origin, direction }, weight: V3::of([1.0; 3]) };
+        let mut outlook = outlook.unwrap_or(&self.panorama);
         let mut bounce = 0;
         loop {
             counts.rays += u64::from(active.bits().count_ones());
-            let hit = match seen {
-                Some(seen) if bounce == 0 => self.geometry.closest_seen(&ray, seen),
-                _ => self.geometry.closest(&ray),
-            };
-            let met = hit.t.lt(L::of(L::MAX));
+            let hit = self.geometry.closest(&path.ray, &outlook.seen);
+            let ended = hit.t.lt(L::of(L::MAX));
             if let Some(group) = self.background {
-                out.groups[group] += weight.only(active.and_not(met));
+                out.groups[group] += path.weight.only(active.and_not(ended));
             }
-            active = active & met;
-            if active.none() {
+            active = active & ended;
+            let Some(met) = self.meet(&path.ray, &hit, active) else { return counts };
+            self.light(&path, &met, outlook, out, &mut counts);
+            if bounce == self.depth || met.reflecting.none() {
                 return counts;
             }
-            let (shaded, finishes) = self.meet(&ray, &hit, active);
-            self.light(&shaded, &finishes, weight, out, &mut counts);
-            if bounce == self.depth {
-                return counts;
-            }
-            active =
-                self.bounce(&shaded, &finishes, draws, bounce, &mut weight, &mut ray, &mut counts);
+            active = self.bounce(&mut path, &met, draws, bounce, &mut counts);
             if active.none() {
                 return counts;
             }
             bounce += 1;
+            outlook = &self.panorama;
         }
     }
 
-    /// The surfaces where the active rays end, and their finishes; backs of one-sided finishes have
-    /// none.
+    /// The surfaces where the active rays end; `None`: there are no such rays.
     #[inline(always)]
-    fn meet(&self, ray: &Ray<L>, hit: &Hit<L>, active: L::Mask) -> (Shaded<L>, Met<L>) {
-        let point = ray.at(hit.t);
-        let mut met =
-            Met { finish: L::tag(0), lanes: L::mask(false), list: [0; MAX_WIDTH], len: 0 };
-        let mut at = Shaded { normal: V3::zero(), start: point, view: -ray.direction };
-        let mut left = active;
-        loop {
-            let bits = left.bits();
-            if bits == 0 {
-                return (at, met);
-            }
-            let item = hit.item.tag_lane(bits.trailing_zeros() as usize);
-            let here = left & hit.item.has_tag(item);
+    fn meet(&self, ray: &Ray<L>, hit: &Hit<L>, active: L::Mask) -> Option<Met<L>> {
+        let (item, here) = first_tag(hit.item, active)?;
+        let mut met = self.face(ray, hit.t, item, here);
+        if active.and_not(here).any() {
+            self.meet_others(ray, hit, active.and_not(here), &mut met);
+        }
+        Some(met)
+    }
+
+    /// The surfaces of lanes that met another item than the first.
+    #[inline(never)]
+    fn meet_others(&self, ray: &Ray<L>, hit: &Hit<L>, mut left: L::Mask, met: &mut Met<L>) {
+        while let Some((item, here)) = first_tag(hit.item, left) {
+            met.take(here, &self.face(ray, hit.t, item, here));
             left = left.and_not(here);
-            let surface = self.geometry.surface(item, point);
-            let facing = surface.normal.dot(ray.direction);
-            let front = facing.lt(L::zero());
-            let normal = V3::select(front, surface.normal, -surface.normal);
-            // Start above the surface by a few roundings of the largest number involved.
-            let lift = surface.reach.max(surface.point.max_abs()) * L::of(8.0 * L::EPSILON);
-            at.normal = V3::select(here, normal, at.normal);
-            at.start = V3::select(here, normal.mul_add(lift, surface.point), at.start);
-            let finish = self.finish_of[item as usize];
-            let here = if self.finishes[finish as usize].two_sided { here } else { here & front };
-            if here.none() {
-                continue;
-            }
-            met.finish = L::select(here, L::tag(finish), met.finish);
-            met.lanes = met.lanes | here;
-            if !met.list[..met.len].contains(&finish) {
-                met.list[met.len] = finish;
-                met.len += 1;
-            }
         }
     }
 
-    /// One value per lane, from the finish of each lane; zero in lanes without one.
+    /// The surface of one item, which the rays of `lanes` meet at `t`.
     #[inline(always)]
-    fn gather(&self, met: &Met<L>, of: impl Fn(&Finish<L::Scalar>) -> [L::Scalar; 3]) -> V3<L> {
-        let value = |finish: u32| V3::splat(of(&self.finishes[finish as usize]));
-        if met.len == 1 {
-            return value(met.list[0]).only(met.lanes);
+    fn face(&self, ray: &Ray<L>, t: L, item: u32, lanes: L::Mask) -> Met<L> {
+        let surface = self.geometry.surface(item, ray.at(t));
+        let front = surface.normal.dot(ray.direction).lt(L::zero());
+        let normal = V3::select(front, surface.normal, -surface.normal);
+        // Start above the surface by a few roundings of the largest number involved.
+        let lift = surface.reach.max(surface.point.max_abs()) * L::of(8.0 * L::EPSILON);
+        let number = self.finish_of[item as usize];
+        let finish = &self.finishes[number as usize];
+        let finished = if finish.two_sided { lanes } else { lanes & front };
+        let those = |having: bool| if having { finished } else { L::mask(false) };
+        Met {
+            normal,
+            start: normal.mul_add(lift, surface.point),
+            finish: L::tag(number),
+            diffuse: V3::splat(finish.diffuse),
+            finished,
+            lit: those(finish.wants_light),
+            shining: those(finish.shines()),
+            reflecting: those(finish.reflection.is_some()),
         }
-        met.entries().fold(V3::zero(), |all, (finish, lanes)| V3::select(lanes, value(finish), all))
     }
 
     /// Adds what the surfaces return of ambient light and of every lamp.
     #[inline(always)]
     fn light(
         &self,
-        at: &Shaded<L>,
+        path: &Path<L>,
         met: &Met<L>,
-        weight: V3<L>,
+        outlook: &Outlook,
         out: &mut Radiance<L>,
         counts: &mut Counts,
     ) {
         if let Some(group) = self.ambient {
-            out.groups[group] += weight.times(self.gather(met, |f| f.ambient));
-        }
-        if self.sources.is_empty() {
-            return;
-        }
-        let mut wanting = L::mask(false);
-        for (finish, lanes) in met.entries() {
-            if self.finishes[finish as usize].wants_light {
-                wanting = wanting | lanes;
+            for (finish, lanes) in met.finishes(met.finished) {
+                let ambient = V3::splat(self.finishes[finish].ambient);
+                out.groups[group] += path.weight.times(ambient).only(lanes);
             }
         }
-        if wanting.none() {
+        if met.lit.none() {
             return;
         }
-        let diffuse = self.gather(met, |f| f.diffuse);
-        for source in &self.sources {
-            let arrival = source.lamp.at(at.start);
-            let nl = at.normal.dot(arrival.towards);
-            let mut lit = wanting & nl.gt(L::zero());
+        for (source, shading) in self.sources.iter().zip(&outlook.shading) {
+            let arrival = source.lamp.at(met.start);
+            let nl = met.normal.dot(arrival.towards);
+            let mut lit = met.lit & nl.gt(L::zero());
             if lit.none() {
                 continue;
             }
             if self.shadows {
                 counts.rays += u64::from(lit.bits().count_ones());
-                let ray = Ray { origin: at.start, direction: arrival.towards };
-                lit = lit.and_not(self.geometry.blocked(&ray, arrival.distance, lit));
+                let ray = Ray { origin: met.start, direction: arrival.towards };
+                lit = lit.and_not(self.geometry.blocked(&ray, arrival.distance, lit, shading));
                 if lit.none() {
                     continue;
                 }
             }
-            let mut value = diffuse * (nl * L::of(FRAC_1_PI));
-            for (finish, lanes) in met.entries() {
-                let finish = &self.finishes[finish as usize];
-                if !finish.shines() || (lanes & lit).none() {
-                    continue;
-                }
-                let nv = at.normal.dot(at.view);
-                let shine = finish.highlight(at.normal, at.view, arrival.towards, nl, nv);
+            let mut value = met.diffuse * (nl * L::of(FRAC_1_PI));
+            for (finish, lanes) in met.finishes(met.shining & lit) {
+                let (finish, view) = (&self.finishes[finish], -path.ray.direction);
+                let nv = met.normal.dot(view);
+                let shine = finish.highlight(met.normal, view, arrival.towards, nl, nv);
                 value += shine.only(lanes);
             }
-            let mut value = weight.times(value) * arrival.irradiance;
+            let mut value = path.weight.times(value) * arrival.irradiance;
             if let Some(strength) = source.weight {
                 value = value.times(V3::splat(strength));
             }
@@ -208,24 +223,20 @@ impl<L: Lanes> World<L> {
         }
     }
 
-    /// Turns `ray` and `weight` into those of the reflections; returns the lanes that go on.
-    #[allow(clippy::too_many_arguments, reason = "the state of a path")]
+    /// Turns the paths into the directions of reflections; returns the lanes that go on.
     #[inline(always)]
     fn bounce(
         &self,
-        at: &Shaded<L>,
+        path: &mut Path<L>,
         met: &Met<L>,
         draws: &Draws<'_, L>,
         bounce: u32,
-        weight: &mut V3<L>,
-        ray: &mut Ray<L>,
         counts: &mut Counts,
     ) -> L::Mask {
-        let mut going = L::mask(false);
         let mut numbers = None;
-        let (incident, weight_in) = (ray.direction, *weight);
-        for (finish, lanes) in met.entries() {
-            let finish = &self.finishes[finish as usize];
+        let Path { ray: Ray { direction: incident, .. }, weight } = *path;
+        for (finish, lanes) in met.finishes(met.reflecting) {
+            let finish = &self.finishes[finish];
             let Some((strength, spread)) = &finish.reflection else { continue };
             let uv = if matches!(spread, Spread::Mirror) {
                 (L::zero(), L::zero())
@@ -233,14 +244,12 @@ impl<L: Lanes> World<L> {
                 counts.glossy = true;
                 *numbers.get_or_insert_with(|| draws.lobe(bounce))
             };
-            let r = finish.reflect(*strength, spread, incident, at.normal, uv, self.fold);
-            ray.direction = V3::select(lanes, r.direction, ray.direction);
-            *weight = V3::select(lanes, weight_in.times(r.weight), *weight);
-            going = going | lanes;
+            let r = finish.reflect(*strength, spread, incident, met.normal, uv, self.fold);
+            path.ray.direction = V3::select(lanes, r.direction, path.ray.direction);
+            path.weight = V3::select(lanes, weight.times(r.weight), path.weight);
         }
-        ray.origin = at.start;
-        let least = L::of(self.min_weight);
-        let strongest = weight.max_element();
-        going & strongest.gt(L::zero()) & strongest.ge(least)
+        path.ray.origin = met.start;
+        let strongest = path.weight.max_element();
+        met.reflecting & strongest.gt(L::zero()) & strongest.ge(L::of(self.min_weight))
     }
 }

@@ -1,4 +1,5 @@
 //! Random numbers for tests: a fixed seed gives the same numbers everywhere.
+#![allow(dead_code, reason = "each test file uses its part")]
 
 use glam::DVec3;
 

@@ -98,15 +98,15 @@ fn compare<L: Lanes<Scalar = S>, S: Real + Lanes<Scalar = S>>(
     let wide = Geometry::<L>::with_tree(forms, tree);
     let narrow = Geometry::<S>::with_tree(forms, tree);
     for (n, (packet, count)) in packets::<L>(lines).enumerate() {
-        let hit = wide.closest(&packet);
+        let hit = wide.closest(&packet, wide.all());
         let met = hit.t.lt(L::of(L::MAX));
         let here = surface(&wide, &packet, &hit);
         let limit = 2.0;
-        let blocked = wide.blocked(&packet, L::of(limit), L::mask(true));
+        let blocked = wide.blocked(&packet, L::of(limit), L::mask(true), wide.all());
         for i in 0..count {
             let ray =
                 Ray { origin: lane_of(packet.origin, i), direction: lane_of(packet.direction, i) };
-            let one = narrow.closest(&ray);
+            let one = narrow.closest(&ray, narrow.all());
             let told = || {
                 format!(
                     "{name}, {} against {}, tree {tree}: ray {} of the seed: {ray:?}: {:?}, not {:?}",
@@ -118,7 +118,8 @@ fn compare<L: Lanes<Scalar = S>, S: Real + Lanes<Scalar = S>>(
                 )
             };
             assert!(same(hit.t.lane(i).to_f64(), one.t.lane(0).to_f64()), "{}", told());
-            let b = narrow.blocked(&ray, <S as Lanes>::of(limit), S::mask(true)).any();
+            let limit = <S as Lanes>::of(limit);
+            let b = narrow.blocked(&ray, limit, S::mask(true), narrow.all()).any();
             assert!(blocked.lane(i) == b, "blocked: {}", told());
             if !met.lane(i) {
                 continue;

@@ -38,6 +38,26 @@ fn ellipsoid_surface(m: DMat3) -> f64 {
     sum * 4.0 * PI / f64::from(rows * columns)
 }
 
+/// Surface and volume of the image of the canonical tapered cylinder.
+fn tapered(m: DMat3, top: f64) -> (f64, f64) {
+    let volume = m.determinant().abs() * PI * (1.0 + top + top * top) / 3.0;
+    let disc = PI * m.x_axis.cross(m.y_axis).length();
+    // The side: u over the angle, z along the axis.
+    let (rings, steps) = (400, 2000);
+    let mut side = 0.0;
+    for ring in 0..rings {
+        let r = 1.0 + (top - 1.0) * (f64::from(ring) + 0.5) / f64::from(rings);
+        for step in 0..steps {
+            let (sin, cos) = (f64::from(step) / f64::from(steps) * TAU).sin_cos();
+            let around = m * DVec3::new(-sin, cos, 0.0) * r;
+            let along = m * DVec3::new((top - 1.0) * cos, (top - 1.0) * sin, 1.0);
+            side += around.cross(along).length();
+        }
+    }
+    side *= TAU / f64::from(rings * steps);
+    (disc * (1.0 + top * top) + side, volume)
+}
+
 /// Surface (both sides of flat things) and volume; `None`: it has no end.
 fn surface_and_volume(form: &Form) -> Option<(f64, f64)> {
     match form {
@@ -57,6 +77,9 @@ fn surface_and_volume(form: &Form) -> Option<(f64, f64)> {
             }
             Some(sums)
         }
+        Form::Tapered { scene_from_unit: m, top } => Some(tapered(m.matrix3, *top)),
+        // Not convex: measured by their chords in `compound.rs`.
+        Form::Compound(_) => None,
         Form::Parallelogram { u, v, .. } => Some((2.0 * u.cross(*v).length(), 0.0)),
         Form::Plane { .. } => None,
     }

@@ -7,8 +7,9 @@ use glam::DVec3;
 use zerkalo::lanes::{Double, Lanes, Single};
 use zerkalo::shape::{Cuboid, Form, Geometry, Kind};
 
+/// Convex solids: compounds have tests of their own.
 fn is_solid(form: &Form) -> bool {
-    !matches!(form, Form::Parallelogram { .. } | Form::Plane { .. })
+    !matches!(form, Form::Parallelogram { .. } | Form::Plane { .. } | Form::Compound(_))
 }
 
 /// A point well inside a solid.
@@ -20,13 +21,19 @@ fn inside(numbers: &mut Numbers, form: &Form) -> DVec3 {
         Form::Ellipsoid { scene_from_unit } => {
             scene_from_unit.transform_point3(numbers.direction() * (0.99 * numbers.unit().cbrt()))
         }
+        Form::Tapered { scene_from_unit, top } => {
+            let z = numbers.between(0.01, 0.99);
+            let r = 0.99 * (1.0 + (top - 1.0) * z) * numbers.unit().sqrt();
+            let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();
+            scene_from_unit.transform_point3(DVec3::new(r * cos, r * sin, z))
+        }
         Form::Convex { corners, .. } => {
             let weights: Vec<f64> =
                 corners.iter().map(|_| 1e-3 - (1.0 - numbers.unit()).ln()).collect();
             let sum: f64 = weights.iter().sum();
             corners.iter().zip(&weights).map(|(c, w)| *c * (w / sum)).sum()
         }
-        _ => unreachable!("a flat thing has no inside"),
+        _ => unreachable!("not a convex solid"),
     }
 }
 

@@ -55,13 +55,13 @@ pub fn surface<L: Lanes>(geometry: &Geometry<L>, ray: &Ray<L>, hit: &Hit<L>) -> 
 pub fn closest<L: Lanes>(geometry: &Geometry<L>, lines: &[Line]) -> Vec<Option<Met>> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
-        let hit = geometry.closest(&ray);
+        let hit = geometry.closest(&ray, geometry.all());
         let met = hit.t.lt(L::of(L::MAX));
         let surface = surface(geometry, &ray, &hit);
         out.extend((0..count).map(|i| {
             met.lane(i).then(|| Met {
                 t: hit.t.lane(i).to_f64(),
-                form: geometry.sources()[hit.item.tag_lane(i) as usize] as usize,
+                form: geometry.sources()[hit.item.tag_lane(i) as usize].form,
                 point: to_dvec3(surface.point, i),
                 normal: to_dvec3(surface.normal, i),
             })
@@ -74,7 +74,7 @@ pub fn closest<L: Lanes>(geometry: &Geometry<L>, lines: &[Line]) -> Vec<Option<M
 pub fn blocked<L: Lanes>(geometry: &Geometry<L>, lines: &[Line], limit: f64) -> Vec<bool> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
-        let blocked = geometry.blocked(&ray, L::of(limit), L::mask(true));
+        let blocked = geometry.blocked(&ray, L::of(limit), L::mask(true), geometry.all());
         out.extend((0..count).map(|i| blocked.lane(i)));
     }
     out
@@ -138,9 +138,10 @@ impl Traced {
         let settings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
         let sampler = Sampler::new(settings, world.jitter());
         let mut out = Vec::with_capacity(lines.len());
+        let points = sampler.aligned(0);
         let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
         for (ray, count) in packets::<L>(lines) {
-            let draws = sampler.of_pixel(0, 0, 0, 0);
+            let draws = points.of_pixel((0, 0), 0);
             world.trace((ray.origin, ray.direction), None, &draws, L::mask(true), &mut radiance);
             for i in 0..count {
                 let mut sum = DVec3::ZERO;

@@ -13,6 +13,8 @@ enum Thing {
     Sphere,
     Cube,
     Pyramid,
+    Cylinder,
+    Cone,
 }
 
 /// Half the size of the flat things and solids, in units of the scale; the sphere's radius is 1.
@@ -43,6 +45,20 @@ impl Thing {
                 format!(
                     "pyramid = {{ corner = [{x:?}, {y:?}, {z:?}], side = {side:?}, \
                      apex_height = {side:?}, height = {scale:?} }}"
+                )
+            }
+            Self::Cylinder => {
+                let (low, high) = (y - scale, y + scale);
+                format!(
+                    "cylinder = {{ base = [{x:?}, {low:?}, {z:?}], top = [{x:?}, {high:?}, {z:?}], \
+                     radius = {scale:?} }}"
+                )
+            }
+            Self::Cone => {
+                let high = y + 2.0 * scale;
+                format!(
+                    "cone = {{ base = [{x:?}, {y:?}, {z:?}], apex = [{x:?}, {high:?}, {z:?}], \
+                     radius = {scale:?} }}"
                 )
             }
         }
@@ -79,6 +95,19 @@ impl Thing {
                 );
                 let p = turn * DVec3::new(reach, h, along * reach);
                 (p, turn * DVec3::new(1.0, 0.5, 0.0).normalize())
+            }
+            Self::Cylinder | Self::Cone => {
+                let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();
+                let out = DVec3::new(cos, 0.0, sin);
+                if matches!(self, Self::Cone) {
+                    // At height h the side is 1 - h / 2 from the axis, as the pyramid's.
+                    let h = numbers.between(0.0, 1.9);
+                    (out * (1.0 - h / 2.0) + DVec3::Y * h, (out + DVec3::Y / 2.0).normalize())
+                } else if numbers.below(3) == 0 {
+                    (out * numbers.unit().sqrt() + DVec3::Y, DVec3::Y)
+                } else {
+                    (out + DVec3::Y * numbers.between(-1.0, 1.0), out)
+                }
             }
         }
     }
@@ -128,8 +157,15 @@ fn falsely_dark(
 }
 
 const SCALES: [f64; 7] = [1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4, 1e6];
-const THINGS: [Thing; 5] =
-    [Thing::Plane, Thing::Platform, Thing::Sphere, Thing::Cube, Thing::Pyramid];
+const THINGS: [Thing; 7] = [
+    Thing::Plane,
+    Thing::Platform,
+    Thing::Sphere,
+    Thing::Cube,
+    Thing::Pyramid,
+    Thing::Cylinder,
+    Thing::Cone,
+];
 
 fn check_self_shadow(precision: Precision, place: DVec3, scales: &[f64], points: usize) {
     let (sin, cos) = 0.01f64.to_radians().sin_cos();
@@ -155,7 +191,7 @@ fn check_self_shadow(precision: Precision, place: DVec3, scales: &[f64], points:
     }
 }
 
-/// 280 settings of 8000 points in all.
+/// 392 settings of 8000 points in all.
 #[test]
 fn extreme_15_nothing_convex_shades_itself() {
     check_self_shadow(Precision::Double, DVec3::ZERO, &SCALES, 8000);

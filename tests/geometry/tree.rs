@@ -39,13 +39,13 @@ fn compare<L: Lanes>(seed: u64, count: usize, forms: &[Form], lines: &[Line]) {
     let tree = Geometry::<L>::with_tree(forms, true);
     let mut numbers = Numbers::new(seed);
     for (packet, lanes) in packets::<L>(lines) {
-        let (a, b) = (list.closest(&packet), tree.closest(&packet));
+        let (a, b) = (list.closest(&packet, list.all()), tree.closest(&packet, tree.all()));
         let limits: Vec<f64> = (0..L::WIDTH).map(|_| numbers.between(0.0, 20.0)).collect();
         let wanted = L::from_fn(|_| L::Scalar::of(numbers.unit())).lt(L::of(0.8));
         let limit = L::from_fn(|i| L::Scalar::of(limits[i]));
         let (c, d) = (
-            list.blocked(&packet, limit, wanted) & wanted,
-            tree.blocked(&packet, limit, wanted) & wanted,
+            list.blocked(&packet, limit, wanted, list.all()) & wanted,
+            tree.blocked(&packet, limit, wanted, tree.all()) & wanted,
         );
         for i in 0..lanes {
             let told = || {

@@ -36,10 +36,7 @@ fn compare<L: Lanes>() {
         for (degrees, known) in DEGREES.into_iter().zip(known) {
             let found = albedo::<L>(Lobe::Beckmann, masking, alpha, degrees);
             let name = format!("{} {masking:?} {alpha} at {degrees}", L::NAME);
-            // Smith's Lambda is a rational fit, good to 0.35 %: that alone gives 0.9663 where the exact
-            // function gives 0.9633 (slope 0.7 at 85 degrees).
-            let limit = if masking == Masking::Smith { 0.0035 } else { 0.003 };
-            assert!((found - known).abs() <= limit, "{name}: {found} for {known}");
+            assert!((found - known).abs() <= 0.003, "{name}: {found} for {known}");
         }
     }
 }

@@ -19,7 +19,8 @@ fn pairs<L: Lanes>(
 ) -> Vec<[f64; 2]> {
     let mut out = Vec::new();
     for first in (0..count).step_by(L::WIDTH) {
-        let draws = sampler.of_pixel(x, y, replicate, first);
+        let points = sampler.aligned(first);
+        let draws = points.of_pixel((x, y), replicate);
         let (u, v) = bounce.map_or_else(|| draws.pixel(), |b| draws.lobe(b));
         out.extend((0..L::WIDTH).map(|i| [u.lane(i).to_f64(), v.lane(i).to_f64()]));
     }
@@ -99,17 +100,18 @@ fn packets_equal_singles<One: Lanes, Many: Lanes>() {
                             (bits(u.lane(0).to_f64()), bits(v.lane(0).to_f64()))
                         };
                         let at = |lane: usize| (lane as u32 * 77, 1000 - lane as u32);
-                        let row = pair(&many.of_pixel(11, 13, replicate, first));
-                        let field = pair(&many.of_pixels(at, replicate, first));
+                        let row = pair(&many.aligned(first).of_pixel((11, 13), replicate));
+                        let field = pair(&many.at(first).of_pixels(at, replicate));
                         for lane in 0..Many::WIDTH {
                             let index = first + lane as u32;
-                            let expected = single(&one.of_pixel(11, 13, replicate, index));
+                            let expected =
+                                single(&one.aligned(index).of_pixel((11, 13), replicate));
                             let lane_of = |p: (Many, Many)| {
                                 (bits(p.0.lane(lane).to_f64()), bits(p.1.lane(lane).to_f64()))
                             };
                             assert_eq!(lane_of(row), expected, "{kind:?} {index} {bounce:?}");
                             let (x, y) = at(lane);
-                            let expected = single(&one.of_pixel(x, y, replicate, first));
+                            let expected = single(&one.at(first).of_pixel((x, y), replicate));
                             assert_eq!(lane_of(field), expected, "{kind:?} {first} {bounce:?}");
                         }
                     }
@@ -127,7 +129,8 @@ fn packets_draw_what_single_samples_draw() {
 
 /// All numbers that sample `index` of a pixel uses in ten bounces.
 fn numbers(sampler: &Sampler<f64>, pixel: (u32, u32), replicate: usize, index: u32) -> Vec<f64> {
-    let draws = sampler.of_pixel(pixel.0, pixel.1, replicate, index);
+    let points = sampler.at(index);
+    let draws = points.of_pixel(pixel, replicate);
     let place = draws.pixel();
     let lobes = (0..10).flat_map(|b| <[f64; 2]>::from(draws.lobe(b)));
     [place.0, place.1].into_iter().chain(lobes).collect()

@@ -105,7 +105,7 @@ pub fn each_reflection<L: Lanes>(
     let settings = SampleSettings { seed: numbers.seed, kind: numbers.kind };
     let sampler = Sampler::<L>::new(settings, false);
     for first in (0..count).step_by(L::WIDTH) {
-        let uv = sampler.of_pixel(numbers.pixel.0, numbers.pixel.1, 0, first).lobe(0);
+        let uv = sampler.aligned(first).of_pixel(numbers.pixel, 0).lobe(0);
         let r = finish.reflect(strength, &spread, incident, n, uv, fold);
         for lane in 0..L::WIDTH {
             take(r.direction.lane(lane).map(Real::to_f64), r.weight.lane(lane).map(Real::to_f64));
@@ -117,14 +117,15 @@ pub fn each_reflection<L: Lanes>(
 pub fn trace<L: Lanes>(
     world: &World<L>,
     sampler: &Sampler<L>,
-    (x, y): (u32, u32),
+    pixel: (u32, u32),
     replicate: usize,
     first: u32,
 ) -> Vec<Vec<Vector>> {
-    let draws = sampler.of_pixel(x, y, replicate, first);
+    let points = sampler.aligned(first);
+    let draws = points.of_pixel(pixel, replicate);
     let half = L::of(0.5);
     let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
-    let rays = world.view().rays_of((x, y), jitter);
+    let rays = world.view().rays_of(pixel, jitter);
     let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
     let all = L::mask(true);
     assert!(all.all());

@@ -1,11 +1,14 @@
 //! Scene files after edits: only what changed is written, and what is written reads back.
 
 mod layouts;
+mod navigation;
+mod operations;
 mod random;
 
 use layouts::LAYOUTS;
 use proptest::prelude::*;
 use zerkalo::camera::ViewAngle;
+use zerkalo::scene::edit::{Subject, rename, store_view};
 use zerkalo::scene::{Document, Object, Scale, Scene, Step};
 use zerkalo::shape::{Plane, Shape, Sphere};
 use zerkalo::value::Color;
@@ -158,6 +161,49 @@ fn kinds_and_keys_change_places_with_their_comments() {
 }
 
 #[test]
+fn renamed_materials_and_views_keep_their_comments_and_their_place() {
+    let text = LAYOUTS[0].replace("color = \"#ff0000\" # pure", "# Of fire.\ncolor = \"#ff0000\"");
+    let text = text.replace("[materials.red]", "# Red.\n[materials.red] # bright");
+    let after = edited(&text, |s| {
+        *s = rename(s, &Subject::Material("red".into()), "fire red").unwrap().scene
+    });
+    let expected = text
+        .replace("[materials.red]", "[materials.\"fire red\"]")
+        .replace("material = \"red\"", "material = \"fire red\"");
+    assert_eq!(after, expected);
+    for layout in &LAYOUTS[1..] {
+        let red = Subject::Material("red".into());
+        let after = edited(layout, |s| *s = rename(s, &red, "fire").unwrap().scene);
+        for comment in layout.lines().filter_map(|line| line.split_once('#')).map(|(_, c)| c) {
+            assert!(after.contains(comment), "{comment}\n{after}");
+        }
+    }
+}
+
+#[test]
+fn views_are_written_as_tables_of_their_own() {
+    let after = edited(LAYOUTS[0], |s| *s = store_view(s, Some("from the left")).unwrap().scene);
+    let written = "[views.\"from the left\"]\ntarget = [0.0, 0.0, 0.0]\n";
+    let (new, gone) = difference(LAYOUTS[0], &after);
+    assert!(after.contains(written), "{after}");
+    assert_eq!(gone, [] as [&str; 0], "{new:?}");
+    let named = after.replace("[views.", "# Where the window is.\n[views.");
+    let back = edited(&named, |s| s.views.clear());
+    assert!(!back.contains("views") && !back.contains("window"), "{back}");
+    let moved = edited(&named, |s| s.views.get_mut("from the left").unwrap().eye[0] = 2.0);
+    assert!(moved.contains("# Where the window is.\n[views"), "{moved}");
+    assert!(moved.contains("eye = [2.0, 1.0, 5.0]"), "{moved}");
+    for (broken, words) in [
+        ("[views.x]\neye = [0, 1, 5]\n", "view \"x\": neither target nor direction is given"),
+        ("[views.x]\ntarget = [0, 0, 0]\nfov = 3\n", "view \"x\": unknown key \"fov\""),
+        ("views = 3\n", "tables that begin with [views.NAME]"),
+    ] {
+        let errors = Scene::parse(broken, "scene.toml").unwrap_err().to_string();
+        assert!(errors.contains(words), "{errors}");
+    }
+}
+
+#[test]
 fn moved_objects_keep_their_comments() {
     for text in LAYOUTS {
         let after = edited(text, |s| s.objects.rotate_left(1));
@@ -200,7 +246,7 @@ proptest! {
     fn any_edit_can_be_written_and_read(
         layout in 0..4usize,
         others in proptest::collection::vec(random::scene(), 2),
-        edits in proptest::collection::vec((0..16u8, 0..7usize), 1..8),
+        edits in proptest::collection::vec((0..18u8, 0..7usize), 1..8),
     ) {
         let text = match LAYOUTS.get(layout) {
             Some(text) => text.to_string(),

@@ -5,7 +5,10 @@ use zerkalo::camera::{Camera, ViewAngle};
 use zerkalo::light::{Directional, Falloff, Light, Point};
 use zerkalo::material::{Fresnel, Highlight, Lobe, Material, Metal};
 use zerkalo::scene::{Filter, Object, Rotate, Scale, Scene, Step};
-use zerkalo::shape::{Cube, Cuboid, Plane, Platform, Prism, Pyramid, Rectangle, Shape, Sphere};
+use zerkalo::shape::{
+    Cone, Cube, Cuboid, Cylinder, Difference, Intersection, Part, Plane, Platform, Prism, Pyramid,
+    Rectangle, Shape, Sphere, TaperedCylinder, Union, UnitCylinder,
+};
 use zerkalo::value::Color;
 
 fn coordinate() -> impl Strategy<Value = f64> {
@@ -37,6 +40,39 @@ fn color() -> impl Strategy<Value = Color> {
 }
 
 fn shape() -> impl Strategy<Value = Shape> {
+    prop_oneof![4 => simple(), 1 => compound(2)]
+}
+
+/// Solids combined, `levels` deep at most.
+fn compound(levels: u32) -> BoxedStrategy<Shape> {
+    let solid = || {
+        simple().prop_filter("flat", |shape| {
+            !matches!(shape, Shape::Platform(_) | Shape::Rectangle(_) | Shape::Plane(_))
+        })
+    };
+    let inner = if levels > 1 {
+        prop_oneof![3 => solid(), 1 => compound(levels - 1)].boxed()
+    } else {
+        solid().boxed()
+    };
+    let transform =
+        prop_oneof![2 => Just(Vec::new()), 1 => proptest::collection::vec(step(), 1..3)];
+    let part = (inner, transform).prop_map(|(shape, transform)| Part {
+        shape,
+        material: String::new(),
+        transform,
+    });
+    (proptest::collection::vec(part, 2..4), 0..3)
+        .prop_map(|(of, kind)| match kind {
+            0 => Shape::Union(Union { of }),
+            1 => Shape::Intersection(Intersection { of }),
+            _ => Shape::Difference(Difference { of }),
+        })
+        .prop_filter("a part misplaced", |shape| shape.faults().is_empty())
+        .boxed()
+}
+
+fn simple() -> impl Strategy<Value = Shape> {
     let angle = || prop_oneof![Just(0.0), -360.0..360.0f64];
     prop_oneof![
         (point(), size()).prop_map(|(center, radius)| Shape::Sphere(Sphere { center, radius })),
@@ -63,6 +99,32 @@ fn shape() -> impl Strategy<Value = Shape> {
             })
             .prop_filter("up along the normal", |shape| shape.faults().is_empty()),
         (point(), direction()).prop_map(|(point, normal)| Shape::Plane(Plane { point, normal })),
+        round(),
+    ]
+}
+
+fn round() -> impl Strategy<Value = Shape> {
+    let axis = || {
+        (point(), direction(), size()).prop_map(|(base, [x, y, z], length)| {
+            let top = [base[0] + x * length, base[1] + y * length, base[2] + z * length];
+            (base, top)
+        })
+    };
+    prop_oneof![
+        (axis(), size()).prop_map(|((base, top), radius)| Shape::Cylinder(Cylinder {
+            base,
+            top,
+            radius
+        })),
+        (axis(), size()).prop_map(|((base, apex), radius)| Shape::Cone(Cone {
+            base,
+            apex,
+            radius
+        })),
+        (axis(), size(), size()).prop_map(|((base, top), base_radius, top_radius)| {
+            Shape::TaperedCylinder(TaperedCylinder { base, top, base_radius, top_radius })
+        }),
+        (0.0..3.0f64).prop_map(|s| Shape::UnitCylinder(UnitCylinder { s })),
     ]
 }
 
@@ -146,7 +208,7 @@ fn material() -> impl Strategy<Value = Material> {
         })
 }
 
-fn camera() -> impl Strategy<Value = Camera> {
+pub fn camera() -> impl Strategy<Value = Camera> {
     (point(), direction(), 1.0..179.0f64, any::<(bool, bool)>())
         .prop_map(|(eye, direction, degrees, (aim, across))| {
             let [x, y, z] = eye;
@@ -192,9 +254,10 @@ pub fn scene() -> impl Strategy<Value = Scene> {
         proptest::collection::btree_map("\\PC{1,6}", material(), 0..4),
         proptest::collection::vec(object(), 0..6),
     );
-    (camera(), [1u32..2000, 1..2000], any::<bool>(), color(), lists).prop_map(
-        |(camera, size, center, background, (lights, materials, objects))| {
-            let mut scene = Scene { camera, lights, materials, objects, ..Scene::default() };
+    let views = proptest::collection::btree_map("\\PC{1,6}", camera(), 0..3);
+    (camera(), views, [1u32..2000, 1..2000], any::<bool>(), color(), lists).prop_map(
+        |(camera, views, size, center, background, (lights, materials, objects))| {
+            let mut scene = Scene { camera, views, lights, materials, objects, ..Scene::default() };
             scene.film.size = size;
             scene.film.filter = if center { Filter::Center } else { Filter::Box };
             scene.background.color = background;
@@ -246,6 +309,12 @@ pub fn edit(scene: &mut Scene, other: &Scene, (what, at): (u8, usize)) {
             }
         }
         15 => *scene = other.clone(),
+        16 => scene.views = other.views.clone(),
+        17 => {
+            if let Some((name, view)) = scene.views.pop_first() {
+                scene.views.insert(name + "'", view);
+            }
+        }
         _ => {}
     }
 }

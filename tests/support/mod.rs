@@ -44,12 +44,13 @@ pub fn parsed(text: &str) -> Scene {
 
 /// A rendering without samples.
 pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> Rendering {
-    let options = Options {
-        world: world::Options { precision },
-        sampling: SampleSettings { seed, kind: SamplerKind::Sobol },
-        display: Display::default(),
-    };
-    Rendering::new(scene, &options, None)
+    begin_with(scene, SampleSettings { seed, kind: SamplerKind::Sobol }, precision)
+}
+
+/// A rendering without samples, with a sampler of its own.
+pub fn begin_with(scene: &Scene, sampling: SampleSettings, precision: Precision) -> Rendering {
+    let world = world::Options { precision };
+    Rendering::new(scene, &Options { world, sampling, display: Display::default() }, None)
 }
 
 /// A pool of `threads` threads.

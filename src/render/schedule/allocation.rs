@@ -1,7 +1,7 @@
 //! Adaptive sampling: the next samples go where they lower the picture's error most per ray.
 
 use super::tile::Tile;
-use super::{Criterion, FULL, PACKET, Schedule};
+use super::{Criterion, FULL, PACKET, Schedule, to_packet};
 use crate::render::wave::Job;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -55,10 +55,13 @@ impl Law {
 }
 
 /// The block that a tile with `count` samples per replicate gets next: about a quarter more, a power
-/// of two and at least a packet, so that blocks stay aligned to what makes the sequence even.
+/// of two and at least a packet, so that blocks stay aligned to what makes the sequence even; or what is missing
+/// to such a block.
 fn block(count: u32) -> u32 {
-    let quarter = (count / 4).max(PACKET);
-    1 << quarter.ilog2()
+    match to_packet(count) {
+        0 => 1 << (count / 4).max(PACKET).ilog2(),
+        rest => rest,
+    }
 }
 
 impl Schedule {

@@ -7,6 +7,7 @@
 //! ends the work.
 
 mod allocation;
+mod change;
 mod settings;
 mod stop;
 #[cfg(test)]
@@ -29,9 +30,15 @@ const GLOSSY_FLOOR: u32 = 32;
 const FIRST_ESTIMATE: u32 = 4;
 /// From the first packet on, samples are given in multiples of the widest packet that renders; only a
 /// tile's last block may be shorter.
-const PACKET: u32 = if Single::WIDTH > 8 { Single::WIDTH as u32 } else { 8 };
+pub const PACKET: u32 = if Single::WIDTH > 8 { Single::WIDTH as u32 } else { 8 };
 /// Samples per replicate at which a tile is full: half of what a 32-bit index can count.
 const FULL: u32 = 1 << 31;
+
+/// Samples that make `count` a multiple of a packet, if it is more than one: a picture that was to
+/// have fewer samples may have stopped inside one.
+fn to_packet(count: u32) -> u32 {
+    if count < PACKET { 0 } else { count.next_multiple_of(PACKET) - count }
+}
 
 /// What comes next.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,13 +125,16 @@ impl Schedule {
         })
     }
 
-    /// Takes in what became of the wave that [`Schedule::next`] gave out. Cancelled jobs will be
-    /// given out again.
+    /// Takes in what became of the wave that [`Schedule::next`] gave out, or of the part of it that
+    /// [`Wave::cut`] left. What was cut off or cancelled will be given out again.
     pub fn complete(&mut self, wave: &Wave, report: &WaveReport) {
-        self.left.clear();
-        for (job, report) in wave.jobs.iter().zip(&report.reports) {
-            let Some(report) = report else {
-                self.left.push(*job);
+        let mut reports = wave.jobs.iter().zip(&report.reports).peekable();
+        let mut begun = Vec::new();
+        let left = std::mem::take(&mut self.left);
+        for whole in left {
+            let traced = reports.next_if(|(job, _)| job.tile == whole.tile);
+            let Some((job, Some(report))) = traced else {
+                self.left.push(whole);
                 continue;
             };
             let tile = &mut self.tiles[job.tile as usize];
@@ -135,16 +145,26 @@ impl Schedule {
             if wave.replicate == 1 {
                 tile.done = count;
             }
-        }
-        if self.left.is_empty() && wave.estimate {
-            self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error.map(|(_, e)| e)));
-            if let Some(noise) = self.noise {
-                let rmse = match self.settings.criterion {
-                    Criterion::Codes => noise.rmse_codes,
-                    Criterion::Linear => noise.rmse_linear,
-                };
-                self.trend.note(self.rays as f64, rmse);
+            if job.count < whole.count {
+                begun.push(Job { first: count, count: whole.count - job.count, ..whole });
             }
+        }
+        // What has had its turn comes last.
+        self.left.append(&mut begun);
+        if self.left.is_empty() && wave.estimate {
+            self.judge();
+        }
+    }
+
+    /// The picture's noise from that of its tiles.
+    fn judge(&mut self) {
+        self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error.map(|(_, e)| e)));
+        if let Some(noise) = self.noise {
+            let rmse = match self.settings.criterion {
+                Criterion::Codes => noise.rmse_codes,
+                Criterion::Linear => noise.rmse_linear,
+            };
+            self.trend.note(self.rays as f64, rmse);
         }
     }
 
@@ -230,9 +250,10 @@ impl Schedule {
     /// The same indices for every tile that is not capped.
     fn uniform(&mut self, common: u32) -> Vec<Job> {
         let grown = match common {
-            0 => 1,
-            n if n < FLOOR => n,
-            n => (self.uniform_growth(n) / PACKET * PACKET).max(PACKET),
+            // To the next power of two; a picture that was to have fewer samples may have stopped
+            // between two of them.
+            n if n < FLOOR => (n + 1).next_power_of_two() - n,
+            n => (self.uniform_growth(n) / PACKET * PACKET).max(PACKET) + to_packet(n),
         };
         let limit = self.settings.stop.spp.map_or(FULL, |spp| spp.div_ceil(2)).min(FULL);
         let count = grown.min(limit.saturating_sub(common));

@@ -33,7 +33,26 @@ impl Tile {
     pub fn note(&mut self, report: &JobReport, count: u32) {
         self.rays += report.rays;
         self.glossy |= report.glossy;
-        let Some(error) = report.error else { return };
+        if let Some(error) = report.error {
+            self.note_error(error, count);
+        }
+    }
+
+    /// Forgets all estimates.
+    pub fn forget_estimates(&mut self) {
+        self.error = None;
+        self.history.clear();
+    }
+
+    /// Takes in the first estimate after they were forgotten.
+    pub fn set_estimate(&mut self, estimate: Option<(u32, TileNoise)>) {
+        self.forget_estimates();
+        if let Some((count, error)) = estimate {
+            self.note_error(error, count);
+        }
+    }
+
+    fn note_error(&mut self, error: TileNoise, count: u32) {
         self.error = Some((count, error));
         if self.history.last().is_none_or(|(before, _)| count / 2 >= *before) {
             self.history.push((count, error));
@@ -85,7 +104,12 @@ impl Tile {
     }
 }
 
-/// Slopes below 0.5 (independent samples) or above 1 are chance.
+/// The slope of independent samples; a flatter one is chance.
+pub(super) const FLATTEST: f64 = 0.5;
+/// A steeper slope is chance.
+pub(super) const STEEPEST: f64 = 1.0;
+
+/// A slope as it can be.
 pub(super) fn clamp_slope(p: f64) -> f64 {
-    if p.is_nan() { 0.5 } else { p.clamp(0.5, 1.0) }
+    if p.is_nan() { FLATTEST } else { p.clamp(FLATTEST, STEEPEST) }
 }

@@ -1,6 +1,6 @@
 //! How the noise of the whole picture falls with the rays spent, and when it will reach a target.
 
-use super::tile::clamp_slope;
+use super::tile::{FLATTEST, STEEPEST, clamp_slope};
 
 /// Points are kept at every half doubling of the rays; this many span three doublings.
 const POINTS: usize = 7;
@@ -33,8 +33,9 @@ impl Trend {
         }
     }
 
-    /// How many rays will have been traced, in all, when the noise has fallen to `target`: a lower and an upper guess, from the steepest and the flattest of the slopes over
-    /// the last one, two and three doublings. `None` before there is a slope.
+    /// How many rays will have been traced, in all, when the noise has fallen to `target`: a lower and an upper
+    /// guess, from the steepest and the flattest of the slopes over the last one, two and three
+    /// doublings; before there is one, from the limits of all slopes. `None` without any noise.
     pub fn rays_needed(&self, target: f64) -> Option<(f64, f64)> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {
@@ -44,11 +45,10 @@ impl Trend {
             let (rays0, noise0) = *self.points.get(self.points.len().checked_sub(back + 1)?)?;
             Some(clamp_slope((noise0 / noise).ln() / (rays / rays0).ln()))
         });
-        let (flat, steep) =
-            slopes.fold((f64::MAX, f64::MIN), |(low, high), p| (low.min(p), high.max(p)));
-        if flat > steep {
-            return None;
-        }
+        let (flat, steep) = slopes
+            .map(|p| (p, p))
+            .reduce(|(low, high), (p, _)| (low.min(p), high.max(p)))
+            .unwrap_or((FLATTEST, STEEPEST));
         let more = |p: f64| rays * ((noise / target).powf(1.0 / p) - 1.0);
         Some((rays + more(steep) * (1.0 - SPREAD), rays + more(flat) * (1.0 + SPREAD)))
     }

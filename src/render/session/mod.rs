@@ -5,18 +5,32 @@
 //! between and wait for a wave that nothing interrupts. Of several scenes only the newest is compiled.
 //! An interrupted wave loses nothing: what was not traced is traced when the work goes on.
 
+//!
+//! A scene that differs from the one in work only in what a [`Lighting`] can mix keeps the film, its
+//! samples and the schedule; only the noise is judged anew. Long waves are traced in pieces, so that
+//! guests see the film grow; what is traced does not depend on where they were cut.
+//!
+//! Who calls a session is never kept waiting, except by [`Session::with`] and [`Session::wait`].
+
+mod pace;
 mod report;
+mod snapshot;
 #[cfg(test)]
 mod tests;
+mod threads;
+mod work;
 mod worker;
 
-use crate::film::Film;
-use crate::render::schedule::{Schedule, Settings};
+use crate::film::{Display, Estimator, Film, Mix};
+use crate::render::lighting::Lighting;
+use crate::render::schedule::{Schedule, Settings, Stop};
 use crate::render::wave::{Wave, WaveReport};
 use crate::scene::Scene;
+use crate::world::Sight;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
-use report::Slot;
-pub use report::{Report, Snapshot, State};
+pub use report::{Report, State};
+use snapshot::Slot;
+pub use snapshot::{Snapshot, TileMaps, View};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,13 +39,27 @@ use std::time::Duration;
 use worker::Worker;
 
 /// A scene that is being traced: what a session drives.
-pub trait Traced: Sized + Send + 'static {
+pub trait Traced: Sized + Send + Sync + 'static {
     /// How scenes are compiled and sampled.
     type Options: Send + 'static;
 
     /// Compiles `scene` and starts it with an empty film; may reuse what `before` has allocated.
     /// `Err`: why it cannot be rendered.
-    fn begin(scene: &Scene, options: &Self::Options, before: Option<Self>) -> Result<Self, String>;
+    fn begin(
+        scene: &Arc<Scene>,
+        options: &Self::Options,
+        before: Option<Self>,
+    ) -> Result<Self, String>;
+
+    /// Takes `scene` over if the samples at hand are samples of it, too; else changes nothing and
+    /// returns false.
+    fn adopt(&mut self, scene: &Arc<Scene>) -> bool;
+
+    /// The display in the options.
+    fn display_of(options: &mut Self::Options) -> &mut Display;
+
+    /// Judges the noise as seen on `display` from now on.
+    fn set_display(&mut self, display: Display);
 
     /// Empties the film.
     fn restart(&mut self);
@@ -53,16 +81,41 @@ pub trait Traced: Sized + Send + 'static {
     /// The film.
     fn film(&self) -> &Film;
 
+    /// The mix of lights that the scene has.
+    fn mix(&self) -> &Mix;
+
+    /// The display on which the noise is judged.
+    fn display(&self) -> Display;
+
+    /// Estimates errors under this mix and display.
+    fn estimator(&self) -> &Estimator;
+
+    /// Which scenes the samples serve.
+    fn lighting(&self) -> &Arc<Lighting>;
+
+    /// What the camera sees through `points` of the film, in pixels; `seen` is as long.
+    fn look(&self, points: &[[f64; 2]], seen: &mut [Sight]);
+
+    /// Name of the lane type.
+    fn lanes(&self) -> &'static str;
+
+    /// What the compiled scene contains, in one line.
+    fn inventory(&self) -> String;
+
     /// A schedule for this film that follows `settings`.
     fn schedule(&self, settings: Settings) -> Schedule;
 }
 
-type Task<T> = Box<dyn FnOnce(&T, &Report) + Send>;
+type Task<T> = Box<dyn FnOnce(Option<(&T, &Report)>) + Send>;
 
 enum Command<T> {
     Scene(u64, Arc<Scene>),
+    Restart(u64),
     Pause(bool),
-    View(Option<[usize; 2]>),
+    View(View),
+    Stop(Stop),
+    Display(Display),
+    Pool(rayon::ThreadPool),
     Task(Task<T>),
     Quit,
 }
@@ -89,11 +142,7 @@ pub struct Session<T: Traced> {
 impl<T: Traced> Session<T> {
     /// Starts a session that traces with `threads` threads. `Err`: no threads are to be had.
     pub fn new(threads: usize, options: T::Options, settings: Settings) -> io::Result<Self> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|i| format!("tracer {i}"))
-            .build()
-            .map_err(io::Error::other)?;
+        let pool = threads::pool(threads, 0)?;
         let (commands, inbox) = unbounded();
         // One place: a bell that has not been heard yet need not ring twice.
         let (ring, bell) = bounded(1);
@@ -104,12 +153,40 @@ impl<T: Traced> Session<T> {
     }
 
     /// Renders `scene` from now on, whatever was rendered before. The number returned comes back in
-    /// the reports about it; later scenes have larger numbers.
+    /// the reports about it; later scenes have larger numbers. Samples that serve the new scene, too,
+    /// are kept (see [`Lighting::mix`]).
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> u64 {
         self.generations += 1;
         self.send(Command::Scene(self.generations, scene));
         self.shared.abandon.store(true, Ordering::Release);
         self.generations
+    }
+
+    /// Compiles the newest scene again and begins with an empty film. The number returned is as that
+    /// of [`Session::set_scene`].
+    pub fn restart(&mut self) -> u64 {
+        self.generations += 1;
+        self.send(Command::Restart(self.generations));
+        self.shared.abandon.store(true, Ordering::Release);
+        self.generations
+    }
+
+    /// When to stop from now on. A session that rests goes on if that is not reached yet.
+    pub fn set_stop(&self, stop: Stop) {
+        self.send(Command::Stop(stop));
+    }
+
+    /// Judges the noise as seen on `display` from now on. Samples are kept.
+    pub fn set_display(&self, display: Display) {
+        self.send(Command::Display(display));
+    }
+
+    /// Traces with `threads` threads (0: one per processor) from now on. With a `niceness` of 1 to 19
+    /// they run at a lower priority, on Linux; 0: at that of the calling thread. `Err`: no threads are
+    /// to be had, the old ones stay.
+    pub fn set_threads(&self, threads: usize, niceness: i32) -> io::Result<()> {
+        self.send(Command::Pool(threads::pool(threads, niceness)?));
+        Ok(())
     }
 
     /// Stops tracing until [`Session::go_on`].
@@ -122,22 +199,30 @@ impl<T: Traced> Session<T> {
         self.send(Command::Pause(false));
     }
 
-    /// Asks for snapshots with a picture of this many columns and rows of cells, or without one.
-    pub fn set_view(&self, cells: Option<[usize; 2]>) {
-        self.send(Command::View(cells));
+    /// What snapshots contain from now on; at first neither picture nor probe.
+    pub fn set_view(&self, view: View) {
+        self.send(Command::View(view));
     }
 
-    /// Runs `task` where the film lives, between two waves, and waits for its result. `None`: there
-    /// is no film, because there is no scene, or only one that cannot be rendered.
+    /// Has `task` run where the film lives, between two pieces of work, and returns at once. It gets
+    /// `None` if there is no film, because there is no scene, or only one that cannot be rendered.
+    /// It is dropped without being run only if the session ends before.
+    pub fn submit(&self, task: impl FnOnce(Option<(&T, &Report)>) + Send + 'static) {
+        self.send(Command::Task(Box::new(task)));
+    }
+
+    /// Runs `task` as [`Session::submit`] does, but waits for its result. `None`: there is no film.
     pub fn with<R: Send + 'static>(
         &self,
         task: impl FnOnce(&T, &Report) -> R + Send + 'static,
     ) -> Option<R> {
         let (answer, result) = bounded(1);
-        self.send(Command::Task(Box::new(move |traced, report| {
-            // Nobody waits if the guest has gone.
-            let _ = answer.send(task(traced, report));
-        })));
+        self.submit(move |film| {
+            if let Some((traced, report)) = film {
+                // Nobody waits if the guest has gone.
+                let _ = answer.send(task(traced, report));
+            }
+        });
         result.recv().ok()
     }
 

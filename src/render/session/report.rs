@@ -1,8 +1,8 @@
 //! What a session tells its guests.
 
-use crate::film::{Noise, Thumbnail};
+use crate::film::Noise;
 use crate::render::schedule::{Spp, StoppedBy};
-use std::sync::Mutex;
+use std::sync::Arc;
 
 /// What the session is doing.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +26,7 @@ pub struct Report {
     pub generation: u64,
     /// What the session is doing.
     pub state: State,
-    /// Samples per pixel.
+    /// Samples per pixel that both replicates have.
     pub spp: Spp,
     /// Samples over all pixels.
     pub samples: u64,
@@ -46,11 +46,19 @@ pub struct Report {
     pub progress: Option<f64>,
     /// Samples that were lost because they were not finite or negative.
     pub bad_samples: u64,
+    /// Speed of the last second of tracing, samples per second; 0 before it is known.
+    pub recent_samples_per_second: f64,
+    /// Threads that trace.
+    pub threads: usize,
+    /// Name of the lane type, such as `f32x8`; empty without a scene.
+    pub lanes: &'static str,
+    /// What the compiled scene contains, in one line; empty without a scene.
+    pub inventory: Arc<str>,
 }
 
 impl Report {
     /// About no scene.
-    pub(super) fn idle() -> Self {
+    pub(super) fn idle(threads: usize) -> Self {
         Self {
             generation: 0,
             state: State::Idle,
@@ -64,45 +72,15 @@ impl Report {
             eta_seconds: None,
             progress: None,
             bad_samples: 0,
+            recent_samples_per_second: 0.0,
+            threads,
+            lanes: "",
+            inventory: Arc::from(""),
         }
     }
 
     /// Mean speed of tracing, samples per second.
     pub fn samples_per_second(&self) -> f64 {
         if self.seconds > 0.0 { self.samples as f64 / self.seconds } else { 0.0 }
-    }
-}
-
-/// The latest state of the work, with a small picture if the guest has asked for one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Snapshot {
-    /// Where the work stands.
-    pub report: Report,
-    /// Means per light group over the cells of the guest's raster; the guest mixes the lights.
-    pub picture: Option<Thumbnail>,
-    /// Estimated RMSE of each tile in codes, row by row; empty before the first estimate.
-    pub tile_noise: Vec<f32>,
-}
-
-/// A place for one snapshot: a newer one replaces what has not been taken.
-#[derive(Debug, Default)]
-pub(super) struct Slot(Mutex<Option<Snapshot>>);
-
-impl Slot {
-    pub fn put(&self, snapshot: Snapshot) {
-        *self.lock() = Some(snapshot);
-    }
-
-    pub fn take(&self) -> Option<Snapshot> {
-        self.lock().take()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.lock().is_none()
-    }
-
-    /// A guest that panicked while it held the lock leaves a whole snapshot behind.
-    fn lock(&self) -> std::sync::MutexGuard<'_, Option<Snapshot>> {
-        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 }

@@ -5,6 +5,7 @@ use super::*;
 use crate::film::{Header, Noise, TILE, TileNoise};
 use crate::render::schedule::{Criterion, Spp, Stop, StoppedBy};
 use crate::render::wave::JobReport;
+use crate::world::Groups;
 use std::sync::atomic::AtomicUsize;
 use std::time::{Duration, Instant};
 
@@ -21,10 +22,15 @@ struct Options {
     log: Log,
     job: Duration,
     compile: Duration,
+    display: Display,
 }
 
 struct Double {
     film: Film,
+    lighting: Arc<Lighting>,
+    mix: Mix,
+    display: Display,
+    estimator: Estimator,
     log: Log,
     job: Duration,
 }
@@ -47,7 +53,7 @@ impl Double {
 impl Traced for Double {
     type Options = Options;
 
-    fn begin(scene: &Scene, options: &Options, before: Option<Self>) -> Result<Self, String> {
+    fn begin(scene: &Arc<Scene>, options: &Options, before: Option<Self>) -> Result<Self, String> {
         std::thread::sleep(options.compile);
         options.log.compiled.fetch_add(1, Ordering::SeqCst);
         let [width, height] = scene.film.size.map(|n| n as usize);
@@ -63,7 +69,56 @@ impl Traced for Double {
             }
             None => Film::new(header),
         };
-        Ok(Self { film, log: options.log.clone(), job: options.job })
+        let groups = Groups::new(scene, false, false);
+        let lighting = Arc::new(Lighting::new(Arc::clone(scene), groups));
+        let mix = lighting.mix(scene).unwrap();
+        let estimator = Estimator::new(film.scales(), &mix, &options.display);
+        let Options { log, job, display, .. } = options;
+        Ok(Self { film, lighting, mix, estimator, log: log.clone(), job: *job, display: *display })
+    }
+
+    fn adopt(&mut self, scene: &Arc<Scene>) -> bool {
+        let Some(mix) = self.lighting.mix(scene) else { return false };
+        self.mix = mix;
+        true
+    }
+
+    fn display_of(options: &mut Options) -> &mut Display {
+        &mut options.display
+    }
+
+    fn set_display(&mut self, display: Display) {
+        self.display = display;
+    }
+
+    fn mix(&self) -> &Mix {
+        &self.mix
+    }
+
+    fn display(&self) -> Display {
+        self.display
+    }
+
+    fn estimator(&self) -> &Estimator {
+        &self.estimator
+    }
+
+    fn lighting(&self) -> &Arc<Lighting> {
+        &self.lighting
+    }
+
+    fn look(&self, points: &[[f64; 2]], seen: &mut [Sight]) {
+        for (point, sight) in points.iter().zip(seen) {
+            sight.depth = (point[0] + 1000.0 * point[1]) as f32;
+        }
+    }
+
+    fn lanes(&self) -> &'static str {
+        "none"
+    }
+
+    fn inventory(&self) -> String {
+        format!("{} tiles", self.film.tile_count())
     }
 
     fn restart(&mut self) {
@@ -113,6 +168,7 @@ fn session(stop: Stop, job_us: u64, compile_ms: u64) -> (Session<Double>, Log) {
         log: log.clone(),
         job: Duration::from_micros(job_us),
         compile: Duration::from_millis(compile_ms),
+        display: Display::default(),
     };
     let settings =
         Settings { adaptive: false, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
@@ -163,7 +219,7 @@ fn the_last_edit_is_never_lost() {
 fn a_new_scene_interrupts_a_long_wave() {
     // 4096 tiles at 100 us: a wave takes 0.4 s and more.
     let (mut session, log) = session(endless(), 100, 0);
-    session.set_view(None);
+    session.set_view(View::default());
     let first = session.set_scene(scene(16 * 1024));
     wait_for(&session, |s| s.report.generation == first && s.report.samples > 0);
     let before = log.jobs.load(Ordering::SeqCst);
@@ -235,14 +291,14 @@ fn a_scene_that_does_not_compile_says_why_and_the_next_one_works() {
 #[test]
 fn snapshots_hold_what_the_guest_asks_for() {
     let (mut session, _) = session(endless(), 0, 0);
-    session.set_view(Some([8, 4]));
+    session.set_view(View { raster: Some([8, 4]), probe: None });
     session.set_scene(scene(64));
     let noisy = wait_for(&session, |s| s.report.noise.is_some());
     let picture = noisy.picture.expect("a picture");
     assert_eq!((picture.cols, picture.rows), (8, 4));
-    assert_eq!(noisy.tile_noise.len(), 16);
-    assert!(noisy.tile_noise.iter().all(|n| *n > 0.0 && *n < 1.0));
-    session.set_view(None);
+    assert_eq!(noisy.tiles.noise_codes.len(), 16);
+    assert!(noisy.tiles.noise_codes.iter().all(|n| *n > 0.0 && *n < 1.0));
+    session.set_view(View::default());
     wait_for(&session, |s| s.picture.is_none());
 }
 

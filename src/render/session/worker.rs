@@ -1,28 +1,16 @@
-//! The session's thread.
+//! The session's thread: takes in commands, decides what is done next.
 
-use super::report::State;
-use super::{Command, Report, Shared, Snapshot, Task, Traced};
-use crate::film::Film;
-use crate::render::schedule::{Schedule, Settings, Step};
-use crate::render::wave::Wave;
+use super::report::{Report, State};
+use super::snapshot::{Snapshot, View};
+use super::work::{Site, Work};
+use super::{Command, Shared, Task, Traced};
+use crate::film::Display;
+use crate::render::schedule::{Settings, Step, Stop};
 use crate::scene::Scene;
 use crossbeam_channel::{Receiver, Sender};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
-
-/// A scene in work.
-struct Work<T> {
-    traced: T,
-    schedule: Schedule,
-    /// When the scene was taken up.
-    begun: Instant,
-    compiled_in: Duration,
-    /// Time spent in waves.
-    traced_for: Duration,
-    first_picture: Option<Duration>,
-}
 
 pub(super) struct Worker<T: Traced> {
     inbox: Receiver<Command<T>>,
@@ -31,15 +19,20 @@ pub(super) struct Worker<T: Traced> {
     pool: rayon::ThreadPool,
     options: T::Options,
     settings: Settings,
-    /// The newest scene and its number, until it is compiled.
+    /// The newest scene and its number.
     newest: Option<(u64, Arc<Scene>)>,
+    /// The newest scene has not been taken up yet.
+    pending: bool,
+    /// It is to begin with an empty film.
+    afresh: bool,
     tasks: Vec<Task<T>>,
     paused: bool,
-    view: Option<[usize; 2]>,
-    generation: u64,
+    view: View,
     work: Result<Option<Work<T>>, String>,
     /// What is going on, as far as the last step told.
     state: State,
+    /// There is nothing to do before the next command.
+    idle: bool,
 }
 
 impl<T: Traced> Worker<T> {
@@ -59,19 +52,21 @@ impl<T: Traced> Worker<T> {
             options,
             settings,
             newest: None,
+            pending: false,
+            afresh: false,
             tasks: Vec::new(),
             paused: false,
-            view: None,
-            generation: 0,
+            view: View::default(),
             work: Ok(None),
             state: State::Idle,
+            idle: true,
         }
     }
 
     pub fn run(mut self) {
         while self.listen().is_continue() {
-            if let Some((generation, scene)) = self.newest.take() {
-                self.take_up(generation, &scene);
+            if std::mem::take(&mut self.pending) {
+                self.take_up();
             }
             self.run_tasks();
             self.advance();
@@ -83,7 +78,7 @@ impl<T: Traced> Worker<T> {
         // The marks first, then the inbox: see the module's description.
         self.shared.interrupt.swap(false, Ordering::AcqRel);
         self.shared.abandon.swap(false, Ordering::AcqRel);
-        if self.state != State::Tracing {
+        if self.idle {
             match self.inbox.recv() {
                 Ok(command) => self.apply(command)?,
                 Err(_) => return ControlFlow::Break(()),
@@ -97,148 +92,135 @@ impl<T: Traced> Worker<T> {
 
     fn apply(&mut self, command: Command<T>) -> ControlFlow<()> {
         match command {
-            Command::Scene(generation, scene) => self.newest = Some((generation, scene)),
+            Command::Scene(generation, scene) => {
+                self.newest = Some((generation, scene));
+                self.pending = true;
+            }
+            Command::Restart(number) => {
+                if let Some((generation, _)) = &mut self.newest {
+                    *generation = number;
+                    (self.pending, self.afresh) = (true, true);
+                }
+            }
             Command::Pause(paused) => self.paused = paused,
             Command::View(view) => self.view = view,
+            Command::Stop(stop) => self.set_stop(stop),
+            Command::Display(display) => self.set_display(display),
+            Command::Pool(pool) => {
+                self.pool = pool;
+                if let Ok(Some(work)) = &mut self.work {
+                    work.forget_pace();
+                }
+            }
             Command::Task(task) => self.tasks.push(task),
             Command::Quit => return ControlFlow::Break(()),
         }
         ControlFlow::Continue(())
     }
 
-    fn take_up(&mut self, generation: u64, scene: &Scene) {
-        let begun = Instant::now();
-        let before = std::mem::replace(&mut self.work, Ok(None)).ok().flatten().map(|w| w.traced);
-        self.generation = generation;
-        self.work = T::begin(scene, &self.options, before).map(|traced| {
-            Some(Work {
-                schedule: traced.schedule(Settings {
-                    rays_per_pixel: scene.film.rays_per_pixel,
-                    ..self.settings
-                }),
-                traced,
-                begun,
-                compiled_in: begun.elapsed(),
-                traced_for: Duration::ZERO,
-                first_picture: None,
-            })
-        });
-    }
-
-    fn run_tasks(&mut self) {
-        let report = self.report();
-        for task in self.tasks.drain(..) {
-            // Without a film the task is dropped, and its guest gets no answer.
-            if let Ok(Some(work)) = &self.work {
-                task(&work.traced, &report);
-            }
+    fn set_stop(&mut self, stop: Stop) {
+        self.settings.stop = stop;
+        if let Ok(Some(work)) = &mut self.work {
+            work.schedule.set_stop(stop);
         }
     }
 
-    /// One wave, or none if there is nothing to do.
+    fn set_display(&mut self, display: Display) {
+        *T::display_of(&mut self.options) = display;
+        if let Ok(Some(work)) = &mut self.work
+            && work.traced.display() != display
+        {
+            work.traced.set_display(display);
+            work.misjudge();
+        }
+    }
+
+    fn take_up(&mut self) {
+        let Some((_, scene)) = &self.newest else { return };
+        let afresh = std::mem::take(&mut self.afresh);
+        if let Ok(Some(work)) = &mut self.work
+            && !afresh
+            && work.adopt(scene)
+        {
+            return;
+        }
+        let before = std::mem::replace(&mut self.work, Ok(None)).ok().flatten();
+        self.work = Work::begin(scene, &self.options, self.settings, before).map(Some);
+    }
+
+    fn run_tasks(&mut self) {
+        if self.tasks.is_empty() {
+            return;
+        }
+        let tasks = std::mem::take(&mut self.tasks);
+        let film = match &self.work {
+            Ok(Some(work)) => Some((&work.traced, work.report(&self.site(), self.state.clone()))),
+            _ => None,
+        };
+        for task in tasks {
+            task(film.as_ref().map(|(traced, report)| (*traced, report)));
+        }
+    }
+
+    fn generation(&self) -> u64 {
+        self.newest.as_ref().map_or(0, |(generation, _)| *generation)
+    }
+
+    fn site(&self) -> Site<'_> {
+        Site {
+            pool: &self.pool,
+            shared: &self.shared,
+            ring: &self.ring,
+            view: self.view,
+            generation: self.generation(),
+        }
+    }
+
+    /// One piece of work, or none if there is nothing to do.
     fn advance(&mut self) {
-        let (generation, paused) = (self.generation, self.paused);
-        let shown = Shown { shared: &self.shared, ring: &self.ring, view: self.view, generation };
+        let generation = self.generation();
+        let site = Site {
+            pool: &self.pool,
+            shared: &self.shared,
+            ring: &self.ring,
+            view: self.view,
+            generation,
+        };
+        self.idle = true;
         let work = match &mut self.work {
             Ok(Some(work)) => work,
             Ok(None) => return,
             Err(why) => {
                 self.state = State::Failed(why.clone());
-                let report = Report { generation, state: self.state.clone(), ..Report::idle() };
-                shown.put(Snapshot { report, picture: None, tile_noise: Vec::new() });
+                let idle = Report::idle(self.pool.current_num_threads());
+                let report = Report { generation, state: self.state.clone(), ..idle };
+                site.put(Snapshot::without_film(report));
                 return;
             }
         };
         // The first picture of a scene is shown even in a pause.
-        self.state = if paused && work.first_picture.is_some() {
+        let paused = self.paused && work.first_picture.is_some();
+        if work.misjudged {
+            // The new look is shown at once, its noise as soon as it is known.
+            self.state = if paused { State::Paused } else { State::Tracing };
+            work.publish(&site, self.state.clone(), true);
+            if !work.judge(&self.pool, &self.shared.interrupt) {
+                self.idle = false;
+                return;
+            }
+        }
+        self.state = if paused {
             State::Paused
         } else {
-            match work.schedule.next(work.traced_for.as_secs_f64()) {
+            match work.schedule.next(work.seconds()) {
                 Step::Rest(reason) => State::Resting(reason),
                 Step::Trace(wave) => {
-                    work.trace(&wave, &self.pool, &shown);
+                    work.trace(wave, &site);
+                    self.idle = false;
                     State::Tracing
                 }
             }
         };
-        let report = work.report(generation, self.state.clone());
-        let noise = work.schedule.tile_noise_codes();
-        shown.publish(work.traced.film(), noise, report, self.state != State::Tracing);
-    }
-
-    fn report(&self) -> Report {
-        match &self.work {
-            Ok(Some(work)) => work.report(self.generation, self.state.clone()),
-            _ => Report::idle(),
-        }
-    }
-}
-
-impl<T: Traced> Work<T> {
-    fn trace(&mut self, wave: &Wave, pool: &rayon::ThreadPool, shown: &Shown) {
-        let start = Instant::now();
-        let marks = shown.shared;
-        let report = if self.first_picture.is_some() {
-            Some(self.traced.run(wave, pool, &marks.interrupt))
-        } else {
-            let coarse = self.report(shown.generation, State::Tracing);
-            self.traced.first(wave, pool, &marks.abandon, &mut |film| {
-                shown.publish(film, Vec::new(), coarse.clone(), true);
-            })
-        };
-        self.traced_for += start.elapsed();
-        match report {
-            Some(report) => {
-                self.schedule.complete(wave, &report);
-                self.first_picture.get_or_insert_with(|| self.begun.elapsed());
-            }
-            // Abandoned for a newer scene; or by a mark that was raised late, for this very scene.
-            None => self.traced.restart(),
-        }
-    }
-
-    fn report(&self, generation: u64, state: State) -> Report {
-        let seconds = self.traced_for.as_secs_f64();
-        Report {
-            generation,
-            state,
-            spp: self.schedule.spp(),
-            samples: self.schedule.samples(),
-            rays: self.schedule.rays(),
-            seconds,
-            compile_seconds: self.compiled_in.as_secs_f64(),
-            first_picture_seconds: self.first_picture.map(|t| t.as_secs_f64()),
-            noise: self.schedule.noise(),
-            eta_seconds: self.schedule.eta_seconds(seconds),
-            progress: self.schedule.progress(seconds),
-            bad_samples: self.traced.film().bad_samples().count,
-        }
-    }
-}
-
-/// Where snapshots go.
-struct Shown<'a> {
-    shared: &'a Shared,
-    ring: &'a Sender<()>,
-    view: Option<[usize; 2]>,
-    generation: u64,
-}
-
-impl Shown<'_> {
-    /// Publishes where the work stands, with a picture if the guest wants one. Between waves
-    /// (`newest`: false) the guest first has to take the last picture: it would only be replaced
-    /// before it is seen, and making it costs time.
-    fn publish(&self, film: &Film, tile_noise: Vec<f32>, report: Report, newest: bool) {
-        if self.view.is_some() && !newest && !self.shared.slot.is_empty() {
-            return;
-        }
-        let picture = self.view.map(|[columns, rows]| film.thumbnail(columns, rows));
-        self.put(Snapshot { report, picture, tile_noise });
-    }
-
-    fn put(&self, snapshot: Snapshot) {
-        self.shared.slot.put(snapshot);
-        // A bell that is ringing already will do.
-        let _ = self.ring.try_send(());
+        work.publish(&site, self.state.clone(), self.idle);
     }
 }

@@ -1,14 +1,24 @@
 //! What rays meet: one batch per form, all items of a form side by side, so that a form that does
 //! not occur costs nothing.
 
+mod compound;
 mod convex;
 mod ellipsoid;
 mod flat;
+mod interval;
+mod span;
 mod sphere;
+mod tapered;
 
 use super::form::Form;
 use crate::lanes::{Lanes, Mask, V3};
+use compound::Compounds;
+use convex::Convex;
+use ellipsoid::Ellipsoid;
+use flat::{Parallelogram, Plane};
+use sphere::Sphere;
 use std::ops::Range;
+use tapered::Tapered;
 
 /// A packet of half-lines.
 #[derive(Clone, Copy, Debug)]
@@ -77,35 +87,115 @@ pub struct Surface<L> {
     pub reach: L,
 }
 
+/// One thing that rays meet, compiled for the lane type.
+pub trait Item<L: Lanes> {
+    /// Distance at which each line through a ray meets the item first in front of the ray's origin, and
+    /// where it meets it; there, a distance that is not positive is no hit. `None`: it meets it nowhere.
+    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;
+
+    /// The surface at `point` (near it, from `ray.at(t)`).
+    fn surface(&self, point: V3<L>) -> Surface<L>;
+}
+
 /// All items of one form.
-pub trait Batch<L: Lanes>: Send + Sync {
+pub enum Batch<L: Lanes> {
+    /// Parallelograms.
+    Parallelograms(Vec<Parallelogram<L::Scalar>>),
+    /// Infinite planes.
+    Planes(Vec<Plane<L::Scalar>>),
+    /// Spheres.
+    Spheres(Vec<Sphere<L::Scalar>>),
+    /// Ellipsoids.
+    Ellipsoids(Vec<Ellipsoid<L::Scalar>>),
+    /// Convex solids.
+    Convex(Vec<Convex<L::Scalar>>),
+    /// Tapered cylinders.
+    Tapered(Vec<Tapered<L::Scalar>>),
+    /// Compounds, whose items are parts.
+    Compounds(Compounds<L::Scalar>),
+}
+
+/// The same expression for the items of any form but compounds, and one for those.
+macro_rules! each {
+    ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr) => {
+        match $batch {
+            Batch::Parallelograms($items) => $value,
+            Batch::Planes($items) => $value,
+            Batch::Spheres($items) => $value,
+            Batch::Ellipsoids($items) => $value,
+            Batch::Convex($items) => $value,
+            Batch::Tapered($items) => $value,
+            Batch::Compounds($compounds) => $other,
+        }
+    };
+}
+
+impl<L: Lanes> Batch<L> {
     /// Narrows `hit` by the items in `range`; an item's tag is `base` + its number.
-    fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>);
+    #[inline(always)]
+    pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
+        each!(self,
+            items => closest(&items[range.clone()], base + range.start as u32, ray, hit),
+            compounds => compounds.closest(range, base, ray, hit));
+    }
 
     /// Where a surface of the items in `range` lies at a distance in (0, limit) of the ray. May stop
     /// early once all lanes of `wanted` are blocked.
-    fn blocked(&self, range: Range<usize>, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask;
+    #[inline(always)]
+    pub fn blocked(&self, range: Range<usize>, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+        each!(self,
+            items => blocked(&items[range], ray, limit, wanted),
+            compounds => compounds.blocked(range, ray, limit, wanted))
+    }
 
     /// The surface of `item` at `point` (near it, from `ray.at(t)`).
-    fn surface(&self, item: usize, point: V3<L>) -> Surface<L>;
+    #[inline(always)]
+    pub fn surface(&self, item: usize, point: V3<L>) -> Surface<L> {
+        each!(self,
+            items => items[item].surface(point),
+            compounds => compounds.surface(item, point))
+    }
 }
 
-/// Collects forms, then compiles those that occur.
-#[derive(Default)]
-struct Sorted {
-    spheres: Vec<(usize, Form)>,
-    ellipsoids: Vec<(usize, Form)>,
-    convex: Vec<(usize, Form)>,
-    parallelograms: Vec<(usize, Form)>,
-    planes: Vec<(usize, Form)>,
+#[inline(always)]
+fn closest<L: Lanes>(items: &[impl Item<L>], first: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
+    for (tag, item) in (first..).zip(items) {
+        if let Some((t, meets)) = item.crossing(ray) {
+            hit.narrow(meets, t, tag);
+        }
+    }
 }
 
-/// A compiled batch and the numbers of the forms its items came from.
+#[inline(always)]
+fn blocked<L: Lanes>(items: &[impl Item<L>], ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+    let mut blocked = L::mask(false);
+    for item in items {
+        if let Some((t, meets)) = item.crossing(ray) {
+            blocked = blocked | (meets & t.gt(L::zero()) & t.lt(limit));
+            if wanted.and_not(blocked).none() {
+                break;
+            }
+        }
+    }
+    blocked
+}
+
+/// What an item came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// Position in the list given to [`compile`].
+    pub form: usize,
+    /// Which part of a compound; 0 for all other forms. Part 0 stands for the whole compound where
+    /// rays ask for items; its other parts never meet anything by themselves.
+    pub part: usize,
+}
+
+/// A compiled batch and what its items came from.
 pub struct Compiled<L: Lanes> {
     /// The batch.
-    pub batch: Box<dyn Batch<L>>,
-    /// `sources[item]`: position in the list given to [`compile`].
-    pub sources: Vec<usize>,
+    pub batch: Batch<L>,
+    /// `sources[item]`: which form, which part of it.
+    pub sources: Vec<Source>,
     /// How the inventory counts the items: singular and plural.
     pub noun: (&'static str, &'static str),
     /// Items without an end, which no tree can hold.
@@ -114,36 +204,35 @@ pub struct Compiled<L: Lanes> {
 
 /// One batch per form that occurs in `forms`.
 pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
-    let mut sorted = Sorted::default();
-    for (i, form) in forms.iter().enumerate() {
-        let list = match form {
-            Form::Sphere { .. } => &mut sorted.spheres,
-            Form::Ellipsoid { .. } => &mut sorted.ellipsoids,
-            Form::Convex { .. } => &mut sorted.convex,
-            Form::Parallelogram { .. } => &mut sorted.parallelograms,
-            Form::Plane { .. } => &mut sorted.planes,
-        };
-        list.push((i, form.clone()));
-    }
     let mut out = Vec::new();
-    let mut add =
-        |list: Vec<(usize, Form)>, noun, infinite, batch: fn(&[Form]) -> Box<dyn Batch<L>>| {
-            if !list.is_empty() {
-                let (sources, forms): (Vec<_>, Vec<_>) = list.into_iter().unzip();
-                out.push(Compiled { batch: batch(&forms), sources, noun, infinite });
+    /// The items that `new` makes of some forms, as one batch.
+    macro_rules! add {
+        ($batch:ident, $item:ident, $noun:expr, $infinite:expr) => {
+            let made = forms
+                .iter()
+                .enumerate()
+                .filter_map(|(form, f)| Some((Source { form, part: 0 }, $item::new(f)?)));
+            let (sources, items): (Vec<_>, Vec<_>) = made.unzip();
+            if !items.is_empty() {
+                let batch = Batch::$batch(items);
+                out.push(Compiled { batch, sources, noun: $noun, infinite: $infinite });
             }
         };
-    add(sorted.parallelograms, ("rectangle", "rectangles"), false, |f| {
-        Box::new(flat::Parallelograms::new(f))
-    });
-    add(sorted.planes, ("plane", "planes"), true, |f| Box::new(flat::Planes::new(f)));
-    add(sorted.spheres, ("sphere", "spheres"), false, |f| Box::new(sphere::Spheres::new(f)));
-    add(sorted.ellipsoids, ("ellipsoid", "ellipsoids"), false, |f| {
-        Box::new(ellipsoid::Ellipsoids::new(f))
-    });
-    add(sorted.convex, ("convex solid", "convex solids"), false, |f| {
-        Box::new(convex::Convexes::new(f))
-    });
+    }
+    add!(Parallelograms, Parallelogram, ("rectangle", "rectangles"), false);
+    add!(Planes, Plane, ("plane", "planes"), true);
+    add!(Spheres, Sphere, ("sphere", "spheres"), false);
+    add!(Ellipsoids, Ellipsoid, ("ellipsoid", "ellipsoids"), false);
+    add!(Convex, Convex, ("convex solid", "convex solids"), false);
+    add!(Tapered, Tapered, ("tapered cylinder", "tapered cylinders"), false);
+    let compounds = forms.iter().enumerate().filter(|(_, f)| matches!(f, Form::Compound(_)));
+    let sources: Vec<_> = compounds
+        .flat_map(|(form, f)| (0..f.parts()).map(move |part| Source { form, part }))
+        .collect();
+    if !sources.is_empty() {
+        let batch = Batch::Compounds(Compounds::new(forms));
+        out.push(Compiled { batch, sources, noun: ("compound", "compounds"), infinite: false });
+    }
     out
 }
 

@@ -1,40 +1,29 @@
 //! Spheres.
 
-use super::{Batch, Hit, Ray, Surface, reach};
+use super::span::{Span, Spans};
+use super::{Item, Ray, Surface, reach};
 use crate::lanes::{Lanes, Mask, Real, V3};
 use crate::shape::form::Form;
-use std::ops::Range;
 
 /// One sphere, rounded to the precision of the kernel.
 #[derive(Clone, Copy)]
-struct Sphere<S> {
+pub struct Sphere<S> {
     center: [S; 3],
     radius: S,
     radius2: S,
     reach: S,
 }
 
-/// All spheres of a scene.
-pub struct Spheres<L: Lanes> {
-    items: Vec<Sphere<L::Scalar>>,
-}
-
-impl<L: Lanes> Spheres<L> {
-    /// From forms that are all spheres.
-    pub fn new(forms: &[Form]) -> Self {
-        let items = forms
-            .iter()
-            .filter_map(|form| match form {
-                Form::Sphere { center, radius } => Some(Sphere {
-                    center: center.to_array().map(L::Scalar::of),
-                    radius: L::Scalar::of(*radius),
-                    radius2: L::Scalar::of(radius * radius),
-                    reach: L::Scalar::of(reach(form)),
-                }),
-                _ => None,
-            })
-            .collect();
-        Self { items }
+impl<S: Real> Sphere<S> {
+    /// `None`: the form is another.
+    pub fn new(form: &Form) -> Option<Self> {
+        let Form::Sphere { center, radius } = form else { return None };
+        Some(Self {
+            center: center.to_array().map(S::of),
+            radius: S::of(*radius),
+            radius2: S::of(radius * radius),
+            reach: S::of(reach(form)),
+        })
     }
 }
 
@@ -64,43 +53,29 @@ pub fn crossings<L: Lanes>(f: V3<L>, d: V3<L>, radius2: L) -> Option<(L, L, L::M
     Some((L::select(behind, q, other), L::select(behind, other, q), meets))
 }
 
-impl<L: Lanes> Batch<L> for Spheres<L> {
-    fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
-        for (item, s) in range.clone().zip(&self.items[range]) {
-            let f = ray.origin - V3::splat(s.center);
-            if let Some((near, far, meets)) = crossings(f, ray.direction, L::splat(s.radius2)) {
-                let t = L::select(near.gt(L::zero()), near, far);
-                hit.narrow(meets, t, base + item as u32);
-            }
-        }
+impl<L: Lanes> Item<L> for Sphere<L::Scalar> {
+    #[inline(always)]
+    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+        let f = ray.origin - V3::splat(self.center);
+        let (near, far, meets) = crossings(f, ray.direction, L::splat(self.radius2))?;
+        Some((L::select(near.gt(L::zero()), near, far), meets))
     }
 
-    fn blocked(&self, range: Range<usize>, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
-        let mut blocked = L::mask(false);
-        for s in &self.items[range] {
-            let f = ray.origin - V3::splat(s.center);
-            if let Some((near, far, meets)) = crossings(f, ray.direction, L::splat(s.radius2)) {
-                let t = L::select(near.gt(L::zero()), near, far);
-                blocked = blocked | (meets & t.gt(L::zero()) & t.lt(limit));
-                if wanted_done::<L>(wanted, blocked) {
-                    break;
-                }
-            }
-        }
-        blocked
-    }
-
-    fn surface(&self, item: usize, point: V3<L>) -> Surface<L> {
-        let s = &self.items[item];
-        let center = V3::splat(s.center);
+    #[inline(always)]
+    fn surface(&self, point: V3<L>) -> Surface<L> {
+        let center = V3::splat(self.center);
         let normal = (point - center).normalize();
-        let point = normal.mul_add(L::splat(s.radius), center);
-        Surface { point, normal, reach: L::splat(s.reach) }
+        let point = normal.mul_add(L::splat(self.radius), center);
+        Surface { point, normal, reach: L::splat(self.reach) }
     }
 }
 
-/// No lane of `wanted` is left open.
-#[inline(always)]
-pub fn wanted_done<L: Lanes>(wanted: L::Mask, blocked: L::Mask) -> bool {
-    wanted.and_not(blocked).none()
+impl<L: Lanes> Spans<L> for Sphere<L::Scalar> {
+    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+        let f = ray.origin - V3::splat(self.center);
+        let (enter, leave, meets) = crossings(f, ray.direction, L::splat(self.radius2))?;
+        // Half the chord over the radius.
+        let cosine = (leave - enter) * (L::of(0.5) / L::splat(self.radius));
+        Some(Span { enter, leave, enter_cosine: cosine, leave_cosine: cosine, meets })
+    }
 }

@@ -1,6 +1,7 @@
 //! The schedule against pictures that are nothing but numbers.
 
 mod adaptive;
+mod changes;
 mod stops;
 
 use super::*;
@@ -48,6 +49,8 @@ struct Model {
     walks: [Vec<Vec<f64>>; 2],
     chance: Chance,
     waves: usize,
+    /// Blocks of samples are to begin where packets do.
+    aligned: bool,
 }
 
 impl Model {
@@ -61,6 +64,7 @@ impl Model {
             walks: [vec![vec![]; tiles], vec![vec![]; tiles]],
             chance: Chance(1),
             waves: 0,
+            aligned: true,
         }
     }
 
@@ -110,15 +114,17 @@ impl Model {
         assert_eq!(*count, job.first, "tile {tile}: every index once, in order");
         assert!(job.count > 0);
         let packets = job.first.is_multiple_of(PACKET);
-        assert!(packets || (job.first < PACKET && job.first.is_power_of_two()), "{job:?}");
+        let early = job.first < PACKET && job.first.is_power_of_two();
+        assert!(packets || early || !self.aligned, "{job:?}");
         *count += job.count;
         let truth = self.truth[tile];
         let step = truth.sigma * f64::from(job.count).sqrt();
         for sum in &mut self.walks[wave.replicate][tile] {
             *sum += step * self.chance.normal();
         }
-        let error = wave.estimate.then(|| {
-            assert_eq!(self.counts[0][tile], self.counts[1][tile], "estimate with unequal counts");
+        // As the film does: no estimate while B lags.
+        let level = self.counts[0][tile] == self.counts[1][tile];
+        let error = (wave.estimate && level).then(|| {
             let mse = self.estimate(tile);
             TileNoise { codes_mse: mse, linear_mse: mse * 1e-6, pixels: PIXELS }
         });

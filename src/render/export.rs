@@ -1,10 +1,44 @@
-//! What a picture file says about how it was made. Equal pictures say the same: no dates, no times,
-//! no threads.
+//! Picture files of a rendering, and what they say about how it was made. Equal pictures say the
+//! same: no dates, no times, no threads.
 
-use super::args::RenderArgs;
-use crate::film::Tone;
-use crate::render::Rendering;
-use crate::render::session::Report;
+use super::rendering::Rendering;
+use super::session::Report;
+use crate::film::{Depth, Display, Picture, Target, Tone, WriteError};
+use crate::sampling::SamplerKind;
+
+/// How a picture came to be, as far as its rendering does not know.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Origin {
+    /// The scene file, as the user named it.
+    pub source: String,
+    /// [`scene_hash`] of its text.
+    pub scene_hash: String,
+    /// Where samples lie.
+    pub sampler: SamplerKind,
+    /// Whether noisy tiles got more samples than others.
+    pub adaptive: bool,
+}
+
+impl Rendering {
+    /// Writes the picture as it stands, with its metadata. `report`: about this very film.
+    pub fn write(
+        &self,
+        report: &Report,
+        origin: &Origin,
+        display: Display,
+        depth: Depth,
+        target: &Target,
+    ) -> Result<(), WriteError> {
+        target.write(&Picture {
+            film: &self.film,
+            mix: &self.mix,
+            group_names: &self.group_names(),
+            display,
+            depth,
+            metadata: &metadata(self, report, origin, &display),
+        })
+    }
+}
 
 /// 64-bit FNV-1a hash of a scene's text, which tells whether a picture was made from it.
 /// Fowler, Noll, Vo: offset basis and prime as in draft-eastlake-fnv.
@@ -17,11 +51,11 @@ pub fn scene_hash(text: &str) -> String {
 }
 
 /// Keys and values for the file.
-pub fn of_picture(
-    args: &RenderArgs,
-    scene_hash: &str,
+fn metadata(
     rendering: &Rendering,
     report: &Report,
+    origin: &Origin,
+    display: &Display,
 ) -> Vec<(String, String)> {
     let spp = &report.spp;
     let noise = match report.noise {
@@ -32,12 +66,13 @@ pub fn of_picture(
         None => "unknown".to_string(),
     };
     let biases = rendering.world.biases();
-    let tone = Tone::NAMED.iter().find(|(_, tone)| *tone == args.tone).map_or("", |(name, _)| name);
+    let tone =
+        Tone::NAMED.iter().find(|(_, tone)| *tone == display.tone).map_or("", |(name, _)| name);
     let header = rendering.film.header();
     let entries = [
         ("Software", format!("zerkalo {}", env!("CARGO_PKG_VERSION"))),
-        ("Source", args.scene.display().to_string()),
-        ("Scene hash", scene_hash.to_string()),
+        ("Source", origin.source.clone()),
+        ("Scene hash", origin.scene_hash.clone()),
         ("Seed", header.seed.to_string()),
         ("Samples per pixel", format!("{:.2} ({}-{})", spp.mean, spp.min, spp.max)),
         ("Noise", noise),
@@ -47,10 +82,10 @@ pub fn of_picture(
             "Settings",
             format!(
                 "sampler {}, lanes {}, {}, exposure {} EV, tone {}",
-                args.sampler.kind().name(),
+                origin.sampler.name(),
                 header.precision,
-                if args.uniform { "uniform" } else { "adaptive" },
-                args.exposure,
+                if origin.adaptive { "adaptive" } else { "uniform" },
+                display.exposure_ev,
                 tone,
             ),
         ),

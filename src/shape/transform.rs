@@ -1,5 +1,6 @@
-//! Transforms: steps that move, turn and scale an object, one after the other.
+//! Transforms: steps that move, turn and scale an object or a part of one, one after the other.
 
+use super::{Form, Shape};
 use crate::value::{Checks, Fault, Field, Range, Takes, sin_cos_degrees};
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -151,7 +152,7 @@ fn turn(axis: DVec3, degrees: f64) -> DAffine3 {
 
 /// Whether an affine map can be undone without losing all digits: finite, and no direction
 /// stretched more than 1e12 times as much as another.
-pub(super) fn is_sound(map: &DAffine3) -> bool {
+fn is_sound(map: &DAffine3) -> bool {
     let linear = map.matrix3;
     let largest = linear.to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));
     if !map.is_finite() || !(1e-12..=1e12).contains(&largest) {
@@ -159,6 +160,48 @@ pub(super) fn is_sound(map: &DAffine3) -> bool {
     }
     let inverse = (linear * largest.recip()).inverse();
     inverse.is_finite() && inverse.to_cols_array().iter().all(|x| x.abs() <= 1e12)
+}
+
+/// The steps in order, as one map.
+pub fn chained(steps: &[Step]) -> DAffine3 {
+    steps.iter().fold(DAffine3::IDENTITY, |map, step| step.map() * map)
+}
+
+/// What `steps` as a whole do wrong to `shape`, although each step is right.
+pub fn misplaced(shape: &Shape, steps: &[Step]) -> Option<Fault> {
+    if steps.is_empty() {
+        return None;
+    }
+    let map = chained(steps);
+    if !is_sound(&map) {
+        return Some(Fault::new(
+            "transform",
+            "transform flattens the object or tears it apart",
+            "factors within 1e12 of each other and of 1",
+        ));
+    }
+    let form = shape.form().transformed(&map);
+    let (reach, extent) = match (&form, form.bounds()) {
+        (_, Some((low, high))) => {
+            (low.abs().max(high.abs()).max_element(), (high - low).max_element())
+        }
+        (Form::Plane { offset, .. }, None) => (offset.abs(), f64::INFINITY),
+        (_, None) => (0.0, f64::INFINITY),
+    };
+    if !Range::COORDINATE.holds(reach) {
+        return Some(Fault::new(
+            "transform",
+            "transform moves the object to coordinates beyond 1e9",
+            "coordinates from -1e9 to 1e9",
+        ));
+    }
+    (extent < 1e-12 * reach).then(|| {
+        Fault::new(
+            "transform",
+            "transform makes the object too small for the place where it stands",
+            "sizes and coordinates within a factor of 1e12 of each other",
+        )
+    })
 }
 
 #[cfg(test)]

@@ -1,0 +1,130 @@
+//! How fast the dashboard answers: the program itself in a terminal of 160x45 cells, with keys pressed
+//! at a fixed rate. Latencies are its own (`--trace`): from the reading of a key to the moment when the
+//! frame that answers it has been written.
+
+#[path = "../tests/pty/terminal.rs"]
+mod terminal;
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use terminal::{Start, Terminal};
+use zerkalo::scene::BUILT_IN;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
+const SIZE: [u16; 2] = [160, 45];
+
+/// Arrow keys, in turn, so that the camera stays about where it is.
+const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[A", "\x1b[D", "\x1b[B"];
+
+/// An event of the trace.
+struct Event {
+    picture: bool,
+    milliseconds: f64,
+}
+
+fn main() {
+    // `cargo test --benches` only wants to know whether it runs.
+    if !std::env::args().any(|argument| argument == "--bench") {
+        return;
+    }
+    let folder = TempDir::new().unwrap();
+    let room = folder.path().join("room.toml");
+    fs::write(&room, BUILT_IN).unwrap();
+    // Single presses, while the picture converges.
+    let single = pressed(folder.path(), 40, Duration::from_millis(250));
+    report("single keys, 640x480, to picture", &single, true);
+    // A key held down for ten seconds.
+    let held = pressed(folder.path(), 300, Duration::from_nanos(1_000_000_000 / 30));
+    report("held key, 640x480, to picture", &held, true);
+    if let Some(last) = held.iter().rfind(|event| event.picture) {
+        println!("{:44} {:6.1} ms", "last key of those to its picture", last.milliseconds);
+    }
+    println!("{:44} {:6.2} %", "one core when converged", idle_percent(folder.path()));
+    fs::write(&room, BUILT_IN.replace("size = [640, 480]", "size = [3840, 2160]")).unwrap();
+    let large = pressed(folder.path(), 40, Duration::from_millis(250));
+    report("single keys, 3840x2160, to screen", &large, false);
+    report("single keys, 3840x2160, to picture", &large, true);
+}
+
+/// Starts the program in `folder` and waits for its first picture.
+fn opened(folder: &Path, more: &[&str]) -> Terminal {
+    let command = [&[PROGRAM, "room.toml"], more].concat();
+    let terminal = Terminal::start(&Start { command: &command, folder, size: SIZE, env: &[] });
+    terminal.wait_for_text("spp");
+    std::thread::sleep(Duration::from_millis(500));
+    terminal
+}
+
+/// Presses `count` keys, one each `interval`, every fourth of them one that only moves the focus.
+fn pressed(folder: &Path, count: usize, interval: Duration) -> Vec<Event> {
+    let trace = folder.join("trace.csv");
+    let mut terminal = opened(folder, &["--trace", trace.to_str().unwrap()]);
+    let begun = Instant::now();
+    for i in 0..count {
+        let due = begun + interval * i as u32;
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        terminal.send(ARROWS[i % ARROWS.len()]);
+        if interval > Duration::from_millis(100) {
+            // Shows and hides the panels: answered by the next frame.
+            std::thread::sleep(interval / 2);
+            terminal.send("z");
+        }
+    }
+    std::thread::sleep(Duration::from_secs(2));
+    end(terminal);
+    let text = fs::read_to_string(trace).unwrap();
+    let event = |line: &str| {
+        let fields: Vec<_> = line.split(',').collect();
+        Event { picture: fields[1] == "picture", milliseconds: fields[2].parse().unwrap() }
+    };
+    text.lines().skip(1).map(event).collect()
+}
+
+/// How much of one processor the program takes when it has nothing to do.
+fn idle_percent(folder: &Path) -> f64 {
+    let mut terminal = opened(folder, &[]);
+    terminal.send("T");
+    terminal.wait_for_text("top at");
+    terminal.send("\x15spp 16\r");
+    terminal.wait_for_text("resting");
+    std::thread::sleep(Duration::from_secs(3));
+    let seconds = 10;
+    let before = processor_ticks(terminal.process_id());
+    std::thread::sleep(Duration::from_secs(seconds));
+    let ticks = processor_ticks(terminal.process_id()) - before;
+    end(terminal);
+    // Ticks of Linux are hundredths of a second.
+    ticks as f64 / seconds as f64
+}
+
+/// User and system time of a process (fields 14 and 15 of proc_pid_stat(5)).
+fn processor_ticks(id: u32) -> u64 {
+    let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap();
+    let after_name = stat.rsplit_once(')').unwrap().1;
+    after_name.split_whitespace().skip(11).take(2).map(|n| n.parse::<u64>().unwrap()).sum()
+}
+
+/// Ends the program without its asking for what is unsaved.
+fn end(terminal: Terminal) {
+    let id = terminal.process_id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &id]).status().unwrap().success());
+    terminal.end();
+}
+
+fn report(what: &str, events: &[Event], picture: bool) {
+    let of_kind = events.iter().filter(|event| event.picture == picture);
+    let mut sorted: Vec<_> = of_kind.map(|event| event.milliseconds).collect();
+    sorted.sort_by(f64::total_cmp);
+    let quantile = |share: f64| {
+        let rank = (share * sorted.len() as f64).ceil() as usize;
+        sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+    };
+    let [median, p99, max] = [0.5, 0.99, 1.0].map(quantile);
+    println!(
+        "{what:44} {median:6.1} ms median, {p99:6.1} ms p99, {max:6.1} ms max  ({} keys)",
+        sorted.len()
+    );
+}

@@ -1,0 +1,172 @@
+//! How soon a session answers: pictures, edits, tasks, on a film of the given size (without one:
+//! 640x480 and 3840x2160). Prints milliseconds: median, 99th percentile, longest.
+//!
+//!     cargo bench --bench session -- 3840x2160
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::sync::mpsc::channel;
+use std::time::{Duration, Instant};
+use zerkalo::film::Display;
+use zerkalo::render::schedule::{Criterion, Settings, Stop};
+use zerkalo::render::session::{Session, Snapshot, View};
+use zerkalo::render::{Options, Rendering};
+use zerkalo::sampling::{SampleSettings, SamplerKind};
+use zerkalo::scene::{Scene, built_in};
+use zerkalo::world;
+
+const RASTER: [usize; 2] = [160, 90];
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn main() {
+    let given: Vec<[u32; 2]> = std::env::args().filter_map(|arg| size(&arg)).collect();
+    let sizes = if given.is_empty() { vec![[640, 480], [3840, 2160]] } else { given };
+    sizes.into_iter().for_each(figures);
+}
+
+fn size(text: &str) -> Option<[u32; 2]> {
+    let (width, height) = text.split_once('x')?;
+    Some([width.parse().ok()?, height.parse().ok()?])
+}
+
+fn figures(size: [u32; 2]) {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let options = Options {
+        world: world::Options::default(),
+        sampling: SampleSettings { seed: 0, kind: SamplerKind::Sobol },
+        display: Display::default(),
+    };
+    let settings = Settings {
+        adaptive: true,
+        criterion: Criterion::Codes,
+        rays_per_pixel: 0,
+        stop: Stop::default(),
+    };
+    let mut session: Session<Rendering> = Session::new(threads, options, settings).unwrap();
+    session.set_view(View { raster: Some(RASTER), probe: Some([9, 9]) });
+    let mut scene = built_in();
+    scene.film.size = size;
+    println!("{}x{}, {threads} threads, raster {}x{}", size[0], size[1], RASTER[0], RASTER[1]);
+
+    first_pictures(&mut session, &scene, "first");
+    let mut moved = scene.clone();
+    moved.camera.eye[0] += 0.1;
+    first_pictures(&mut session, &moved, "again");
+    let mut other = moved.clone();
+    other.ambient.color.0 = [0.0; 3];
+    other.camera.eye[0] += 0.1;
+    first_pictures(&mut session, &other, "with other light groups");
+    first_pictures(&mut session, &scene, "and back");
+
+    tell("snapshots while tracing, apart", &snapshots(&session, Duration::from_secs(4)));
+    tell("task to its answer", &tasks(&session, 60));
+    tell("edit to its first picture", &edits(&mut session, &mut scene, 20));
+    wait(&session, |s| s.report.spp.min >= 4);
+    let (shown, judged) = relights(&mut session, &mut scene, 10);
+    tell("intensity to its snapshot", &shown);
+    tell("intensity to its noise", &judged);
+    let costs = session.with(|rendering, _| {
+        let film = &rendering.film;
+        let timed = |f: &dyn Fn()| {
+            let start = Instant::now();
+            f();
+            vec![start.elapsed()]
+        };
+        [
+            timed(&|| drop(black_box(film.thumbnail(RASTER[0], RASTER[1])))),
+            timed(&|| drop(black_box(film.linear(&rendering.mix)))),
+        ]
+    });
+    let [thumbnail, linear] = costs.unwrap();
+    tell("a thumbnail from nothing, one thread", &thumbnail);
+    tell("a linear picture, one thread", &linear);
+    let report = session.with(|_, report| report.clone()).unwrap();
+    println!("  {:.1} Msamples/s, {:.0} spp", report.samples_per_second() * 1e-6, report.spp.mean);
+}
+
+fn tell(what: &str, times: &[Duration]) {
+    let mut ms: Vec<f64> = times.iter().map(|t| t.as_secs_f64() * 1e3).collect();
+    ms.sort_by(f64::total_cmp);
+    let at = |share: f64| ms[((ms.len() - 1) as f64 * share).round() as usize];
+    println!("  {what:42} {:8.1} {:8.1} {:8.1}", at(0.5), at(0.99), at(1.0));
+}
+
+fn wait(session: &Session<Rendering>, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {
+    let end = Instant::now() + PATIENCE;
+    while Instant::now() < end {
+        if let Some(snapshot) = session.wait(Duration::from_millis(100)).filter(&wanted) {
+            return snapshot;
+        }
+    }
+    panic!("no snapshot in time");
+}
+
+fn first_pictures(session: &mut Session<Rendering>, scene: &Scene, which: &str) {
+    let start = Instant::now();
+    let generation = session.set_scene(Arc::new(scene.clone()));
+    wait(session, |s| s.report.generation == generation);
+    tell(&format!("{which}: coarse picture"), &[start.elapsed()]);
+    let of_this = |s: &Snapshot| s.report.generation == generation;
+    wait(session, |s| of_this(s) && s.report.first_picture_seconds.is_some());
+    tell(&format!("{which}: every pixel"), &[start.elapsed()]);
+}
+
+fn snapshots(session: &Session<Rendering>, during: Duration) -> Vec<Duration> {
+    let end = Instant::now() + during;
+    let (mut last, mut apart) = (Instant::now(), Vec::new());
+    while Instant::now() < end {
+        wait(session, |_| true);
+        apart.push(last.elapsed());
+        last = Instant::now();
+    }
+    apart
+}
+
+fn tasks(session: &Session<Rendering>, count: usize) -> Vec<Duration> {
+    let task = |i: usize| {
+        std::thread::sleep(Duration::from_millis(i as u64 * 7 % 50));
+        session.take();
+        let (answer, result) = channel();
+        let start = Instant::now();
+        session.submit(move |film| {
+            answer.send(film.map(|(_, report)| report.samples)).expect("somebody waits");
+        });
+        assert!(result.recv().unwrap().is_some());
+        start.elapsed()
+    };
+    (0..count).map(task).collect()
+}
+
+fn edits(session: &mut Session<Rendering>, scene: &mut Scene, count: usize) -> Vec<Duration> {
+    let mut edit = |i: usize| {
+        std::thread::sleep(Duration::from_millis(i as u64 * 37 % 400));
+        scene.camera.eye[0] += 0.01;
+        let scene = Arc::new(scene.clone());
+        let start = Instant::now();
+        let generation = session.set_scene(scene);
+        wait(session, |s| s.report.generation == generation);
+        start.elapsed()
+    };
+    (0..count).map(&mut edit).collect()
+}
+
+fn relights(
+    session: &mut Session<Rendering>,
+    scene: &mut Scene,
+    count: usize,
+) -> (Vec<Duration>, Vec<Duration>) {
+    let mut relight = |i: usize| {
+        std::thread::sleep(Duration::from_millis(i as u64 * 37 % 400));
+        scene.lights[0].intensity *= 1.1;
+        let scene = Arc::new(scene.clone());
+        let start = Instant::now();
+        let generation = session.set_scene(scene);
+        let snapshot = wait(session, |s| s.report.generation == generation);
+        assert!(snapshot.report.samples > 0, "the film was restarted");
+        let shown = start.elapsed();
+        let of_this = |s: &Snapshot| s.report.generation == generation;
+        wait(session, |s| of_this(s) && s.report.noise.is_some());
+        (shown, start.elapsed())
+    };
+    (0..count).map(&mut relight).unzip()
+}

@@ -1,0 +1,156 @@
+//! `zerkalo [SCENE]`: the dashboard.
+
+use super::args::{ColorArg, EditArgs};
+use super::{Failure, all_threads, say, warn};
+use crate::dashboard::message::Exported;
+use crate::dashboard::run::{Colors, DEFAULT_STOP, Setup, run as run_dashboard};
+use crate::film::Display;
+use crate::render::Options;
+use crate::render::schedule::{Criterion, Settings};
+use crate::sampling::{SampleSettings, SamplerKind};
+use crate::scene::{BUILT_IN, SceneErrors, SceneFile};
+use crate::world;
+use std::env;
+use std::fs::File;
+use std::io::{self, IsTerminal};
+use std::path::{Path, PathBuf};
+
+/// What the built-in scene is called.
+const BUILT_IN_NAME: &str = "mirror-room.toml";
+
+pub fn run(args: &EditArgs) -> Result<(), Failure> {
+    let variable = |name: &str| env::var(name).unwrap_or_default();
+    if !io::stdout().is_terminal() || variable("TERM") == "dumb" {
+        let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
+        return Err(Failure::Usage(format!(
+            "the dashboard needs a terminal; `zerkalo render {scene} -o PICTURE.png` renders without \
+             one"
+        )));
+    }
+    let file = match &args.scene {
+        Some(path) => opened(path)?,
+        None => SceneFile::untitled(BUILT_IN.to_string(), BUILT_IN_NAME)
+            .map_err(|errors| (PathBuf::new(), errors)),
+    };
+    let setup = Setup {
+        file,
+        threads: args.threads.map_or_else(all_threads, usize::from),
+        options: Options {
+            world: world::Options { precision: args.precision.precision() },
+            sampling: SampleSettings { seed: args.seed, kind: SamplerKind::Sobol },
+            display: Display::default(),
+        },
+        settings: Settings {
+            adaptive: true,
+            criterion: Criterion::Codes,
+            // The scene's; the session puts it in.
+            rays_per_pixel: 0,
+            stop: DEFAULT_STOP,
+        },
+        colors: colors(args.color, variable),
+        trace: args.trace.clone(),
+    };
+    let ended = run_dashboard(setup).map_err(|error| Failure::Failed(error.to_string()))?;
+    for exported in &ended.exported {
+        match exported {
+            Ok(exported) => say(&told(exported)),
+            Err(why) => warn(why),
+        }
+    }
+    ended.latencies.iter().for_each(|line| warn(line));
+    ended.signalled.map_or(Ok(()), |status| Err(Failure::Signalled(status)))
+}
+
+/// The scene's file. One that can be read but holds no scene is the dashboard's to show: its user may
+/// mend it meanwhile.
+fn opened(path: &Path) -> Result<Result<SceneFile, (PathBuf, SceneErrors)>, Failure> {
+    match SceneFile::open(path) {
+        Ok(file) => Ok(Ok(file)),
+        Err(errors) => {
+            let readable = File::open(path).and_then(|file| file.metadata());
+            match readable.is_ok_and(|metadata| metadata.is_file()) {
+                true => Ok(Err((path.to_path_buf(), errors))),
+                false => Err(Failure::Failed(errors.to_string())),
+            }
+        }
+    }
+}
+
+/// `mirror-room-1.png  640x480  212 spp  noise 0.50 codes`
+fn told(exported: &Exported) -> String {
+    let [width, height] = exported.size;
+    let noise = match exported.noise_codes {
+        Some(codes) => format!("{codes:.2} codes"),
+        None => "unknown".to_string(),
+    };
+    let path = exported.path.display();
+    format!("{path}  {width}x{height}  {:.0} spp  noise {noise}", exported.spp)
+}
+
+/// How many colours the terminal has, by what the user says or the environment tells.
+fn colors(asked: ColorArg, variable: impl Fn(&str) -> String) -> Colors {
+    /// Terminals that have 24-bit colour and do not say so by their name's ending.
+    const TRUE: [&str; 8] = [
+        "xterm-kitty",
+        "alacritty",
+        "foot",
+        "wezterm",
+        "xterm-ghostty",
+        "contour",
+        "iterm",
+        "iterm2",
+    ];
+    match asked {
+        ColorArg::True => return Colors::True,
+        ColorArg::Indexed => return Colors::Indexed,
+        ColorArg::Sixteen => return Colors::Sixteen,
+        ColorArg::None => return Colors::Mono,
+        ColorArg::Auto => {}
+    }
+    let term = variable("TERM");
+    if !variable("NO_COLOR").is_empty() || term.starts_with("vt") {
+        Colors::Mono
+    } else if ["truecolor", "24bit"].contains(&variable("COLORTERM").as_str())
+        || ["-direct", "-truecolor"].iter().any(|end| term.ends_with(end))
+        || TRUE.contains(&term.as_str())
+    {
+        Colors::True
+    } else if ["linux", "ansi", "xterm-color", "screen", "cygwin"].contains(&term.as_str()) {
+        Colors::Sixteen
+    } else {
+        Colors::Indexed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_follow_the_user_then_the_environment() {
+        for (term, colorterm, no_color, expected) in [
+            ("xterm-256color", "truecolor", "", Colors::True),
+            ("xterm-256color", "24bit", "", Colors::True),
+            ("xterm-256color", "", "", Colors::Indexed),
+            ("tmux-direct", "", "", Colors::True),
+            ("xterm-kitty", "", "", Colors::True),
+            ("linux", "", "", Colors::Sixteen),
+            ("vt100", "", "", Colors::Mono),
+            ("xterm-256color", "truecolor", "1", Colors::Mono),
+            ("", "", "", Colors::Indexed),
+        ] {
+            let variable = |name: &str| {
+                let value = match name {
+                    "TERM" => term,
+                    "COLORTERM" => colorterm,
+                    "NO_COLOR" => no_color,
+                    other => panic!("{other}"),
+                };
+                value.to_string()
+            };
+            assert_eq!(colors(ColorArg::Auto, variable), expected, "{term} {colorterm} {no_color}");
+            assert_eq!(colors(ColorArg::True, variable), Colors::True);
+            assert_eq!(colors(ColorArg::None, variable), Colors::Mono);
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! A measurement for programs. Keys are for scripts: they stay.
+
+use super::table::About;
+use crate::measure::{Measured, Measurement, median, spread};
+use serde::Serialize;
+
+#[derive(Serialize)]
+struct Document<'a> {
+    scene: String,
+    version: &'static str,
+    machine: String,
+    size: [u32; 2],
+    lanes: &'static str,
+    threads: usize,
+    reference_spp: f64,
+    reference_codes: f64,
+    reference_linear: f64,
+    reference_seconds: f64,
+    compared_at_codes: f64,
+    variations: Vec<Variation<'a>>,
+}
+
+#[derive(Serialize)]
+struct Variation<'a> {
+    setting: &'static str,
+    name: &'a str,
+    threads: usize,
+    samples_per_second: Option<f64>,
+    samples_per_second_spread: Option<f64>,
+    slope: Option<f64>,
+    slope_standard_error: Option<f64>,
+    /// 1 / (linear MSE x seconds).
+    efficiency: Option<f64>,
+    bias_z: Option<f64>,
+    bias_codes: Option<f64>,
+    crossings: Vec<Crossing>,
+    points: Vec<Point>,
+}
+
+#[derive(Serialize)]
+struct Crossing {
+    codes: f64,
+    seconds: f64,
+    spread: f64,
+    spp: f64,
+    at_most: bool,
+}
+
+/// One place on the way; a line of the CSV.
+#[derive(Serialize)]
+struct Point {
+    samples: u64,
+    spp: f64,
+    seconds: f64,
+    seconds_spread: f64,
+    told_codes: Option<f64>,
+    rmse_codes: f64,
+    rmse_linear: f64,
+    rel_mse: f64,
+}
+
+#[derive(Serialize)]
+struct Line<'a> {
+    setting: &'static str,
+    name: &'a str,
+    threads: usize,
+    samples: u64,
+    spp: f64,
+    seconds: f64,
+    seconds_spread: f64,
+    told_codes: Option<f64>,
+    rmse_codes: f64,
+    rmse_linear: f64,
+    rel_mse: f64,
+}
+
+fn points(measured: &Measured) -> impl Iterator<Item = Point> {
+    measured.points.iter().map(|p| Point {
+        samples: p.samples,
+        spp: p.spp,
+        seconds: median(&p.seconds),
+        seconds_spread: spread(&p.seconds),
+        told_codes: p.told_codes,
+        rmse_codes: p.errors.rmse_codes,
+        rmse_linear: p.errors.rmse_linear,
+        rel_mse: p.errors.rel_mse,
+    })
+}
+
+fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
+    let speed = measured.samples_per_second();
+    let slope = measured.slope();
+    let crossing = |codes: &f64| {
+        let c = measured.crossing(*codes)?;
+        Some(Crossing {
+            codes: *codes,
+            seconds: c.seconds,
+            spread: c.spread,
+            spp: c.spp,
+            at_most: c.at_most,
+        })
+    };
+    Variation {
+        setting: measured.topic.name(),
+        name: &measured.name,
+        threads: measured.threads,
+        samples_per_second: speed.map(|s| s.0),
+        samples_per_second_spread: speed.map(|s| s.1),
+        slope: slope.map(|s| s.value),
+        slope_standard_error: slope.map(|s| s.standard_error),
+        efficiency: measured.efficiency(),
+        // A difference without noise has no finite number of standard errors.
+        bias_z: measured.bias.map(|b| b.z).filter(|z| z.is_finite()),
+        bias_codes: measured.bias.map(|b| b.codes),
+        crossings: targets.iter().filter_map(crossing).collect(),
+        points: points(measured).collect(),
+    }
+}
+
+/// Everything.
+pub fn json(about: &About) -> Vec<u8> {
+    let m = about.measurement;
+    let document = Document {
+        scene: about.scene.display().to_string(),
+        version: env!("CARGO_PKG_VERSION"),
+        machine: about.machine(),
+        size: m.size,
+        lanes: about.lanes,
+        threads: about.threads,
+        reference_spp: m.reference_spp,
+        reference_codes: m.reference_codes,
+        reference_linear: m.reference_linear,
+        reference_seconds: m.reference_seconds,
+        compared_at_codes: m.compared_at,
+        variations: m.measured.iter().map(|v| variation(v, &m.targets)).collect(),
+    };
+    let mut bytes = serde_json::to_vec_pretty(&document).expect("numbers and strings only");
+    bytes.push(b'\n');
+    bytes
+}
+
+/// The points of all ways, a line each.
+pub fn csv(measurement: &Measurement) -> Vec<u8> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for measured in &measurement.measured {
+        for p in points(measured) {
+            let line = Line {
+                setting: measured.topic.name(),
+                name: &measured.name,
+                threads: measured.threads,
+                samples: p.samples,
+                spp: p.spp,
+                seconds: p.seconds,
+                seconds_spread: p.seconds_spread,
+                told_codes: p.told_codes,
+                rmse_codes: p.rmse_codes,
+                rmse_linear: p.rmse_linear,
+                rel_mse: p.rel_mse,
+            };
+            writer.serialize(line).expect("a vector takes everything");
+        }
+    }
+    writer.into_inner().expect("a vector takes everything")
+}

@@ -1,0 +1,148 @@
+//! `zerkalo measure`: what accuracy costs on a scene, as a table, as data, as a drawing.
+
+mod data;
+mod table;
+
+use super::args::MeasureArgs;
+use super::signals::Signals;
+use super::{Failure, say, warn};
+use crate::film::{self, Display};
+use crate::measure::{self, Plan, Reference, Topic};
+use crate::scene::Document;
+use crate::world::{self, AnyWorld};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::Path;
+use std::sync::Arc;
+
+/// What most people ask.
+const SHORT: [Topic; 3] = [Topic::Adaptivity, Topic::Precision, Topic::Threads];
+
+pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
+    let failed = |why: String| Failure::Failed(why);
+    if let Some(path) = &args.plot {
+        drawing(path).map_err(Failure::Usage)?;
+    }
+    let document = Document::read(&args.scene).map_err(|e| failed(e.to_string()))?;
+    for warning in document.warnings() {
+        warn(&format!("warning: {warning}"));
+    }
+    let mut scene = document.scene().clone();
+    if let Some(size) = args.size {
+        scene.film.size = size;
+        if let Some(fault) = scene.faults().first() {
+            let [width, height] = size;
+            return Err(Failure::Usage(format!("--size {width}x{height}: {fault}")));
+        }
+    }
+    let display = Display { exposure_ev: args.exposure, tone: args.tone };
+    let reference = match &args.reference {
+        Some(path) => Some(given_reference(path, scene.film.size, &display)?),
+        None => None,
+    };
+    let threads = match args.threads {
+        Some(n) => usize::from(n),
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let topics = match (&args.only, args.full) {
+        (topics, _) if !topics.is_empty() => topics.clone(),
+        (_, true) => Topic::ALL.iter().map(|(topic, ..)| *topic).collect(),
+        _ => SHORT.to_vec(),
+    };
+    let seconds = args.seconds.unwrap_or(if args.full { 300.0 } else { 50.0 });
+    let mut targets = args.noise.clone();
+    targets.sort_by(|a, b| b.total_cmp(a));
+    let plan = Plan {
+        targets,
+        topics,
+        repetitions: usize::from(args.repetitions),
+        seconds,
+        threads,
+        seed: args.seed,
+        display,
+    };
+    let lanes = AnyWorld::compile(&scene, &world::Options::default()).lanes();
+    let signals = Signals::watch().map_err(|e| failed(format!("no signals: {e}")))?;
+    let bar = progress_bar();
+    let measurement = measure::measure(&Arc::new(scene), &plan, reference, &mut |progress| {
+        bar.set_length(progress.of as u64);
+        bar.set_position(progress.done as u64);
+        bar.set_message(progress.what.to_string());
+        signals.caught().is_none()
+    })
+    .map_err(|e| failed(format!("cannot start {threads} threads: {e}; try fewer by --threads")))?;
+    bar.finish_and_clear();
+
+    let about = table::About { scene: &args.scene, threads, lanes, measurement: &measurement };
+    say(&about.to_string());
+    if let Some(path) = &args.json {
+        write(path, &data::json(&about))?;
+    }
+    if let Some(path) = &args.csv {
+        write(path, &data::csv(&measurement))?;
+    }
+    if let Some(path) = &args.plot {
+        plot(path, &about)?;
+    }
+    match signals.caught() {
+        Some(status) => Err(Failure::Signalled(status)),
+        None => Ok(()),
+    }
+}
+
+/// Kinds of drawings.
+enum Drawing {
+    Svg,
+    Png,
+}
+
+fn drawing(path: &Path) -> Result<Drawing, String> {
+    match path.extension() {
+        Some(e) if e.eq_ignore_ascii_case("svg") => Ok(Drawing::Svg),
+        Some(e) if e.eq_ignore_ascii_case("png") => Ok(Drawing::Png),
+        _ => Err(format!("--plot {}: expected a name that ends in .svg or .png", path.display())),
+    }
+}
+
+fn plot(path: &Path, about: &table::About) -> Result<(), Failure> {
+    let title = about.title();
+    let drawn = match drawing(path).map_err(Failure::Usage)? {
+        Drawing::Svg => measure::plot::svg(about.measurement, &title).map(String::into_bytes),
+        Drawing::Png => measure::plot::pixels(about.measurement, &title).and_then(|pixels| {
+            let (width, height) = measure::plot::SIZE;
+            Ok(film::png_of_rgb([width, height], &pixels)?)
+        }),
+    };
+    let bytes = drawn.map_err(|e| Failure::Failed(format!("cannot draw: {e}")))?;
+    write(path, &bytes)
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, bytes)
+        .map_err(|e| Failure::Failed(format!("cannot write {}: {e}", path.display())))
+}
+
+/// The reference out of an EXR file.
+fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Reference, Failure> {
+    let failed = |why: String| Failure::Failed(format!("{}: {why}", path.display()));
+    let read = film::read_exr(path).map_err(failed)?;
+    let [width, height] = read.size;
+    if read.size != size.map(|n| n as usize) {
+        return Err(failed(format!(
+            "the reference is {width} x {height} pixels, the scene {} x {}; expected the same, \
+             such as by --size {width}x{height}",
+            size[0], size[1]
+        )));
+    }
+    Ok(match &read.replicates {
+        Some([a, b]) => Reference::of_replicates(read.size, a, b, display),
+        None => Reference::of_pixels(read.size, read.pixels, display),
+    })
+}
+
+fn progress_bar() -> ProgressBar {
+    let bar = ProgressBar::new(1);
+    let style = ProgressStyle::with_template("measuring {bar:30} {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    bar.set_style(style);
+    bar
+}

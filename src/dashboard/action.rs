@@ -1,0 +1,197 @@
+//! Everything that a user can ask for by a key, a hint or the palette.
+
+/// A direction on the screen, or along the view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Way {
+    /// To the left.
+    Left,
+    /// To the right.
+    Right,
+    /// Upwards.
+    Up,
+    /// Downwards.
+    Down,
+    /// Into the picture.
+    In,
+    /// Out of the picture.
+    Out,
+}
+
+/// How far one step goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Pace {
+    /// A step that is seen at once.
+    Coarse,
+    /// A tenth of it.
+    Fine,
+}
+
+/// More or less.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Change {
+    /// More.
+    Up,
+    /// Less.
+    Down,
+}
+
+/// Everything that a user can ask for. What it acts on is the selection, unless it says otherwise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Action {
+    // Camera
+    /// Turns the eye about the target.
+    Orbit(Way),
+    /// Shifts eye and target in the plane of the picture.
+    Pan(Way),
+    /// Moves the eye towards the target, or away.
+    Dolly(Way, Pace),
+    /// Turns the view where the eye stands.
+    Look(Way),
+    /// Moves eye and target together, along the view's own axes.
+    Fly(Way),
+    /// Turns the picture about its centre.
+    Roll(Way),
+    /// Widens or narrows the view angle.
+    ViewAngle(Change),
+    /// Fills the picture with the selection.
+    Frame,
+    /// The camera as the file has it.
+    ResetCamera,
+    /// Stores the camera in the scene, under a name that is asked for.
+    StoreView,
+    /// The stored view of this number, from 1.
+    RecallView(u8),
+
+    // Modes of the picture
+    /// Arrows move the selection.
+    MoveMode,
+    /// Arrows turn the selection.
+    TurnMode,
+    /// Letters fly the camera.
+    FlyMode,
+    /// Moves the selection as the camera sees it: `Left`, `Right`, `In` (away) and `Out` (nearer) in
+    /// the ground plane, `Up` and `Down` in height.
+    Move(Way, Pace),
+    /// Turns the selection about the vertical.
+    Turn(Way, Pace),
+    /// Ends the mode.
+    Leave,
+
+    // Light
+    /// Selects the next light.
+    NextLight,
+    /// The selected light, else the first one, brighter or darker.
+    Intensity(Change, Pace),
+    /// Switches the selected light, else the first one.
+    SwitchLight,
+    /// A form for a new light.
+    AddLight,
+
+    // Mirror
+    /// Roughness of the selected reflecting object, else of the scene's mirror.
+    Roughness(Change, Pace),
+    /// Reflection coefficient of the same.
+    Reflection(Change),
+    /// The next lobe of the same.
+    NextLobe,
+
+    // Objects
+    /// A form for a new object.
+    AddObject,
+    /// A copy of the selection beside it.
+    Duplicate,
+    /// Removes the selection.
+    Delete,
+    /// Asks for a new name.
+    Rename,
+    /// Puts the selected object on what is below it.
+    Drop,
+    /// Gives the selected object a material of its own.
+    OwnMaterial,
+
+    // Panels and selection
+    /// The next panel.
+    NextPanel,
+    /// The panel before.
+    PreviousPanel,
+    /// Shows or hides everything but the picture.
+    OnlyPicture,
+    /// Moves the cursor of a panel, list or form.
+    Cursor(Way),
+    /// The first line of a panel, list or form.
+    First,
+    /// The last line.
+    Last,
+    /// A page up or down.
+    Page(Way),
+    /// Opens what is under the cursor: types into the field, chooses the entry, confirms.
+    Open,
+    /// Changes the field under the cursor by a step.
+    Step(Change, Pace),
+    /// The field under the cursor as it is when the file does not give it.
+    ClearField,
+
+    // History and file
+    /// Takes back the last edit.
+    Undo,
+    /// Does it again.
+    Redo,
+    /// Writes the scene file.
+    Save,
+    /// Writes the scene to another file.
+    SaveAs,
+    /// Reads the file again.
+    Reload,
+    /// Ends the program; asks if there are unsaved edits.
+    Quit,
+
+    // Picture
+    /// Stops or continues tracing.
+    Pause,
+    /// Begins the picture anew.
+    Restart,
+    /// Asks when to stop: noise, samples, seconds.
+    StopAt,
+    /// Writes the picture as PNG.
+    ExportPng,
+    /// Writes the picture as EXR.
+    ExportExr,
+    /// Renders at another size, asked for, into a file.
+    ExportSized,
+    /// Ends a running export of another size.
+    CancelExport,
+    /// Exposure by a quarter of a stop.
+    Exposure(Change),
+    /// Exposure 0.
+    ResetExposure,
+    /// The next tone curve.
+    NextTone,
+    /// The next view: beauty, noise, samples, objects, normals, depth.
+    NextChannel,
+    /// The view before.
+    PreviousChannel,
+    /// Shows a pixel in numbers, or ends that.
+    Probe,
+    /// Moves the probe over the picture: by a cell, or by a pixel of the film.
+    MoveProbe(Way, Pace),
+    /// Keeps the picture for comparison.
+    Keep,
+    /// Flips between the kept and the live picture.
+    Flip,
+    /// Shows the difference between the kept and the live picture.
+    Difference,
+    /// More or fewer threads.
+    Threads(Change),
+    /// Lower or normal priority of the tracing threads.
+    Priority,
+    /// The next of the terminal's colour modes.
+    NextColors,
+
+    // Help
+    /// All keys.
+    Help,
+    /// Finds an action by typing.
+    Palette,
+    /// What the compiled scene contains.
+    Inventory,
+}

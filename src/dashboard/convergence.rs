@@ -1,0 +1,97 @@
+//! How the error has fallen: what the plot shows.
+
+use crate::render::session::Report;
+
+/// One look at the work.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Seconds of tracing.
+    pub seconds: f64,
+    /// Mean samples per pixel.
+    pub spp: f64,
+    /// Estimated RMSE as displayed, in codes; greater than 0.
+    pub noise_codes: f64,
+}
+
+/// The looks at one picture, in order, thinned so that there are never many.
+#[derive(Clone, Debug, Default)]
+pub struct Convergence {
+    points: Vec<Point>,
+    generation: u64,
+    samples: u64,
+}
+
+/// Points kept at most: more than a plot has columns.
+const MOST: usize = 400;
+
+impl Convergence {
+    /// The points, by rising seconds.
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// Takes in a report. A picture begun anew begins the history anew.
+    pub fn add(&mut self, report: &Report) {
+        if report.generation != self.generation || report.samples < self.samples {
+            self.points.clear();
+        }
+        self.generation = report.generation;
+        self.samples = report.samples;
+        let Some(noise_codes) = report.noise.map(|n| n.rmse_codes).filter(|n| *n > 0.0) else {
+            return;
+        };
+        let point = Point { seconds: report.seconds, spp: report.spp.mean, noise_codes };
+        // Without new samples (a light was dimmed, the work rests) only the error can be another.
+        match self.points.last_mut() {
+            Some(last) if last.seconds >= point.seconds => *last = point,
+            _ => self.points.push(point),
+        }
+        if self.points.len() > MOST {
+            self.thin();
+        }
+    }
+
+    /// Leaves out every second of the later three quarters: on a logarithmic axis they stand
+    /// densest. The newest stays.
+    fn thin(&mut self) {
+        let (early, newest) = (MOST / 4, self.points.len() - 1);
+        let mut index = 0;
+        self.points.retain(|_| {
+            index += 1;
+            index <= early || index % 2 == 0 || index == newest + 1
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dashboard::testing::report;
+
+    #[test]
+    fn history_stays_short_in_order_and_keeps_both_ends() {
+        let mut convergence = Convergence::default();
+        for i in 1..100_000u64 {
+            convergence.add(&report(1, i, Some(100.0 / (i as f64).sqrt())));
+        }
+        let points = convergence.points();
+        assert!((MOST / 2..=MOST).contains(&points.len()), "{}", points.len());
+        assert!(points.is_sorted_by(|a, b| a.seconds < b.seconds));
+        assert_eq!(points[0].noise_codes, 100.0);
+        assert_eq!(points.last().unwrap().seconds, report(1, 99_999, None).seconds);
+    }
+
+    #[test]
+    fn a_new_picture_and_a_restart_begin_anew() {
+        let mut convergence = Convergence::default();
+        convergence.add(&report(1, 10, Some(3.0)));
+        convergence.add(&report(1, 20, Some(2.0)));
+        convergence.add(&report(1, 20, Some(2.5)));
+        assert_eq!(convergence.points().len(), 2, "the same moment seen twice");
+        assert_eq!(convergence.points()[1].noise_codes, 2.5);
+        convergence.add(&report(1, 5, Some(4.0)));
+        assert_eq!(convergence.points().len(), 1, "restarted");
+        convergence.add(&report(2, 50, None));
+        assert!(convergence.points().is_empty(), "another scene");
+    }
+}

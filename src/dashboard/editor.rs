@@ -1,0 +1,114 @@
+//! One line of text being typed.
+
+use super::input::{Code, Key};
+use tui_input::{Input, InputRequest};
+
+/// The most characters that are taken: enough for a path, too few to slow anything down.
+const MOST: usize = 400;
+
+/// A line of text with a cursor, and what was wrong with it when it was last tried.
+#[derive(Clone, Debug, Default)]
+pub struct Editor {
+    input: Input,
+    /// Why it was refused, in a sentence or two; shown below it until something is typed.
+    pub problem: Option<String>,
+}
+
+impl Editor {
+    /// With `text` in it, the cursor behind it.
+    pub fn new(text: impl Into<String>) -> Self {
+        Self { input: Input::new(text.into()), problem: None }
+    }
+
+    /// The text.
+    pub fn text(&self) -> &str {
+        self.input.value()
+    }
+
+    /// Columns of the terminal from the beginning of the text to the cursor.
+    pub fn cursor_columns(&self) -> usize {
+        self.input.visual_cursor()
+    }
+
+    /// Columns of the text to leave out on the left so that the cursor shows in `width` columns.
+    pub fn scroll_columns(&self, width: usize) -> usize {
+        self.input.visual_scroll(width)
+    }
+
+    /// Lets a key act on the text. Whether it was one for a line of text; the keys that end it (Enter,
+    /// Esc, Tab, Up, Down) are not.
+    pub fn key(&mut self, key: Key) -> bool {
+        let request = match (key.code, key.ctrl, key.alt) {
+            (Code::Char(c), false, false) => return self.insert(c),
+            (Code::Backspace, false, false) | (Code::Char('h'), true, false) => {
+                InputRequest::DeletePrevChar
+            }
+            (Code::Backspace, _, _) | (Code::Char('w'), true, false) => {
+                InputRequest::DeletePrevWord
+            }
+            (Code::Delete, false, false) => InputRequest::DeleteNextChar,
+            (Code::Delete, _, _) => InputRequest::DeleteNextWord,
+            (Code::Left, false, false) => InputRequest::GoToPrevChar,
+            (Code::Right, false, false) => InputRequest::GoToNextChar,
+            (Code::Left, _, _) => InputRequest::GoToPrevWord,
+            (Code::Right, _, _) => InputRequest::GoToNextWord,
+            (Code::Home, _, _) | (Code::Char('a'), true, false) => InputRequest::GoToStart,
+            (Code::End, _, _) | (Code::Char('e'), true, false) => InputRequest::GoToEnd,
+            (Code::Char('u'), true, false) => InputRequest::DeleteFromStart,
+            (Code::Char('k'), true, false) => InputRequest::DeleteTillEnd,
+            (Code::Char('y'), true, false) => InputRequest::Yank,
+            _ => return false,
+        };
+        if self.input.handle(request).is_some_and(|changed| changed.value) {
+            self.problem = None;
+        }
+        true
+    }
+
+    /// Inserts pasted text: its first line, without what could not be typed.
+    pub fn paste(&mut self, text: &str) {
+        let line = text.trim_start_matches(['\n', '\r']).lines().next().unwrap_or_default();
+        for c in line.chars() {
+            self.insert(if c == '\t' { ' ' } else { c });
+        }
+    }
+
+    fn insert(&mut self, c: char) -> bool {
+        if !c.is_control() && self.text().chars().count() < MOST {
+            self.input.handle(InputRequest::InsertChar(c));
+            self.problem = None;
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn press(editor: &mut Editor, keys: &str) {
+        keys.split(' ').for_each(|key| assert!(editor.key(key.parse().unwrap()), "{key}"));
+    }
+
+    #[test]
+    fn a_line_is_edited_as_lines_are() {
+        let mut editor = Editor::new("0.5 red");
+        press(&mut editor, "Backspace Left x Home 1 Delete End Ctrl-w");
+        assert_eq!(editor.text(), "1.5 ");
+        press(&mut editor, "Ctrl-u é 鏡");
+        assert_eq!((editor.text(), editor.cursor_columns()), ("é鏡", 3));
+        for key in ["Enter", "Esc", "Tab", "Up", "Down", "F2", "Ctrl-s", "Alt-x"] {
+            assert!(!editor.key(key.parse().unwrap()), "{key}");
+        }
+    }
+
+    #[test]
+    fn pasted_text_is_one_line_of_what_could_be_typed() {
+        let mut editor = Editor { problem: Some("empty".into()), ..Editor::default() };
+        editor.paste("\n1\t2\u{1b}[31m 3\nq\n");
+        assert_eq!(editor.text(), "1 2[31m 3");
+        assert_eq!(editor.problem, None);
+        editor.paste(&"x".repeat(10_000));
+        assert_eq!(editor.text().chars().count(), MOST);
+    }
+}

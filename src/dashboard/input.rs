@@ -1,0 +1,186 @@
+//! Keys and mouse as the dashboard knows them, whichever library reads the terminal.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// What was pressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Code {
+    /// A character, as typed: a capital stands for itself, without `shift`.
+    Char(char),
+    /// Enter.
+    Enter,
+    /// Escape.
+    Esc,
+    /// Tabulator; with `shift` the way back.
+    Tab,
+    /// Backspace.
+    Backspace,
+    /// Delete.
+    Delete,
+    /// Arrow.
+    Left,
+    /// Arrow.
+    Right,
+    /// Arrow.
+    Up,
+    /// Arrow.
+    Down,
+    /// Home.
+    Home,
+    /// End.
+    End,
+    /// Page up.
+    PageUp,
+    /// Page down.
+    PageDown,
+    /// A function key.
+    F(u8),
+}
+
+/// A key press with its modifiers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Key {
+    /// What was pressed.
+    pub code: Code,
+    /// With Control.
+    pub ctrl: bool,
+    /// With Alt.
+    pub alt: bool,
+    /// With Shift; never set for characters.
+    pub shift: bool,
+}
+
+/// What the mouse did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MouseKind {
+    /// A button went down.
+    Press(Button),
+    /// The mouse moved with a button down.
+    Drag(Button),
+    /// A button came up.
+    Release(Button),
+    /// Wheel: ticks towards (negative) or away from the user (positive).
+    Scroll(i32),
+}
+
+/// A mouse button.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Button {
+    /// Left.
+    Left,
+    /// Middle.
+    Middle,
+    /// Right.
+    Right,
+}
+
+/// What the mouse did, and where.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mouse {
+    /// What.
+    pub kind: MouseKind,
+    /// Column of the cell, from 0.
+    pub column: u16,
+    /// Row of the cell, from 0.
+    pub row: u16,
+    /// With Control or Alt (terminals keep Shift for themselves).
+    pub modified: bool,
+}
+
+/// Names of keys that are no characters.
+const NAMED: &[(&str, Code)] = &[
+    ("Enter", Code::Enter),
+    ("Esc", Code::Esc),
+    ("Tab", Code::Tab),
+    ("Backspace", Code::Backspace),
+    ("Delete", Code::Delete),
+    ("Left", Code::Left),
+    ("Right", Code::Right),
+    ("Up", Code::Up),
+    ("Down", Code::Down),
+    ("Home", Code::Home),
+    ("End", Code::End),
+    ("PageUp", Code::PageUp),
+    ("PageDown", Code::PageDown),
+    ("Space", Code::Char(' ')),
+];
+
+/// As in the key table and in help: `Ctrl-s`, `Shift-Left`, `a`, `?`, `Space`.
+impl fmt::Display for Key {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for (on, name) in [(self.ctrl, "Ctrl-"), (self.alt, "Alt-"), (self.shift, "Shift-")] {
+            if on {
+                f.write_str(name)?;
+            }
+        }
+        if let Some((name, _)) = NAMED.iter().find(|(_, code)| *code == self.code) {
+            return f.write_str(name);
+        }
+        match self.code {
+            Code::Char(c) => write!(f, "{c}"),
+            Code::F(n) => write!(f, "F{n}"),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl FromStr for Key {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut key = Self { code: Code::Esc, ctrl: false, alt: false, shift: false };
+        let mut rest = text;
+        for (prefix, flag) in
+            [("Ctrl-", &mut key.ctrl), ("Alt-", &mut key.alt), ("Shift-", &mut key.shift)]
+        {
+            if let Some(after) = rest.strip_prefix(prefix) {
+                *flag = true;
+                rest = after;
+            }
+        }
+        let mut chars = rest.chars();
+        key.code = match (chars.next(), chars.next()) {
+            (Some(only), None) => Code::Char(only),
+            (Some('F'), Some('0'..='9')) => {
+                Code::F(rest[1..].parse().map_err(|_| format!("no key is called {text:?}"))?)
+            }
+            _ => NAMED
+                .iter()
+                .find(|(name, _)| *name == rest)
+                .map(|(_, code)| *code)
+                .ok_or_else(|| format!("no key is called {text:?}"))?,
+        };
+        Ok(key)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_keys_are_each_others_inverse() {
+        for name in [
+            "a",
+            "A",
+            "?",
+            "Space",
+            "Ctrl-s",
+            "Shift-Left",
+            "Alt-Up",
+            "F1",
+            "F12",
+            "Shift-Tab",
+            "PageUp",
+            "Esc",
+            "-",
+            "Ctrl-Alt-Delete",
+        ] {
+            assert_eq!(name.parse::<Key>().unwrap().to_string(), name);
+        }
+        for wrong in ["", "Meta-x", "Hyper", "Fx"] {
+            assert!(wrong.parse::<Key>().is_err(), "{wrong}");
+        }
+    }
+}

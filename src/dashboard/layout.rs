@@ -1,0 +1,244 @@
+//! Where everything is on the screen: a pure function, used to draw and to know what a click means.
+
+/// A rectangle of cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Area {
+    /// First column.
+    pub x: u16,
+    /// First row.
+    pub y: u16,
+    /// Columns.
+    pub width: u16,
+    /// Rows.
+    pub height: u16,
+}
+
+impl Area {
+    /// Whether the cell in this column and row lies in it.
+    pub fn contains(&self, column: u16, row: u16) -> bool {
+        (self.x..self.x + self.width).contains(&column)
+            && (self.y..self.y + self.height).contains(&row)
+    }
+
+    /// What is left inside a border of one cell.
+    pub fn inner(&self) -> Self {
+        Self {
+            x: self.x + 1,
+            y: self.y + 1,
+            width: self.width.saturating_sub(2),
+            height: self.height.saturating_sub(2),
+        }
+    }
+}
+
+/// Who gets the keys that mean something else in every panel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Focus {
+    /// The picture.
+    Picture,
+    /// The list of everything in the scene.
+    Outline,
+    /// The fields of the selection.
+    Inspector,
+}
+
+/// What the layout depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// Columns and rows of the terminal.
+    pub screen: [u16; 2],
+    /// Width and height of the film in pixels.
+    pub film: [u32; 2],
+    /// Which panel has the focus.
+    pub focus: Focus,
+    /// Everything but the picture is hidden.
+    pub only_picture: bool,
+}
+
+/// Where everything is. Panels are given with their borders; `None`: folded away.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Layout {
+    /// The picture's panel.
+    pub picture: Area,
+    /// The cells inside it that the picture is painted on, centred.
+    pub image: Area,
+    /// Columns and rows of half cells of the picture (its last row may be the upper half of a row of
+    /// cells). Half cells count as square.
+    pub raster: [usize; 2],
+    /// The outline.
+    pub outline: Option<Area>,
+    /// The inspector.
+    pub inspector: Option<Area>,
+    /// The convergence plot.
+    pub plot: Option<Area>,
+    /// The status line.
+    pub status: Area,
+    /// The line of hints, notices and questions.
+    pub hints: Area,
+}
+
+/// The smallest terminal that is drawn to: columns and rows.
+pub const SMALLEST: [u16; 2] = [40, 12];
+
+/// Rows of a plot that is worth looking at.
+const PLOT_ROWS: u16 = 8;
+/// From this many columns on the side column is there whoever has the focus.
+const SIDE_FROM: u16 = 72;
+
+/// The layout; `None`: the terminal is smaller than [`SMALLEST`].
+pub fn layout(request: &Request) -> Option<Layout> {
+    let [width, height] = request.screen;
+    if width < SMALLEST[0] || height < SMALLEST[1] {
+        return None;
+    }
+    let status = Area { x: 0, y: height - 2, width, height: 1 };
+    let hints = Area { x: 0, y: height - 1, width, height: 1 };
+    let rows = height - 2;
+    let mut side = match width {
+        0..100 => 28,
+        100..160 => 38,
+        _ => 52,
+    };
+    if request.only_picture || width < SIDE_FROM && request.focus == Focus::Picture {
+        side = 0;
+    }
+    let picture = Area { x: 0, y: 0, width: width - side, height: rows };
+    let inside = if request.only_picture { picture } else { picture.inner() };
+    let (image, raster) = fitted(inside, request.film);
+    let [outline, inspector, plot] = match side {
+        0 => [None; 3],
+        _ => column(Area { x: width - side, y: 0, width: side, height: rows }, request.focus),
+    };
+    Some(Layout { picture, image, raster, outline, inspector, plot, status, hints })
+}
+
+/// Outline, inspector and plot, one below the other.
+fn column(side: Area, focus: Focus) -> [Option<Area>; 3] {
+    let rows = side.height;
+    let part = |y: u16, height: u16| Some(Area { y: side.y + y, height, ..side });
+    if rows < 16 {
+        // One at a time.
+        return match focus {
+            Focus::Outline => [part(0, rows), None, None],
+            _ => [None, part(0, rows), None],
+        };
+    }
+    let plot = if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 };
+    let left = rows - plot;
+    // Where there is little room the panel in use gets the larger part.
+    let outline = match focus {
+        _ if rows >= 40 => left * 2 / 5,
+        Focus::Outline => left * 3 / 5,
+        _ => left * 2 / 5,
+    };
+    let plot = if plot > 0 { part(left, plot) } else { None };
+    [part(0, outline), part(outline, left - outline), plot]
+}
+
+/// The largest centred picture of the film's shape, and its raster of half cells.
+fn fitted(inside: Area, [film_width, film_height]: [u32; 2]) -> (Area, [usize; 2]) {
+    let (columns, halves) = (f64::from(inside.width), 2.0 * f64::from(inside.height));
+    let (film_width, film_height) = (f64::from(film_width.max(1)), f64::from(film_height.max(1)));
+    let per_pixel = (columns / film_width).min(halves / film_height);
+    let whole = |pixels: f64, most: f64| (pixels * per_pixel).round().clamp(1.0, most.max(1.0));
+    let raster = [whole(film_width, columns), whole(film_height, halves)];
+    let [width, height] = [raster[0] as u16, (raster[1] / 2.0).ceil() as u16];
+    let image = Area {
+        x: inside.x + (inside.width - width.min(inside.width)) / 2,
+        y: inside.y + (inside.height - height.min(inside.height)) / 2,
+        width,
+        height,
+    };
+    (image, raster.map(|n| n as usize))
+}
+
+impl Layout {
+    /// The film's pixel (column, row) in the middle of what a cell shows; `None`: the cell is not in
+    /// the picture.
+    pub fn film_pixel(&self, film: [u32; 2], column: u16, row: u16) -> Option<[usize; 2]> {
+        if !self.image.contains(column, row) {
+            return None;
+        }
+        let at =
+            [f64::from(column - self.image.x) + 0.5, 2.0 * f64::from(row - self.image.y) + 1.0];
+        let pixel = |i: usize| {
+            let pixel = at[i] / self.raster[i] as f64 * f64::from(film[i]);
+            (pixel as usize).min(film[i].saturating_sub(1) as usize)
+        };
+        Some([pixel(0), pixel(1)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(width: u16, height: u16, focus: Focus) -> Option<Layout> {
+        let film = [640, 480];
+        layout(&Request { screen: [width, height], film, focus, only_picture: false })
+    }
+
+    const FOCI: [Focus; 3] = [Focus::Picture, Focus::Outline, Focus::Inspector];
+
+    /// At every size: nothing overlaps, nothing leaves the screen, all cells but those of a folded
+    /// side are used, and the panel with the focus is there.
+    #[test]
+    fn panels_tile_the_screen() {
+        for width in 40..220 {
+            for height in 12..70 {
+                for focus in FOCI {
+                    let l = at(width, height, focus).unwrap();
+                    let panels = [Some(l.picture), l.outline, l.inspector, l.plot];
+                    let cells = |a: &Area| u32::from(a.width) * u32::from(a.height);
+                    let all: u32 = panels.iter().flatten().map(cells).sum();
+                    assert_eq!(all, u32::from(width) * u32::from(height - 2), "{width}x{height}");
+                    for panel in panels.into_iter().flatten() {
+                        assert!(panel.x + panel.width <= width && panel.y + panel.height <= height);
+                        assert!(panel.width >= 12 && panel.height >= 5, "{panel:?}");
+                    }
+                    let focused = match focus {
+                        Focus::Picture => Some(l.picture),
+                        Focus::Outline => l.outline,
+                        Focus::Inspector => l.inspector,
+                    };
+                    assert!(focused.is_some(), "{width}x{height} {focus:?}");
+                    assert!(l.plot.is_none_or(|plot| plot.height >= PLOT_ROWS));
+                }
+            }
+        }
+        assert!(at(39, 12, Focus::Picture).is_none() && at(40, 11, Focus::Picture).is_none());
+        assert!(at(200, 60, Focus::Picture).unwrap().plot.is_some());
+        assert!(at(120, 36, Focus::Picture).unwrap().plot.is_some());
+        assert!(at(80, 24, Focus::Picture).unwrap().inspector.is_some());
+    }
+
+    /// The picture has the film's shape to within half a half cell, is as large as fits, and every
+    /// one of its cells shows a pixel of the film.
+    #[test]
+    fn the_picture_keeps_the_shape_of_the_film() {
+        for film in [[640, 480], [480, 640], [1920, 800], [1, 1], [8192, 1], [1, 8192]] {
+            for screen in [[80, 24], [120, 36], [200, 60], [40, 12]] {
+                for only_picture in [false, true] {
+                    let request = Request { screen, film, focus: Focus::Picture, only_picture };
+                    let l = layout(&request).unwrap();
+                    let inside = if only_picture { l.picture } else { l.picture.inner() };
+                    let [columns, halves] = l.raster;
+                    let room = [usize::from(inside.width), 2 * usize::from(inside.height)];
+                    assert!(columns == room[0] || halves == room[1], "{request:?} {l:?}");
+                    assert!(columns <= room[0] && halves <= room[1]);
+                    let aspect = f64::from(film[0]) / f64::from(film[1]);
+                    let off = (columns as f64 - halves as f64 * aspect).abs() / aspect.max(1.0);
+                    assert!(off <= 0.51 || columns == 1 || halves == 1, "{request:?} {l:?}");
+                    let image = l.image;
+                    for row in image.y..image.y + image.height {
+                        for column in image.x..image.x + image.width {
+                            assert!(inside.contains(column, row));
+                            assert!(l.film_pixel(film, column, row).is_some());
+                        }
+                    }
+                    assert_eq!(l.film_pixel(film, image.x + image.width, image.y), None);
+                }
+            }
+        }
+    }
+}

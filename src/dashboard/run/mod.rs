@@ -1,0 +1,275 @@
+//! The dashboard at work: terminal, keys, renderer, files, time. One thread decides and draws; whatever
+//! could keep it waiting has a thread of its own.
+
+mod exports;
+mod files;
+mod frames;
+mod hands;
+mod input;
+mod names;
+mod signals;
+pub mod terminal;
+mod trace;
+mod writer;
+
+use super::message::{Effect, Exported, Message};
+use super::model::{Model, Start};
+use super::update::update;
+use crate::render::Options;
+use crate::render::schedule::{Settings, Stop};
+use crate::render::session::State;
+use crate::scene::{SceneErrors, SceneFile};
+use crossbeam_channel::{Receiver, after, never, select};
+use frames::Frames;
+use hands::{Hands, Tools};
+use input::Input;
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use terminal::Screen;
+use trace::Trace;
+
+pub use super::model::Colors;
+
+/// What a dashboard is started with.
+pub struct Setup {
+    /// The scene's file; or where it is and why it cannot be read.
+    pub file: Result<SceneFile, (PathBuf, SceneErrors)>,
+    /// Tracing threads, at least 1.
+    pub threads: usize,
+    /// How scenes are compiled and sampled.
+    pub options: Options,
+    /// How samples are allotted, and when the work is done at first.
+    pub settings: Settings,
+    /// How many colours the terminal has.
+    pub colors: Colors,
+    /// Where to write how long answers took.
+    pub trace: Option<PathBuf>,
+}
+
+/// How a dashboard ended.
+#[derive(Debug, Default)]
+pub struct Ended {
+    /// The exit status that a signal asks for.
+    pub signalled: Option<u8>,
+    /// Pictures that were written after the screen was left.
+    pub exported: Vec<Result<Exported, String>>,
+    /// How long answers took, a line each; empty unless asked for.
+    pub latencies: Vec<String>,
+}
+
+/// Runs a dashboard on the terminal of stdin and stdout until the user quits or a signal comes.
+///
+/// # Errors
+/// If the terminal cannot be used (any more) or there are no threads. The terminal is restored.
+pub fn run(setup: Setup) -> io::Result<Ended> {
+    let Setup { file, threads, options, settings, colors, trace } = setup;
+    let (start, file) = match file {
+        Ok(file) => (Ok(Arc::new(file.document().scene().clone())), Ok(file)),
+        Err((path, errors)) => (Err(errors), Err(path)),
+    };
+    let (path, name) = match &file {
+        Ok(file) => (file.path().map(PathBuf::from), file.document().name().to_string()),
+        Err(path) => (Some(path.clone()), String::new()),
+    };
+    let hands = Hands::new(Tools { file, threads, options, settings })?;
+    let screen = Screen::enter()?;
+    let signals = signals::watch(screen.tty())?;
+    let (columns, rows) = crossterm::terminal::size()?;
+    let model = Model::new(Start {
+        path,
+        name,
+        scene: start,
+        screen: [columns, rows],
+        colors,
+        stop: settings.stop,
+        threads,
+        most_threads: std::thread::available_parallelism().map_or(threads, usize::from),
+    });
+    let mut dashboard = Dashboard {
+        model,
+        hands,
+        frames: Frames::new(screen.tty())?,
+        trace: Trace::new(trace.is_some()),
+        began: Instant::now(),
+        shown: 0,
+        changed: true,
+        quit: false,
+    };
+    dashboard.begin();
+    let result = dashboard.watch(&input::read()?, &signals, screen.left());
+    // What is still to be written may take a while: it need not be waited for on an empty screen.
+    drop(screen);
+    let finished = dashboard.hands.finish();
+    let exported = finished.into_iter().filter_map(|message| match message {
+        Message::Exported(result) => Some(result),
+        _ => None,
+    });
+    let mut ended =
+        Ended { signalled: result?, exported: exported.collect(), latencies: Vec::new() };
+    if let Some(path) = trace {
+        dashboard.trace.write(&path)?;
+        ended.latencies = dashboard.trace.summary();
+    }
+    Ok(ended)
+}
+
+struct Dashboard {
+    model: Model,
+    hands: Hands,
+    frames: Frames,
+    trace: Trace,
+    began: Instant,
+    /// The scene whose picture the model has: its number.
+    shown: u64,
+    /// The screen may have to change.
+    changed: bool,
+    quit: bool,
+}
+
+impl Dashboard {
+    fn begin(&mut self) {
+        if !self.model.file.blank {
+            let scene = Arc::clone(self.model.scene());
+            self.hands.show(scene);
+        }
+        // So that the renderer learns how large the picture is.
+        self.take(Message::Resize(self.model.screen));
+    }
+
+    /// Lets things happen until the end; the exit status of a signal.
+    fn watch(
+        &mut self,
+        input: &Receiver<io::Result<Input>>,
+        signals: &Receiver<u8>,
+        left: &Receiver<()>,
+    ) -> io::Result<Option<u8>> {
+        let bell = self.hands.session().bell().clone();
+        let done = self.hands.done().clone();
+        let written = self.frames.written().clone();
+        let silence = never();
+        let mut waiting = Vec::new();
+        while !self.quit {
+            let wait = self.draw()?;
+            // A picture is made when the last one has been taken: not before it can be shown.
+            let (bell, hungry) = match self.hungry() {
+                None => (&silence, None),
+                Some(Duration::ZERO) => (&bell, None),
+                wait => (&silence, wait),
+            };
+            let timer = match wait.into_iter().chain(hungry).min() {
+                Some(wait) => after(wait),
+                None => never(),
+            };
+            select! {
+                recv(input) -> event => input::join(&mut waiting, event.map_err(io::Error::other)??),
+                recv(bell) -> rung => match rung {
+                    Ok(()) => self.take_snapshot(),
+                    // Its panic has been told already.
+                    Err(_) => return Err(io::Error::other("the renderer has ended")),
+                },
+                recv(done) -> message => message.into_iter().for_each(|m| self.take_done(m)),
+                recv(written) -> frame => {
+                    if let Ok(frame) = frame {
+                        self.trace.written(self.frames.written_at(frame)?);
+                    }
+                }
+                recv(signals) -> status => return Ok(status.ok()),
+                recv(left) -> _ => return Err(io::Error::other("the dashboard has failed")),
+                recv(timer) -> _ => self.wake(),
+            }
+            while let Ok(event) = input.try_recv() {
+                input::join(&mut waiting, event?);
+            }
+            for Input { at, message } in waiting.drain(..) {
+                let scene = self.take(message);
+                self.trace.event(at, scene);
+            }
+            while let Ok(message) = done.try_recv() {
+                self.take_done(message);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Takes what happened into the model and does what that asks for; the number of the scene if the
+    /// answer needs a new picture.
+    fn take(&mut self, message: Message) -> Option<u64> {
+        let mut awaited = None;
+        for effect in update(&mut self.model, message, self.began.elapsed()) {
+            self.quit |= effect == Effect::Quit;
+            let scene = match &effect {
+                Effect::Show(scene) => Some(Arc::clone(scene)),
+                _ => None,
+            };
+            let number = self.hands.perform(effect);
+            // A change of light is seen at once in the picture that is there.
+            let snapshot = self.model.snapshot.as_deref();
+            let mixed = scene.is_some_and(|s| snapshot.is_some_and(|n| n.mix_for(&s).is_some()));
+            if number.is_some() && !mixed {
+                awaited = number;
+            }
+        }
+        self.changed = true;
+        awaited
+    }
+
+    fn take_done(&mut self, message: Message) {
+        self.hands.note(&message);
+        self.take(message);
+    }
+
+    fn take_snapshot(&mut self) {
+        if let Some(snapshot) = self.hands.session().take() {
+            let failed = matches!(snapshot.report.state, State::Failed(_));
+            if snapshot.picture.is_some() || failed {
+                self.shown = snapshot.report.generation;
+            }
+            self.take(Message::Snapshot(Box::new(snapshot)));
+        }
+    }
+
+    /// How long to wait before the next picture could be shown; `None`: until the terminal has taken
+    /// the last one.
+    fn hungry(&self) -> Option<Duration> {
+        let now = self.began.elapsed();
+        let due = self.frames.due(now, self.trace.answers(u64::MAX));
+        self.frames.ready().then(|| due.saturating_sub(now))
+    }
+
+    /// Time has passed: the model is told if it wanted to be.
+    fn wake(&mut self) {
+        if self.model.wakes_at().is_some_and(|at| at <= self.began.elapsed()) {
+            self.take(Message::Tick);
+        }
+    }
+
+    /// Draws if there is something to draw and the terminal can take it. How long to wait for what
+    /// happens by itself, if anything.
+    fn draw(&mut self) -> io::Result<Option<Duration>> {
+        let now = self.began.elapsed();
+        let wakes = self.model.wakes_at();
+        let mut due = None;
+        if self.changed && self.frames.ready() && !self.quit {
+            let at = self.frames.due(now, self.trace.answers(self.shown));
+            if at <= now {
+                let sent = self.frames.draw(&self.model, now)?;
+                self.trace.sent(self.shown);
+                if !sent {
+                    // The screen was the answer already.
+                    self.trace.written(Instant::now());
+                }
+                self.changed = false;
+            } else {
+                due = Some(at);
+            }
+        }
+        let next = wakes.into_iter().chain(due).min();
+        Ok(next.map(|at| at.saturating_sub(now)))
+    }
+}
+
+/// Without a better idea the work is done at half a step of an 8-bit file.
+pub const DEFAULT_STOP: Stop =
+    Stop { spp: None, noise_codes: Some(0.5), rmse_linear: None, seconds: None };

@@ -1,0 +1,190 @@
+//! The terminal as the dashboard needs it, and back: raw mode, alternate screen, mouse, paste.
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+use std::io::{self, Write};
+use std::panic;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Alternate screen, no cursor, pasted text in brackets, mouse buttons and drags (not every motion)
+/// with coordinates that do not end at column 223; an empty screen.
+pub const ENTER: &str = "\x1b[?1049h\x1b[?25l\x1b[?2004h\x1b[?1002h\x1b[?1006h\x1b[2J";
+
+/// Takes [`ENTER`] back, in the opposite order, and resets colours and attributes.
+pub const LEAVE: &str = "\x1b[0m\x1b[?1006l\x1b[?1002l\x1b[?2004l\x1b[?25h\x1b[?1049l";
+
+/// How long leaving waits for a frame that the terminal is slow to take.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// The terminal while the dashboard has it. Dropped, it is as before; so it is after a panic, in
+/// whichever thread.
+pub struct Screen {
+    tty: Arc<Tty>,
+    left: Receiver<()>,
+}
+
+/// What the threads share that write to the terminal.
+pub(super) struct Tty {
+    out: Mutex<Box<dyn Write + Send>>,
+    entered: AtomicBool,
+    raw: bool,
+    leaving: Sender<()>,
+}
+
+impl Screen {
+    /// Takes the terminal that stdout leads to.
+    pub fn enter() -> io::Result<Self> {
+        crossterm::terminal::enable_raw_mode()?;
+        // From here on `Drop` restores the terminal, even if entering fails half-way.
+        Self::over(Box::new(io::stdout()), true)
+    }
+
+    fn over(out: Box<dyn Write + Send>, raw: bool) -> io::Result<Self> {
+        let (leaving, left) = bounded(1);
+        let tty =
+            Arc::new(Tty { out: Mutex::new(out), entered: AtomicBool::new(true), raw, leaving });
+        let screen = Self { tty, left };
+        let tty = Arc::clone(&screen.tty);
+        let report = panic::take_hook();
+        panic::set_hook(Box::new(move |panic| {
+            // First, so that the message is not lost with the alternate screen.
+            tty.leave();
+            report(panic);
+        }));
+        screen.tty.write(ENTER.as_bytes())?;
+        Ok(screen)
+    }
+
+    /// Tells when the terminal was given back, because of a panic in some thread.
+    pub fn left(&self) -> &Receiver<()> {
+        &self.left
+    }
+
+    pub(super) fn tty(&self) -> Arc<Tty> {
+        Arc::clone(&self.tty)
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        self.tty.leave();
+    }
+}
+
+impl Tty {
+    /// Writes `bytes` in one go; not any more once the terminal was given back.
+    pub fn write(&self, bytes: &[u8]) -> io::Result<()> {
+        let mut out = self.out.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if self.entered.load(Ordering::Acquire) {
+            out.write_all(bytes)?;
+            out.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Gives the terminal back. The second time nothing happens.
+    pub fn leave(&self) {
+        if !self.entered.swap(false, Ordering::AcqRel) {
+            return;
+        }
+        // A terminal that has stopped reading shall not keep the program from ending.
+        if let Some(mut out) = self.lock_within(PATIENCE) {
+            // If the terminal has gone there is nothing left to restore.
+            let _ = out.write_all(LEAVE.as_bytes()).and_then(|()| out.flush());
+        }
+        if self.raw {
+            let _ = crossterm::terminal::disable_raw_mode();
+        }
+        let _ = self.leaving.try_send(());
+    }
+
+    fn lock_within(&self, limit: Duration) -> Option<MutexGuard<'_, Box<dyn Write + Send>>> {
+        let end = Instant::now() + limit;
+        loop {
+            match self.out.try_lock() {
+                Ok(out) => return Some(out),
+                Err(TryLockError::Poisoned(out)) => return Some(out.into_inner()),
+                Err(TryLockError::WouldBlock) if Instant::now() >= end => return None,
+                Err(TryLockError::WouldBlock) => thread::sleep(Duration::from_millis(5)),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What was written, still readable when the writer has been given away.
+    #[derive(Clone, Default)]
+    struct Paper(Arc<Mutex<Vec<u8>>>);
+
+    impl Paper {
+        fn text(&self) -> String {
+            String::from_utf8(self.0.lock().unwrap().clone()).unwrap()
+        }
+    }
+
+    impl Write for Paper {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn what_is_entered_is_left_once() {
+        let paper = Paper::default();
+        let screen = Screen::over(Box::new(paper.clone()), false).unwrap();
+        let tty = screen.tty();
+        tty.write(b"frame").unwrap();
+        drop(screen);
+        tty.leave();
+        tty.write(b"a frame that comes too late").unwrap();
+        assert_eq!(paper.text(), format!("{ENTER}frame{LEAVE}"));
+    }
+
+    #[test]
+    fn every_mode_that_is_set_is_reset() {
+        let modes = |text: &str, end: char| -> Vec<String> {
+            let modes = text.split("\x1b[?").skip(1).filter_map(|mode| mode.split_once(end));
+            modes.map(|(mode, _)| mode.to_string()).collect()
+        };
+        // The cursor is the one mode that is on outside.
+        let mut set = modes(ENTER, 'h');
+        set.retain(|mode| !mode.contains('l'));
+        let mut reset = modes(LEAVE, 'l');
+        reset.retain(|mode| !mode.contains('h'));
+        reset.reverse();
+        assert_eq!(set, ["1049", "2004", "1002", "1006"]);
+        assert_eq!(set, reset);
+        assert!(ENTER.contains("\x1b[?25l") && LEAVE.contains("\x1b[?25h"));
+    }
+
+    #[test]
+    fn a_panic_in_any_thread_gives_the_terminal_back_and_says_so() {
+        let paper = Paper::default();
+        let screen = Screen::over(Box::new(paper.clone()), false).unwrap();
+        assert!(screen.left().try_recv().is_err());
+        thread::spawn(|| panic!("as the test wants it")).join().unwrap_err();
+        screen.left().recv_timeout(Duration::from_secs(10)).expect("told that it was left");
+        assert_eq!(paper.text(), format!("{ENTER}{LEAVE}"));
+        drop(screen);
+        assert_eq!(paper.text(), format!("{ENTER}{LEAVE}"));
+    }
+
+    #[test]
+    fn a_terminal_that_does_not_read_does_not_hold_up_the_end() {
+        let screen = Screen::over(Box::new(Paper::default()), false).unwrap();
+        let tty = screen.tty();
+        let _busy = tty.out.lock().unwrap();
+        let begun = Instant::now();
+        assert!(tty.lock_within(Duration::from_millis(20)).is_none());
+        assert!(begun.elapsed() < PATIENCE);
+    }
+}

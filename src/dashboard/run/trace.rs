@@ -1,0 +1,205 @@
+//! How long answers take: from the reading of an event to the moment when the frame that answers it
+//! has been handed to the terminal.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// What answers an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Answer {
+    /// The next frame.
+    Screen,
+    /// The first frame with a picture of this scene, or of a later one.
+    Picture(u64),
+}
+
+/// An event that waits for its answer.
+#[derive(Clone, Copy, Debug)]
+struct Awaiting {
+    read: Instant,
+    answer: Answer,
+}
+
+/// An event that was answered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Answered {
+    /// When it was read, after the start.
+    read: Duration,
+    picture: bool,
+    after: Duration,
+}
+
+/// Events and their answers. Always at work, because answers do not wait for the frame interval;
+/// what was answered is remembered only if somebody wants to know.
+#[derive(Debug)]
+pub struct Trace {
+    began: Instant,
+    awaiting: Vec<Awaiting>,
+    in_flight: Vec<Awaiting>,
+    answered: Option<Vec<Answered>>,
+}
+
+impl Trace {
+    /// From now on; `remember`: for [`Trace::write`].
+    pub fn new(remember: bool) -> Self {
+        Self {
+            began: Instant::now(),
+            awaiting: Vec::new(),
+            in_flight: Vec::new(),
+            answered: remember.then(Vec::new),
+        }
+    }
+
+    /// An event was read and acted upon; `scene`: the number of the scene that it made.
+    pub fn event(&mut self, read: Instant, scene: Option<u64>) {
+        let answer = scene.map_or(Answer::Screen, Answer::Picture);
+        self.awaiting.push(Awaiting { read, answer });
+    }
+
+    /// Whether a frame that shows the picture of `scene` would answer somebody.
+    pub fn answers(&self, scene: u64) -> bool {
+        self.awaiting.iter().any(|waiting| waiting.answered_by(scene))
+    }
+
+    /// A frame that shows the picture of `scene` is on its way.
+    pub fn sent(&mut self, scene: u64) {
+        let in_flight = &mut self.in_flight;
+        self.awaiting.retain(|waiting| {
+            let answered = waiting.answered_by(scene);
+            if answered {
+                in_flight.push(*waiting);
+            }
+            !answered
+        });
+    }
+
+    /// The frame on its way was written at `at`.
+    pub fn written(&mut self, at: Instant) {
+        for waiting in self.in_flight.drain(..) {
+            if let Some(answered) = &mut self.answered {
+                answered.push(Answered {
+                    read: waiting.read.saturating_duration_since(self.began),
+                    picture: waiting.answer != Answer::Screen,
+                    after: at.saturating_duration_since(waiting.read),
+                });
+            }
+        }
+    }
+
+    /// Writes one line per event: seconds from the start to its reading, what answered it, and
+    /// milliseconds until then. Events without an answer so far are left out.
+    pub fn write(&self, path: &Path) -> io::Result<()> {
+        let mut file = BufWriter::new(File::create(path)?);
+        writeln!(file, "read_seconds,answer,milliseconds")?;
+        for Answered { read, picture, after } in self.answered.iter().flatten() {
+            let answer = if *picture { "picture" } else { "screen" };
+            let (read, after) = (read.as_secs_f64(), 1e3 * after.as_secs_f64());
+            writeln!(file, "{read:.6},{answer},{after:.3}")?;
+        }
+        file.flush()
+    }
+
+    /// The distribution, a line per kind of answer that there was.
+    pub fn summary(&self) -> Vec<String> {
+        let of = |wanted: bool, name: &str| {
+            let of_kind = self.answered.iter().flatten().filter(|a| a.picture == wanted);
+            let mut after: Vec<_> = of_kind.map(|a| a.after).collect();
+            after.sort_unstable();
+            let [median, p99] = [0.5, 0.99].map(|share| quantile(&after, share));
+            let ms = |time: Duration| format!("{:.1} ms", 1e3 * time.as_secs_f64());
+            let last = *after.last()?;
+            Some(format!(
+                "{name}: {} events, median {}, p99 {}, max {}",
+                after.len(),
+                ms(median),
+                ms(p99),
+                ms(last)
+            ))
+        };
+        [(true, "event to picture"), (false, "event to screen")]
+            .into_iter()
+            .filter_map(|(picture, name)| of(picture, name))
+            .collect()
+    }
+}
+
+impl Awaiting {
+    fn answered_by(&self, scene: u64) -> bool {
+        match self.answer {
+            Answer::Screen => true,
+            Answer::Picture(wanted) => scene >= wanted,
+        }
+    }
+}
+
+/// The smallest value that at least `share` of the `sorted` ones do not exceed; 0 if there are none.
+fn quantile(sorted: &[Duration], share: f64) -> Duration {
+    let rank = (share * sorted.len() as f64).ceil() as usize;
+    sorted.get(rank.saturating_sub(1)).copied().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_answers_its_scene_and_those_before() {
+        let mut trace = Trace::new(true);
+        let start = trace.began;
+        let at = |ms| start + Duration::from_millis(ms);
+        assert!(!trace.answers(0));
+        trace.event(at(0), Some(1));
+        trace.event(at(5), Some(2));
+        trace.event(at(6), None);
+        assert!(trace.answers(0));
+        trace.sent(0);
+        trace.written(at(7));
+        assert!(!trace.answers(0));
+        assert!(trace.answers(1));
+        trace.sent(1);
+        assert!(!trace.answers(1), "it is on its way");
+        // Read while the frame is on its way: not answered by it.
+        trace.event(at(9), None);
+        trace.written(at(20));
+        trace.sent(7);
+        trace.written(at(30));
+        let answers: Vec<_> = trace
+            .answered
+            .as_ref()
+            .unwrap()
+            .iter()
+            .map(|a| (a.read.as_millis(), a.picture, a.after.as_millis()))
+            .collect();
+        assert_eq!(answers, [(6, false, 1), (0, true, 20), (5, true, 25), (9, false, 21)]);
+        assert_eq!(
+            trace.summary(),
+            [
+                "event to picture: 2 events, median 20.0 ms, p99 25.0 ms, max 25.0 ms",
+                "event to screen: 2 events, median 1.0 ms, p99 21.0 ms, max 21.0 ms",
+            ]
+        );
+        let path = tempfile::tempdir().unwrap().path().join("trace.csv");
+        assert!(trace.write(&path).is_err(), "no such folder");
+    }
+
+    #[test]
+    fn quantiles() {
+        let ms = |n: u64| Duration::from_millis(n);
+        let sorted: Vec<_> = (1..=100).map(ms).collect();
+        assert_eq!(quantile(&sorted, 0.5), ms(50));
+        assert_eq!(quantile(&sorted, 0.99), ms(99));
+        assert_eq!(quantile(&sorted[..3], 0.5), ms(2));
+        assert_eq!(quantile(&[], 0.5), ms(0));
+    }
+
+    #[test]
+    fn nothing_is_remembered_unasked() {
+        let mut trace = Trace::new(false);
+        trace.event(trace.began, None);
+        trace.sent(0);
+        trace.written(trace.began);
+        assert!(trace.summary().is_empty());
+    }
+}

@@ -1,0 +1,32 @@
+//! What tests of the dashboard share.
+
+use crate::film::Noise;
+use crate::render::schedule::Spp;
+use crate::render::session::{Report, State};
+
+/// A report about scene `generation` after `spp` samples in each pixel, ten thousand pixels.
+pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
+    Report {
+        generation,
+        state: State::Tracing,
+        spp: Spp { min: spp as u32, mean: spp as f64, max: spp as u32 },
+        samples: spp * 10_000,
+        rays: spp * 20_000,
+        seconds: spp as f64 * 1e-3,
+        compile_seconds: 1e-4,
+        first_picture_seconds: Some(0.02),
+        noise: noise_codes.map(|codes| Noise {
+            rmse_linear: codes / 255.0,
+            rmse_codes: codes,
+            p95_codes: 2.0 * codes,
+            worst_codes: 3.0 * codes,
+        }),
+        eta_seconds: None,
+        progress: None,
+        bad_samples: 0,
+        recent_samples_per_second: 1e7,
+        threads: 2,
+        lanes: "f32x8",
+        inventory: "1 sphere (list)".into(),
+    }
+}

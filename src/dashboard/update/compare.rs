@@ -1,0 +1,113 @@
+//! What the picture shows: exposure, tone curve, channel, probe, kept against live.
+
+use super::Turn;
+use crate::dashboard::action::{Pace, Way};
+use crate::dashboard::message::{Channel, Effect};
+use crate::dashboard::model::{Compared, Mode};
+use crate::film::{Linear, Tone};
+use std::sync::Arc;
+
+/// Stops of a step.
+const EXPOSURE_STEP: f64 = 0.25;
+/// The most stops up or down: beyond it everything is white or black.
+const MOST_EXPOSURE: f64 = 20.0;
+
+impl Turn<'_> {
+    pub(super) fn exposure(&mut self, steps: f64) {
+        let ev = self.model.display.exposure_ev + steps * EXPOSURE_STEP;
+        self.set_exposure(ev.clamp(-MOST_EXPOSURE, MOST_EXPOSURE));
+    }
+
+    pub(super) fn reset_exposure(&mut self) {
+        self.set_exposure(0.0);
+    }
+
+    fn set_exposure(&mut self, ev: f64) {
+        self.model.display.exposure_ev = ev;
+        self.set_display();
+        self.say(format!("exposure {ev:+.2} stops"));
+    }
+
+    pub(super) fn next_tone(&mut self) {
+        let tones = Tone::NAMED;
+        let at = tones.iter().position(|(_, tone)| *tone == self.model.display.tone).unwrap_or(0);
+        let (name, tone) = tones[(at + 1) % tones.len()];
+        self.model.display.tone = tone;
+        self.set_display();
+        self.say(format!("tone curve: {name}"));
+    }
+
+    fn set_display(&mut self) {
+        self.emit(Effect::Display(self.model.display));
+        self.repaint();
+    }
+
+    pub(super) fn next_channel(&mut self, by: isize) {
+        let all = Channel::ALL;
+        let at = all.iter().position(|channel| *channel == self.model.channel).unwrap_or(0);
+        let next = (at as isize + by).rem_euclid(all.len() as isize) as usize;
+        self.model.channel = all[next];
+        self.repaint();
+        self.say(format!("view: {}", self.model.channel.name()));
+    }
+
+    pub(super) fn toggle_probe(&mut self) {
+        if self.model.mode == Mode::Probe {
+            self.end_mode();
+            return;
+        }
+        self.enter_mode(Mode::Probe);
+        let [width, height] = self.scene().film.size.map(|n| n as usize);
+        self.set_probe(Some([width / 2, height / 2]));
+    }
+
+    pub(super) fn set_probe(&mut self, pixel: Option<[usize; 2]>) {
+        let [width, height] = self.scene().film.size.map(|n| n as usize);
+        let pixel = pixel.map(|[x, y]| [x.min(width - 1), y.min(height - 1)]);
+        self.model.probe = pixel;
+        self.emit(Effect::Probe(pixel));
+    }
+
+    /// By a cell of the picture, or by one pixel of the film.
+    pub(super) fn move_probe(&mut self, way: Way, pace: Pace) {
+        let Some([x, y]) = self.model.probe else {
+            self.toggle_probe();
+            return;
+        };
+        let film = self.scene().film.size.map(|n| n as usize);
+        let step = match (pace, self.model.layout()) {
+            (Pace::Coarse, Some(layout)) => {
+                [(film[0] / layout.raster[0]).max(1), (2 * film[1] / layout.raster[1]).max(1)]
+            }
+            _ => [1, 1],
+        };
+        let to = match way {
+            Way::Left => [x.saturating_sub(step[0]), y],
+            Way::Right => [x + step[0], y],
+            Way::Up => [x, y.saturating_sub(step[1])],
+            _ => [x, y + step[1]],
+        };
+        self.set_probe(Some(to));
+    }
+
+    pub(super) fn keep(&mut self) {
+        self.emit(Effect::Keep);
+    }
+
+    pub(super) fn kept(&mut self, picture: Arc<Linear>, spp: f64) {
+        self.model.comparison.kept = Some((picture, spp));
+        self.repaint();
+        self.say(format!("kept at {spp:.0} spp · c flips · C shows the difference"));
+    }
+
+    /// Shows the kept picture or the difference; the live one if it is that already.
+    pub(super) fn compare(&mut self, what: Compared) {
+        if self.model.comparison.kept.is_none() {
+            self.say("No picture is kept yet · k keeps one");
+            return;
+        }
+        let shown = &mut self.model.comparison.shown;
+        *shown = if *shown == what { Compared::Live } else { what };
+        self.repaint();
+    }
+}

@@ -1,0 +1,220 @@
+//! Undo, saving, reloading, quitting, and what became of the pictures that were written.
+
+use super::Turn;
+use crate::dashboard::message::{Effect, Exported};
+use crate::dashboard::model::{Tone, short_name};
+use crate::dashboard::overlay::Answer;
+use crate::scene::edit::Subject;
+use crate::scene::{SaveError, Scene, SceneErrors};
+use crate::value::printable;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+impl Turn<'_> {
+    pub(super) fn undo(&mut self) {
+        let undone = self.model.history.undo();
+        self.went_back(undone, "undone", "There is nothing to undo");
+    }
+
+    pub(super) fn redo(&mut self) {
+        let redone = self.model.history.redo();
+        self.went_back(redone, "done again", "There is nothing to do again");
+    }
+
+    fn went_back(&mut self, label: Option<String>, what: &str, nothing: &str) {
+        self.model.last_edit = None;
+        match label {
+            Some(label) => {
+                self.show();
+                self.say(format!("{what}: {label}"));
+            }
+            None => self.say(nothing),
+        }
+    }
+
+    pub(super) fn save(&mut self) {
+        if self.model.file.path.is_none() {
+            self.ask_path();
+        } else if self.model.file.broken.is_some() {
+            let text = format!(
+                "{} on disk has an error now. Saving puts this scene in its place.",
+                self.model.file.name
+            );
+            self.ask(
+                text,
+                &[
+                    ('k', "keep the file on disk", Answer::Nothing),
+                    ('o', "overwrite it", Answer::Overwrite(None)),
+                    ('s', "save under another name", Answer::SaveAs),
+                ],
+            );
+        } else {
+            self.write(None, false);
+        }
+    }
+
+    /// Has the scene written.
+    pub(super) fn write(&mut self, path: Option<PathBuf>, overwrite: bool) {
+        let scene = Arc::clone(self.model.history.scene());
+        self.emit(Effect::Save { scene, path, overwrite });
+    }
+
+    pub(super) fn saved(&mut self, scene: Arc<Scene>, result: Result<PathBuf, SaveError>) {
+        match result {
+            Ok(path) => {
+                self.model.file.name = short_name(&path);
+                self.model.file.path = Some(path);
+                self.model.file.saved = Arc::clone(&scene);
+                self.model.file.broken = None;
+                self.model.history.mark_saved(scene);
+                self.model.last_edit = None;
+                self.notify(Tone::Good, format!("saved {}", self.model.file.name), Some(3.0));
+                if std::mem::take(&mut self.model.quit_when_saved) {
+                    self.emit(Effect::Quit);
+                }
+            }
+            Err(SaveError::Untitled) => self.ask_path(),
+            Err(error @ SaveError::Changed(_)) => {
+                let text = capital(&error.to_string());
+                self.ask(
+                    text,
+                    &[
+                        ('k', "keep the file on disk", Answer::Nothing),
+                        ('o', "overwrite it", Answer::Overwrite(None)),
+                        ('s', "save under another name", Answer::SaveAs),
+                        ('r', "reload it and lose my edits", Answer::Load),
+                    ],
+                );
+            }
+            Err(SaveError::Exists(path)) => {
+                let text = format!("{} exists.", printable(&path.display().to_string()));
+                self.ask(
+                    text,
+                    &[
+                        ('s', "another name", Answer::SaveAs),
+                        ('o', "overwrite it", Answer::Overwrite(Some(path))),
+                    ],
+                );
+            }
+            Err(error @ SaveError::Failed { .. }) => {
+                self.model.quit_when_saved = false;
+                self.notify(Tone::Bad, capital(&error.to_string()), None);
+            }
+        }
+    }
+
+    pub(super) fn reload(&mut self) {
+        if self.model.file.path.is_none() {
+            self.say("This scene has no file to read yet");
+        } else if self.model.is_unsaved() {
+            let text = format!("Reading {} again loses the unsaved edits.", self.model.file.name);
+            self.ask(
+                text,
+                &[('k', "keep my edits", Answer::Nothing), ('r', "read the file", Answer::Load)],
+            );
+        } else {
+            self.emit(Effect::Load);
+        }
+    }
+
+    pub(super) fn changed_on_disk(&mut self) {
+        if self.model.overlay.is_some() || self.model.editor().is_some() {
+            let text = format!("{} has changed on disk · Ctrl-o reads it", self.model.file.name);
+            self.notify(Tone::Plain, text, None);
+        } else if self.model.is_unsaved() {
+            let text = format!(
+                "{} has changed on disk, and here are unsaved edits.",
+                self.model.file.name
+            );
+            self.ask(
+                text,
+                &[
+                    ('k', "keep my edits", Answer::Nothing),
+                    ('r', "read the file and lose my edits", Answer::Load),
+                ],
+            );
+        } else {
+            self.emit(Effect::Load);
+        }
+    }
+
+    pub(super) fn loaded(&mut self, result: Result<Arc<Scene>, SceneErrors>) {
+        match result {
+            Ok(scene) => {
+                // Positions may be those of other things now: what is selected is found by name.
+                let title = self.model.selection.title(self.model.history.scene());
+                self.model.overlay = None;
+                self.end_mode();
+                self.model.file.saved = Arc::clone(&scene);
+                self.model.file.broken = None;
+                self.model.file.blank = false;
+                self.model.history.restart(scene);
+                let outline = crate::scene::edit::outline(self.scene());
+                let same = |(_, subject): &(_, Subject)| subject.title(self.scene()) == title;
+                let found = outline.iter().find(|entry| same(entry));
+                let found = found.map_or(Subject::Camera, |(_, subject)| subject.clone());
+                self.model.inspector.editor = None;
+                self.select(found);
+                self.show();
+                self.say(format!("read {}", self.model.file.name));
+            }
+            Err(errors) => {
+                let first = errors.messages().first().map(ToString::to_string).unwrap_or_default();
+                let text = first.lines().map(str::trim).collect::<Vec<_>>().join(" ");
+                self.model.file.broken = Some(errors);
+                if !self.model.file.blank {
+                    self.notify(Tone::Bad, text, None);
+                }
+            }
+        }
+    }
+
+    pub(super) fn quit(&mut self) {
+        if self.model.is_unsaved() && !self.model.file.blank {
+            let text = format!("{} has unsaved edits.", self.model.file.name);
+            self.ask(
+                text,
+                &[
+                    ('s', "save and quit", Answer::SaveAndQuit),
+                    ('d', "discard them and quit", Answer::Quit),
+                    ('c', "stay", Answer::Nothing),
+                ],
+            );
+        } else if self.model.export.is_some() {
+            self.ask(
+                "A picture is still being rendered.".to_string(),
+                &[('c', "stay", Answer::Nothing), ('q', "quit without it", Answer::Quit)],
+            );
+        } else {
+            self.emit(Effect::Quit);
+        }
+    }
+
+    pub(super) fn exported(&mut self, result: Result<Exported, String>) {
+        match result {
+            Ok(Exported { path, size: [width, height], spp, noise_codes, scp }) => {
+                // The render beside this one has ended if it was of this size.
+                if self.model.export.is_some_and(|e| e.size.map(|n| n as usize) == [width, height])
+                {
+                    self.model.export = None;
+                }
+                let noise = noise_codes.map_or(String::new(), |n| format!("  noise {n:.2}"));
+                let text = format!(
+                    "{}  {width}x{height}  {spp:.0} spp{noise}  ·  scp {scp} .",
+                    path.display()
+                );
+                self.notify(Tone::Good, text, None);
+            }
+            Err(reason) => {
+                self.model.export = None;
+                self.notify(Tone::Bad, capital(&reason), None);
+            }
+        }
+    }
+}
+
+/// With a capital at the beginning.
+fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
+}

@@ -1,0 +1,201 @@
+//! Moving over lines and choosing: outline, inspector, palette, lists, help, questions.
+
+use super::Turn;
+use crate::dashboard::action::Way;
+use crate::dashboard::editor::Editor;
+use crate::dashboard::hints::help;
+use crate::dashboard::keymap::KEYMAP;
+use crate::dashboard::layout::Focus;
+use crate::dashboard::overlay::{Answer, Overlay, Palette, PickFor, Question};
+use crate::dashboard::panels::{OutlineLine, outline, outline_position, scrolled};
+use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
+use nucleo_matcher::{Config, Matcher, Utf32Str};
+
+/// A position moved by `steps`, kept below `len`.
+fn moved(cursor: usize, steps: isize, len: usize) -> usize {
+    cursor.saturating_add_signed(steps).min(len.saturating_sub(1))
+}
+
+impl Turn<'_> {
+    /// Moves the cursor of whatever has it by `steps` lines.
+    pub(super) fn walk(&mut self, steps: isize) {
+        let rows = self.model.place().map_or(1, |place| usize::from(place.list.height));
+        let width = self.model.place().map_or(1, |place| place.list.width);
+        let inventory = self.model.inventory(width).len();
+        match &mut self.model.overlay {
+            Some(Overlay::Help { scroll }) => {
+                *scroll = moved(*scroll, steps, help().len().saturating_sub(rows) + 1);
+            }
+            Some(Overlay::Inventory { scroll }) => {
+                *scroll = moved(*scroll, steps, inventory.saturating_sub(rows) + 1);
+            }
+            Some(Overlay::Palette(palette)) => {
+                palette.cursor = moved(palette.cursor, steps, palette.found.len());
+                palette.scroll =
+                    scrolled(palette.scroll, palette.cursor, palette.found.len(), rows);
+            }
+            Some(Overlay::Pick(pick)) => {
+                pick.cursor = moved(pick.cursor, steps, pick.entries.len());
+                pick.scroll = scrolled(pick.scroll, pick.cursor, pick.entries.len(), rows);
+            }
+            Some(Overlay::Question(question)) => {
+                question.cursor = moved(question.cursor, steps, question.answers.len());
+            }
+            Some(Overlay::Prompt(_)) => {}
+            Some(Overlay::Form(_)) => {
+                if self.apply_field() {
+                    self.walk_field(steps);
+                }
+            }
+            None if self.model.focus == Focus::Outline => self.walk_outline(steps),
+            None => self.walk_field(steps),
+        }
+    }
+
+    pub(super) fn page(&mut self, way: Way) {
+        let rows = match (self.model.place(), self.model.focus) {
+            (Some(place), _) => place.list.height,
+            (None, Focus::Outline) => self.model.outline_rows().map_or(1, |rows| rows.height),
+            (None, _) => self.model.inspector_rows().map_or(1, |(rows, _)| rows.height),
+        };
+        let page = isize::from(i16::try_from(rows).unwrap_or(1)).max(2) - 1;
+        self.walk(if way == Way::Up { -page } else { page });
+    }
+
+    fn walk_outline(&mut self, steps: isize) {
+        let lines = outline(self.scene());
+        let entry = |line: &OutlineLine| match line {
+            OutlineLine::Entry { subject, .. } => Some(subject.clone()),
+            OutlineLine::Heading(_) => None,
+        };
+        let before = outline_position(&lines, &self.model.selection).unwrap_or(0);
+        let at = lines[..before].iter().filter_map(entry).count();
+        let subjects: Vec<_> = lines.iter().filter_map(entry).collect();
+        if let Some(subject) = subjects.get(moved(at, steps, subjects.len())) {
+            self.select(subject.clone());
+        }
+    }
+
+    /// Opens what is under the cursor.
+    pub(super) fn open(&mut self, typed: Option<char>) {
+        match &self.model.overlay {
+            Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
+            Some(Overlay::Palette(palette)) => {
+                let row = palette.found.get(palette.cursor).map(|at| KEYMAP[*at]);
+                if let Some(row) = row {
+                    self.model.overlay = None;
+                    self.act(row.action, None);
+                }
+            }
+            Some(Overlay::Pick(pick)) => {
+                let Some((name, _)) = pick.entries.get(pick.cursor).cloned() else { return };
+                let purpose = pick.purpose.clone();
+                self.model.overlay = None;
+                match purpose {
+                    PickFor::Object => self.open_object_form(&name),
+                    PickFor::Light => self.open_light_form(&name),
+                    PickFor::Word(subject, key) => self.set_word(&subject, &key, &name),
+                }
+            }
+            Some(Overlay::Form(form)) => {
+                if form.editor.is_none() {
+                    self.confirm_form();
+                } else if self.apply_field() {
+                    self.walk_field(1);
+                }
+            }
+            Some(Overlay::Prompt(_)) => self.answer_prompt(),
+            Some(Overlay::Question(question)) => self.answer(question.cursor),
+            None if self.model.focus == Focus::Inspector => {
+                if self.model.inspector.editor.is_some() {
+                    self.apply_field();
+                } else {
+                    self.open_field(typed);
+                }
+            }
+            None => self.inspect(),
+        }
+    }
+
+    /// Esc where an overlay lies.
+    pub(super) fn close_overlay(&mut self) {
+        match &mut self.model.overlay {
+            Some(Overlay::Form(form)) if form.editor.is_some() => form.editor = None,
+            Some(Overlay::Form(_)) => self.cancel_form(),
+            _ => {
+                self.model.quit_when_saved = false;
+                self.model.overlay = None;
+            }
+        }
+    }
+
+    pub(super) fn open_palette(&mut self) {
+        self.model.overlay = Some(Overlay::Palette(Palette {
+            editor: Editor::default(),
+            found: (0..KEYMAP.len()).collect(),
+            cursor: 0,
+            scroll: 0,
+        }));
+    }
+
+    /// Finds the actions that fit what is typed in the palette, the best first.
+    pub(super) fn search(&mut self) {
+        let Some(Overlay::Palette(palette)) = &mut self.model.overlay else { return };
+        let text = palette.editor.text();
+        let pattern = Pattern::parse(text, CaseMatching::Ignore, Normalization::Smart);
+        let mut matcher = Matcher::new(Config::DEFAULT);
+        let mut buffer = Vec::new();
+        let mut found: Vec<(u32, usize)> = KEYMAP
+            .iter()
+            .enumerate()
+            .filter_map(|(i, row)| {
+                let line = format!("{} {}", row.label, row.chapter.title());
+                let score = pattern.score(Utf32Str::new(&line, &mut buffer), &mut matcher)?;
+                Some((score, i))
+            })
+            .collect();
+        // Of equally good ones the first of the table comes first.
+        found.sort_by_key(|(score, i)| (std::cmp::Reverse(*score), *i));
+        palette.found = found.into_iter().map(|(_, i)| i).collect();
+        palette.cursor = 0;
+        palette.scroll = 0;
+    }
+
+    /// Goes to the next entry of a list that begins with this letter.
+    pub(super) fn jump_to(&mut self, c: char) {
+        let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
+        let begins = |i: &usize| {
+            let first = pick.entries[*i].0.chars().next();
+            first.is_some_and(|first| first.eq_ignore_ascii_case(&c))
+        };
+        let after = (pick.cursor + 1..pick.entries.len()).find(begins);
+        if let Some(to) = after.or_else(|| (0..pick.entries.len()).find(begins)) {
+            self.walk(to as isize - pick.cursor as isize);
+        }
+    }
+
+    /// Asks something. `Esc` leaves all as it is.
+    pub(super) fn ask(&mut self, text: String, answers: &[(char, &str, Answer)]) {
+        let answers =
+            answers.iter().map(|(c, words, answer)| (*c, words.to_string(), answer.clone()));
+        let question = Question { text, answers: answers.collect(), cursor: 0 };
+        self.model.overlay = Some(Overlay::Question(question));
+    }
+
+    pub(super) fn answer(&mut self, at: usize) {
+        let Some(Overlay::Question(question)) = &self.model.overlay else { return };
+        let Some((_, _, answer)) = question.answers.get(at).cloned() else { return };
+        self.model.overlay = None;
+        match answer {
+            Answer::Nothing => self.model.quit_when_saved = false,
+            Answer::SaveAndQuit => {
+                self.model.quit_when_saved = true;
+                self.save();
+            }
+            Answer::Quit => self.emit(super::Effect::Quit),
+            Answer::Load => self.emit(super::Effect::Load),
+            Answer::Overwrite(path) => self.write(path, true),
+            Answer::SaveAs => self.ask_path(),
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! The keys that act on the mirror.
+
+use super::{Hold, Turn};
+use crate::scene::edit::{self, Edit, Refusal, Subject};
+use crate::value::{excerpt, number};
+
+impl Turn<'_> {
+    pub(super) fn roughness(&mut self, steps: f64) {
+        let edit = edit::roughen(self.scene(), Some(&self.model.selection), steps);
+        self.commit_mirror(edit, Hold::Repeat);
+    }
+
+    pub(super) fn reflection(&mut self, steps: f64) {
+        let edit = edit::reflect(self.scene(), Some(&self.model.selection), steps);
+        self.commit_mirror(edit, Hold::Repeat);
+    }
+
+    pub(super) fn next_lobe(&mut self) {
+        let edit = edit::next_lobe(self.scene(), Some(&self.model.selection), true);
+        self.commit_mirror(edit, Hold::Single);
+    }
+
+    /// Carries the edit out and tells what the mirror is like now.
+    fn commit_mirror(&mut self, edit: Result<Edit, Refusal>, hold: Hold) {
+        let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
+        self.commit(edit, hold);
+        let Some(Subject::Material(name)) = subject else { return };
+        let Some(material) = self.scene().materials.get(&name) else { return };
+        let lobe = edit::rows(self.scene(), &Subject::Material(name.clone()))
+            .ok()
+            .and_then(|rows| rows.into_iter().find(|row| row.key == "lobe"))
+            .map_or_else(String::new, |row| format!(" · {}", row.value));
+        let told = format!(
+            "{}: roughness {} · reflection {}{lobe}",
+            excerpt(&name),
+            number(material.roughness),
+            number(material.reflection),
+        );
+        self.say(told);
+    }
+}

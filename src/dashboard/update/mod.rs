@@ -1,0 +1,286 @@
+//! What every message does: a changed model and what is asked for. No clock, no file, no terminal.
+
+mod actions;
+mod camera;
+mod compare;
+mod fields;
+mod files;
+mod form;
+mod keys;
+mod light;
+mod lists;
+mod mirror;
+mod mouse;
+mod objects;
+mod prompt;
+mod render;
+
+use super::message::{Effect, Message};
+use super::model::{Inspector, Model, Notice, Tone};
+use super::overlay::Overlay;
+use super::panels::{Line, nearest_field, outline, outline_position, scrolled};
+use crate::render::session::State;
+use crate::scene::Scene;
+use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::value::printable;
+use std::mem::discriminant;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Repeats of a key that come within this time are one step of undo: longer than the pause before
+/// a held key begins to repeat.
+const REPEAT_WINDOW: Duration = Duration::from_millis(700);
+
+/// What a model that has just been made asks for.
+pub fn begin(model: &mut Model) -> Vec<Effect> {
+    let mut turn = Turn::new(model, Duration::ZERO);
+    turn.emit(Effect::Stop(turn.model.stop));
+    if !turn.model.file.blank {
+        turn.show();
+    }
+    turn.settle();
+    turn.effects
+}
+
+/// Takes in a message at the time `now` (since any fixed moment) and says what is to be done.
+pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
+    let mut turn = Turn::new(model, now);
+    turn.forget_notice();
+    turn.take(message);
+    turn.settle();
+    turn.effects
+}
+
+/// One message being taken in.
+struct Turn<'a> {
+    model: &'a mut Model,
+    now: Duration,
+    effects: Vec<Effect>,
+    /// Whether lists are to be scrolled to their cursors.
+    follow: bool,
+}
+
+/// How an edit joins the one before.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Hold {
+    /// It stands alone.
+    Single,
+    /// It joins edits of the same label a moment ago.
+    Repeat,
+    /// It joins edits of the same label until the gesture (a drag, a mode) ends.
+    Gesture,
+}
+
+impl<'a> Turn<'a> {
+    fn new(model: &'a mut Model, now: Duration) -> Self {
+        Self { model, now, effects: Vec::new(), follow: true }
+    }
+
+    fn take(&mut self, message: Message) {
+        match message {
+            Message::Key(key) => self.key(key),
+            Message::Mouse(mouse) => self.mouse(mouse),
+            Message::Paste(text) => self.paste(&text),
+            Message::Resize(screen) => {
+                self.model.screen = screen;
+                self.repaint();
+            }
+            Message::Snapshot(snapshot) => {
+                self.follow = false;
+                if let State::Failed(reason) = &snapshot.report.state {
+                    let text = format!("This scene cannot be rendered: {reason}");
+                    self.notify(Tone::Bad, text, None);
+                }
+                self.model.convergence.add(&snapshot.report);
+                self.model.snapshot = Some(snapshot);
+                self.repaint();
+            }
+            Message::Kept(picture, spp) => self.kept(picture, spp),
+            Message::Saved(scene, result) => self.saved(scene, result),
+            Message::Loaded(result) => self.loaded(*result),
+            Message::ChangedOnDisk => self.changed_on_disk(),
+            Message::Exported(result) => self.exported(result),
+            Message::ExportProgress(progress) => {
+                self.follow = false;
+                if let Some(export) = &mut self.model.export {
+                    export.progress = progress;
+                }
+            }
+            Message::Tick => self.follow = false,
+        }
+    }
+
+    /// Asks for something. A newer wish of the same kind replaces an older one, except for files.
+    fn emit(&mut self, effect: Effect) {
+        if !matches!(effect, Effect::Save { .. } | Effect::Export(_) | Effect::ExportSized { .. }) {
+            self.effects.retain(|e| discriminant(e) != discriminant(&effect));
+        }
+        self.effects.push(effect);
+    }
+
+    /// The cells of the picture may have to be others.
+    fn repaint(&mut self) {
+        self.model.picture_version += 1;
+    }
+
+    /// Has the scene rendered that is to be seen.
+    fn show(&mut self) {
+        let scene = Arc::clone(self.model.scene());
+        self.emit(Effect::Show(scene));
+        self.repaint();
+    }
+
+    fn scene(&self) -> &Arc<Scene> {
+        self.model.scene()
+    }
+
+    /// Carries an edit out or says why it is refused. Whether the scene is another now.
+    fn commit(&mut self, edit: Result<Edit, Refusal>, hold: Hold) -> bool {
+        match edit {
+            Ok(edit) => self.record(edit, hold),
+            Err(refusal) => {
+                self.refuse(&refusal.to_string());
+                false
+            }
+        }
+    }
+
+    fn record(&mut self, edit: Edit, hold: Hold) -> bool {
+        if let Some(note) = &edit.note {
+            self.say(note.clone());
+        }
+        let scene = Arc::new(edit.scene);
+        if let Some(Overlay::Form(form)) = &mut self.model.overlay {
+            let changed = *form.scene != *scene;
+            form.scene = scene;
+            form.problem = None;
+            if changed {
+                self.show();
+            }
+            return changed;
+        }
+        let model = &mut *self.model;
+        let soon = |last: Duration| self.now.saturating_sub(last) <= REPEAT_WINDOW;
+        let joins = match hold {
+            Hold::Single => false,
+            Hold::Repeat => model.last_edit.is_some_and(soon),
+            Hold::Gesture => true,
+        };
+        if !joins {
+            model.history.end_gesture();
+        }
+        let changed = model.history.record(scene, &edit.label, hold != Hold::Single);
+        model.last_edit = (hold == Hold::Repeat).then_some(self.now);
+        if changed {
+            self.show();
+        }
+        changed
+    }
+
+    /// The next edit is a step of its own.
+    fn end_gesture(&mut self) {
+        self.model.history.end_gesture();
+        self.model.last_edit = None;
+    }
+
+    /// As `commit`; afterwards what was edited is selected.
+    fn commit_and_select(&mut self, edit: Result<Edit, Refusal>) -> bool {
+        let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
+        let changed = self.commit(edit, Hold::Single);
+        if let Some(subject) = subject {
+            self.select(subject);
+        }
+        changed
+    }
+
+    fn select(&mut self, subject: Subject) {
+        if self.model.selection != subject {
+            self.model.selection = subject;
+            self.model.inspector = Inspector::default();
+        }
+    }
+
+    /// Tells something for some seconds, the longer the more there is to read.
+    fn notify(&mut self, tone: Tone, text: impl Into<String>, seconds: Option<f64>) {
+        let text = printable(&text.into());
+        let until = seconds.map(|seconds| {
+            let reading = text.chars().count() as f64 * 0.05;
+            self.now + Duration::from_secs_f64(seconds.max(reading))
+        });
+        self.model.notice = Some(Notice { text, tone, until });
+    }
+
+    fn say(&mut self, text: impl Into<String>) {
+        self.notify(Tone::Plain, text, Some(3.0));
+    }
+
+    fn refuse(&mut self, text: &str) {
+        if let Some(Overlay::Form(form)) = &mut self.model.overlay {
+            form.problem = Some(printable(text));
+        } else {
+            self.notify(Tone::Bad, text, Some(5.0));
+        }
+    }
+
+    /// Takes away a notice whose time is over.
+    fn forget_notice(&mut self) {
+        let over = |notice: &Notice| notice.until.is_some_and(|until| until <= self.now);
+        if self.model.notice.as_ref().is_some_and(over) {
+            self.model.notice = None;
+        }
+    }
+
+    /// Leaves the model sound: the selection exists, cursors are in their lists and in view, and the
+    /// renderer knows the raster.
+    fn settle(&mut self) {
+        if !self.model.selection.exists(self.model.scene()) {
+            let last = |len: usize, of: fn(usize) -> Subject| len.checked_sub(1).map(of);
+            let scene = self.model.scene();
+            let near = match self.model.selection {
+                Subject::Object(_) => last(scene.objects.len(), Subject::Object),
+                Subject::Light(_) => last(scene.lights.len(), Subject::Light),
+                _ => None,
+            };
+            self.select(near.unwrap_or(Subject::Camera));
+        }
+        let raster = self.model.layout().map(|layout| layout.raster);
+        if let Some(raster) = raster.filter(|raster| self.model.raster != Some(*raster)) {
+            self.model.raster = Some(raster);
+            self.emit(Effect::Raster(raster));
+            self.repaint();
+        }
+        self.settle_panels();
+    }
+
+    fn settle_panels(&mut self) {
+        let lines = self.model.field_lines();
+        let follow = self.follow;
+        let place = self.model.place();
+        let inspector_rows = self.model.inspector_rows();
+        if let Some(Overlay::Form(form)) = &mut self.model.overlay {
+            let rows = place.map_or(0, |place| place.list.height);
+            settle_cursor(&mut form.cursor, &mut form.scroll, &lines, rows, follow);
+            return;
+        }
+        let rows = inspector_rows.map_or(0, |(rows, _)| rows.height);
+        let Inspector { cursor, scroll, .. } = &mut self.model.inspector;
+        settle_cursor(cursor, scroll, &lines, rows, follow);
+        if let Some(rows) = self.model.outline_rows() {
+            let lines = outline(self.model.scene());
+            let rows = usize::from(rows.height);
+            let scroll = &mut self.model.outline_scroll;
+            *scroll = (*scroll).min(lines.len().saturating_sub(rows));
+            let at = outline_position(&lines, &self.model.selection).filter(|_| follow);
+            *scroll = at.map_or(*scroll, |at| scrolled(*scroll, at, lines.len(), rows));
+        }
+    }
+}
+
+fn settle_cursor(cursor: &mut usize, scroll: &mut usize, lines: &[Line], rows: u16, follow: bool) {
+    let rows = usize::from(rows);
+    *cursor = nearest_field(lines, *cursor);
+    *scroll = (*scroll).min(lines.len().saturating_sub(rows));
+    if follow {
+        *scroll = scrolled(*scroll, *cursor, lines.len(), rows);
+    }
+}

@@ -1,0 +1,252 @@
+//! The mouse: clicks select, drags turn and move, the wheel goes nearer.
+
+use super::Turn;
+use crate::dashboard::input::{Button, Mouse, MouseKind};
+use crate::dashboard::layout::{Area, Focus};
+use crate::dashboard::model::{Drag, Mode};
+use crate::dashboard::overlay::Overlay;
+use crate::dashboard::panels::{Line, OutlineLine, outline};
+use crate::scene::Scene;
+use crate::scene::edit::Subject;
+use glam::DVec3;
+
+/// Lines that a tick of the wheel scrolls.
+const WHEEL_LINES: i32 = 3;
+
+/// The line of a list that a cell shows.
+fn line_at(rows: Area, scroll: usize, mouse: Mouse) -> Option<usize> {
+    let inside = rows.contains(mouse.column, mouse.row);
+    inside.then(|| usize::from(mouse.row - rows.y) + scroll)
+}
+
+impl Turn<'_> {
+    pub(super) fn mouse(&mut self, mouse: Mouse) {
+        self.model.first_time = false;
+        match mouse.kind {
+            MouseKind::Press(button) => self.press(button, mouse),
+            MouseKind::Drag(_) => self.dragged(mouse),
+            MouseKind::Release(_) => self.released(mouse),
+            MouseKind::Scroll(ticks) => self.scrolled(ticks, mouse),
+        }
+    }
+
+    fn press(&mut self, button: Button, mouse: Mouse) {
+        self.model.drag = None;
+        if self.model.file.blank {
+            return;
+        }
+        if self.model.overlay.is_some() {
+            if button == Button::Left {
+                self.press_in_overlay(mouse);
+            }
+            return;
+        }
+        if self.model.inspector.editor.is_some() && !self.apply_field() {
+            return;
+        }
+        let Some(layout) = self.model.layout() else { return };
+        if layout.picture.contains(mouse.column, mouse.row) {
+            let in_picture = layout.image.contains(mouse.column, mouse.row);
+            self.model.focus = Focus::Picture;
+            if !self.moves_or_turns() {
+                self.end_gesture();
+            }
+            let last = [mouse.column, mouse.row];
+            let modified = mouse.modified;
+            self.model.drag = Some(Drag { button, modified, last, moved: false, in_picture });
+        } else if let Some((rows, _)) = self.model.inspector_rows()
+            && layout.inspector.is_some_and(|area| area.contains(mouse.column, mouse.row))
+        {
+            self.press_in_inspector(rows, mouse);
+        } else if let Some(rows) = self.model.outline_rows()
+            && layout.outline.is_some_and(|area| area.contains(mouse.column, mouse.row))
+        {
+            self.press_in_outline(rows, mouse);
+        }
+    }
+
+    fn press_in_outline(&mut self, rows: Area, mouse: Mouse) {
+        // The rows are those of before the focus came here, which may unfold the panel.
+        let lines = outline(self.scene());
+        let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|at| lines.get(at));
+        let subject = line.and_then(|line| match line {
+            OutlineLine::Entry { subject, .. } => Some(subject.clone()),
+            OutlineLine::Heading(_) => None,
+        });
+        let again =
+            self.model.focus == Focus::Outline && subject.as_ref() == Some(&self.model.selection);
+        self.set_focus(Focus::Outline);
+        match subject {
+            Some(_) if again => self.inspect(),
+            Some(subject) => self.select(subject),
+            None => {}
+        }
+    }
+
+    fn press_in_inspector(&mut self, rows: Area, mouse: Mouse) {
+        let lines = self.model.field_lines();
+        let at = line_at(rows, self.model.inspector.scroll, mouse);
+        let at = at.filter(|at| lines.get(*at).and_then(Line::field).is_some());
+        let again = self.model.focus == Focus::Inspector && at == Some(self.model.inspector.cursor);
+        self.set_focus(Focus::Inspector);
+        match at {
+            Some(_) if again => self.open_field(None),
+            Some(at) => self.set_cursor(at),
+            None => {}
+        }
+    }
+
+    /// A click on the line under the cursor takes it, another one moves the cursor there.
+    fn press_in_overlay(&mut self, mouse: Mouse) {
+        let Some(place) = self.model.place() else { return };
+        let (scroll, cursor, len) = match &self.model.overlay {
+            Some(Overlay::Palette(palette)) => {
+                (palette.scroll, palette.cursor, palette.found.len())
+            }
+            Some(Overlay::Pick(pick)) => (pick.scroll, pick.cursor, pick.entries.len()),
+            Some(Overlay::Question(question)) => (0, question.cursor, question.answers.len()),
+            Some(Overlay::Form(form)) => {
+                let at = line_at(place.list, form.scroll, mouse);
+                let (cursor, typing) = (form.cursor, form.editor.is_some());
+                let lines = self.model.field_lines();
+                let at = at.filter(|at| lines.get(*at).and_then(Line::field).is_some());
+                match at {
+                    Some(at) if at == cursor && !typing => self.open_field(None),
+                    Some(at) if self.apply_field() => self.set_cursor(at),
+                    _ => {}
+                }
+                return;
+            }
+            _ => return,
+        };
+        if let Some(at) = line_at(place.list, scroll, mouse).filter(|at| *at < len) {
+            match at == cursor {
+                true => self.open(None),
+                false => self.walk(at as isize - cursor as isize),
+            }
+        }
+    }
+
+    fn dragged(&mut self, mouse: Mouse) {
+        let Some(drag) = &mut self.model.drag else { return };
+        let [column, row] = drag.last;
+        let right = f64::from(mouse.column) - f64::from(column);
+        let down = 2.0 * (f64::from(mouse.row) - f64::from(row));
+        if (right, down) == (0.0, 0.0) {
+            return;
+        }
+        drag.last = [mouse.column, mouse.row];
+        drag.moved = true;
+        let drag = *drag;
+        if !drag.in_picture || self.model.overlay.is_some() {
+            return;
+        }
+        let other = drag.button != Button::Left || drag.modified;
+        match (self.model.mode, other) {
+            (Mode::Probe, _) => self.probe_at(mouse),
+            (Mode::Move, upright) => self.move_by_hand(right, down, upright),
+            (Mode::Turn, false) => self.turn_by(right * 2.0),
+            (Mode::Fly, false) => self.look_by_hand(right, down),
+            (Mode::Orbit, false) => self.orbit_by_hand(right, down),
+            (_, true) => self.pan_by_hand(right, down),
+        }
+    }
+
+    fn released(&mut self, mouse: Mouse) {
+        let Some(drag) = self.model.drag.take() else { return };
+        if drag.moved {
+            if !self.moves_or_turns() {
+                self.end_gesture();
+            }
+        } else if self.model.overlay.is_none() {
+            self.click(drag, mouse);
+        }
+    }
+
+    /// Whether all drags and keys are one step, until the mode ends.
+    fn moves_or_turns(&self) -> bool {
+        matches!(self.model.mode, Mode::Move | Mode::Turn)
+    }
+
+    fn click(&mut self, drag: Drag, mouse: Mouse) {
+        if drag.button != Button::Left {
+            return;
+        }
+        if self.model.mode == Mode::Probe {
+            self.probe_at(mouse);
+            return;
+        }
+        let film = self.scene().film.size;
+        let pixel = self.model.layout().and_then(|l| l.film_pixel(film, mouse.column, mouse.row));
+        if let Some(pixel) = pixel {
+            let seen = seen_at(self.scene(), pixel).map_or(Subject::Background, Subject::Object);
+            if seen != self.model.selection {
+                self.end_mode();
+            }
+            self.select(seen);
+            let label = self.model.selection.label(self.scene());
+            self.say(label);
+        }
+    }
+
+    fn probe_at(&mut self, mouse: Mouse) {
+        let film = self.scene().film.size;
+        let pixel = self.model.layout().and_then(|l| l.film_pixel(film, mouse.column, mouse.row));
+        if let Some(pixel) = pixel {
+            self.set_probe(Some(pixel));
+        }
+    }
+
+    fn scrolled(&mut self, ticks: i32, mouse: Mouse) {
+        let lines = -(ticks.clamp(-100, 100) * WHEEL_LINES) as isize;
+        if self.model.overlay.is_some() {
+            let over_list = matches!(
+                self.model.overlay,
+                Some(Overlay::Help { .. } | Overlay::Inventory { .. })
+            );
+            self.walk(if over_list { lines } else { -(ticks.clamp(-100, 100) as isize) });
+            return;
+        }
+        let Some(layout) = self.model.layout().filter(|_| !self.model.file.blank) else { return };
+        let over = |area: Option<Area>| area.is_some_and(|a| a.contains(mouse.column, mouse.row));
+        if over(Some(layout.picture)) {
+            self.dolly_by_wheel(ticks);
+        } else if over(layout.inspector) {
+            let rows = self.model.inspector_rows().map(|(rows, _)| rows).unwrap_or_default();
+            let under = line_at(rows, self.model.inspector.scroll, mouse);
+            let typing = self.model.inspector.editor.is_some();
+            if self.model.focus == Focus::Inspector
+                && under == Some(self.model.inspector.cursor)
+                && !typing
+            {
+                self.step_field(f64::from(ticks.clamp(-100, 100)));
+            } else {
+                let scroll = &mut self.model.inspector.scroll;
+                *scroll = scroll.saturating_add_signed(lines);
+                self.follow = false;
+            }
+        } else if over(layout.outline) {
+            let scroll = &mut self.model.outline_scroll;
+            *scroll = scroll.saturating_add_signed(lines);
+            self.follow = false;
+        }
+    }
+}
+
+/// The object that the middle of a pixel of the film shows.
+fn seen_at(scene: &Scene, [x, y]: [usize; 2]) -> Option<usize> {
+    let camera = &scene.camera;
+    let [width, height] = scene.film.size.map(f64::from);
+    let half = camera.half_size(width / height);
+    let [right, up, forward] = camera.frame();
+    let across = |at: usize, size: f64| (2.0 * (at as f64 + 0.5) / size) - 1.0;
+    let direction =
+        forward + right * (half[0] * across(x, width)) - up * (half[1] * across(y, height));
+    let origin = DVec3::from_array(camera.eye) + direction * camera.near;
+    let hits = scene
+        .objects
+        .iter()
+        .enumerate()
+        .filter_map(|(i, object)| Some((i, object.form().cast(origin, direction)?)));
+    hits.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+}

@@ -1,0 +1,130 @@
+//! Moving, turning, copying, removing what is selected.
+
+use super::{Hold, Turn};
+use crate::dashboard::action::{Pace, Way};
+use crate::dashboard::model::Mode;
+use crate::scene::edit::{self, bounds, step_length};
+use glam::{DVec2, DVec3};
+
+/// Degrees of a step.
+const TURN_DEGREES: f64 = 15.0;
+const TURN_DEGREES_FINE: f64 = 1.0;
+/// A drag at a flat angle to the ground would move things without end: at most so many times as far
+/// as across.
+const MOST_STRETCH: f64 = 4.0;
+
+/// The coordinate axis in the ground plane that is nearest to `v`.
+fn nearest_axis(v: DVec3) -> DVec3 {
+    if v.x.abs() >= v.z.abs() { DVec3::X * v.x.signum() } else { DVec3::Z * v.z.signum() }
+}
+
+impl Turn<'_> {
+    /// The directions in the ground that look like right and away in the picture, along the
+    /// coordinate axes, so that coordinates stay round.
+    fn ground_axes(&self) -> [DVec3; 2] {
+        let [right, _, _] = self.scene().camera.frame();
+        let right = nearest_axis(right);
+        // Away from one who has `right` on the right and stands upright.
+        [right, DVec3::Y.cross(right)]
+    }
+
+    pub(super) fn check_movable(&mut self) -> bool {
+        let tried = edit::move_by(self.scene(), &self.model.selection, [0.0; 3]);
+        tried.map_err(|refusal| self.refuse(&refusal.to_string())).is_ok()
+    }
+
+    pub(super) fn check_turnable(&mut self) -> bool {
+        let tried = edit::turn(self.scene(), &self.model.selection, 0.0);
+        tried.map_err(|refusal| self.refuse(&refusal.to_string())).is_ok()
+    }
+
+    pub(super) fn move_selection(&mut self, way: Way, pace: Pace) {
+        let coarse = step_length(self.scene());
+        let step = if pace == Pace::Fine { 0.1 * coarse } else { coarse };
+        let [right, away] = self.ground_axes();
+        let by = step
+            * match way {
+                Way::Left => -right,
+                Way::Right => right,
+                Way::In => away,
+                Way::Out => -away,
+                Way::Up => DVec3::Y,
+                Way::Down => DVec3::NEG_Y,
+            };
+        self.move_by(by);
+    }
+
+    fn move_by(&mut self, by: DVec3) {
+        let edit = edit::move_by(self.scene(), &self.model.selection, by.to_array());
+        self.commit(edit, self.gesture());
+    }
+
+    /// In a mode or a drag all steps are one; otherwise (from the palette) those of a moment.
+    fn gesture(&self) -> Hold {
+        let in_mode = matches!(self.model.mode, Mode::Move | Mode::Turn);
+        if in_mode || self.model.drag.is_some() { Hold::Gesture } else { Hold::Repeat }
+    }
+
+    /// Moves the selection by a drag of so many half cells to the right and down: in the ground
+    /// plane, or up and down. It stays under the hand as far as that goes.
+    pub(super) fn move_by_hand(&mut self, right: f64, down: f64, upright: bool) {
+        let scene = self.scene();
+        let [x, _, forward] = scene.camera.frame();
+        let eye = DVec3::from_array(scene.camera.eye);
+        let distance = match bounds(scene, &self.model.selection) {
+            Some(ball) => forward.dot(DVec3::from_array(ball.center) - eye),
+            None => edit::focus_distance(scene),
+        };
+        let distance = if distance > 0.0 { distance } else { edit::focus_distance(scene) };
+        let unit = distance * self.per_half_cell(2.0 * self.half_width());
+        let flat = |v: DVec3| DVec2::new(v.x, v.z).try_normalize();
+        let by = if upright {
+            DVec3::Y * (-down * unit)
+        } else {
+            let Some(across) = flat(x) else { return };
+            let away = DVec2::new(across.y, -across.x);
+            let stretch = (1.0 / forward.y.abs().max(1e-9)).min(MOST_STRETCH);
+            let by = across * (right * unit) + away * (-down * unit * stretch);
+            DVec3::new(by.x, 0.0, by.y)
+        };
+        self.move_by(by);
+    }
+
+    pub(super) fn turn_selection(&mut self, way: Way, pace: Pace) {
+        let degrees = if pace == Pace::Fine { TURN_DEGREES_FINE } else { TURN_DEGREES };
+        // Counter-clockwise from above: the near side goes to the right.
+        self.turn_by(if way == Way::Right { degrees } else { -degrees });
+    }
+
+    pub(super) fn turn_by(&mut self, degrees: f64) {
+        let edit = edit::turn(self.scene(), &self.model.selection, degrees);
+        self.commit(edit, self.gesture());
+    }
+
+    pub(super) fn drop_down(&mut self) {
+        let edit = edit::drop_down(self.scene(), &self.model.selection);
+        self.commit(edit, Hold::Single);
+    }
+
+    pub(super) fn duplicate(&mut self) {
+        let edit = edit::duplicate(self.scene(), &self.model.selection);
+        if self.commit_and_select(edit) {
+            let label = self.model.selection.label(self.scene());
+            self.say(format!("{label} is there · m moves it"));
+        }
+    }
+
+    pub(super) fn delete(&mut self) {
+        let label = self.model.selection.label(self.scene());
+        let edit = edit::delete(self.scene(), &self.model.selection);
+        let noted = edit.as_ref().is_ok_and(|edit| edit.note.is_some());
+        if self.commit_and_select(edit) && !noted {
+            self.say(format!("{label} is gone · u brings it back"));
+        }
+    }
+
+    pub(super) fn own_material(&mut self) {
+        let edit = edit::own_material(self.scene(), &self.model.selection);
+        self.commit(edit, Hold::Single);
+    }
+}

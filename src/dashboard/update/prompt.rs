@@ -1,0 +1,223 @@
+//! Lines of text that are asked for: names, paths, when to stop, sizes.
+
+use super::{Hold, Turn};
+use crate::dashboard::editor::Editor;
+use crate::dashboard::message::{Effect, Format};
+use crate::dashboard::model::RunningExport;
+use crate::dashboard::overlay::{Overlay, Prompt, PromptFor};
+use crate::render::schedule::Stop;
+use crate::scene::edit::{self, Subject};
+use crate::value::{excerpt, number};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+impl Turn<'_> {
+    fn prompt(&mut self, purpose: PromptFor, title: &str, help: &str, text: impl Into<String>) {
+        let (title, help) = (title.to_string(), help.to_string());
+        let editor = Editor::new(text);
+        self.model.overlay = Some(Overlay::Prompt(Prompt { purpose, title, help, editor }));
+    }
+
+    pub(super) fn ask_path(&mut self) {
+        let path = match &self.model.file.path {
+            Some(path) => path.display().to_string(),
+            None => self.model.file.name.clone(),
+        };
+        self.prompt(
+            PromptFor::SaveAs,
+            "save as",
+            "A path. An existing file is not overwritten unasked.",
+            path,
+        );
+    }
+
+    pub(super) fn ask_name(&mut self) {
+        let subject = self.model.selection.clone();
+        let scene = self.scene();
+        let name = match &subject {
+            Subject::Light(i) => scene.lights.get(*i).map(|light| light.name.clone()),
+            Subject::Object(i) => scene.objects.get(*i).map(|object| object.name.clone()),
+            Subject::Material(name) | Subject::View(name) => Some(name.clone()),
+            _ => None,
+        };
+        match name {
+            Some(name) => {
+                let title = format!("rename {}", subject.label(self.scene()));
+                let help = "A name that nothing else of its kind has.";
+                self.prompt(PromptFor::Rename(subject), &title, help, name);
+            }
+            None => {
+                let label = subject.label(self.scene());
+                self.refuse(&format!("{label} has no name to change"));
+            }
+        }
+    }
+
+    pub(super) fn ask_view_name(&mut self) {
+        let count = self.scene().views.len();
+        let free = (count + 1..).map(|n| format!("view {n}"));
+        let name = free.into_iter().find(|name| !self.scene().views.contains_key(name));
+        let help = "A name for this viewpoint; keys 1 to 9 go back to it.";
+        self.prompt(PromptFor::StoreView, "store this viewpoint", help, name.unwrap_or_default());
+    }
+
+    pub(super) fn ask_stop(&mut self) {
+        let help = "noise 0.5 (codes), rmse 0.001 (linear), spp 1000, time 60 (seconds): one or \
+                    more, whichever comes first; or none";
+        let now = stop_text(&self.model.stop);
+        self.prompt(PromptFor::StopAt, "stop at", help, now);
+    }
+
+    pub(super) fn ask_export_size(&mut self) {
+        if let Some(export) = &self.model.export {
+            let [width, height] = export.size;
+            self.refuse(&format!("{width}x{height} is being rendered · Ctrl-x cancels it"));
+            return;
+        }
+        let [width, height] = self.scene().film.size;
+        let text = format!("{}x{} png", 2 * width, 2 * height);
+        let help = "Width x height in pixels, then png or exr. Rendered to the same target.";
+        self.prompt(PromptFor::ExportSized, "render at another size", help, text);
+    }
+
+    /// Enter in a prompt.
+    pub(super) fn answer_prompt(&mut self) {
+        let Some(Overlay::Prompt(prompt)) = &self.model.overlay else { return };
+        let (purpose, text) = (prompt.purpose.clone(), prompt.editor.text().trim().to_string());
+        let answered = match purpose {
+            PromptFor::SaveAs => self.save_to(&text),
+            PromptFor::Rename(subject) => self.rename(&subject, &text),
+            PromptFor::StoreView => self.store_view(&text),
+            PromptFor::StopAt => parse_stop(&text).map(|stop| self.set_stop(stop)),
+            PromptFor::ExportSized => self.export_sized(&text),
+        };
+        match (answered, &mut self.model.overlay) {
+            (Err(problem), Some(Overlay::Prompt(prompt))) => prompt.editor.problem = Some(problem),
+            // What was answered may have asked something else.
+            (Ok(()), overlay @ Some(Overlay::Prompt(_))) => *overlay = None,
+            _ => {}
+        }
+    }
+
+    fn save_to(&mut self, text: &str) -> Result<(), String> {
+        if text.is_empty() || text.ends_with('/') {
+            return Err("A file needs a name.".to_string());
+        }
+        let mut path = PathBuf::from(text);
+        if path.extension().is_none() {
+            path.set_extension("toml");
+        }
+        // Its own file is saved as always: with a look whether somebody else wrote it.
+        let own = self.model.file.path.as_ref() == Some(&path);
+        self.write((!own).then_some(path), false);
+        Ok(())
+    }
+
+    fn rename(&mut self, subject: &Subject, text: &str) -> Result<(), String> {
+        let edit = edit::rename(self.scene(), subject, text).map_err(|e| e.to_string())?;
+        self.commit_and_select(Ok(edit));
+        Ok(())
+    }
+
+    fn store_view(&mut self, text: &str) -> Result<(), String> {
+        let edit = edit::store_view(self.scene(), Some(text)).map_err(|e| e.to_string())?;
+        self.record(edit, Hold::Single);
+        let number = self.scene().views.keys().position(|name| name == text).map_or(0, |at| at + 1);
+        let key = if number <= 9 { format!(" · key {number}") } else { String::new() };
+        self.say(format!("viewpoint {} is stored{key}", excerpt(text)));
+        Ok(())
+    }
+
+    fn export_sized(&mut self, text: &str) -> Result<(), String> {
+        let mut words = text.split_whitespace();
+        let size = words.next().ok_or("A size is needed, such as 1920x1080.")?;
+        let format = match words.next() {
+            None | Some("png") => Format::Png,
+            Some("exr") => Format::Exr,
+            Some(other) => return Err(format!("\"{}\" is neither png nor exr.", excerpt(other))),
+        };
+        if let Some(more) = words.next() {
+            return Err(format!("\"{}\" is too much.", excerpt(more)));
+        }
+        let film = edit::set(self.scene(), &Subject::Film, "size", size);
+        let scene = film.map_err(|refusal| refusal.to_string())?.scene;
+        let size = scene.film.size;
+        self.model.export = Some(RunningExport { size, format, progress: 0.0 });
+        let (display, stop) = (self.model.display, self.model.stop);
+        self.emit(Effect::ExportSized { scene: Arc::new(scene), format, display, stop });
+        self.say(format!("rendering {}x{} beside this picture · Ctrl-x cancels", size[0], size[1]));
+        Ok(())
+    }
+}
+
+/// A stop as it is typed: `noise 0.5 time 60`; `none`.
+pub(super) fn stop_text(stop: &Stop) -> String {
+    let targets = [
+        ("noise", stop.noise_codes),
+        ("rmse", stop.rmse_linear),
+        ("spp", stop.spp.map(f64::from)),
+        ("time", stop.seconds),
+    ];
+    let given = targets.iter().filter_map(|(word, x)| Some(format!("{word} {}", number((*x)?))));
+    let text = given.collect::<Vec<_>>().join(" ");
+    if text.is_empty() { "none".to_string() } else { text }
+}
+
+/// What `stop_text` writes; commas may stand between.
+fn parse_stop(text: &str) -> Result<Stop, String> {
+    let mut stop = Stop::default();
+    let mut words = text.split([' ', ',', '=']).filter(|word| !word.is_empty());
+    let mut any = false;
+    while let Some(word) = words.next() {
+        any = true;
+        if word.eq_ignore_ascii_case("none") {
+            continue;
+        }
+        let Some(value) = words.next() else {
+            return Err(format!("\"{}\" needs a number, such as noise 0.5.", excerpt(word)));
+        };
+        let positive = value.parse::<f64>().ok().filter(|x| x.is_finite() && *x > 0.0);
+        let wrong =
+            |expected: &str| format!("{word} cannot be \"{}\": {expected}.", excerpt(value));
+        let number = || positive.ok_or_else(|| wrong("expected a number greater than 0"));
+        match word.to_ascii_lowercase().as_str() {
+            "noise" => stop.noise_codes = Some(number()?),
+            "rmse" => stop.rmse_linear = Some(number()?),
+            "time" => stop.seconds = Some(number()?),
+            "spp" => {
+                let whole = value.parse().ok().filter(|n: &u32| *n > 0);
+                stop.spp =
+                    Some(whole.ok_or_else(|| wrong("expected a whole number of at least 1"))?);
+            }
+            _ => {
+                let word = excerpt(word);
+                return Err(format!("\"{word}\" is not known: noise, rmse, spp, time or none."));
+            }
+        }
+    }
+    if any { Ok(stop) } else { Err("Type one, or none to trace on and on.".to_string()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stops_are_read_as_they_are_written() {
+        let all = Stop {
+            spp: Some(1000),
+            noise_codes: Some(0.5),
+            rmse_linear: Some(0.001),
+            seconds: Some(60.0),
+        };
+        for stop in [all, Stop::default(), Stop { seconds: Some(1.5), ..Stop::default() }] {
+            assert_eq!(parse_stop(&stop_text(&stop)), Ok(stop));
+        }
+        assert_eq!(parse_stop("NOISE=0.5, spp 1000 rmse 0.001,time 60"), Ok(all));
+        for wrong in
+            ["", "noise", "noise -1", "spp 0", "spp 1.5", "time nan", "0.5", "x 1", "time inf"]
+        {
+            assert!(parse_stop(wrong).is_err(), "{wrong}");
+        }
+    }
+}

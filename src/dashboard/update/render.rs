@@ -1,0 +1,66 @@
+//! The work: pause, restart, targets, threads; exports; the terminal's colours.
+
+use super::Turn;
+use super::prompt::stop_text;
+use crate::dashboard::action::Change;
+use crate::dashboard::message::{Effect, Format};
+use crate::dashboard::model::Colors;
+use crate::render::schedule::Stop;
+
+impl Turn<'_> {
+    pub(super) fn pause(&mut self) {
+        self.model.paused = !self.model.paused;
+        self.emit(Effect::Pause(self.model.paused));
+    }
+
+    pub(super) fn restart(&mut self) {
+        self.emit(Effect::Restart);
+        self.say("begun anew");
+    }
+
+    pub(super) fn set_stop(&mut self, stop: Stop) {
+        self.model.stop = stop;
+        self.emit(Effect::Stop(stop));
+        let told = stop_text(&stop);
+        let told = if told == "none" { "never".to_string() } else { format!("at {told}") };
+        self.say(format!("stops {told}"));
+    }
+
+    pub(super) fn threads(&mut self, change: Change) {
+        let more = if change == Change::Up { 1 } else { -1 };
+        let threads = self.model.threads.saturating_add_signed(more);
+        self.model.threads = threads.clamp(1, self.model.most_threads);
+        self.emit(Effect::Threads(self.model.threads));
+        let of = self.model.most_threads;
+        self.say(format!("{} of {of} threads", self.model.threads));
+    }
+
+    pub(super) fn priority(&mut self) {
+        self.model.low_priority = !self.model.low_priority;
+        self.emit(Effect::LowPriority(self.model.low_priority));
+        let priority = if self.model.low_priority { "low" } else { "normal" };
+        self.say(format!("{priority} priority"));
+    }
+
+    pub(super) fn export(&mut self, format: Format) {
+        self.emit(Effect::Export(format));
+        self.say(format!("writing {} …", format.extension()));
+    }
+
+    pub(super) fn cancel_export(&mut self) {
+        match self.model.export.take() {
+            Some(_) => {
+                self.emit(Effect::CancelExport);
+                self.say("the export is cancelled");
+            }
+            None => self.say("No export is running"),
+        }
+    }
+
+    pub(super) fn next_colors(&mut self) {
+        let at = Colors::ALL.iter().position(|colors| *colors == self.model.colors).unwrap_or(0);
+        self.model.colors = Colors::ALL[(at + 1) % Colors::ALL.len()];
+        self.repaint();
+        self.say(self.model.colors.name());
+    }
+}

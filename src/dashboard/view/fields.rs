@@ -1,0 +1,192 @@
+//! Fields with their values: the inspector, and the body of a form.
+
+use super::frame::{panel, scroll_mark};
+use super::is_active;
+use super::text::{Row, columns, skip};
+use super::theme::Theme;
+use crate::dashboard::editor::Editor;
+use crate::dashboard::layout::{Area, Focus, Layout};
+use crate::dashboard::model::Model;
+use crate::dashboard::panels::{FieldLine, Line};
+use crate::dashboard::places::wrapped;
+use crate::film::Display;
+use crate::scene::edit::Entry;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Position;
+use ratatui::style::{Modifier, Style};
+
+/// The unit of lengths: told under the cursor only.
+const LENGTH: &str = "scene units";
+
+/// Fields in their area.
+pub struct Fields<'a> {
+    /// The lines.
+    pub lines: &'a [Line],
+    /// Rows for them.
+    pub list: Area,
+    /// Rows for what is to be said about the one under the cursor.
+    pub help: Area,
+    /// Position of the cursor.
+    pub cursor: usize,
+    /// First line shown.
+    pub scroll: usize,
+    /// The value being typed.
+    pub editor: Option<&'a Editor>,
+    /// What was wrong, if not with what is typed.
+    pub problem: Option<&'a str>,
+    /// Whether keys go here.
+    pub active: bool,
+}
+
+/// Draws the inspector, if it is not folded away. Where text is being typed, if it is.
+pub fn inspector(
+    model: &Model,
+    layout: &Layout,
+    theme: &Theme,
+    buffer: &mut Buffer,
+) -> Option<Position> {
+    let area = layout.inspector?;
+    let (list, help) = model.inspector_rows()?;
+    let active = is_active(model, Focus::Inspector);
+    panel(area, &model.selection.title(model.scene()), active, theme, buffer);
+    let lines = model.field_lines();
+    let fields = Fields {
+        lines: &lines,
+        list,
+        help,
+        cursor: model.inspector.cursor,
+        scroll: model.inspector.scroll,
+        editor: model.inspector.editor.as_ref(),
+        problem: None,
+        active,
+    };
+    fields.draw(theme, buffer)
+}
+
+impl Fields<'_> {
+    /// Draws them. Where text is being typed, if it is.
+    pub fn draw(&self, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
+        let rows = usize::from(self.list.height);
+        let first = self.scroll.min(self.lines.len().saturating_sub(rows));
+        let label = |line: &Line| line.field().map_or(0, |f| 1 + 2 * f.depth + columns(&f.label));
+        let widest = self.lines.iter().map(label).max().unwrap_or(0);
+        let labels = widest.min(usize::from(self.list.width) * 9 / 20);
+        let mut typing = None;
+        for (row, (i, line)) in (0..).zip(self.lines.iter().enumerate().skip(first).take(rows)) {
+            let to = Row::new(buffer, self.list, row);
+            match line {
+                Line::Heading(title) => heading(to, title, theme),
+                Line::Field(field) => {
+                    let at = self.field(field, i == self.cursor, labels, to, theme);
+                    typing = typing.or(at);
+                }
+            }
+        }
+        let shown = (first, rows, self.lines.len());
+        scroll_mark(self.list, shown, theme.border(self.active), buffer);
+        if self.active {
+            self.say(theme, buffer);
+        }
+        typing
+    }
+
+    fn field(
+        &self,
+        field: &FieldLine,
+        chosen: bool,
+        labels: usize,
+        mut to: Row,
+        theme: &Theme,
+    ) -> Option<Position> {
+        let chosen = chosen && self.active;
+        let (name, value) = match (chosen, field.is_default) {
+            (true, _) => (theme.selected(true), theme.selected(true)),
+            (false, true) => (theme.dim(), theme.dim()),
+            (false, false) => (theme.dim(), theme.text()),
+        };
+        if chosen {
+            to.fill(name);
+        }
+        let indent = 1 + 2 * field.depth;
+        to.skip(indent.min(labels));
+        to.put_wide(&field.label, labels.saturating_sub(indent), name).skip(2);
+        if let Some(editor) = self.editor.filter(|_| chosen) {
+            return typed(editor, &mut to, theme);
+        }
+        let swatch = field.swatch.and_then(|color| theme.swatch(Display::default().codes_8(color)));
+        if let Some(style) = swatch {
+            to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
+        }
+        let words = matches!(field.entry, Entry::Choice | Entry::Kind | Entry::Switch);
+        match field.value.as_str() {
+            "" => to.put("–", theme.dim()),
+            words_value if words && chosen => {
+                to.put("‹ ", value).put(words_value, value).put(" ›", value)
+            }
+            given => to.put(given, value),
+        };
+        // A word that nearly every number has would only be noise.
+        let telling = chosen || field.unit != LENGTH;
+        let fits = to.left() >= columns(field.unit) + 2;
+        if telling && fits && !field.unit.is_empty() && !field.value.is_empty() {
+            let unit = if chosen { name } else { theme.dim() };
+            to.put(" ", unit).put(field.unit, unit);
+        }
+        None
+    }
+
+    /// What is to be said about the field under the cursor: what is wrong, else what it is and what
+    /// may be typed.
+    fn say(&self, theme: &Theme, buffer: &mut Buffer) {
+        let Some(field) = self.lines.get(self.cursor).and_then(Line::field) else { return };
+        let width = self.help.width.saturating_sub(2);
+        let problem = self.editor.and_then(|e| e.problem.as_deref()).or(self.problem);
+        let said = match problem {
+            Some(problem) => vec![(problem.to_string(), theme.bad())],
+            None => vec![
+                (field.doc.to_string(), theme.dim()),
+                (expected(field), theme.dim().add_modifier(Modifier::ITALIC)),
+            ],
+        };
+        let lines = said.iter().flat_map(|(text, style)| {
+            let lines = if text.is_empty() { Vec::new() } else { wrapped(text, width) };
+            lines.into_iter().map(move |line| (line, *style))
+        });
+        for (row, (line, style)) in (0..self.help.height).zip(lines) {
+            Row::new(buffer, self.help, row).put(" ", style).put(&line, style);
+        }
+    }
+}
+
+/// What may be typed, and what holds if nothing is.
+fn expected(field: &FieldLine) -> String {
+    match &field.default {
+        Some(default) if !default.is_empty() && !field.is_default => {
+            format!("{}; default {default}", field.expected)
+        }
+        _ => field.expected.clone(),
+    }
+}
+
+fn heading(mut to: Row, title: &str, theme: &Theme) {
+    to.put(" ", theme.heading()).put(title, theme.heading()).put(" ", theme.heading());
+    let rest = to.left().saturating_sub(1);
+    to.put(&"─".repeat(rest), theme.border(false));
+}
+
+/// A line of text with its cursor, in all that is left of the row.
+pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
+    let width = to.left().saturating_sub(1);
+    if width == 0 {
+        return None;
+    }
+    let hidden = editor.scroll_columns(width);
+    let style = Style::new().add_modifier(Modifier::UNDERLINED).patch(match editor.problem {
+        Some(_) => theme.bad(),
+        None => theme.accent(),
+    });
+    let (x, y) = (to.x(), to.y());
+    to.put_wide(skip(editor.text(), hidden), width, style);
+    let column = editor.cursor_columns().saturating_sub(hidden).min(width) as u16;
+    Some(Position { x: x + column, y })
+}

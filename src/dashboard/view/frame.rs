@@ -1,0 +1,137 @@
+//! Panels' borders with their titles, and the picture's panel.
+
+use super::legend::Legend;
+use super::text::{Row, columns, number, rect};
+use super::theme::Theme;
+use crate::dashboard::layout::{Area, Focus, Layout};
+use crate::dashboard::message::Channel;
+use crate::dashboard::model::{Compared, Mode, Model};
+use crate::film::Tone;
+use ratatui::buffer::Buffer;
+use ratatui::style::{Modifier, Style};
+use ratatui::widgets::{Block, Clear, Widget};
+
+/// The border of a panel with its title.
+pub fn panel(area: Area, title: &str, focused: bool, theme: &Theme, buffer: &mut Buffer) {
+    Block::bordered()
+        .border_type(theme.border_type(focused))
+        .border_style(theme.border(focused))
+        .render(rect(area), buffer);
+    let style = match focused {
+        true => theme.accent().add_modifier(Modifier::BOLD),
+        false => theme.heading(),
+    };
+    let inside = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
+    if !title.is_empty() {
+        Row::new(buffer, inside, 0).put(" ", style).put(title, style).put(" ", style);
+    }
+}
+
+/// A box over the panels: nothing shines through.
+pub fn overlay(area: Area, title: &str, theme: &Theme, buffer: &mut Buffer) {
+    Clear.render(rect(area).intersection(buffer.area), buffer);
+    panel(area, title, true, theme, buffer);
+}
+
+/// Lines above and below what is shown of a longer list: a mark on the right border.
+pub fn scroll_mark(
+    area: Area,
+    (first, shown, all): (usize, usize, usize),
+    style: Style,
+    buffer: &mut Buffer,
+) {
+    let rows = usize::from(area.height);
+    if all <= shown || rows == 0 {
+        return;
+    }
+    let length = (rows * shown / all).max(1);
+    let most = all - shown;
+    let top = (rows - length) * first.min(most) / most;
+    for row in top..top + length {
+        let at = Area { x: area.x + area.width, width: 1, ..area };
+        Row::new(buffer, at, row as u16).put("┃", style);
+    }
+}
+
+/// The picture's panel: the file's name, what is shown, how.
+pub fn draw(
+    model: &Model,
+    layout: &Layout,
+    legend: Option<&Legend>,
+    theme: &Theme,
+    buffer: &mut Buffer,
+) {
+    let area = layout.picture;
+    let bottom = area.height.saturating_sub(1);
+    let inside = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
+    if model.only_picture {
+        return;
+    }
+    let focused = super::is_active(model, Focus::Picture);
+    panel(area, "", focused, theme, buffer);
+    let chips = chips(model);
+    let chip_columns: usize = chips.iter().map(|(text, _)| columns(text) + 3).sum();
+    let mut row = Row::new(buffer, inside, 0);
+    if chip_columns + 12 <= row.left() {
+        for (text, loud) in chips.iter().rev() {
+            let style = if *loud { theme.warn() } else { theme.dim() };
+            row.put_right(&format!(" {text} "), 0, style);
+            row.put_right("─", 0, theme.border(focused));
+        }
+    }
+    let name = match focused {
+        true => theme.accent().add_modifier(Modifier::BOLD),
+        false => theme.text().add_modifier(Modifier::BOLD),
+    };
+    let unsaved = if model.is_unsaved() { 2 } else { 0 };
+    let room = row.left().saturating_sub(2 + unsaved);
+    row.put(" ", name).put(&super::text::cut(&model.file.name, room), name);
+    if unsaved > 0 {
+        row.put(" ●", theme.warn());
+    }
+    row.put(" ", name);
+    if let Some(mode) = mode(model) {
+        Row::new(buffer, inside, bottom)
+            .put(" ", theme.accent())
+            .put(&mode, theme.accent())
+            .put(" ", theme.accent());
+    }
+    if let Some(legend) = legend {
+        legend.draw(inside, bottom, theme, buffer);
+    }
+}
+
+/// What is shown, if it is not simply the picture (loud), and how it is displayed.
+fn chips(model: &Model) -> Vec<(String, bool)> {
+    let mut chips = Vec::new();
+    match (model.comparison.shown, model.channel) {
+        (Compared::Kept, _) => {
+            let spp = model.comparison.kept.as_ref().map_or(0.0, |(_, spp)| *spp);
+            chips.push((format!("kept picture, {spp:.0} spp"), true));
+        }
+        (Compared::Difference, _) => chips.push(("live − kept".to_string(), true)),
+        (Compared::Live, Channel::Beauty) => {}
+        (Compared::Live, channel) => chips.push((channel.name().to_string(), true)),
+    }
+    let exposure = model.display.exposure_ev;
+    if exposure != 0.0 {
+        let sign = if exposure > 0.0 { "+" } else { "−" };
+        chips.push((format!("{sign}{} EV", number(exposure.abs())), false));
+    }
+    if model.display.tone != Tone::Clip {
+        chips.push((model.display.tone.to_string(), false));
+    }
+    chips
+}
+
+/// What the arrows act on, if not on the camera.
+fn mode(model: &Model) -> Option<String> {
+    let selected = || model.selection.title(model.scene());
+    Some(match model.mode {
+        Mode::Orbit => return None,
+        Mode::Move => format!("moving {}", selected()),
+        Mode::Turn => format!("turning {}", selected()),
+        Mode::Fly => "flying".to_string(),
+        Mode::Probe => "probing".to_string(),
+    })
+}

@@ -1,0 +1,70 @@
+//! What the colours of a picture of numbers mean.
+
+use super::image::paint;
+use super::text::{Row, columns, number};
+use super::theme::Theme;
+use crate::dashboard::layout::Area;
+use crate::dashboard::raster::{PictureCells, Raster, Scale, difference, magnitude};
+use ratatui::buffer::Buffer;
+use ratatui::style::Style;
+
+/// Columns of the bar of colours.
+const BAR: usize = 12;
+
+/// The scale of a picture, with words.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Legend {
+    low: String,
+    high: String,
+    unit: String,
+    bar: Raster,
+}
+
+impl Legend {
+    /// Of magnitudes on `scale`, told in `unit`.
+    pub fn magnitude(scale: Scale, unit: &str) -> Self {
+        let bar = bar(magnitude);
+        let [low, high] = [scale.value(0.0), scale.value(1.0)].map(number);
+        Self { low, high, unit: unit.to_string(), bar }
+    }
+
+    /// Of differences up to `end` codes to both sides, `rms` of them over all.
+    pub fn difference(end: f64, rms: f64) -> Self {
+        Self {
+            low: format!("-{end}"),
+            high: format!("+{end}"),
+            unit: format!("codes · RMS {}", number(rms)),
+            bar: bar(|part| difference(2.0 * part - 1.0)),
+        }
+    }
+
+    /// Columns that it takes at most.
+    fn columns(&self) -> usize {
+        columns(&self.low) + columns(&self.high) + columns(&self.unit) + BAR + 5
+    }
+
+    /// Draws it at the right end of `row` of `area`: all of it, or without the words, or nothing.
+    pub fn draw(&self, area: Area, row: u16, theme: &Theme, buffer: &mut Buffer) {
+        let mut line = Row::new(buffer, area, row);
+        let words = columns(&self.unit) + 1;
+        let (width, with_words) = match line.left() {
+            left if left >= self.columns() => (self.columns(), true),
+            left if left >= self.columns() - words => (self.columns() - words, false),
+            _ => return,
+        };
+        line.skip(line.left() - width).put(" ", theme.text()).put(&self.low, theme.text());
+        line.put(" ", theme.text());
+        let bar = Area { x: line.x(), y: area.y + row, width: BAR as u16, height: 1 };
+        line.skip(BAR).put(" ", Style::new()).put(&self.high, theme.text());
+        if with_words {
+            line.put(" ", Style::new()).put(&self.unit, theme.dim());
+        }
+        line.put(" ", Style::new());
+        paint(&PictureCells::new(&self.bar, theme.colors(), false), bar, buffer);
+    }
+}
+
+/// The colours of 0 to 1 in a row of cells.
+fn bar(color: impl Fn(f64) -> [u8; 3]) -> Raster {
+    Raster::from_fn(BAR, 2, |i| color((i % BAR) as f64 / (BAR - 1) as f64))
+}

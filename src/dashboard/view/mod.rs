@@ -1,0 +1,108 @@
+//! What the screen looks like: a model drawn into a buffer of cells.
+//!
+//! The picture is computed apart from everything around it ([`View::picture`]) and kept until it has
+//! to be another one.
+
+mod fields;
+mod frame;
+mod image;
+mod legend;
+mod outline;
+mod overlay;
+mod plot;
+mod probe;
+mod reading;
+mod status;
+#[cfg(test)]
+mod tests;
+mod text;
+mod theme;
+
+use super::layout::{Focus, Layout, SMALLEST};
+use super::model::Model;
+use super::overlay::Overlay;
+use super::raster::{Colors, PictureCells};
+use image::Imager;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Position;
+use text::{Row, rect};
+use theme::Theme;
+
+/// Draws models.
+#[derive(Debug, Default)]
+pub struct View {
+    imager: Imager,
+    /// What the picture was made for.
+    made_for: Option<Version>,
+    picture: PictureCells,
+}
+
+/// What the picture's cells depend on.
+type Version = (u64, [usize; 2], Colors);
+
+impl View {
+    /// The cells of the picture, as they ought to be.
+    pub fn picture(&mut self, model: &Model, layout: &Layout) -> &PictureCells {
+        let version = (model.picture_version, layout.raster, model.colors);
+        if self.made_for != Some(version) {
+            let settled = image::is_settled(model);
+            let raster = self.imager.raster(model, layout.raster);
+            self.picture = PictureCells::new(&raster, model.colors, settled);
+            self.made_for = Some(version);
+        }
+        &self.picture
+    }
+
+    /// Draws `model` on the whole of `buffer`, which is empty and as large as the model's screen.
+    /// Where text is being typed, if it is.
+    pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
+        let theme = Theme::new(model.colors);
+        let Some(layout) = model.layout() else {
+            too_small(model.screen, buffer);
+            return None;
+        };
+        self.picture(model, &layout);
+        frame::draw(model, &layout, self.imager.legend(), &theme, buffer);
+        if model.file.blank {
+            reading::broken(model, &layout, &theme, buffer);
+        } else {
+            image::paint(&self.picture, layout.image, buffer);
+            reading::failure(model, &layout, &theme, buffer);
+            probe::draw(model, &layout, &theme, buffer);
+        }
+        status::draw(model, layout.status, &theme, buffer);
+        status::hints_line(model, layout.hints, &theme, buffer);
+        // A form has the place of the panels.
+        let mut cursor = None;
+        if !matches!(model.overlay, Some(Overlay::Form(_))) {
+            outline::draw(model, &layout, &theme, buffer);
+            cursor = fields::inspector(model, &layout, &theme, buffer);
+            plot::draw(model, &layout, &theme, buffer);
+        }
+        if model.overlay.is_some() {
+            cursor = overlay::draw(model, &theme, buffer);
+        }
+        cursor
+    }
+}
+
+/// Whether keys go to the panel `focus`.
+fn is_active(model: &Model, focus: Focus) -> bool {
+    model.focus == focus && model.overlay.is_none()
+}
+
+/// One polite line, broken as often as it must be.
+fn too_small([width, height]: [u16; 2], buffer: &mut Buffer) {
+    let [columns, rows] = SMALLEST;
+    let text = format!(
+        "zerkalo needs at least {columns} columns and {rows} rows; this terminal has {width} and \
+         {height}."
+    );
+    let lines = super::places::wrapped(&text, width.max(1));
+    let area = super::layout::Area { x: 0, y: 0, width, height };
+    let top = height.saturating_sub(lines.len() as u16) / 2;
+    for (row, line) in (top..).zip(&lines) {
+        let indent = usize::from(width).saturating_sub(text::columns(line)) / 2;
+        Row::new(buffer, area, row).skip(indent).put(line, ratatui::style::Style::new());
+    }
+}

@@ -1,0 +1,56 @@
+//! The outline: everything in the scene.
+
+use super::frame::{panel, scroll_mark};
+use super::is_active;
+use super::text::{Row, columns};
+use super::theme::Theme;
+use crate::dashboard::layout::{Focus, Layout};
+use crate::dashboard::message::Channel;
+use crate::dashboard::model::{Compared, Model};
+use crate::dashboard::panels::{OutlineLine, outline};
+use crate::dashboard::raster::object_color;
+use crate::scene::edit::Subject;
+use ratatui::buffer::Buffer;
+
+/// Draws it, if it is not folded away.
+pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
+    let Some(area) = layout.outline else { return };
+    let active = is_active(model, Focus::Outline);
+    panel(area, "outline", active, theme, buffer);
+    let inner = area.inner();
+    let lines = outline(model.scene());
+    let rows = usize::from(inner.height);
+    let first = model.outline_scroll.min(lines.len().saturating_sub(rows));
+    // The view of object ids needs a key to its colours.
+    let with_ids = model.channel == Channel::Objects && model.comparison.shown == Compared::Live;
+    for (row, line) in (0..).zip(lines.iter().skip(first).take(rows)) {
+        let mut to = Row::new(buffer, inner, row);
+        match line {
+            OutlineLine::Heading(title) => {
+                to.put(" ", theme.heading()).put(title, theme.heading());
+            }
+            OutlineLine::Entry { subject, label, note } => {
+                let selected = *subject == model.selection;
+                let (name, noted) = match selected {
+                    true => (theme.selected(active), theme.selected(active)),
+                    false => (theme.text(), theme.dim()),
+                };
+                if selected {
+                    to.fill(name);
+                }
+                let id = match subject {
+                    Subject::Object(i) if with_ids => theme.swatch(object_color(*i as u32)),
+                    _ => None,
+                };
+                match id {
+                    Some(style) => to.put(" ", name).put("■", style).put(" ", name),
+                    None => to.put(if selected { " ▸ " } else { "   " }, name),
+                };
+                // The note gives way to the name.
+                to.put_right(" ", 0, name).put_right(note, 2 + columns(label), noted);
+                to.put(label, name);
+            }
+        }
+    }
+    scroll_mark(inner, (first, rows, lines.len()), theme.border(active), buffer);
+}

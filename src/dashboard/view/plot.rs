@@ -1,0 +1,203 @@
+//! How the error falls: noise against seconds, both by ratio, with the target and the way there.
+
+use super::frame::panel;
+use super::text::{Row, columns, number};
+use super::theme::Theme;
+use crate::dashboard::layout::{Area, Layout};
+use crate::dashboard::model::Model;
+use ratatui::buffer::Buffer;
+use ratatui::style::{Color, Style};
+use ratatui::symbols::Marker;
+use ratatui::widgets::Widget;
+use ratatui::widgets::canvas::{Canvas, Line};
+
+/// Ends of an axis, natural numbers, the lower one first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Axis {
+    low: f64,
+    high: f64,
+}
+
+impl Axis {
+    /// Holds all of `values`, which are greater than 0, with some room around them.
+    fn around(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+        for value in values.filter(|v| *v > 0.0 && v.is_finite()) {
+            low = low.min(value);
+            high = high.max(value);
+        }
+        // At least a factor of 2, and a tenth beyond the ends.
+        (low <= high).then(|| {
+            let stretch = (2.0 * low / high).max(1.0).sqrt() * 1.1;
+            Self { low: low / stretch, high: high * stretch }
+        })
+    }
+
+    /// Where a value lies, 0 low to 1 high; may lie outside.
+    fn part(&self, value: f64) -> f64 {
+        (value / self.low).ln() / (self.high / self.low).ln()
+    }
+
+    /// Round numbers to write beside it: powers of ten, or 1, 2, 5 of each if they are few.
+    fn ticks(&self) -> Vec<f64> {
+        let steps: &[f64] = if self.high / self.low < 50.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let first = self.low.log10().floor() as i32;
+        let last = self.high.log10().ceil() as i32;
+        let all = (first..=last).flat_map(|e| steps.iter().map(move |s| s * 10f64.powi(e)));
+        all.filter(|t| (self.low..=self.high).contains(t)).collect()
+    }
+}
+
+/// A tick's number without what is not needed: `0.5`, `20`.
+fn label(value: f64) -> String {
+    if (1e-3..1e6).contains(&value) {
+        // Sixteen digits at most: sums of powers of ten are not exact.
+        format!("{}", (value * 1e6).round() / 1e6)
+    } else {
+        format!("{value:.0e}")
+    }
+}
+
+/// Draws it, if there is room for it.
+pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
+    let Some(area) = layout.plot else { return };
+    panel(area, "convergence", false, theme, buffer);
+    let inner = area.inner();
+    let points = model.convergence.points();
+    let Some(last) = points.last() else {
+        let middle = inner.height / 2;
+        let text = "no estimate of the noise yet";
+        let indent = usize::from(inner.width).saturating_sub(columns(text)) / 2;
+        Row::new(buffer, inner, middle).skip(indent).put(text, theme.dim());
+        return;
+    };
+    let corner = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
+    let mut title = Row::new(buffer, corner, 0);
+    title.skip(14).put_right(&format!(" {} codes ", number(last.noise_codes)), 0, theme.text());
+    let target = model.stop.noise_codes.filter(|t| *t > 0.0);
+    let eta = model.snapshot.as_ref().and_then(|s| s.report.eta_seconds);
+    // Where the target is reached if the middle guess holds.
+    let reached = match (target, eta) {
+        (Some(target), Some((from, to))) if target < last.noise_codes => {
+            Some((last.seconds + 0.5 * (from + to), target))
+        }
+        _ => None,
+    };
+    let seconds = points.iter().map(|p| p.seconds).chain(reached.map(|(s, _)| s));
+    let noise = points.iter().map(|p| p.noise_codes).chain(target);
+    let (Some(x), Some(y)) = (Axis::around(seconds), Axis::around(noise)) else { return };
+    let Some(plot) = axes(inner, &x, &y, theme, buffer) else { return };
+    let place = |seconds: f64, noise: f64| (x.part(seconds), y.part(noise));
+    // A canvas knows colours only.
+    let color = |style: Style| style.fg.unwrap_or(Color::Reset);
+    let line = |(x1, y1): (f64, f64), (x2, y2): (f64, f64), style| Line {
+        x1,
+        y1,
+        x2,
+        y2,
+        color: color(style),
+    };
+    Canvas::default()
+        .marker(Marker::Braille)
+        .x_bounds([0.0, 1.0])
+        .y_bounds([0.0, 1.0])
+        .paint(|canvas| {
+            if let Some(target) = target {
+                let height = y.part(target);
+                for i in 0..DASHES {
+                    let from = i as f64 / DASHES as f64;
+                    let to = from + 0.5 / DASHES as f64;
+                    canvas.draw(&line((from, height), (to, height), theme.good()));
+                }
+            }
+            if let Some((seconds, noise)) = reached {
+                let (from, to) = (place(last.seconds, last.noise_codes), place(seconds, noise));
+                let at =
+                    |part: f64| (from.0 + (to.0 - from.0) * part, from.1 + (to.1 - from.1) * part);
+                for i in 0..DASHES {
+                    let part = i as f64 / DASHES as f64;
+                    canvas.draw(&line(at(part), at(part + 0.4 / DASHES as f64), theme.dim()));
+                }
+            }
+            canvas.layer();
+            for pair in points.windows(2) {
+                let [a, b] = [pair[0], pair[1]].map(|p| place(p.seconds, p.noise_codes));
+                canvas.draw(&line(a, b, theme.accent()));
+            }
+            let at = place(last.seconds, last.noise_codes);
+            canvas.draw(&line(at, at, theme.accent()));
+        })
+        .render(super::rect(plot), buffer);
+}
+
+/// Pieces of a broken line across the plot.
+const DASHES: usize = 16;
+
+/// Draws both axes inside `area`; what is left for the plot itself.
+fn axes(area: Area, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> Option<Area> {
+    let ticks: Vec<_> = y.ticks().into_iter().map(|t| (t, label(t))).collect();
+    let labels = ticks.iter().map(|(_, l)| columns(l)).max().unwrap_or(0) as u16;
+    let left = labels + 2;
+    if area.width < left + 8 || area.height < 4 {
+        return None;
+    }
+    let plot =
+        Area { x: area.x + left, y: area.y, width: area.width - left - 1, height: area.height - 2 };
+    let line = theme.border(false);
+    for row in 0..plot.height {
+        Row::new(buffer, Area { x: plot.x - 1, width: 1, ..plot }, row).put("│", line);
+    }
+    let foot = Area { x: plot.x - 1, width: plot.width + 1, ..area };
+    Row::new(buffer, foot, plot.height).put("└", line).put(&"─".repeat(plot.width.into()), line);
+    let mut free = plot.height;
+    for (tick, text) in &ticks {
+        let row = ((1.0 - y.part(*tick)) * f64::from(plot.height)) as u16;
+        // One row, one number.
+        if row < free {
+            let indent = usize::from(labels) - columns(text);
+            Row::new(buffer, area, row).skip(indent).put(text, theme.dim());
+            Row::new(buffer, Area { x: plot.x - 1, width: 1, ..plot }, row).put("┤", line);
+            free = row;
+        }
+    }
+    let mut free = area.x;
+    for tick in x.ticks() {
+        let text = format!("{} s", label(tick));
+        let column = plot.x + (x.part(tick) * f64::from(plot.width)) as u16;
+        let start = column.saturating_sub(columns(&text) as u16 / 2).max(area.x);
+        let end = start + columns(&text) as u16;
+        if start >= free && end <= area.x + area.width && column < plot.x + plot.width {
+            let at = Area { x: start, width: end - start, ..area };
+            Row::new(buffer, at, plot.height + 1).put(&text, theme.dim());
+            Row::new(buffer, Area { x: column, width: 1, ..area }, plot.height).put("┬", line);
+            free = end + 1;
+        }
+    }
+    Some(plot)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_hold_their_values_and_have_ticks() {
+        for values in [vec![0.02, 30.0], vec![1.0], vec![0.4, 0.5], vec![1e-3, 1e5]] {
+            let axis = Axis::around(values.iter().copied()).unwrap();
+            for value in &values {
+                assert!((0.0..=1.0).contains(&axis.part(*value)), "{values:?} {axis:?}");
+            }
+            let ticks = axis.ticks();
+            assert!(!ticks.is_empty() && ticks.is_sorted(), "{values:?} {ticks:?}");
+        }
+        assert_eq!(Axis::around([0.0, f64::NAN].into_iter()), None);
+        assert_eq!(
+            Axis { low: 0.3, high: 6.0 }.ticks().iter().map(|t| label(*t)).collect::<Vec<_>>(),
+            ["0.5", "1", "2", "5"]
+        );
+        assert_eq!(
+            Axis { low: 0.02, high: 60.0 }.ticks().iter().map(|t| label(*t)).collect::<Vec<_>>(),
+            ["0.1", "1", "10"]
+        );
+    }
+}

@@ -1,0 +1,111 @@
+//! The probe: a mark on the picture and numbers beside it.
+
+use super::frame::overlay;
+use super::text::{Row, columns, number};
+use super::theme::Theme;
+use crate::dashboard::layout::{Area, Layout};
+use crate::dashboard::model::Model;
+use crate::film::quantised_8;
+use crate::scene::edit::Subject;
+use ratatui::buffer::Buffer;
+use ratatui::style::{Color, Modifier, Style};
+
+/// Columns of the box with its border.
+const WIDTH: u16 = 36;
+
+/// Draws both, while a pixel is probed.
+pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
+    let Some([x, y]) = model.probe else { return };
+    let film = model.scene().film.size;
+    // The half cell that shows the pixel.
+    let place = |at: usize, pixels: u32, cells: usize| {
+        ((at as f64 + 0.5) / f64::from(pixels.max(1)) * cells as f64) as u16
+    };
+    let column = layout.image.x + place(x, film[0], layout.raster[0]);
+    let row = layout.image.y + place(y, film[1], layout.raster[1]) / 2;
+    mark(column, row, theme, buffer);
+    let lines = readout(model);
+    let height = lines.len() as u16 + 2;
+    let area = layout.picture;
+    if area.width < WIDTH + 4 || area.height < height + 4 {
+        let mut row = Row::new(buffer, area, area.height.saturating_sub(1));
+        row.skip(2);
+        for (name, value) in lines.iter().take(2) {
+            row.put(&format!(" {name} {value} "), theme.text());
+        }
+        return;
+    }
+    // In the corner that is farthest from the mark.
+    let left = area.x + 2;
+    let right = area.x + area.width - WIDTH - 2;
+    let x_box = if column < area.x + area.width / 2 { right } else { left };
+    let top = area.y + 1;
+    let bottom = area.y + area.height - height - 1;
+    let y_box = if row < area.y + area.height / 2 { bottom } else { top };
+    let frame = Area { x: x_box, y: y_box, width: WIDTH, height };
+    overlay(frame, &format!("pixel {x}, {y}"), theme, buffer);
+    let inner = frame.inner();
+    for (i, (name, value)) in (0..).zip(&lines) {
+        let mut row = Row::new(buffer, inner, i);
+        row.skip(1).put_wide(name, 10, theme.dim());
+        if i == 1
+            && let Some(probe) = model.probed()
+            && let Some(style) = theme.swatch(probe.codes.map(quantised_8))
+        {
+            row.put_right(" ", 0, style).put_right("██", columns(value), style);
+        }
+        row.put(value, theme.text());
+    }
+}
+
+/// Names and numbers.
+fn readout(model: &Model) -> Vec<(&'static str, String)> {
+    let Some(probe) = model.probed() else {
+        return vec![("samples", "none yet".to_string())];
+    };
+    let three = |values: [f64; 3]| values.map(number).join("  ");
+    let [a, b] = probe.samples;
+    let mut lines = vec![
+        ("radiance", three(probe.radiance)),
+        ("codes", probe.codes.map(|c| format!("{c:.1}")).join("  ")),
+        ("samples", format!("{}", u64::from(a) + u64::from(b))),
+    ];
+    if let Some(difference) = probe.difference {
+        lines.push(("error", format!("± {}", three(difference))));
+    }
+    if let Some(codes) = probe.tile_rmse_codes {
+        lines.push(("tile", format!("± {} codes", number(codes))));
+    }
+    if let Some(name) = seen(model, probe.pixel) {
+        lines.push(("object", name));
+    }
+    lines
+}
+
+/// What is seen at a pixel of the film.
+fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
+    let guide = model.snapshot.as_ref()?.guide.as_deref()?;
+    let [width, height] = model.scene().film.size.map(|n| n.max(1) as usize);
+    let object = guide.at(x * guide.columns / width, y * guide.rows / height)?.object?;
+    let subject = Subject::Object(object as usize);
+    subject.exists(model.scene()).then(|| subject.label(model.scene()))
+}
+
+/// A cross whose colour stands out from what is below.
+fn mark(column: u16, row: u16, theme: &Theme, buffer: &mut Buffer) {
+    let Some(cell) = buffer.cell_mut((column, row)) else { return };
+    let light = |color: Color| match color {
+        Color::Rgb(r, g, b) => u32::from(r) * 2 + u32::from(g) * 7 + u32::from(b) > 1400,
+        _ => false,
+    };
+    // Both halves take part: the cross covers the middle.
+    let style = match (cell.bg, cell.fg) {
+        (Color::Rgb(..), fg) if cell.symbol() != " " && light(fg) != light(cell.bg) => {
+            theme.accent()
+        }
+        (bg @ Color::Rgb(..), _) if light(bg) => Style::new().fg(Color::Rgb(0, 0, 0)),
+        (Color::Rgb(..), _) => Style::new().fg(Color::Rgb(255, 255, 255)),
+        _ => Style::new().add_modifier(Modifier::REVERSED),
+    };
+    cell.set_char('┼').set_style(style);
+}

@@ -1,0 +1,187 @@
+//! The two lowest lines: where the work stands, and what the keys do or what has just happened.
+
+use super::text::{Row, columns, duration, durations, number};
+use super::theme::Theme;
+use crate::dashboard::hints::{Hint, hints};
+use crate::dashboard::layout::Area;
+use crate::dashboard::model::{Model, Tone};
+use crate::render::schedule::StoppedBy;
+use crate::render::session::{Report, State};
+use ratatui::buffer::Buffer;
+use ratatui::style::{Modifier, Style};
+
+/// A part of the status line.
+struct Part {
+    /// The larger, the earlier it gives way.
+    expendable: u8,
+    text: Vec<(String, Style)>,
+}
+
+/// Draws where the work stands: as many parts as fit, whole ones only.
+pub fn draw(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
+    let mut parts = parts(model, theme);
+    let width = |parts: &[Part]| -> usize {
+        parts.iter().flat_map(|p| &p.text).map(|(text, _)| columns(text)).sum::<usize>()
+            + 2 * parts.len()
+    };
+    while width(&parts) > usize::from(area.width) && parts.len() > 1 {
+        let most = parts.iter().map(|p| p.expendable).max().unwrap_or(0);
+        let Some(last) = parts.iter().rposition(|p| p.expendable == most) else { break };
+        parts.remove(last);
+    }
+    let mut row = Row::new(buffer, area, 0);
+    row.skip(1);
+    for part in &parts {
+        for (text, style) in &part.text {
+            row.put(text, *style);
+        }
+        row.skip(2);
+    }
+}
+
+fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
+    let part = |expendable, text| Part { expendable, text };
+    let plain = |text: String| (text, theme.text());
+    let dim = |text: &str| (text.to_string(), theme.dim());
+    let mut parts = Vec::new();
+    if let Some(export) = &model.export {
+        let [width, height] = export.size;
+        let text = format!("writing {width}×{height}  {:.0} %", 100.0 * export.progress);
+        parts.push(part(0, vec![(text, theme.accent())]));
+    }
+    let Some(snapshot) = &model.snapshot else {
+        let text = if model.file.blank { "nothing to trace" } else { "compiling" };
+        parts.push(part(0, vec![dim(text)]));
+        return parts;
+    };
+    let report = &snapshot.report;
+    parts.insert(0, part(0, vec![state(model, report, theme)]));
+    if matches!(report.state, State::Idle | State::Failed(_)) {
+        return parts;
+    }
+    parts.push(part(1, spp(model, report, theme)));
+    if matches!(report.state, State::Tracing) {
+        let speed = report.recent_samples_per_second * 1e-6;
+        parts.push(part(4, vec![plain(number(speed)), dim(" Ms/s")]));
+    }
+    if let Some(noise) = report.noise {
+        parts.push(part(2, noise_part(model, report, noise.rmse_codes, theme)));
+    }
+    if let Some(limit) = model.stop.seconds {
+        let text = format!("{} of {}", duration(report.seconds), duration(limit));
+        parts.push(part(3, vec![plain(text)]));
+    } else {
+        parts.push(part(6, vec![dim(&duration(report.seconds))]));
+    }
+    if report.bad_samples > 0 {
+        let text = format!("{} bad samples", report.bad_samples);
+        parts.push(part(3, vec![(text, theme.warn())]));
+    }
+    let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
+    parts.push(part(7, vec![dim(precision)]));
+    let threads = match report.threads {
+        1 => "1 thread".to_string(),
+        n => format!("{n} threads"),
+    };
+    let priority = if model.low_priority { ", low priority" } else { "" };
+    parts.push(part(5, vec![dim(&threads), dim(priority)]));
+    parts
+}
+
+fn state(model: &Model, report: &Report, theme: &Theme) -> (String, Style) {
+    let (text, style) = match &report.state {
+        State::Idle => ("compiling", theme.dim()),
+        State::Failed(_) => ("✗ cannot be rendered", theme.bad()),
+        State::Paused => ("‖ paused", theme.warn()),
+        State::Tracing if model.paused => ("‖ paused", theme.warn()),
+        State::Tracing => ("● tracing", theme.accent()),
+        State::Resting(StoppedBy::Noise | StoppedBy::Rmse) => {
+            ("✓ converged, resting", theme.good())
+        }
+        State::Resting(StoppedBy::Spp) => ("✓ samples reached, resting", theme.good()),
+        State::Resting(StoppedBy::Time) => ("✓ time over, resting", theme.good()),
+        State::Resting(StoppedBy::RaysPerPixel) => ("✓ rays per pixel reached", theme.good()),
+        State::Resting(StoppedBy::Full) => ("✓ no more samples fit", theme.good()),
+    };
+    (text.to_string(), style)
+}
+
+fn spp(model: &Model, report: &Report, theme: &Theme) -> Vec<(String, Style)> {
+    let spp = report.spp;
+    let mut text = vec![(format!("{:.0}", spp.mean), theme.text())];
+    if let Some(target) = model.stop.spp {
+        text.push((format!(" of {target}"), theme.text()));
+    }
+    text.push((" spp".to_string(), theme.dim()));
+    if spp.min != spp.max {
+        text.push((format!(" ({}–{})", spp.min, spp.max), theme.dim()));
+    }
+    text
+}
+
+/// `noise 0.84 → 0.5 codes in 3–5 s`.
+fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<(String, Style)> {
+    let dim = |text: &str| (text.to_string(), theme.dim());
+    let mut text = vec![dim("noise "), (number(codes), theme.text())];
+    match model.stop.noise_codes.filter(|target| *target < codes) {
+        Some(target) => {
+            text.push((format!(" → {target}"), theme.good()));
+            text.push(dim(" codes"));
+        }
+        None => text.push(dim(" codes")),
+    }
+    if let (Some((from, to)), State::Tracing) = (report.eta_seconds, &report.state) {
+        text.push((format!(" in {}", durations(from, to)), theme.text()));
+    }
+    text
+}
+
+/// Draws the notice, or else the hints for what the keys do now.
+pub fn hints_line(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
+    let mut row = Row::new(buffer, area, 0);
+    row.skip(1);
+    if let Some(notice) = &model.notice {
+        let (mark, style) = match notice.tone {
+            Tone::Good => ("✓ ", theme.good()),
+            Tone::Plain => ("· ", theme.accent()),
+            Tone::Bad => ("✗ ", theme.bad()),
+        };
+        row.put(mark, style).put(&notice.text, theme.text());
+        return;
+    }
+    let all = hints(model);
+    for (keys, _, does) in fitting(all, row.left()) {
+        row.put(keys, theme.accent().add_modifier(Modifier::BOLD)).put(" ", theme.dim());
+        row.put(does, theme.dim()).skip(3);
+    }
+}
+
+/// The hints that fit whole in `width` columns. The last ones, which lead to all others, stay.
+fn fitting(all: &[Hint], width: usize) -> Vec<Hint> {
+    let mut some = all.to_vec();
+    let taken = |hints: &[Hint]| -> usize {
+        let one = |(keys, _, does): &Hint| columns(keys) + 1 + columns(does) + 3;
+        hints.iter().map(one).sum::<usize>().saturating_sub(3)
+    };
+    while taken(&some) > width && !some.is_empty() {
+        // The first and the last two are the last to go.
+        let at = if some.len() > 3 { some.len() - 3 } else { some.len() - 1 };
+        some.remove(at);
+    }
+    some
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hints_are_dropped_whole_and_the_way_to_help_stays() {
+        let all: &[Hint] =
+            &[("a", "a", "first"), ("b", "b", "second"), (":", ":", "all"), ("?", "?", "keys")];
+        assert_eq!(fitting(all, 80).len(), 4);
+        let some = fitting(all, 25);
+        assert_eq!(some.iter().map(|h| h.0).collect::<Vec<_>>(), ["a", ":", "?"]);
+        assert!(fitting(all, 3).is_empty());
+    }
+}

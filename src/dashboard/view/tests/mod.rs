@@ -1,0 +1,39 @@
+//! Screens: what is drawn in each state at each size.
+//!
+//! The text of every screen stands in `tests/screens`; `ZERKALO_BLESS=1` writes it anew.
+
+mod golden;
+mod paint;
+mod robust;
+mod states;
+mod styles;
+
+use super::View;
+use crate::dashboard::model::Model;
+use ratatui::buffer::Buffer;
+use ratatui::layout::{Position, Rect};
+
+/// The screen of a model.
+fn drawn(model: &Model) -> (Buffer, Option<Position>) {
+    let [width, height] = model.screen;
+    let mut buffer = Buffer::empty(Rect { x: 0, y: 0, width, height });
+    let cursor = View::default().draw(model, &mut buffer);
+    (buffer, cursor)
+}
+
+/// The text of a row, without blanks at its end.
+fn row_text(buffer: &Buffer, y: u16) -> String {
+    let mut text = String::new();
+    let mut hidden = 0;
+    for x in buffer.area.left()..buffer.area.right() {
+        // What a wide character covers is no cell of its own.
+        if hidden > 0 {
+            hidden -= 1;
+            continue;
+        }
+        let symbol = buffer[(x, y)].symbol();
+        hidden = super::text::columns(symbol).saturating_sub(1);
+        text += symbol;
+    }
+    text.trim_end().to_string()
+}

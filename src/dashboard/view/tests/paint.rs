@@ -1,0 +1,81 @@
+//! Screens with real pictures as files of terminal codes, to look at:
+//! `ZERKALO_SCREENS=folder cargo test --lib paint -- --ignored`, then `cat` one in a terminal of its
+//! size.
+
+use super::drawn;
+use super::states::{STATES, tracing};
+use crate::dashboard::model::{Colors, Model};
+use crate::film::Display;
+use crate::render::schedule::{Criterion, Settings, Stop};
+use crate::render::session::{Session, Snapshot, State, View};
+use crate::render::{Options, Rendering};
+use crate::sampling::{SampleSettings, SamplerKind};
+use crate::world;
+use ratatui::backend::{Backend, CrosstermBackend};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+fn rendered(model: &Model, spp: u32) -> Snapshot {
+    let options = Options {
+        world: world::Options::default(),
+        sampling: SampleSettings { seed: 0, kind: SamplerKind::Sobol },
+        display: Display::default(),
+    };
+    let stop = Stop { spp: Some(spp), ..Stop::default() };
+    let settings =
+        Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+    let mut session: Session<Rendering> = Session::new(2, options, settings).unwrap();
+    session.set_view(View { raster: Some(model.layout().unwrap().raster), probe: model.probe });
+    session.set_scene(Arc::clone(model.scene()));
+    loop {
+        let snapshot = session.wait(Duration::from_secs(60)).expect("a snapshot in time");
+        if matches!(snapshot.report.state, State::Resting(_)) && snapshot.guide.is_some() {
+            return snapshot;
+        }
+    }
+}
+
+#[test]
+#[ignore = "for eyes"]
+fn paint() {
+    let folder = std::env::var_os("ZERKALO_SCREENS").expect("ZERKALO_SCREENS names a folder");
+    let levels = [
+        ("true", Colors::True),
+        ("256", Colors::Indexed),
+        ("16", Colors::Sixteen),
+        ("mono", Colors::Mono),
+    ];
+    for screen in [[200, 60], [120, 36], [80, 24], [40, 12]] {
+        let picture = rendered(&tracing(screen), 32);
+        for (name, make) in STATES {
+            let mut model = tracing(screen);
+            make(&mut model);
+            if let Some(before) = &model.snapshot {
+                let mut snapshot = picture.clone();
+                snapshot.probe = before.probe;
+                snapshot.report = before.report.clone();
+                snapshot.report.inventory = "6 objects: 2 spheres (list), 3 convex solids, 1 rectangle, Phong, cone lobe, 1 point light, single precision".into();
+                model.snapshot = Some(Box::new(snapshot));
+            }
+            for (level, colors) in levels {
+                if colors != Colors::True && *name != "tracing" {
+                    continue;
+                }
+                model.colors = colors;
+                let (buffer, _) = drawn(&model);
+                let mut bytes = Vec::new();
+                let mut encoder = CrosstermBackend::new(&mut bytes);
+                encoder.clear().unwrap();
+                encoder
+                    .draw(buffer.content().iter().enumerate().map(|(i, cell)| {
+                        let (x, y) = buffer.pos_of(i);
+                        (x, y, cell)
+                    }))
+                    .unwrap();
+                let file = format!("{name}-{}x{}-{level}.ans", screen[0], screen[1]);
+                std::fs::write(Path::new(&folder).join(file), bytes).unwrap();
+            }
+        }
+    }
+}

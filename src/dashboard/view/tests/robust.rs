@@ -1,0 +1,39 @@
+//! No size and no colours are too few for any state.
+
+use super::drawn;
+use super::states::{STATES, tracing};
+use crate::dashboard::model::Colors;
+use proptest::prelude::*;
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+    #[test]
+    fn nothing_panics_and_nothing_steers_the_terminal(
+        width in 0u16..=300, height in 0u16..=100, state in 0..STATES.len(), colors in 0usize..4,
+    ) {
+        let mut model = tracing([width, height]);
+        STATES[state].1(&mut model);
+        model.colors = Colors::ALL[colors];
+        let (buffer, cursor) = drawn(&model);
+        for cell in buffer.content() {
+            prop_assert!(!cell.symbol().chars().any(char::is_control));
+        }
+        if let Some(at) = cursor {
+            prop_assert!(at.x < width && at.y < height, "cursor at {at:?}");
+        }
+    }
+}
+
+/// The sizes around every threshold of the layout.
+#[test]
+fn small_sizes() {
+    for (_, make) in STATES {
+        for width in (0..46).chain([71, 72, 73, 99, 100]) {
+            for height in (0..20).step_by(1 + usize::from(width > 41)) {
+                let mut model = tracing([width, height]);
+                make(&mut model);
+                drawn(&model);
+            }
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! Models in every state that has a look of its own.
+
+use crate::dashboard::editor::Editor;
+use crate::dashboard::keymap::KEYMAP;
+use crate::dashboard::layout::Focus;
+use crate::dashboard::message::{Channel, Format};
+use crate::dashboard::model::{
+    Colors, Compared, Inspector, Mode, Model, Notice, RunningExport, Start, Tone,
+};
+use crate::dashboard::overlay::{
+    Answer, Form, Overlay, Palette, Pick, PickFor, Prompt, PromptFor, Question,
+};
+use crate::dashboard::panels::{Line, scrolled};
+use crate::dashboard::testing::report;
+use crate::film::{Mix, Probe};
+use crate::render::schedule::{Spp, Stop, StoppedBy};
+use crate::render::session::{Report, Snapshot, State, TileMaps};
+use crate::scene::edit::{self, Subject};
+use crate::scene::{Scene, built_in};
+use std::sync::Arc;
+
+/// A name, and what makes the state of a model that has been tracing for a while.
+pub type Named = (&'static str, fn(&mut Model));
+
+/// The built-in scene after 212 samples, nothing pressed since long.
+pub fn tracing(screen: [u16; 2]) -> Model {
+    let mut model = Model::new(Start {
+        path: Some("scenes/mirror-room.toml".into()),
+        name: String::new(),
+        scene: Ok(Arc::new(built_in())),
+        screen,
+        colors: Colors::True,
+        stop: Stop { noise_codes: Some(0.5), ..Stop::default() },
+        threads: 2,
+        most_threads: 2,
+    });
+    model.first_time = false;
+    for spp in [2, 4, 8, 16, 32, 64, 96, 128, 160, 212] {
+        let noise = 0.9 * (212.0 / spp as f64).powf(0.6);
+        model.convergence.add(&with_spread(report(1, spp, Some(noise))));
+    }
+    let last = Report {
+        eta_seconds: Some((0.9, 1.6)),
+        progress: Some(0.4),
+        ..with_spread(report(1, 212, Some(0.9)))
+    };
+    model.snapshot = Some(Box::new(snapshot(last)));
+    model
+}
+
+fn with_spread(mut report: Report) -> Report {
+    report.spp = Spp { min: 32, mean: report.spp.mean, max: 900 };
+    report.seconds *= 10.0;
+    report
+}
+
+pub fn snapshot(report: Report) -> Snapshot {
+    Snapshot {
+        report,
+        picture: None,
+        mix: Mix { weights: Vec::new() },
+        lighting: None,
+        guide: None,
+        tiles: Arc::new(TileMaps {
+            columns: 40,
+            rows: 30,
+            noise_codes: (0..1200).map(|i| 0.1 + i as f32 * 0.01).collect(),
+            spp: (0..1200).map(|i| 32 + i % 900).collect(),
+        }),
+        probe: None,
+    }
+}
+
+fn select(model: &mut Model, object: &str) {
+    let scene = Arc::clone(model.scene());
+    let found = (0..scene.objects.len())
+        .map(Subject::Object)
+        .find(|subject| subject.label(&scene) == object);
+    model.selection = found.unwrap_or_else(|| panic!("{object} in the built-in scene"));
+}
+
+/// The first object that is no mirror.
+fn select_first(model: &mut Model) {
+    let name = Subject::Object(0).label(model.scene());
+    select(model, &name);
+}
+
+fn field(model: &Model, key: &str) -> usize {
+    let is = |line: &Line| line.field().is_some_and(|field| field.key == key);
+    model.field_lines().iter().position(is).unwrap_or_else(|| panic!("a field {key}"))
+}
+
+fn inspecting(model: &mut Model, key: &str) {
+    select_first(model);
+    model.focus = Focus::Inspector;
+    model.inspector = Inspector { cursor: field(model, key), ..Inspector::default() };
+}
+
+fn typing(model: &mut Model, text: &str, problem: Option<&str>) {
+    inspecting(model, "color");
+    let mut editor = Editor::new(text);
+    editor.problem = problem.map(str::to_string);
+    model.inspector.editor = Some(editor);
+    if let Some((list, _)) = model.inspector_rows() {
+        let (cursor, lines) = (model.inspector.cursor, model.field_lines().len());
+        model.inspector.scroll = scrolled(0, cursor, lines, list.height.into());
+    }
+}
+
+fn resting(model: &mut Model, by: StoppedBy) {
+    let snapshot = model.snapshot.as_mut().unwrap();
+    snapshot.report.state = State::Resting(by);
+    snapshot.report.eta_seconds = None;
+    snapshot.report.noise.as_mut().unwrap().rmse_codes = 0.49;
+}
+
+fn notice(model: &mut Model, tone: Tone, text: &str) {
+    model.notice = Some(Notice { text: text.to_string(), tone, until: None });
+}
+
+fn adding(model: &mut Model, problem: Option<&str>) {
+    let edit = edit::add_object(model.scene(), "sphere", None).unwrap();
+    let form = Form {
+        title: "new sphere".to_string(),
+        scene: Arc::new(edit.scene),
+        subject: edit.subject,
+        label: edit.label,
+        before: model.selection.clone(),
+        cursor: 2,
+        scroll: 0,
+        editor: None,
+        problem: problem.map(str::to_string),
+    };
+    model.overlay = Some(Overlay::Form(form));
+}
+
+fn prompt(model: &mut Model, purpose: PromptFor, words: [&str; 3], problem: Option<&str>) {
+    let [title, help, text] = words.map(str::to_string);
+    let mut editor = Editor::new(text);
+    editor.problem = problem.map(str::to_string);
+    model.overlay = Some(Overlay::Prompt(Prompt { purpose, title, help, editor }));
+}
+
+fn probing(model: &mut Model) {
+    model.mode = Mode::Probe;
+    model.probe = Some([320, 240]);
+    model.snapshot.as_mut().unwrap().probe = Some(Probe {
+        pixel: [320, 240],
+        samples: [106, 106],
+        radiance: [0.2123, 0.18, 0.0904],
+        codes: [127.46, 118.2, 83.9],
+        difference: Some([0.012, 0.01, 0.004]),
+        tile_rmse_linear: Some(0.01),
+        tile_rmse_codes: Some(0.84),
+    });
+}
+
+fn broken(model: &mut Model) {
+    let text = "[film]\nsize = [640, 480]\n\n[[object]]\nname = \"queen\"\nmaterial = \"ivroy\"\n\
+                shape.sphere = { center = [0, 0, 0], radius = -1.0 }\n";
+    model.file.broken = Some(Scene::parse(text, "mirror-room.toml").unwrap_err());
+}
+
+/// Every state.
+pub const STATES: &[Named] = &[
+    ("first-time", |m| {
+        m.first_time = true;
+        m.snapshot = None;
+        m.convergence = Default::default();
+    }),
+    ("tracing", |_| {}),
+    ("converged", |m| resting(m, StoppedBy::Noise)),
+    ("paused", |m| {
+        m.paused = true;
+        m.snapshot.as_mut().unwrap().report.state = State::Paused;
+    }),
+    ("failed", |m| {
+        let why = "object \"cube\" is so far away that no precision is left there.";
+        m.snapshot.as_mut().unwrap().report.state = State::Failed(why.to_string());
+    }),
+    ("unsaved-and-shown-otherwise", |m| {
+        let edit = edit::delete(m.scene(), &Subject::Object(0)).unwrap();
+        m.history.record(Arc::new(edit.scene), "delete", false);
+        m.display.exposure_ev = 0.75;
+        m.display.tone = crate::film::Tone::Neutral;
+        m.low_priority = true;
+        let size = [1920, 1080];
+        m.export = Some(RunningExport { size, format: Format::Png, progress: 0.43 });
+    }),
+    ("outline", |m| {
+        m.focus = Focus::Outline;
+        select_first(m);
+    }),
+    ("inspector", |m| inspecting(m, "material")),
+    ("typing", |m| typing(m, "0.7", None)),
+    ("typing-refused", |m| {
+        typing(
+            m,
+            "bright red",
+            Some(
+                "`bright red` is no colour. Expected three numbers of at least 0, or \"#rrggbb\".",
+            ),
+        );
+    }),
+    ("moving", |m| {
+        select_first(m);
+        m.mode = Mode::Move;
+    }),
+    ("turning", |m| {
+        select_first(m);
+        m.mode = Mode::Turn;
+    }),
+    ("flying", |m| m.mode = Mode::Fly),
+    ("probing", probing),
+    ("noise", |m| m.channel = Channel::Noise),
+    ("samples", |m| m.channel = Channel::Samples),
+    ("objects", |m| m.channel = Channel::Objects),
+    ("kept", |m| m.comparison.shown = Compared::Kept),
+    ("only-picture", |m| m.only_picture = true),
+    ("notice", |m| {
+        notice(
+            m,
+            Tone::Good,
+            "wrote mirror-room-1.png, 640×480, 212 spp, noise 0.9 codes — scp ada@sun:/home/ada/mirror-room-1.png .",
+        );
+    }),
+    ("notice-of-a-refusal", |m| notice(m, Tone::Bad, "nothing is selected that can be deleted")),
+    ("help", |m| m.overlay = Some(Overlay::Help { scroll: 0 })),
+    ("help-scrolled", |m| m.overlay = Some(Overlay::Help { scroll: 60 })),
+    ("inventory", |m| m.overlay = Some(Overlay::Inventory { scroll: 0 })),
+    ("palette", |m| {
+        let found = (0..KEYMAP.len()).filter(|i| KEYMAP[*i].label.contains("light")).collect();
+        let editor = Editor::new("light");
+        m.overlay = Some(Overlay::Palette(Palette { editor, found, cursor: 1, scroll: 0 }));
+    }),
+    ("palette-empty", |m| {
+        let editor = Editor::new("teapot");
+        m.overlay = Some(Overlay::Palette(Palette { editor, found: vec![], cursor: 0, scroll: 0 }));
+    }),
+    ("kinds", |m| {
+        let kinds = edit::object_kinds();
+        let entries = kinds.iter().map(|w| (w.name.to_string(), w.doc.to_string())).collect();
+        let title = "add an object".to_string();
+        let purpose = PickFor::Object;
+        m.overlay = Some(Overlay::Pick(Pick { purpose, title, entries, cursor: 1, scroll: 0 }));
+    }),
+    ("form", |m| adding(m, None)),
+    ("form-refused", |m| {
+        adding(m, Some("radius is -1. Expected a number greater than 0, at most 1e9."));
+    }),
+    ("save-as", |m| {
+        let words = ["save as", "A file name ending in .toml.", "rooms/mirror-room-2.toml"];
+        prompt(m, PromptFor::SaveAs, words, None);
+    }),
+    ("stop-at-refused", |m| {
+        let help = "noise 0.5, spp 1000, time 60, or none.";
+        let problem =
+            "`noise low` is no number of codes. Type noise 0.5, spp 1000, time 60, or none.";
+        prompt(m, PromptFor::StopAt, ["stop at", help, "noise low"], Some(problem));
+    }),
+    ("quit", |m| {
+        let text = "There are edits that are not saved.".to_string();
+        let answers = vec![
+            ('s', "save and quit".to_string(), Answer::SaveAndQuit),
+            ('d', "discard them and quit".to_string(), Answer::Quit),
+            ('c', "cancel".to_string(), Answer::Nothing),
+        ];
+        m.overlay = Some(Overlay::Question(Question { text, answers, cursor: 0 }));
+    }),
+    ("file-became-unreadable", broken),
+    ("broken-file", |m| {
+        broken(m);
+        m.file.blank = true;
+        m.snapshot = None;
+        m.convergence = Default::default();
+    }),
+    ("names-from-elsewhere", |m| {
+        let mut scene = built_in();
+        scene.objects[0].name = "鏡の部屋\u{1b}[31m\u{202e} with a name that never ends".into();
+        scene.lights[0].name = "\t\n\u{7}".into();
+        m.file.name = crate::value::printable("鏡\u{1b}]0;evil\u{7}.toml");
+        m.history.record(Arc::new(scene), "names", false);
+        m.focus = Focus::Outline;
+        m.selection = Subject::Object(0);
+    }),
+];

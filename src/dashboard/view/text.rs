@@ -1,0 +1,227 @@
+//! Text in cells: measured in columns, cut with an ellipsis, never outside its area.
+
+use crate::dashboard::layout::Area;
+use crate::value::printable;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use std::borrow::Cow;
+use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+
+/// Columns that `text` takes.
+pub fn columns(text: &str) -> usize {
+    text.width()
+}
+
+/// `text` in at most `width` columns, with an ellipsis if there was more.
+pub fn cut(text: &str, width: usize) -> Cow<'_, str> {
+    if columns(text) <= width {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::new();
+    let mut used = 1;
+    for c in text.chars() {
+        used += c.width().unwrap_or(0);
+        if used > width {
+            break;
+        }
+        out.push(c);
+    }
+    if width > 0 {
+        out.push('…');
+    }
+    Cow::Owned(out)
+}
+
+/// `text` without its first `skipped` columns.
+pub fn skip(text: &str, skipped: usize) -> &str {
+    let mut used = 0;
+    let start = text.char_indices().find(|(_, c)| {
+        let reached = used >= skipped;
+        used += c.width().unwrap_or(0);
+        reached
+    });
+    start.map_or("", |(at, _)| &text[at..])
+}
+
+/// The same rectangle in ratatui's words.
+pub fn rect(area: Area) -> Rect {
+    Rect { x: area.x, y: area.y, width: area.width, height: area.height }
+}
+
+/// A row of cells that is filled from left to right.
+pub struct Row<'a> {
+    buffer: &'a mut Buffer,
+    x: u16,
+    end: u16,
+    y: u16,
+}
+
+impl<'a> Row<'a> {
+    /// Row `row` of `area`, from 0; nothing is drawn if it is outside of it.
+    pub fn new(buffer: &'a mut Buffer, area: Area, row: u16) -> Self {
+        let bounds = rect(area).intersection(buffer.area);
+        let y = area.y.saturating_add(row);
+        let inside = row < area.height && (bounds.top()..bounds.bottom()).contains(&y);
+        let (x, end) = if inside { (bounds.left(), bounds.right()) } else { (0, 0) };
+        Self { buffer, x, end, y }
+    }
+
+    /// Columns left.
+    pub fn left(&self) -> usize {
+        usize::from(self.end.saturating_sub(self.x))
+    }
+
+    /// Where the next text begins.
+    pub fn x(&self) -> u16 {
+        self.x
+    }
+
+    /// The row on the screen.
+    pub fn y(&self) -> u16 {
+        self.y
+    }
+
+    /// Draws `text`, cut to what is left.
+    pub fn put(&mut self, text: &str, style: Style) -> &mut Self {
+        let left = self.left();
+        if left > 0 {
+            let text = safe(text);
+            let shown = cut(&text, left);
+            (self.x, _) = self.buffer.set_stringn(self.x, self.y, shown, left, style);
+        }
+        self
+    }
+
+    /// Draws `text` in exactly `width` columns, or what is left of them.
+    pub fn put_wide(&mut self, text: &str, width: usize, style: Style) -> &mut Self {
+        let width = width.min(self.left());
+        let text = safe(text);
+        let shown = cut(&text, width);
+        let gap = width - columns(&shown).min(width);
+        self.put(&shown, style).skip(gap)
+    }
+
+    /// Draws `text` at the right end, if it fits there with `gap` columns before it; it is then no
+    /// longer left for others.
+    pub fn put_right(&mut self, text: &str, gap: usize, style: Style) -> &mut Self {
+        let text = safe(text);
+        let width = columns(&text);
+        if width > 0 && width + gap <= self.left() {
+            self.end -= width as u16;
+            self.buffer.set_stringn(self.end, self.y, text, width, style);
+        }
+        self
+    }
+
+    /// Leaves out columns.
+    pub fn skip(&mut self, columns: usize) -> &mut Self {
+        self.x += columns.min(self.left()) as u16;
+        self
+    }
+
+    /// Gives all that is left a style, whatever stands there.
+    pub fn fill(&mut self, style: Style) -> &mut Self {
+        let area = Rect { x: self.x, y: self.y, width: self.end - self.x, height: 1 };
+        if area.width > 0 {
+            self.buffer.set_style(area, style);
+        }
+        self
+    }
+}
+
+/// What the buffer would leave out without a word stands there as an escape.
+fn safe(text: &str) -> Cow<'_, str> {
+    if text.chars().any(char::is_control) {
+        Cow::Owned(printable(text))
+    } else {
+        Cow::Borrowed(text)
+    }
+}
+
+/// `value` to three digits.
+pub fn number(value: f64) -> String {
+    match value.abs() {
+        v if v >= 9.995e5 || v < 5e-4 && v > 0.0 => format!("{value:.2e}"),
+        v if v >= 99.95 => format!("{value:.0}"),
+        v if v >= 9.995 => format!("{value:.1}"),
+        v if v >= 0.0995 || v == 0.0 => format!("{value:.2}"),
+        _ => format!("{value:.3}"),
+    }
+}
+
+/// A time as one would say it: `0.4 s`, `35 s`, `12 min`, `3.5 h`.
+pub fn duration(seconds: f64) -> String {
+    let (value, unit) = in_unit(seconds, seconds);
+    format!("{value} {unit}")
+}
+
+/// A range of times: `3–5 s`.
+pub fn durations(from: f64, to: f64) -> String {
+    let ((from, _), (to, unit)) = (in_unit(from, to), in_unit(to, to));
+    if from == to { format!("{to} {unit}") } else { format!("{from}–{to} {unit}") }
+}
+
+/// `seconds` in the unit that suits `reference` seconds.
+fn in_unit(seconds: f64, reference: f64) -> (String, &'static str) {
+    let (value, unit) = match reference {
+        r if r < 99.5 => (seconds, "s"),
+        r if r < 99.5 * 60.0 => (seconds / 60.0, "min"),
+        r if r < 72.0 * 3600.0 => (seconds / 3600.0, "h"),
+        _ => (seconds / 86_400.0, "days"),
+    };
+    let text = if value >= 9.95 || value == 0.0 {
+        format!("{value:.0}")
+    } else {
+        format!("{value:.1}").trim_end_matches(".0").to_string()
+    };
+    (text, unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cuts_count_columns() {
+        assert_eq!(cut("mirror", 6), "mirror");
+        assert_eq!(cut("mirror", 5), "mirr…");
+        assert_eq!(cut("鏡鏡鏡", 6), "鏡鏡鏡");
+        // A wide character does not fit half.
+        assert_eq!(cut("鏡鏡鏡", 4), "鏡…");
+        assert_eq!(cut("鏡鏡鏡", 5), "鏡鏡…");
+        assert_eq!([cut("abc", 1), cut("abc", 0)], ["…", ""]);
+        assert_eq!([skip("abc", 1), skip("鏡ab", 2), skip("ab", 9)], ["bc", "ab", ""]);
+    }
+
+    #[test]
+    fn nothing_leaves_its_area() {
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 8, 2));
+        let area = Area { x: 2, y: 1, width: 4, height: 1 };
+        Row::new(&mut buffer, area, 0).put("abcdefgh", Style::new());
+        Row::new(&mut buffer, area, 1).put("outside", Style::new());
+        Row::new(&mut buffer, Area { x: 7, y: 0, width: 9, height: 9 }, 0).put("yz", Style::new());
+        let wide = Area { x: 0, y: 0, width: 6, height: 1 };
+        Row::new(&mut buffer, wide, 0)
+            .put_right("r\u{1b}", 0, Style::new())
+            .put_right("R", 0, Style::new())
+            .put("l", Style::new())
+            .put_right("never", 1, Style::new());
+        let row = |y: u16| (0..8).map(|x| buffer[(x, y)].symbol()).collect::<String>();
+        assert_eq!([row(0), row(1)], ["l    R …", "  abc…  "]);
+    }
+
+    #[test]
+    fn numbers_as_one_says_them() {
+        let numbers = [0.0, 0.012_34, 0.5, 1.0 / 3.0, 9.999, 12.34, 99.96, 1234.0, 3e6, 1e-5];
+        let expected =
+            ["0.00", "0.012", "0.50", "0.33", "10.0", "12.3", "100", "1234", "3.00e6", "1.00e-5"];
+        assert_eq!(numbers.map(number), expected);
+        let times = [0.0, 0.42, 3.04, 35.2, 99.6, 600.0, 5999.0, 9000.0, 1e6];
+        let expected =
+            ["0 s", "0.4 s", "3 s", "35 s", "1.7 min", "10 min", "1.7 h", "2.5 h", "12 days"];
+        assert_eq!(times.map(duration), expected);
+        assert_eq!([durations(3.0, 5.0), durations(20.0, 150.0)], ["3–5 s", "0.3–2.5 min"]);
+        assert_eq!(durations(3.01, 3.02), "3 s");
+    }
+}

@@ -1,0 +1,56 @@
+//! OpenEXR files as pictures to compare with.
+
+use exr::prelude::*;
+use std::path::Path;
+
+/// A picture out of a file, linear radiance.
+pub struct ReadPicture {
+    /// Width and height in pixels.
+    pub size: [usize; 2],
+    /// Row by row.
+    pub pixels: Vec<[f64; 3]>,
+    /// The two replicates of a picture of this program, row by row.
+    pub replicates: Option<[Vec<[f64; 3]>; 2]>,
+}
+
+/// The most pixels that are read: as many as a scene may have.
+const MAX_PIXELS: usize = 1 << 26;
+
+/// Reads the channels `R G B` of an OpenEXR file, and `A.R ..` and `B.R ..` if there are such.
+///
+/// # Errors
+/// It cannot be read, is too large, or lacks the channels.
+pub fn read_exr(path: &Path) -> std::result::Result<ReadPicture, String> {
+    let meta = MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
+    let largest = meta.headers.iter().map(|h| h.layer_size.area()).max().unwrap_or(0);
+    if largest > MAX_PIXELS {
+        return Err(format!("it has {largest} pixels; expected at most {MAX_PIXELS}"));
+    }
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .map_err(|e| e.to_string())?;
+    let layer = &image.layer_data;
+    let size = [layer.size.width(), layer.size.height()];
+    let channel = |name: &str| {
+        let all = &layer.channel_data.list;
+        let found = all.iter().find(|channel| channel.name.to_string() == name)?;
+        Some(found.sample_data.values_as_f32().map(f64::from).collect::<Vec<_>>())
+    };
+    let picture = |prefix: &str| {
+        let [r, g, b] = ["R", "G", "B"].map(|color| channel(&format!("{prefix}{color}")));
+        let (r, g, b) = (r?, g?, b?);
+        Some(r.iter().zip(&g).zip(&b).map(|((r, g), b)| [*r, *g, *b]).collect::<Vec<_>>())
+    };
+    let pixels = picture("").ok_or("it has no channels R, G and B")?;
+    let replicates = picture("A.").zip(picture("B.")).map(|(a, b)| [a, b]);
+    let bad = pixels.iter().flatten().filter(|x| !x.is_finite()).count();
+    if bad > 0 {
+        return Err(format!("{bad} of its values are infinite or no numbers"));
+    }
+    Ok(ReadPicture { size, pixels, replicates })
+}

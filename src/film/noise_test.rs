@@ -1,0 +1,260 @@
+//! Estimates against errors that are known.
+
+use super::noise::*;
+use super::testing::{Rng, each_tile, fill, film, white};
+use super::*;
+use super::{Part, quantised_8};
+
+/// A pixel whose samples have a known mean: each is `dark + LIGHT` with probability `chance` and
+/// else `dark`, or normal around the mean.
+#[derive(Clone, Copy)]
+struct Pixel {
+    chance: f64,
+    normal: bool,
+    dark: [f64; 3],
+}
+
+const GLOOM: [f64; 3] = [0.02, 0.05, 0.04];
+const LIGHT: [f64; 3] = [0.2, 0.7, 0.3];
+
+impl Pixel {
+    fn mean(self) -> [f64; 3] {
+        [0, 1, 2].map(|c| self.dark[c] + self.chance * LIGHT[c])
+    }
+
+    /// The sum of `n` samples. Stratified: one in each n-th of the unit interval.
+    fn sum(self, n: u32, stratified: bool, rng: &mut Rng) -> [f64; 3] {
+        let count = f64::from(n);
+        let hits = if self.normal {
+            (count * self.chance + 0.3 * count.sqrt() * rng.normal()).max(0.0)
+        } else {
+            let draw = |i: u32| match stratified {
+                true => (f64::from(i) + rng.unit()) / count,
+                false => rng.unit(),
+            };
+            (0..n).map(draw).filter(|u| *u < self.chance).count() as f64
+        };
+        [0, 1, 2].map(|c| count * self.dark[c] + hits * LIGHT[c])
+    }
+}
+
+/// Pixels of a scene of 64x48, with a few that see the light hardly ever or nearly always.
+fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
+    (0..64 * 48).map(|_| Pixel { chance: rng.unit(), normal, dark }).collect()
+}
+
+struct Outcome {
+    linear: Vec<f64>,
+    codes: Vec<f64>,
+    /// Estimated RMSE of each tile, in codes, over the true one (in the mean over the seeds).
+    tile_spread: f64,
+}
+
+/// True RMSE over the estimate, for each of 20 seeds.
+fn ratios(n: u32, normal: bool, stratified: bool, dark: [f64; 3]) -> Outcome {
+    let pixels = scene(normal, dark, &mut Rng(11));
+    let (mix, display) = (white(1), Display::default());
+    let mut outcome = Outcome { linear: vec![], codes: vec![], tile_spread: 0.0 };
+    let mut tiles: Vec<Vec<f64>> = vec![vec![]; 12];
+    for seed in 0..20 {
+        let mut rng = Rng(1000 + seed);
+        let mut film = film(64, 48, &[2f64.powi(28)]);
+        fill(&mut film, n, |x, y, _| pixels[y * 64 + x].sum(n, stratified, &mut rng).to_vec());
+        let (mut linear, mut codes) = (0.0, 0.0);
+        for (i, pixel) in pixels.iter().enumerate() {
+            let (got, truth) = (film.pixel(i % 64, i / 64, &mix), pixel.mean());
+            let (got_codes, true_codes) = (display.codes(got), display.codes(truth));
+            for c in 0..3 {
+                linear += (got[c] - truth[c]).powi(2) / (3.0 * 64.0 * 48.0);
+                codes += (got_codes[c] - true_codes[c]).powi(2) / (3.0 * 64.0 * 48.0);
+            }
+        }
+        let noise = film.noise(&mix, &display).unwrap();
+        outcome.linear.push(linear.sqrt() / noise.rmse_linear);
+        outcome.codes.push(codes.sqrt() / noise.rmse_codes);
+        let estimator = Estimator::new(film.scales(), &mix, &display);
+        for (index, tile) in film.touched() {
+            tiles[index].push(estimator.tile(tile).unwrap().codes_mse.sqrt());
+        }
+    }
+    let spreads: Vec<_> = tiles
+        .iter()
+        .map(|tile| {
+            let deviations: Vec<_> = tile.iter().map(|t| (t / mean(tile) - 1.0).powi(2)).collect();
+            mean(&deviations).sqrt()
+        })
+        .collect();
+    outcome.tile_spread = mean(&spreads);
+    outcome
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+#[test]
+fn estimates_are_honest() {
+    for n in [16, 64, 512] {
+        for (normal, stratified, dark) in [
+            (true, false, GLOOM),
+            (false, false, GLOOM),
+            (false, true, GLOOM),
+            (false, false, [0.0; 3]),
+            (false, true, [0.0; 3]),
+        ] {
+            let outcome = ratios(n, normal, stratified, dark);
+            let (linear, codes) = (mean(&outcome.linear), mean(&outcome.codes));
+            let case = format!(
+                "n {n}, normal {normal}, stratified {stratified}, dark {dark:?}: linear {linear:.3}, \
+                 codes {codes:.3}, spread {:.3}",
+                outcome.tile_spread
+            );
+            println!("{case}");
+            assert!((0.95..1.05).contains(&linear), "{case}");
+            assert!((0.9..1.1).contains(&codes), "{case}");
+            assert!(outcome.tile_spread <= 0.2, "{case}");
+        }
+    }
+}
+
+/// Dark pixels that few samples find lit, where the tone curve is steep and bent: the estimate
+/// against the two simpler ones.
+#[test]
+fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
+    let (n, mut rng) = (16u32, Rng(5));
+    let display = Display::default();
+    let curve = |x: f64| display.codes([x; 3])[0];
+    let mut sum = [0.0; 4];
+    for _ in 0..20_000 {
+        let chance = 10f64.powf(-2.5 * rng.unit());
+        let mut hits =
+            || (0..n).filter(|i| (f64::from(*i) + rng.unit()) / 16.0 < chance).count() as f64;
+        let (a, b) = (0.7 * hits() / 16.0, 0.7 * hits() / 16.0);
+        let mut film = film(1, 1, &[2f64.powi(28)]);
+        fill(&mut film, n, |_, _, r| vec![16.0 * [a, b][r]; 3]);
+        let picture = 0.5 * (a + b);
+        let slope = (curve(picture + 1e-7) - curve((picture - 1e-7).max(0.0))) / 2e-7;
+        sum[0] += (curve(picture) - curve(0.7 * chance)).powi(2);
+        sum[1] += film.noise(&white(1), &display).unwrap().rmse_codes.powi(2);
+        sum[2] += (0.5 * (curve(a) - curve(b))).powi(2);
+        sum[3] += (0.5 * (a - b) * slope).powi(2);
+    }
+    let [ours, half, slope] = [1, 2, 3].map(|i| (sum[0] / sum[i]).sqrt());
+    println!("true / estimate: {ours:.3}, half difference {half:.3}, slope {slope:.3}");
+    assert!((ours - 1.0).abs() < 0.16 && half > ours + 0.05 && slope > ours + 0.3);
+}
+
+#[test]
+fn one_pixel_by_hand() {
+    let mut film = film(1, 1, &[1024.0, 2.0]);
+    fill(&mut film, 2, |_, _, r| vec![[0.25, 0.5][r], 1.0, 0.5, 0.0, 0.0, [2.0, 0.0][r]]);
+    let mix = Mix { weights: vec![[1.0; 3], [0.0, 0.0, 0.25]] };
+    let display = Display { exposure_ev: 1.0, tone: Tone::Clip };
+    let tile = Estimator::new(film.scales(), &mix, &display).tile(film.tile(0).unwrap()).unwrap();
+    // Red 0.125 and 0.25, blue 0.25 + 0.25 and 0.25.
+    let expected = (0.0625f64.powi(2) + 0.125f64.powi(2)) / 3.0;
+    assert!((tile.linear_mse - expected).abs() < 1e-15, "{tile:?}");
+    let code = |x: f64| display.codes([x; 3])[0];
+    let apart = |a: f64, b: f64| {
+        let m = code(0.5 * (a + b));
+        0.5 * ((code(a) - m).powi(2) + (code(b) - m).powi(2))
+    };
+    let expected = (apart(0.125, 0.25) + apart(0.5, 0.25)) / 3.0;
+    assert!((tile.codes_mse / expected - 1.0).abs() < 1e-4, "{tile:?} {expected}");
+    assert_eq!(tile.pixels, 1);
+    // Far over white nothing is seen of the difference.
+    let bright = Display { exposure_ev: 9.0, tone: Tone::Clip };
+    let noise = film.noise(&Mix::only(0, 2), &bright).unwrap();
+    assert_eq!((noise.rmse_codes, quantised_8(bright.codes([0.125; 3])[0])), (0.0, 255));
+    assert!(noise.rmse_linear > 0.0);
+}
+
+#[test]
+fn both_tone_curves_are_estimated_as_displayed() {
+    for (name, tone) in Tone::NAMED {
+        let display = Display { exposure_ev: -0.5, tone };
+        let (mut film, mut rng) = (film(16, 16, &[2f64.powi(20)]), Rng(3));
+        fill(&mut film, 1, |_, _, _| (0..3).map(|_| 2.0 * rng.unit()).collect());
+        let mut mse = 0.0;
+        for y in 0..16 {
+            let [m, a, b] = [Part::Both, Part::A, Part::B].map(|part| {
+                let mut row = vec![];
+                film.row(y, part, &white(1), &mut row);
+                row
+            });
+            for ((m, a), b) in m.iter().zip(&a).zip(&b) {
+                let [m, a, b] = [m, a, b].map(|radiance| display.codes(*radiance));
+                for c in 0..3 {
+                    mse += ((a[c] - m[c]).powi(2) + (b[c] - m[c]).powi(2)) / (2.0 * 768.0);
+                }
+            }
+        }
+        let noise = film.noise(&white(1), &display).unwrap();
+        assert!((noise.rmse_codes / mse.sqrt() - 1.0).abs() < 1e-5, "{name}: {noise:?} {mse}");
+    }
+}
+
+#[test]
+fn unequal_counts_have_no_noise() {
+    let mut film = film(32, 16, &[1.0]);
+    let noise = |film: &Film| film.noise(&white(1), &Display::default());
+    assert_eq!(noise(&film), None);
+    fill(&mut film, 3, |_, _, _| vec![1.0; 3]);
+    let zero = Noise { rmse_linear: 0.0, rmse_codes: 0.0, p95_codes: 0.0, worst_codes: 0.0 };
+    assert_eq!(noise(&film), Some(zero));
+    film.slots(&[1]).remove(0).open().advance(0, 1);
+    assert_eq!(noise(&film), None);
+    film.slots(&[1]).remove(0).open().advance(1, 1);
+    assert!(noise(&film).is_some());
+    film.restart();
+    each_tile(&mut film, |tile, _| tile.set_lattice(8));
+    assert_eq!(noise(&film), None);
+}
+
+/// The estimate between two waves, in the mean over many tiles, against the variance that the
+/// picture has.
+#[test]
+fn a_lagging_replicate_still_has_an_estimate() {
+    let display = Display { exposure_ev: -2.0, tone: Tone::Clip };
+    let (n, m) = (12u32, 8u32);
+    let (mut rng, mut estimates, mut codes, mut errors) = (Rng(9), 0.0, 0.0, [0.0; 2]);
+    for _ in 0..200 {
+        let mut film = film(16, 16, &[2f64.powi(20)]);
+        each_tile(&mut film, |tile, _| {
+            for (replicate, count) in [(0, n), (1, m)] {
+                for pixel in 0..256 {
+                    let sum: f64 = (0..count).map(|_| rng.unit()).sum();
+                    tile.add(replicate, pixel, &[(sum * 2f64.powi(20)) as i64; 3]);
+                }
+                tile.advance(replicate, count);
+            }
+        });
+        let estimator = Estimator::new(film.scales(), &white(1), &display);
+        let tile = film.tile(0).unwrap();
+        assert_eq!(estimator.tile(tile), None);
+        let noise = estimator.tile_so_far(tile).unwrap();
+        estimates += noise.linear_mse;
+        codes += noise.codes_mse;
+        let truth = display.codes([0.5; 3])[0];
+        for pixel in 0..256 {
+            let value = film.pixel(pixel % 16, pixel / 16, &white(1));
+            errors[0] += (value[0] - 0.5).powi(2) / 256.0;
+            errors[1] += (display.codes(value)[0] - truth).powi(2) / 256.0;
+        }
+    }
+    let ratios = [(errors[0] / estimates).sqrt(), (errors[1] / codes).sqrt()];
+    assert!(ratios.iter().all(|r| (0.98..1.02).contains(r)), "{ratios:?}");
+}
+
+#[test]
+fn the_picture_sums_up_its_tiles() {
+    let tile =
+        |codes: f64, pixels| Some(TileNoise { linear_mse: 0.01, codes_mse: codes * codes, pixels });
+    let tiles = (1..=20).map(|i| tile(f64::from(i), 256)).chain([tile(7.0, 0)]);
+    let noise = Noise::of_tiles(tiles).unwrap();
+    assert!((noise.rmse_linear - 0.1).abs() < 1e-15);
+    assert!((noise.rmse_codes - 143.5f64.sqrt()).abs() < 1e-12);
+    assert_eq!((noise.p95_codes, noise.worst_codes), (19.0, 20.0));
+    assert_eq!(Noise::of_tiles([tile(1.0, 256), None]), None);
+    assert_eq!(Noise::of_tiles([]), None);
+}

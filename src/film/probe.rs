@@ -1,0 +1,97 @@
+//! One pixel, looked at closely.
+
+use super::TILE;
+use super::display::Display;
+use super::mix::{Mix, Part};
+use super::noise::Estimator;
+use super::storage::Film;
+
+/// What the film knows about one pixel under one mix of lights and one display transform.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Probe {
+    /// Column and row of the film.
+    pub pixel: [usize; 2],
+    /// Samples of replicates A and B.
+    pub samples: [u32; 2],
+    /// Linear radiance; black without samples.
+    pub radiance: [f64; 3],
+    /// The same as displayed, in codes of 0..=255, not rounded.
+    pub codes: [f64; 3],
+    /// Half the difference of A and B, in radiance: the size of this pixel's error, but with one
+    /// degree of freedom, that is, within a factor of two or three. `None` without samples of both.
+    pub difference: Option<[f64; 3]>,
+    /// Estimated RMSE of the pixels of its tile in linear radiance; `None` without samples of both.
+    pub tile_rmse_linear: Option<f64>,
+    /// The same as displayed, in codes.
+    pub tile_rmse_codes: Option<f64>,
+}
+
+impl Film {
+    /// The pixel in column `x`, row `y`; `None`: it lies outside.
+    pub fn probe(&self, [x, y]: [usize; 2], mix: &Mix, display: &Display) -> Option<Probe> {
+        if x >= self.width() || y >= self.height() {
+            return None;
+        }
+        let mut probe = Probe {
+            pixel: [x, y],
+            samples: [0; 2],
+            radiance: [0.0; 3],
+            codes: display.codes([0.0; 3]),
+            difference: None,
+            tile_rmse_linear: None,
+            tile_rmse_codes: None,
+        };
+        let Some(tile) = self.tile(y / TILE * self.tile_columns() + x / TILE) else {
+            return Some(probe);
+        };
+        let per_unit = mix.per_unit(self.scales());
+        let sums = tile.sums(y % TILE * TILE + x % TILE);
+        probe.samples = sums.counts;
+        probe.radiance = sums.mean(Part::Both, &per_unit);
+        probe.codes = display.codes(probe.radiance);
+        if !sums.counts.contains(&0) {
+            let [a, b] = [Part::A, Part::B].map(|part| sums.mean(part, &per_unit));
+            probe.difference = Some([0, 1, 2].map(|c| 0.5 * (a[c] - b[c]).abs()));
+        }
+        if let Some(noise) = Estimator::new(self.scales(), mix, display).tile_so_far(tile) {
+            probe.tile_rmse_linear = Some(noise.linear_mse.sqrt());
+            probe.tile_rmse_codes = Some(noise.codes_mse.sqrt());
+        }
+        Some(probe)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{each_tile, fill, film};
+    use super::*;
+
+    #[test]
+    fn a_pixel_and_its_error() {
+        let mut film = film(20, 18, &[8.0, 4.0]);
+        let mix = Mix { weights: vec![[1.0, 2.0, 0.0], [0.0, 0.0, 3.0]] };
+        let display = Display { exposure_ev: -3.0, ..Display::default() };
+        let probe = |film: &Film, at| film.probe(at, &mix, &display);
+        let empty = probe(&film, [19, 17]).unwrap();
+        assert_eq!((empty.samples, empty.radiance, empty.difference), ([0; 2], [0.0; 3], None));
+        assert_eq!(empty.tile_rmse_codes, None);
+        assert_eq!([probe(&film, [20, 0]), probe(&film, [0, 18])], [None; 2]);
+        fill(&mut film, 2, |x, y, r| {
+            let v = if [x, y] == [19, 17] { [2.0, 6.0][r] } else { 2.0 };
+            vec![v, v, v, v, v, 4.0]
+        });
+        let full = probe(&film, [19, 17]).unwrap();
+        assert_eq!((full.pixel, full.samples), ([19, 17], [2, 2]));
+        assert_eq!(full.radiance, [2.0, 4.0, 6.0]);
+        assert_eq!(full.codes, display.codes([2.0, 4.0, 6.0]));
+        assert_eq!(full.difference, Some([1.0, 2.0, 0.0]));
+        // The tile in the corner has 4 x 2 pixels; one is wrong by 1 in red, 2 in green.
+        let rmse = full.tile_rmse_linear.unwrap();
+        assert!((rmse - (5.0f64 / 24.0).sqrt()).abs() < 1e-12, "{rmse}");
+        assert!(full.tile_rmse_codes.is_some_and(|codes| codes > 0.0));
+        film.restart();
+        each_tile(&mut film, |tile, _| tile.set_lattice(8));
+        assert_eq!(probe(&film, [16, 16]).unwrap().samples, [1, 0]);
+        assert_eq!(probe(&film, [17, 16]).unwrap().samples, [0, 0]);
+    }
+}

@@ -1,0 +1,235 @@
+//! What is measured: the settings that trade speed for accuracy, one at a time.
+
+use crate::film::Display;
+use crate::material::Lobe;
+use crate::render::schedule::{Criterion, Settings, Stop};
+use crate::render::{Course, Options};
+use crate::sampling::{SampleSettings, SamplerKind};
+use crate::scene::{Level, Scene};
+use crate::world::{self, Precision};
+use std::io;
+use std::str::FromStr;
+use std::sync::Arc;
+
+/// A setting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Topic {
+    /// All settings as the program has them unless told otherwise.
+    Default,
+    /// Samples where they help most, or the same number everywhere.
+    Adaptivity,
+    /// Single or double precision.
+    Precision,
+    /// Threads that trace.
+    Threads,
+    /// Sobol's points or independent random numbers.
+    Sampler,
+    /// The cone or its cheap stand-in, the square.
+    Lobe,
+    /// What is traced at all.
+    Level,
+    /// The most reflections of a path.
+    Depth,
+    /// Paths end below a weight.
+    MinWeight,
+    /// The most samples of a glossy pixel.
+    RaysPerPixel,
+}
+
+impl Topic {
+    /// Every setting, its name on the command line, and the question that it answers.
+    pub const ALL: &'static [(Self, &'static str, &'static str)] = &[
+        (Self::Default, "default", "As the program is set"),
+        (Self::Adaptivity, "adaptivity", "What adaptive sampling gives"),
+        (Self::Precision, "precision", "What double precision costs"),
+        (Self::Threads, "threads", "How many threads pay"),
+        (Self::Sampler, "sampler", "What Sobol's points give over independent random numbers"),
+        (Self::Lobe, "lobe", "What the square gives over the cone, and gets wrong"),
+        (Self::Level, "level", "What less tracing gives, and gets wrong"),
+        (Self::Depth, "depth", "What fewer reflections give, and get wrong"),
+        (Self::MinWeight, "min-weight", "What ending weak paths gives, and gets wrong"),
+        (Self::RaysPerPixel, "rays-per-pixel", "What a cap on glossy pixels gives, and leaves"),
+    ];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(topic, ..)| *topic == self).map_or("", |(_, name, _)| name)
+    }
+
+    /// The question that it answers.
+    pub fn question(self) -> &'static str {
+        Self::ALL.iter().find(|(topic, ..)| *topic == self).map_or("", |(.., question)| question)
+    }
+
+    /// Whether all its variations have the same expectation: only their noise differs.
+    pub fn unbiased(self) -> bool {
+        matches!(
+            self,
+            Self::Default | Self::Adaptivity | Self::Precision | Self::Threads | Self::Sampler
+        )
+    }
+}
+
+impl FromStr for Topic {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.iter().find(|(_, name, _)| *name == text);
+        found.map(|(topic, ..)| *topic).ok_or_else(|| {
+            let names: Vec<_> = Self::ALL.iter().map(|(_, name, _)| *name).collect();
+            format!("setting `{text}` is not known; known: {}", names.join(", "))
+        })
+    }
+}
+
+/// One way to render the scene.
+#[derive(Clone)]
+pub struct Variation {
+    /// Which setting differs from the default.
+    pub topic: Topic,
+    /// How: `uniform`, `depth 4`.
+    pub name: String,
+    /// The scene, with the settings that it holds.
+    pub scene: Arc<Scene>,
+    /// How it is compiled and sampled.
+    pub options: Options,
+    /// Whether samples go where they help most.
+    pub adaptive: bool,
+    /// Threads that trace.
+    pub threads: usize,
+}
+
+impl Variation {
+    /// A render of it, not begun, that ends by itself only when there is nothing left to do.
+    pub fn course(&self) -> io::Result<Course> {
+        let settings = Settings {
+            adaptive: self.adaptive,
+            criterion: Criterion::Codes,
+            rays_per_pixel: 0,
+            stop: Stop::default(),
+        };
+        Course::new(&self.scene, &self.options, settings, self.threads)
+    }
+}
+
+/// What to measure.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Noise to reach, in codes, falling.
+    pub targets: Vec<f64>,
+    /// The settings to compare, beside the default.
+    pub topics: Vec<Topic>,
+    /// How often each way is timed, at least.
+    pub repetitions: usize,
+    /// About so many seconds in all.
+    pub seconds: f64,
+    /// Threads, unless they are what is compared.
+    pub threads: usize,
+    /// Number that the random choices follow from. The reference has another one.
+    pub seed: u64,
+    /// Exposure and tone curve that codes are told in.
+    pub display: Display,
+}
+
+impl Plan {
+    /// The default, then the variations of each topic that make a difference in this scene.
+    pub fn variations(&self, scene: &Arc<Scene>) -> Vec<Variation> {
+        let mut all = vec![self.default_of(scene)];
+        for topic in &self.topics {
+            all.extend(self.of_topic(*topic, scene));
+        }
+        all
+    }
+
+    /// All settings as the program has them.
+    pub fn default_of(&self, scene: &Arc<Scene>) -> Variation {
+        Variation {
+            topic: Topic::Default,
+            name: "default".to_string(),
+            scene: Arc::clone(scene),
+            options: Options {
+                world: world::Options::default(),
+                sampling: SampleSettings { seed: self.seed, kind: SamplerKind::Sobol },
+                display: self.display,
+            },
+            adaptive: true,
+            threads: self.threads,
+        }
+    }
+
+    fn of_topic(&self, topic: Topic, scene: &Arc<Scene>) -> Vec<Variation> {
+        let base = self.default_of(scene);
+        let named = |name: &str| Variation { topic, name: name.to_string(), ..base.clone() };
+        let edited = |name: String, edit: &dyn Fn(&mut Scene)| {
+            let mut scene = Scene::clone(scene);
+            edit(&mut scene);
+            Variation { topic, name, scene: Arc::new(scene), ..base.clone() }
+        };
+        let reflects = scene.trace.level == Level::Full
+            && scene.trace.depth > 0
+            && scene.objects.iter().any(|object| {
+                scene.materials.get(&object.material).is_some_and(|m| m.reflection > 0.0)
+            });
+        match topic {
+            Topic::Default => Vec::new(),
+            Topic::Adaptivity => vec![Variation { adaptive: false, ..named("uniform") }],
+            Topic::Precision => [("single", Precision::Single), ("double", Precision::Double)]
+                .map(|(name, precision)| {
+                    let mut variation = named(name);
+                    variation.options.world.precision = precision;
+                    variation
+                })
+                .into(),
+            Topic::Threads => {
+                let mut counts: Vec<usize> =
+                    (0..).map(|k| 1 << k).take_while(|n| *n < self.threads).collect();
+                counts.push(self.threads);
+                let of = |n: usize| {
+                    let name = if n == 1 { "1 thread".to_string() } else { format!("{n} threads") };
+                    Variation { threads: n, ..named(&name) }
+                };
+                counts.into_iter().map(of).collect()
+            }
+            Topic::Sampler => {
+                let mut random = named("random");
+                random.options.sampling.kind = SamplerKind::Random;
+                vec![random]
+            }
+            Topic::Lobe => {
+                let has =
+                    |lobe| scene.materials.values().any(|m| m.lobe == lobe && m.roughness > 0.0);
+                let swap = |from: Lobe, to: Lobe, name: &str| {
+                    has(from).then(|| {
+                        edited(name.to_string(), &|scene| {
+                            let of = scene.materials.values_mut().filter(|m| m.lobe == from);
+                            of.for_each(|m| m.lobe = to);
+                        })
+                    })
+                };
+                let square = swap(Lobe::Cone, Lobe::Square, "square for cone");
+                let cone = swap(Lobe::Square, Lobe::Cone, "cone for square");
+                square.into_iter().chain(cone).filter(|_| reflects).collect()
+            }
+            Topic::Level => [("primary", Level::Primary), ("shadows", Level::Shadows)]
+                .into_iter()
+                .filter(|(_, level)| *level < scene.trace.level)
+                .map(|(name, level)| edited(name.to_string(), &|s| s.trace.level = level))
+                .collect(),
+            Topic::Depth => [0, 1, 2, 4, 8]
+                .into_iter()
+                .filter(|depth| reflects && *depth < scene.trace.depth)
+                .map(|depth| edited(format!("depth {depth}"), &|s| s.trace.depth = depth))
+                .collect(),
+            Topic::MinWeight => [0.001, 0.01, 0.1]
+                .into_iter()
+                .filter(|weight| reflects && *weight > scene.trace.min_weight)
+                .map(|weight| edited(format!("weight {weight}"), &|s| s.trace.min_weight = weight))
+                .collect(),
+            Topic::RaysPerPixel => [64, 256, 1024]
+                .into_iter()
+                .filter(|_| reflects)
+                .map(|cap| edited(format!("{cap} samples"), &|s| s.film.rays_per_pixel = cap))
+                .collect(),
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! A render in the caller's thread, one decision of the schedule after the other: for measurements,
+//! where nothing may depend on when somebody looks.
+
+use crate::render::schedule::{Schedule, Settings, Spp, Step, StoppedBy};
+use crate::render::session::Traced;
+use crate::render::{Options, Rendering};
+use crate::scene::Scene;
+use std::io;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+/// A render that is taken step by step.
+pub struct Course {
+    rendering: Rendering,
+    schedule: Schedule,
+    pool: rayon::ThreadPool,
+    seconds: f64,
+}
+
+impl Course {
+    /// Compiles `scene`, which has no faults, to be traced by `threads` threads. `Err`: they are not
+    /// to be had.
+    pub fn new(
+        scene: &Scene,
+        options: &Options,
+        settings: Settings,
+        threads: usize,
+    ) -> io::Result<Self> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(io::Error::other)?;
+        let rendering = Rendering::new(scene, options, None);
+        let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
+        let schedule = rendering.schedule(settings);
+        Ok(Self { rendering, schedule, pool, seconds: 0.0 })
+    }
+
+    /// Traces what the schedule decides next, in both replicates, so that the picture's error is
+    /// known afterwards. `Some`: there was nothing left to do, and why.
+    pub fn step(&mut self) -> Option<StoppedBy> {
+        loop {
+            let wave = match self.schedule.next(self.seconds) {
+                Step::Rest(reason) => return Some(reason),
+                Step::Trace(wave) => wave,
+            };
+            let start = Instant::now();
+            let report = self.rendering.run(&wave, &self.pool, &AtomicBool::new(false));
+            self.seconds += start.elapsed().as_secs_f64();
+            self.schedule.complete(&wave, &report);
+            if wave.replicate == 1 {
+                return None;
+            }
+        }
+    }
+
+    /// Seconds of tracing so far, without compilation.
+    pub fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    /// Samples so far, over all pixels.
+    pub fn samples(&self) -> u64 {
+        self.schedule.samples()
+    }
+
+    /// Samples per pixel.
+    pub fn spp(&self) -> Spp {
+        self.schedule.spp()
+    }
+
+    /// The RMSE as displayed that the program itself would tell [codes].
+    pub fn noise_codes(&self) -> Option<f64> {
+        self.schedule.noise().map(|noise| noise.rmse_codes)
+    }
+
+    /// The world and the film.
+    pub fn rendering(&self) -> &Rendering {
+        &self.rendering
+    }
+}

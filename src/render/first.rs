@@ -1,0 +1,121 @@
+//! The first sample of every pixel, coarse to fine.
+
+use super::pass::{Tracer, Work};
+use super::wave::{JobReport, Wave, WaveReport};
+use crate::film::{Film, Slot, TILE, lattice_pixels};
+use crate::lanes::Lanes;
+use crate::sampling::SampleSettings;
+use crate::world::{AnyWorld, Counts, World};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The first sample of replicate A in interleaved order: every 8th pixel in x and y, then the gaps in
+/// three stages, each over the whole picture; `shown` sees the film after all but the last. Once `abandon`
+/// is raised the later stages are left out, and there is no report.
+pub fn run(
+    world: &AnyWorld,
+    film: &mut Film,
+    wave: &Wave,
+    sampling: &SampleSettings,
+    pool: &rayon::ThreadPool,
+    abandon: &AtomicBool,
+    shown: &mut dyn FnMut(&Film),
+) -> Option<WaveReport> {
+    match world {
+        AnyWorld::Single(w) => first_in(w, film, wave, sampling, pool, abandon, shown),
+        AnyWorld::Double(w) => first_in(w, film, wave, sampling, pool, abandon, shown),
+    }
+}
+
+/// Tiles side by side that share packets while the lattice is coarse.
+const STRIP_TILES: usize = 8;
+
+fn first_in<L: Lanes>(
+    world: &World<L>,
+    film: &mut Film,
+    wave: &Wave,
+    sampling: &SampleSettings,
+    pool: &rayon::ThreadPool,
+    abandon: &AtomicBool,
+    shown: &mut dyn FnMut(&Film),
+) -> Option<WaveReport> {
+    let tracer = Tracer::new(world, sampling);
+    let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
+    let mut counts = vec![Counts::default(); tiles.len()];
+    let mut before = 0;
+    for step in [8, 4, 2, 1] {
+        let mut strips: Vec<(Vec<Slot>, &mut [Counts])> = Vec::new();
+        let mut slots = film.slots(&tiles).into_iter();
+        for counts in counts.chunks_mut(STRIP_TILES) {
+            strips.push((slots.by_ref().take(counts.len()).collect(), counts));
+        }
+        let complete = pool.install(|| {
+            strips
+                .into_par_iter()
+                .map(|(slots, counts)| {
+                    if step != 8 && abandon.load(Ordering::Relaxed) {
+                        return false;
+                    }
+                    tracer.lattice(slots, before, step, counts);
+                    true
+                })
+                .reduce(|| true, |a, b| a & b)
+        });
+        if complete && step != 1 {
+            shown(film);
+        }
+        if !complete || (step != 1 && abandon.load(Ordering::Relaxed)) {
+            return None;
+        }
+        before = step;
+    }
+    let report = |c: Counts| Some(JobReport { rays: c.rays, glossy: c.glossy, error: None });
+    Some(WaveReport { reports: counts.into_iter().map(report).collect() })
+}
+
+impl<L: Lanes> Tracer<'_, L> {
+    /// The first sample of the pixels that a lattice of `step` pixels adds to one of `before` (0:
+    /// none) in tiles side by side, whose pixels share packets.
+    fn lattice(&self, slots: Vec<Slot>, before: usize, step: usize, counts: &mut [Counts]) {
+        let mut tiles = Vec::new();
+        let mut pixels = Vec::new();
+        for (t, slot) in slots.into_iter().enumerate() {
+            let origin = slot.origin;
+            let tile = slot.open();
+            let extent = tile.extent();
+            let inside = |p: &usize| p % TILE < extent[0] && p / TILE < extent[1];
+            pixels.extend(lattice_pixels(before, step).filter(inside).map(|p| (t, origin, p)));
+            tiles.push(tile);
+        }
+        let points = self.sampler.at(0);
+        for packet in pixels.chunks(L::WIDTH) {
+            let at = |lane: usize| {
+                let (_, origin, p) = packet[lane.min(packet.len() - 1)];
+                ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
+            };
+            let mut work = Work::new(0, None);
+            self.pixels(&mut work, &points, packet.len(), at, 0);
+            // A packet's rays are shared out among its pixels' tiles, the remainder to the first.
+            let Counts { rays, glossy } = work.counts;
+            let share = rays / packet.len() as u64;
+            counts[packet[0].0].rays += rays - share * packet.len() as u64;
+            for (t, _, _) in packet {
+                counts[*t].rays += share;
+                counts[*t].glossy |= glossy;
+            }
+            self.scatter(&work.radiance, packet.len(), |lane, group, values| {
+                let (t, _, p) = packet[lane];
+                tiles[t].add_group(0, p, group, values);
+            });
+            for bad in work.bad {
+                let tile_of = |lane: &usize| at(*lane) == (bad.x, bad.y);
+                if let Some(lane) = (0..packet.len()).find(tile_of) {
+                    tiles[packet[lane].0].record_bad(bad);
+                }
+            }
+        }
+        for tile in tiles {
+            tile.set_lattice(step);
+        }
+    }
+}

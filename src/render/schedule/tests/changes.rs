@@ -1,0 +1,117 @@
+//! What changes while the work goes on: aims, estimates, the length of pieces.
+
+use super::*;
+
+/// Traces until it rests; every wave in pieces of `tiles` jobs at most, of `longest` samples.
+fn in_pieces(model: &mut Model, schedule: &mut Schedule, tiles: u64, longest: u32) -> StoppedBy {
+    loop {
+        match schedule.next(0.0) {
+            Step::Rest(reason) => return reason,
+            Step::Trace(wave) => {
+                let piece = wave.cut(tiles * u64::from(longest) * u64::from(PIXELS), longest);
+                assert!(piece.jobs.iter().all(|job| job.count <= longest));
+                let report = model.run(&piece);
+                schedule.complete(&piece, &report);
+            }
+        }
+    }
+}
+
+fn mixed() -> Vec<Truth> {
+    (0..36).map(|i| if i % 3 == 0 { NOISY } else { Truth { sigma: 4.0, ..CALM } }).collect()
+}
+
+#[test]
+fn pieces_decide_nothing() {
+    for adaptive in [false, true] {
+        let settings = until(noise(0.6), adaptive);
+        let (whole, reason) = Model::exact(mixed(), 6).finish(settings);
+        for (tiles, longest) in [(1, 8), (5, 16), (100, 24)] {
+            let mut model = Model::exact(mixed(), 6);
+            let mut schedule = model.schedule(settings);
+            assert_eq!(in_pieces(&mut model, &mut schedule, tiles, longest), reason);
+            let done = |s: &Schedule| s.tiles.iter().map(|t| t.done).collect::<Vec<_>>();
+            assert_eq!(done(&schedule), done(&whole), "{tiles} x {longest}, adaptive {adaptive}");
+            assert_eq!((schedule.samples(), schedule.rays()), (whole.samples(), whole.rays()));
+            assert_eq!(schedule.noise(), whole.noise());
+        }
+    }
+}
+
+#[test]
+fn a_higher_aim_goes_on_where_the_lower_one_ended() {
+    for adaptive in [false, true] {
+        for low in [2, 6, 22, 50, 150] {
+            let mut model = Model::exact(mixed(), 6);
+            let mut schedule = model.schedule(until(spp(low), adaptive));
+            assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);
+            assert_eq!(schedule.spp().mean, f64::from(low));
+            schedule.set_stop(spp(2000));
+            // The model refuses samples twice or out of order.
+            model.aligned = false;
+            let mut ends = Vec::new();
+            while let Step::Trace(wave) = schedule.next(0.0) {
+                let even = |j: &Job| {
+                    let end = j.first + j.count;
+                    end.is_multiple_of(PACKET) || (end < FLOOR && end.is_power_of_two())
+                };
+                ends.push(wave.jobs.iter().all(even));
+                let report = model.run(&wave);
+                schedule.complete(&wave, &report);
+            }
+            // All but the last decision, which gives A and B what is left.
+            assert!(ends[..ends.len() - 2].iter().all(|even| *even), "after {low} {adaptive}");
+            assert_eq!(schedule.spp().mean, 2000.0);
+            // And back: it rests at once.
+            schedule.set_stop(spp(low));
+            assert_eq!(schedule.next(0.0), Step::Rest(StoppedBy::Spp));
+            schedule.set_stop(noise(1e6));
+            assert_eq!(schedule.next(0.0), Step::Rest(StoppedBy::Noise));
+        }
+    }
+}
+
+#[test]
+fn estimates_made_anew_replace_the_old_ones() {
+    let mut model = Model::exact(mixed(), 6);
+    let mut schedule = model.schedule(until(noise(0.6), true));
+    in_pieces(&mut model, &mut schedule, 100, FULL);
+    let (before, samples) = (schedule.noise().unwrap(), schedule.samples());
+    schedule.forget_estimates();
+    assert_eq!((schedule.noise(), schedule.eta_seconds(1.0)), (None, None));
+    // The picture is displayed three times as bright: so is its error.
+    model.truth.iter_mut().for_each(|t| t.sigma *= 3.0);
+    let estimates: Vec<_> = (0..36)
+        .map(|tile| {
+            let mse = model.estimate(tile);
+            let error = TileNoise { linear_mse: mse, codes_mse: mse, pixels: PIXELS };
+            Some((schedule.tiles[tile].done, error))
+        })
+        .collect();
+    schedule.set_estimates(&estimates);
+    let after = schedule.noise().unwrap();
+    assert!((after.rmse_codes / before.rmse_codes - 3.0).abs() < 1e-9);
+    assert_eq!(schedule.samples(), samples);
+    // Nobody knows how fast this picture's noise falls: the range is wide, and holds.
+    let (low, high) = schedule.eta_seconds(1.0).unwrap();
+    assert!(high > 2.0 * low, "{low}..{high}");
+    let rays = schedule.rays() as f64;
+    assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Noise);
+    assert!((model.rmse() / 0.6 - 1.0).abs() < 0.1);
+    let needed = schedule.rays() as f64 / rays - 1.0;
+    assert!((low..high).contains(&needed), "{needed} not in {low}..{high}");
+}
+
+#[test]
+fn a_cap_may_rise_and_fall() {
+    let mut model = Model::exact(mixed(), 6);
+    let mut schedule = model.schedule(until(spp(100), false));
+    schedule.set_rays_per_pixel(40);
+    assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);
+    assert_eq!((schedule.spp().min, schedule.spp().max), (40, 100));
+    schedule.set_rays_per_pixel(0);
+    // The cap of 20 per replicate ended inside a packet.
+    model.aligned = false;
+    assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);
+    assert_eq!((schedule.spp().min, schedule.spp().max), (100, 100));
+}

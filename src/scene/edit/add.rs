@@ -1,0 +1,277 @@
+//! New things, with defaults that fit the scene at hand.
+
+use super::extent::{Ball, scene_bounds};
+use super::ground::place_for;
+use super::names::{free_light, free_material, free_object};
+use super::rows::Word;
+use super::{Edit, Refusal, Subject};
+use crate::light::{Directional, Falloff, Light, Point};
+use crate::material::Material;
+use crate::scene::{Object, Scene};
+use crate::shape::{Form, KINDS, Shape};
+use crate::value::{Color, clean, number, rounded_to, significant};
+use glam::DVec3;
+
+/// The kinds of object that can be added, with what they are.
+pub fn object_kinds() -> Vec<Word> {
+    KINDS.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
+}
+
+/// The kinds of light that can be added, with what they are.
+pub fn light_kinds() -> Vec<Word> {
+    let words = [
+        ("point", "Light from one point, such as a lamp."),
+        ("directional", "Light from infinitely far away, such as the sun."),
+    ];
+    words.map(|(name, doc)| Word { name: name.into(), doc: doc.into() }).to_vec()
+}
+
+/// Body colours of new materials, one after the other.
+const PALETTE: [[f64; 3]; 6] = [
+    [0.85, 0.16, 0.11],
+    [0.13, 0.28, 0.8],
+    [0.15, 0.62, 0.28],
+    [0.9, 0.68, 0.12],
+    [0.55, 0.2, 0.65],
+    [0.1, 0.6, 0.65],
+];
+
+/// A material with a colour that the scene does not have yet, if the palette has one left.
+fn fresh_material(scene: &Scene) -> Material {
+    let used = |color: &[f64; 3]| scene.materials.values().any(|m| m.color.0 == *color);
+    let free = PALETTE.iter().find(|color| !used(color));
+    let color = free.copied().unwrap_or(PALETTE[scene.materials.len() % PALETTE.len()]);
+    let (diffuse, specular, exponent) = (0.8, 0.2, 40.0);
+    Material { color: Color(color), diffuse, specular, exponent, ..Material::default() }
+}
+
+/// Adds an object of the kind `kind`, standing on what is there in the middle of what the camera sees,
+/// as large as the things around it. `material`: one that it shares; `None`: a new one of its own.
+///
+/// # Errors
+/// If there is no such kind or material.
+pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<Edit, Refusal> {
+    let size = usual_size(scene);
+    let room = DVec3::splat(size);
+    let base = place_for(scene, room);
+    let Some(mut shape) = Shape::standing(kind, base, room) else {
+        let names: Vec<_> = KINDS.iter().map(|k| k.name).collect();
+        let found = format!("there is no kind of object called \"{kind}\"");
+        return Err(Refusal::new(&found, &format!("Expected one of {}.", names.join(", "))));
+    };
+    face_camera(&mut shape, scene);
+    if let Form::Plane { .. } = shape.form() {
+        // Under everything, so that it does not lie in a ground that is there already.
+        let lows = scene.objects.iter().filter_map(|o| Some(o.form().bounds()?.0.y));
+        if let Some(lowest) = lows.reduce(f64::min) {
+            let under = clean(lowest - 0.1 * size, size);
+            shape.anchors().into_iter().for_each(|anchor| anchor[1] = under);
+        }
+    }
+    let mut next = scene.clone();
+    let name = free_object(scene, kind);
+    let material = match material {
+        Some(shared) => shared.to_string(),
+        None => {
+            let own = free_material(scene, &name);
+            next.materials.insert(own.clone(), fresh_material(scene));
+            own
+        }
+    };
+    next.objects.push(Object { name, material, shape, transform: Vec::new() });
+    let subject = Subject::Object(next.objects.len() - 1);
+    Edit::checked(next, subject, format!("add {kind}"))
+}
+
+/// The length of a new thing: that of the solids that are there (the middle one of them), between a
+/// hundredth and half of the scene's; 1 in an empty scene.
+fn usual_size(scene: &Scene) -> f64 {
+    let Ball { radius, .. } = scene_bounds(scene);
+    let solid = |object: &Object| {
+        let form = object.form();
+        let (low, high) = form.bounds()?;
+        super::extent::is_solid(&form).then(|| (high - low).max_element())
+    };
+    let mut sizes: Vec<f64> = scene.objects.iter().filter_map(solid).collect();
+    sizes.sort_by(f64::total_cmp);
+    let size = match sizes.get(sizes.len() / 2) {
+        Some(middle) => middle.clamp(0.01 * radius, radius),
+        None if scene.objects.is_empty() => 1.0,
+        None => 0.25 * radius,
+    };
+    significant(size, 1)
+}
+
+/// Turns a flat thing that stands upright so that its front is towards the camera.
+fn face_camera(shape: &mut Shape, scene: &Scene) {
+    let Form::Parallelogram { u, v, .. } = shape.form() else { return };
+    let front = u.cross(v).normalize();
+    if front.y.abs() > 0.5 {
+        return;
+    }
+    let heading = |d: DVec3| d.x.atan2(d.z).to_degrees();
+    let toward = -scene.camera.view().unwrap_or(DVec3::NEG_Z);
+    shape.turn(rounded_to((heading(toward) - heading(front)) / 5.0, 0) * 5.0);
+}
+
+/// Adds a light of the kind `kind`: above the scene, to the side of the camera that has no light yet,
+/// about as bright as a scene's only light should be.
+///
+/// # Errors
+/// If there is no such kind.
+pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, Refusal> {
+    let Ball { center, radius } = scene_bounds(scene);
+    let center = DVec3::from_array(center);
+    let [right, _, forward] = scene.camera.frame();
+    let level = |v: DVec3| DVec3::new(v.x, 0.0, v.z).try_normalize().unwrap_or(DVec3::X);
+    let (right, forward) = (level(right), level(forward));
+    let side = |light: &Light| match (light.point, light.directional) {
+        (Some(point), _) => (DVec3::from_array(point.position) - center).dot(right),
+        (_, Some(directional)) => -DVec3::from_array(directional.direction).dot(right),
+        _ => 0.0,
+    };
+    let lit: f64 = scene.lights.iter().map(|l| side(l).signum()).sum();
+    let toward = if lit > 0.0 { -right } else { right };
+    let from = toward * 0.8 - forward * 0.8 + DVec3::Y * 1.4;
+    let mut light = Light::default();
+    let name = match kind {
+        "point" => {
+            let position = center + from * (1.5 * radius);
+            light.point = Some(Point { position: position.map(|x| clean(x, radius)).to_array() });
+            "lamp"
+        }
+        "directional" => {
+            let direction = (-from).normalize().map(|x| rounded_to(x, -2)).to_array();
+            light.directional = Some(Directional { direction });
+            "sun"
+        }
+        _ => {
+            let found = format!("there is no kind of light called \"{kind}\"");
+            return Err(Refusal::new(&found, "Expected \"point\" or \"directional\"."));
+        }
+    };
+    light.name = free_light(scene, name);
+    // A second light adds to the first: half as much.
+    light.intensity = if scene.lights.iter().any(|l| l.on) { 0.5 } else { 1.0 };
+    let physical = scene.lights.iter().all(|l| l.falloff == Falloff::InverseSquare);
+    let mut note = None;
+    if physical && !scene.lights.is_empty() && kind == "point" {
+        // As the others are: the same brightness in the middle, by the inverse square.
+        let squared = (from * (1.5 * radius)).length_squared();
+        light.falloff = Falloff::InverseSquare;
+        light.intensity = significant(light.intensity * std::f64::consts::PI * squared, 2);
+        let text = number(light.intensity);
+        note = Some(format!("It falls off with the square of the distance; intensity {text}."));
+    }
+    let mut next = scene.clone();
+    let label = format!("add {}", light.name);
+    next.lights.push(light);
+    let subject = Subject::Light(next.lights.len() - 1);
+    let edit = Edit::checked(next, subject, label)?;
+    Ok(match note {
+        Some(note) => edit.noted(note),
+        None => edit,
+    })
+}
+
+/// Adds a material that no object has yet.
+///
+/// # Errors
+/// None that is known: the result is checked as every edit is.
+pub fn add_material(scene: &Scene) -> Result<Edit, Refusal> {
+    let mut next = scene.clone();
+    let name = free_material(scene, "material");
+    next.materials.insert(name.clone(), fresh_material(scene));
+    let label = format!("add {name}");
+    Edit::checked(next, Subject::Material(name), label)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+
+    #[test]
+    fn every_kind_stands_free_and_in_view() {
+        let scene = built_in();
+        for word in object_kinds() {
+            let edit = add_object(&scene, &word.name, None).unwrap();
+            let Subject::Object(i) = edit.subject else { panic!() };
+            let object = &edit.scene.objects[i];
+            assert_eq!(object.shape.key(), word.name);
+            assert_eq!(
+                object.name,
+                if word.name == "cube" {
+                    "cube 2"
+                } else if ["prism", "pyramid"].contains(&word.name.as_str()) {
+                    object.name.as_str()
+                } else {
+                    word.name.as_str()
+                }
+            );
+            assert!(edit.scene.materials.contains_key(&object.material));
+            let Some((low, high)) = object.form().bounds() else { continue };
+            assert!(low.y.abs() < 1e-12 || word.name == "platform", "{}: {low}", word.name);
+            let middle = (low + high) / 2.0;
+            let [right, up, forward] = scene.camera.frame();
+            let to = middle - DVec3::from_array(scene.camera.eye);
+            let depth = to.dot(forward);
+            let [w, h] = scene.camera.half_size(4.0 / 3.0);
+            let inside = to.dot(right).abs() < w * depth && to.dot(up).abs() < h * depth;
+            assert!(depth > 0.0 && inside, "{}: {middle}", word.name);
+            for other in &scene.objects[2..] {
+                let (a, b) = other.form().bounds().unwrap();
+                assert!(!(low.cmplt(b).all() && a.cmplt(high).all()), "{}", word.name);
+            }
+        }
+    }
+
+    #[test]
+    fn ten_cubes_find_ten_places() {
+        let mut scene = built_in();
+        for _ in 0..10 {
+            scene = add_object(&scene, "cube", Some("red")).unwrap().scene;
+        }
+        let boxes: Vec<_> = scene.objects[2..].iter().map(|o| o.form().bounds().unwrap()).collect();
+        for (i, a) in boxes.iter().enumerate().skip(4) {
+            for b in &boxes[..i] {
+                assert!(
+                    !(a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()),
+                    "cube {i} stands in another"
+                );
+            }
+        }
+        assert_eq!(scene.materials.len(), 6);
+    }
+
+    #[test]
+    fn an_empty_scene_gets_things_before_the_camera() {
+        for word in object_kinds() {
+            let edit = add_object(&Scene::default(), &word.name, None).unwrap();
+            assert_eq!(edit.scene.faults(), []);
+        }
+        assert!(add_object(&Scene::default(), "sphere", Some("none")).is_err());
+        assert!(add_object(&Scene::default(), "torus", None).is_err());
+    }
+
+    #[test]
+    fn lights_come_from_the_side_that_is_dark() {
+        let scene = built_in();
+        for word in light_kinds() {
+            let edit = add_light(&scene, &word.name).unwrap();
+            let light = &edit.scene.lights[1];
+            let x = match (light.point, light.directional) {
+                (Some(point), _) => point.position[0],
+                (_, Some(directional)) => -directional.direction[0],
+                _ => panic!(),
+            };
+            assert!(x < 0.0, "the lamp that is there stands to the right");
+            assert_eq!(light.name, if word.name == "point" { "lamp 2" } else { "sun" });
+        }
+        assert!(add_light(&scene, "area").is_err());
+        let physical = "light = [{ point.position = [3, 3, 3], intensity = 40, \
+                        falloff = \"inverse-square\" }]\n";
+        let edit = add_light(&Scene::parse(physical, "").unwrap(), "point").unwrap();
+        assert!(edit.scene.lights[1].falloff == Falloff::InverseSquare && edit.note.is_some());
+    }
+}

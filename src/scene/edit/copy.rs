@@ -1,0 +1,283 @@
+//! Copying, deleting, renaming.
+
+use super::extent::bounds;
+use super::ground::place_for;
+use super::motion::move_object;
+use super::names::{free_light, free_material, free_object, free_view};
+use super::typed::name;
+use super::{Edit, Refusal, Subject};
+use crate::scene::Scene;
+use crate::value::excerpt;
+use glam::DVec3;
+
+/// A copy, last in its list, under a name of its own (`cube 2`). The copy of an object stands beside
+/// it, where there is room and the camera sees it; that of a light beside the light.
+///
+/// # Errors
+/// For what a scene has only once.
+pub fn duplicate(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
+    if !subject.exists(scene) {
+        return Err(Refusal::gone(subject));
+    }
+    let mut next = scene.clone();
+    let copy = match subject {
+        Subject::Object(i) => {
+            let mut copy = scene.objects[*i].clone();
+            if !copy.name.is_empty() {
+                copy.name = free_object(scene, &copy.name);
+            }
+            if let Some((low, high)) = copy.form().bounds() {
+                let size = high - low;
+                let usual = size.max_element();
+                let base = place_for(scene, size.map(|s| s.max(1e-3 * usual)));
+                let from = DVec3::new((low.x + high.x) / 2.0, low.y, (low.z + high.z) / 2.0);
+                // As high above the ground as the original.
+                let by = DVec3::new(base.x - from.x, 0.0, base.z - from.z);
+                let digits = crate::value::decade(usual) - 3;
+                let by = by.map(|x| crate::value::rounded_to(x, digits));
+                move_object(&mut copy, by.to_array());
+            } else {
+                let ball = bounds(scene, subject);
+                move_object(&mut copy, [0.0, -0.1 * ball.map_or(1.0, |b| b.radius), 0.0]);
+            }
+            next.objects.push(copy);
+            Subject::Object(next.objects.len() - 1)
+        }
+        Subject::Light(i) => {
+            let mut copy = scene.lights[*i].clone();
+            if !copy.name.is_empty() {
+                copy.name = free_light(scene, &copy.name);
+            }
+            if let Some(point) = &mut copy.point {
+                let step = super::step_length(scene);
+                point.position = super::motion::moved(point.position, [5.0 * step, 0.0, 0.0]);
+            }
+            next.lights.push(copy);
+            Subject::Light(next.lights.len() - 1)
+        }
+        Subject::Material(old) => {
+            let new = free_material(scene, old);
+            next.materials.insert(new.clone(), scene.materials[old].clone());
+            Subject::Material(new)
+        }
+        Subject::View(old) => {
+            let new = free_view(scene, old);
+            next.views.insert(new.clone(), scene.views[old].clone());
+            Subject::View(new)
+        }
+        _ => {
+            let found = format!("there is only one {}", subject.label(scene));
+            return Err(Refusal::new(&found, ""));
+        }
+    };
+    Edit::checked(next, copy, format!("duplicate {}", subject.label(scene)))
+}
+
+/// Takes an object, a light, a view or a material away. Objects whose material goes get the default
+/// finish, and the note names them.
+///
+/// # Errors
+/// For what a scene always has.
+pub fn delete(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
+    if !subject.exists(scene) {
+        return Err(Refusal::gone(subject));
+    }
+    let label = format!("delete {}", subject.label(scene));
+    let mut next = scene.clone();
+    let mut note = None;
+    // What comes next in the list, else what came before.
+    let neighbour = |i: usize, left: usize| if i < left { Some(i) } else { left.checked_sub(1) };
+    let select = match subject {
+        Subject::Object(i) => {
+            next.objects.remove(*i);
+            neighbour(*i, next.objects.len()).map(Subject::Object)
+        }
+        Subject::Light(i) => {
+            next.lights.remove(*i);
+            neighbour(*i, next.lights.len()).map(Subject::Light)
+        }
+        Subject::View(name) => {
+            next.views.remove(name);
+            following(next.views.keys(), name).map(Subject::View)
+        }
+        Subject::Material(name) => {
+            next.materials.remove(name);
+            note = strip(&mut next, name);
+            following(next.materials.keys(), name).map(Subject::Material)
+        }
+        _ => {
+            let found = format!("{} belongs to every scene", subject.label(scene));
+            return Err(Refusal::new(&found, "Only its values can be changed."));
+        }
+    };
+    let edit = Edit::checked(next, select.unwrap_or(Subject::Camera), label)?;
+    Ok(match note {
+        Some(note) => edit.noted(note),
+        None => edit,
+    })
+}
+
+/// The name after `gone` in a sorted list, else the last one.
+fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) -> Option<String> {
+    names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
+}
+
+/// Gives every object of the material `name` the default finish and says which.
+fn strip(scene: &mut Scene, name: &str) -> Option<String> {
+    let mut stripped = Vec::new();
+    for i in 0..scene.objects.len() {
+        if scene.objects[i].material == name {
+            scene.objects[i].material.clear();
+            stripped.push(Subject::Object(i).label(scene));
+        }
+    }
+    let shown = stripped.iter().take(3).cloned().collect::<Vec<_>>().join(", ");
+    match stripped.len() {
+        0 => None,
+        1 => Some(format!("{shown} has the default finish now.")),
+        2 | 3 => Some(format!("{shown} have the default finish now.")),
+        n => Some(format!("{shown} and {} more have the default finish now.", n - 3)),
+    }
+}
+
+/// Gives a new name. Objects follow their material's name; an object or a light may have none.
+///
+/// # Errors
+/// For what has no name, and for a name that is taken or cannot be shown.
+pub fn rename(scene: &Scene, subject: &Subject, new: &str) -> Result<Edit, Refusal> {
+    if !subject.exists(scene) {
+        return Err(Refusal::gone(subject));
+    }
+    let new = name("name", new)?;
+    let mut next = scene.clone();
+    let needed = || Refusal::new("the name must not be empty", "Type one.");
+    let taken = |what| Refusal::new(&format!("there is a {what} \"{new}\" already"), "");
+    let select = match subject {
+        Subject::Object(i) => {
+            next.objects[*i].name = new.clone();
+            subject.clone()
+        }
+        Subject::Light(i) => {
+            next.lights[*i].name = new.clone();
+            subject.clone()
+        }
+        Subject::Material(_) | Subject::View(_) if new.is_empty() => return Err(needed()),
+        Subject::Material(old) => {
+            if old != &new && next.materials.contains_key(&new) {
+                return Err(taken("material"));
+            }
+            let moved = next.materials.remove(old);
+            next.materials.extend(moved.map(|material| (new.clone(), material)));
+            for object in next.objects.iter_mut().filter(|o| o.material == *old) {
+                object.material = new.clone();
+            }
+            Subject::Material(new.clone())
+        }
+        Subject::View(old) => {
+            if old != &new && next.views.contains_key(&new) {
+                return Err(taken("view"));
+            }
+            let moved = next.views.remove(old);
+            next.views.extend(moved.map(|view| (new.clone(), view)));
+            Subject::View(new.clone())
+        }
+        _ => {
+            let found = format!("{} has no name to change", subject.label(scene));
+            return Err(Refusal::new(&found, ""));
+        }
+    };
+    Edit::checked(next, select, format!("rename {}", subject.label(scene)))
+}
+
+/// Gives an object a copy of its material that no other object has.
+///
+/// # Errors
+/// For what is no object.
+pub fn own_material(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
+    let Subject::Object(index) = subject else {
+        return Err(Refusal::new("only objects have a material", "Select an object."));
+    };
+    let object = scene.objects.get(*index).ok_or_else(|| Refusal::gone(subject))?;
+    let mut next = scene.clone();
+    let old = scene.materials.get(&object.material).cloned().unwrap_or_default();
+    let wanted = if object.name.is_empty() { object.shape.key() } else { &object.name };
+    let new = free_material(scene, wanted);
+    next.materials.insert(new.clone(), old);
+    next.objects[*index].material = new.clone();
+    let label = format!("own material for {}", subject.label(scene));
+    Ok(Edit::checked(next, subject.clone(), label)?
+        .noted(format!("Its material is {} now.", excerpt(&new))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+
+    #[test]
+    fn copies_stand_apart_under_their_own_name() {
+        let scene = built_in();
+        let edit = duplicate(&scene, &Subject::Object(3)).unwrap();
+        assert_eq!(edit.subject, Subject::Object(6));
+        let (old, new) = (&scene.objects[3], &edit.scene.objects[6]);
+        assert_eq!((new.name.as_str(), &new.material), ("cube 2", &old.material));
+        let (a, b) = (old.form().bounds().unwrap(), new.form().bounds().unwrap());
+        assert!(!(a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()), "{a:?} {b:?}");
+        assert_eq!(a.0.y, b.0.y);
+        let lamp = duplicate(&scene, &Subject::Light(0)).unwrap().scene;
+        assert_eq!(lamp.lights[1].name, "lamp 2");
+        assert_ne!(lamp.lights[1].point, lamp.lights[0].point);
+        let red = duplicate(&scene, &Subject::Material("red".into())).unwrap();
+        assert_eq!(red.subject, Subject::Material("red 2".into()));
+        assert!(duplicate(&scene, &Subject::Film).is_err());
+        assert!(duplicate(&scene, &Subject::Light(7)).is_err());
+    }
+
+    #[test]
+    fn deleting_selects_the_neighbour_and_names_who_lost_a_material() {
+        let scene = built_in();
+        let edit = delete(&scene, &Subject::Object(5)).unwrap();
+        assert_eq!((edit.subject, edit.scene.objects.len()), (Subject::Object(4), 5));
+        let edit = delete(&scene, &Subject::Object(2)).unwrap();
+        assert_eq!(edit.subject, Subject::Object(2));
+        let edit = delete(&scene, &Subject::Material("red".into())).unwrap();
+        assert_eq!(edit.scene.objects[2].material, "");
+        assert_eq!(edit.note.as_deref(), Some("ball has the default finish now."));
+        assert_eq!(edit.subject, Subject::Material("yellow".into()));
+        let edit = delete(&scene, &Subject::Light(0)).unwrap();
+        assert_eq!(edit.subject, Subject::Camera);
+        assert!(delete(&scene, &Subject::Camera).is_err());
+    }
+
+    #[test]
+    fn names_change_everywhere() {
+        let scene = built_in();
+        let red = Subject::Material("red".into());
+        let edit = rename(&scene, &red, " crimson ").unwrap();
+        assert_eq!(edit.scene.objects[2].material, "crimson");
+        assert_eq!(edit.subject, Subject::Material("crimson".into()));
+        assert_eq!(rename(&scene, &red, "red").unwrap().scene, scene);
+        assert_eq!(
+            rename(&scene, &Subject::Object(2), "bowl").unwrap().scene.objects[2].name,
+            "bowl"
+        );
+        for (subject, new) in [
+            (red.clone(), "green"),
+            (red, ""),
+            (Subject::Object(2), "cube"),
+            (Subject::Object(2), "a\nb"),
+            (Subject::Camera, "x"),
+        ] {
+            assert!(rename(&scene, &subject, new).is_err(), "{subject:?} {new:?}");
+        }
+    }
+
+    #[test]
+    fn one_object_gets_a_material_of_its_own() {
+        let scene = built_in();
+        let edit = own_material(&scene, &Subject::Object(2)).unwrap();
+        assert_eq!(edit.scene.objects[2].material, "ball");
+        assert_eq!(edit.scene.materials["ball"], scene.materials["red"]);
+        assert!(own_material(&scene, &Subject::Light(0)).is_err());
+    }
+}

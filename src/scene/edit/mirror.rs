@@ -1,0 +1,147 @@
+//! The keys that act on the scene's mirror.
+
+use super::subject::reflects;
+use super::{Edit, Refusal, Subject, step, toggle};
+use crate::scene::Scene;
+use crate::shape::Form;
+
+/// The material that the mirror keys act on: that of the selected object (or the selected material) if
+/// it reflects; else that of the first rectangle that reflects; else the one that reflects most among
+/// the objects'. If nothing reflects: the selected one, else that of the first rectangle, so that a
+/// mirror that was turned down to nothing can be turned up again. `None`: there is none of all these.
+pub fn mirror(scene: &Scene, selected: Option<&Subject>) -> Option<String> {
+    let name = |i: usize| Some(scene.objects.get(i)?.material.clone());
+    let chosen = selected.and_then(|subject| match subject.material(scene) {
+        Some(Subject::Material(name)) => Some(name),
+        _ => None,
+    });
+    let mirrors =
+        |material: &String| scene.materials.get(material).is_some_and(|m| m.reflection > 0.0);
+    if let Some(chosen) = chosen.clone().filter(mirrors) {
+        return Some(chosen);
+    }
+    // A rectangle of any orientation, not the ground.
+    let rectangle = |i: &usize| {
+        let object = &scene.objects[*i];
+        object.shape.key() == "rectangle" && matches!(object.form(), Form::Parallelogram { .. })
+    };
+    let mut all = 0..scene.objects.len();
+    if let Some(i) = all.clone().filter(rectangle).find(|i| reflects(scene, *i)) {
+        return name(i);
+    }
+    let reflection = |i: &usize| scene.materials[&scene.objects[*i].material].reflection;
+    let most = all
+        .clone()
+        .filter(|i| reflects(scene, *i))
+        .reduce(|a, b| if reflection(&b) > reflection(&a) { b } else { a });
+    if let Some(i) = most {
+        return name(i);
+    }
+    let named = |i: &usize| scene.materials.contains_key(&scene.objects[*i].material);
+    chosen.or_else(|| all.find(|i| rectangle(i) && named(i)).and_then(name))
+}
+
+fn the_mirror(scene: &Scene, selected: Option<&Subject>) -> Result<Subject, Refusal> {
+    mirror(scene, selected).map(Subject::Material).ok_or_else(|| {
+        let help = "Give an object's material a reflection first.";
+        Refusal::new("nothing in this scene reflects", help)
+    })
+}
+
+/// Changes the mirror's roughness by `steps`, as [`step`] counts them: from 0 up and back to 0.
+///
+/// # Errors
+/// If nothing in the scene reflects.
+pub fn roughen(scene: &Scene, selected: Option<&Subject>, steps: f64) -> Result<Edit, Refusal> {
+    step(scene, &the_mirror(scene, selected)?, "roughness", None, steps)
+}
+
+/// Changes the mirror's reflection coefficient by `steps`, as [`step`] counts them.
+///
+/// # Errors
+/// If there is nothing in the scene to be a mirror.
+pub fn reflect(scene: &Scene, selected: Option<&Subject>, steps: f64) -> Result<Edit, Refusal> {
+    step(scene, &the_mirror(scene, selected)?, "reflection", None, steps)
+}
+
+/// Gives the mirror the next (or previous) lobe, round and round.
+///
+/// # Errors
+/// If nothing in the scene reflects.
+pub fn next_lobe(
+    scene: &Scene,
+    selected: Option<&Subject>,
+    forward: bool,
+) -> Result<Edit, Refusal> {
+    toggle(scene, &the_mirror(scene, selected)?, "lobe", forward)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::Lobe;
+    use crate::scene::built_in;
+
+    #[test]
+    fn the_mirror_is_found() {
+        let mut scene = built_in();
+        let at = |scene: &Scene, subject: Option<Subject>| mirror(scene, subject.as_ref()).unwrap();
+        assert_eq!(at(&scene, None), "mirror");
+        assert_eq!(at(&scene, Some(Subject::Object(2))), "red");
+        assert_eq!(at(&scene, Some(Subject::Object(3))), "mirror", "the cube does not reflect");
+        assert_eq!(at(&scene, Some(Subject::Material("floor".into()))), "floor");
+        assert_eq!(at(&scene, Some(Subject::Camera)), "mirror");
+        scene.materials.get_mut("mirror").unwrap().reflection = 0.0;
+        assert_eq!(at(&scene, None), "red");
+        for material in scene.materials.values_mut() {
+            material.reflection = 0.0;
+        }
+        assert_eq!(at(&scene, None), "mirror", "so that it can be turned up again");
+        assert_eq!(at(&scene, Some(Subject::Object(3))), "green");
+        scene.objects.clear();
+        assert_eq!(mirror(&scene, None), None);
+        assert!(roughen(&scene, None, 1.0).unwrap_err().found.contains("nothing"));
+    }
+
+    #[test]
+    fn roughness_goes_up_from_zero_and_back() {
+        let mut scene = built_in();
+        scene.materials.get_mut("mirror").unwrap().roughness = 0.0;
+        let start = scene.clone();
+        let mut seen = vec![0.0];
+        for _ in 0..60 {
+            scene = roughen(&scene, None, 1.0).unwrap().scene;
+            seen.push(scene.materials["mirror"].roughness);
+        }
+        assert!(seen.is_sorted_by(|a, b| a < b), "{seen:?}");
+        assert!(seen.contains(&0.3) && seen.contains(&0.001) && seen.contains(&0.05), "{seen:?}");
+        for expected in seen.iter().rev().skip(1) {
+            scene = roughen(&scene, None, -1.0).unwrap().scene;
+            assert_eq!(scene.materials["mirror"].roughness, *expected);
+        }
+        assert_eq!(scene, start);
+        assert_eq!(roughen(&scene, None, -1.0).unwrap().scene, start, "0 is the end");
+        let fine = roughen(&scene, None, 0.1).unwrap().scene;
+        assert_eq!(fine.materials["mirror"].roughness, 0.001);
+    }
+
+    #[test]
+    fn lobes_and_reflection() {
+        let mut scene = built_in();
+        let mut lobes = Vec::new();
+        for _ in 0..5 {
+            scene = next_lobe(&scene, None, true).unwrap().scene;
+            lobes.push(scene.materials["mirror"].lobe);
+        }
+        assert_eq!(lobes, [Lobe::Square, Lobe::Beckmann, Lobe::Ggx, Lobe::Mirror, Lobe::Cone]);
+        assert_eq!(
+            next_lobe(&scene, None, false).unwrap().scene.materials["mirror"].lobe,
+            Lobe::Mirror
+        );
+        let edit = reflect(&scene, None, 1.0).unwrap();
+        assert_eq!(edit.scene.materials["mirror"].reflection, 0.97);
+        assert_eq!(edit.label, "reflection of mirror");
+        let edit = reflect(&scene, None, -0.1).unwrap();
+        assert_eq!(edit.scene.materials["mirror"].reflection, 0.915);
+    }
+}

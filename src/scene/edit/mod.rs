@@ -1,0 +1,105 @@
+//! Everything that can be done to a scene, as functions from a scene to a scene. Text in, text out;
+//! no terminal, no file, no clock.
+//!
+//! Every function leaves the given scene as it was and either returns an [`Edit`] whose scene has no
+//! faults, or a [`Refusal`] that says why not. The given scene must have no faults.
+
+mod add;
+mod copy;
+mod extent;
+mod ground;
+mod kinds;
+mod mirror;
+mod motion;
+mod names;
+mod rows;
+mod set;
+mod step;
+#[cfg(test)]
+mod step_test;
+mod subject;
+mod tree;
+mod turning;
+mod typed;
+mod views;
+
+pub use add::{add_light, add_material, add_object, light_kinds, object_kinds};
+pub use copy::{delete, duplicate, own_material, rename};
+pub use extent::{Ball, bounds, focus_distance, scene_bounds, step_length};
+pub use ground::drop_down;
+pub use mirror::{mirror, next_lobe, reflect, roughen};
+pub use motion::move_by;
+pub use rows::{Entry, Row, Word, rows};
+pub use set::{set, set_component};
+pub use step::{step, toggle};
+pub use subject::{Section, Subject, outline};
+pub use turning::turn;
+pub use views::{recall_view, store_view};
+
+use super::Scene;
+use crate::value::excerpt;
+use std::fmt;
+
+/// A scene after an edit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Edit {
+    /// The edited scene; without faults.
+    pub scene: Scene,
+    /// What to select now: what was edited, added, or stands where something was deleted.
+    pub subject: Subject,
+    /// What was done, in a few words: `move cube`, `radius of ball`. The same words for every step of
+    /// one gesture.
+    pub label: String,
+    /// What else happened, in a sentence, if there is something to say.
+    pub note: Option<String>,
+}
+
+/// Why something was not done; the scene stays as it was.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// What was found, as a phrase.
+    pub found: String,
+    /// What is expected, or would help, in sentences; may be empty.
+    pub help: String,
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}.", self.found)?;
+        if self.help.is_empty() { Ok(()) } else { write!(f, " {}", self.help) }
+    }
+}
+
+impl std::error::Error for Refusal {}
+
+impl Refusal {
+    fn new(found: &str, help: &str) -> Self {
+        Self { found: found.to_string(), help: help.to_string() }
+    }
+
+    fn gone(subject: &Subject) -> Self {
+        let what = match subject {
+            Subject::View(name) => format!("there is no view \"{}\"", excerpt(name)),
+            Subject::Material(name) => format!("there is no material \"{}\"", excerpt(name)),
+            Subject::Light(i) => format!("there is no light {}", i + 1),
+            Subject::Object(i) => format!("there is no object {}", i + 1),
+            _ => "it cannot be read".to_string(),
+        };
+        Self::new(&what, "")
+    }
+}
+
+impl Edit {
+    /// `scene` as an edit if it has no faults, otherwise the first of them.
+    fn checked(scene: Scene, subject: Subject, label: String) -> Result<Self, Refusal> {
+        match scene.faults().into_iter().next() {
+            Some(fault) => Err(Refusal { found: fault.found, help: fault.help }),
+            None => Ok(Self { scene, subject, label, note: None }),
+        }
+    }
+
+    fn noted(mut self, note: impl Into<String>) -> Self {
+        self.note = Some(note.into());
+        self
+    }
+}

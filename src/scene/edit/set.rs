@@ -1,0 +1,262 @@
+//! Setting one value by typed text.
+
+use super::kinds::{self, AIM, KIND};
+use super::rows::is_material;
+use super::tree::{field, fields, get, put, read, rivals, write};
+use super::typed::{floats, parse, word};
+use super::{Edit, Refusal, Subject};
+use crate::scene::Scene;
+use crate::value::{Field, Preset, Takes};
+use toml::{Table, Value};
+
+/// Sets what stands behind `key` (of a [`Row`](super::Row)) to what `text` says. Empty text takes the
+/// key away where it may be left out, so that its default holds; an empty step of a transform goes.
+///
+/// # Errors
+/// What was found and what is expected, if `text` cannot be read or the scene would have a fault.
+pub fn set(scene: &Scene, subject: &Subject, key: &str, text: &str) -> Result<Edit, Refusal> {
+    let text = text.trim();
+    let values = read(scene, subject)?;
+    let Some(field) = lookup(subject, key) else {
+        return Err(Refusal::new(&format!("there is no key {key} here"), ""));
+    };
+    match field.takes {
+        Takes::OneOf(kinds) => {
+            let names: Vec<_> = kinds.iter().map(|k| k.name).collect();
+            let name = names[word(field, text, &names)?];
+            return kinds::switch(scene, subject, key, name);
+        }
+        Takes::ListOf(steps) => {
+            let mut object = values;
+            match text {
+                "" => drop(object.remove(key)),
+                _ => {
+                    let names: Vec<_> = steps.iter().map(|k| k.name).collect();
+                    let name = names[word(field, text, &names)?];
+                    kinds::append_step(&mut object, key, name);
+                }
+            }
+            return finish(scene, subject, key, object);
+        }
+        _ => {}
+    }
+    if text.is_empty() {
+        return clear(scene, subject, key, field, values);
+    }
+    let value = if is_material(subject, field) {
+        let names: Vec<_> = scene.materials.keys().map(String::as_str).collect();
+        Value::String(names[word(field, text.trim_matches('"'), &names)?].to_string())
+    } else {
+        parse(field, text)?
+    };
+    if let (Subject::Light(i), "falloff") = (subject, key) {
+        return kinds::switch_falloff(scene, *i, values, value);
+    }
+    replace(scene, subject, key, values, value)
+}
+
+/// Sets one number of those behind `key`, from 0.
+///
+/// # Errors
+/// As [`set`].
+pub fn set_component(
+    scene: &Scene,
+    subject: &Subject,
+    key: &str,
+    component: usize,
+    text: &str,
+) -> Result<Edit, Refusal> {
+    let values = read(scene, subject)?;
+    let list = get(&values, key).and_then(floats).unwrap_or_default();
+    if component >= list.len() {
+        return Err(Refusal::new(&format!("{key} has no number {}", component + 1), ""));
+    }
+    let text = text.trim();
+    // The same reading and the same words of refusal as for the whole list.
+    let parts: Vec<_> = list
+        .iter()
+        .enumerate()
+        .map(|(i, x)| if i == component { text.to_string() } else { x.to_string() })
+        .collect();
+    if text.is_empty() || text.contains([',', ' ', ';', '[', ']', '#']) {
+        let found = format!("number {} of {key} cannot be \"{text}\"", component + 1);
+        return Err(Refusal::new(&found, "Expected one number."));
+    }
+    set(scene, subject, key, &parts.join(" "))
+}
+
+/// The field behind `key`, also of the keys that only an inspector has.
+pub(super) fn lookup(subject: &Subject, key: &str) -> Option<&'static Field> {
+    match (subject, key) {
+        (Subject::Light(_), "kind") => Some(&KIND),
+        (Subject::Camera | Subject::View(_), "aim") => Some(&AIM),
+        _ => field(fields(subject), key),
+    }
+}
+
+/// Puts `value` behind `key`, takes rivals of the key away, checks.
+pub(super) fn replace(
+    scene: &Scene,
+    subject: &Subject,
+    key: &str,
+    mut values: Table,
+    value: Value,
+) -> Result<Edit, Refusal> {
+    let mut gone = None;
+    let first = key.split('.').next().unwrap_or(key);
+    if rivals(subject).contains(&first) {
+        for rival in rivals(subject).iter().filter(|rival| **rival != first) {
+            gone = values.remove(*rival).map(|_| *rival).or(gone);
+        }
+    }
+    if !put(&mut values, key, Some(value)) {
+        return Err(Refusal::new(&format!("there is no place for {key} here"), ""));
+    }
+    let edit = finish(scene, subject, key, values)?;
+    Ok(match gone {
+        Some(rival) => edit.noted(format!("{rival} is gone: {first} stands in its place.")),
+        None => edit,
+    })
+}
+
+/// Takes `key` away.
+fn clear(
+    scene: &Scene,
+    subject: &Subject,
+    key: &str,
+    field: &Field,
+    mut values: Table,
+) -> Result<Edit, Refusal> {
+    let parts: Vec<_> = key.split('.').collect();
+    if let ["transform", index, ..] = parts[..] {
+        let list = values.get_mut("transform").and_then(Value::as_array_mut);
+        match (list, index.parse::<usize>()) {
+            (Some(list), Ok(i)) if i < list.len() => drop(list.remove(i)),
+            _ => return Err(Refusal::new(&format!("there is no step {key}"), "")),
+        }
+    } else if field.preset == Preset::Required {
+        let found = format!("{} must not be left out", field.name);
+        return Err(Refusal::new(&found, &format!("Expected {}.", field.takes)));
+    } else {
+        put(&mut values, key, None);
+    }
+    finish(scene, subject, key, values)
+}
+
+/// The scene with these values, checked.
+pub(super) fn finish(
+    scene: &Scene,
+    subject: &Subject,
+    key: &str,
+    values: Table,
+) -> Result<Edit, Refusal> {
+    let next = write(scene, subject, values)?;
+    Edit::checked(next, subject.clone(), label(scene, subject, key))
+}
+
+/// `radius of ball`.
+pub(super) fn label(scene: &Scene, subject: &Subject, key: &str) -> String {
+    let last = key.rsplit('.').next().unwrap_or(key).replace('_', " ");
+    format!("{last} of {}", subject.label(scene))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+    use crate::shape::Shape;
+
+    fn ball() -> Subject {
+        Subject::Object(2)
+    }
+
+    fn refused(subject: &Subject, key: &str, text: &str) -> String {
+        set(&built_in(), subject, key, text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn typed_values_arrive() {
+        let scene = built_in();
+        let edit = set(&scene, &ball(), "shape.sphere.radius", " .75").unwrap();
+        assert_eq!(edit.label, "radius of ball");
+        let Shape::Sphere(sphere) = &edit.scene.objects[2].shape else { panic!() };
+        assert_eq!(sphere.radius, 0.75);
+        let edit = set_component(&scene, &ball(), "shape.sphere.center", 1, "2").unwrap();
+        let Shape::Sphere(sphere) = &edit.scene.objects[2].shape else { panic!() };
+        assert_eq!(sphere.center, [-0.9, 2.0, 0.0]);
+        let edit = set(&scene, &Subject::Film, "size", "320x200").unwrap();
+        assert_eq!(edit.scene.film.size, [320, 200]);
+        let edit = set(&scene, &ball(), "material", "gr").unwrap();
+        assert_eq!(edit.scene.objects[2].material, "green");
+        let edit = set(&scene, &Subject::Light(0), "on", "off").unwrap();
+        assert!(!edit.scene.lights[0].on);
+    }
+
+    #[test]
+    fn refusals_say_what_was_found_and_what_is_expected() {
+        for (subject, key, text, words) in [
+            (ball(), "shape.sphere.radius", "-1", "radius is -1. Expected a number greater than 0"),
+            (ball(), "shape.sphere.radius", "big", "radius cannot be \"big\". Expected a number"),
+            (ball(), "shape.sphere.radius", "", "radius must not be left out"),
+            (ball(), "shape.sphere.center", "1 2", "center needs 3 numbers, not 2"),
+            (ball(), "name", "cube", "has the same name"),
+            (ball(), "material", "rde", "Did you mean \"red\"?"),
+            (ball(), "shape", "ball", "Expected one of \"sphere\", \"cube\""),
+            (ball(), "no.such", "1", "there is no key no.such here"),
+            (Subject::Camera, "target", "0.6 1.4 4.5", "target is the eye itself"),
+            (Subject::Camera, "view_angle.vertical", "180", "Expected a number between 0 and 180"),
+            (Subject::Film, "size", "99999 1", "size cannot be"),
+            (Subject::Film, "size", "16384 16384", "268435456 pixels"),
+            (Subject::Object(99), "name", "x", "there is no object 100"),
+            (Subject::Material("rot".into()), "color", "1 1 1", "there is no material \"rot\""),
+        ] {
+            let message = refused(&subject, key, text);
+            assert!(message.contains(words), "{message}");
+        }
+        let one = set_component(&built_in(), &ball(), "shape.sphere.center", 3, "1").unwrap_err();
+        assert!(one.found.contains("has no number 4"), "{one}");
+        let two = set_component(&built_in(), &ball(), "shape.sphere.center", 0, "1 2").unwrap_err();
+        assert!(two.help.contains("one number"), "{two}");
+    }
+
+    #[test]
+    fn empty_text_brings_the_default_back() {
+        let scene = built_in();
+        let red = Subject::Material("red".into());
+        let edit = set(&scene, &red, "exponent", "").unwrap();
+        assert_eq!(edit.scene.materials["red"].exponent, 32.0);
+        let edit = set(&scene, &ball(), "name", "").unwrap();
+        assert_eq!(edit.scene.objects[2].name, "");
+        let edit = set(&scene, &ball(), "material", "").unwrap();
+        assert_eq!(edit.scene.objects[2].material, "");
+    }
+
+    #[test]
+    fn rivals_give_way() {
+        let scene = built_in();
+        let red = Subject::Material("red".into());
+        let gold = set(&scene, &red, "metal", "gold").unwrap().scene;
+        let edit = set(&gold, &red, "reflectance", "0.5 0.5 0.5").unwrap();
+        assert!(edit.scene.materials["red"].metal.is_none());
+        assert!(edit.note.unwrap().contains("metal is gone"));
+        let edit = set(&scene, &Subject::Camera, "direction", "0 0 -1").unwrap();
+        assert_eq!(edit.scene.camera.target, None);
+    }
+
+    #[test]
+    fn steps_come_and_go() {
+        let scene = built_in();
+        let turned = set(&scene, &ball(), "transform", "rotate_y").unwrap().scene;
+        let turned = set(&turned, &ball(), "transform.0.rotate_y", "30").unwrap().scene;
+        let moved = set(&turned, &ball(), "transform", "tr").unwrap().scene;
+        let moved = set(&moved, &ball(), "transform", "rotate").unwrap().scene;
+        assert_eq!(moved.objects[2].transform.len(), 3);
+        let moved = set(&moved, &ball(), "transform.2.rotate.degrees", "5").unwrap().scene;
+        let moved = set(&moved, &ball(), "transform.2.rotate.degrees", "").unwrap().scene;
+        let back = set(&moved, &ball(), "transform.1.translate", "").unwrap().scene;
+        assert_eq!(back, turned);
+        assert_eq!(set(&back, &ball(), "transform", "").unwrap().scene, scene);
+        assert!(set(&back, &ball(), "transform.7.rotate_y", "").is_err());
+        assert!(set(&back, &ball(), "transform.7.rotate_y", "1").is_err());
+    }
+}

@@ -1,0 +1,228 @@
+//! What can be selected and edited.
+
+use crate::scene::{Finding, Message, Scene};
+use crate::value::excerpt;
+
+/// One thing of a scene that can be selected and edited.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Subject {
+    /// The camera that the picture is taken from.
+    Camera,
+    /// A viewpoint kept by name.
+    View(String),
+    /// Light from everywhere.
+    Ambient,
+    /// What a ray sees that meets nothing.
+    Background,
+    /// A light, by its position in the scene from 0.
+    Light(usize),
+    /// An object, by its position in the scene from 0.
+    Object(usize),
+    /// A finish, by name.
+    Material(String),
+    /// The picture's raster.
+    Film,
+    /// How far paths are followed.
+    Trace,
+}
+
+/// A part of the outline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Section {
+    /// The camera and the kept viewpoints.
+    Camera,
+    /// Ambient light and background.
+    Surroundings,
+    /// Lights.
+    Lights,
+    /// Objects whose material reflects.
+    Mirrors,
+    /// All other objects.
+    Objects,
+    /// Finishes.
+    Materials,
+    /// Film and tracing.
+    Picture,
+}
+
+impl Section {
+    /// The heading above it.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Camera => "camera",
+            Self::Surroundings => "surroundings",
+            Self::Lights => "lights",
+            Self::Mirrors => "mirrors",
+            Self::Objects => "objects",
+            Self::Materials => "materials",
+            Self::Picture => "picture",
+        }
+    }
+}
+
+/// Every subject of the scene, each once, in the order in which an outline shows them.
+pub fn outline(scene: &Scene) -> Vec<(Section, Subject)> {
+    let mut list = vec![(Section::Camera, Subject::Camera)];
+    list.extend(scene.views.keys().map(|name| (Section::Camera, Subject::View(name.clone()))));
+    list.push((Section::Surroundings, Subject::Ambient));
+    list.push((Section::Surroundings, Subject::Background));
+    list.extend((0..scene.lights.len()).map(|i| (Section::Lights, Subject::Light(i))));
+    let (mirrors, others): (Vec<_>, Vec<_>) =
+        (0..scene.objects.len()).partition(|i| reflects(scene, *i));
+    list.extend(mirrors.into_iter().map(|i| (Section::Mirrors, Subject::Object(i))));
+    list.extend(others.into_iter().map(|i| (Section::Objects, Subject::Object(i))));
+    let materials = scene.materials.keys();
+    list.extend(materials.map(|name| (Section::Materials, Subject::Material(name.clone()))));
+    list.push((Section::Picture, Subject::Film));
+    list.push((Section::Picture, Subject::Trace));
+    list
+}
+
+/// Whether the object at `index` has a material that reflects.
+pub(super) fn reflects(scene: &Scene, index: usize) -> bool {
+    let object = scene.objects.get(index);
+    object.and_then(|o| scene.materials.get(&o.material)).is_some_and(|m| m.reflection > 0.0)
+}
+
+impl Subject {
+    /// Whether the scene (still) has it.
+    pub fn exists(&self, scene: &Scene) -> bool {
+        match self {
+            Self::View(name) => scene.views.contains_key(name),
+            Self::Light(i) => *i < scene.lights.len(),
+            Self::Object(i) => *i < scene.objects.len(),
+            Self::Material(name) => scene.materials.contains_key(name),
+            Self::Camera | Self::Ambient | Self::Background | Self::Film | Self::Trace => true,
+        }
+    }
+
+    /// The keys that lead to it in the file.
+    pub(super) fn path(&self) -> Vec<String> {
+        let keys: &[&str] = match self {
+            Self::Camera => &["camera"],
+            Self::Ambient => &["ambient"],
+            Self::Background => &["background"],
+            Self::Film => &["film"],
+            Self::Trace => &["trace"],
+            Self::View(name) => &["views", name],
+            Self::Material(name) => &["materials", name],
+            Self::Light(i) => &["light", &i.to_string()],
+            Self::Object(i) => &["object", &i.to_string()],
+        };
+        keys.iter().map(|key| key.to_string()).collect()
+    }
+
+    /// What a path of keys (of a [`Finding`]) leads to; `None`: the scene as a whole.
+    pub fn of_path(path: &[String]) -> Option<Self> {
+        let index = || path.get(1)?.parse().ok();
+        match path.first()?.as_str() {
+            "camera" => Some(Self::Camera),
+            "views" => path.get(1).cloned().map(Self::View),
+            "ambient" => Some(Self::Ambient),
+            "background" => Some(Self::Background),
+            "light" => index().map(Self::Light),
+            "object" => index().map(Self::Object),
+            "materials" => path.get(1).cloned().map(Self::Material),
+            "film" => Some(Self::Film),
+            "trace" => Some(Self::Trace),
+            _ => None,
+        }
+    }
+
+    /// What a finding about the scene is about, and the key in it; the key may be empty.
+    pub fn of_finding(finding: &Finding) -> Option<(Self, String)> {
+        let subject = Self::of_path(&finding.path)?;
+        let rest = finding.path.get(subject.path().len()..).unwrap_or_default();
+        Some((subject, rest.join(".")))
+    }
+
+    /// What a message about the scene's file is about.
+    pub fn of_message(scene: &Scene, message: &Message) -> Option<Self> {
+        let subjects = outline(scene).into_iter().map(|(_, subject)| subject);
+        subjects.into_iter().find(|subject| subject.title(scene) == message.subject)
+    }
+
+    /// Its name in an outline: `lamp`, `light 2`, `sphere 3` (the third object, without a name).
+    /// Names from a file are made printable and cut after 40 characters.
+    pub fn label(&self, scene: &Scene) -> String {
+        let named = |name: Option<&String>| name.filter(|n| !n.is_empty()).map(|n| excerpt(n));
+        match self {
+            Self::View(name) | Self::Material(name) => excerpt(name),
+            Self::Light(i) => named(scene.lights.get(*i).map(|l| &l.name))
+                .unwrap_or_else(|| format!("light {}", i + 1)),
+            Self::Object(i) => {
+                let object = scene.objects.get(*i);
+                let kind = object.map_or("object", |o| o.shape.key());
+                named(object.map(|o| &o.name)).unwrap_or_else(|| format!("{kind} {}", i + 1))
+            }
+            Self::Camera => "camera".into(),
+            Self::Ambient => "ambient".into(),
+            Self::Background => "background".into(),
+            Self::Film => "film".into(),
+            Self::Trace => "trace".into(),
+        }
+    }
+
+    /// What messages call it: `object "queen"`, `light 2`, `camera`.
+    pub fn title(&self, scene: &Scene) -> String {
+        scene.subject(&self.path())
+    }
+
+    /// The object's material; a material's is itself.
+    pub fn material(&self, scene: &Scene) -> Option<Self> {
+        match self {
+            Self::Material(_) => self.exists(scene).then(|| self.clone()),
+            Self::Object(i) => {
+                let name = &scene.objects.get(*i)?.material;
+                scene.materials.contains_key(name).then(|| Self::Material(name.clone()))
+            }
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+    use std::collections::HashSet;
+
+    #[test]
+    fn the_outline_has_everything_once_and_in_order() {
+        let mut scene = built_in();
+        scene.views.insert("left".into(), scene.camera.clone());
+        let list = outline(&scene);
+        let once: HashSet<_> = list.iter().map(|(_, subject)| subject).collect();
+        assert_eq!(once.len(), list.len());
+        assert!(list.is_sorted_by_key(|(section, _)| *section));
+        assert!(list.iter().all(|(_, subject)| subject.exists(&scene)));
+        let labels: Vec<_> = list.iter().map(|(_, s)| s.label(&scene)).collect();
+        let expected = "camera left ambient background lamp floor mirror ball cube pyramid prism \
+                        blue floor green mirror red yellow film trace";
+        assert_eq!(labels.join(" "), expected);
+    }
+
+    #[test]
+    fn findings_and_messages_lead_to_their_subject() {
+        let mut scene = built_in();
+        scene.lights[0].name.clear();
+        scene.views.insert("left".into(), scene.camera.clone());
+        for (_, subject) in outline(&scene) {
+            assert_eq!(Subject::of_path(&subject.path()).as_ref(), Some(&subject));
+            let message = Message {
+                file: String::new(),
+                place: None,
+                subject: subject.title(&scene),
+                found: String::new(),
+                help: String::new(),
+            };
+            assert_eq!(Subject::of_message(&scene, &message), Some(subject));
+        }
+        scene.materials.get_mut("red").unwrap().roughness = -1.0;
+        let found = Subject::of_finding(&scene.faults()[0]);
+        assert_eq!(found, Some((Subject::Material("red".into()), "roughness".into())));
+        assert!(!Subject::Object(6).exists(&scene) && !Subject::View("x".into()).exists(&scene));
+        assert_eq!(Subject::Object(2).material(&scene), Some(Subject::Material("red".into())));
+        assert_eq!(Subject::Camera.material(&scene), None);
+    }
+}

@@ -1,0 +1,251 @@
+//! A scene and the file that it is kept in: opening, saving without harm, noticing other writers.
+
+use super::{Document, Scene, SceneErrors};
+use std::fmt;
+use std::fs::{self, File};
+use std::hash::{DefaultHasher, Hasher};
+use std::io::{self, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// A scene's document and where it is kept.
+#[derive(Clone, Debug)]
+pub struct SceneFile {
+    path: Option<PathBuf>,
+    document: Document,
+    /// Of the bytes that this program last read from or wrote to the file.
+    fingerprint: u64,
+}
+
+/// What is in the file now, compared with what this program last read or wrote.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DiskState {
+    /// The same; or there is no file yet to differ.
+    Same,
+    /// Somebody else has written it, or it cannot be read any more.
+    Changed,
+    /// It is not there.
+    Gone,
+}
+
+/// Why a scene was not saved.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SaveError {
+    /// It has no file yet.
+    Untitled,
+    /// Somebody else has written the file since it was read.
+    Changed(PathBuf),
+    /// The file exists and was not to be overwritten.
+    Exists(PathBuf),
+    /// It cannot be written.
+    Failed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, as a clause.
+        what: String,
+    },
+}
+
+impl fmt::Display for SaveError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let shown = |path: &PathBuf| crate::value::printable(&path.display().to_string());
+        match self {
+            Self::Untitled => f.write_str("this scene has no file yet; save it under a name"),
+            Self::Changed(path) => write!(
+                f,
+                "{} was changed by another program; reload it, overwrite it, or save under another \
+                 name",
+                shown(path)
+            ),
+            Self::Exists(path) => {
+                write!(f, "{} exists; overwrite it or choose another name", shown(path))
+            }
+            Self::Failed { path, what } => write!(f, "cannot write {}: {what}", shown(path)),
+        }
+    }
+}
+
+impl std::error::Error for SaveError {}
+
+impl SceneFile {
+    /// Reads and checks the scene file at `path`.
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub fn open(path: &Path) -> Result<Self, SceneErrors> {
+        let document = Document::read(path)?;
+        let fingerprint = fingerprint(document.text().as_bytes());
+        Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
+    }
+
+    /// A scene that is in no file yet; messages call it `name`.
+    ///
+    /// # Errors
+    /// As [`Scene::parse`].
+    pub fn untitled(text: String, name: &str) -> Result<Self, SceneErrors> {
+        Ok(Self { path: None, document: Document::parse(text, name)?, fingerprint: 0 })
+    }
+
+    /// Where it is kept.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+
+    /// The document as it was last read or saved.
+    pub fn document(&self) -> &Document {
+        &self.document
+    }
+
+    /// Reads the file and compares it with what this program last read or wrote.
+    pub fn on_disk(&self) -> DiskState {
+        match self.path.as_deref().map(content) {
+            None => DiskState::Same,
+            Some(Ok(Some(found))) if found == self.fingerprint => DiskState::Same,
+            Some(Ok(None)) => DiskState::Gone,
+            Some(_) => DiskState::Changed,
+        }
+    }
+
+    /// Reads the file again.
+    ///
+    /// # Errors
+    /// As [`Scene::read`]; the document stays what it was. What was read counts as seen all the same,
+    /// so that a broken file is told once and not at every look.
+    pub fn reload(&mut self) -> Result<(), SceneErrors> {
+        let Some(path) = self.path.clone() else { return Ok(()) };
+        if let Ok(Some(found)) = content(&path) {
+            self.fingerprint = found;
+        }
+        *self = Self::open(&path)?;
+        Ok(())
+    }
+
+    /// Writes `scene`, which has no faults, to its file: comments, order and layout of what has not
+    /// changed stay. The old file is replaced in one step or stays as it was; a link stays a link, and
+    /// permissions stay.
+    ///
+    /// # Errors
+    /// If there is no file yet, if another program wrote it meanwhile (unless `overwrite`), if it cannot
+    /// be written.
+    pub fn save(&mut self, scene: &Scene, overwrite: bool) -> Result<(), SaveError> {
+        let Some(path) = self.path.clone() else { return Err(SaveError::Untitled) };
+        if !overwrite && self.on_disk() == DiskState::Changed {
+            return Err(SaveError::Changed(path));
+        }
+        let mut document = self.document.clone();
+        document.apply(scene);
+        replace(&path, document.text(), true)?;
+        self.fingerprint = fingerprint(document.text().as_bytes());
+        self.document = document;
+        Ok(())
+    }
+
+    /// Writes `scene`, which has no faults, to another file, which becomes its own.
+    ///
+    /// # Errors
+    /// If the file exists (unless `overwrite`), if it cannot be written.
+    pub fn save_as(
+        &mut self,
+        path: &Path,
+        scene: &Scene,
+        overwrite: bool,
+    ) -> Result<(), SaveError> {
+        let mut document = self.document.clone().renamed(&path.display().to_string());
+        document.apply(scene);
+        replace(path, document.text(), overwrite)?;
+        self.path = Some(path.to_path_buf());
+        self.fingerprint = fingerprint(document.text().as_bytes());
+        self.document = document;
+        Ok(())
+    }
+}
+
+fn fingerprint(bytes: &[u8]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(bytes);
+    hasher.finish()
+}
+
+/// The fingerprint of what is in the file; `None`: there is no file.
+fn content(path: &Path) -> io::Result<Option<u64>> {
+    match File::open(path) {
+        Ok(file) if file.metadata()?.is_file() => {
+            let mut bytes = Vec::new();
+            file.take(1 << 30).read_to_end(&mut bytes)?;
+            Ok(Some(fingerprint(&bytes)))
+        }
+        Ok(_) => Err(ErrorKind::InvalidInput.into()),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// Puts `text` at `path`, complete and on the disk, or leaves what is there.
+fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
+    let failed = |what: String| SaveError::Failed { path: path.to_path_buf(), what };
+    // A link stays a link: what it points to is replaced.
+    let is_link = path.symlink_metadata().is_ok_and(|m| m.file_type().is_symlink());
+    let file = match is_link.then(|| fs::canonicalize(path)) {
+        Some(Ok(real)) => real,
+        Some(Err(_)) => return Err(failed("it is a link that leads nowhere".to_string())),
+        None => path.to_path_buf(),
+    };
+    let existing = fs::metadata(&file).ok();
+    if let Some(existing) = &existing {
+        if !existing.is_file() {
+            return Err(failed("it is not a regular file; name another one".to_string()));
+        }
+        if !overwrite {
+            return Err(SaveError::Exists(path.to_path_buf()));
+        }
+        if existing.permissions().readonly() {
+            let what = "it is read-only; make it writable or save under another name";
+            return Err(failed(what.to_string()));
+        }
+    }
+    let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let directory = parent.unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".zerkalo-").suffix(".tmp");
+    // An existing file keeps its permissions; a new one gets those that the user's umask leaves.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    let written = builder.tempfile_in(directory).and_then(|mut temporary| {
+        if let Some(existing) = &existing {
+            temporary.as_file().set_permissions(existing.permissions())?;
+        }
+        temporary.write_all(text.as_bytes())?;
+        temporary.as_file().sync_all()?;
+        Ok(temporary)
+    });
+    let explained = |error: io::Error| failed(explain(&error, directory));
+    let temporary = written.map_err(explained)?;
+    // A file that came into being a moment ago is not overwritten unasked either.
+    let put = if overwrite { temporary.persist(&file) } else { temporary.persist_noclobber(&file) };
+    put.map_err(|e| match e.error.kind() {
+        ErrorKind::AlreadyExists => SaveError::Exists(path.to_path_buf()),
+        _ => explained(e.error),
+    })?;
+    // Makes the new name durable; not every system lets a directory be synced.
+    if let Ok(directory) = File::open(directory) {
+        let _ = directory.sync_all();
+    }
+    Ok(())
+}
+
+fn explain(error: &io::Error, directory: &Path) -> String {
+    let shown = directory.display();
+    match error.kind() {
+        ErrorKind::NotFound => format!("the directory {shown} does not exist; create it first"),
+        ErrorKind::NotADirectory => format!("{shown} is not a directory"),
+        ErrorKind::PermissionDenied => {
+            format!("no permission to write in the directory {shown}; save somewhere else")
+        }
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            format!("no space is left in {shown}")
+        }
+        _ => error.to_string(),
+    }
+}

@@ -1,0 +1,129 @@
+//! Saving and reloading on a real file system.
+
+use super::{BUILT_IN, DiskState, SaveError, Scene, SceneFile};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The built-in scene in a file of its own.
+fn opened(directory: &Path) -> (PathBuf, SceneFile) {
+    let path = directory.join("scene.toml");
+    fs::write(&path, BUILT_IN).unwrap();
+    let file = SceneFile::open(&path).unwrap();
+    (path, file)
+}
+
+/// What is there with another depth.
+fn edited(file: &SceneFile, depth: u32) -> Scene {
+    let mut scene = file.document().scene().clone();
+    scene.trace.depth = depth;
+    scene
+}
+
+fn count(directory: &Path) -> usize {
+    fs::read_dir(directory).unwrap().count()
+}
+
+#[test]
+fn saving_there_and_back_gives_the_same_bytes() {
+    let directory = tempfile::tempdir().unwrap();
+    let (path, mut file) = opened(directory.path());
+    let start = file.document().scene().clone();
+    file.save(&edited(&file, 3), false).unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    assert_eq!(text, BUILT_IN.to_string() + "\n[trace]\ndepth = 3\n");
+    assert_eq!(file.on_disk(), DiskState::Same);
+    file.save(&start, false).unwrap();
+    assert_eq!(fs::read_to_string(&path).unwrap(), BUILT_IN);
+    assert_eq!(count(directory.path()), 1, "no temporary file is left");
+}
+
+#[test]
+fn another_writer_is_noticed() {
+    let directory = tempfile::tempdir().unwrap();
+    let (path, mut file) = opened(directory.path());
+    let theirs = BUILT_IN.replace("[640, 480]", "[320, 240]");
+    fs::write(&path, &theirs).unwrap();
+    assert_eq!(file.on_disk(), DiskState::Changed);
+    let scene = edited(&file, 3);
+    assert_eq!(file.save(&scene, false), Err(SaveError::Changed(path.clone())));
+    assert_eq!(fs::read_to_string(&path).unwrap(), theirs);
+    file.save(&scene, true).unwrap();
+    assert_eq!(SceneFile::open(&path).unwrap().document().scene(), &scene);
+    fs::write(&path, &theirs).unwrap();
+    file.reload().unwrap();
+    assert_eq!(file.document().scene().film.size, [320, 240]);
+    assert_eq!(file.on_disk(), DiskState::Same);
+    fs::remove_file(&path).unwrap();
+    assert_eq!(file.on_disk(), DiskState::Gone);
+    file.save(&scene, false).unwrap();
+    assert_eq!(file.on_disk(), DiskState::Same);
+}
+
+#[test]
+fn a_broken_file_is_told_once_and_harms_nothing() {
+    let directory = tempfile::tempdir().unwrap();
+    let (path, mut file) = opened(directory.path());
+    fs::write(&path, BUILT_IN.replace("radius = 0.5", "radius = -0.5")).unwrap();
+    let errors = file.reload().unwrap_err();
+    assert_eq!(errors.messages()[0].subject, "object \"ball\"");
+    assert_eq!(file.document().text(), BUILT_IN);
+    assert_eq!(file.on_disk(), DiskState::Same);
+    fs::write(&path, BUILT_IN).unwrap();
+    assert_eq!(file.on_disk(), DiskState::Changed);
+    file.reload().unwrap();
+}
+
+#[test]
+fn saving_under_another_name_overwrites_nothing_unasked() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut file = SceneFile::untitled(BUILT_IN.to_string(), "mirror-room.toml").unwrap();
+    let scene = edited(&file, 3);
+    assert_eq!(file.save(&scene, true), Err(SaveError::Untitled));
+    assert_eq!(file.on_disk(), DiskState::Same);
+    let other = directory.path().join("other.toml");
+    fs::write(&other, "theirs").unwrap();
+    assert_eq!(file.save_as(&other, &scene, false), Err(SaveError::Exists(other.clone())));
+    assert_eq!(fs::read_to_string(&other).unwrap(), "theirs");
+    assert_eq!(file.path(), None);
+    let new = directory.path().join("new.toml");
+    file.save_as(&new, &scene, false).unwrap();
+    assert_eq!((file.path(), file.document().name()), (Some(&*new), &*new.display().to_string()));
+    file.save_as(&other, &scene, true).unwrap();
+    assert_eq!(fs::read(&other).unwrap(), fs::read(&new).unwrap());
+    file.save(&edited(&file, 4), false).unwrap();
+    assert_eq!(count(directory.path()), 2);
+}
+
+#[test]
+fn what_cannot_be_written_says_why() {
+    let directory = tempfile::tempdir().unwrap();
+    let (path, mut file) = opened(directory.path());
+    let scene = edited(&file, 3);
+    let missing = directory.path().join("no/such.toml");
+    let error = file.save_as(&missing, &scene, false).unwrap_err().to_string();
+    assert!(error.contains("does not exist; create it first"), "{error}");
+    let error = file.save_as(directory.path(), &scene, true).unwrap_err().to_string();
+    assert!(error.contains("not a regular file"), "{error}");
+    let mut permissions = fs::metadata(&path).unwrap().permissions();
+    permissions.set_readonly(true);
+    fs::set_permissions(&path, permissions).unwrap();
+    let error = file.save(&scene, false).unwrap_err().to_string();
+    assert!(error.contains("read-only"), "{error}");
+    assert_eq!(fs::read_to_string(&path).unwrap(), BUILT_IN);
+}
+
+#[test]
+#[cfg(unix)]
+fn links_and_permissions_stay() {
+    use std::os::unix::fs::PermissionsExt;
+    let directory = tempfile::tempdir().unwrap();
+    let (path, _) = opened(directory.path());
+    let link = directory.path().join("link.toml");
+    std::os::unix::fs::symlink(&path, &link).unwrap();
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+    let mut file = SceneFile::open(&link).unwrap();
+    file.save(&edited(&file, 3), false).unwrap();
+    assert!(link.symlink_metadata().unwrap().file_type().is_symlink());
+    assert!(fs::read_to_string(&path).unwrap().ends_with("depth = 3\n"));
+    assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o640);
+}

@@ -1,0 +1,236 @@
+//! Undo and redo of whole scenes.
+
+use super::{Object, Scene, Step};
+use crate::camera::Camera;
+use crate::light::Light;
+use crate::material::Material;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Most memory for scenes to go back to [bytes], roughly counted.
+const MAX_BYTES: usize = 64 << 20;
+/// Most steps to go back.
+const MAX_STEPS: usize = 10_000;
+
+/// The scenes that an editor has been through. Each step has a label; the steps of one gesture (a drag,
+/// a held key) become one.
+#[derive(Clone, Debug)]
+pub struct History {
+    /// What was before each step that can be undone, the oldest first.
+    past: VecDeque<Entry>,
+    now: Arc<Scene>,
+    /// What was after each step that can be done again, the next one last.
+    future: Vec<Entry>,
+    /// Whether the last step may still grow.
+    open: bool,
+    saved: Arc<Scene>,
+}
+
+#[derive(Clone, Debug)]
+struct Entry {
+    scene: Arc<Scene>,
+    label: String,
+    bytes: usize,
+}
+
+impl Entry {
+    fn new(scene: Arc<Scene>, label: String) -> Self {
+        let bytes = bytes(&scene);
+        Self { scene, label, bytes }
+    }
+}
+
+impl History {
+    /// No steps yet; `scene` is what is saved.
+    pub fn new(scene: Arc<Scene>) -> Self {
+        let saved = Arc::clone(&scene);
+        Self { past: VecDeque::new(), now: scene, future: Vec::new(), open: false, saved }
+    }
+
+    /// The scene as it is now.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.now
+    }
+
+    /// Makes `scene` the scene of now. `held`: a step of a gesture, which becomes one with the step
+    /// before if that was of the same gesture and has the same label. `false`: nothing has changed, and
+    /// nothing is recorded.
+    pub fn record(&mut self, scene: Arc<Scene>, label: &str, held: bool) -> bool {
+        if *scene == *self.now {
+            return false;
+        }
+        self.future.clear();
+        let grows = held && self.open && self.past.back().is_some_and(|last| last.label == label);
+        let before = std::mem::replace(&mut self.now, scene);
+        self.open = held;
+        if grows {
+            // A gesture that led back to where it began leaves no step.
+            if self.past.back().is_some_and(|last| *last.scene == *self.now) {
+                self.now = self.past.pop_back().map_or(before, |last| last.scene);
+                self.open = false;
+            }
+        } else {
+            self.past.push_back(Entry::new(before, label.to_string()));
+            self.forget();
+        }
+        true
+    }
+
+    /// Ends a gesture: the next step is one of its own.
+    pub fn end_gesture(&mut self) {
+        self.open = false;
+    }
+
+    /// Goes back one step and returns its label; `None`: there is none.
+    pub fn undo(&mut self) -> Option<String> {
+        self.open = false;
+        let Entry { scene, label, .. } = self.past.pop_back()?;
+        let after = std::mem::replace(&mut self.now, scene);
+        self.future.push(Entry::new(after, label.clone()));
+        Some(label)
+    }
+
+    /// Goes forward one step that was undone and returns its label; `None`: there is none.
+    pub fn redo(&mut self) -> Option<String> {
+        self.open = false;
+        let Entry { scene, label, .. } = self.future.pop()?;
+        let before = std::mem::replace(&mut self.now, scene);
+        self.past.push_back(Entry::new(before, label.clone()));
+        Some(label)
+    }
+
+    /// What `undo` would undo.
+    pub fn undo_label(&self) -> Option<&str> {
+        self.past.back().map(|entry| entry.label.as_str())
+    }
+
+    /// What `redo` would do again.
+    pub fn redo_label(&self) -> Option<&str> {
+        self.future.last().map(|entry| entry.label.as_str())
+    }
+
+    /// `scene`, the one of now or an earlier one, has been written to the file.
+    pub fn mark_saved(&mut self, scene: Arc<Scene>) {
+        self.saved = scene;
+        self.open = false;
+    }
+
+    /// Whether the scene of now is the one in the file, however it came to be that.
+    pub fn is_saved(&self) -> bool {
+        Arc::ptr_eq(&self.saved, &self.now) || *self.saved == *self.now
+    }
+
+    /// Forgets all steps: `scene` is what the file holds now.
+    pub fn restart(&mut self, scene: Arc<Scene>) {
+        *self = Self::new(scene);
+    }
+
+    /// Drops the oldest steps beyond the memory allowed.
+    fn forget(&mut self) {
+        let mut total: usize = self.past.iter().map(|entry| entry.bytes).sum();
+        while self.past.len() > 1 && (total > MAX_BYTES || self.past.len() > MAX_STEPS) {
+            total -= self.past.pop_front().map_or(0, |entry| entry.bytes);
+        }
+    }
+}
+
+/// About how much memory a scene takes.
+fn bytes(scene: &Scene) -> usize {
+    let objects: usize = scene
+        .objects
+        .iter()
+        .map(|o| o.name.len() + o.material.len() + o.transform.len() * size_of::<Step>())
+        .sum();
+    size_of::<Scene>()
+        + objects
+        + scene.objects.len() * size_of::<Object>()
+        + scene.lights.len() * (size_of::<Light>() + 16)
+        + scene.materials.len() * (size_of::<Material>() + 32)
+        + scene.views.len() * (size_of::<Camera>() + 32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(depth: u32) -> Arc<Scene> {
+        let mut scene = Scene::default();
+        scene.trace.depth = depth;
+        Arc::new(scene)
+    }
+
+    fn depth(history: &History) -> u32 {
+        history.scene().trace.depth
+    }
+
+    #[test]
+    fn steps_go_back_and_forth() {
+        let mut history = History::new(scene(0));
+        assert!(history.is_saved() && history.undo().is_none() && history.redo().is_none());
+        assert!(history.record(scene(1), "one", false));
+        assert!(history.record(scene(2), "two", false));
+        assert!(!history.record(scene(2), "nothing", false));
+        assert_eq!((history.undo_label(), history.redo_label()), (Some("two"), None));
+        assert_eq!(history.undo().as_deref(), Some("two"));
+        assert_eq!((depth(&history), history.redo_label()), (1, Some("two")));
+        assert_eq!(history.redo().as_deref(), Some("two"));
+        assert_eq!(depth(&history), 2);
+        history.undo();
+        history.undo();
+        assert!(depth(&history) == 0 && history.is_saved());
+        history.record(scene(3), "three", false);
+        assert!(history.redo().is_none(), "another way was taken");
+    }
+
+    #[test]
+    fn a_gesture_is_one_step() {
+        let mut history = History::new(scene(0));
+        for i in 1..50 {
+            history.record(scene(i), "drag", true);
+        }
+        history.record(scene(60), "other", true);
+        history.record(scene(61), "other", true);
+        history.end_gesture();
+        history.record(scene(62), "other", true);
+        let back: Vec<_> = std::iter::from_fn(|| {
+            history.undo()?;
+            Some(depth(&history))
+        })
+        .collect();
+        assert_eq!(back, [61, 49, 0]);
+        history.record(scene(7), "drag", true);
+        history.record(scene(0), "drag", true);
+        assert!(history.undo().is_none(), "back where it began");
+        assert_eq!(depth(&history), 0);
+    }
+
+    #[test]
+    fn saved_is_what_the_scene_says_not_how_it_came() {
+        let mut history = History::new(scene(0));
+        history.record(scene(1), "one", true);
+        history.mark_saved(Arc::clone(history.scene()));
+        history.record(scene(2), "one", true);
+        assert!(!history.is_saved());
+        history.record(scene(1), "back", false);
+        assert!(history.is_saved());
+        assert_eq!(history.undo_label(), Some("back"), "a saved step has ended");
+        history.restart(scene(9));
+        assert!(history.is_saved() && history.undo().is_none());
+    }
+
+    #[test]
+    fn memory_is_bounded() {
+        let mut large = (*scene(0)).clone();
+        let text = "object = [{ shape.sphere = { center = [0, 0, 0], radius = 1 } }]";
+        let ball = Scene::parse(text, "").unwrap().objects.remove(0);
+        large.objects = vec![ball; 20_000];
+        let mut history = History::new(Arc::new(large.clone()));
+        for depth in 1..100 {
+            large.trace.depth = depth;
+            history.record(Arc::new(large.clone()), "deeper", false);
+        }
+        let held: usize = history.past.iter().map(|entry| entry.bytes).sum();
+        assert!(held <= MAX_BYTES && history.past.len() > 3, "{held}");
+        assert!(history.past.len() < 99);
+    }
+}

@@ -1,0 +1,293 @@
+//! Where things are, roughly: enough to tell that some rays cannot meet them. In double precision, and
+//! with room for the roundings of single: whatever a ray in lanes may meet is never ruled out.
+
+use super::form::Form;
+use glam::DVec3;
+
+/// Rays in single precision stray by a few times 2^-24 of the largest coordinate; this is more.
+const STRAY: f64 = 1e-5;
+
+/// A ball.
+#[derive(Clone, Copy, Debug)]
+pub struct Ball {
+    /// Centre.
+    pub center: DVec3,
+    /// Radius; infinite for things without an end.
+    pub radius: f64,
+}
+
+/// Where shadow rays lead.
+#[derive(Clone, Copy, Debug)]
+pub enum Towards {
+    /// To a point.
+    Point(DVec3),
+    /// Far away in a direction of unit length.
+    Direction(DVec3),
+}
+
+/// Straight lines that leave one point through a convex quadrilateral.
+#[derive(Clone, Copy, Debug)]
+pub struct Pencil {
+    /// The point.
+    pub apex: DVec3,
+    /// Forward, of unit length.
+    pub forward: DVec3,
+    /// From the apex to the quadrilateral's corners, which lie at distance 1 along `forward`.
+    pub corners: [DVec3; 4],
+}
+
+/// The surroundings of one thing.
+#[derive(Clone, Copy, Debug)]
+pub struct Bound {
+    ball: Ball,
+    /// Unit normal and offset of the plane that a flat thing lies in.
+    plane: Option<(DVec3, f64)>,
+    /// It does not see itself from outside.
+    convex: bool,
+}
+
+impl Ball {
+    fn around(points: &[DVec3]) -> Self {
+        let center = points.iter().sum::<DVec3>() / points.len() as f64;
+        let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
+        Self { center, radius }
+    }
+
+    /// Whether `point` lies inside or near the surface.
+    pub fn holds(&self, point: DVec3) -> bool {
+        self.center.distance(point) <= self.radius + stray(self.center) + stray(point)
+    }
+}
+
+fn stray(point: DVec3) -> f64 {
+    STRAY * point.abs().max_element()
+}
+
+impl Bound {
+    /// Of a form.
+    pub fn new(form: &Form) -> Self {
+        let ball = match form {
+            Form::Sphere { center, radius } => Ball { center: *center, radius: *radius },
+            Form::Convex { corners, .. } => Ball::around(corners),
+            Form::Parallelogram { corner, u, v } => {
+                Ball::around(&[*corner, corner + u, corner + v, corner + u + v])
+            }
+            Form::Ellipsoid { scene_from_unit: map } => {
+                let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis]
+                    .map(|a| a.length_squared());
+                // The largest singular value is at most the root of the sum of squares.
+                Ball { center: map.translation, radius: (x + y + z).sqrt() }
+            }
+            Form::Tapered { .. } | Form::Compound(_) | Form::Plane { .. } => match form.bounds() {
+                Some((low, high)) => {
+                    Ball { center: 0.5 * (low + high), radius: 0.5 * low.distance(high) }
+                }
+                None => Ball { center: DVec3::ZERO, radius: f64::INFINITY },
+            },
+        };
+        let plane = match form {
+            Form::Parallelogram { corner, u, v } => {
+                let normal = u.cross(*v).normalize();
+                Some((normal, normal.dot(*corner)))
+            }
+            Form::Plane { normal, offset } => Some((*normal, *offset)),
+            _ => None,
+        };
+        Self { ball, plane, convex: !matches!(form, Form::Compound(_)) }
+    }
+
+    /// A ball around it.
+    pub fn ball(&self) -> Ball {
+        self.ball
+    }
+
+    /// Whether it is flat: a ray that leaves it does not meet it again.
+    pub fn is_flat(&self) -> bool {
+        self.plane.is_some()
+    }
+
+    /// Whether it is convex: its outside does not see itself.
+    pub fn is_convex(&self) -> bool {
+        self.convex
+    }
+
+    /// A ball around all of it that the pencil's lines meet in front of the apex; `None`: nothing.
+    pub fn part_in(&self, pencil: &Pencil) -> Option<Ball> {
+        let Pencil { apex, forward, corners } = pencil;
+        let ball = self.ball;
+        if ball.radius.is_finite() {
+            let axis = corners.iter().sum::<DVec3>().normalize();
+            let cos = corners.iter().map(|c| c.normalize().dot(axis)).fold(1.0, f64::min);
+            let cone = Cone { apex: *apex, axis, cos, sin: (1.0 - cos * cos).sqrt() };
+            if !cone.meets(&ball) {
+                return None;
+            }
+        }
+        // Depths along `forward` between which the thing lies.
+        let middle = (ball.center - *apex).dot(*forward);
+        let (mut near, mut far) = ((middle - ball.radius).max(0.0), middle + ball.radius);
+        if let Some((normal, offset)) = self.plane {
+            // Along lines that have the same length in depth, 1 / depth of a plane is linear: its
+            // extremes are at the corners, if the plane crosses all four in front.
+            let height = offset - normal.dot(*apex);
+            let depths = corners.map(|c| height / normal.dot(c));
+            if depths.iter().all(|d| d.is_finite() && *d > 0.0) {
+                near = near.max(depths.iter().copied().fold(f64::INFINITY, f64::min));
+                far = far.min(depths.iter().copied().fold(0.0, f64::max));
+            } else if depths.iter().all(|d| *d < 0.0) {
+                return None;
+            }
+        }
+        if !far.is_finite() {
+            return Some(ball);
+        }
+        let far = far.max(near);
+        let ends: [DVec3; 8] =
+            std::array::from_fn(|i| *apex + corners[i % 4] * if i < 4 { near } else { far });
+        let part = Ball::around(&ends);
+        Some(if part.radius < ball.radius { part } else { ball })
+    }
+
+    /// Whether it may stand between some point of `lit` and the light.
+    pub fn shades(&self, lit: &Ball, towards: &Towards) -> bool {
+        let slack = stray(lit.center) + STRAY * lit.radius;
+        let radius = lit.radius + slack;
+        if let Some((normal, offset)) = self.plane {
+            let height = normal.dot(lit.center) - offset;
+            let beyond = match towards {
+                Towards::Point(light) => normal.dot(*light) - offset,
+                Towards::Direction(direction) => normal.dot(*direction),
+            };
+            // Both on the same side.
+            if height.abs() > radius && height * beyond > 0.0 {
+                return false;
+            }
+        }
+        if !lit.radius.is_finite() || !self.ball.radius.is_finite() {
+            return true;
+        }
+        match towards {
+            Towards::Direction(direction) => {
+                let to = self.ball.center - lit.center;
+                let along = to.dot(*direction);
+                let across = (to - *direction * along).length();
+                let both = (radius + self.ball.radius) * (1.0 + STRAY) + stray(self.ball.center);
+                across <= both && along >= -both
+            }
+            Towards::Point(light) => {
+                let to = lit.center - *light;
+                let distance = to.length();
+                if distance <= radius {
+                    return true;
+                }
+                let sin = radius / distance;
+                let (axis, cos) = (to / distance, (1.0 - sin * sin).sqrt());
+                let cone = Cone { apex: *light, axis, sin, cos };
+                let nearest = (self.ball.center - *light).length() - self.ball.radius;
+                nearest <= distance + radius && cone.meets(&self.ball)
+            }
+        }
+    }
+}
+
+/// All directions within an angle below 90 degrees of an axis.
+struct Cone {
+    apex: DVec3,
+    axis: DVec3,
+    sin: f64,
+    cos: f64,
+}
+
+impl Cone {
+    /// Whether a ball may reach into the cone: it is not all behind the apex, and its centre is no
+    /// farther from the cone's side than its radius.
+    fn meets(&self, ball: &Ball) -> bool {
+        let to = ball.center - self.apex;
+        let along = to.dot(self.axis);
+        let across = (to - self.axis * along).length();
+        let radius = ball.radius * (1.0 + STRAY) + stray(ball.center) + stray(self.apex);
+        along >= -radius && across * self.cos - along * self.sin <= radius
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ball(center: [f64; 3], radius: f64) -> Form {
+        Form::Sphere { center: center.into(), radius }
+    }
+
+    /// A square of side 2 about `center`, facing up.
+    fn tile(center: [f64; 3]) -> Form {
+        let corner = DVec3::from(center) - DVec3::new(1.0, 0.0, 1.0);
+        Form::Parallelogram { corner, u: DVec3::Z * 2.0, v: DVec3::X * 2.0 }
+    }
+
+    /// Looks from (0, 0, 5) along -z, 0.1 to each side at unit distance.
+    fn pencil() -> Pencil {
+        let corners = [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)];
+        Pencil {
+            apex: DVec3::Z * 5.0,
+            forward: DVec3::NEG_Z,
+            corners: corners.map(|(x, y)| DVec3::new(x, y, -1.0)),
+        }
+    }
+
+    #[test]
+    fn a_pencil_meets_what_is_in_front_of_it() {
+        let part = |form: &Form| Bound::new(form).part_in(&pencil());
+        assert!(part(&ball([0.0, 0.0, 0.0], 1.0)).is_some());
+        assert!(part(&ball([1.4, 0.0, 0.0], 1.0)).is_some());
+        assert!(part(&ball([2.0, 0.0, 0.0], 1.0)).is_none());
+        assert!(part(&ball([0.0, 0.0, 7.0], 1.0)).is_none());
+        let wall = Form::Plane { normal: DVec3::Z, offset: 0.0 };
+        let seen = part(&wall).unwrap();
+        // A square with half-sides 0.5.
+        assert!(seen.center.length() < 1e-12 && (seen.radius - 0.5f64.sqrt()).abs() < 1e-12);
+        assert!(part(&Form::Plane { normal: DVec3::Z, offset: 6.0 }).is_none());
+        // Seen edge-on, without an end.
+        let floor = part(&Form::Plane { normal: DVec3::Y, offset: -0.1 }).unwrap();
+        assert!(floor.radius.is_infinite());
+    }
+
+    #[test]
+    fn only_what_is_between_shades() {
+        let lit = Ball { center: DVec3::ZERO, radius: 0.5 };
+        let lamp = Towards::Point(DVec3::Y * 4.0);
+        let sun = Towards::Direction(DVec3::Y);
+        for (form, by_lamp, by_sun) in [
+            (ball([0.0, 2.0, 0.0], 0.1), true, true),
+            (ball([0.4, 2.0, 0.0], 0.1), false, true),
+            (ball([0.3, 2.0, 0.0], 0.1), true, true),
+            (ball([0.0, 5.0, 0.0], 0.5), false, true),
+            (ball([0.0, -2.0, 0.0], 1.0), false, false),
+            (tile([0.0, 1.0, 0.0]), true, true),
+            (tile([0.0, -0.6, 0.0]), false, false),
+            (tile([0.0, -0.4, 0.0]), true, true),
+            (tile([0.0, 6.0, 0.0]), false, true),
+        ] {
+            let bound = Bound::new(&form);
+            assert_eq!(bound.shades(&lit, &lamp), by_lamp, "lamp {form:?}");
+            assert_eq!(bound.shades(&lit, &sun), by_sun, "sun {form:?}");
+        }
+    }
+
+    /// No point of a thing seen through the pencil lies outside the ball.
+    #[test]
+    fn the_part_seen_holds_every_point_met() {
+        let mut random = 1u64;
+        let mut unit = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (random >> 40) as f64 / 16_777_216.0
+        };
+        let slanted = Form::Plane { normal: DVec3::new(0.3, 0.4, 0.5).normalize(), offset: 0.2 };
+        let part = Bound::new(&slanted).part_in(&pencil()).unwrap();
+        let Form::Plane { normal, offset } = slanted else { unreachable!() };
+        for _ in 0..1000 {
+            let toward = DVec3::new(0.2 * unit() - 0.1, 0.2 * unit() - 0.1, -1.0);
+            let t = (offset - normal.dot(pencil().apex)) / normal.dot(toward);
+            assert!(t > 0.0 && part.holds(pencil().apex + toward * t));
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Cone: from a disc to its apex.
+
+use super::tapered::{between, height, is_upright, no_axis};
+use super::{Form, Kind};
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// A right circular cone with its base closed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cone {
+    /// Centre of the base.
+    pub base: [f64; 3],
+    /// The apex.
+    pub apex: [f64; 3],
+    /// Radius of the base.
+    pub radius: f64,
+}
+
+impl Kind for Cone {
+    const DOC: &'static str = "A right circular cone with a flat base.";
+    const EXAMPLE: &'static str =
+        "shape.cone = { base = [0.0, 0.0, 0.0], apex = [0.0, 1.0, 0.0], radius = 0.5 }";
+    const FIELDS: &'static [Field] = &[
+        Field::required(
+            "base",
+            Takes::Numbers(3, Range::COORDINATE),
+            "scene units",
+            "Centre of the base.",
+        ),
+        Field::required("apex", Takes::Numbers(3, Range::COORDINATE), "scene units", "The apex."),
+        Field::required("radius", Takes::Number(Range::SIZE), "scene units", "Radius of the base."),
+    ];
+
+    fn form(&self) -> Form {
+        between(self.base, self.apex, self.radius, 0.0)
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        let sizes = [("radius", self.radius), ("apex", height(self.base, self.apex))];
+        Checks::new(Self::FIELDS)
+            .numbers("base", &self.base)
+            .numbers("apex", &self.apex)
+            .numbers("radius", &[self.radius])
+            .and(no_axis(self.base, self.apex, "apex"))
+            .ratio(&sizes, &[self.base, self.apex].concat())
+            .faults()
+    }
+
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        let top = base + DVec3::Y * size.y;
+        let radius = size.x.min(size.z) / 2.0;
+        Self { base: base.to_array(), apex: top.to_array(), radius }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.base, &mut self.apex]
+    }
+
+    /// Upright it looks the same from all sides.
+    fn turn(&mut self, _: f64) -> bool {
+        is_upright(self.base, self.apex)
+    }
+}

@@ -1,0 +1,70 @@
+//! Cylinder: the points within `radius` of the axis between two points, with flat ends.
+
+use super::tapered::{between, height, is_upright, no_axis};
+use super::{Form, Kind};
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// A circular cylinder with its ends closed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cylinder {
+    /// Centre of one end.
+    pub base: [f64; 3],
+    /// Centre of the other end.
+    pub top: [f64; 3],
+    /// Radius.
+    pub radius: f64,
+}
+
+impl Kind for Cylinder {
+    const DOC: &'static str = "A circular cylinder with flat ends.";
+    const EXAMPLE: &'static str =
+        "shape.cylinder = { base = [0.0, 0.0, 0.0], top = [0.0, 1.0, 0.0], radius = 0.4 }";
+    const FIELDS: &'static [Field] = &[
+        Field::required(
+            "base",
+            Takes::Numbers(3, Range::COORDINATE),
+            "scene units",
+            "Centre of one end.",
+        ),
+        Field::required(
+            "top",
+            Takes::Numbers(3, Range::COORDINATE),
+            "scene units",
+            "Centre of the other end.",
+        ),
+        Field::required("radius", Takes::Number(Range::SIZE), "scene units", "Radius."),
+    ];
+
+    fn form(&self) -> Form {
+        between(self.base, self.top, self.radius, self.radius)
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        let sizes = [("radius", self.radius), ("top", height(self.base, self.top))];
+        Checks::new(Self::FIELDS)
+            .numbers("base", &self.base)
+            .numbers("top", &self.top)
+            .numbers("radius", &[self.radius])
+            .and(no_axis(self.base, self.top, "top"))
+            .ratio(&sizes, &[self.base, self.top].concat())
+            .faults()
+    }
+
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        let top = base + DVec3::Y * size.y;
+        let radius = size.x.min(size.z) / 2.0;
+        Self { base: base.to_array(), top: top.to_array(), radius }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.base, &mut self.top]
+    }
+
+    /// Upright it looks the same from all sides.
+    fn turn(&mut self, _: f64) -> bool {
+        is_upright(self.base, self.top)
+    }
+}

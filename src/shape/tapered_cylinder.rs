@@ -1,0 +1,93 @@
+//! Tapered cylinder: its radius changes evenly along the axis between two points.
+
+use super::tapered::{between, height, is_upright, no_axis};
+use super::{Form, Kind};
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// A circular cylinder that narrows or widens evenly, with its ends closed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TaperedCylinder {
+    /// Centre of one end.
+    pub base: [f64; 3],
+    /// Centre of the other end.
+    pub top: [f64; 3],
+    /// Radius at `base`; 0: a cone that points there.
+    pub base_radius: f64,
+    /// Radius at `top`; 0: a cone that points there.
+    pub top_radius: f64,
+}
+
+/// A radius that may be 0.
+const RADIUS: Takes = Takes::Number(Range::closed(0.0, Range::SIZE.high));
+
+impl Kind for TaperedCylinder {
+    const DOC: &'static str =
+        "A circular cylinder that narrows or widens evenly, with flat ends: a cone cut off.";
+    const EXAMPLE: &'static str = "shape.tapered_cylinder = { base = [0.0, 0.0, 0.0], top = [0.0, 1.0, 0.0], \
+         base_radius = 0.5, top_radius = 0.3 }";
+    const FIELDS: &'static [Field] = &[
+        Field::required(
+            "base",
+            Takes::Numbers(3, Range::COORDINATE),
+            "scene units",
+            "Centre of one end.",
+        ),
+        Field::required(
+            "top",
+            Takes::Numbers(3, Range::COORDINATE),
+            "scene units",
+            "Centre of the other end.",
+        ),
+        Field::required("base_radius", RADIUS, "scene units", "Radius at `base`; 0: an apex."),
+        Field::required("top_radius", RADIUS, "scene units", "Radius at `top`; 0: an apex."),
+    ];
+
+    fn form(&self) -> Form {
+        between(self.base, self.top, self.base_radius, self.top_radius)
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        let radii = [("base_radius", self.base_radius), ("top_radius", self.top_radius)];
+        let mut sizes: Vec<_> = radii.into_iter().filter(|(_, r)| *r != 0.0).collect();
+        let thin = sizes.is_empty().then(|| {
+            Fault::new(
+                "top_radius",
+                "both radii are 0",
+                "a radius greater than 0 at one end at least",
+            )
+        });
+        sizes.push(("top", height(self.base, self.top)));
+        Checks::new(Self::FIELDS)
+            .numbers("base", &self.base)
+            .numbers("top", &self.top)
+            .numbers("base_radius", &[self.base_radius])
+            .numbers("top_radius", &[self.top_radius])
+            .and(no_axis(self.base, self.top, "top"))
+            .and(thin)
+            .ratio(&sizes, &[self.base, self.top].concat())
+            .faults()
+    }
+
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        let top = base + DVec3::Y * size.y;
+        let radius = size.x.min(size.z) / 2.0;
+        Self {
+            base: base.to_array(),
+            top: top.to_array(),
+            base_radius: radius,
+            top_radius: 0.6 * radius,
+        }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.base, &mut self.top]
+    }
+
+    /// Upright it looks the same from all sides.
+    fn turn(&mut self, _: f64) -> bool {
+        is_upright(self.base, self.top)
+    }
+}

@@ -1,0 +1,98 @@
+//! Numbers that programs compute and people read: rounded to decimals that look chosen.
+
+/// `x` rounded to a multiple of 10^`exponent`: the number nearest to that decimal, never `-0`.
+pub fn rounded_to(x: f64, exponent: i32) -> f64 {
+    if !x.is_finite() {
+        return x;
+    }
+    let rounded = if exponent <= 0 {
+        // Decimal digits are exact only in decimal: 35 * 0.01 is not 0.35.
+        format!("{x:.*}", exponent.unsigned_abs().min(340) as usize).parse().unwrap_or(x)
+    } else {
+        let unit = 10f64.powi(exponent.min(300));
+        (x / unit).round() * unit
+    };
+    rounded + 0.0
+}
+
+/// `x` rounded to that many significant decimal digits (at least one).
+pub fn significant(x: f64, digits: usize) -> f64 {
+    if x.is_finite() { format!("{x:.*e}", digits.max(1) - 1).parse().unwrap_or(x) } else { x }
+}
+
+/// The exponent of the largest power of ten that is not above |`x`|; 0 for 0 and for what is not
+/// finite.
+pub fn decade(x: f64) -> i32 {
+    if x == 0.0 || !x.is_finite() {
+        return 0;
+    }
+    // The formatter knows powers of ten exactly; a logarithm would miss some by one.
+    format!("{:e}", x.abs()).rsplit_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0)
+}
+
+/// `x` rounded to a ten-thousandth of the power of ten at or below `scale`: for a coordinate in a
+/// scene of that size.
+pub fn clean(x: f64, scale: f64) -> f64 {
+    rounded_to(x, decade(scale) - 4)
+}
+
+/// The direction `v` turned by `degrees` about the vertical, counter-clockwise seen from above, its
+/// numbers rounded to about a millionth of its length. Turns add up: the heading is rounded to
+/// thousandths of a degree, so that the rounding of a direction does not reach the next turn.
+pub fn turned(v: [f64; 3], degrees: f64) -> [f64; 3] {
+    let [x, y, z] = v;
+    let flat = x.hypot(z);
+    if flat == 0.0 || !flat.is_finite() {
+        return v;
+    }
+    let heading = rounded_to((x.atan2(z).to_degrees() + degrees).rem_euclid(360.0), -3);
+    let (sin, cos) = super::sin_cos_degrees(heading);
+    let digits = decade(flat) - 6;
+    [rounded_to(flat * sin, digits), y, rounded_to(flat * cos, digits)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decimals_are_the_nearest_ones() {
+        for (x, exponent, expected) in [
+            (0.1 + 0.2, -4, 0.3),
+            (0.34999, -2, 0.35),
+            (-0.00001, -4, 0.0),
+            (12345.0, 2, 12300.0),
+            (1e-300, -302, 1e-300),
+        ] {
+            assert_eq!(rounded_to(x, exponent), expected, "{x}");
+        }
+        assert!(rounded_to(-1e-9, -2).is_sign_positive());
+        assert!(rounded_to(f64::NAN, -2).is_nan());
+        assert_eq!(significant(1.0 / 3.0, 3), 0.333);
+        assert_eq!(significant(0.0, 3), 0.0);
+        assert_eq!(significant(-123456.0, 2), -120000.0);
+    }
+
+    #[test]
+    fn decades_are_exact() {
+        for e in -300..300 {
+            let x: f64 = format!("1e{e}").parse().unwrap();
+            assert_eq!((decade(x), decade(x * 9.99)), (e, e));
+        }
+        assert_eq!((decade(0.0), decade(f64::INFINITY)), (0, 0));
+    }
+
+    #[test]
+    fn turns_come_round() {
+        let start = [0.3, -0.2, 0.7];
+        let mut v = start;
+        for _ in 0..7200 {
+            v = turned(v, 5.0);
+        }
+        for i in 0..3 {
+            assert!((v[i] - start[i]).abs() < 2e-5, "{v:?}");
+        }
+        assert_eq!(turned([0.0, 0.0, 1.0], 90.0), [1.0, 0.0, 0.0]);
+        assert_eq!(turned([0.0, 1.0, 0.0], 33.0), [0.0, 1.0, 0.0]);
+    }
+}

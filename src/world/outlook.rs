@@ -1,0 +1,66 @@
+//! What the rays of one part of the picture may meet: the things that its camera rays see, and those
+//! that may stand between what they see and a light. Most parts see one or two things, and nothing
+//! shades them: the others are never asked.
+
+use crate::lanes::{Lanes, Real};
+use crate::light::Lamp;
+use crate::shape::{Ball, Bound, Form, Geometry, Pencil, Selection, Towards};
+use glam::DVec3;
+
+/// The things that some camera rays and the shadow rays from where they end may meet.
+#[derive(Clone, Debug)]
+pub struct Outlook {
+    /// What the camera rays may meet.
+    pub(super) seen: Selection,
+    /// For each light of the world, what shadow rays may meet.
+    pub(super) shading: Vec<Selection>,
+}
+
+/// What outlooks are found from.
+pub(super) struct Surroundings {
+    /// For each item of the geometry.
+    bounds: Vec<Bound>,
+    /// For each item: paths may be inside it, so that it may shade itself.
+    hollow: Vec<bool>,
+    /// For each light.
+    towards: Vec<Towards>,
+}
+
+impl Surroundings {
+    /// `eye`: where paths begin; `None`: not known.
+    pub fn new<S: Real>(forms: Vec<&Form>, eye: Option<DVec3>, lamps: &[Lamp<S>]) -> Self {
+        let bounds: Vec<Bound> = forms.into_iter().map(Bound::new).collect();
+        let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
+        let towards = lamps.iter().map(|lamp| match lamp {
+            Lamp::Falling { position } | Lamp::Even { position } => {
+                Towards::Point(vector(position))
+            }
+            Lamp::Directional { towards } => Towards::Direction(vector(towards)),
+        });
+        // The outside of a convex thing does not see itself, and only paths that begin inside get
+        // inside.
+        let hollow =
+            |b: &Bound| !b.is_convex() || !b.is_flat() && eye.is_none_or(|eye| b.ball().holds(eye));
+        Self { towards: towards.collect(), hollow: bounds.iter().map(hollow).collect(), bounds }
+    }
+
+    /// The outlook of camera rays inside `pencil`; `None`: of any rays.
+    pub fn outlook<L: Lanes>(&self, geometry: &Geometry<L>, pencil: Option<&Pencil>) -> Outlook {
+        let part = |bound: &Bound| match pencil {
+            Some(pencil) => bound.part_in(pencil),
+            None => Some(bound.ball()),
+        };
+        let parts: Vec<Option<Ball>> = self.bounds.iter().map(part).collect();
+        let seen = geometry.select(|item| parts[item as usize].is_some());
+        let shades = |item: usize, towards: &Towards| {
+            let lit = |(other, part): (usize, &Option<Ball>)| {
+                part.is_some_and(|part| {
+                    (other != item || self.hollow[item]) && self.bounds[item].shades(&part, towards)
+                })
+            };
+            parts.iter().enumerate().any(lit)
+        };
+        let of_light = |towards| geometry.select(|item| shades(item as usize, towards));
+        Outlook { seen, shading: self.towards.iter().map(of_light).collect() }
+    }
+}

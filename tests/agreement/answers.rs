@@ -1,0 +1,183 @@
+//! What surfaces do with light, formula by formula.
+
+use crate::common::Numbers;
+use crate::tracer::Mutation;
+use glam::DVec3;
+use std::f64::consts::{PI, TAU};
+use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Material};
+use zerkalo::scene::Horizon;
+
+/// Slopes below this reflect like mirrors, and highlights are no smaller.
+const SMOOTHEST: f64 = 1e-3;
+
+/// Reflectance at cosine `c` between light and facet.
+fn fresnel(material: &Material, c: f64) -> DVec3 {
+    let channel = |f0: f64| match material.law() {
+        Fresnel::Constant => f0,
+        Fresnel::Schlick => f0 + (1.0 - f0) * (1.0 - c).powi(5),
+        Fresnel::Exact if f0 >= 1.0 => 1.0,
+        Fresnel::Exact => {
+            // The mean of both polarisations (Fresnel), for light from a vacuum.
+            let n = (1.0 + f0.sqrt()) / (1.0 - f0.sqrt());
+            let sin_t = (1.0 - c * c).max(0.0).sqrt() / n;
+            let t = (1.0 - sin_t * sin_t).max(0.0).sqrt();
+            let s = ((c - n * t) / (c + n * t)).powi(2);
+            let p = ((n * c - t) / (n * c + t)).powi(2);
+            0.5 * (s + p)
+        }
+    };
+    DVec3::from(material.f0().0.map(channel))
+}
+
+/// Density of facet normals at cosine `c` from the surface's.
+fn facet_density(ggx: bool, alpha: f64, c: f64) -> f64 {
+    let tan2 = (1.0 - c * c).max(0.0) / (c * c);
+    let shape =
+        if ggx { (1.0 + tan2 / (alpha * alpha)).powi(-2) } else { (-tan2 / (alpha * alpha)).exp() };
+    shape / (PI * alpha * alpha * c.powi(4))
+}
+
+/// The error function, by its series or its continued fraction.
+fn erf(x: f64) -> f64 {
+    if x > 3.0 {
+        let tail = (1..60).rev().fold(0.0, |below, k| f64::from(k) / 2.0 / (x + below));
+        return 1.0 - (-x * x).exp() / (PI.sqrt() * (x + tail));
+    }
+    let (mut term, mut sum) = (x, x);
+    for k in 1..100 {
+        term *= -x * x / f64::from(k);
+        sum += term / f64::from(2 * k + 1);
+    }
+    2.0 / PI.sqrt() * sum
+}
+
+fn lambda(ggx: bool, alpha: f64, c: f64) -> f64 {
+    let tan = (1.0 - c * c).max(0.0).sqrt() / c;
+    if tan == 0.0 {
+        return 0.0;
+    }
+    if ggx {
+        return 0.5 * ((1.0 + (alpha * tan).powi(2)).sqrt() - 1.0);
+    }
+    let a = 1.0 / (alpha * tan);
+    0.5 * (erf(a) - 1.0) + (-a * a).exp() / (2.0 * a * PI.sqrt())
+}
+
+fn masking(material: &Material, ggx: bool, alpha: f64, n: DVec3, v: DVec3, l: DVec3) -> f64 {
+    let h = (v + l).normalize();
+    let (nh, nv, nl, vh) = (n.dot(h), n.dot(v), n.dot(l), v.dot(h));
+    match material.masking {
+        Masking::VCavity => 1f64.min(2.0 * nh * nv / vh).min(2.0 * nh * nl / vh),
+        Masking::Smith => 1.0 / (1.0 + lambda(ggx, alpha, nv) + lambda(ggx, alpha, nl)),
+    }
+}
+
+/// Radiance towards `v` per irradiance of a surface facing the light, without the diffuse part.
+pub fn highlight(material: &Material, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
+    let k = material.specular;
+    if k == 0.0 {
+        return DVec3::ZERO;
+    }
+    match material.highlight {
+        Highlight::Phong => {
+            let cos = (2.0 * n.dot(l) * n - l).dot(v);
+            DVec3::splat(if cos > 0.0 { k * cos.powf(material.exponent) / PI } else { 0.0 })
+        }
+        Highlight::CookTorrance => {
+            let ggx = material.lobe == Lobe::Ggx;
+            let alpha = material.slope().max(SMOOTHEST);
+            let h = (v + l).normalize();
+            let nv = n.dot(v);
+            if nv <= 0.0 || v.dot(h) <= 0.0 || n.dot(h) <= 0.0 {
+                return DVec3::ZERO;
+            }
+            let d = facet_density(ggx, alpha, n.dot(h));
+            let g = masking(material, ggx, alpha, n, v, l);
+            fresnel(material, v.dot(h)) * (k * d * g / (4.0 * nv))
+        }
+    }
+}
+
+/// The frame about `w` of Duff et al. 2017, *Building an Orthonormal Basis, Revisited*: which one it is
+/// only matters to the square lobe, whose sides lie along it.
+fn around(w: DVec3) -> (DVec3, DVec3) {
+    let sign = 1f64.copysign(w.z);
+    let a = -1.0 / (sign + w.z);
+    let b = w.x * w.y * a;
+    let u = DVec3::new(1.0 + sign * w.x * w.x * a, sign * b, -sign * w.x);
+    (u, DVec3::new(b, sign + w.y * w.y * a, -w.y))
+}
+
+/// A reflected ray: its direction and the factor of what is seen there; `None`: nothing is.
+pub fn reflect(
+    material: &Material,
+    n: DVec3,
+    v: DVec3,
+    horizon: Horizon,
+    mutation: Mutation,
+    numbers: &mut Numbers,
+) -> Option<(DVec3, DVec3)> {
+    let k = material.reflection;
+    let mirror = 2.0 * n.dot(v) * n - v;
+    let mut radius = material.roughness;
+    if mutation == Mutation::WiderLobe {
+        radius *= 1.05;
+    }
+    let facets = matches!(material.lobe, Lobe::Beckmann | Lobe::Ggx);
+    let sharp = material.lobe == Lobe::Mirror
+        || if facets { material.slope() < SMOOTHEST } else { radius == 0.0 };
+    if facets && !sharp {
+        return facet(material, n, v, mutation, numbers);
+    }
+    let (a, b) = around(mirror);
+    let local = if sharp {
+        DVec3::Z
+    } else if material.lobe == Lobe::Cone {
+        let edge = 1.0 / (1.0 + radius * radius).sqrt();
+        let z = numbers.between(edge, 1.0);
+        let (sin, cos) = numbers.between(0.0, TAU).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * cos, r * sin, z)
+    } else {
+        let half = 0.5 * PI.sqrt() * radius;
+        DVec3::new(numbers.between(-half, half), numbers.between(-half, half), 1.0).normalize()
+    };
+    let mut direction = a * local.x + b * local.y + mirror * local.z;
+    if direction.dot(n) <= 0.0 {
+        if horizon == Horizon::Absorb || mutation == Mutation::Absorb {
+            return None;
+        }
+        direction -= 2.0 * direction.dot(n) * n;
+    }
+    // The facet half-way between the two directions sends this ray.
+    let f = fresnel(material, v.dot((v + direction).normalize()));
+    Some((direction, f * k))
+}
+
+/// By the facets' distribution D cos, whichever it is.
+fn facet(
+    material: &Material,
+    n: DVec3,
+    v: DVec3,
+    mutation: Mutation,
+    numbers: &mut Numbers,
+) -> Option<(DVec3, DVec3)> {
+    let ggx = material.lobe == Lobe::Ggx;
+    let alpha = material.slope() * if mutation == Mutation::WiderLobe { 1.05 } else { 1.0 };
+    let u = numbers.unit();
+    let tan2 = alpha * alpha * if ggx { u / (1.0 - u) } else { -(1.0 - u).ln() };
+    let cos = 1.0 / (1.0 + tan2).sqrt();
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    let (s, c) = numbers.between(0.0, TAU).sin_cos();
+    let (a, b) = around(n);
+    let h = a * (sin * c) + b * (sin * s) + n * cos;
+    let vh = v.dot(h);
+    let l = 2.0 * vh * h - v;
+    let (nv, nl, nh) = (n.dot(v), n.dot(l), n.dot(h));
+    if vh <= 0.0 || nl <= 0.0 || nv <= 0.0 {
+        return None;
+    }
+    // f N.L / density, where density = D N.H / (4 V.H).
+    let g = masking(material, ggx, alpha, n, v, l);
+    Some((l, fresnel(material, vh) * (material.reflection * g * vh / (nv * nh))))
+}

@@ -1,0 +1,214 @@
+//! Two pictures of the same scene by two programs: do they agree as well as their noise allows?
+
+use crate::common::Numbers;
+use crate::support::{begin_with, picture, pool, sized, uniform};
+use crate::tracer::{Estimate, Mutation, Tracer};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::fmt;
+use std::path::PathBuf;
+use zerkalo::film::Part;
+use zerkalo::sampling::{SampleSettings, SamplerKind};
+use zerkalo::scene::Scene;
+use zerkalo::world::Precision;
+
+/// Raster of the small pictures.
+pub const SIZE: [u32; 2] = [32, 24];
+/// Side of the blocks of pixels whose means are compared.
+const BLOCK: usize = 4;
+/// The chance that all comparisons of one scene together raise a false alarm.
+const LEVEL: f64 = 1e-3;
+
+/// How far two pictures are apart, beside what chance allows.
+#[derive(Debug)]
+pub struct Verdict {
+    /// The largest deviation of a block, in standard errors.
+    pub worst_z: f64,
+    pub allowed_z: f64,
+    /// The sum of the squared deviations of all blocks' brightness.
+    pub chi2: f64,
+    pub allowed_chi2: f64,
+    pub picture: Vec<DVec3>,
+    pub reference: Vec<DVec3>,
+}
+
+impl Verdict {
+    pub fn agree(&self) -> bool {
+        self.worst_z <= self.allowed_z && self.chi2 <= self.allowed_chi2
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { worst_z, allowed_z, chi2, allowed_chi2, .. } = self;
+        write!(f, "z {worst_z:.2} of {allowed_z:.2}, chi2 {chi2:.0} of {allowed_chi2:.0}")
+    }
+}
+
+/// The program's picture of a scene with what is known about its noise.
+pub struct Picture {
+    size: [u32; 2],
+    mean: Vec<DVec3>,
+    /// Half the difference of the replicates: the noise of `mean`.
+    half: Vec<DVec3>,
+    /// The same of another picture, made with independent random numbers.
+    random: Vec<DVec3>,
+    samples: u32,
+}
+
+impl Picture {
+    /// By `samples` samples for each pixel and replicate.
+    pub fn new(scene: &Scene, samples: u32) -> Self {
+        let (mean, half) = rendered(scene, samples, SamplerKind::Sobol);
+        let (_, random) = rendered(scene, samples, SamplerKind::Random);
+        Self { size: scene.film.size, mean, half, random, samples }
+    }
+
+    /// Beside a reference of `samples` samples for each pixel, far more noisy than this. Means over
+    /// blocks of pixels are compared. How much single samples vary is taken from the reference or
+    /// from this program's random samples, whichever says more: of an event that is rare enough, the
+    /// few samples of the reference know nothing.
+    pub fn beside(&self, reference: &[Estimate], samples: u32) -> Verdict {
+        let (mut worst_z, mut chi2, mut count) = (0f64, 0.0, 0.0);
+        let per_reference = 2.0 * f64::from(self.samples) / f64::from(samples);
+        let blocks = blocks(self.size);
+        for pixels in &blocks {
+            let n = pixels.len() as f64;
+            let sum = |of: &dyn Fn(usize) -> DVec3| pixels.iter().map(|p| of(*p)).sum::<DVec3>();
+            let difference = sum(&|p| self.mean[p] - reference[p].mean) / n;
+            let theirs = sum(&|p| reference[p].variance);
+            let like_ours = sum(&|p| self.random[p] * self.random[p]) * per_reference;
+            let own = sum(&|p| self.half[p] * self.half[p]);
+            // Roundings of the film and of two ways to compute the same thing.
+            let floor = 1e-7 * (sum(&|p| reference[p].mean).abs() / n + 1e-3);
+            let variance = (theirs.max(like_ours) + own) / (n * n) + floor * floor;
+            let z = difference.abs() / variance.map(f64::sqrt);
+            worst_z = worst_z.max(z.max_element());
+            // The channels of a block vary together: their sum is one number more.
+            let z = difference.element_sum() / variance.map(f64::sqrt).element_sum();
+            chi2 += z * z;
+            count += 1.0;
+        }
+        let allowed_z = two_sided_z(1.0 - (1.0 - LEVEL).powf(1.0 / (3.0 * count)));
+        Verdict {
+            worst_z,
+            allowed_z,
+            chi2,
+            allowed_chi2: chi2_quantile(count, two_sided_z(2.0 * LEVEL)),
+            picture: self.mean.clone(),
+            reference: reference.iter().map(|e| e.mean).collect(),
+        }
+    }
+}
+
+/// The value that a chi-square variable of `n` degrees of freedom exceeds as rarely as a normal one
+/// exceeds `z` (Wilson and Hilferty 1931).
+fn chi2_quantile(n: f64, z: f64) -> f64 {
+    n * (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3)
+}
+
+/// The scene with the raster of the comparison.
+pub fn small(scene: Scene) -> Scene {
+    sized(scene, SIZE)
+}
+
+/// Every pixel by the plain tracer; `None`: it does not know all that is in the scene.
+pub fn reference(scene: &Scene, samples: u32, mutation: Mutation) -> Option<Vec<Estimate>> {
+    let tracer = Tracer::new(scene, mutation)?;
+    let [width, height] = scene.film.size;
+    let row = |y: u32| {
+        let mut numbers = Numbers::new(u64::from(y) + 1);
+        (0..width).map(|x| tracer.pixel(x, y, samples, &mut numbers)).collect::<Vec<_>>()
+    };
+    let rows: Vec<Vec<Estimate>> = (0..height).into_par_iter().map(row).collect();
+    Some(rows.concat())
+}
+
+/// The program's picture and half the difference of its replicates.
+pub fn rendered(scene: &Scene, samples: u32, kind: SamplerKind) -> (Vec<DVec3>, Vec<DVec3>) {
+    let mut rendering = begin_with(scene, SampleSettings { seed: 1, kind }, Precision::Double);
+    uniform(&mut rendering, 0, samples, &pool(2));
+    let part = |part| picture(&rendering, part).into_iter().map(DVec3::from).collect::<Vec<_>>();
+    let (a, b) = (part(Part::A), part(Part::B));
+    let mean = a.iter().zip(&b).map(|(a, b)| 0.5 * (*a + *b)).collect();
+    (mean, a.iter().zip(&b).map(|(a, b)| 0.5 * (*a - *b)).collect())
+}
+
+/// The pixels of each block, as positions in the picture.
+fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
+    let [width, height] = [width as usize, height as usize];
+    let block = |x0: usize, y0: usize| {
+        let ys = y0..(y0 + BLOCK).min(height);
+        ys.flat_map(|y| (x0..(x0 + BLOCK).min(width)).map(move |x| y * width + x)).collect()
+    };
+    let corners = (0..height).step_by(BLOCK);
+    corners.flat_map(|y| (0..width).step_by(BLOCK).map(move |x| block(x, y))).collect()
+}
+
+/// How many standard errors the variances of single samples differ by, pooled over the picture; the
+/// standard error is taken from how much the blocks differ from each other.
+pub fn variances_differ_by(
+    reference: &[Estimate],
+    reference_samples: u32,
+    half: &[DVec3],
+    samples: u32,
+    size: [u32; 2],
+) -> f64 {
+    let differences: Vec<f64> = blocks(size)
+        .iter()
+        .map(|pixels| {
+            let theirs = pixels.iter().map(|p| reference[*p].variance.element_sum()).sum::<f64>();
+            let own = pixels.iter().map(|p| half[*p].length_squared()).sum::<f64>();
+            // Half the difference of two means of n samples has the variance of a mean of 2 n.
+            own * 2.0 * f64::from(samples) - theirs * f64::from(reference_samples)
+        })
+        .collect();
+    let n = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / n;
+    let spread = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    mean.abs() / (spread / n).sqrt()
+}
+
+/// The z beyond which a normal variable lies with probability `p`, on both sides together.
+fn two_sided_z(p: f64) -> f64 {
+    // Newton on log Q, with Q by the continued fraction of the normal tail (z > 2 here).
+    let tail = |z: f64| {
+        let fraction = (1..200).rev().fold(z, |below, k| z + f64::from(k) / below);
+        (-0.5 * z * z).exp() / ((2.0 * std::f64::consts::PI).sqrt() * fraction)
+    };
+    let (mut low, mut high) = (1.5, 20.0);
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if 2.0 * tail(middle) > p { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// Writes picture, reference and difference where they can be looked at; returns the folder.
+pub fn keep(name: &str, verdict: &Verdict) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("agreement");
+    std::fs::create_dir_all(&folder).unwrap();
+    let difference: Vec<DVec3> = verdict
+        .picture
+        .iter()
+        .zip(&verdict.reference)
+        .map(|(a, b)| (*a - *b).abs() * 10.0)
+        .collect();
+    let three = [
+        ("picture", &verdict.picture),
+        ("reference", &verdict.reference),
+        ("difference", &difference),
+    ];
+    for (what, pixels) in three {
+        // Portable float map: text header, then rows from the bottom up.
+        let [width, height] = SIZE.map(|n| n as usize);
+        let mut bytes = format!("PF\n{width} {height}\n-1.0\n").into_bytes();
+        for row in pixels.chunks(width).rev() {
+            for c in row.iter().flat_map(|p| p.to_array()) {
+                bytes.extend((c as f32).to_le_bytes());
+            }
+        }
+        std::fs::write(folder.join(format!("{name}-{what}.pfm")), bytes).unwrap();
+    }
+    folder
+}

@@ -1,0 +1,124 @@
+//! Compounds in the plainest way: wherever a ray crosses the surface of a part, points just before and
+//! just behind tell whether the whole begins or ends there.
+
+use crate::surfaces::{Piece, map, pieces};
+use glam::{DAffine3, DMat3, DVec3};
+use zerkalo::scene::Object;
+use zerkalo::shape::{Part, Shape};
+
+/// A simple shape: its pieces, and the maps between their space and the scene's.
+pub struct Leaf {
+    pieces: Vec<Piece>,
+    own_from_scene: DAffine3,
+    /// Normals are mapped by the inverse transpose.
+    scene_from_own_normals: DMat3,
+    /// Name of its material.
+    pub material: String,
+}
+
+/// How leaves are combined.
+enum Tree {
+    Leaf(usize),
+    Union(Vec<Tree>),
+    Intersection(Vec<Tree>),
+    Difference(Vec<Tree>),
+}
+
+/// An object: its leaves, and how they are combined.
+pub struct Body {
+    pub leaves: Vec<Leaf>,
+    tree: Tree,
+}
+
+/// How far before and behind a crossing points are asked, in lengths of the direction.
+const ASIDE: f64 = 1e-7;
+
+impl Leaf {
+    fn crossings(&self, origin: DVec3, direction: DVec3) -> Vec<(f64, DVec3)> {
+        let origin = self.own_from_scene.transform_point3(origin);
+        let direction = self.own_from_scene.transform_vector3(direction);
+        let hits = self.pieces.iter().flat_map(|piece| piece.meet(origin, direction)).flatten();
+        hits.map(|(t, n)| (t, (self.scene_from_own_normals * n).normalize())).collect()
+    }
+
+    fn contains(&self, point: DVec3) -> bool {
+        let point = self.own_from_scene.transform_point3(point);
+        self.pieces.iter().all(|piece| piece.is_behind(point))
+    }
+}
+
+impl Body {
+    /// `None`: a shape that this tracer does not know.
+    pub fn new(object: &Object) -> Option<Self> {
+        let place = object.transform.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all);
+        let mut leaves = Vec::new();
+        let tree = grow(&object.shape, &object.material, place, &mut leaves)?;
+        Some(Self { leaves, tree })
+    }
+
+    /// Nearest distance beyond `from` (in lengths of `direction`) at which the ray meets the body, the
+    /// unit normal there on the front or outside, and which leaf it is.
+    pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<(f64, DVec3, usize)> {
+        let mut nearest: Option<(f64, DVec3, usize)> = None;
+        for (i, leaf) in self.leaves.iter().enumerate() {
+            for (t, normal) in leaf.crossings(origin, direction) {
+                if t <= from || nearest.is_some_and(|n| n.0 <= t) {
+                    continue;
+                }
+                if matches!(self.tree, Tree::Leaf(_)) {
+                    nearest = Some((t, normal, i));
+                    continue;
+                }
+                let inside = |t: f64| self.contains(&self.tree, origin + direction * t);
+                let (before, after) = (inside(t - ASIDE), inside(t + ASIDE));
+                if before != after {
+                    let outward = after == (normal.dot(direction) < 0.0);
+                    nearest = Some((t, if outward { normal } else { -normal }, i));
+                }
+            }
+        }
+        nearest
+    }
+
+    fn contains(&self, tree: &Tree, point: DVec3) -> bool {
+        let inside = |tree: &Tree| self.contains(tree, point);
+        match tree {
+            Tree::Leaf(i) => self.leaves[*i].contains(point),
+            Tree::Union(list) => list.iter().any(inside),
+            Tree::Intersection(list) => list.iter().all(inside),
+            Tree::Difference(list) => inside(&list[0]) && !list[1..].iter().any(inside),
+        }
+    }
+}
+
+fn grow(
+    shape: &Shape,
+    material: &str,
+    scene_from_own: DAffine3,
+    leaves: &mut Vec<Leaf>,
+) -> Option<Tree> {
+    let mut all = |of: &[Part]| -> Option<Vec<Tree>> {
+        of.iter()
+            .map(|part| {
+                let inner =
+                    part.transform.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all);
+                let material = if part.material.is_empty() { material } else { &part.material };
+                grow(&part.shape, material, scene_from_own * inner, leaves)
+            })
+            .collect()
+    };
+    Some(match shape {
+        Shape::Union(u) => Tree::Union(all(&u.of)?),
+        Shape::Intersection(i) => Tree::Intersection(all(&i.of)?),
+        Shape::Difference(d) => Tree::Difference(all(&d.of)?),
+        simple => {
+            leaves.push(Leaf {
+                pieces: pieces(simple)?,
+                own_from_scene: scene_from_own.inverse(),
+                scene_from_own_normals: scene_from_own.matrix3.inverse().transpose(),
+                material: material.to_string(),
+            });
+            Tree::Leaf(leaves.len() - 1)
+        }
+    })
+}

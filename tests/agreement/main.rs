@@ -1,0 +1,97 @@
+//! The program against a second, independent implementation: a slow, plain path tracer that shares
+//! nothing with it but the description of the scene. Their pictures agree as well as noise allows, and
+//! deliberate errors in the plain one are found.
+
+mod answers;
+#[path = "../common/mod.rs"]
+mod common;
+mod compare;
+mod compounds;
+#[path = "../support/mod.rs"]
+mod support;
+mod surfaces;
+mod tracer;
+
+use compare::{Picture, keep, reference, rendered, small, variances_differ_by};
+use support::{all_shipped, shipped};
+use tracer::Mutation;
+use zerkalo::material::Lobe;
+use zerkalo::sampling::SamplerKind;
+use zerkalo::scene::{Scale, Scene, Step};
+
+/// Samples of the plain tracer for one pixel.
+const PLAIN: u32 = 96;
+/// Samples of the program for one pixel and replicate.
+const OWN: u32 = 512;
+
+#[test]
+fn every_shipped_scene_agrees_with_the_plain_tracer() {
+    let mut checked = Vec::new();
+    let mut wrong = Vec::new();
+    for (name, scene) in all_shipped() {
+        let scene = small(scene);
+        let Some(reference) = reference(&scene, PLAIN, Mutation::None) else { continue };
+        let verdict = Picture::new(&scene, OWN).beside(&reference, PLAIN);
+        println!("{name}: {verdict}");
+        if !verdict.agree() {
+            let folder = keep(&name, &verdict);
+            wrong.push(format!("{name}: {verdict}; pictures in {}", folder.display()));
+        }
+        checked.push(name);
+    }
+    assert!(checked.len() >= 30, "only {checked:?}");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// A deliberate error is found; without it the same samples agree.
+fn is_found(mutation: Mutation, name: &str, scene: &Scene, samples: u32) {
+    let picture = Picture::new(scene, OWN);
+    let beside = |m| picture.beside(&reference(scene, samples, m).unwrap(), samples);
+    let (right, wrong) = (beside(Mutation::None), beside(mutation));
+    println!("{mutation:?} in {name}: {wrong}; without it {right}");
+    assert!(right.agree(), "{name}: {right}");
+    assert!(!wrong.agree(), "{mutation:?} in {name} was not noticed: {wrong}");
+}
+
+/// A thousand times smaller: eye, lights without falloff, and every object.
+fn shrunk(mut scene: Scene) -> Scene {
+    const FACTOR: f64 = 1e-3;
+    let shrink = |v: &mut [f64; 3]| *v = v.map(|x| x * FACTOR);
+    shrink(&mut scene.camera.eye);
+    scene.camera.target.as_mut().map(shrink);
+    scene.lights.iter_mut().filter_map(|l| l.point.as_mut()).for_each(|p| shrink(&mut p.position));
+    let step = Step::Scale(Scale([FACTOR; 3]));
+    scene.objects.iter_mut().for_each(|object| object.transform.push(step));
+    scene
+}
+
+#[test]
+fn deliberate_errors_are_found() {
+    let scene = |name| small(shipped(name));
+    for (mutation, name, scene) in [
+        (Mutation::ShadowOffset, "a small mirror room", shrunk(scene("mirror-room.toml"))),
+        (Mutation::Absorb, "horizon-fold.toml", scene("horizon-fold.toml")),
+        (Mutation::NoCosine, "mirror-room-physical.toml", scene("mirror-room-physical.toml")),
+    ] {
+        is_found(mutation, name, &scene, 4 * PLAIN);
+    }
+    for lobe in [Lobe::Cone, Lobe::Beckmann] {
+        let mut scene = scene("roughness-0.3.toml");
+        scene.materials.values_mut().for_each(|material| material.lobe = lobe);
+        is_found(Mutation::WiderLobe, &format!("{lobe:?}"), &scene, 24 * PLAIN);
+    }
+}
+
+/// With independent random numbers single samples vary as much in both programs, where both draw
+/// their lobes by the same density.
+#[test]
+fn variances_agree_under_independent_random_numbers() {
+    for name in ["lobe-cone.toml", "lobe-square.toml", "lobe-beckmann.toml", "mirror-room.toml"] {
+        let scene = small(shipped(name));
+        let reference = reference(&scene, PLAIN, Mutation::None).unwrap();
+        let (_, half) = rendered(&scene, OWN, SamplerKind::Random);
+        let z = variances_differ_by(&reference, PLAIN, &half, OWN, scene.film.size);
+        println!("{name}: {z:.2} standard errors");
+        assert!(z < 4.0, "{name}: variances differ by {z:.2} standard errors");
+    }
+}

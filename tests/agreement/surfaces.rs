@@ -1,0 +1,219 @@
+//! Shapes as the plainest things that rays can meet: spheres, polygons, infinite planes, discs and the
+//! sides of cones, each in the space that its description uses. Nothing here is fast, and nothing is shared with the program.
+
+use glam::{DAffine3, DMat3, DVec2, DVec3};
+use zerkalo::scene::Step;
+use zerkalo::shape::Shape;
+
+/// What a ray can meet, before the object's transform.
+pub enum Piece {
+    /// Centre, radius.
+    Sphere(DVec3, f64),
+    /// Corners in order, and the front's normal.
+    Polygon(Vec<DVec3>, DVec3),
+    /// A point and the front's normal.
+    Plane(DVec3, DVec3),
+    /// Centre, normal, radius.
+    Disc(DVec3, DVec3, f64),
+    /// The side around an axis: where it begins, its direction, its length, the radii at both ends.
+    Side(DVec3, DVec3, f64, [f64; 2]),
+}
+
+/// Distance in lengths of the direction, and normal.
+type Meeting = Option<(f64, DVec3)>;
+
+impl Piece {
+    pub fn meet(&self, origin: DVec3, direction: DVec3) -> [Meeting; 2] {
+        match self {
+            Self::Sphere(center, radius) => {
+                let f = origin - center;
+                let a = direction.dot(direction);
+                let b = f.dot(direction);
+                let c = f.dot(f) - radius * radius;
+                let root = b * b - a * c;
+                if root < 0.0 {
+                    return [None; 2];
+                }
+                let normal = |t: f64| (origin + direction * t - center) / *radius;
+                let at = |sign: f64| (-b + sign * root.sqrt()) / a;
+                [at(-1.0), at(1.0)].map(|t| Some((t, normal(t))))
+            }
+            Self::Disc(center, normal, radius) => {
+                let hit = flat(*center, *normal, origin, direction);
+                [hit.filter(|(t, _)| (origin + direction * *t).distance(*center) <= *radius), None]
+            }
+            Self::Side(base, axis, height, [r0, r1]) => {
+                let across = |v: DVec3| v - *axis * v.dot(*axis);
+                let f = origin - base;
+                let (p, d) = (across(f), across(direction));
+                let slope = (r1 - r0) / height;
+                let (r, widening) = (r0 + slope * f.dot(*axis), slope * direction.dot(*axis));
+                let a = d.dot(d) - widening * widening;
+                let b = p.dot(d) - r * widening;
+                let c = p.dot(p) - r * r;
+                let root = (b * b - a * c).sqrt();
+                let at = |t: f64| {
+                    let from_axis = across(f + direction * t);
+                    let z = (f + direction * t).dot(*axis);
+                    let normal = (from_axis.normalize() - *axis * slope).normalize();
+                    // Without a crossing t is NaN.
+                    (z >= 0.0 && z <= *height).then_some((t, normal))
+                };
+                [at((-b - root) / a), at((-b + root) / a)]
+            }
+            Self::Plane(point, normal) => [flat(*point, *normal, origin, direction), None],
+            Self::Polygon(corners, normal) => {
+                let inside = |p: DVec3| {
+                    let (mut left, mut right) = (true, true);
+                    for (i, a) in corners.iter().enumerate() {
+                        let b = corners[(i + 1) % corners.len()];
+                        let side = (b - a).cross(p - a).dot(*normal);
+                        left &= side >= 0.0;
+                        right &= side <= 0.0;
+                    }
+                    left || right
+                };
+                let hit = flat(corners[0], *normal, origin, direction);
+                [hit.filter(|(t, _)| inside(origin + direction * *t)), None]
+            }
+        }
+    }
+}
+
+impl Piece {
+    /// Whether a point is inside, as far as this piece of a convex solid knows.
+    pub fn is_behind(&self, point: DVec3) -> bool {
+        match self {
+            Self::Sphere(center, radius) => point.distance(*center) <= *radius,
+            Self::Polygon(corners, normal) => normal.dot(point - corners[0]) <= 0.0,
+            Self::Plane(on, normal) | Self::Disc(on, normal, _) => normal.dot(point - on) <= 0.0,
+            Self::Side(base, axis, height, [r0, r1]) => {
+                let z = axis.dot(point - base);
+                (point - base - *axis * z).length() <= r0 + (r1 - r0) * z / height
+            }
+        }
+    }
+}
+
+fn flat(point: DVec3, normal: DVec3, origin: DVec3, direction: DVec3) -> Meeting {
+    let speed = normal.dot(direction);
+    (speed != 0.0).then(|| (normal.dot(point - origin) / speed, normal))
+}
+
+/// A step of a transform.
+pub fn map(step: &Step) -> DAffine3 {
+    let turn = |axis: DVec3, degrees: f64| {
+        DAffine3::from_axis_angle(axis.normalize(), degrees.to_radians())
+    };
+    match step {
+        Step::Translate(by) => DAffine3::from_translation(DVec3::from(*by)),
+        Step::RotateX(degrees) => turn(DVec3::X, *degrees),
+        Step::RotateY(degrees) => turn(DVec3::Y, *degrees),
+        Step::RotateZ(degrees) => turn(DVec3::Z, *degrees),
+        Step::Rotate(r) => turn(DVec3::from(r.axis), r.degrees),
+        Step::Scale(s) => DAffine3::from_mat3(DMat3::from_diagonal(DVec3::from(s.0))),
+    }
+}
+
+/// The pieces of a simple shape; `None`: a shape that this tracer does not know.
+#[allow(unreachable_patterns, reason = "kinds that this tracer does not know may be added")]
+pub fn pieces(shape: &Shape) -> Option<Vec<Piece>> {
+    let v = |a: [f64; 3]| DVec3::from(a);
+    let square = |side: f64| vec![[0.0, 0.0], [side, 0.0], [side, -side], [0.0, -side]];
+    Some(match shape {
+        Shape::Sphere(s) => vec![Piece::Sphere(v(s.center), s.radius)],
+        Shape::Plane(p) => vec![Piece::Plane(v(p.point), v(p.normal).normalize())],
+        Shape::Platform(p) => {
+            let half = DVec3::new(0.5 * p.size[0], 0.0, 0.5 * p.size[1]);
+            let corner = |x: f64, z: f64| v(p.center) + half * DVec3::new(x, 0.0, z);
+            let corners =
+                vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+            vec![Piece::Polygon(corners, DVec3::Y)]
+        }
+        Shape::Rectangle(r) => {
+            let front = v(r.normal).normalize();
+            let right = v(r.up).cross(front).normalize();
+            let up = front.cross(right);
+            let corner = |x: f64, y: f64| {
+                v(r.center) + right * (0.5 * x * r.size[0]) + up * (0.5 * y * r.size[1])
+            };
+            let corners =
+                vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+            vec![Piece::Polygon(corners, front)]
+        }
+        Shape::Cylinder(c) => round(v(c.base), v(c.top), [c.radius; 2]),
+        Shape::Cone(c) => round(v(c.base), v(c.apex), [c.radius, 0.0]),
+        Shape::TaperedCylinder(c) => round(v(c.base), v(c.top), [c.base_radius, c.top_radius]),
+        Shape::UnitCylinder(c) => round(DVec3::ZERO, DVec3::Z, [1.0, c.s]),
+        Shape::Cuboid(b) => {
+            let [x, y, z] = b.size;
+            let base = vec![[0.0, 0.0], [x, 0.0], [x, -z], [0.0, -z]];
+            let corner = v(b.center) + DVec3::new(-0.5 * x, -0.5 * y, 0.5 * z);
+            frustum(corner, &base, y, 1.0, 0.0)
+        }
+        Shape::Cube(c) => frustum(v(c.corner), &square(c.edge), c.edge, 1.0, c.rotation),
+        Shape::Prism(p) => {
+            let third = [0.5 * p.side, -0.5 * 3f64.sqrt() * p.side];
+            let base = vec![[0.0, 0.0], [p.side, 0.0], third];
+            frustum(v(p.corner), &base, p.height, 1.0, p.rotation)
+        }
+        Shape::Pyramid(p) => {
+            let height = p.height.min(p.apex_height);
+            let top = 1.0 - height / p.apex_height;
+            frustum(v(p.corner), &square(p.side), height, top, p.rotation)
+        }
+        _ => return None,
+    })
+}
+
+/// Both ends and the side of a solid around an axis.
+fn round(base: DVec3, top: DVec3, radii: [f64; 2]) -> Vec<Piece> {
+    let axis = (top - base).normalize();
+    vec![
+        Piece::Disc(base, -axis, radii[0]),
+        Piece::Disc(top, axis, radii[1]),
+        Piece::Side(base, axis, base.distance(top), radii),
+    ]
+}
+
+/// Base, top and sides of an upright solid whose base has these corners (x and z from `corner`); the
+/// top is `top` times as large. The base is turned counter-clockwise, seen from above, about its
+/// centroid.
+fn frustum(corner: DVec3, base: &[[f64; 2]], height: f64, top: f64, degrees: f64) -> Vec<Piece> {
+    let base: Vec<DVec2> = base.iter().map(|b| DVec2::from(*b)).collect();
+    let middle = base.iter().sum::<DVec2>() / base.len() as f64;
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let ring = |scale: f64, y: f64| -> Vec<DVec3> {
+        let place = |b: &DVec2| {
+            let d = (*b - middle) * scale;
+            let turned = DVec2::new(d.x * cos + d.y * sin, -d.x * sin + d.y * cos);
+            corner + DVec3::new(middle.x + turned.x, y, middle.y + turned.y)
+        };
+        base.iter().map(place).collect()
+    };
+    let (low, high) = (ring(1.0, 0.0), ring(top, height));
+    let inner = (low.iter().sum::<DVec3>() + high.iter().sum::<DVec3>()) / (2 * low.len()) as f64;
+    let mut faces = vec![low.clone()];
+    if top > 0.0 {
+        faces.push(high.clone());
+    }
+    for i in 0..low.len() {
+        let j = (i + 1) % low.len();
+        let mut face = vec![low[i], low[j], high[j]];
+        if top > 0.0 {
+            face.push(high[i]);
+        }
+        faces.push(face);
+    }
+    let outward = |face: &Vec<DVec3>| {
+        let normal = (face[1] - face[0]).cross(face[2] - face[0]).normalize();
+        if normal.dot(face[0] - inner) > 0.0 { normal } else { -normal }
+    };
+    faces
+        .into_iter()
+        .map(|face| {
+            let n = outward(&face);
+            Piece::Polygon(face, n)
+        })
+        .collect()
+}

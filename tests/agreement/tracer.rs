@@ -1,0 +1,203 @@
+//! A path tracer in plain double precision, one sample at a time, written to be read.
+
+use crate::answers::{highlight, reflect};
+use crate::common::Numbers;
+use crate::compounds::Body;
+use glam::DVec3;
+use std::f64::consts::PI;
+use zerkalo::camera::ViewAngle;
+use zerkalo::light::{Falloff, Light};
+use zerkalo::material::Material;
+use zerkalo::scene::{Filter, Level, Scene};
+
+/// A deliberate error, to see that the comparison finds it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mutation {
+    /// No error.
+    None,
+    /// Lobes are 5 % wider.
+    WiderLobe,
+    /// Shadow rays begin 1e-3 of a scene unit too far along the light's direction.
+    ShadowOffset,
+    /// Lobes that dip under the surface are lost.
+    Absorb,
+    /// The first light's cosine is left out.
+    NoCosine,
+}
+
+/// A scene to trace.
+pub struct Tracer<'a> {
+    scene: &'a Scene,
+    bodies: Vec<Body>,
+    plain: Material,
+    mutation: Mutation,
+}
+
+/// Mean and variance of the mean of one pixel's samples.
+#[derive(Clone, Copy, Default)]
+pub struct Estimate {
+    pub mean: DVec3,
+    pub variance: DVec3,
+}
+
+struct Hit<'a> {
+    point: DVec3,
+    /// On the viewer's side.
+    normal: DVec3,
+    material: &'a Material,
+    /// The back of something that has no finish there.
+    bare: bool,
+}
+
+impl<'a> Tracer<'a> {
+    /// `None`: there is something in the scene that this tracer does not know.
+    pub fn new(scene: &'a Scene, mutation: Mutation) -> Option<Self> {
+        let bodies = scene.objects.iter().map(Body::new).collect::<Option<_>>()?;
+        Some(Self { scene, bodies, plain: Material::default(), mutation })
+    }
+
+    /// `samples` samples of the pixel `x`, `y`.
+    pub fn pixel(&self, x: u32, y: u32, samples: u32, numbers: &mut Numbers) -> Estimate {
+        let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
+        for _ in 0..samples {
+            let value = self.sample(x, y, numbers);
+            sum += value;
+            squares += value * value;
+        }
+        let n = f64::from(samples);
+        let mean = sum / n;
+        let spread = (squares / n - mean * mean).max(DVec3::ZERO);
+        Estimate { mean, variance: spread / (n - 1.0) }
+    }
+
+    fn sample(&self, x: u32, y: u32, numbers: &mut Numbers) -> DVec3 {
+        let (dx, dy) = match self.scene.film.filter {
+            Filter::Box => (numbers.unit(), numbers.unit()),
+            Filter::Center => (0.5, 0.5),
+        };
+        let (mut origin, mut direction) = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy);
+        let trace = &self.scene.trace;
+        let mut weight = DVec3::ONE;
+        let mut radiance = DVec3::ZERO;
+        for bounce in 0.. {
+            let Some(hit) = self.meet(origin, direction) else {
+                return radiance + weight * DVec3::from(self.scene.background.color.0);
+            };
+            if hit.bare {
+                return radiance;
+            }
+            radiance += weight * self.shade(&hit, -direction);
+            let reflects = hit.material.reflection > 0.0 && trace.level == Level::Full;
+            if !reflects || bounce == trace.depth {
+                return radiance;
+            }
+            let turned = reflect(
+                hit.material,
+                hit.normal,
+                -direction,
+                trace.horizon,
+                self.mutation,
+                numbers,
+            );
+            let Some((next, factor)) = turned else { return radiance };
+            weight *= factor;
+            if weight.max_element() <= 0.0 || weight.max_element() < trace.min_weight {
+                return radiance;
+            }
+            (origin, direction) = (hit.point, next);
+        }
+        unreachable!("the depth ends every path");
+    }
+
+    /// Through the point `x`, `y` of the raster, in pixels from the upper left corner.
+    fn camera_ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
+        let camera = &self.scene.camera;
+        let eye = DVec3::from(camera.eye);
+        let forward = match (camera.target, camera.direction) {
+            (Some(target), _) => DVec3::from(target) - eye,
+            (_, Some(direction)) => DVec3::from(direction),
+            (None, None) => panic!("a camera looks somewhere"),
+        }
+        .normalize();
+        let right = forward.cross(DVec3::from(camera.up)).normalize();
+        let up = right.cross(forward);
+        let [width, height] = self.scene.film.size.map(f64::from);
+        let pixel = match camera.view_angle {
+            ViewAngle::Vertical(degrees) => 2.0 * (0.5 * degrees).to_radians().tan() / height,
+            ViewAngle::Horizontal(degrees) => 2.0 * (0.5 * degrees).to_radians().tan() / width,
+        };
+        let toward =
+            forward + right * ((x - 0.5 * width) * pixel) - up * ((y - 0.5 * height) * pixel);
+        (eye + toward * camera.near, toward.normalize())
+    }
+
+    /// Rounding moves a point by less than this times the size of its coordinates.
+    fn clearance(origin: DVec3) -> f64 {
+        1e-10 * (1.0 + origin.abs().max_element())
+    }
+
+    fn meet(&self, origin: DVec3, direction: DVec3) -> Option<Hit<'_>> {
+        let from = Self::clearance(origin);
+        let hits = self.bodies.iter().enumerate().filter_map(|(i, body)| {
+            let (t, normal, leaf) = body.meet(origin, direction, from)?;
+            Some((t, normal, i, leaf))
+        });
+        let (t, normal, i, leaf) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let name = &self.bodies[i].leaves[leaf].material;
+        let material = self.scene.materials.get(name).unwrap_or(&self.plain);
+        let front = normal.dot(direction) < 0.0;
+        Some(Hit {
+            point: origin + direction * t,
+            normal: if front { normal } else { -normal },
+            material,
+            bare: !front && !material.two_sided,
+        })
+    }
+
+    /// Ambient light and every lamp.
+    fn shade(&self, hit: &Hit, view: DVec3) -> DVec3 {
+        let m = hit.material;
+        let color = DVec3::from(m.color.0);
+        let mut sum = color * m.ambient * DVec3::from(self.scene.ambient.color.0);
+        for (i, light) in self.scene.lights.iter().enumerate().filter(|(_, l)| l.on) {
+            let (towards, distance, irradiance) = arrival(light, hit.point);
+            let mut cos = hit.normal.dot(towards);
+            if cos <= 0.0 || self.in_shadow(hit.point, towards, distance) {
+                continue;
+            }
+            let shine = highlight(m, hit.normal, view, towards);
+            if i == 0 && self.mutation == Mutation::NoCosine {
+                cos = 1.0;
+            }
+            sum += irradiance * (color * (m.diffuse * cos / PI) + shine);
+        }
+        sum
+    }
+
+    fn in_shadow(&self, point: DVec3, towards: DVec3, distance: f64) -> bool {
+        if self.scene.trace.level == Level::Primary {
+            return false;
+        }
+        let offset = if self.mutation == Mutation::ShadowOffset { 1e-3 } else { 0.0 };
+        let from = Self::clearance(point) + offset;
+        self.bodies.iter().any(|body| {
+            body.meet(point, towards, from).is_some_and(|(t, ..)| t < distance * (1.0 - 1e-12))
+        })
+    }
+}
+
+/// Direction to the light, distance, and irradiance of a surface that faces it.
+fn arrival(light: &Light, point: DVec3) -> (DVec3, f64, DVec3) {
+    let strength = DVec3::from(light.color.0) * light.intensity;
+    if let Some(directional) = &light.directional {
+        let towards = -DVec3::from(directional.direction).normalize();
+        return (towards, f64::INFINITY, strength * PI);
+    }
+    let position = DVec3::from(light.point.as_ref().expect("a light of some kind").position);
+    let distance = position.distance(point);
+    let irradiance = match light.falloff {
+        Falloff::None => strength * PI,
+        Falloff::InverseSquare => strength / (distance * distance),
+    };
+    ((position - point) / distance, distance, irradiance)
+}

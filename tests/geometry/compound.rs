@@ -1,0 +1,384 @@
+//! Compound solids: volumes, parity, algebra.
+
+use crate::common::Numbers;
+use crate::rays::{Line, Met, blocked, closest};
+use glam::{DAffine3, DQuat, DVec3};
+use std::f64::consts::PI;
+use zerkalo::lanes::{Double, Lanes};
+use zerkalo::shape::{Compound, CompoundTree as Tree, Cuboid, Cylinder, Form, Geometry, Kind};
+
+fn ball(x: f64, y: f64, z: f64, radius: f64) -> Form {
+    Form::Sphere { center: DVec3::new(x, y, z), radius }
+}
+
+pub fn block(center: [f64; 3], size: [f64; 3]) -> Form {
+    Cuboid { center, size }.form()
+}
+
+/// All parts joined in one way.
+fn joined(join: fn(Vec<Tree>) -> Tree, parts: Vec<Form>) -> Form {
+    let tree = join((0..parts.len()).map(Tree::Part).collect());
+    Form::Compound(Compound { parts, tree })
+}
+
+pub fn union(parts: Vec<Form>) -> Form {
+    joined(Tree::Union, parts)
+}
+
+fn intersection(parts: Vec<Form>) -> Form {
+    joined(Tree::Intersection, parts)
+}
+
+pub fn difference(parts: Vec<Form>) -> Form {
+    joined(Tree::Difference, parts)
+}
+
+pub fn geometry<L: Lanes>(form: &Form) -> Geometry<L> {
+    Geometry::new(std::slice::from_ref(form))
+}
+
+/// A line from outside the ball of radius 4 through a random point near the origin.
+fn line(numbers: &mut Numbers) -> Line {
+    let d = numbers.direction();
+    (numbers.in_cube(1.5) - d * 6.0, d)
+}
+
+fn lines(seed: u64, count: usize) -> Vec<Line> {
+    let mut numbers = Numbers::new(seed);
+    (0..count).map(|_| line(&mut numbers)).collect()
+}
+
+/// Every surface along each line, by going on from one to the next.
+fn surfaces<L: Lanes>(geometry: &Geometry<L>, lines: &[Line]) -> Vec<Vec<Met>> {
+    let mut out = vec![Vec::new(); lines.len()];
+    let mut open: Vec<(usize, f64)> = (0..lines.len()).map(|i| (i, 0.0)).collect();
+    while !open.is_empty() {
+        let starts: Vec<Line> =
+            open.iter().map(|(i, t)| (lines[*i].0 + lines[*i].1 * *t, lines[*i].1)).collect();
+        let mut next = Vec::new();
+        for ((i, t), met) in open.iter().zip(closest(geometry, &starts)) {
+            let Some(met) = met else { continue };
+            let t = t + met.t;
+            out[*i].push(Met { t, ..met });
+            // Past the surface by more than what it may be off, flat or not.
+            let cosine = met.normal.dot(lines[*i].1).abs().max(1e-7);
+            next.push((*i, t + 64.0 * L::EPSILON * 8.0 / cosine));
+            assert!(out[*i].len() < 200, "{:?} has no end", lines[*i]);
+        }
+        open = next;
+    }
+    out
+}
+
+/// The length of a line inside; every surface must be the right way round, in turn.
+fn chord(name: &str, line: &Line, met: &[Met]) -> f64 {
+    let told = || format!("{name}: {line:?} {met:?}");
+    assert!(met.len() % 2 == 0, "odd: {}", told());
+    for (i, met) in met.iter().enumerate() {
+        let cosine = met.normal.dot(line.1);
+        assert!(if i % 2 == 0 { cosine < 0.0 } else { cosine > 0.0 }, "{}", told());
+    }
+    met.chunks(2).map(|pair| pair[1].t - pair[0].t).sum()
+}
+
+/// The lengths of lines inside.
+fn chords<L: Lanes>(name: &str, form: &Form, lines: &[Line]) -> Vec<f64> {
+    let all = surfaces(&geometry::<L>(form), lines);
+    lines.iter().zip(all).map(|(line, met)| chord(name, line, &met)).collect()
+}
+
+/// The volume of what stands in the cube from -half to half, by the chords of parallel lines, one in
+/// each cell of a lattice, and its standard error.
+fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
+    let mut numbers = Numbers::new(seed);
+    let side = 400;
+    let cell = 2.0 * half / f64::from(side);
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.5, 0.7);
+    // The cube's shadow along any direction fits into sqrt 3 times its side.
+    let reach = 3f64.sqrt();
+    let mut sum = 0.0;
+    let mut squares = 0.0;
+    for row in 0..side {
+        let lines: Vec<Line> = (0..side)
+            .map(|column| {
+                let at =
+                    |i: i32, n: &mut Numbers| reach * (cell * (f64::from(i) + n.unit()) - half);
+                let (u, v) = (at(row, &mut numbers), at(column, &mut numbers));
+                (turn * DVec3::new(u, v, -4.0 * half), turn * DVec3::Z)
+            })
+            .collect();
+        let found = chords::<Double>(name, form, &lines);
+        sum += found.iter().sum::<f64>();
+        squares += found.windows(2).map(|w| 0.5 * (w[0] - w[1]).powi(2)).sum::<f64>();
+    }
+    let area = (reach * cell).powi(2);
+    (sum * area, squares.sqrt() * area)
+}
+
+#[test]
+fn closed_form_09_volumes() {
+    let lens = |r: f64, s: f64, d: f64| {
+        PI * (r + s - d).powi(2) * (d * d + 2.0 * d * (r + s) - 3.0 * (r - s).powi(2)) / (12.0 * d)
+    };
+    let rod =
+        |end: [f64; 3], radius: f64| Cylinder { base: end.map(|x| -x), top: end, radius }.form();
+    let above = |height: f64| Form::Plane { normal: DVec3::Y, offset: height };
+    let below = |height: f64| Form::Plane { normal: DVec3::NEG_Y, offset: -height };
+    // A ball pierced by a rod so that a ring of height 1.2 is left.
+    let ring: f64 = 1.2;
+    let hole = (1.0 - ring * ring / 4.0).sqrt();
+    let cone = Form::tapered(DAffine3::from_translation(DVec3::new(0.0, 0.0, -0.5)), 0.0);
+    let half_space = |normal: DVec3, offset| Form::Plane { normal, offset };
+    for (n, (name, form, expected)) in [
+        (
+            "lens",
+            intersection(vec![ball(-0.3, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)]),
+            lens(1.0, 0.8, 0.8),
+        ),
+        (
+            "two balls",
+            union(vec![ball(-0.3, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)]),
+            4.0 / 3.0 * PI * (1.0 + 0.512) - lens(1.0, 0.8, 0.8),
+        ),
+        (
+            "cap",
+            intersection(vec![ball(0.0, 0.0, 0.0, 1.0), below(0.4)]),
+            PI * 0.36 * (3.0 - 0.6) / 3.0,
+        ),
+        (
+            "cap cut away",
+            difference(vec![ball(0.0, 0.0, 0.0, 1.0), below(0.4)]),
+            4.0 / 3.0 * PI - PI * 0.36 * (3.0 - 0.6) / 3.0,
+        ),
+        (
+            "slice",
+            intersection(vec![ball(0.0, 0.0, 0.0, 1.0), above(0.25), below(-0.25)]),
+            PI * (0.5 - 2.0 * 0.25f64.powi(3) / 3.0),
+        ),
+        (
+            "napkin ring",
+            difference(vec![ball(0.0, 0.0, 0.0, 1.0), rod([0.0, 2.0, 0.0], hole)]),
+            PI * ring.powi(3) / 6.0,
+        ),
+        (
+            "Steinmetz",
+            intersection(vec![rod([2.0, 0.0, 0.0], 0.7), rod([0.0, 2.0, 0.0], 0.7)]),
+            16.0 * 0.7f64.powi(3) / 3.0,
+        ),
+        (
+            "frustum",
+            intersection(vec![cone.clone(), half_space(DVec3::Z, 0.1)]),
+            PI * 0.6 * (1.0 + 0.4 + 0.16) / 3.0,
+        ),
+        (
+            "truncated pyramid",
+            difference(vec![
+                zerkalo::shape::Pyramid {
+                    corner: [-0.6, -0.5, 0.6],
+                    side: 1.2,
+                    apex_height: 1.5,
+                    height: 1.5,
+                    rotation: 20.0,
+                }
+                .form(),
+                below(0.1),
+            ]),
+            // The top at height 0.6 of 1.5 has side 0.72.
+            0.6 * (1.44 + 0.5184 + (1.44f64 * 0.5184).sqrt()) / 3.0,
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (found, error) = volume(name, &form, 1.4, 90 + n as u64);
+        let z = (found - expected) / error;
+        assert!(error < 2e-3 * expected, "{name}: {found} +- {error}");
+        assert!(z.abs() < 4.0, "{name}: {found} +- {error}, not {expected}: {z} sigma");
+    }
+}
+
+/// V(A or B) + V(A and B) = V(A) + V(B), on every line.
+#[test]
+fn closed_form_09_inclusion_and_exclusion_on_every_line() {
+    let solids = [
+        ball(0.2, -0.1, 0.0, 0.9),
+        block([-0.3, 0.2, 0.1], [1.1, 0.9, 1.5]),
+        Cylinder { base: [-0.8, -0.9, 0.3], top: [0.7, 0.8, -0.2], radius: 0.5 }.form(),
+        Form::tapered(DAffine3::from_scale(DVec3::new(0.7, 0.9, 1.1)), 0.2),
+        ball(0.0, 0.0, 0.0, 0.8).transformed(&DAffine3::from_scale(DVec3::new(1.0, 0.5, 1.6))),
+    ];
+    let lines = lines(91, 40_000);
+    let alone: Vec<Vec<f64>> = solids.iter().map(|s| chords::<Double>("one", s, &lines)).collect();
+    for i in 0..solids.len() {
+        for j in 0..i {
+            let pair = || vec![solids[i].clone(), solids[j].clone()];
+            let either = chords::<Double>("or", &union(pair()), &lines);
+            let both = chords::<Double>("and", &intersection(pair()), &lines);
+            let first = chords::<Double>("minus", &difference(pair()), &lines);
+            for n in 0..lines.len() {
+                let sum = alone[i][n] + alone[j][n];
+                let told = || format!("{i} {j} {:?}", lines[n]);
+                // What is thinner than a tie is nothing; along a flat line that is some length.
+                let close = |a: f64, b: f64| (a - b).abs() < 1e-5;
+                assert!(close(either[n] + both[n], sum), "{}: {}", told(), either[n] + both[n]);
+                assert!(close(first[n] + both[n], alone[i][n]), "{}", told());
+            }
+        }
+    }
+}
+
+fn random_solid(numbers: &mut Numbers) -> Form {
+    let place = numbers.in_cube(0.8);
+    let size = numbers.between(0.3, 1.2);
+    let form = match numbers.below(5) {
+        0 => return Form::Sphere { center: place, radius: size },
+        1 => block([0.0; 3], [1.3, 0.9, 1.1]),
+        2 => Form::tapered(DAffine3::IDENTITY, numbers.between(0.0, 2.0)),
+        3 => ball(0.0, 0.0, 0.0, 1.0),
+        _ => Form::tapered(DAffine3::IDENTITY, [0.0, 1.0][numbers.below(2)]),
+    };
+    let turn = DQuat::from_axis_angle(numbers.direction(), numbers.between(0.0, 3.0));
+    let scale = size * DVec3::new(1.0, numbers.between(0.5, 1.5), numbers.between(0.5, 1.5));
+    form.transformed(&DAffine3::from_scale_rotation_translation(scale, turn, place))
+}
+
+/// A random tree of this depth; some parts are used again, so that faces lie on each other.
+fn random_tree(numbers: &mut Numbers, depth: usize, parts: &mut Vec<Form>) -> Tree {
+    if depth == 0 || numbers.below(6) == 0 {
+        let part = match numbers.below(4) {
+            0 if !parts.is_empty() => parts[numbers.below(parts.len())].clone(),
+            _ => random_solid(numbers),
+        };
+        parts.push(part);
+        return Tree::Part(parts.len() - 1);
+    }
+    let count = 2 + usize::from(numbers.below(4) == 0);
+    let list = (0..count).map(|_| random_tree(numbers, depth - 1, parts)).collect();
+    match numbers.below(3) {
+        0 => Tree::Union(list),
+        1 => Tree::Intersection(list),
+        _ => Tree::Difference(list),
+    }
+}
+
+fn contains(part: &Form, p: DVec3) -> bool {
+    match part {
+        Form::Sphere { center, radius } => p.distance(*center) <= *radius,
+        Form::Ellipsoid { scene_from_unit } => {
+            scene_from_unit.inverse().transform_point3(p).length() <= 1.0
+        }
+        Form::Convex { faces, .. } => faces.iter().all(|f| f.normal.dot(p) <= f.offset),
+        Form::Tapered { scene_from_unit, top } => {
+            let q = scene_from_unit.inverse().transform_point3(p);
+            (0.0..=1.0).contains(&q.z) && q.truncate().length() <= 1.0 + (top - 1.0) * q.z
+        }
+        Form::Plane { normal, offset } => normal.dot(p) <= *offset,
+        _ => unreachable!("no solid"),
+    }
+}
+
+fn tree_contains(tree: &Tree, parts: &[Form], p: DVec3) -> bool {
+    let inside = |t: &Tree| tree_contains(t, parts, p);
+    match tree {
+        Tree::Part(i) => contains(&parts[*i], p),
+        Tree::Union(list) => list.iter().any(inside),
+        Tree::Intersection(list) => list.iter().all(inside),
+        Tree::Difference(list) => inside(&list[0]) && !list[1..].iter().any(inside),
+    }
+}
+
+/// Random trees of depth 8: surfaces in turn, and between them what the points themselves say. Half a
+/// million rays each way.
+#[test]
+fn extreme_08_extreme_04_parity_of_random_trees() {
+    let mut seen = 0;
+    for seed in 0..100 {
+        let mut numbers = Numbers::new(800 + seed);
+        let mut parts = Vec::new();
+        let tree = random_tree(&mut numbers, 1 + (seed as usize) % 8, &mut parts);
+        let form = Form::Compound(Compound { parts: parts.clone(), tree: tree.clone() });
+        if form.bounds().is_none() {
+            continue;
+        }
+        let double = geometry::<Double>(&form);
+        let lines: Vec<Line> = (0..5_000).map(|_| line(&mut numbers)).collect();
+        let all = surfaces(&double, &lines);
+        let name = format!("tree {seed}");
+        for (line, met) in lines.iter().zip(&all) {
+            chord(&name, line, met);
+            seen += met.len();
+            let mut ends = vec![0.0];
+            ends.extend(met.iter().map(|m| m.t));
+            ends.push(ends[ends.len() - 1] + 1.0);
+            for (n, gap) in ends.windows(2).enumerate() {
+                if gap[1] - gap[0] < 1e-6 {
+                    continue;
+                }
+                let t = gap[0] + numbers.between(0.01, 0.99) * (gap[1] - gap[0]);
+                let inside = tree_contains(&tree, &parts, line.0 + line.1 * t);
+                // A random point lies in a sliver that a tie hides as rarely as that is thin.
+                assert_eq!(inside, n % 2 == 1, "{name}: {line:?} at {t} of {ends:?}");
+            }
+        }
+        // Inside, in cavities and outside: the first surface ahead tells where the origin is.
+        let starts: Vec<Line> =
+            (0..5_000).map(|_| (numbers.in_cube(1.5), numbers.direction())).collect();
+        for (line, met) in starts.iter().zip(closest(&double, &starts)) {
+            let inside = tree_contains(&tree, &parts, line.0);
+            let told = || format!("{name}: {line:?} {met:?}");
+            match met {
+                Some(met) => assert_eq!(met.normal.dot(line.1) > 0.0, inside, "{}", told()),
+                None => assert!(!inside, "{}", told()),
+            }
+        }
+    }
+    assert!(seen > 150_000, "{seen} surfaces");
+}
+
+/// The same surfaces, to 1e-12 of the distance; beside a tie's width at flat ends.
+fn same_surfaces(name: &str, a: &Form, b: &Form, lines: &[Line]) {
+    let (a, b) = (geometry::<Double>(a), geometry::<Double>(b));
+    for ((line, a), b) in lines.iter().zip(surfaces(&a, lines)).zip(surfaces(&b, lines)) {
+        let flat = |m: &Met| m.normal.dot(line.1).abs() < 1e-5;
+        if a.iter().chain(&b).any(flat) {
+            continue;
+        }
+        assert_eq!(a.len(), b.len(), "{name}: {line:?}: {a:?} {b:?}");
+        for (a, b) in a.iter().zip(&b) {
+            assert!((a.t - b.t).abs() <= 1e-12 * a.t, "{name}: {line:?}: {a:?} {b:?}");
+            assert!((a.normal - b.normal).length() < 1e-6, "{name}: {line:?}: {a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn extreme_09_algebra() {
+    let lines = lines(9, 20_000);
+    let mut numbers = Numbers::new(90);
+    for n in 0..12 {
+        let (a, b) = (random_solid(&mut numbers), random_solid(&mut numbers));
+        let (a, b, c) = (|| a.clone(), || b.clone(), random_solid(&mut numbers));
+        let told = |what: &str| format!("{what}, pair {n}");
+        same_surfaces(&told("A or A = A"), &union(vec![a(), a()]), &a(), &lines);
+        same_surfaces(&told("A and A = A"), &intersection(vec![a(), a()]), &a(), &lines);
+        let nothing = geometry::<Double>(&difference(vec![a(), a()]));
+        assert!(closest(&nothing, &lines).iter().all(Option::is_none), "A - A, pair {n}");
+        assert!(blocked(&nothing, &lines, 100.0).iter().all(|b| !b), "A - A, pair {n}");
+        // A - B = A and not B, where not B = everything - B.
+        let all = block([0.0; 3], [20.0; 3]);
+        let not_b = Tree::Difference(vec![Tree::Part(1), Tree::Part(2)]);
+        let tree = Tree::Intersection(vec![Tree::Part(0), not_b]);
+        let and_not = Form::Compound(Compound { parts: vec![a(), all, b()], tree });
+        same_surfaces(&told("A - B = A and not B"), &difference(vec![a(), b()]), &and_not, &lines);
+        let swapped = (union(vec![a(), b()]), union(vec![b(), a()]));
+        same_surfaces(&told("A or B = B or A"), &swapped.0, &swapped.1, &lines);
+        // (A - B) - C = A - (B or C)
+        let tree = Tree::Difference(vec![
+            Tree::Difference(vec![Tree::Part(0), Tree::Part(1)]),
+            Tree::Part(2),
+        ]);
+        let steps = Form::Compound(Compound { parts: vec![a(), b(), c.clone()], tree });
+        let at_once = difference(vec![a(), b(), c]);
+        same_surfaces(&told("(A - B) - C"), &steps, &at_once, &lines);
+    }
+}

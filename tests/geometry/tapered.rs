@@ -1,0 +1,212 @@
+//! Cylinders, cones and what lies between, at their extremes.
+
+use crate::common::Numbers;
+use crate::rays::{Line, Met, closest};
+use glam::{DAffine3, DQuat, DVec3};
+use zerkalo::lanes::{Double, Lanes, Single};
+use zerkalo::shape::{Form, Geometry};
+
+fn canonical(s: f64) -> Form {
+    Form::tapered(DAffine3::IDENTITY, s)
+}
+
+fn meet<L: Lanes>(form: &Form, lines: &[Line]) -> Vec<Option<Met>> {
+    closest(&Geometry::<L>::new(std::slice::from_ref(form)), lines)
+}
+
+/// Entry and exit, by a ray from each side.
+fn ends(form: &Form, (p, d): Line, far: f64) -> Option<(f64, f64)> {
+    let met = meet::<Double>(form, &[(p - d * far, d), (p + d * far, -d)]);
+    Some((met[0]?.t - far, far - met[1]?.t))
+}
+
+/// Lines through the canonical solids, from all sides.
+fn lines(seed: u64, count: usize) -> Vec<Line> {
+    let mut numbers = Numbers::new(seed);
+    (0..count)
+        .map(|_| {
+            let d = numbers.direction();
+            let at = DVec3::new(
+                numbers.between(-1.0, 1.0),
+                numbers.between(-1.0, 1.0),
+                numbers.between(0.0, 1.0),
+            );
+            (at - d * 5.0, d)
+        })
+        .collect()
+}
+
+/// The span of a line in the canonical solid by the plain quadratic formula; `None`: it is met too
+/// flatly to be told that way, or not at all.
+fn plain(s: f64, (o, d): Line) -> Option<(f64, f64)> {
+    let k = s - 1.0;
+    let r = 1.0 + k * o.z;
+    let a = d.x * d.x + d.y * d.y - k * k * d.z * d.z;
+    let b = o.x * d.x + o.y * d.y - k * d.z * r;
+    let c = o.x * o.x + o.y * o.y - r * r;
+    let mut ts = vec![-o.z / d.z, (1.0 - o.z) / d.z];
+    let root = (b * b - a * c).sqrt();
+    if root.is_finite() {
+        ts.extend([(-b - root) / a, (-b + root) / a]);
+    }
+    let inside = |t: f64| {
+        let p = o + d * t;
+        (-1e-9..=1.0 + 1e-9).contains(&p.z) && p.x.hypot(p.y) <= 1.0 + k * p.z + 1e-9
+    };
+    ts.retain(|t| t.is_finite() && inside(*t));
+    let low = ts.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = ts.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    (high - low > 1e-3).then_some((low, high))
+}
+
+#[test]
+fn spans_are_those_of_the_plain_formula() {
+    for s in [0.0, 0.3, 1.0, 1.7, 20.0] {
+        let mut counted = 0;
+        for line in lines(11, 20_000) {
+            let Some((low, high)) = plain(s, line) else { continue };
+            let form = canonical(s);
+            // From far outside, on both sides: a wide solid reaches round the line's origin.
+            let (enter, leave) =
+                ends(&form, line, 60.0).unwrap_or_else(|| panic!("s = {s}: lost {line:?}"));
+            let error = (enter - low).abs().max((leave - high).abs());
+            assert!(error < 1e-7, "s = {s}, {line:?}: {enter} {leave}, not {low} {high}");
+            counted += 1;
+        }
+        assert!(counted > 10_000, "s = {s}: {counted}");
+    }
+}
+
+/// From cylinder to cone without a step, where the quadratic changes its degree.
+#[test]
+fn extreme_11_a_hair_of_taper_changes_nothing() {
+    let lines = lines(12, 50_000);
+    let straight = meet::<Double>(&canonical(1.0), &lines);
+    for hair in [1e-15, 1e-12, -1e-15, -1e-12] {
+        let tapered = meet::<Double>(&canonical(1.0 + hair), &lines);
+        for ((line, a), b) in lines.iter().zip(&straight).zip(&tapered) {
+            match (a, b) {
+                (Some(a), Some(b)) => {
+                    let flat = a.normal.dot(line.1).abs().min(b.normal.dot(line.1).abs());
+                    assert!((a.t - b.t).abs() < 1e-9 / flat.max(1e-6), "{hair}: {line:?}");
+                    assert!((b.normal.length() - 1.0).abs() < 1e-14, "{hair}: {line:?}");
+                }
+                (None, None) => {}
+                // The limb moves by the hair.
+                (Some(m), None) | (None, Some(m)) => {
+                    assert!(m.normal.dot(line.1).abs() < 1e-5, "{hair}: {line:?} {m:?}")
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn extreme_11_flat_and_tall_solids() {
+    let mut numbers = Numbers::new(13);
+    for height in [1e-9, 1e-6, 1e6, 1e9] {
+        for s in [0.0, 0.5, 1.0, 3.0] {
+            let form = Form::tapered(DAffine3::from_scale(DVec3::new(1.0, 1.0, height)), s);
+            for n in 0..4000 {
+                // Through the axis somewhere, across it and aslant.
+                let at = DVec3::Z * (height * numbers.between(0.1, 0.7));
+                let d = match n % 2 {
+                    0 => DVec3::new(numbers.between(-1.0, 1.0), 1.0, 0.0).normalize(),
+                    _ => numbers.direction(),
+                };
+                let far = 10.0f64;
+                let line = (at - d * far, d);
+                let met = meet::<Double>(&form, &[line])[0];
+                let told = || format!("height {height:e}, s = {s}: {line:?} {met:?}");
+                let met = met.unwrap_or_else(|| panic!("lost: {}", told()));
+                assert!(met.t.is_finite() && met.point.is_finite(), "{}", told());
+                assert!((met.normal.length() - 1.0).abs() < 1e-14, "{}", told());
+            }
+        }
+    }
+}
+
+#[test]
+fn extreme_12_along_generators_and_through_the_apex() {
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, 1.0, -2.0);
+    let mut numbers = Numbers::new(14);
+    for place in [DAffine3::IDENTITY, DAffine3::from_quat(turn)] {
+        for s in [0.0, 0.25, 0.5, 1.0, 2.0] {
+            let form = Form::tapered(place, s);
+            let own = |p: DVec3| place.transform_point3(p);
+            // The axis.
+            let axis = (own(DVec3::new(0.0, 0.0, 0.5)), place.matrix3 * DVec3::Z);
+            let (enter, leave) = ends(&form, axis, 4.0).unwrap();
+            assert!((enter + 0.5).abs() < 1e-13 && (leave - 0.5).abs() < 1e-13, "s = {s}");
+            for _ in 0..2000 {
+                let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();
+                let low = own(DVec3::new(cos, sin, 0.0));
+                let high = own(DVec3::new(s * cos, s * sin, 1.0));
+                let d = (high - low).normalize();
+                let middle = (low + high) / 2.0;
+                // On the generator: inside or outside by rounding, but finite. A little inside: the
+                // length between the ends.
+                for met in meet::<Double>(&form, &[(low - d * 3.0, d)]).into_iter().flatten() {
+                    assert!(met.t.is_finite() && met.normal.is_finite(), "s = {s}: {met:?}");
+                }
+                let center = own(DVec3::Z * 0.5);
+                let inner = middle + (center - middle) * 1e-9;
+                let (enter, leave) = ends(&form, (inner, d), 4.0).unwrap();
+                let half = low.distance(high) / 2.0;
+                let error = (enter + half).abs().max((leave - half).abs());
+                assert!(error < 1e-6, "s = {s}: {enter} {leave} {half}");
+                let outer = middle - (center - middle) * 1e-9;
+                let found = ends(&form, (outer, d), 4.0).map_or(0.0, |(a, b)| b - a);
+                assert!(found < 1e-6, "s = {s}: {found}");
+                // From aside through the apex.
+                if s == 0.0 {
+                    let side = numbers.direction();
+                    let met = meet::<Double>(&form, &[(high - side * 3.0, side)])[0];
+                    assert!(met.is_none_or(|m| m.t.is_finite() && m.normal.is_finite()), "{met:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Lines that touch: no NaN, and hardly any length inside.
+fn check_tangents<L: Lanes>() {
+    let mut numbers = Numbers::new(15);
+    for s in [0.0f64, 0.6, 1.0, 1.5] {
+        let form = canonical(s);
+        let k = s - 1.0;
+        let touching: Vec<Line> = (0..20_000)
+            .map(|_| {
+                let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();
+                let z = numbers.between(0.01, 0.99);
+                let r = 1.0 + k * z;
+                // In the tangent plane, which holds the generator and the circle's tangent.
+                let along = DVec3::new(k * cos, k * sin, 1.0).normalize();
+                let around = DVec3::new(-sin, cos, 0.0);
+                let turn = numbers.between(0.2, 1.4);
+                let d = along * turn.cos() + around * turn.sin();
+                (DVec3::new(r * cos, r * sin, z) - d * 3.0, d)
+            })
+            .collect();
+        let forward = meet::<L>(&form, &touching);
+        let back: Vec<Line> = touching.iter().map(|(o, d)| (*o + *d * 6.0, -*d)).collect();
+        let backward = meet::<L>(&form, &back);
+        for ((line, a), b) in touching.iter().zip(forward).zip(backward) {
+            let told = || format!("{}, s = {s}: {line:?} {a:?} {b:?}", L::NAME);
+            for met in a.iter().chain(&b) {
+                assert!(met.t.is_finite() && met.normal.is_finite(), "{}", told());
+            }
+            if let (Some(a), Some(b)) = (a, b) {
+                // Inside by e of the radius the chord is about sqrt(8 e) / sin(turn).
+                let limit = 40.0 * (64.0 * L::EPSILON).sqrt();
+                assert!(6.0 - a.t - b.t < limit, "{}", told());
+            }
+        }
+    }
+}
+
+#[test]
+fn extreme_05_tangents() {
+    check_tangents::<Double>();
+    check_tangents::<Single>();
+}

@@ -1,0 +1,386 @@
+//! What a guest changes while a session works: lights, aims, display, threads. Samples are kept
+//! wherever they serve, and figures are those of a fresh render.
+
+use std::sync::Arc;
+use std::sync::mpsc::channel;
+use std::time::{Duration, Instant};
+use zerkalo::film::{Display, Tone};
+use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
+use zerkalo::render::session::{Session, Snapshot, State, View};
+use zerkalo::render::{Options, Rendering};
+use zerkalo::sampling::{SampleSettings, SamplerKind};
+use zerkalo::scene::Scene;
+use zerkalo::value::Color;
+use zerkalo::world;
+
+const SCENE: &str = r#"
+[film]
+size = [100, 70]
+[camera]
+eye = [0.0, 1.0, 4.0]
+target = [0.0, 0.5, 0.0]
+[ambient]
+color = [0.05, 0.05, 0.1]
+[background]
+color = [0.1, 0.2, 0.3]
+[[light]]
+name = "lamp"
+point = { position = [2.0, 4.0, 3.0] }
+[[light]]
+directional = { direction = [1.0, -1.0, -1.0] }
+intensity = 0.3
+[materials.red]
+color = [0.8, 0.2, 0.1]
+[materials.mirror]
+diffuse = 0.1
+reflection = 0.9
+roughness = 0.3
+[[object]]
+material = "red"
+shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.5 }
+[[object]]
+material = "mirror"
+shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0, 0.0, 1.0] }
+"#;
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn scene() -> Scene {
+    Scene::parse(SCENE, "test").unwrap()
+}
+
+fn spp(spp: u32) -> Stop {
+    Stop { spp: Some(spp), ..Stop::default() }
+}
+
+fn noise(codes: f64) -> Stop {
+    Stop { noise_codes: Some(codes), ..Stop::default() }
+}
+
+fn session(stop: Stop, adaptive: bool) -> Session<Rendering> {
+    let options = Options {
+        world: world::Options::default(),
+        sampling: SampleSettings { seed: 3, kind: SamplerKind::Sobol },
+        display: Display::default(),
+    };
+    let settings = Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+    Session::new(2, options, settings).unwrap()
+}
+
+fn wait(session: &Session<Rendering>, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {
+    let end = Instant::now() + PATIENCE;
+    while Instant::now() < end {
+        if let Some(snapshot) = session.wait(Duration::from_millis(100)).filter(&wanted) {
+            return snapshot;
+        }
+    }
+    panic!("no such snapshot in time")
+}
+
+/// Sets `scene` and waits until it is finished.
+fn finish(session: &mut Session<Rendering>, scene: &Scene) -> Snapshot {
+    let generation = session.set_scene(Arc::new(scene.clone()));
+    resting(session, generation)
+}
+
+fn resting(session: &Session<Rendering>, generation: u64) -> Snapshot {
+    let done = |s: &Snapshot| {
+        s.report.generation == generation && matches!(s.report.state, State::Resting(_))
+    };
+    wait(session, done)
+}
+
+fn bytes(session: &Session<Rendering>) -> Vec<u8> {
+    session.with(|rendering, _| rendering.film.bytes()).unwrap()
+}
+
+/// Other colours and strengths; every group is still there.
+fn relit() -> Scene {
+    let mut scene = scene();
+    scene.ambient.color = Color([0.3, 0.1, 0.0]);
+    scene.background.color = Color([0.0, 0.4, 0.1]);
+    scene.lights[0].color = Color([0.2, 1.0, 0.7]);
+    scene.lights[0].intensity = 2.5;
+    scene.lights[1].intensity = 0.01;
+    scene
+}
+
+#[test]
+fn another_light_is_what_a_fresh_render_gives() {
+    let mut fresh = session(spp(64), false);
+    let expected = finish(&mut fresh, &relit());
+    let film = bytes(&fresh);
+
+    // At rest, and at any moment before.
+    for wait_us in [None, Some(0), Some(300), Some(3000), Some(9000)] {
+        let mut session = session(spp(64), false);
+        let first = match wait_us {
+            None => finish(&mut session, &scene()).report.generation,
+            Some(us) => {
+                let generation = session.set_scene(Arc::new(scene()));
+                wait(&session, |s| s.report.generation == generation);
+                std::thread::sleep(Duration::from_micros(us));
+                generation
+            }
+        };
+        let end = finish(&mut session, &relit());
+        assert!(end.report.generation > first);
+        assert!(bytes(&session) == film, "after {wait_us:?}");
+        assert_eq!(end.mix, expected.mix);
+        assert_eq!(end.report.noise, expected.report.noise, "after {wait_us:?}");
+        assert_eq!(end.report.spp, expected.report.spp);
+        assert_eq!(end.report.samples, expected.report.samples);
+        let shown = session.with(|r, _| r.film.pixel(50, 40, &r.mix));
+        assert_eq!(shown, fresh.with(|r, _| r.film.pixel(50, 40, &r.mix)));
+    }
+}
+
+#[test]
+fn no_sample_is_lost_to_another_light() {
+    let mut session = session(spp(64), true);
+    session.set_view(View { raster: Some([10, 7]), probe: None });
+    let before = finish(&mut session, &scene());
+    let newer = relit();
+    let mix = before.mix_for(&newer).expect("the film serves the scene");
+    let generation = session.set_scene(Arc::new(newer.clone()));
+    // All snapshots from here on have all the samples.
+    let after = wait(&session, |s| {
+        assert_eq!(s.report.samples, before.report.samples);
+        s.report.generation == generation && s.report.noise.is_some()
+    });
+    // What the guest has mixed from the old snapshot is what the new one shows.
+    assert_eq!(after.mix, mix);
+    assert_eq!(before.picture.unwrap().mixed(&mix), after.picture.unwrap().mixed(&after.mix));
+    assert_eq!(after.guide, before.guide);
+    // A name, a spare material, a cap that nothing reaches.
+    let mut renamed = newer.clone();
+    renamed.lights[0].name = "sun".to_string();
+    renamed.materials.insert("spare".to_string(), renamed.materials["red"].clone());
+    renamed.film.rays_per_pixel = 1000;
+    let renamed = finish(&mut session, &renamed);
+    assert_eq!(renamed.report.samples, before.report.samples);
+    assert_eq!(renamed.report.noise, after.report.noise);
+    let names = session.with(|rendering, _| rendering.group_names()).unwrap();
+    assert_eq!(names, ["ambient", "background", "sun", "light 2"]);
+    // A moved light is another scene.
+    let mut moved = newer;
+    moved.lights[0].point.as_mut().unwrap().position[0] = 1.0;
+    assert_eq!(after.lighting.unwrap().mix(&moved), None);
+    let generation = session.set_scene(Arc::new(moved));
+    let first = wait(&session, |s| s.report.generation == generation);
+    assert!(first.report.samples < before.report.samples);
+}
+
+#[test]
+fn a_mix_that_is_too_noisy_wakes_a_session_at_rest() {
+    let mut session = session(noise(0.15), true);
+    let dim = finish(&mut session, &scene()).report;
+    assert_eq!(dim.state, State::Resting(StoppedBy::Noise));
+    let mut bright = scene();
+    bright.lights[0].intensity = 2.0;
+    let generation = session.set_scene(Arc::new(bright.clone()));
+    let report = wait(&session, |s| {
+        assert!(s.report.samples >= dim.samples, "nothing is lost");
+        s.report.generation == generation && matches!(s.report.state, State::Resting(_))
+    })
+    .report;
+    assert!(report.samples > dim.samples, "the target was not met: {:?}", dim.noise);
+    assert!(report.noise.unwrap().rmse_codes <= 0.15);
+    // The figure is that of the film as it is, estimated from nothing, and about that of a fresh
+    // render, which gives as many samples to other tiles.
+    let film = session.with(|r, _| r.film.noise(&r.mix, &Display::default())).unwrap().unwrap();
+    assert_eq!(report.noise.unwrap(), film);
+    let mut fresh = self::session(spp(report.spp.mean.round() as u32), true);
+    let expected = finish(&mut fresh, &bright).report.noise.unwrap();
+    let ratio = film.rmse_codes / expected.rmse_codes;
+    println!("{film:?}, fresh {expected:?}");
+    assert!((0.75..1.33).contains(&ratio), "{ratio}");
+    // Back to less noise: it stays at rest.
+    let back = finish(&mut session, &scene()).report;
+    assert_eq!(back.samples, report.samples);
+    assert!(back.noise.unwrap().rmse_codes < 0.15);
+}
+
+#[test]
+fn a_light_that_goes_out_keeps_its_group_until_a_restart() {
+    let mut session = session(spp(32), true);
+    let groups = |session: &Session<Rendering>| session.with(|r, _| r.film.groups());
+    let before = finish(&mut session, &scene()).report;
+    let mut dark = scene();
+    dark.lights[0].on = false;
+    let off = finish(&mut session, &dark);
+    assert_eq!((off.report.samples, groups(&session)), (before.samples, Some(4)));
+    assert_eq!(off.mix.weights[2], [0.0; 3]);
+    let generation = session.restart();
+    let again = wait(&session, |s| s.report.generation == generation);
+    assert!(again.report.samples < before.samples, "it begins afresh");
+    resting(&session, generation);
+    assert_eq!(groups(&session), Some(3));
+    // Without a group it cannot be switched on without new samples.
+    let on = session.set_scene(Arc::new(scene()));
+    let first = wait(&session, |s| s.report.generation == on);
+    assert!(first.report.samples < before.samples);
+    resting(&session, on);
+    assert_eq!(groups(&session), Some(4));
+}
+
+#[test]
+fn aims_display_and_threads_change_without_losing_samples() {
+    let mut plain = session(spp(96), false);
+    finish(&mut plain, &scene());
+
+    let mut session = session(spp(40), false);
+    let first = finish(&mut session, &scene()).report;
+    assert_eq!((first.spp.min, first.threads, first.lanes), (40, 2, "f32x8"));
+    assert!(first.inventory.contains("1 sphere"), "{}", first.inventory);
+    assert!(first.recent_samples_per_second > 0.0);
+    session.set_threads(1, 5).unwrap();
+    session.set_stop(spp(96));
+    let more =
+        wait(&session, |s| s.report.spp.min == 96 && s.report.state != State::Tracing).report;
+    assert_eq!((more.threads, more.generation), (1, first.generation));
+    assert_eq!(more.state, State::Resting(StoppedBy::Spp));
+    assert!(bytes(&session) == bytes(&plain));
+
+    // An aim that is met already changes nothing.
+    session.set_stop(noise(1000.0));
+    let met = |s: &Snapshot| s.report.state == State::Resting(StoppedBy::Noise);
+    assert_eq!(wait(&session, met).report.samples, more.samples);
+
+    let display = Display { exposure_ev: 3.0, tone: Tone::Neutral };
+    session.set_display(display);
+    let expected = session.with(move |r, _| r.film.noise(&r.mix, &display)).unwrap();
+    let judged = wait(&session, |s| s.report.noise == expected);
+    assert_eq!(judged.report.samples, more.samples);
+    // It also holds for the scenes to come.
+    let mut moved = scene();
+    moved.camera.eye[0] = 0.1;
+    let moved = finish(&mut session, &moved).report;
+    let noise = session.with(move |r, _| r.film.noise(&r.mix, &display)).unwrap();
+    assert_eq!(moved.noise, noise);
+}
+
+#[test]
+fn tasks_do_not_wait_and_always_answer() {
+    let mut session = session(Stop::default(), true);
+    let (answer, answers) = channel();
+    let samples = |session: &Session<Rendering>| {
+        let answer = answer.clone();
+        session.submit(move |film| answer.send(film.map(|(_, r)| r.generation)).unwrap());
+    };
+    samples(&session);
+    assert_eq!(answers.recv_timeout(PATIENCE).unwrap(), None);
+    let generation = session.set_scene(Arc::new(scene()));
+    (0..50).for_each(|_| samples(&session));
+    for _ in 0..50 {
+        assert_eq!(answers.recv_timeout(PATIENCE).unwrap(), Some(generation));
+    }
+    // A kept picture, and the probe at the same moment.
+    session.set_view(View { raster: Some([20, 14]), probe: Some([50, 40]) });
+    session.set_stop(spp(16));
+    let end = resting(&session, generation);
+    let (keep, kept) = channel();
+    session.submit(move |film| {
+        keep.send(film.map(|(r, _)| (r.film.linear(&r.mix), r.film.pixel(50, 40, &r.mix))))
+            .unwrap();
+    });
+    let (kept, pixel) = kept.recv_timeout(PATIENCE).unwrap().unwrap();
+    for (a, b) in end.picture.unwrap().mixed(&end.mix).iter().zip(kept.resampled(20, 14)) {
+        (0..3).for_each(|c| assert!((a[c] - b[c]).abs() < 1e-5, "{a:?} {b:?}"));
+    }
+    let probe = end.probe.unwrap();
+    assert_eq!((probe.pixel, probe.radiance), ([50, 40], pixel));
+    assert_eq!(u64::from(probe.samples[0] + probe.samples[1]), u64::from(end.tiles.spp[0]));
+    assert!(probe.difference.is_some() && probe.tile_rmse_codes.is_some());
+    assert_eq!((end.tiles.columns, end.tiles.rows), (7, 5));
+    assert_eq!((end.tiles.noise_codes.len(), end.tiles.spp.len()), (35, 35));
+}
+
+/// A wall whose colour and distance tell which scene it belongs to.
+fn wall(number: u64) -> Scene {
+    let mut scene = scene();
+    scene.lights.clear();
+    scene.ambient.color = Color::WHITE;
+    scene.objects.remove(0);
+    let red = scene.materials.get_mut("mirror").unwrap();
+    red.reflection = 0.0;
+    red.color = Color([0.01 * (number % 50 + 1) as f64, 0.0, 0.0]);
+    scene.camera.eye = [0.0, 1.0, 0.1 + 0.01 * (number % 50) as f64];
+    scene.camera.target = Some([0.0, 1.0, -1.0]);
+    scene
+}
+
+#[test]
+fn picture_guide_and_generation_belong_together() {
+    let (mut a, mut b) = (session(Stop::default(), true), session(spp(8), true));
+    let mut seen = 0;
+    for number in 1..=200u64 {
+        for session in [&mut a, &mut b] {
+            let raster = Some([5 + number as usize % 3, 4]);
+            session.set_view(View { raster, probe: None });
+            assert_eq!(session.set_scene(Arc::new(wall(number))), number);
+        }
+        std::thread::sleep(Duration::from_micros(number * 97 % 4000));
+        for snapshot in [a.take(), b.take()].into_iter().flatten() {
+            let (number, Some(picture)) = (snapshot.report.generation, snapshot.picture) else {
+                continue;
+            };
+            let red = picture.mixed(&snapshot.mix)[0][0];
+            assert!((red - 0.01 * (number % 50 + 1) as f32).abs() < 1e-5, "{number}: {red}");
+            // On a busy machine it may seem too slow to come with the first picture.
+            let Some(guide) = snapshot.guide else { continue };
+            assert_eq!((guide.columns, guide.rows), (picture.cols, picture.rows));
+            let sight = guide.at(guide.columns / 2, 2).unwrap();
+            let axis = (wall(number).camera.eye[2] + 1.0) as f32;
+            assert!(sight.depth >= axis * 0.999 && sight.depth < axis * 1.1, "{number} {sight:?}");
+            assert_eq!((sight.object, sight.reflects), (Some(0), false));
+            seen += 1;
+        }
+    }
+    assert!(seen > 20, "{seen} snapshots");
+}
+
+/// Threads that wait for a command are not woken by anything else.
+#[cfg(target_os = "linux")]
+#[test]
+fn nothing_wakes_a_session_at_rest_or_in_a_pause() {
+    let mut session = session(spp(8), true);
+    let generation = session.set_scene(Arc::new(scene()));
+    session.set_view(View { raster: Some([8, 8]), probe: None });
+    resting(&session, generation);
+    let rest = switches_in(&session);
+    session.set_stop(Stop::default());
+    session.pause();
+    wait(&session, |s| s.report.state == State::Paused);
+    assert_eq!((rest, switches_in(&session)), (0, 0));
+}
+
+/// How often the session's threads wake in a while; the least of a few tries, as they need a moment to
+/// fall asleep.
+#[cfg(target_os = "linux")]
+fn switches_in(session: &Session<Rendering>) -> u64 {
+    let ids = session
+        .with(|_, _| {
+            let of_pool = std::fs::read_dir("/proc/self/task").unwrap();
+            let own = std::fs::read_link("/proc/thread-self").unwrap();
+            let own = own.file_name().unwrap().to_owned();
+            of_pool.map(|e| e.unwrap().file_name()).filter(|id| *id == own).collect::<Vec<_>>()
+        })
+        .unwrap();
+    let count = || -> u64 {
+        let of = |id: &std::ffi::OsString| {
+            let path = std::path::Path::new("/proc/self/task").join(id).join("status");
+            let status = std::fs::read_to_string(path).unwrap();
+            let lines = status.lines().filter(|line| line.contains("ctxt_switches"));
+            lines.map(|l| l.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap()).sum::<u64>()
+        };
+        ids.iter().map(of).sum()
+    };
+    let wakes = |_| {
+        std::thread::sleep(Duration::from_millis(100));
+        let before = count();
+        std::thread::sleep(Duration::from_millis(200));
+        count() - before
+    };
+    (0..5).map(wakes).min().unwrap()
+}

@@ -1,0 +1,67 @@
+//! Edits, files, and the end with a question.
+
+use super::*;
+use zerkalo::scene::BUILT_IN;
+
+#[test]
+fn keys_change_the_picture_and_undo_brings_it_back() {
+    let desk = Desk::with_room();
+    let mut terminal = desk.open(&["room.toml"], [120, 36]);
+    wait_for_picture(&terminal);
+    assert!(!terminal.screen(|s| s.contents()).contains('●'), "nothing is unsaved yet");
+    terminal.send("]]");
+    terminal.wait_for_text("●");
+    terminal.send("uu");
+    terminal.wait_until_gone("●");
+    terminal.send("\x1b[C\x1b[C");
+    terminal.wait_for_text("●");
+    terminal.send("q");
+    terminal.wait_for_text("nsaved");
+    terminal.send("\x1b");
+    terminal.wait_until_gone("nsaved");
+    terminal.send("uuq");
+    assert_eq!(terminal.end().0, 0);
+    assert_eq!(fs::read_to_string(desk.path("room.toml")).unwrap(), BUILT_IN);
+}
+
+#[test]
+fn saving_keeps_every_other_line() {
+    let desk = Desk::with_room();
+    let mut terminal = desk.open(&["room.toml"], [120, 36]);
+    wait_for_picture(&terminal);
+    terminal.send("]");
+    terminal.wait_for_text("●");
+    terminal.send("\x13");
+    terminal.wait_until_gone("●");
+    terminal.send("q");
+    assert_eq!(terminal.end().0, 0);
+    let saved = fs::read_to_string(desk.path("room.toml")).unwrap();
+    let changed: Vec<_> =
+        BUILT_IN.lines().zip(saved.lines()).filter(|(before, after)| before != after).collect();
+    assert_eq!(BUILT_IN.lines().count(), saved.lines().count());
+    assert!(
+        matches!(changed[..], [(before, after)] if before.starts_with("roughness = ")
+            && after.starts_with("roughness = ")),
+        "{changed:?}"
+    );
+}
+
+#[test]
+fn what_others_write_is_shown_and_a_broken_file_can_be_mended() {
+    let desk = Desk::with_room();
+    fs::write(desk.path("room.toml"), "[camera]\neye = [0.0, 1.0\n").unwrap();
+    let mut terminal = desk.open(&["room.toml"], [120, 36]);
+    terminal.wait_for_text("cannot be read");
+    assert_eq!(terminal.screen(picture_cells), 0);
+    fs::write(desk.path("room.toml"), BUILT_IN).unwrap();
+    let cells = |what: &str, wanted: std::ops::Range<usize>| {
+        terminal.wait_for(what, |s| wanted.contains(&picture_cells(s)).then_some(()));
+    };
+    cells("a picture as wide as its film", 2000..3000);
+    // A film of another shape makes another picture.
+    let narrow = BUILT_IN.replace("size = [640, 480]", "size = [120, 480]");
+    fs::write(desk.path("room.toml"), narrow).unwrap();
+    cells("a narrower picture", 300..1000);
+    terminal.send("q");
+    assert_eq!(terminal.end().0, 0);
+}

@@ -1,0 +1,134 @@
+//! Beginning and end: the terminal is taken, and given back as it was.
+
+use super::*;
+use std::io::Write;
+use std::process::{Command, Stdio};
+use zerkalo::dashboard::run::terminal::{ENTER, LEAVE, Screen};
+
+fn signal(name: &str, id: u32) {
+    let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
+    assert!(sent.unwrap().success());
+}
+
+#[test]
+fn the_built_in_scene_opens_and_quits() {
+    let desk = Desk::new();
+    let mut terminal = desk.open(&[], [120, 36]);
+    wait_for_picture(&terminal);
+    terminal.wait_for_text("mirror-room");
+    terminal.send("q");
+    let (status, bytes) = terminal.end();
+    assert_eq!(status, 0);
+    assert!(bytes.starts_with(ENTER), "{:?}", &bytes[..100]);
+    assert!(bytes.ends_with(LEAVE), "{:?}", &bytes[bytes.len() - 100..]);
+    assert_eq!(fs::read_dir(desk.path(".")).unwrap().count(), 0, "nothing was written");
+}
+
+#[test]
+fn signals_give_the_terminal_back() {
+    let desk = Desk::with_room();
+    for (name, expected) in [("TERM", 143), ("INT", 130), ("HUP", 129)] {
+        let terminal = desk.open(&["room.toml"], [80, 24]);
+        wait_for_picture(&terminal);
+        signal(name, terminal.process_id());
+        let (status, bytes) = terminal.end();
+        assert_eq!(status, expected, "{name}");
+        assert!(bytes.ends_with(LEAVE), "{name}");
+    }
+}
+
+/// The program of the next test.
+#[test]
+#[ignore = "runs in the terminal of another test"]
+fn a_program_that_panics() {
+    let screen = Screen::enter().unwrap();
+    std::thread::spawn(|| panic!("as the test wants it")).join().unwrap_err();
+    drop(screen);
+    std::io::stdout().write_all(b"still alive\r\n").unwrap();
+}
+
+#[test]
+fn a_panic_is_told_on_a_restored_terminal() {
+    let desk = Desk::new();
+    let this = std::env::current_exe().unwrap();
+    let command = [
+        this.to_str().unwrap(),
+        "life::a_program_that_panics",
+        "--exact",
+        "--ignored",
+        "--nocapture",
+    ];
+    let start = Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &[] };
+    let (status, bytes) = Terminal::start(&start).end();
+    assert_eq!(status, 0, "{bytes}");
+    let [entered, left, told, after] = [ENTER, LEAVE, "as the test wants it", "still alive"]
+        .map(|part| bytes.find(part).unwrap_or_else(|| panic!("no {part:?} in {bytes:?}")));
+    assert!(entered < left && left < told && told < after, "{bytes:?}");
+    assert_eq!(bytes.matches(LEAVE).count(), 1);
+}
+
+#[test]
+fn without_a_terminal_one_line_tells_what_to_do() {
+    let desk = Desk::with_room();
+    let run = Command::new(PROGRAM)
+        .arg("room.toml")
+        .current_dir(desk.0.path())
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    let told = String::from_utf8(run.stderr).unwrap();
+    assert_eq!((run.status.code(), told.lines().count()), (Some(2), 1), "{told}");
+    assert!(told.contains("zerkalo render room.toml"), "{told}");
+    assert!(run.stdout.is_empty());
+
+    let command = [PROGRAM];
+    let env = [("TERM", "dumb")];
+    let start = Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &env };
+    let (status, bytes) = Terminal::start(&start).end();
+    assert_eq!(status, 2);
+    assert!(bytes.contains("zerkalo render") && !bytes.contains('\x1b'), "{bytes:?}");
+}
+
+#[test]
+fn a_missing_file_is_told_outside() {
+    let desk = Desk::new();
+    let (status, bytes) = desk.open(&["nowhere.toml"], [80, 24]).end();
+    assert_eq!(status, 1);
+    assert!(bytes.contains("nowhere.toml") && !bytes.contains(ENTER), "{bytes:?}");
+}
+
+#[test]
+fn the_picture_follows_the_size_of_the_terminal() {
+    let desk = Desk::new();
+    let mut terminal = desk.open(&[], [80, 24]);
+    let cells = |what: &str, wanted: std::ops::Range<usize>| {
+        terminal.wait_for(what, |s| wanted.contains(&picture_cells(s)).then_some(()));
+    };
+    cells("a small picture", 800..1100);
+    terminal.resize([160, 45]);
+    cells("a larger picture", 3000..5000);
+    terminal.resize([30, 8]);
+    terminal.wait_for("no picture, but a line", |screen| {
+        let told = screen.contents().contains("at least");
+        (picture_cells(screen) == 0 && told).then_some(())
+    });
+    terminal.resize([80, 24]);
+    cells("the picture again", 800..1100);
+    terminal.send("q");
+    assert_eq!(terminal.end().0, 0);
+}
+
+#[test]
+fn pasted_text_presses_no_keys() {
+    let desk = Desk::new();
+    let mut terminal = desk.open(&[], [120, 36]);
+    wait_for_picture(&terminal);
+    terminal.send("\x1b[200~qqq]]]x\x1b[201~");
+    // The program goes on, and nothing was edited: it ends without a question.
+    terminal.send("?");
+    terminal.wait_for_text("orbit left");
+    terminal.send("\x1b");
+    terminal.wait_until_gone("orbit left");
+    terminal.send("q");
+    assert_eq!(terminal.end().0, 0);
+}

@@ -1,0 +1,158 @@
+//! Random sequences of everything that can be done to a scene.
+
+use super::LAYOUTS;
+use proptest::prelude::*;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use zerkalo::scene::edit::{self, Edit, Entry, Refusal, Subject};
+use zerkalo::scene::{BUILT_IN, Document, History, Scene};
+
+const TRANSFORMS: &str = include_str!("../../scenes/transform.toml");
+
+/// Random numbers that say what is done to what and how much.
+type Act = (u8, usize, usize, f64);
+
+fn act() -> impl Strategy<Value = Act> {
+    let amount =
+        prop_oneof![prop::sample::select(vec![1.0, -1.0, 0.1, -0.1, 3.0, 0.0]), -90.0..90.0f64,];
+    (0..20u8, 0..1000usize, 0..1000usize, amount)
+}
+
+const TEXTS: [&str; 12] =
+    ["0.5", "", "-1", "1 2 3", "0 0 0", "#80ff01", "on", "rotate_y", "sphere", "1e9", "a b", "nan"];
+
+fn pick<T: Clone>(list: &[T], at: usize) -> Option<T> {
+    list.get(at.checked_rem(list.len())?).cloned()
+}
+
+/// One operation; its name, for the tally, and what came of it.
+fn perform(scene: &Scene, (what, at, other, amount): Act) -> (&'static str, Result<Edit, Refusal>) {
+    let subjects: Vec<_> = edit::outline(scene).into_iter().map(|(_, s)| s).collect();
+    let subject = pick(&subjects, at).unwrap_or(Subject::Camera);
+    let row = pick(&edit::rows(scene, &subject).expect("it is in the outline"), other);
+    let row = row.expect("every subject has rows");
+    let kinds = edit::object_kinds();
+    let text = TEXTS[other % TEXTS.len()];
+    let component = (!row.components.is_empty() && amount > 0.0).then(|| at % row.components.len());
+    let by = [amount * 0.1, if other % 2 == 0 { 0.05 } else { 0.0 }, -amount * 0.01];
+    match what {
+        0 | 1 => ("step", edit::step(scene, &subject, &row.key, component, amount.trunc())),
+        2 => ("fine step", edit::step(scene, &subject, &row.key, component, amount * 0.1 + 0.05)),
+        3 => ("set", edit::set(scene, &subject, &row.key, text)),
+        4 => ("set number", edit::set_component(scene, &subject, &row.key, at % 3, text)),
+        5 => match row.entry {
+            Entry::Switch | Entry::Choice | Entry::Kind => {
+                ("toggle", edit::toggle(scene, &subject, &row.key, amount > 0.0))
+            }
+            _ => ("toggle refused", edit::toggle(scene, &subject, &row.key, amount > 0.0)),
+        },
+        6 if scene.objects.len() < 12 => {
+            let materials: Vec<_> = scene.materials.keys().map(String::as_str).collect();
+            let shared = pick(&materials, at).filter(|_| other % 3 == 0);
+            let kind = &kinds[other % kinds.len()].name;
+            ("add object", edit::add_object(scene, kind, shared))
+        }
+        7 if scene.lights.len() < 6 => {
+            let kind = if at % 2 == 0 { "point" } else { "directional" };
+            ("add light", edit::add_light(scene, kind))
+        }
+        8 => ("move", edit::move_by(scene, &subject, by)),
+        9 => ("turn", edit::turn(scene, &subject, amount)),
+        10 => ("drop", edit::drop_down(scene, &subject)),
+        11 if subjects.len() < 30 => ("duplicate", edit::duplicate(scene, &subject)),
+        12 => ("delete", edit::delete(scene, &subject)),
+        13 => {
+            let names = ["new", "cube", "red", "", "a\"b\\c", "ключ", "x.y"];
+            ("rename", edit::rename(scene, &subject, names[other % names.len()]))
+        }
+        14 => ("own material", edit::own_material(scene, &subject)),
+        15 => ("store view", edit::store_view(scene, (at % 2 == 0).then_some("left"))),
+        16 => ("recall view", edit::recall_view(scene, "left")),
+        17 => ("roughen", edit::roughen(scene, Some(&subject), amount.trunc())),
+        18 => ("reflect", edit::reflect(scene, Some(&subject), amount.trunc())),
+        19 => ("next lobe", edit::next_lobe(scene, None, amount > 0.0)),
+        _ => ("add material", edit::add_material(scene)),
+    }
+}
+
+/// How often each operation was done and refused.
+type Tally = BTreeMap<&'static str, [u32; 2]>;
+
+fn go(text: &str, acts: &[Act], tally: &mut Tally) -> Result<(), TestCaseError> {
+    let mut document = Document::parse(text.to_string(), "scene.toml").unwrap();
+    let mut history = History::new(Arc::new(document.scene().clone()));
+    for (i, act) in acts.iter().enumerate() {
+        let before = Arc::clone(history.scene());
+        let (name, result) = perform(&before, *act);
+        let counts = tally.entry(name).or_default();
+        counts[usize::from(result.is_err())] += 1;
+        match result {
+            Ok(edit) => {
+                prop_assert_eq!(edit.scene.faults(), [], "{} {:?}", name, act);
+                prop_assert!(edit.subject.exists(&edit.scene), "{} {:?}", name, edit.subject);
+                history.record(Arc::new(edit.scene), &edit.label, act.1 % 2 == 0);
+            }
+            Err(refusal) => prop_assert!(!refusal.found.is_empty() && !name.contains("add m")),
+        }
+        if act.2 % 7 == 0 {
+            history.undo();
+        }
+        if act.2 % 11 == 0 {
+            history.redo();
+        }
+        if i % 4 == 0 {
+            document.apply(history.scene());
+            let again = Scene::parse(document.text(), "scene.toml");
+            prop_assert!(again.is_ok(), "{}\n{}", again.unwrap_err(), document.text());
+            prop_assert_eq!(&again.unwrap(), &**history.scene(), "{}", document.text());
+        }
+    }
+    while history.undo().is_some() {}
+    document.apply(history.scene());
+    prop_assert_eq!(document.text(), text);
+    prop_assert!(history.is_saved());
+    Ok(())
+}
+
+#[test]
+fn any_sequence_leaves_a_valid_scene_and_can_be_undone() {
+    let tally = RefCell::new(Tally::new());
+    let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
+        cases: 120,
+        ..ProptestConfig::default()
+    });
+    let sequences = (0..3usize, prop::collection::vec(act(), 1..60));
+    let result = runner.run(&sequences, |(which, acts)| {
+        let text = [BUILT_IN, LAYOUTS[1], TRANSFORMS][which];
+        go(text, &acts, &mut tally.borrow_mut())
+    });
+    result.unwrap_or_else(|e| panic!("{e}"));
+    let tally = tally.into_inner();
+    println!("done and refused: {tally:?}");
+    // A tally that leaves something out would be a test of less than it says.
+    for name in [
+        "step",
+        "fine step",
+        "set",
+        "set number",
+        "toggle",
+        "add object",
+        "add light",
+        "add material",
+        "move",
+        "turn",
+        "drop",
+        "duplicate",
+        "delete",
+        "rename",
+        "own material",
+        "store view",
+        "recall view",
+        "roughen",
+        "reflect",
+        "next lobe",
+    ] {
+        assert!(tally.get(name).is_some_and(|[done, _]| *done > 0), "{name}: {tally:?}");
+    }
+}

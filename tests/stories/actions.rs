@@ -1,0 +1,420 @@
+//! One story at least for every action of the key table.
+
+use crate::desk::{Desk, FILE, ROOM};
+use std::collections::HashSet;
+use std::path::Path;
+use zerkalo::camera::Camera;
+use zerkalo::dashboard::action::{Action, Action::*, Change, Pace, Way};
+use zerkalo::dashboard::keymap::{KEYMAP, Row};
+use zerkalo::dashboard::layout::Focus;
+use zerkalo::dashboard::message::{Channel, Effect, Format};
+use zerkalo::dashboard::model::{Colors, Compared, Mode};
+use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::film::Tone;
+use zerkalo::light::Light;
+use zerkalo::material::{Lobe, Material};
+use zerkalo::scene::Scene;
+use zerkalo::scene::edit::Subject;
+use zerkalo::shape::Shape;
+
+const BALL: Subject = Subject::Object(1);
+const GLASS: Subject = Subject::Object(2);
+
+/// The scene before, the desk afterwards.
+type Expect = dyn Fn(&Scene, &Desk) -> bool;
+
+/// What was pressed with what selected, and what must be so afterwards.
+struct Story {
+    action: Action,
+    select: Subject,
+    /// Keys; `:` alone: the action is found in the palette.
+    keys: String,
+    expect: Box<Expect>,
+}
+
+fn story(
+    action: Action,
+    select: Subject,
+    keys: &str,
+    expect: impl Fn(&Scene, &Desk) -> bool + 'static,
+) -> Story {
+    Story { action, select, keys: keys.to_string(), expect: Box::new(expect) }
+}
+
+/// Nine viewpoints, each a unit farther to the right.
+fn room_with_views() -> String {
+    let view =
+        |n: i32| format!("\n[views.v{n}]\neye = [{n}.0, 1.0, 5.0]\ntarget = [0.0, 1.0, 0.0]\n");
+    (1..=9).fold(ROOM.to_string(), |text, n| text + &view(n))
+}
+
+fn camera(scene: &Scene) -> &Camera {
+    &scene.camera
+}
+
+fn eye(scene: &Scene) -> [f64; 3] {
+    scene.camera.eye
+}
+
+fn target(scene: &Scene) -> [f64; 3] {
+    scene.camera.target.unwrap()
+}
+
+fn mirror(scene: &Scene) -> &Material {
+    &scene.materials["mirror"]
+}
+
+fn lamp(scene: &Scene) -> &Light {
+    &scene.lights[0]
+}
+
+fn ball(scene: &Scene) -> [f64; 3] {
+    match &scene.objects[1].shape {
+        Shape::Sphere(sphere) => sphere.center,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn normal(scene: &Scene) -> [f64; 3] {
+    match &scene.objects[2].shape {
+        Shape::Rectangle(rectangle) => rectangle.normal,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn camera_stories() -> Vec<Story> {
+    let c = || Subject::Camera;
+    let mut stories = vec![
+        story(Orbit(Way::Left), c(), "Left", |a, d| {
+            eye(d.scene())[0] < 0.0 && target(a) == target(d.scene())
+        }),
+        story(Orbit(Way::Right), c(), "Right", |_, d| eye(d.scene())[0] > 0.0),
+        story(Orbit(Way::Up), c(), "Up", |_, d| eye(d.scene())[1] > 1.0),
+        story(Orbit(Way::Down), c(), "Down", |_, d| eye(d.scene())[1] < 1.0),
+        story(Pan(Way::Left), c(), "Shift-Left", |_, d| {
+            eye(d.scene())[0] < 0.0 && target(d.scene())[0] < 0.0
+        }),
+        story(Pan(Way::Right), c(), "Shift-Right", |_, d| {
+            eye(d.scene())[0] > 0.0 && target(d.scene())[0] > 0.0
+        }),
+        story(Pan(Way::Up), c(), "Shift-Up", |_, d| {
+            eye(d.scene())[1] > 1.0 && target(d.scene())[1] > 1.0
+        }),
+        story(Pan(Way::Down), c(), "Shift-Down", |_, d| {
+            eye(d.scene())[1] < 1.0 && target(d.scene())[1] < 1.0
+        }),
+        story(Dolly(Way::In, Pace::Coarse), c(), "PageUp", |_, d| eye(d.scene())[2] < 4.9),
+        story(Dolly(Way::Out, Pace::Coarse), c(), "PageDown", |_, d| eye(d.scene())[2] > 5.1),
+        story(Dolly(Way::In, Pace::Fine), c(), "Shift-PageUp", |_, d| {
+            (4.9..5.0).contains(&eye(d.scene())[2])
+        }),
+        story(Dolly(Way::Out, Pace::Fine), c(), "Shift-PageDown", |_, d| {
+            eye(d.scene())[2] > 5.0 && eye(d.scene())[2] < 5.1
+        }),
+        story(Look(Way::Left), c(), "Ctrl-Left", |a, d| {
+            eye(a) == eye(d.scene()) && target(d.scene())[0] < 0.0
+        }),
+        story(Look(Way::Right), c(), "w Right", |a, d| {
+            eye(a) == eye(d.scene()) && target(d.scene())[0] > 0.0
+        }),
+        story(Look(Way::Up), c(), "Ctrl-Up", |a, d| {
+            eye(a) == eye(d.scene()) && target(d.scene())[1] > 1.0
+        }),
+        story(Look(Way::Down), c(), "w Down", |a, d| {
+            eye(a) == eye(d.scene()) && target(d.scene())[1] < 1.0
+        }),
+        story(Roll(Way::Left), c(), "Alt-Left", |_, d| camera(d.scene()).up[0] != 0.0),
+        story(Roll(Way::Right), c(), "Alt-Right Alt-Left", |a, d| camera(a) == camera(d.scene())),
+        story(ViewAngle(Change::Down), c(), "Alt-Up", |_, d| {
+            camera(d.scene()).view_angle.key_degrees().1 < 40.0
+        }),
+        story(ViewAngle(Change::Up), c(), "Alt-Down", |_, d| {
+            camera(d.scene()).view_angle.key_degrees().1 > 40.0
+        }),
+        story(FlyMode, c(), "w", |_, d| d.model.mode == Mode::Fly),
+        story(Fly(Way::In), c(), "w w", |_, d| {
+            eye(d.scene())[2] < 5.0 && target(d.scene())[2] < 0.0
+        }),
+        story(Fly(Way::Out), c(), "w s", |_, d| eye(d.scene())[2] > 5.0),
+        story(Fly(Way::Left), c(), "w a", |_, d| eye(d.scene())[0] < 0.0),
+        story(Fly(Way::Right), c(), "w d", |_, d| eye(d.scene())[0] > 0.0),
+        story(Fly(Way::Up), c(), "w r", |_, d| eye(d.scene())[1] > 1.0),
+        story(Fly(Way::Down), c(), "w f", |_, d| eye(d.scene())[1] < 1.0),
+        story(Frame, BALL, "f", |_, d| {
+            target(d.scene()) == [0.0, 1.0, 0.0] && eye(d.scene())[2] < 3.0
+        }),
+        story(ResetCamera, c(), "Left Up Home", |a, d| camera(a) == camera(d.scene())),
+        story(StoreView, c(), "n Ctrl-u `door` Enter", |a, d| d.scene().views["door"] == a.camera),
+    ];
+    for n in 1..=9 {
+        stories.push(story(RecallView(n), c(), &n.to_string(), move |_, d| {
+            eye(d.scene())[0] == f64::from(n)
+        }));
+    }
+    stories
+}
+
+fn light_and_mirror_stories() -> Vec<Story> {
+    let c = || Subject::Camera;
+    vec![
+        story(NextLight, c(), "l", |_, d| d.model.selection == Subject::Light(0)),
+        story(Intensity(Change::Up, Pace::Coarse), c(), "'", |_, d| {
+            lamp(d.scene()).intensity > 1.05
+        }),
+        story(Intensity(Change::Down, Pace::Coarse), c(), ";", |_, d| {
+            lamp(d.scene()).intensity < 0.95
+        }),
+        story(Intensity(Change::Up, Pace::Fine), c(), "Alt-'", |_, d| {
+            (1.001..1.05).contains(&lamp(d.scene()).intensity)
+        }),
+        story(Intensity(Change::Down, Pace::Fine), c(), "Alt-;", |_, d| {
+            (0.95..0.999).contains(&lamp(d.scene()).intensity)
+        }),
+        story(SwitchLight, c(), "L", |_, d| !lamp(d.scene()).on),
+        story(AddLight, c(), "A Enter Enter", |_, d| {
+            d.scene().lights.len() == 2 && d.model.selection == Subject::Light(1)
+        }),
+        story(Roughness(Change::Up, Pace::Coarse), c(), "]", |_, d| {
+            mirror(d.scene()).roughness > 0.0525
+        }),
+        story(Roughness(Change::Down, Pace::Coarse), c(), ",", |_, d| {
+            mirror(d.scene()).roughness < 0.0475
+        }),
+        story(Roughness(Change::Up, Pace::Fine), c(), "}", |_, d| {
+            (0.0501..0.0525).contains(&mirror(d.scene()).roughness)
+        }),
+        story(Roughness(Change::Down, Pace::Fine), c(), "<", |_, d| {
+            (0.0475..0.0499).contains(&mirror(d.scene()).roughness)
+        }),
+        story(Reflection(Change::Up), c(), ")", |_, d| mirror(d.scene()).reflection > 0.5),
+        story(Reflection(Change::Down), c(), "(", |_, d| mirror(d.scene()).reflection < 0.5),
+        story(NextLobe, c(), "b", |_, d| mirror(d.scene()).lobe == Lobe::Square),
+    ]
+}
+
+fn object_stories() -> Vec<Story> {
+    let c = || Subject::Camera;
+    vec![
+        story(AddObject, c(), "a Enter Enter", |_, d| {
+            d.scene().objects.len() == 4 && d.model.selection == Subject::Object(3)
+        }),
+        story(Duplicate, BALL, "D", |_, d| {
+            d.scene().objects.len() == 4 && d.model.selection != BALL
+        }),
+        story(Delete, BALL, "x", |_, d| d.scene().objects.iter().all(|o| o.name != "ball")),
+        story(Rename, BALL, "e Ctrl-u `pearl` Enter", |_, d| d.scene().objects[1].name == "pearl"),
+        story(MoveMode, BALL, "m", |_, d| d.model.mode == Mode::Move),
+        story(Move(Way::Left, Pace::Coarse), BALL, "m Left", |_, d| ball(d.scene())[0] < 0.0),
+        story(Move(Way::Right, Pace::Coarse), BALL, "m Right", |_, d| ball(d.scene())[0] > 0.0),
+        story(Move(Way::In, Pace::Coarse), BALL, "m Up", |_, d| ball(d.scene())[2] < 0.0),
+        story(Move(Way::Out, Pace::Coarse), BALL, "m Down", |_, d| ball(d.scene())[2] > 0.0),
+        story(Move(Way::Up, Pace::Coarse), BALL, "m PageUp", |_, d| ball(d.scene())[1] > 1.0),
+        story(Move(Way::Down, Pace::Coarse), BALL, "m PageDown", |_, d| ball(d.scene())[1] < 1.0),
+        story(Move(Way::Left, Pace::Fine), BALL, "m Right Shift-Left", |_, d| {
+            ball(d.scene())[0] > 0.0
+        }),
+        story(Move(Way::Right, Pace::Fine), BALL, "m Left Shift-Right", |_, d| {
+            ball(d.scene())[0] < 0.0
+        }),
+        story(Move(Way::In, Pace::Fine), BALL, "m Down Shift-Up", |_, d| ball(d.scene())[2] > 0.0),
+        story(Move(Way::Out, Pace::Fine), BALL, "m Up Shift-Down", |_, d| ball(d.scene())[2] < 0.0),
+        story(Move(Way::Up, Pace::Fine), BALL, "m PageDown Shift-PageUp", |_, d| {
+            ball(d.scene())[1] < 1.0
+        }),
+        story(Move(Way::Down, Pace::Fine), BALL, "m PageUp Shift-PageDown", |_, d| {
+            ball(d.scene())[1] > 1.0
+        }),
+        story(TurnMode, GLASS, "r", |_, d| d.model.mode == Mode::Turn),
+        story(Turn(Way::Left, Pace::Coarse), GLASS, "r Left", |_, d| normal(d.scene())[0] < -0.2),
+        story(Turn(Way::Right, Pace::Coarse), GLASS, "r Right", |_, d| normal(d.scene())[0] > 0.2),
+        story(Turn(Way::Left, Pace::Fine), GLASS, "r Shift-Left", |_, d| {
+            (-0.02..-0.01).contains(&normal(d.scene())[0])
+        }),
+        story(Turn(Way::Right, Pace::Fine), GLASS, "r Shift-Right", |_, d| {
+            (0.01..0.02).contains(&normal(d.scene())[0])
+        }),
+        story(Drop, BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),
+        story(OwnMaterial, BALL, "M", |a, d| {
+            let own = &d.scene().objects[1].material;
+            own != "red" && d.scene().materials[own] == a.materials["red"]
+        }),
+    ]
+}
+
+fn panel_stories() -> Vec<Story> {
+    let c = || Subject::Camera;
+    vec![
+        story(NextPanel, c(), "Tab", |_, d| d.model.focus == Focus::Outline),
+        story(PreviousPanel, c(), "Shift-Tab", |_, d| d.model.focus == Focus::Inspector),
+        story(Leave, BALL, "m Esc", |_, d| d.model.mode == Mode::Orbit),
+        story(Open, BALL, "Enter", |_, d| d.model.focus == Focus::Inspector),
+        story(Cursor(Way::Down), c(), "Tab Down", |_, d| {
+            d.model.selection == Subject::View("v1".into())
+        }),
+        story(Cursor(Way::Up), c(), "Tab Down Down Up", |_, d| {
+            d.model.selection == Subject::View("v1".into())
+        }),
+        story(Page(Way::Down), c(), "Tab PageDown", |_, d| {
+            !matches!(d.model.selection, Subject::Camera | Subject::View(_))
+        }),
+        story(Page(Way::Up), Subject::Trace, "Tab PageUp", |_, d| {
+            !matches!(d.model.selection, Subject::Trace | Subject::Film)
+        }),
+        story(First, Subject::Trace, "Tab Home", |_, d| d.model.selection == Subject::Camera),
+        story(Last, c(), "Tab End", |_, d| d.model.selection == Subject::Trace),
+        story(Step(Change::Up, Pace::Coarse), c(), "Enter Right", |_, d| eye(d.scene())[0] > 0.05),
+        story(Step(Change::Down, Pace::Coarse), c(), "Enter Left", |_, d| {
+            eye(d.scene())[0] < -0.05
+        }),
+        story(Step(Change::Up, Pace::Fine), c(), "Enter Shift-Right", |_, d| {
+            (0.001..0.05).contains(&eye(d.scene())[0])
+        }),
+        story(Step(Change::Down, Pace::Fine), c(), "Enter Shift-Left", |_, d| {
+            (-0.05..-0.001).contains(&eye(d.scene())[0])
+        }),
+        story(ClearField, c(), "Enter `7` Enter Down Backspace", |_, d| {
+            eye(d.scene()) == [0.0, 1.0, 5.0]
+        }),
+        story(OnlyPicture, c(), "z", |_, d| {
+            d.model.only_picture && d.model.layout().unwrap().outline.is_none()
+        }),
+    ]
+}
+
+fn file_stories() -> Vec<Story> {
+    let c = || Subject::Camera;
+    vec![
+        story(Undo, c(), "Left u", |a, d| d.scene() == a && !d.model.is_unsaved()),
+        story(Redo, c(), "Left u U", |_, d| eye(d.scene())[0] < 0.0),
+        story(Save, c(), "Enter `7` Enter Ctrl-s", |_, d| {
+            d.disk[Path::new(FILE)] == room_with_views().replacen("eye = [0.0", "eye = [7.0", 1)
+                && !d.model.is_unsaved()
+        }),
+        story(SaveAs, c(), "W Ctrl-u `copy` Enter", |_, d| {
+            d.disk.contains_key(Path::new("copy.toml")) && d.model.file.name == "copy.toml"
+        }),
+        story(Reload, c(), "Ctrl-o", |_, d| d.asked(|e| *e == Effect::Load)),
+        story(Quit, c(), "q", |_, d| d.asked(|e| *e == Effect::Quit)),
+    ]
+}
+
+fn picture_stories() -> Vec<Story> {
+    let c = || Subject::Camera;
+    let probe = |d: &Desk| d.model.probe.unwrap();
+    vec![
+        story(ExportPng, c(), "p", |_, d| {
+            d.asked(|e| *e == Effect::Export(Format::Png))
+                && d.notice().contains("room-1.png  64x48  16 spp  noise 2.50")
+        }),
+        story(ExportExr, c(), "P", |_, d| d.asked(|e| *e == Effect::Export(Format::Exr))),
+        story(ExportSized, c(), "Ctrl-e Ctrl-u `320x240 exr` Enter", |_, d| {
+            d.asked(|e| matches!(e, Effect::ExportSized { scene, format: Format::Exr, .. } if scene.film.size == [320, 240])) && d.scene().film.size == [64, 48]
+        }),
+        story(CancelExport, c(), "Ctrl-e Enter Ctrl-x", |_, d| {
+            d.asked(|e| *e == Effect::CancelExport) && d.model.export.is_none()
+        }),
+        story(Exposure(Change::Up), c(), "=", |_, d| d.model.display.exposure_ev == 0.25),
+        story(Exposure(Change::Down), c(), "-", |_, d| d.model.display.exposure_ev == -0.25),
+        story(ResetExposure, c(), "= = 0", |_, d| d.model.display.exposure_ev == 0.0),
+        story(NextTone, c(), "t", |_, d| {
+            d.model.display.tone == Tone::Neutral && d.asked(|e| matches!(e, Effect::Display(_)))
+        }),
+        story(NextChannel, c(), "v", |_, d| d.model.channel == Channel::Noise),
+        story(PreviousChannel, c(), "V", |_, d| d.model.channel == Channel::Depth),
+        story(Probe, c(), "i", |_, d| {
+            d.asked(|e| *e == Effect::Probe(Some([32, 24]))) && d.model.mode == Mode::Probe
+        }),
+        story(MoveProbe(Way::Left, Pace::Coarse), c(), "i Left", move |_, d| probe(d)[0] < 32),
+        story(MoveProbe(Way::Right, Pace::Coarse), c(), "i Right", move |_, d| probe(d)[0] > 32),
+        story(MoveProbe(Way::Up, Pace::Coarse), c(), "i Up", move |_, d| probe(d)[1] < 24),
+        story(MoveProbe(Way::Down, Pace::Coarse), c(), "i Down", move |_, d| probe(d)[1] > 24),
+        story(MoveProbe(Way::Left, Pace::Fine), c(), "i Shift-Left", move |_, d| {
+            probe(d) == [31, 24]
+        }),
+        story(MoveProbe(Way::Right, Pace::Fine), c(), "i Shift-Right", move |_, d| {
+            probe(d) == [33, 24]
+        }),
+        story(MoveProbe(Way::Up, Pace::Fine), c(), "i Shift-Up", move |_, d| probe(d) == [32, 23]),
+        story(MoveProbe(Way::Down, Pace::Fine), c(), "i Shift-Down", move |_, d| {
+            probe(d) == [32, 25]
+        }),
+        story(Keep, c(), "k", |_, d| d.model.comparison.kept.is_some()),
+        story(Flip, c(), "k c", |_, d| d.model.comparison.shown == Compared::Kept),
+        story(Difference, c(), "k C", |_, d| d.model.comparison.shown == Compared::Difference),
+        story(Pause, c(), "Space", |_, d| d.model.paused && d.asked(|e| *e == Effect::Pause(true))),
+        story(Restart, c(), "R", |_, d| d.asked(|e| *e == Effect::Restart)),
+        story(StopAt, c(), "T Ctrl-u `spp 100, time 5` Enter", |_, d| {
+            d.model.stop.spp == Some(100)
+                && d.model.stop.seconds == Some(5.0)
+                && d.model.stop.noise_codes.is_none()
+        }),
+        story(Threads(Change::Up), c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(3))),
+        story(Threads(Change::Down), c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(1))),
+        story(Priority, c(), ":", |_, d| d.asked(|e| *e == Effect::LowPriority(true))),
+        story(NextColors, c(), ":", |_, d| d.model.colors == Colors::Indexed),
+        story(Help, c(), "?", |_, d| matches!(d.model.overlay, Some(Overlay::Help { .. }))),
+        story(Palette, c(), ":", |_, d| matches!(d.model.overlay, Some(Overlay::Palette(_)))),
+        story(Inventory, c(), ":", |_, d| {
+            matches!(d.model.overlay, Some(Overlay::Inventory { .. }))
+        }),
+    ]
+}
+
+fn stories() -> Vec<Story> {
+    let chapters = [
+        camera_stories(),
+        light_and_mirror_stories(),
+        object_stories(),
+        panel_stories(),
+        file_stories(),
+        picture_stories(),
+    ];
+    chapters.into_iter().flatten().collect()
+}
+
+#[test]
+fn every_action_does_what_its_story_says() {
+    let mut told = HashSet::new();
+    let mut wrong = Vec::new();
+    for Story { action, select, keys, expect } in stories() {
+        let row = Row::of(action).unwrap();
+        let mut desk = Desk::new(&room_with_views());
+        desk.select(select);
+        let before = desk.scene().clone();
+        match keys.as_str() {
+            ":" if action != Palette => drop(desk.palette(row.label)),
+            keys => drop(desk.keys(keys)),
+        }
+        if !desk.fired.contains(&action) {
+            wrong.push(format!("{}: {keys} does not fire it", row.label));
+        }
+        if !expect(&before, &desk) {
+            let notice = desk.notice();
+            wrong.push(format!(
+                "{}: after {keys}: {notice:?} {:?}",
+                row.label,
+                desk.scene().camera
+            ));
+        }
+        assert!(desk.scene().faults().is_empty(), "{}", row.label);
+        desk.undo_all();
+        assert_eq!(desk.text(), room_with_views(), "{}: undone", row.label);
+        told.insert(action);
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    for row in KEYMAP {
+        assert!(told.contains(&row.action), "{} has no story", row.label);
+    }
+}
+
+/// Whatever has a key can be found by its name too, and then does the same.
+#[test]
+fn the_palette_finds_every_action_by_its_label() {
+    for row in KEYMAP {
+        let mut desk = Desk::new(&room_with_views());
+        desk.select(BALL);
+        desk.palette(row.label);
+        assert!(desk.fired.contains(&row.action), "{}", row.label);
+        assert!(desk.scene().faults().is_empty(), "{}", row.label);
+    }
+}

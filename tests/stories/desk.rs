@@ -1,0 +1,292 @@
+//! A dashboard without a terminal, a renderer or a disk: keys go in by name, what would be asked of
+//! the outside is answered at once by a make-believe one.
+
+use std::collections::{BTreeMap, HashSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+use zerkalo::dashboard::action::Action;
+use zerkalo::dashboard::input::{Button, Code, Key, Mouse, MouseKind};
+use zerkalo::dashboard::keymap::{KEYMAP, lookup};
+use zerkalo::dashboard::message::{Effect, Exported, Message};
+use zerkalo::dashboard::model::{Colors, Model, Start};
+use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::dashboard::update::{begin, update};
+use zerkalo::film::{Film, Header, Mix};
+use zerkalo::render::schedule::Stop;
+use zerkalo::scene::edit::Subject;
+use zerkalo::scene::{Document, SaveError, Scene};
+
+/// The file of the scene.
+pub const FILE: &str = "room.toml";
+
+/// A room with one of each.
+pub const ROOM: &str = r#"# A room.
+[film]
+size = [64, 48]
+
+[camera]
+eye = [0.0, 1.0, 5.0]   # at the door
+target = [0.0, 1.0, 0.0]
+view_angle.vertical = 40.0
+
+[ambient]
+color = [0.1, 0.1, 0.1]
+
+[[light]]
+name = "lamp"
+point = { position = [2.0, 4.0, 3.0] }
+intensity = 1.0
+
+[materials.red]
+color = [0.8, 0.1, 0.1] # like a brick
+
+[materials.mirror]
+reflection = 0.5
+roughness = 0.05
+
+[[object]]
+name = "floor"
+material = "red"
+shape.platform = { center = [0.0, 0.0, 0.0], size = [6.0, 6.0] }
+
+[[object]]
+name = "ball"
+material = "red"
+shape.sphere = { center = [0.0, 1.0, 0.0], radius = 0.5 }
+
+[[object]]
+name = "glass"
+material = "mirror"
+shape.rectangle = { center = [0.0, 1.0, -2.0], size = [3.0, 2.0], normal = [0.0, 0.0, 1.0] }
+"#;
+
+/// The dashboard and its make-believe outside.
+pub struct Desk {
+    pub model: Model,
+    pub now: Duration,
+    /// What was asked for since the last look.
+    pub effects: Vec<Effect>,
+    /// Files and their texts.
+    pub disk: BTreeMap<PathBuf, String>,
+    /// Every action that a key or the palette has fired.
+    pub fired: HashSet<Action>,
+    pub document: Document,
+    begun_with: Document,
+    /// Whether reading the file is answered: it begins another history of edits.
+    pub reads: bool,
+}
+
+fn parse(text: &str) -> Document {
+    Document::parse(text.to_string(), FILE).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+impl Desk {
+    /// Opened on a file with this text.
+    pub fn new(text: &str) -> Self {
+        let document = parse(text);
+        let scene = Arc::new(document.scene().clone());
+        let model = Model::new(Start {
+            path: Some(FILE.into()),
+            name: FILE.into(),
+            scene: Ok(scene),
+            screen: [120, 36],
+            colors: Colors::True,
+            stop: Stop { noise_codes: Some(0.5), ..Stop::default() },
+            threads: 2,
+            most_threads: 4,
+        });
+        let disk = [(PathBuf::from(FILE), text.to_string())].into();
+        let (effects, fired) = (Vec::new(), HashSet::new());
+        let begun_with = document.clone();
+        let mut desk = Self {
+            model,
+            now: Duration::ZERO,
+            effects,
+            disk,
+            fired,
+            document,
+            begun_with,
+            reads: true,
+        };
+        desk.effects = begin(&mut desk.model);
+        desk
+    }
+
+    /// What the file would be if it were saved now.
+    pub fn text(&self) -> String {
+        let mut document = self.document.clone();
+        document.apply(self.model.history.scene());
+        document.text().to_string()
+    }
+
+    /// The file as it was when the desk was opened.
+    pub fn original(&self) -> Document {
+        self.begun_with.clone()
+    }
+
+    pub fn scene(&self) -> &Scene {
+        self.model.scene()
+    }
+
+    pub fn select(&mut self, subject: Subject) {
+        assert!(subject.exists(self.scene()), "{subject:?}");
+        self.model.selection = subject;
+    }
+
+    /// Takes in a message and lets the outside answer.
+    pub fn send(&mut self, message: Message) {
+        let effects = update(&mut self.model, message, self.now);
+        for effect in effects {
+            self.effects.push(effect.clone());
+            if let Some(answer) = self.answers(effect) {
+                self.send(answer);
+            }
+        }
+    }
+
+    fn answers(&mut self, effect: Effect) -> Option<Message> {
+        Some(match effect {
+            Effect::Save { scene, path, overwrite } => {
+                let own = path.is_none();
+                let path = path.unwrap_or_else(|| FILE.into());
+                let result = if self.disk.contains_key(&path) && !own && !overwrite {
+                    Err(SaveError::Exists(path))
+                } else {
+                    self.document.apply(&scene);
+                    self.disk.insert(path.clone(), self.document.text().to_string());
+                    Ok(path)
+                };
+                Message::Saved(scene, result)
+            }
+            Effect::Load if self.reads => {
+                let text = self.disk.get(Path::new(FILE)).cloned().unwrap_or_default();
+                let read = Document::parse(text, FILE);
+                if let Ok(document) = &read {
+                    self.document = document.clone();
+                }
+                Message::Loaded(Box::new(read.map(|d| Arc::new(d.scene().clone()))))
+            }
+            Effect::Export(format) => Message::Exported(Ok(Exported {
+                path: format!("room-1.{}", format.extension()).into(),
+                size: [64, 48],
+                spp: 16.0,
+                noise_codes: Some(2.5),
+                scp: "me@here:room-1.png".into(),
+            })),
+            Effect::Keep => {
+                let header = Header {
+                    width: 64,
+                    height: 48,
+                    scales: vec![1.0],
+                    seed: 0,
+                    precision: "f32".into(),
+                };
+                let mix = Mix { weights: vec![[1.0; 3]] };
+                Message::Kept(Arc::new(Film::new(header).linear(&mix)), 16.0)
+            }
+            _ => return None,
+        })
+    }
+
+    /// A key by its event. A tenth of a second passes before it.
+    pub fn key(&mut self, key: Key) {
+        self.now += Duration::from_millis(100);
+        self.fired.extend(self.would_fire(key));
+        self.send(Message::Key(key));
+    }
+
+    /// What a key fires as things stand.
+    fn would_fire(&self, key: Key) -> Vec<Action> {
+        if self.model.editor().is_some_and(|editor| editor.clone().key(key)) {
+            return Vec::new();
+        }
+        let types = matches!(key, Key { code: Code::Char(_), ctrl: false, alt: false, .. });
+        if types && self.model.overlay.is_some() {
+            return Vec::new();
+        }
+        let mut fired: Vec<_> = lookup(self.model.context(), key).into_iter().collect();
+        if let (Some(Overlay::Palette(palette)), Some(Action::Open)) =
+            (&self.model.overlay, fired.first())
+        {
+            fired.extend(palette.found.get(palette.cursor).map(|at| KEYMAP[*at].action));
+        }
+        fired
+    }
+
+    /// Keys by their names; what stands between backquotes is typed letter by letter.
+    pub fn keys(&mut self, keys: &str) -> &mut Self {
+        for (i, part) in keys.split('`').enumerate() {
+            if i % 2 == 1 {
+                let plain = |c| Key { code: Code::Char(c), ctrl: false, alt: false, shift: false };
+                part.chars().for_each(|c| self.key(plain(c)));
+            } else {
+                for name in part.split_whitespace() {
+                    self.key(name.parse().unwrap_or_else(|e| panic!("{e}")));
+                }
+            }
+        }
+        self
+    }
+
+    /// Finds a row of the table in the palette by its label and fires it.
+    pub fn palette(&mut self, label: &str) -> &mut Self {
+        self.keys(": ").keys(&format!("`{label}`"));
+        let at = KEYMAP.iter().position(|row| row.label == label);
+        let Some(Overlay::Palette(palette)) = &self.model.overlay else { panic!("no palette") };
+        let downs = palette.found.iter().position(|found| Some(*found) == at);
+        let downs = downs.unwrap_or_else(|| panic!("{label} is not found by its own name"));
+        assert!(downs < 10, "{label} is {downs} lines down");
+        for _ in 0..downs {
+            self.keys("Down");
+        }
+        self.keys("Enter")
+    }
+
+    pub fn mouse(&mut self, kind: MouseKind, column: u16, row: u16) -> &mut Self {
+        self.now += Duration::from_millis(20);
+        self.send(Message::Mouse(Mouse { kind, column, row, modified: false }));
+        self
+    }
+
+    pub fn click(&mut self, column: u16, row: u16) -> &mut Self {
+        self.mouse(MouseKind::Press(Button::Left), column, row);
+        self.mouse(MouseKind::Release(Button::Left), column, row)
+    }
+
+    /// Presses, moves in steps of one cell, releases.
+    pub fn drag(&mut self, button: Button, from: [u16; 2], by: [i16; 2]) -> &mut Self {
+        self.mouse(MouseKind::Press(button), from[0], from[1]);
+        let steps = by[0].abs().max(by[1].abs()).max(1);
+        let at = |i: i16| {
+            let along = |c: usize| from[c].saturating_add_signed(by[c] * i / steps);
+            [along(0), along(1)]
+        };
+        for i in 1..=steps {
+            let [column, row] = at(i);
+            self.mouse(MouseKind::Drag(button), column, row);
+        }
+        let [column, row] = at(steps);
+        self.mouse(MouseKind::Release(button), column, row)
+    }
+
+    /// Undoes everything.
+    pub fn undo_all(&mut self) {
+        while self.model.history.undo_label().is_some() {
+            assert!(self.model.history.undo().is_some());
+        }
+    }
+
+    pub fn asked(&self, what: impl Fn(&Effect) -> bool) -> bool {
+        self.effects.iter().any(what)
+    }
+
+    /// The notice, or nothing.
+    pub fn notice(&self) -> &str {
+        self.model.notice.as_ref().map_or("", |notice| &notice.text)
+    }
+
+    pub fn problem(&self) -> Option<&str> {
+        self.model.editor()?.problem.as_deref()
+    }
+}

@@ -1,0 +1,251 @@
+//! Stories of typing, forms, gestures and refusals.
+
+use crate::desk::{Desk, ROOM};
+use std::time::Duration;
+use zerkalo::dashboard::layout::Focus;
+use zerkalo::dashboard::message::{Effect, Message};
+use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::scene::edit::Subject;
+use zerkalo::shape::Shape;
+
+const BALL: Subject = Subject::Object(1);
+
+fn desk(subject: Subject, keys: &str) -> Desk {
+    let mut desk = Desk::new(ROOM);
+    desk.select(subject);
+    desk.keys(keys);
+    desk
+}
+
+fn radius(desk: &Desk) -> f64 {
+    match &desk.scene().objects[1].shape {
+        Shape::Sphere(sphere) => sphere.radius,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The inspector of the ball with the cursor on the radius.
+fn at_radius() -> Desk {
+    let desk = desk(BALL, "Enter Down Down Down Down Down Down");
+    let lines = desk.model.field_lines();
+    assert_eq!(lines[desk.model.inspector.cursor].field().unwrap().label, "radius");
+    desk
+}
+
+#[test]
+fn typed_numbers_arrive_in_the_file() {
+    let mut desk = at_radius();
+    desk.keys("`0.75` Enter");
+    assert_eq!(radius(&desk), 0.75);
+    assert_eq!(desk.text(), ROOM.replace("radius = 0.5", "radius = 0.75"));
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM);
+}
+
+#[test]
+fn what_is_wrong_is_refused_where_it_is_typed() {
+    for (typed, words) in [
+        ("-1", "radius is -1"),
+        ("1e12", "radius is 1e12"),
+        ("5 5", "needs 1 number"),
+        ("one", "cannot be"),
+        ("nan", "cannot be"),
+        ("#ff0000", "cannot be"),
+    ] {
+        let mut desk = at_radius();
+        desk.keys(&format!("Enter Ctrl-u `{typed}` Enter"));
+        let problem = desk.problem().unwrap_or_default().to_string();
+        assert!(problem.contains(words), "{typed}: {problem}");
+        assert_eq!(desk.text(), ROOM, "{typed}: the scene stays");
+        // The reason goes with the next letter, the old value comes back with Esc.
+        desk.keys("Backspace");
+        assert_eq!(desk.problem(), None);
+        desk.keys("Esc");
+        assert!(desk.model.editor().is_none());
+        assert_eq!((desk.text().as_str(), desk.model.focus), (ROOM, Focus::Inspector));
+    }
+    let mut desk = at_radius();
+    desk.keys("Backspace");
+    assert!(desk.notice().contains("must not be left out"), "{}", desk.notice());
+}
+
+#[test]
+fn a_value_being_typed_is_applied_before_anything_else_is_done() {
+    let mut desk = at_radius();
+    desk.keys("`0.25` Up");
+    assert_eq!(radius(&desk), 0.25);
+    let mut desk = at_radius();
+    desk.keys("`0.25` Tab");
+    assert_eq!((radius(&desk), desk.model.focus), (0.25, Focus::Picture));
+    let mut desk = at_radius();
+    desk.keys("`-3` Ctrl-s");
+    assert!(desk.problem().is_some() && !desk.asked(|e| matches!(e, Effect::Save { .. })));
+}
+
+#[test]
+fn a_whole_vector_or_colour_can_be_typed_into_any_of_its_lines() {
+    let mut desk = desk(BALL, "Enter Down Down Down `1, 2 -3` Enter");
+    let Shape::Sphere(sphere) = &desk.scene().objects[1].shape else { panic!() };
+    assert_eq!(sphere.center, [1.0, 2.0, -3.0]);
+    desk.select(Subject::Material("red".into()));
+    desk.keys("Home Down Down `#ffffff` Enter");
+    assert_eq!(desk.scene().materials["red"].color.0, [1.0; 3]);
+}
+
+#[test]
+fn words_are_chosen_from_a_list_or_stepped() {
+    let mut desk = desk(BALL, "Enter Down Enter");
+    assert!(
+        matches!(&desk.model.overlay, Some(Overlay::Pick(pick)) if pick.entries[0].0 == "mirror")
+    );
+    desk.keys("m Enter");
+    assert_eq!(desk.scene().objects[1].material, "mirror");
+    desk.keys("u Right");
+    assert_ne!(desk.scene().objects[1].material, "red");
+    desk.select(Subject::Light(0));
+    desk.keys("End Enter");
+    assert!(!desk.scene().lights[0].on, "Enter switches a switch");
+}
+
+#[test]
+fn a_form_shows_what_it_makes_and_is_taken_as_a_whole() {
+    let mut desk = desk(Subject::Camera, "a Enter");
+    assert_eq!(desk.scene().objects.len(), 4, "it is seen while the form is open");
+    assert!(matches!(desk.effects.last(), Some(Effect::Show(s)) if s.objects.len() == 4));
+    assert_eq!(desk.text(), ROOM, "but not there yet");
+    // Name, material, shape, center x y z, radius.
+    desk.keys("`pearl` Enter Down Down Down Down Down `0.2` Enter");
+    let Some(Overlay::Form(form)) = &desk.model.overlay else { panic!("the form has closed") };
+    assert_eq!(form.scene.objects[3].name, "pearl");
+    desk.keys("Enter");
+    assert!(desk.model.overlay.is_none());
+    let Shape::Sphere(sphere) = &desk.scene().objects[3].shape else { panic!() };
+    assert_eq!((sphere.radius, desk.scene().materials.len()), (0.2, 3));
+    assert_eq!(desk.model.selection, Subject::Object(3));
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM, "one step");
+}
+
+#[test]
+fn a_form_is_cancelled_as_a_whole() {
+    for kind in 0..8 {
+        for keys in ["Esc", "Down Right Right Esc", "`x` Esc Esc", "`-1` Enter Esc Esc"] {
+            let downs = "Down ".repeat(kind);
+            let mut desk = desk(BALL, &format!("a {downs} Enter {keys}"));
+            assert!(desk.model.overlay.is_none(), "kind {kind}: {keys}");
+            assert_eq!(desk.text(), ROOM);
+            assert!(matches!(desk.effects.last(), Some(Effect::Show(s)) if s.objects.len() == 3));
+            assert_eq!(desk.model.selection, BALL);
+            desk.keys("u");
+            assert!(desk.notice().contains("nothing to undo"));
+        }
+    }
+}
+
+#[test]
+fn a_form_shares_a_material_and_leaves_no_other_behind() {
+    let mut desk = desk(Subject::Camera, "a Enter Down");
+    for _ in 0..3 {
+        desk.keys("Right");
+        if desk.scene().objects[3].material == "red" {
+            break;
+        }
+    }
+    desk.keys("Enter");
+    assert_eq!(desk.scene().objects[3].material, "red");
+    assert_eq!(desk.scene().materials.len(), 2, "its own colour is not used");
+}
+
+#[test]
+fn a_wrong_value_in_a_form_stays_in_the_form() {
+    let mut desk = desk(Subject::Camera, "a Enter End Home `ball` Enter");
+    assert!(desk.problem().is_some_and(|p| p.contains("same name")), "{:?}", desk.problem());
+    desk.keys("Backspace `2` Enter Enter");
+    assert_eq!(desk.scene().objects[3].name, "bal2");
+}
+
+#[test]
+fn a_held_key_is_one_step_and_a_pause_ends_it() {
+    let mut desk = desk(Subject::Camera, "] ] ] ] ]");
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM);
+    desk.keys("] ]");
+    desk.now += Duration::from_secs(1);
+    desk.keys("]").keys("u");
+    assert_ne!(desk.text(), ROOM, "the first two");
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM);
+    desk.keys("Left Up PageUp u");
+    assert_eq!(desk.text(), ROOM, "camera moves that follow each other");
+}
+
+#[test]
+fn a_mode_is_one_step_however_long_it_takes() {
+    let mut desk = desk(BALL, "m Right");
+    desk.now += Duration::from_secs(100);
+    desk.keys("Up PageUp Esc");
+    assert_ne!(desk.text(), ROOM);
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM);
+    let mut desk = self::desk(Subject::Film, "m");
+    assert!(desk.notice().contains("cannot be moved"), "{}", desk.notice());
+    desk.keys("Left");
+    assert!(desk.scene().camera.eye[0] < 0.0, "the keys still move the camera");
+}
+
+#[test]
+fn pasted_text_never_fires_shortcuts() {
+    let mut desk = desk(BALL, "");
+    desk.send(Message::Paste("xxq\nDDD".into()));
+    assert_eq!(desk.text(), ROOM);
+    assert!(desk.notice().contains("fields"));
+    let mut desk = at_radius();
+    desk.keys("Enter Ctrl-u");
+    desk.send(Message::Paste("0.125\nx q".into()));
+    desk.keys("Enter");
+    assert_eq!(radius(&desk), 0.125);
+}
+
+#[test]
+fn prompts_say_what_is_wrong_and_stay_open() {
+    for (keys, words) in [
+        ("e Ctrl-u `floor` Enter", "same name"),
+        ("T Ctrl-u `spp 0` Enter", "at least 1"),
+        ("T Ctrl-u Enter", "Type one"),
+        ("Ctrl-e Ctrl-u `10` Enter", "needs 2 numbers"),
+        ("Ctrl-e Ctrl-u `99999x99999` Enter", "size"),
+        ("Ctrl-e Ctrl-u `10x10 jpg` Enter", "neither png nor exr"),
+        ("n Ctrl-u Enter", "needs a name"),
+        ("W Ctrl-u Enter", "needs a name"),
+    ] {
+        let mut desk = desk(BALL, keys);
+        assert!(desk.problem().is_some_and(|p| p.contains(words)), "{keys}: {:?}", desk.problem());
+        desk.keys("Esc");
+        assert!(desk.model.overlay.is_none());
+        assert_eq!(desk.text(), ROOM);
+    }
+}
+
+#[test]
+fn strength_of_light_is_told_and_keeps_its_subject() {
+    let mut desk = desk(Subject::Ambient, "' '");
+    assert!(desk.scene().ambient.color.0[0] > 0.1 && desk.scene().lights[0].intensity == 1.0);
+    assert!(desk.notice().starts_with("ambient: "), "{}", desk.notice());
+    assert_eq!(desk.model.selection, Subject::Ambient);
+    desk.keys("L");
+    assert!(desk.notice().contains("no switch"));
+}
+
+#[test]
+fn every_size_of_terminal_can_be_worked_in() {
+    for screen in [[200, 60], [120, 36], [80, 24], [40, 12], [39, 11], [1, 1], [0, 0]] {
+        let mut desk = desk(BALL, "");
+        desk.send(Message::Resize(screen));
+        desk.keys("Tab Down End Home Tab Down Right Enter Esc Esc a Down Enter Down Right Enter");
+        desk.keys("? PageDown End Esc : `undo` Enter q Esc v k c i Left Esc u u u");
+        for x in 0..screen[0].min(50) {
+            desk.click(x, x / 2);
+        }
+        assert!(desk.scene().faults().is_empty());
+    }
+}

@@ -1,0 +1,187 @@
+//! Stories of files: saving, other writers, errors in the file, leaving.
+
+use crate::desk::{Desk, FILE, ROOM};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+use zerkalo::dashboard::message::{Effect, Message};
+use zerkalo::dashboard::model::{Colors, Model, Start};
+use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::dashboard::update::{begin, update};
+use zerkalo::render::schedule::Stop;
+use zerkalo::scene::edit::Subject;
+use zerkalo::scene::{SaveError, Scene, built_in};
+
+fn start(path: Option<&str>, text: &str) -> Model {
+    Model::new(Start {
+        path: path.map(PathBuf::from),
+        name: "mirror-room.toml".into(),
+        scene: Scene::parse(text, FILE).map(Arc::new),
+        screen: [80, 24],
+        colors: Colors::True,
+        stop: Stop::default(),
+        threads: 1,
+        most_threads: 1,
+    })
+}
+
+fn press(model: &mut Model, keys: &str) -> Vec<Effect> {
+    let press = |key: &str| update(model, Message::Key(key.parse().unwrap()), Duration::ZERO);
+    keys.split_whitespace().flat_map(press).collect()
+}
+
+#[test]
+fn quitting_with_unsaved_edits_asks() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("Left q");
+    assert!(matches!(desk.model.overlay, Some(Overlay::Question(_))));
+    desk.keys("Ctrl-c Esc");
+    assert!(!desk.asked(|e| *e == Effect::Quit) && desk.model.overlay.is_none());
+    desk.keys("q `c`");
+    assert!(!desk.asked(|e| *e == Effect::Quit));
+    desk.keys("q `s`");
+    assert!(desk.asked(|e| *e == Effect::Quit));
+    assert_ne!(desk.disk[Path::new(FILE)], ROOM);
+    let mut desk = Desk::new(ROOM);
+    desk.keys("Left q `d`");
+    assert!(desk.asked(|e| *e == Effect::Quit));
+    assert_eq!(desk.disk[Path::new(FILE)], ROOM);
+    let mut desk = Desk::new(ROOM);
+    desk.keys("Left u q");
+    assert!(desk.asked(|e| *e == Effect::Quit), "nothing is left to save");
+}
+
+#[test]
+fn save_as_never_overwrites_unasked() {
+    let mut desk = Desk::new(ROOM);
+    desk.disk.insert("other.toml".into(), "precious".into());
+    desk.keys("Left W Ctrl-u `other.toml` Enter");
+    assert_eq!(desk.disk[Path::new("other.toml")], "precious");
+    assert!(
+        matches!(&desk.model.overlay, Some(Overlay::Question(q)) if q.text.contains("other.toml"))
+    );
+    desk.keys("Esc");
+    assert!(desk.model.is_unsaved());
+    desk.keys("W Ctrl-u `other.toml` Enter `o`");
+    assert_eq!(desk.disk[Path::new("other.toml")], desk.text());
+    assert!(!desk.model.is_unsaved());
+}
+
+#[test]
+fn a_scene_without_a_file_is_asked_for_one_and_then_left() {
+    let mut model = start(None, ROOM);
+    begin(&mut model);
+    press(&mut model, "Left q s");
+    assert!(matches!(model.overlay, Some(Overlay::Prompt(_))));
+    let effects = press(&mut model, "Enter");
+    let Some(Effect::Save { scene, path, overwrite: false }) = effects.first() else {
+        panic!("{effects:?}")
+    };
+    assert_eq!(path.as_deref(), Some(Path::new("mirror-room.toml")));
+    let saved = Message::Saved(Arc::clone(scene), Ok("mirror-room.toml".into()));
+    assert_eq!(update(&mut model, saved, Duration::ZERO).last(), Some(&Effect::Quit));
+}
+
+#[test]
+fn an_edit_made_while_the_file_was_written_stays_unsaved() {
+    let mut model = start(Some(FILE), ROOM);
+    let effects = press(&mut model, "Left Ctrl-s Left");
+    let save = effects.into_iter().find_map(|e| match e {
+        Effect::Save { scene, .. } => Some(scene),
+        _ => None,
+    });
+    update(&mut model, Message::Saved(save.unwrap(), Ok(FILE.into())), Duration::ZERO);
+    assert!(model.is_unsaved());
+}
+
+#[test]
+fn somebody_elses_version_is_asked_about() {
+    let mut model = start(Some(FILE), ROOM);
+    press(&mut model, "Left Ctrl-s");
+    let scene = Arc::clone(model.history.scene());
+    let changed = Message::Saved(scene, Err(SaveError::Changed(FILE.into())));
+    update(&mut model, changed, Duration::ZERO);
+    let Some(Overlay::Question(question)) = &model.overlay else { panic!() };
+    assert!(question.text.contains("changed by another program"), "{}", question.text);
+    assert!(press(&mut model, "Enter").is_empty(), "Enter alone does no harm");
+    assert!(model.is_unsaved());
+    let failed = SaveError::Failed { path: FILE.into(), what: "the disk is full".into() };
+    let scene = Arc::clone(model.history.scene());
+    update(&mut model, Message::Saved(scene, Err(failed)), Duration::ZERO);
+    assert!(model.notice.as_ref().is_some_and(|n| n.text.contains("the disk is full")));
+}
+
+#[test]
+fn a_changed_file_is_read_at_once_unless_edits_would_be_lost() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Subject::Object(1));
+    let other = ROOM.replace("radius = 0.5", "radius = 0.25");
+    desk.disk.insert(FILE.into(), other.clone());
+    desk.send(Message::ChangedOnDisk);
+    assert_eq!(desk.text(), other);
+    assert_eq!(desk.model.selection, Subject::Object(1), "found again by its name");
+    desk.keys("Left");
+    desk.disk.insert(FILE.into(), ROOM.into());
+    desk.send(Message::ChangedOnDisk);
+    desk.keys("Enter");
+    assert!(desk.text().contains("0.25") && desk.model.is_unsaved(), "mine are kept");
+    desk.send(Message::ChangedOnDisk);
+    desk.keys("`r`");
+    assert_eq!((desk.text().as_str(), desk.model.is_unsaved()), (ROOM, false));
+    // Who is filling in a form is not interrupted.
+    desk.keys("a Enter");
+    desk.send(Message::ChangedOnDisk);
+    assert!(matches!(desk.model.overlay, Some(Overlay::Form(_))));
+    assert!(desk.notice().contains("Ctrl-o"));
+}
+
+#[test]
+fn a_broken_file_is_told_and_work_begins_when_it_is_mended() {
+    let broken = ROOM.replace("radius = 0.5", "radius = -1");
+    let mut model = start(Some(FILE), &broken);
+    let begun = begin(&mut model);
+    assert!(begun.iter().all(|e| !matches!(e, Effect::Show(_))), "{begun:?}");
+    assert!(model.file.blank);
+    let told = model.file.broken.as_ref().unwrap().to_string();
+    assert!(told.contains("room.toml:33") && told.contains("radius is -1"), "{told}");
+    let effects = press(&mut model, "Left a ] x m Ctrl-s Enter Tab Down Right p");
+    assert!(effects.is_empty(), "{effects:?}");
+    assert!(model.notice.as_ref().unwrap().text.contains("mend"));
+    assert_eq!(press(&mut model, "Ctrl-o"), [Effect::Load]);
+    let scene = Arc::new(Scene::parse(ROOM, FILE).unwrap());
+    let loaded = Message::Loaded(Box::new(Ok(Arc::clone(&scene))));
+    let effects = update(&mut model, loaded, Duration::ZERO);
+    assert!(effects.contains(&Effect::Show(scene)));
+    assert!(!model.file.blank && model.file.broken.is_none() && !model.is_unsaved());
+    assert!(!press(&mut model, "Left").is_empty());
+    let mut model = start(Some(FILE), &broken);
+    begin(&mut model);
+    assert_eq!(press(&mut model, "q"), [Effect::Quit]);
+}
+
+#[test]
+fn an_error_in_a_changed_file_leaves_the_scene() {
+    let mut desk = Desk::new(ROOM);
+    desk.disk.insert(FILE.into(), ROOM.replace("[film]", "[flim]"));
+    desk.send(Message::ChangedOnDisk);
+    assert!(desk.notice().contains("room.toml:2") && desk.notice().contains("flim"));
+    assert_eq!(desk.text(), ROOM);
+    desk.keys("Left Ctrl-s");
+    assert!(matches!(desk.model.overlay, Some(Overlay::Question(_))), "not over it unasked");
+    desk.keys("Esc u");
+    desk.disk.insert(FILE.into(), ROOM.into());
+    desk.send(Message::ChangedOnDisk);
+    assert!(desk.model.file.broken.is_none());
+}
+
+#[test]
+fn the_built_in_scene_is_ready_at_once() {
+    let text = zerkalo::scene::BUILT_IN;
+    let mut model = start(None, text);
+    let effects = begin(&mut model);
+    assert!(effects.contains(&Effect::Show(Arc::new(built_in()))));
+    let raster = model.layout().unwrap().raster;
+    assert!(effects.contains(&Effect::Raster(raster)), "{effects:?}");
+    let effects = update(&mut model, Message::Resize([120, 36]), Duration::ZERO);
+    assert!(matches!(effects[..], [Effect::Raster(new)] if new != raster));
+}

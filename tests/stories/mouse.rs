@@ -1,0 +1,149 @@
+//! Stories with the mouse.
+
+use crate::desk::{Desk, ROOM};
+use zerkalo::dashboard::input::{Button, MouseKind};
+use zerkalo::dashboard::layout::Focus;
+use zerkalo::dashboard::message::Effect;
+use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::dashboard::panels::{OutlineLine, outline};
+use zerkalo::scene::edit::Subject;
+use zerkalo::shape::Shape;
+
+/// The cell in the middle of the picture: the ball is seen there.
+fn middle(desk: &Desk) -> [u16; 2] {
+    let image = desk.model.layout().unwrap().image;
+    [image.x + image.width / 2, image.y + image.height / 2]
+}
+
+fn center(desk: &Desk) -> [f64; 3] {
+    match &desk.scene().objects[1].shape {
+        Shape::Sphere(sphere) => sphere.center,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_click_selects_what_is_seen() {
+    let mut desk = Desk::new(ROOM);
+    let [x, y] = middle(&desk);
+    desk.click(x, y);
+    assert_eq!(desk.model.selection, Subject::Object(1), "the ball");
+    let image = desk.model.layout().unwrap().image;
+    desk.click(x, image.y + image.height - 1);
+    assert_eq!(desk.model.selection, Subject::Object(0), "the floor");
+    desk.click(x, image.y);
+    assert_eq!(desk.model.selection, Subject::Background);
+    assert_eq!(desk.text(), ROOM);
+}
+
+#[test]
+fn a_drag_is_one_step_of_undo() {
+    let mut desk = Desk::new(ROOM);
+    let at = middle(&desk);
+    desk.drag(Button::Left, at, [12, -4]);
+    let eye = desk.scene().camera.eye;
+    assert!(eye[0] < -0.5, "what is seen follows the hand: {eye:?}");
+    desk.drag(Button::Right, at, [5, 5]);
+    assert!(desk.scene().camera.target.unwrap()[1] > 1.0, "the picture goes down, the eye up");
+    desk.keys("u");
+    assert_eq!(desk.scene().camera.eye, eye, "the second drag");
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM, "the first");
+    assert!(desk.model.history.undo_label().is_none());
+}
+
+#[test]
+fn a_drag_moves_what_is_being_moved_and_stays_under_the_hand() {
+    let mut desk = Desk::new(ROOM);
+    desk.select(Subject::Object(1));
+    desk.keys("m");
+    let at = middle(&desk);
+    let columns = f64::from(desk.model.layout().unwrap().image.width);
+    desk.drag(Button::Left, at, [10, 0]);
+    let [x, y, z] = center(&desk);
+    // At distance 5 the picture is 5 x 2 tan 20° x 4/3 wide.
+    let expected = 10.0 / columns * 10.0 * 20f64.to_radians().tan() * 4.0 / 3.0;
+    assert!((x - expected).abs() < 0.02 && y == 1.0 && z == 0.0, "{x} {expected}");
+    desk.drag(Button::Left, at, [0, 6]);
+    assert!(center(&desk)[2] > 0.3, "nearer");
+    desk.drag(Button::Right, at, [0, -6]);
+    assert!(center(&desk)[1] > 1.2, "higher");
+    desk.keys("Right Esc u");
+    assert_eq!(desk.text(), ROOM, "one step from entering the mode to leaving it");
+}
+
+#[test]
+fn the_wheel_dollies_and_scrolls_and_steps() {
+    let mut desk = Desk::new(ROOM);
+    let [x, y] = middle(&desk);
+    desk.mouse(MouseKind::Scroll(2), x, y);
+    assert!(desk.scene().camera.eye[2] < 4.2);
+    desk.keys("u");
+    let (rows, _) = desk.model.inspector_rows().unwrap();
+    desk.click(rows.x + 1, rows.y);
+    assert_eq!((desk.model.focus, desk.model.inspector.cursor), (Focus::Inspector, 0));
+    desk.mouse(MouseKind::Scroll(3), rows.x + 1, rows.y);
+    let eye = desk.scene().camera.eye;
+    assert!(eye[0] > 0.2, "three coarse steps of the eye's x: {eye:?}");
+    desk.select(Subject::Material("mirror".into()));
+    desk.keys("Tab");
+    let (rows, _) = desk.model.inspector_rows().unwrap();
+    desk.mouse(MouseKind::Scroll(-2), rows.x + 1, rows.y + 2);
+    assert!(desk.model.inspector.scroll > 0);
+}
+
+#[test]
+fn outline_and_inspector_are_clicked_line_by_line() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("Tab");
+    let rows = desk.model.outline_rows().unwrap();
+    for (i, line) in outline(desk.scene()).into_iter().enumerate().take(usize::from(rows.height)) {
+        if desk.model.outline_scroll > 0 {
+            break;
+        }
+        desk.click(rows.x + 2, rows.y + i as u16);
+        if let OutlineLine::Entry { subject, .. } = line {
+            assert_eq!(desk.model.selection, subject);
+        }
+    }
+    desk.select(Subject::Object(1));
+    desk.keys("Enter");
+    let (rows, _) = desk.model.inspector_rows().unwrap();
+    // Name, material, shape, center x.
+    desk.click(rows.x + 3, rows.y + 3).click(rows.x + 3, rows.y + 3);
+    desk.keys("Ctrl-u `0.25`");
+    // A click elsewhere applies what was typed.
+    desk.click(rows.x + 3, rows.y + 5);
+    assert_eq!(center(&desk)[0], 0.25);
+    // What is wrong holds the click back.
+    desk.keys("Enter Ctrl-u `far`").click(rows.x + 3, rows.y + 3);
+    assert!(desk.problem().is_some_and(|p| p.contains("far")), "{:?}", desk.problem());
+    assert_eq!(desk.model.inspector.cursor, 5);
+}
+
+#[test]
+fn lists_and_questions_are_clicked() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("a");
+    let place = desk.model.place().unwrap();
+    desk.click(place.list.x + 1, place.list.y + 1).click(place.list.x + 1, place.list.y + 1);
+    assert!(matches!(&desk.model.overlay, Some(Overlay::Form(form)) if form.title == "new cube"));
+    desk.keys("Esc Left q");
+    let place = desk.model.place().unwrap();
+    desk.click(place.list.x + 1, place.list.y + 1).click(place.list.x + 1, place.list.y + 1);
+    assert!(desk.asked(|e| *e == Effect::Quit), "discard and quit");
+}
+
+#[test]
+fn a_click_while_probing_places_the_probe() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("i");
+    let image = desk.model.layout().unwrap().image;
+    desk.click(image.x, image.y);
+    let probe = desk.model.probe.unwrap();
+    assert!(probe[0] <= 1 && probe[1] <= 1, "{probe:?}");
+    assert_eq!(desk.model.selection, Subject::Camera, "a probe selects nothing");
+    desk.keys("Esc");
+    assert_eq!(desk.model.probe, None);
+    assert!(desk.asked(|e| *e == Effect::Probe(None)));
+}

@@ -1,0 +1,133 @@
+//! Ten thousand random keys and mouse events on three scenes: nothing breaks, and everything can be
+//! taken back.
+
+use crate::desk::{Desk, ROOM};
+use std::collections::HashSet;
+use std::time::Duration;
+use zerkalo::dashboard::action::Action;
+use zerkalo::dashboard::input::{Button, Code, Key, MouseKind};
+use zerkalo::dashboard::keymap::{KEYMAP, lookup};
+use zerkalo::dashboard::message::{Effect, Message};
+use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::scene::BUILT_IN;
+
+const EVENTS: usize = 10_000;
+
+/// xorshift64*.
+struct Rng(u64);
+
+impl Rng {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33) as usize % n
+    }
+}
+
+/// Every key of the table, and those that type.
+fn keys() -> Vec<Key> {
+    let names = KEYMAP.iter().flat_map(|row| row.keys).flat_map(|(_, names)| names.iter());
+    let mut keys: Vec<Key> = names.map(|name| name.parse().unwrap()).collect();
+    for c in "0123456789.-#eyxñ鏡 ".chars() {
+        keys.push(Key { code: Code::Char(c), ctrl: false, alt: false, shift: false });
+    }
+    keys
+}
+
+fn quits(desk: &Desk, key: Key) -> bool {
+    let palette = match &desk.model.overlay {
+        Some(Overlay::Palette(palette)) => {
+            palette.found.get(palette.cursor).is_some_and(|at| KEYMAP[*at].action == Action::Quit)
+        }
+        _ => false,
+    };
+    lookup(desk.model.context(), key) == Some(Action::Quit) || palette && key.code == Code::Enter
+}
+
+fn event(desk: &mut Desk, rng: &mut Rng, keys: &[Key]) {
+    let [width, height] = [130, 40];
+    match rng.below(20) {
+        0..14 => {
+            let key = keys[rng.below(keys.len())];
+            if !quits(desk, key) {
+                desk.key(key);
+            }
+        }
+        // By name, as one does who does not know the keys; what has no key, too.
+        14 if desk.model.overlay.is_none() && desk.model.editor().is_none() => {
+            let row = KEYMAP[rng.below(KEYMAP.len())];
+            if row.action != Action::Quit {
+                desk.palette(row.label);
+            }
+        }
+        14..16 => {
+            desk.keys("Esc Esc");
+        }
+        16 => {
+            desk.click(rng.below(width) as u16, rng.below(height) as u16);
+        }
+        17 => {
+            let button = [Button::Left, Button::Middle, Button::Right][rng.below(3)];
+            let from = [rng.below(width) as u16, rng.below(height) as u16];
+            let by = [rng.below(21) as i16 - 10, rng.below(11) as i16 - 5];
+            desk.drag(button, from, by);
+        }
+        18 => {
+            let ticks = rng.below(7) as i32 - 3;
+            desk.mouse(MouseKind::Scroll(ticks), rng.below(width) as u16, rng.below(height) as u16);
+        }
+        _ => match rng.below(4) {
+            0 => desk.send(Message::Resize([rng.below(220) as u16, rng.below(70) as u16])),
+            1 => desk.send(Message::Paste("0.5\nq".into())),
+            2 => desk.send(Message::Tick),
+            _ => desk.now += Duration::from_secs(rng.below(3) as u64),
+        },
+    }
+}
+
+fn play(name: &str, text: &str, seed: u64, fired: &mut HashSet<Action>) {
+    let (keys, mut rng) = (keys(), Rng(seed));
+    let mut desk = Desk::new(text);
+    desk.reads = false;
+    for i in 0..EVENTS {
+        event(&mut desk, &mut rng, &keys);
+        // A question may lead to the end or to another file: that is told elsewhere.
+        if let Some(Overlay::Question(_)) = desk.model.overlay {
+            desk.keys("Esc");
+        }
+        assert!(!desk.asked(|e| *e == Effect::Quit), "{name}: event {i}");
+        let scene = desk.scene();
+        assert!(scene.faults().is_empty(), "{name}: event {i}: {:?}", scene.faults());
+        assert!(desk.model.selection.exists(scene), "{name}: event {i}");
+        desk.effects.clear();
+        if scene_is_large(&desk) {
+            desk.keys("Esc Esc Esc u u u u u u");
+        }
+    }
+    fired.extend(&desk.fired);
+    desk.model.overlay = None;
+    desk.undo_all();
+    desk.document = desk.original();
+    assert_eq!(desk.text(), text, "{name}: everything undone");
+}
+
+/// Copies of copies: more of them find nothing new.
+fn scene_is_large(desk: &Desk) -> bool {
+    desk.scene().objects.len() > 60
+}
+
+#[test]
+fn random_events_break_nothing() {
+    let physical = include_str!("../../scenes/mirror-room-physical.toml");
+    let mut fired = HashSet::new();
+    play("room", ROOM, 1, &mut fired);
+    play("built in", BUILT_IN, 2, &mut fired);
+    play("physical", physical, 3, &mut fired);
+    let table: Vec<_> = KEYMAP.iter().filter(|row| row.action != Action::Quit).collect();
+    let missed: Vec<_> =
+        table.iter().filter(|row| !fired.contains(&row.action)).map(|row| row.label).collect();
+    let share = 1.0 - missed.len() as f64 / table.len() as f64;
+    println!("{:.1} % of {} rows fired; not: {missed:?}", 100.0 * share, table.len());
+    assert!(share >= 0.95, "{share}: {missed:?}");
+}
