@@ -66,6 +66,15 @@ impl Scene {
         Finding { subject: self.subject(&path), path, found, help }
     }
 
+    /// Looks for the files that it names, those that have not been looked for yet. What is wrong with
+    /// them is among the faults from then on.
+    pub fn resolve(&mut self) {
+        let library = &self.library;
+        for object in &mut self.objects {
+            object.shape.resolve(|name| library.mesh(name));
+        }
+    }
+
     /// Everything wrong with the scene; a scene that was read has nothing wrong, an edited one may.
     pub fn faults(&self) -> Vec<Finding> {
         let mut findings = Vec::new();

@@ -1,11 +1,13 @@
 //! A scene file as text with its comments, beside the scene that it describes.
 
-use super::Scene;
+use super::{Library, Scene};
+use crate::asset::Assets;
 use super::locate::located;
 use super::message::{Message, SceneErrors};
 use super::read::read_text;
 use super::rewrite::rewrite;
 use std::path::Path;
+use std::sync::Arc;
 use toml_edit::DocumentMut;
 
 /// A scene file: its text, and the scene that it describes. Edits of the scene change only those
@@ -25,7 +27,16 @@ impl Document {
     /// # Errors
     /// As [`Scene::read`].
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
-        read_text(path).and_then(|text| Self::parse(text, &path.display().to_string()))
+        Self::read_with(path, Arc::default())
+    }
+
+    /// As [`Document::read`]; what the files hold that the scene names is remembered in `assets`.
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub fn read_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
+        let name = path.display().to_string();
+        read_text(path).and_then(|text| Self::parse_in(text, &name, Library::of(path, assets)))
     }
 
     /// Reads and checks a scene from `text`; messages call it `name`.
@@ -33,7 +44,11 @@ impl Document {
     /// # Errors
     /// As [`Scene::read`].
     pub fn parse(text: String, name: &str) -> Result<Self, SceneErrors> {
-        let scene = Scene::parse(&text, name)?;
+        Self::parse_in(text, name, Library::of(Path::new(name), Arc::default()))
+    }
+
+    fn parse_in(text: String, name: &str, library: Library) -> Result<Self, SceneErrors> {
+        let scene = Scene::parse_in(&text, name, library)?;
         Ok(Self { name: name.to_string(), origin: (text.clone(), scene.clone()), text, scene })
     }
 

@@ -1,11 +1,13 @@
 //! A scene and the file that it is kept in: opening, saving without harm, noticing other writers.
 
 use super::{Document, Scene, SceneErrors};
+use crate::asset::Assets;
 use std::fmt;
 use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hasher};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A scene's document and where it is kept.
 #[derive(Clone, Debug)]
@@ -72,7 +74,15 @@ impl SceneFile {
     /// # Errors
     /// As [`Scene::read`].
     pub fn open(path: &Path) -> Result<Self, SceneErrors> {
-        let document = Document::read(path)?;
+        Self::open_with(path, Arc::default())
+    }
+
+    /// As [`SceneFile::open`]; what the files hold that the scene names is remembered in `assets`.
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub fn open_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
+        let document = Document::read_with(path, assets)?;
         let fingerprint = fingerprint(document.text().as_bytes());
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }
@@ -115,7 +125,7 @@ impl SceneFile {
         if let Ok(Some(found)) = content(&path) {
             self.fingerprint = found;
         }
-        *self = Self::open(&path)?;
+        *self = Self::open_with(&path, self.document.scene().library.assets())?;
         Ok(())
     }
 
@@ -149,9 +159,19 @@ impl SceneFile {
         scene: &Scene,
         overwrite: bool,
     ) -> Result<(), SaveError> {
+        let library = &scene.library;
+        let named = || scene.objects.iter().filter_map(|object| object.shape.file());
+        if let Some(file) = named().find(|file| library.loses(file, path)) {
+            let file = crate::value::printable(file);
+            return Err(SaveError::Failed {
+                path: path.to_path_buf(),
+                what: format!("from there \"{file}\", which the scene names, would not be found"),
+            });
+        }
         let mut document = self.document.clone().renamed(&path.display().to_string());
         document.apply(scene);
         replace(path, document.text(), overwrite)?;
+        library.move_to(path);
         self.path = Some(path.to_path_buf());
         self.fingerprint = fingerprint(document.text().as_bytes());
         self.document = document;

@@ -9,6 +9,7 @@ mod fresh;
 mod history;
 mod included;
 mod keep;
+mod library;
 mod locate;
 mod message;
 mod object;
@@ -26,6 +27,7 @@ pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};
 pub use history::History;
 pub use included::{BUILT_IN, built_in, starter};
+pub use library::Library;
 pub use message::{Message, SceneErrors};
 pub use object::{OBJECT_FIELDS, Object};
 pub use reference::reference;
@@ -65,6 +67,9 @@ pub struct Scene {
     /// Things.
     #[serde(rename = "object")]
     pub objects: Vec<Object>,
+    /// Where the files are that it names.
+    #[serde(skip)]
+    pub library: Library,
 }
 
 #[cfg(test)]

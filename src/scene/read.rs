@@ -2,10 +2,11 @@
 
 use super::locate::{located, place};
 use super::message::SceneErrors;
-use super::{Scene, schema};
+use super::{Library, Scene, schema};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
+use std::sync::Arc;
 use toml::de::DeTable;
 
 /// Largest file that is read [bytes]: some hundred thousand objects.
@@ -19,14 +20,21 @@ impl Scene {
     /// wrong types, values out of range, names that lead nowhere. What is wrong with the form hides
     /// what is wrong with the values.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
-        read_text(path).and_then(|text| Self::parse(&text, &path.display().to_string()))
+        let library = Library::of(path, Arc::default());
+        read_text(path).and_then(|t| Self::parse_in(&t, &path.display().to_string(), library))
     }
 
-    /// Reads and checks a scene from `text`; messages call it `name`.
+    /// Reads and checks a scene from `text`; messages call it `name`, and names of files start from
+    /// that path's folder.
     ///
     /// # Errors
     /// As [`Scene::read`].
     pub fn parse(text: &str, name: &str) -> Result<Self, SceneErrors> {
+        Self::parse_in(text, name, Library::of(Path::new(name), Arc::default()))
+    }
+
+    /// As [`Scene::parse`], with the files that the scene names in `library`.
+    pub(super) fn parse_in(text: &str, name: &str, library: Library) -> Result<Self, SceneErrors> {
         let (root, syntax) = DeTable::parse_recoverable(text);
         let at = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
         if let Some(error) = syntax.iter().min_by_key(|e| at(e)) {
@@ -46,10 +54,12 @@ impl Scene {
         if !form.is_empty() {
             return Err(SceneErrors::new(form));
         }
-        let scene: Self = toml::from_str(text).map_err(|error| {
+        let mut scene: Self = toml::from_str(text).map_err(|error| {
             let place = error.span().map(|span| place(text, span.start));
             SceneErrors::at(name, place, error.message().to_string(), "")
         })?;
+        scene.library = library;
+        scene.resolve();
         match scene.faults() {
             faults if faults.is_empty() => Ok(scene),
             faults => Err(SceneErrors::new(located(name, text, faults))),

@@ -78,7 +78,10 @@ impl Bound {
                 // The largest singular value is at most the root of the sum of squares.
                 Ball { center: map.translation, radius: (x + y + z).sqrt() }
             }
-            Form::Tapered { .. } | Form::Compound(_) | Form::Plane { .. } => match form.bounds() {
+            Form::Tapered { .. }
+            | Form::Compound(_)
+            | Form::Mesh { .. }
+            | Form::Plane { .. } => match form.bounds() {
                 Some((low, high)) => {
                     Ball { center: 0.5 * (low + high), radius: 0.5 * low.distance(high) }
                 }
@@ -93,7 +96,7 @@ impl Bound {
             Form::Plane { normal, offset } => Some((*normal, *offset)),
             _ => None,
         };
-        Self { ball, plane, convex: !matches!(form, Form::Compound(_)) }
+        Self { ball, plane, convex: !matches!(form, Form::Compound(_) | Form::Mesh { .. }) }
     }
 
     /// A ball around it.

@@ -46,7 +46,7 @@ impl Form {
                 let inside = (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b);
                 (t > 0.0 && t.is_finite() && inside).then_some(t)
             }
-            Self::Tapered { .. } | Self::Compound(_) => {
+            Self::Tapered { .. } | Self::Compound(_) | Self::Mesh { .. } => {
                 let length = direction.length();
                 let vector = |v: DVec3| V3::<f64>::of(v.to_array());
                 let ray = Ray { origin: vector(origin), direction: vector(direction / length) };

@@ -171,9 +171,13 @@ fn combined(of: &[Part], join: fn(Vec<Tree>) -> Tree) -> Compound {
     Compound { parts, tree: join(trees) }
 }
 
-/// Whether something can be inside the shape.
-fn is_closed(shape: &Shape) -> bool {
-    !matches!(shape, Shape::Rectangle(_) | Shape::Platform(_))
+/// Why the shape cannot be a part, if it cannot.
+fn unfit(shape: &Shape) -> Option<&'static str> {
+    match shape {
+        Shape::Rectangle(_) | Shape::Platform(_) => Some("is flat: nothing is inside it"),
+        Shape::MeshFile(_) => Some("cannot be a part of a compound"),
+        _ => None,
+    }
 }
 
 fn part_faults(of: &[Part], depth: usize) -> Vec<Fault> {
@@ -198,9 +202,9 @@ fn part_faults(of: &[Part], depth: usize) -> Vec<Fault> {
                 .collect(),
             None => part.shape.faults(),
         };
-        let open = (!is_closed(&part.shape)).then(|| {
-            let key = part.shape.key();
-            Fault::new("shape", format!("a {key} is flat: nothing is inside it"), "a solid")
+        let open = unfit(&part.shape).map(|why| {
+            let found = format!("a {} {why}", part.shape.key());
+            Fault::new("shape", found, "a solid")
         });
         let mut checks = Checks::new(&PART_FIELDS).inner("shape", inner).and(open);
         for (k, step) in part.transform.iter().enumerate() {

@@ -2,7 +2,9 @@
 //! which every kind of shape and every transform collapses.
 
 use super::csg::Compound;
+use crate::asset::Mesh;
 use glam::{DAffine3, DMat3, DVec3};
+use std::sync::Arc;
 
 /// One side of a plane: the points p with `normal . p <= offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +47,15 @@ pub enum Form {
     },
     /// Solids joined, intersected, cut out of each other.
     Compound(Compound),
+    /// The image of a mesh under an invertible affine map.
+    Mesh {
+        /// The triangles.
+        mesh: Arc<Mesh>,
+        /// From the space of the mesh's coordinates to the scene's.
+        scene_from_mesh: DAffine3,
+        /// Whether light sees normals interpolated between vertices, not the triangles' own.
+        smooth: bool,
+    },
     /// The flat parallelogram `corner + a u + b v`, 0 <= a, b <= 1. Its front is the side of u x v.
     Parallelogram {
         /// The corner that both edges leave.
@@ -115,6 +126,9 @@ impl Form {
                 Self::Tapered { scene_from_unit: *map * scene_from_unit, top }
             }
             Self::Compound(compound) => Self::Compound(compound.transformed(map)),
+            Self::Mesh { mesh, scene_from_mesh, smooth } => {
+                Self::Mesh { mesh, scene_from_mesh: *map * scene_from_mesh, smooth }
+            }
             Self::Parallelogram { corner, u, v } => {
                 let (u, v) = (linear * u, linear * v);
                 let corner = map.transform_point3(corner);
@@ -170,6 +184,13 @@ impl Form {
                 around(&[base - half, base + half, cap - narrow, cap + narrow])
             }
             Self::Compound(compound) => compound.bounds(),
+            Self::Mesh { mesh, scene_from_mesh: m, .. } => {
+                let rows = m.matrix3.transpose();
+                let rows = [rows.x_axis, rows.y_axis, rows.z_axis].map(|r| r.to_array());
+                let high = rows.map(|r| mesh.farthest(r));
+                let low = rows.map(|r| -mesh.farthest(r.map(|x| -x)));
+                Some((m.translation + DVec3::from(low), m.translation + DVec3::from(high)))
+            }
             Self::Parallelogram { corner, u, v } => {
                 around(&[*corner, corner + u, corner + v, corner + u + v])
             }

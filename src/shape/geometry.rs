@@ -1,6 +1,6 @@
 //! All things of a scene, ready for rays: batches, and a tree over them where it pays.
 
-use super::batch::{Batch, Compiled, Hit, Ray, Source, Surface, compile};
+use super::batch::{Batch, Compiled, Hit, Meshes, Ray, Source, Surface, compile};
 use super::form::Form;
 use super::tree::Tree;
 use crate::lanes::{Lanes, Mask, V3};
@@ -58,13 +58,13 @@ impl<L: Lanes> Geometry<L> {
             counts: Vec::new(),
         };
         let mut bounds = Vec::new();
-        for Compiled { batch, sources, noun, infinite } in compile(forms) {
+        for Compiled { batch, sources, noun, detail, infinite } in compile(forms) {
             let base = out.source.len() as u32;
             let in_tree = tree && !infinite;
             let how = if in_tree { "tree" } else { "list" };
             let count = sources.iter().filter(|s| s.part == 0).count();
             let name = if count == 1 { noun.0 } else { noun.1 };
-            out.counts.push(format!("{count} {name} ({how})"));
+            out.counts.push(format!("{count} {name}{detail} ({how})"));
             let part = out.parts.len() as u32;
             if in_tree {
                 for (i, source) in sources.iter().enumerate().filter(|(_, s)| s.part == 0) {
@@ -125,7 +125,14 @@ impl<L: Lanes> Geometry<L> {
     /// The nearest of some items in front of each ray; of several at the same distance the one with
     /// the lowest number, so that neither the order in the tree nor the other rays of the packet decide.
     pub fn closest(&self, ray: &Ray<L>, of: &Selection) -> Hit<L> {
-        let mut hit = Hit::none();
+        self.closest_of(ray, of, L::mask(true))
+    }
+
+    /// As [`Geometry::closest`], in those lanes for which `wanted` is true; the others are meaningless.
+    #[inline(always)]
+    pub fn closest_of(&self, ray: &Ray<L>, of: &Selection, wanted: L::Mask) -> Hit<L> {
+        // What nobody wants goes no way.
+        let mut hit = Hit::nearer_than(L::select(wanted, L::of(L::MAX), L::of(-1.0)));
         for (part, range) in &of.runs {
             let part = &self.parts[*part as usize];
             part.batch.closest(indices(range), part.base, ray, &mut hit);
@@ -141,7 +148,8 @@ impl<L: Lanes> Geometry<L> {
         tree.walk(ray, hit.t, |item, _| {
             let (part, i) = self.tree_items[item];
             let part = &self.parts[part as usize];
-            let mut one = Hit::none();
+            // As near is near enough: of equal distances the lowest tag counts.
+            let mut one = Hit::nearer_than(hit.t * L::of(1.0 + 2.0 * L::EPSILON));
             part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut one);
             hit.take(&one);
             hit.t
@@ -187,15 +195,55 @@ impl<L: Lanes> Geometry<L> {
         blocked
     }
 
-    /// The surface of `item` near `point`.
+    /// The surface of `item` near `point`; `facet`: as the hit has it.
     #[inline(always)]
-    pub fn surface(&self, item: u32, point: V3<L>) -> Surface<L> {
+    pub fn surface(&self, item: u32, facet: L, point: V3<L>) -> Surface<L> {
         for part in &self.parts {
             if item < part.end {
-                return part.batch.surface((item - part.base) as usize, point);
+                return part.batch.surface((item - part.base) as usize, facet, point);
             }
         }
         unreachable!("every item belongs to a part")
+    }
+
+    /// The meshes, and the number of the first; they are the last of all items.
+    fn meshes(&self) -> Option<(&Meshes<L::Scalar>, u32)> {
+        match self.parts.last()? {
+            Part { batch: Batch::Meshes(meshes), base, .. } => Some((meshes, *base)),
+            _ => None,
+        }
+    }
+
+    /// Whether light sees other normals than the surfaces' own anywhere: [`Geometry::shading_normal`].
+    pub fn is_smooth(&self) -> bool {
+        self.meshes().is_some_and(|(meshes, _)| meshes.is_smooth())
+    }
+
+    /// Whether things have colours of their own: [`Geometry::color`].
+    pub fn is_colored(&self) -> bool {
+        self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
+    }
+
+    /// The normal that light is computed with where rays along `direction` meet `item` at `point`, whose
+    /// geometric normal on the viewer's side is `normal`: on the same side, and facing the viewer.
+    pub fn shading_normal(
+        &self,
+        (item, facet): (u32, L),
+        at: (V3<L>, V3<L>),
+        direction: V3<L>,
+    ) -> V3<L> {
+        match self.meshes() {
+            Some((meshes, base)) if item >= base => {
+                meshes.shading_normal((item - base) as usize, facet, at, direction)
+            }
+            _ => at.1,
+        }
+    }
+
+    /// The colour of its own that `item` has at `facet`, if it has one.
+    pub fn color(&self, item: u32, facet: L) -> Option<V3<L>> {
+        let (meshes, base) = self.meshes()?;
+        (item >= base).then(|| meshes.color((item - base) as usize, facet))?
     }
 }
 

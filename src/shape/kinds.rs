@@ -3,7 +3,7 @@
 use super::Form;
 use super::compound::OF_FIELDS;
 use super::{
-    Cone, Cube, Cuboid, Cylinder, Difference, Intersection, Plane, Platform, Prism, Pyramid,
+    Cone, Cube, Cuboid, Cylinder, Difference, Intersection, MeshFile, Plane, Platform, Prism, Pyramid,
 };
 use super::{Rectangle, Sphere, TaperedCylinder, Union, UnitCylinder};
 use crate::value::{Fault, Field, Takes, rounded_to};
@@ -142,6 +142,7 @@ kinds! {
     "platform" => Platform,
     "rectangle" => Rectangle,
     "plane" => Plane,
+    "mesh" => MeshFile,
     "union" => Union with OF_FIELDS,
     "intersection" => Intersection with OF_FIELDS,
     "difference" => Difference with OF_FIELDS,

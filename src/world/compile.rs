@@ -36,6 +36,9 @@ pub struct Options {
 /// rays that leave a surface start 2^-20 of the extent above it, 1/128 of that thing.
 const SINGLE_RATIO: f64 = 8192.0;
 
+/// The extent of a mesh over that of its details, as far as precision is concerned.
+const MESH_DETAILS: f64 = 64.0;
+
 /// A light of the world: the lamp, its group, its weight in the group's samples.
 pub(super) struct Source<S> {
     pub lamp: Lamp<S>,
@@ -54,6 +57,10 @@ pub struct World<L: Lanes> {
     pub(super) ambient: Option<usize>,
     pub(super) background: Option<usize>,
     pub(super) shadows: bool,
+    /// Light sees other normals than the surfaces' own.
+    pub(super) smooth: bool,
+    /// Things have colours of their own.
+    pub(super) colored: bool,
     /// The most reflections of a path.
     pub(super) depth: u32,
     pub(super) min_weight: f64,
@@ -130,6 +137,10 @@ fn thickness(form: &Form) -> f64 {
             let across = rows.x_axis.length().max(rows.y_axis.length());
             (2.0 / across).min(rows.z_axis.length().recip())
         }
+        Form::Mesh { .. } => form.bounds().map_or(f64::INFINITY, |(l, h)| {
+            // Details are taken to be as large as this part of the whole.
+            (h - l).max_element() / MESH_DETAILS
+        }),
         Form::Compound(compound) => {
             compound.parts.iter().map(thickness).fold(f64::INFINITY, f64::min)
         }
@@ -205,6 +216,8 @@ impl<L: Lanes> World<L> {
             background: (scene.background.color.0 != [0.0; 3])
                 .then(|| groups.find(&Member::Background))
                 .flatten(),
+            smooth: geometry.is_smooth(),
+            colored: geometry.is_colored(),
             shadows: level >= Level::Shadows && !geometry.is_empty(),
             depth: if reflecting { scene.trace.depth } else { 0 },
             min_weight: scene.trace.min_weight,

@@ -119,6 +119,7 @@ impl Groups {
             lights: _,
             materials: _,
             objects,
+            library: _,
         } = scene;
         let default = Material::default();
         let same_object = |(a, b): (&Object, &Object)| {

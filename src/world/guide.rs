@@ -52,7 +52,7 @@ impl<L: Lanes> World<L> {
             let item = hit.item.tag_lane(left.trailing_zeros() as usize);
             let here = hit.item.has_tag(item).bits() & left;
             left &= !here;
-            let normal = self.geometry.surface(item, at).normal;
+            let normal = self.geometry.surface(item, hit.facet, at).normal;
             let facing = normal.dot(direction);
             let finish = &self.finishes[self.finish_of[item as usize] as usize];
             for (lane, sight) in seen.iter_mut().enumerate().filter(|(l, _)| here >> l & 1 != 0) {

@@ -9,11 +9,11 @@ fn strongest(material: &Material) -> f64 {
     material.reflection * material.f0().0.into_iter().fold(0.0, f64::max).min(1.0)
 }
 
-/// Whether a path may meet `object` twice in a row. Every thing but a compound is convex, so only its
+/// Whether a path may meet `object` twice in a row. Every thing but a compound or a mesh is convex, so only its
 /// inside sees itself, and only paths that begin inside get there.
 fn sees_itself(object: &Object, material: &Material, scene: &Scene) -> bool {
     let form = object.shape.form().transformed(&object.scene_from_object());
-    if matches!(form, Form::Compound(_)) {
+    if matches!(form, Form::Compound(_) | Form::Mesh { .. }) {
         return true;
     }
     let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });

@@ -33,12 +33,16 @@ struct Path<L> {
 
 /// The surfaces that a packet met.
 struct Met<L: Lanes> {
-    /// Normal on the viewer's side.
+    /// Normal on the viewer's side that light is computed with.
     normal: V3<L>,
+    /// The surface's own, on the viewer's side: the same but on smooth meshes. Light comes from that side.
+    geometric: V3<L>,
     /// Origin of rays that leave on the viewer's side.
     start: V3<L>,
     /// Tag of the finish.
     finish: L,
+    /// Colour of the thing itself, which multiplies its finish's.
+    tint: V3<L>,
     /// k_d x colour.
     diffuse: V3<L>,
     /// Lanes with a finish: all but those that met the back of a one-sided one.
@@ -78,6 +82,8 @@ impl<L: Lanes> Met<L> {
     #[inline(always)]
     fn take(&mut self, lanes: L::Mask, other: &Self) {
         self.normal = V3::select(lanes, other.normal, self.normal);
+        self.geometric = V3::select(lanes, other.geometric, self.geometric);
+        self.tint = V3::select(lanes, other.tint, self.tint);
         self.start = V3::select(lanes, other.start, self.start);
         self.finish = L::select(lanes, other.finish, self.finish);
         self.diffuse = V3::select(lanes, other.diffuse, self.diffuse);
@@ -110,7 +116,7 @@ impl<L: Lanes> World<L> {
         let mut bounce = 0;
         loop {
             counts.rays += u64::from(active.bits().count_ones());
-            let hit = self.geometry.closest(&path.ray, &outlook.seen);
+            let hit = self.geometry.closest_of(&path.ray, &outlook.seen, active);
             let ended = hit.t.lt(L::of(L::MAX));
             if let Some(group) = self.background {
                 out.groups[group] += path.weight.only(active.and_not(ended));
@@ -134,7 +140,7 @@ impl<L: Lanes> World<L> {
     #[inline(always)]
     fn meet(&self, ray: &Ray<L>, hit: &Hit<L>, active: L::Mask) -> Option<Met<L>> {
         let (item, here) = first_tag(hit.item, active)?;
-        let mut met = self.face(ray, hit.t, item, here);
+        let mut met = self.face(ray, hit, item, here);
         if active.and_not(here).any() {
             self.meet_others(ray, hit, active.and_not(here), &mut met);
         }
@@ -145,28 +151,42 @@ impl<L: Lanes> World<L> {
     #[inline(never)]
     fn meet_others(&self, ray: &Ray<L>, hit: &Hit<L>, mut left: L::Mask, met: &mut Met<L>) {
         while let Some((item, here)) = first_tag(hit.item, left) {
-            met.take(here, &self.face(ray, hit.t, item, here));
+            met.take(here, &self.face(ray, hit, item, here));
             left = left.and_not(here);
         }
     }
 
-    /// The surface of one item, which the rays of `lanes` meet at `t`.
+    /// The surface of one item, which the rays of `lanes` meet at `hit`.
     #[inline(always)]
-    fn face(&self, ray: &Ray<L>, t: L, item: u32, lanes: L::Mask) -> Met<L> {
-        let surface = self.geometry.surface(item, ray.at(t));
+    fn face(&self, ray: &Ray<L>, hit: &Hit<L>, item: u32, lanes: L::Mask) -> Met<L> {
+        let surface = self.geometry.surface(item, hit.facet, ray.at(hit.t));
         let front = surface.normal.dot(ray.direction).lt(L::zero());
-        let normal = V3::select(front, surface.normal, -surface.normal);
+        let geometric = V3::select(front, surface.normal, -surface.normal);
         // Start above the surface by a few roundings of the largest number involved.
         let lift = surface.reach.max(surface.point.max_abs()) * L::of(8.0 * L::EPSILON);
         let number = self.finish_of[item as usize];
         let finish = &self.finishes[number as usize];
+        let mut normal = geometric;
+        if self.smooth {
+            let at = (surface.point, geometric);
+            normal = self.geometry.shading_normal((item, hit.facet), at, ray.direction);
+        }
+        let mut tint = V3::of([1.0; 3]);
+        let mut diffuse = V3::splat(finish.diffuse);
+        if self.colored
+            && let Some(color) = self.geometry.color(item, hit.facet)
+        {
+            (tint, diffuse) = (color, diffuse.times(color));
+        }
         let finished = if finish.two_sided { lanes } else { lanes & front };
         let those = |having: bool| if having { finished } else { L::mask(false) };
         Met {
             normal,
-            start: normal.mul_add(lift, surface.point),
+            geometric,
+            tint,
+            start: geometric.mul_add(lift, surface.point),
             finish: L::tag(number),
-            diffuse: V3::splat(finish.diffuse),
+            diffuse,
             finished,
             lit: those(finish.wants_light),
             shining: those(finish.shines()),
@@ -186,7 +206,10 @@ impl<L: Lanes> World<L> {
     ) {
         if let Some(group) = self.ambient {
             for (finish, lanes) in met.finishes(met.finished) {
-                let ambient = V3::splat(self.finishes[finish].ambient);
+                let mut ambient = V3::splat(self.finishes[finish].ambient);
+                if self.colored {
+                    ambient = ambient.times(met.tint);
+                }
                 out.groups[group] += path.weight.times(ambient).only(lanes);
             }
         }
@@ -197,6 +220,9 @@ impl<L: Lanes> World<L> {
             let arrival = source.lamp.at(met.start);
             let nl = met.normal.dot(arrival.towards);
             let mut lit = met.lit & nl.gt(L::zero());
+            if self.smooth {
+                lit = lit & met.geometric.dot(arrival.towards).gt(L::zero());
+            }
             if lit.none() {
                 continue;
             }
@@ -245,7 +271,13 @@ impl<L: Lanes> World<L> {
                 *numbers.get_or_insert_with(|| draws.lobe(bounce))
             };
             let r = finish.reflect(*strength, spread, incident, met.normal, uv, self.fold);
-            path.ray.direction = V3::select(lanes, r.direction, path.ray.direction);
+            let mut out = r.direction;
+            if self.smooth {
+                // What would go into the surface goes as steeply out of it.
+                let height = out.dot(met.geometric).min(L::zero());
+                out = met.geometric.mul_add(height * L::of(-2.0), out);
+            }
+            path.ray.direction = V3::select(lanes, out, path.ray.direction);
             path.weight = V3::select(lanes, weight.times(r.weight), path.weight);
         }
         path.ray.origin = met.start;

@@ -42,7 +42,7 @@ pub fn surface<L: Lanes>(geometry: &Geometry<L>, ray: &Ray<L>, hit: &Hit<L>) -> 
     while left.any() {
         let item = hit.item.tag_lane(left.bits().trailing_zeros() as usize);
         let here = left & hit.item.has_tag(item);
-        let one = geometry.surface(item, ray.at(hit.t));
+        let one = geometry.surface(item, hit.facet, ray.at(hit.t));
         all.point = V3::select(here, one.point, all.point);
         all.normal = V3::select(here, one.normal, all.normal);
         all.reach = L::select(here, one.reach, all.reach);

@@ -65,6 +65,13 @@ pub struct Mesh {
     smooth: OnceLock<Vec<[f32; 3]>>,
 }
 
+/// A mesh equals itself alone: two readings of a file are two meshes.
+impl PartialEq for Mesh {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+    }
+}
+
 impl fmt::Debug for Mesh {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.debug_struct("Mesh")
@@ -194,6 +201,39 @@ impl Mesh {
             Some(normals) => normals,
             None => self.smooth.get_or_init(|| smooth(&self.mesh.positions, &self.mesh.triangles)),
         }
+    }
+
+    /// The largest `direction . corner` of its triangles' corners.
+    pub fn farthest(&self, direction: [f64; 3]) -> f64 {
+        let along = |axis: usize, x: f32| direction[axis] * f64::from(x);
+        let mut best = f64::NEG_INFINITY;
+        let mut todo = vec![(0u32, f64::INFINITY)];
+        while let Some((branch, bound)) = todo.pop() {
+            if bound <= best {
+                continue;
+            }
+            let branch = &self.branches[branch as usize];
+            let first = todo.len();
+            for i in 0..usize::from(branch.count) {
+                let reach = |a| along(a, branch.low[a][i]).max(along(a, branch.high[a][i]));
+                let bound: f64 = (0..3).map(reach).sum();
+                if bound <= best {
+                    continue;
+                }
+                if branch.leaves >> i & 1 == 0 {
+                    todo.push((branch.child[i], bound));
+                    continue;
+                }
+                let leaf = &self.leaves[branch.child[i] as usize];
+                for corner in &leaf.corners {
+                    for k in 0..leaf.count as usize {
+                        best = best.max((0..3).map(|a| along(a, corner[a][k])).sum());
+                    }
+                }
+            }
+            todo[first..].sort_by(|a, b| a.1.total_cmp(&b.1));
+        }
+        best
     }
 
     /// Memory that it takes [bytes].

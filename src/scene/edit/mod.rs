@@ -1,5 +1,5 @@
 //! Everything that can be done to a scene, as functions from a scene to a scene. Text in, text out;
-//! no terminal, no file, no clock.
+//! no terminal, no clock, and no file but those that a scene names, each looked for when it is named.
 //!
 //! Every function leaves the given scene as it was and either returns an [`Edit`] whose scene has no
 //! faults, or a [`Refusal`] that says why not. The given scene must have no faults.
@@ -91,7 +91,8 @@ impl Refusal {
 
 impl Edit {
     /// `scene` as an edit if it has no faults, otherwise the first of them.
-    fn checked(scene: Scene, subject: Subject, label: String) -> Result<Self, Refusal> {
+    fn checked(mut scene: Scene, subject: Subject, label: String) -> Result<Self, Refusal> {
+        scene.resolve();
         match scene.faults().into_iter().next() {
             Some(fault) => Err(Refusal { found: fault.found, help: fault.help }),
             None => Ok(Self { scene, subject, label, note: None }),

@@ -69,7 +69,12 @@ pub(super) fn write(scene: &Scene, subject: &Subject, values: Table) -> Result<S
         Subject::Ambient => fill(Some(&mut next.ambient), values)?,
         Subject::Background => fill(Some(&mut next.background), values)?,
         Subject::Light(i) => fill(next.lights.get_mut(*i), values)?,
-        Subject::Object(i) => fill(next.objects.get_mut(*i), values)?,
+        Subject::Object(i) => {
+            fill(next.objects.get_mut(*i), values)?;
+            if let (Some(new), Some(old)) = (next.objects.get_mut(*i), scene.objects.get(*i)) {
+                new.shape.resolve_as(&old.shape);
+            }
+        }
         Subject::Material(name) => fill(next.materials.get_mut(name), values)?,
         Subject::Film => fill(Some(&mut next.film), values)?,
         Subject::Trace => fill(Some(&mut next.trace), values)?,

@@ -336,7 +336,7 @@ impl<S: Real> Compounds<S> {
             if open.none() {
                 break;
             }
-            let mut hit = Hit { t: limit, item: L::tag(0) };
+            let mut hit = Hit::nearer_than(limit);
             self.meet(&self.compounds[*compound as usize], 0, ray, open, &mut hit);
             blocked = blocked | hit.t.lt(limit);
         }

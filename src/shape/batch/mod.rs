@@ -6,6 +6,7 @@ mod convex;
 mod ellipsoid;
 mod flat;
 mod interval;
+mod mesh;
 mod span;
 mod sphere;
 mod tapered;
@@ -16,6 +17,7 @@ use compound::Compounds;
 use convex::Convex;
 use ellipsoid::Ellipsoid;
 use flat::{Parallelogram, Plane};
+pub use mesh::Meshes;
 use sphere::Sphere;
 use std::ops::Range;
 use tapered::Tapered;
@@ -44,13 +46,21 @@ pub struct Hit<L> {
     pub t: L,
     /// Tag of the item met; meaningless where nothing was.
     pub item: L,
+    /// Tag of the triangle of a mesh met; meaningless elsewhere.
+    pub facet: L,
 }
 
 impl<L: Lanes> Hit<L> {
     /// Nothing met.
     #[inline(always)]
     pub fn none() -> Self {
-        Self { t: L::of(L::MAX), item: L::tag(0) }
+        Self::nearer_than(L::of(L::MAX))
+    }
+
+    /// Nothing met yet, and nothing to be met at `t` or beyond.
+    #[inline(always)]
+    pub(super) fn nearer_than(t: L) -> Self {
+        Self { t, item: L::tag(0), facet: L::tag(0) }
     }
 
     /// Takes `t` and `item` where `t` is positive, nearer than what is known, and `mask` is true.
@@ -72,6 +82,7 @@ impl<L: Lanes> Hit<L> {
         }
         self.t = L::select(nearer, other.t, self.t);
         self.item = L::select(nearer, other.item, self.item);
+        self.facet = L::select(nearer, other.facet, self.facet);
     }
 }
 
@@ -113,11 +124,14 @@ pub enum Batch<L: Lanes> {
     Tapered(Vec<Tapered<L::Scalar>>),
     /// Compounds, whose items are parts.
     Compounds(Compounds<L::Scalar>),
+    /// Meshes.
+    Meshes(Meshes<L::Scalar>),
 }
 
-/// The same expression for the items of any form but compounds, and one for those.
+/// The same expression for the items of any form but compounds and meshes, and one for each of those.
 macro_rules! each {
-    ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr) => {
+    ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
+        $meshes:ident => $third:expr) => {
         match $batch {
             Batch::Parallelograms($items) => $value,
             Batch::Planes($items) => $value,
@@ -126,6 +140,7 @@ macro_rules! each {
             Batch::Convex($items) => $value,
             Batch::Tapered($items) => $value,
             Batch::Compounds($compounds) => $other,
+            Batch::Meshes($meshes) => $third,
         }
     };
 }
@@ -136,7 +151,8 @@ impl<L: Lanes> Batch<L> {
     pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         each!(self,
             items => closest(&items[range.clone()], base + range.start as u32, ray, hit),
-            compounds => compounds.closest(range, base, ray, hit));
+            compounds => compounds.closest(range, base, ray, hit),
+            meshes => meshes.closest(range, base, ray, hit));
     }
 
     /// Where a surface of the items in `range` lies at a distance in (0, limit) of the ray. May stop
@@ -145,15 +161,17 @@ impl<L: Lanes> Batch<L> {
     pub fn blocked(&self, range: Range<usize>, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         each!(self,
             items => blocked(&items[range], ray, limit, wanted),
-            compounds => compounds.blocked(range, ray, limit, wanted))
+            compounds => compounds.blocked(range, ray, limit, wanted),
+            meshes => meshes.blocked(range, ray, limit, wanted))
     }
 
-    /// The surface of `item` at `point` (near it, from `ray.at(t)`).
+    /// The surface of `item` at `point` (near it, from `ray.at(t)`); `facet`: tag of a mesh's triangle.
     #[inline(always)]
-    pub fn surface(&self, item: usize, point: V3<L>) -> Surface<L> {
+    pub fn surface(&self, item: usize, facet: L, point: V3<L>) -> Surface<L> {
         each!(self,
             items => items[item].surface(point),
-            compounds => compounds.surface(item, point))
+            compounds => compounds.surface(item, point),
+            meshes => meshes.surface(item, facet, point))
     }
 }
 
@@ -198,6 +216,8 @@ pub struct Compiled<L: Lanes> {
     pub sources: Vec<Source>,
     /// How the inventory counts the items: singular and plural.
     pub noun: (&'static str, &'static str),
+    /// What it says behind that.
+    pub detail: String,
     /// Items without an end, which no tree can hold.
     pub infinite: bool,
 }
@@ -215,7 +235,8 @@ pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
             let (sources, items): (Vec<_>, Vec<_>) = made.unzip();
             if !items.is_empty() {
                 let batch = Batch::$batch(items);
-                out.push(Compiled { batch, sources, noun: $noun, infinite: $infinite });
+                let detail = String::new();
+                out.push(Compiled { batch, sources, noun: $noun, detail, infinite: $infinite });
             }
         };
     }
@@ -231,7 +252,34 @@ pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
         .collect();
     if !sources.is_empty() {
         let batch = Batch::Compounds(Compounds::new(forms));
-        out.push(Compiled { batch, sources, noun: ("compound", "compounds"), infinite: false });
+        let (noun, detail) = (("compound", "compounds"), String::new());
+        out.push(Compiled { batch, sources, noun, detail, infinite: false });
+    }
+    let mut triangles = 0;
+    let mut sources = Vec::new();
+    for (form, f) in forms.iter().enumerate() {
+        if let Form::Mesh { mesh, .. } = f {
+            triangles += mesh.mesh().triangles.len();
+            sources.push(Source { form, part: 0 });
+        }
+    }
+    if !sources.is_empty() {
+        let batch = Batch::Meshes(Meshes::new(forms));
+        let detail = format!(" of {} triangles", grouped(triangles));
+        out.push(Compiled { batch, sources, noun: ("mesh", "meshes"), detail, infinite: false });
+    }
+    out
+}
+
+/// `69,451`
+fn grouped(n: usize) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
     }
     out
 }

@@ -1,0 +1,205 @@
+//! Triangle meshes from files.
+
+use super::{Form, Kind, Shape};
+use crate::asset::{AssetError, Mesh, TriangleMesh};
+use crate::value::{Choice, Fault, Field, Takes};
+use glam::{DAffine3, DVec3};
+use serde::{Deserialize, Serialize};
+use std::sync::{Arc, LazyLock};
+
+/// A mesh of triangles from a file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshFile {
+    /// Name of the file, as the scene's author wrote it; empty: the stand-in.
+    #[serde(default)]
+    pub file: String,
+    /// What light sees of the triangles.
+    #[serde(default)]
+    pub normals: Normals,
+    /// What is in the file, once it was looked for.
+    #[serde(skip)]
+    content: Option<Result<Arc<Mesh>, AssetError>>,
+}
+
+/// Normals that light is computed with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Normals {
+    /// Interpolated between those of the vertices.
+    #[default]
+    Smooth,
+    /// The triangles' own.
+    Flat,
+}
+
+const NORMALS: &[Choice] = &[
+    Choice {
+        name: "smooth",
+        doc: "interpolated between the vertices: the file's, else the mean of the triangles around",
+    },
+    Choice { name: "flat", doc: "each triangle's own" },
+];
+
+/// An icosahedron that stands on the origin and is 1 high.
+static STAND_IN: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
+    let golden = 0.5 * (1.0 + 5.0f64.sqrt());
+    let mut corners = Vec::new();
+    for axis in 0..3 {
+        for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
+            let mut corner = [0.0; 3];
+            (corner[axis], corner[(axis + 1) % 3]) = (a, b);
+            corners.push(DVec3::from(corner));
+        }
+    }
+    // Edges are 2 long; every three corners that are such neighbours are a triangle.
+    let near = |a: usize, b: usize| corners[a].distance_squared(corners[b]) < 4.1;
+    let mut triangles = Vec::new();
+    for a in 0..12 {
+        for b in (a + 1..12).filter(|b| near(a, *b)) {
+            for c in (b + 1..12).filter(|c| near(a, *c) && near(b, *c)) {
+                let [p, q, r] = [a, b, c].map(|i| corners[i]);
+                let outward = (q - p).cross(r - p).dot(p) > 0.0;
+                triangles.push(if outward { [a, b, c] } else { [a, c, b] }.map(|i| i as u32));
+            }
+        }
+    }
+    let (half, scale) = (0.5, 0.5 / golden);
+    let mut bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+    let place = |corner: &DVec3| {
+        let position = (*corner * scale + DVec3::Y * half).to_array().map(|x| x as f32);
+        for (axis, x) in position.into_iter().enumerate() {
+            bounds[0][axis] = bounds[0][axis].min(x);
+            bounds[1][axis] = bounds[1][axis].max(x);
+        }
+        position
+    };
+    Arc::new(Mesh::new(TriangleMesh {
+        positions: corners.iter().map(place).collect(),
+        center: [0.0; 3],
+        triangles,
+        normals: None,
+        uvs: None,
+        colors: Vec::new(),
+        color_of: Vec::new(),
+        bounds,
+        notes: Vec::new(),
+    }))
+});
+
+impl MeshFile {
+    /// What is drawn: the file's mesh, or the stand-in while there is none.
+    fn mesh(&self) -> &Arc<Mesh> {
+        match &self.content {
+            Some(Ok(mesh)) => mesh,
+            _ => &STAND_IN,
+        }
+    }
+}
+
+impl Kind for MeshFile {
+    const DOC: &'static str = "Triangles from a file: OBJ (with the colours of its MTL), PLY, STL, glTF or GLB. Placed by \
+         `transform`. Light falls on the side from which the corners of a triangle turn \
+         counter-clockwise, and on the other if its material is two-sided.";
+    const EXAMPLE: &'static str =
+        "shape.mesh = { file = \"scenes/meshes/knot.ply\", normals = \"smooth\" }";
+    const FIELDS: &'static [Field] = &[
+        Field::preset(
+            "file",
+            Takes::Text,
+            "",
+            "\"\"",
+            "Name of the file, relative to the folder of the scene file. Empty: an icosahedron \
+             stands in.",
+        ),
+        Field::preset(
+            "normals",
+            Takes::Choice(NORMALS),
+            "",
+            "\"smooth\"",
+            "What light sees: curved triangles or flat ones.",
+        ),
+    ];
+
+    fn form(&self) -> Form {
+        let mesh = self.mesh().clone();
+        Form::Mesh {
+            scene_from_mesh: DAffine3::from_translation(mesh.mesh().center.into()),
+            smooth: self.normals == Normals::Smooth,
+            mesh,
+        }
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        match &self.content {
+            Some(Err(error)) => {
+                vec![Fault::new("file", error.what(), error.expected.clone())]
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The stand-in at the origin: only a transform places it.
+    fn standing(_: DVec3, _: DVec3) -> Self {
+        Self { file: String::new(), normals: Normals::Smooth, content: None }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        Vec::new()
+    }
+
+    fn turn(&mut self, _: f64) -> bool {
+        false
+    }
+}
+
+impl Shape {
+    /// Takes what `load` finds in the file that the shape names, if it has not been looked for yet.
+    pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
+        if let Self::MeshFile(mesh) = self
+            && !mesh.file.is_empty()
+            && mesh.content.is_none()
+        {
+            mesh.content = Some(load(&mesh.file));
+        }
+    }
+
+    /// Takes over what `other` found in a file, if this shape names the same.
+    pub fn resolve_as(&mut self, other: &Self) {
+        if let (Self::MeshFile(new), Self::MeshFile(old)) = (self, other)
+            && new.file == old.file
+        {
+            new.content.clone_from(&old.content);
+        }
+    }
+
+    /// The file that the shape names, if it names one.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::MeshFile(mesh) if !mesh.file.is_empty() => Some(&mesh.file),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_stand_in_is_an_icosahedron_on_the_origin() {
+        let mesh = STAND_IN.mesh();
+        assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 20));
+        let form = MeshFile::standing(DVec3::ZERO, DVec3::ONE).form();
+        let (low, high) = form.bounds().unwrap();
+        assert!((low - DVec3::new(-0.5, 0.0, -0.5)).length() < 1e-6, "{low}");
+        assert!((high - DVec3::new(0.5, 1.0, 0.5)).length() < 1e-6, "{high}");
+        // All corners as far from the middle as any; all fronts outside.
+        let point = |i: u32| DVec3::from(mesh.positions[i as usize].map(f64::from)) - DVec3::Y * 0.5;
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(point);
+            assert!((b - a).cross(c - a).dot(a) > 0.0);
+            assert!((a.length() - point(0).length()).abs() < 1e-6);
+        }
+    }
+}
