@@ -18,6 +18,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "scene",
             "shape",
             "material",
+            "asset",
             "light",
             "camera",
             "value",
@@ -29,8 +30,8 @@ const ROOMS: &[(&str, &[&str])] = &[
     (
         "dashboard",
         &[
-            "render", "world", "scene", "shape", "material", "light", "camera", "value", "film",
-            "sampling", "lanes",
+            "render", "world", "scene", "shape", "material", "asset", "light", "camera", "value",
+            "film", "sampling", "lanes",
         ],
     ),
     ("measure", &["render", "world", "scene", "material", "film", "sampling"]),

@@ -22,8 +22,7 @@ impl Source {
     /// # Errors
     /// If it cannot be read, or is no regular file, or is larger.
     pub fn read(path: &Path, limit: u64) -> Result<Self, AssetError> {
-        let file = File::open(path).map_err(|e| unreadable(path, &e))?;
-        let metadata = file.metadata().map_err(|e| unreadable(path, &e))?;
+        let metadata = std::fs::metadata(path).map_err(|e| unreadable(path, &e))?;
         let wrong = |found: String, expected: &str| {
             Err(AssetError {
                 file: path.to_path_buf(),
@@ -39,6 +38,8 @@ impl Source {
             let found = format!("the file has {} MiB", metadata.len() >> 20);
             return wrong(found, &format!("at most {} MiB", limit >> 20));
         }
+        // Only now: to open a pipe is to wait for its writer.
+        let file = File::open(path).map_err(|e| unreadable(path, &e))?;
         let mut bytes = Vec::with_capacity(metadata.len() as usize);
         // One byte more than the limit tells of a file that grew meanwhile.
         file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| unreadable(path, &e))?;

@@ -1,13 +1,15 @@
 //! `zerkalo check`: is a scene valid, and what is in it?
 
 use super::args::CheckArgs;
+use super::files::Told;
 use super::{Failure, say, warn};
 use crate::film::{TILE, TILE_PIXELS};
 use crate::scene::Document;
 use crate::world::{self, AnyWorld};
 
 pub fn run(args: &CheckArgs) -> Result<(), Failure> {
-    let document = Document::read(&args.scene).map_err(|e| Failure::Failed(e.to_string()))?;
+    let document = Document::read_with(&args.scene, Told::new().assets)
+        .map_err(|e| Failure::Failed(e.to_string()))?;
     for warning in document.warnings() {
         warn(&format!("warning: {warning}"));
     }

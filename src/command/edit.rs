@@ -1,7 +1,9 @@
 //! `zerkalo [SCENE]`: the dashboard.
 
 use super::args::{ColorArg, EditArgs};
+use super::files::Told;
 use super::{Failure, all_threads, say, warn};
+use crate::asset::Assets;
 use crate::dashboard::message::Exported;
 use crate::dashboard::run::{Colors, DEFAULT_STOP, Setup, run as run_dashboard};
 use crate::film::Display;
@@ -14,6 +16,7 @@ use std::env;
 use std::fs::File;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What the built-in scene is called.
 const BUILT_IN_NAME: &str = "mirror-room.toml";
@@ -27,11 +30,13 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
              one"
         )));
     }
+    let told = Told::new();
     let file = match &args.scene {
-        Some(path) => opened(path)?,
+        Some(path) => opened(path, told.assets.clone())?,
         None => SceneFile::untitled(BUILT_IN.to_string(), BUILT_IN_NAME)
             .map_err(|errors| (PathBuf::new(), errors)),
     };
+    told.hush();
     let setup = Setup {
         file,
         threads: args.threads.map_or_else(all_threads, usize::from),
@@ -63,8 +68,11 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
 
 /// The scene's file. One that can be read but holds no scene is the dashboard's to show: its user may
 /// mend it meanwhile.
-fn opened(path: &Path) -> Result<Result<SceneFile, (PathBuf, SceneErrors)>, Failure> {
-    match SceneFile::open(path) {
+fn opened(
+    path: &Path,
+    assets: Arc<Assets>,
+) -> Result<Result<SceneFile, (PathBuf, SceneErrors)>, Failure> {
+    match SceneFile::open_with(path, assets) {
         Ok(file) => Ok(Ok(file)),
         Err(errors) => {
             let readable = File::open(path).and_then(|file| file.metadata());

@@ -4,6 +4,7 @@ mod args;
 mod check;
 mod cpu;
 mod edit;
+mod files;
 mod measure;
 mod new;
 mod progress;

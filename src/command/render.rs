@@ -1,6 +1,7 @@
 //! `zerkalo render`: a scene file to a picture file.
 
 use super::args::RenderArgs;
+use super::files::Told;
 use super::progress::Progress;
 use super::signals::Signals;
 use super::stats::{Stats, peak_rss_bytes};
@@ -26,7 +27,8 @@ const POLL: Duration = Duration::from_millis(50);
 pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let target =
         Target::from_path(&args.output).map_err(|error| Failure::Usage(error.to_string()))?;
-    let document = Document::read(&args.scene).map_err(|e| Failure::Failed(e.to_string()))?;
+    let document = Document::read_with(&args.scene, Told::new().assets)
+        .map_err(|e| Failure::Failed(e.to_string()))?;
     let scene = sized(document.scene(), args)?;
     // What cannot be written had better be known before the work than after it.
     target.check_writable().map_err(failed_write)?;

@@ -1,11 +1,11 @@
 //! A scene file as text with its comments, beside the scene that it describes.
 
-use super::{Library, Scene};
-use crate::asset::Assets;
 use super::locate::located;
 use super::message::{Message, SceneErrors};
 use super::read::read_text;
 use super::rewrite::rewrite;
+use super::{Library, Scene};
+use crate::asset::Assets;
 use std::path::Path;
 use std::sync::Arc;
 use toml_edit::DocumentMut;

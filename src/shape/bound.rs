@@ -78,15 +78,14 @@ impl Bound {
                 // The largest singular value is at most the root of the sum of squares.
                 Ball { center: map.translation, radius: (x + y + z).sqrt() }
             }
-            Form::Tapered { .. }
-            | Form::Compound(_)
-            | Form::Mesh { .. }
-            | Form::Plane { .. } => match form.bounds() {
-                Some((low, high)) => {
-                    Ball { center: 0.5 * (low + high), radius: 0.5 * low.distance(high) }
+            Form::Tapered { .. } | Form::Compound(_) | Form::Mesh { .. } | Form::Plane { .. } => {
+                match form.bounds() {
+                    Some((low, high)) => {
+                        Ball { center: 0.5 * (low + high), radius: 0.5 * low.distance(high) }
+                    }
+                    None => Ball { center: DVec3::ZERO, radius: f64::INFINITY },
                 }
-                None => Ball { center: DVec3::ZERO, radius: f64::INFINITY },
-            },
+            }
         };
         let plane = match form {
             Form::Parallelogram { corner, u, v } => {

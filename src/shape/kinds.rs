@@ -3,7 +3,8 @@
 use super::Form;
 use super::compound::OF_FIELDS;
 use super::{
-    Cone, Cube, Cuboid, Cylinder, Difference, Intersection, MeshFile, Plane, Platform, Prism, Pyramid,
+    Cone, Cube, Cuboid, Cylinder, Difference, Intersection, MeshFile, Plane, Platform, Prism,
+    Pyramid,
 };
 use super::{Rectangle, Sphere, TaperedCylinder, Union, UnitCylinder};
 use crate::value::{Fault, Field, Takes, rounded_to};

@@ -195,7 +195,8 @@ mod tests {
         assert!((low - DVec3::new(-0.5, 0.0, -0.5)).length() < 1e-6, "{low}");
         assert!((high - DVec3::new(0.5, 1.0, 0.5)).length() < 1e-6, "{high}");
         // All corners as far from the middle as any; all fronts outside.
-        let point = |i: u32| DVec3::from(mesh.positions[i as usize].map(f64::from)) - DVec3::Y * 0.5;
+        let point =
+            |i: u32| DVec3::from(mesh.positions[i as usize].map(f64::from)) - DVec3::Y * 0.5;
         for t in &mesh.triangles {
             let [a, b, c] = t.map(point);
             assert!((b - a).cross(c - a).dot(a) > 0.0);

@@ -80,6 +80,8 @@ fn surface_and_volume(form: &Form) -> Option<(f64, f64)> {
         Form::Tapered { scene_from_unit: m, top } => Some(tapered(m.matrix3, *top)),
         // Not convex: measured by their chords in `compound.rs`.
         Form::Compound(_) => None,
+        // Not convex in general.
+        Form::Mesh { .. } => None,
         Form::Parallelogram { u, v, .. } => Some((2.0 * u.cross(*v).length(), 0.0)),
         Form::Plane { .. } => None,
     }

@@ -7,9 +7,12 @@ use glam::DVec3;
 use zerkalo::lanes::{Double, Lanes, Single};
 use zerkalo::shape::{Cuboid, Form, Geometry, Kind};
 
-/// Convex solids: compounds have tests of their own.
+/// Convex solids: compounds and meshes have tests of their own.
 fn is_solid(form: &Form) -> bool {
-    !matches!(form, Form::Parallelogram { .. } | Form::Plane { .. } | Form::Compound(_))
+    !matches!(
+        form,
+        Form::Parallelogram { .. } | Form::Plane { .. } | Form::Compound(_) | Form::Mesh { .. }
+    )
 }
 
 /// A point well inside a solid.

@@ -96,9 +96,7 @@ impl<S: Real> Placed<S> {
         // Lanes that met something else may hold any tag.
         let number = |lane| (facet.tag_lane(lane) as usize).min(triangles.len() - 1);
         std::array::from_fn(|k| {
-            V3::from_fn(|lane| {
-                of[triangles[number(lane)][k] as usize].map(|x| S::of(f64::from(x)))
-            })
+            V3::from_fn(|lane| of[triangles[number(lane)][k] as usize].map(|x| S::of(f64::from(x))))
         })
     }
 
@@ -178,12 +176,7 @@ impl<S: Real> Meshes<S> {
 
     /// The surface of `item` at `point`, which lies near its triangles tagged `facet`.
     #[inline(never)]
-    pub fn surface<L: Lanes<Scalar = S>>(
-        &self,
-        item: usize,
-        facet: L,
-        point: V3<L>,
-    ) -> Surface<L> {
+    pub fn surface<L: Lanes<Scalar = S>>(&self, item: usize, facet: L, point: V3<L>) -> Surface<L> {
         let item = &self.items[item];
         let triangle = item.triangle(facet);
         // Neither the largest nor the smallest triangle may lose its area to the range of numbers.

@@ -1,0 +1,396 @@
+//! Meshes in scenes: the files that come with the program, pictures against shapes known by formula,
+//! no holes, normals, colours, and files that are wrong or change.
+
+mod support;
+
+use glam::DVec3;
+use std::f64::consts::{PI, TAU};
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use support::{picture, rendered};
+use zerkalo::film::Part;
+use zerkalo::scene::edit::{Subject, add_object, set};
+use zerkalo::scene::{Scene, SceneFile};
+use zerkalo::shape::Form;
+use zerkalo::world::{AnyWorld, Options, Precision, Sight};
+
+/// A tube round a trefoil knot, of quadrilaterals, as binary PLY.
+fn knot() -> Vec<u8> {
+    const ALONG: usize = 240;
+    const AROUND: usize = 24;
+    let curve = |t: f64| {
+        let (x, y) = (t.sin() + 2.0 * (2.0 * t).sin(), t.cos() - 2.0 * (2.0 * t).cos());
+        DVec3::new(x, y, -(3.0 * t).sin())
+    };
+    let mut out = format!(
+        "ply\nformat binary_little_endian 1.0\ncomment A tube round a trefoil knot.\n\
+         element vertex {0}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {0}\nproperty list uchar int vertex_indices\nend_header\n",
+        ALONG * AROUND
+    )
+    .into_bytes();
+    for i in 0..ALONG {
+        let t = TAU * i as f64 / ALONG as f64;
+        let (before, here, after) = (curve(t - 1e-3), curve(t), curve(t + 1e-3));
+        let tangent = (after - before).normalize();
+        let inward = (before + after - 2.0 * here).normalize();
+        let inward = (inward - tangent * inward.dot(tangent)).normalize();
+        let side = tangent.cross(inward);
+        for k in 0..AROUND {
+            let (sin, cos) = (TAU * k as f64 / AROUND as f64).sin_cos();
+            for x in (here + (inward * cos + side * sin) * 0.45).to_array() {
+                // Decimals at which the rounding of no machine shows.
+                out.extend((((x * 1e5).round() / 1e5) as f32).to_le_bytes());
+            }
+        }
+    }
+    for i in 0..ALONG {
+        for k in 0..AROUND {
+            let at = |i: usize, k: usize| (i % ALONG * AROUND + k % AROUND) as i32;
+            out.push(4);
+            for corner in [at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)] {
+                out.extend(corner.to_le_bytes());
+            }
+        }
+    }
+    out
+}
+
+/// A cut stone, as OBJ: a table and a crown of one colour, a pavilion of another.
+fn stone() -> String {
+    let mut out = String::from("# A cut stone.\nmtllib stone.mtl\n");
+    let ring = |out: &mut String, radius: f64, y: f64, turn: f64| {
+        for i in 0..12 {
+            let (sin, cos) = (TAU * (f64::from(i) + turn) / 12.0).sin_cos();
+            writeln!(out, "v {:.6} {y:.6} {:.6}", radius * cos, -radius * sin).unwrap();
+        }
+    };
+    ring(&mut out, 0.6, 0.35, 0.5);
+    ring(&mut out, 1.0, 0.0, 0.0);
+    writeln!(out, "v 0 -1 0").unwrap();
+    let (table, girdle, tip) = (|i: usize| i % 12 + 1, |i: usize| i % 12 + 13, 25);
+    out += "usemtl crown\nf";
+    (0..12).for_each(|i| write!(out, " {}", table(i)).unwrap());
+    out += "\n";
+    for i in 0..12 {
+        writeln!(out, "f {} {} {}", table(i), girdle(i), girdle(i + 1)).unwrap();
+        writeln!(out, "f {} {} {}", table(i), girdle(i + 1), table(i + 1)).unwrap();
+    }
+    out += "usemtl pavilion\n";
+    for i in 0..12 {
+        writeln!(out, "f {} {tip} {}", girdle(i), girdle(i + 1)).unwrap();
+    }
+    out
+}
+
+const STONE_COLORS: &str = "newmtl crown\nKd 0.55 0.75 0.85\nnewmtl pavilion\nKd 0.10 0.30 0.60\n";
+
+#[test]
+fn the_files_are_what_makes_them() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/meshes");
+    for (name, made) in [
+        ("knot.ply", knot()),
+        ("stone.obj", stone().into_bytes()),
+        ("stone.mtl", STONE_COLORS.as_bytes().to_vec()),
+    ] {
+        let path = folder.join(name);
+        if std::env::var_os("ZERKALO_BLESS").is_some() {
+            fs::write(&path, &made).unwrap();
+        }
+        assert!(fs::read(&path).unwrap() == made, "{name}");
+    }
+}
+
+/// A ball of radius 1 around the origin as OBJ, its corners on the sphere.
+fn ball(rings: usize, sides: usize) -> String {
+    let mut text = String::from("v 0 1 0\n");
+    for ring in 1..rings {
+        let (across, y) = (PI * ring as f64 / rings as f64).sin_cos();
+        for side in 0..sides {
+            let (sin, cos) = (TAU * side as f64 / sides as f64).sin_cos();
+            writeln!(text, "v {} {y} {}", across * cos, across * sin).unwrap();
+        }
+    }
+    text += "v 0 -1 0\n";
+    let last = (rings - 1) * sides + 2;
+    let at = |ring: usize, side: usize| (ring - 1) * sides + side % sides + 2;
+    for side in 0..sides {
+        writeln!(text, "f 1 {} {}", at(1, side + 1), at(1, side)).unwrap();
+        for ring in 1..rings - 1 {
+            let [a, b] = [at(ring, side), at(ring, side + 1)];
+            let [c, d] = [at(ring + 1, side), at(ring + 1, side + 1)];
+            writeln!(text, "f {a} {b} {d} {c}").unwrap();
+        }
+        writeln!(text, "f {last} {} {}", at(rings - 1, side), at(rings - 1, side + 1)).unwrap();
+    }
+    text
+}
+
+/// A folder with mesh files, and scenes that name them.
+struct Desk(tempfile::TempDir);
+
+impl Desk {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn put(&self, name: &str, text: &str) -> PathBuf {
+        let path = self.0.path().join(name);
+        fs::write(&path, text).unwrap();
+        path
+    }
+
+    fn scene(&self, text: &str) -> Scene {
+        Scene::read(&self.put("scene.toml", text)).unwrap_or_else(|e| panic!("{e}"))
+    }
+}
+
+const VIEW: &str = "
+    [film]
+    size = [96, 96]
+    [camera]
+    eye = [0.4, 1.1, 3.4]
+    target = [0.0, 0.0, 0.0]
+    view_angle.vertical = 40.0
+    [background]
+    color = [0.0, 0.0, 1.0]
+    [[light]]
+    point = { position = [3.0, 4.0, 5.0] }
+    [materials.matt]
+    color = [1.0, 0.0, 0.0]
+    diffuse = 1.0
+    [[object]]
+    material = \"matt\"
+";
+
+fn sights(scene: &Scene, precision: Precision) -> Vec<Sight> {
+    let [width, height] = scene.film.size.map(|n| n as usize);
+    let world = AnyWorld::compile(scene, &Options { precision });
+    let points: Vec<[f64; 2]> = (0..width * height)
+        .map(|i| [(i % width) as f64 + 0.37, (i / width) as f64 + 0.61])
+        .collect();
+    let mut seen = vec![Sight::NOTHING; points.len()];
+    world.look(&points, &mut seen);
+    seen
+}
+
+#[test]
+fn a_mesh_of_a_sphere_is_met_where_the_sphere_is() {
+    let desk = Desk::new();
+    desk.put("ball.obj", &ball(200, 400));
+    let sphere =
+        desk.scene(&(VIEW.to_string() + "shape.sphere = { center = [0, 0, 0], radius = 1 }"));
+    let mesh = desk.scene(&(VIEW.to_string() + "shape.mesh = { file = \"ball.obj\" }"));
+    for precision in [Precision::Single, Precision::Double] {
+        let (a, b) = (sights(&sphere, precision), sights(&mesh, precision));
+        let mut both = 0;
+        for (a, b) in a.iter().zip(&b) {
+            // The faces lie at most 1 - cos(pi / 400) inside, which shows most at the rim.
+            let (n, m) =
+                (DVec3::from(a.normal.map(f64::from)), DVec3::from(b.normal.map(f64::from)));
+            if a.object.is_some() && b.object.is_some() {
+                both += 1;
+                assert!((a.depth - b.depth).abs() < 0.01, "{a:?} {b:?}");
+                assert!(n.dot(m) > 0.995, "{a:?} {b:?}");
+            } else {
+                assert!(b.object.is_none(), "the mesh lies inside the sphere");
+            }
+        }
+        let sphere_pixels = a.iter().filter(|s| s.object.is_some()).count();
+        assert!(both * 100 > sphere_pixels * 99, "{both} of {sphere_pixels}");
+    }
+    let [sphere, smooth] = [&sphere, &mesh].map(|scene| rendered(scene, 7, Precision::Auto, 16));
+    let [sphere, smooth] = [&sphere, &smooth].map(|r| picture(r, Part::Mean));
+    let difference = |a: &[[f64; 3]], b: &[[f64; 3]]| {
+        a.iter().zip(b).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>() / a.len() as f64
+    };
+    let apart = difference(&sphere, &smooth);
+    assert!(apart < 1e-3, "{apart}");
+}
+
+/// The blue background shines in no pixel whose surroundings all show the mesh, and the red mesh is
+/// nowhere lit from inside.
+#[test]
+fn a_closed_mesh_has_no_holes() {
+    let desk = Desk::new();
+    for (rings, sides) in [(7, 12), (90, 181)] {
+        desk.put("ball.obj", &ball(rings, sides));
+        for normals in ["smooth", "flat"] {
+            let text =
+                format!("{VIEW}shape.mesh = {{ file = \"ball.obj\", normals = \"{normals}\" }}");
+            let scene = desk.scene(&text);
+            for precision in [Precision::Single, Precision::Double] {
+                let rendering = rendered(&scene, 3, precision, 16);
+                let pixels = picture(&rendering, Part::Mean);
+                let blue = |x: usize, y: usize| pixels[y * 96 + x][2];
+                let mut inner = 0;
+                for y in 0..96usize {
+                    for x in 0..96usize {
+                        let (dx, dy) = (x as f64 - 47.5, y as f64 - 47.5);
+                        // The ball's image has a radius of about 37 pixels.
+                        if dx.hypot(dy) < 33.0 {
+                            inner += 1;
+                            assert_eq!(blue(x, y), 0.0, "{x} {y} {rings} {normals}");
+                        }
+                    }
+                }
+                assert!(inner > 3000);
+            }
+        }
+    }
+}
+
+/// A lamp inside a closed mesh lights nothing outside it; one behind it lights no smooth front.
+#[test]
+fn no_light_leaks_through_a_mesh() {
+    let desk = Desk::new();
+    desk.put("ball.obj", &ball(6, 9));
+    for (lamp, normals) in [([0.1, -0.1, 0.2], "smooth"), ([0.1, -0.1, 0.2], "flat")] {
+        let text = VIEW.replace("[3.0, 4.0, 5.0]", &format!("{lamp:?}"));
+        let text = format!("{text}shape.mesh = {{ file = \"ball.obj\", normals = \"{normals}\" }}");
+        let rendering = rendered(&desk.scene(&text), 3, Precision::Single, 64);
+        let brightest = picture(&rendering, Part::Mean).iter().fold(0.0f64, |m, p| m.max(p[0]));
+        assert_eq!(brightest, 0.0, "{normals}");
+    }
+}
+
+/// A big flat triangle under a grazing lamp has no shadow of its own, near and far from the origin.
+#[test]
+fn triangles_do_not_shade_themselves() {
+    let desk = Desk::new();
+    for at in [0.0, 100.0] {
+        let corners = [[-9.0, 0.0, 9.0], [9.0, 0.0, 9.0], [0.0, 0.0, -20.0]];
+        let mut text = String::new();
+        for [x, y, z] in corners {
+            writeln!(text, "v {} {y} {z}", x + at).unwrap();
+        }
+        desk.put("floor.obj", &(text + "f 1 2 3\n"));
+        let view = VIEW
+            .replace("eye = [0.4, 1.1, 3.4]", &format!("eye = [{:?}, 2.0, 2.0]", 0.4 + at))
+            .replace("target = [0.0, 0.0, 0.0]", &format!("target = [{at:?}, 0.0, 0.0]"))
+            .replace("[3.0, 4.0, 5.0]", &format!("[{:?}, 0.002, 2.0]", 8.0 + at));
+        let scene = desk.scene(&format!("{view}shape.mesh = {{ file = \"floor.obj\" }}"));
+        let pixels = picture(&rendered(&scene, 3, Precision::Auto, 8), Part::Mean);
+        let dark = pixels.iter().filter(|p| p[2] == 0.0 && p[0] == 0.0).count();
+        let seen = pixels.iter().filter(|p| p[2] == 0.0).count();
+        assert!(seen > 4000 && dark == 0, "{dark} of {seen} at {at}");
+    }
+}
+
+#[test]
+fn flat_normals_show_the_triangles() {
+    let desk = Desk::new();
+    desk.put("ball.obj", &ball(6, 9));
+    let sphere =
+        desk.scene(&(VIEW.to_string() + "shape.sphere = { center = [0, 0, 0], radius = 1 }"));
+    let mesh = |normals: &str| {
+        let shape = format!("shape.mesh = {{ file = \"ball.obj\", normals = \"{normals}\" }}");
+        desk.scene(&(VIEW.to_string() + &shape))
+    };
+    let pictures = [sphere, mesh("smooth"), mesh("flat")]
+        .map(|scene| picture(&rendered(&scene, 7, Precision::Auto, 16), Part::Mean));
+    // Within the silhouettes of both, where the lamp shines on all.
+    let apart = |which: usize| {
+        let inner = (0..96 * 96).filter(|i| {
+            let (x, y) = ((i % 96) as f64 - 47.5, (i / 96) as f64 - 47.5);
+            x.hypot(y) < 20.0
+        });
+        inner.map(|i| (pictures[which][i][0] - pictures[0][i][0]).powi(2)).sum::<f64>()
+    };
+    let (smooth, flat) = (apart(1), apart(2));
+    assert!(smooth * 4.0 < flat, "{smooth} {flat}");
+}
+
+#[test]
+fn colours_of_the_file_multiply_the_materials() {
+    let desk = Desk::new();
+    desk.put("two.mtl", "newmtl a\nKd 0.5 0.25 0.0\nnewmtl b\nKd 0 0 0.5\n");
+    let square = "mtllib two.mtl\nv -1 -1 0\nv 0 -1 0\nv 1 -1 0\nv -1 1 0\nv 0 1 0\nv 1 1 0\n";
+    desk.put("two.obj", &format!("{square}usemtl a\nf 1 2 5 4\nusemtl b\nf 2 3 6 5\n"));
+    let text = "
+        film.size = [8, 8]
+        camera = { eye = [0.0, 0.0, 1.0], direction = [0.0, 0.0, -1.0], view_angle.vertical = 40.0 }
+        ambient.color = [1.0, 1.0, 1.0]
+        [materials.m]
+        color = [0.5, 0.5, 1.0]
+        ambient = 1.0
+        diffuse = 0.5
+        [[light]]
+        directional = { direction = [0.0, 0.0, -1.0] }
+        [[object]]
+        material = \"m\"
+        shape.mesh = { file = \"two.obj\" }
+    ";
+    let pixels = picture(&rendered(&desk.scene(text), 1, Precision::Auto, 2), Part::Mean);
+    for (pixel, expected) in [(24, [0.25, 0.125, 0.0]), (31, [0.0, 0.0, 0.5])] {
+        for c in 0..3 {
+            // Ambient light and the lamp, whose white matt surface has the brightness 1.
+            let value = expected[c] * 1.5;
+            assert!((pixels[pixel][c] - value).abs() < 1e-4, "{pixel} {:?}", pixels[pixel]);
+        }
+    }
+}
+
+#[test]
+fn a_wrong_name_is_refused_where_it_is_typed_and_a_right_one_read_once() {
+    let desk = Desk::new();
+    let ball_file = desk.put("ball.obj", &ball(6, 9));
+    desk.put("broken.obj", "v 0 0 0\nf 1 2 3\n");
+    let scene =
+        desk.scene(&(VIEW.to_string() + "shape.sphere = { center = [0, 0, 0], radius = 1 }"));
+    let edit = add_object(&scene, "mesh", None).unwrap();
+    let subject = edit.subject.clone();
+    let typed = |scene: &Scene, text: &str| set(scene, &subject, "shape.mesh.file", text);
+    for (text, words) in [
+        ("bell.obj", "there is no such file"),
+        ("broken.obj", "broken.obj:2: "),
+        ("scene.toml", "\"toml\" is not a kind of mesh file"),
+        (".", "not"),
+    ] {
+        let refusal = typed(&edit.scene, text).unwrap_err().to_string();
+        assert!(refusal.contains(words), "{text}: {refusal}");
+    }
+    let named = typed(&edit.scene, "ball.obj").unwrap().scene;
+    let mesh = |scene: &Scene| match scene.objects[1].form() {
+        Form::Mesh { mesh, .. } => mesh,
+        other => panic!("{other:?}"),
+    };
+    let triangles = mesh(&named).mesh().triangles.len();
+    assert_eq!(triangles, 2 * 9 * 5);
+    // Once read it stays, whatever is edited and whatever becomes of the file.
+    fs::remove_file(ball_file).unwrap();
+    let flat = set(&named, &subject, "shape.mesh.normals", "flat").unwrap().scene;
+    let turned = set(&flat, &subject, "transform", "rotate_y").unwrap().scene;
+    let lit = set(&turned, &Subject::Ambient, "color", "0.5 0.5 0.5").unwrap().scene;
+    assert_eq!(mesh(&lit), mesh(&named));
+    assert!(typed(&lit, "other.obj").is_err());
+    assert!(lit.faults().is_empty());
+}
+
+#[test]
+fn a_scene_is_not_saved_where_it_would_lose_its_mesh() {
+    let desk = Desk::new();
+    desk.put("ball.obj", &ball(6, 9));
+    let text = VIEW.to_string() + "shape.mesh = { file = \"ball.obj\" }";
+    let path = desk.put("scene.toml", &text);
+    let elsewhere = tempfile::tempdir().unwrap();
+    let mut file = SceneFile::open(&path).unwrap();
+    let scene = file.document().scene().clone();
+    let other = elsewhere.path().join("scene.toml");
+    let refusal = file.save_as(&other, &scene, false).unwrap_err().to_string();
+    assert!(refusal.contains("\"ball.obj\"") && !other.exists(), "{refusal}");
+    let beside = desk.0.path().join("copy.toml");
+    file.save_as(&beside, &scene, false).unwrap();
+    assert!(Scene::read(&beside).is_ok());
+    // Where another file has the name, it is another mesh.
+    fs::write(elsewhere.path().join("ball.obj"), ball(5, 5)).unwrap();
+    assert!(file.save_as(&other, &scene, false).is_err());
+}
+
+#[test]
+fn the_inventory_counts_triangles() {
+    let scene = support::shipped("shape-mesh.toml");
+    let inventory = AnyWorld::compile(&scene, &Options::default()).inventory().to_string();
+    assert!(inventory.contains("4 meshes of 23,106 triangles (list)"), "{inventory}");
+}
