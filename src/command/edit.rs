@@ -30,13 +30,13 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
              one"
         )));
     }
-    let told = Told::new();
+    let reading = Told::new();
     let file = match &args.scene {
-        Some(path) => opened(path, told.assets.clone())?,
+        Some(path) => opened(path, reading.assets.clone())?,
         None => SceneFile::untitled(BUILT_IN.to_string(), BUILT_IN_NAME)
             .map_err(|errors| (PathBuf::new(), errors)),
     };
-    told.hush();
+    reading.hush();
     let setup = Setup {
         file,
         threads: args.threads.map_or_else(all_threads, usize::from),

@@ -8,7 +8,7 @@ use super::{Edit, Refusal, Subject};
 use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::Material;
 use crate::scene::{Object, Scene};
-use crate::shape::{Form, KINDS, Scale, Shape, Step};
+use crate::shape::{Form, KINDS, Shape};
 use crate::value::{Color, clean, number, rounded_to, significant};
 use glam::DVec3;
 
@@ -78,25 +78,9 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
             own
         }
     };
-    let transform = placing(&shape, base, room);
-    next.objects.push(Object { name, material, shape, transform });
+    next.objects.push(Object { name, material, shape, transform: Vec::new() });
     let subject = Subject::Object(next.objects.len() - 1);
     Edit::checked(next, subject, format!("add {kind}"))
-}
-
-/// The steps that put a shape onto `base`, about as large as `size`, which only a transform can place.
-fn placing(shape: &Shape, base: DVec3, size: DVec3) -> Vec<Step> {
-    let (movable, form) = (!shape.clone().anchors().is_empty(), shape.form());
-    let Some((low, high)) = form.bounds().filter(|_| !movable) else { return Vec::new() };
-    let (extent, size) = ((high - low).max_element(), size.max_element());
-    let foot = (0.5 * (low + high)).with_y(low.y);
-    // Compounds stand there by their parts.
-    if extent.max(size) < 2.0 * extent.min(size) && foot.distance(base) < size {
-        return Vec::new();
-    }
-    let factor = significant(size / extent, 2);
-    let shift = (base - foot * factor).map(|x| clean(x, size));
-    vec![Step::Scale(Scale([factor; 3])), Step::Translate(shift.to_array())]
 }
 
 /// The length of a new thing: that of the solids that are there (the middle one of them), between a
