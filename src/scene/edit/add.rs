@@ -7,7 +7,7 @@ use super::rows::Word;
 use super::{Edit, Refusal, Subject};
 use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::Material;
-use crate::scene::{Object, Scene};
+use crate::scene::{Object, Scale, Scene, Step};
 use crate::shape::{Form, KINDS, Shape};
 use crate::value::{Color, clean, number, rounded_to, significant};
 use glam::DVec3;
@@ -78,9 +78,21 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
             own
         }
     };
-    next.objects.push(Object { name, material, shape, transform: Vec::new() });
+    let transform =
+        if shape.anchors().is_empty() { upright_steps(&shape, base, size) } else { Vec::new() };
+    next.objects.push(Object { name, material, shape, transform });
     let subject = Subject::Object(next.objects.len() - 1);
     Edit::checked(next, subject, format!("add {kind}"))
+}
+
+/// Steps that put a shape which has no place of its own on `base`, its z axis upright, `size` large.
+fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<Step> {
+    let turned = shape.form().transformed(&Step::RotateX(-90.0).map());
+    let Some((low, high)) = turned.bounds() else { return Vec::new() };
+    let factor = size / (high - low).max_element();
+    let foot = DVec3::new(0.5 * (low.x + high.x), low.y, 0.5 * (low.z + high.z));
+    let by = base - factor * foot;
+    vec![Step::RotateX(-90.0), Step::Scale(Scale([factor; 3])), Step::Translate(by.to_array())]
 }
 
 /// The length of a new thing: that of the solids that are there (the middle one of them), between a
