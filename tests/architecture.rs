@@ -73,7 +73,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("serde", &["command", "scene", "shape", "material", "light", "camera", "value"]),
     ("serde_json", &["command"]),
     ("signal_hook", &["command", "dashboard"]),
-    ("tempfile", &["film", "scene", "command"]),
+    ("tempfile", &["film", "command", "scene", "dashboard"]),
     // Descriptions read their own examples in tests.
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),
     ("toml_edit", &["scene"]),

@@ -95,8 +95,8 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<Step> {
     vec![Step::RotateX(-90.0), Step::Scale(Scale([factor; 3])), Step::Translate(by.to_array())]
 }
 
-/// The length of a new thing: that of the solids that are there (the middle one of them), between a
-/// hundredth and half of the scene's; 1 in an empty scene.
+/// The length of a new thing: somewhat less than that of the solids that are there (the middle one of
+/// them), and than half of the scene's; 1 in an empty scene.
 fn usual_size(scene: &Scene) -> f64 {
     let Ball { radius, .. } = scene_bounds(scene);
     let solid = |object: &Object| {
@@ -111,7 +111,7 @@ fn usual_size(scene: &Scene) -> f64 {
         None if scene.objects.is_empty() => 1.0,
         None => 0.25 * radius,
     };
-    significant(size, 1)
+    significant(0.6 * size, 1)
 }
 
 /// Turns a flat thing that stands upright so that its front is towards the camera.
