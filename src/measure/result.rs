@@ -182,7 +182,7 @@ mod tests {
     fn crossings_lie_on_the_power_law() {
         // error = 8 / sqrt(spp)
         let way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
-        let at = way.crossing(1.4142135623730951).unwrap();
+        let at = way.crossing(2f64.sqrt()).unwrap();
         assert!((at.spp - 32.0).abs() < 1e-9 && (at.seconds - 0.064).abs() < 1e-12, "{at:?}");
         assert!(!at.at_most && (at.spread - 0.25).abs() < 1e-12);
         assert!(way.crossing(3.0).unwrap().at_most);
