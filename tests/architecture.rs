@@ -84,7 +84,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("signal_hook", &["command", "dashboard"]),
     ("stl_io", &["asset"]),
     // In `asset` only tests do.
-    ("tempfile", &["film", "scene", "command", "asset"]),
+    ("tempfile", &["film", "command", "scene", "dashboard", "asset"]),
     // Descriptions read their own examples in tests.
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),
     ("tobj", &["asset"]),

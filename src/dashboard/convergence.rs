@@ -41,8 +41,10 @@ impl Convergence {
             return;
         };
         let point = Point { seconds: report.seconds, spp: report.spp.mean, noise_codes };
-        // Without new samples (a light was dimmed, the work rests) only the error can be another.
         match self.points.last_mut() {
+            // The estimate is still the one that was made then.
+            Some(last) if last.noise_codes == point.noise_codes => {}
+            // Without new samples (a light was dimmed, the work rests) only the error is another.
             Some(last) if last.seconds >= point.seconds => *last = point,
             _ => self.points.push(point),
         }

@@ -27,8 +27,6 @@ pub fn svg(measurement: &Measurement, title: &str) -> Result<String, Box<dyn Err
 /// # Errors
 /// What the drawing library says.
 pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn Error>> {
-    // Only the first call can register it.
-    let _ = register_font("sans-serif", FontStyle::Normal, UBUNTU_LIGHT);
     let mut bytes = vec![0; SIZE.0 as usize * SIZE.1 as usize * 3];
     draw(BitMapBackend::with_buffer(&mut bytes, SIZE), measurement, title)?;
     Ok(bytes)
@@ -48,6 +46,8 @@ fn draw<B: DrawingBackend>(
 where
     B::ErrorType: 'static,
 {
+    // Drawings look alike on every machine; a font that is registered already stays.
+    let _ = register_font("sans-serif", FontStyle::Normal, UBUNTU_LIGHT);
     let lines: Vec<(&Measured, Vec<(f64, f64)>)> = measurement
         .measured
         .iter()

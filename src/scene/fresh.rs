@@ -1,6 +1,6 @@
 //! New pieces of a scene file: only what differs from the defaults, in the layout of the reference.
 
-use crate::value::{Field, Preset, Takes};
+use crate::value::{Color, Field, Preset, Takes};
 use toml::Value;
 use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table};
 
@@ -44,8 +44,21 @@ pub(super) fn fresh(takes: Takes, value: &Value, headers: bool) -> Item {
             let entries = list.iter().map(|v| fresh_entry(takes, v).into_inline_table());
             Item::Value(toml_edit::Value::Array(entries.collect::<Array>()))
         }
+        (Takes::Color(_), value) => Item::Value(color_leaf(value)),
         _ => Item::Value(leaf(value)),
     }
+}
+
+/// A colour: three numbers, or `#rrggbb` where that stands for it and the numbers would be long.
+fn color_leaf(value: &Value) -> toml_edit::Value {
+    let code = color(value).filter(|c| c.0.iter().any(|x| x.fract() != 0.0));
+    code.and_then(Color::to_hex).map_or_else(|| leaf(value), toml_edit::Value::from)
+}
+
+/// Three numbers.
+pub(super) fn color(value: &Value) -> Option<Color> {
+    let channels: Vec<f64> = value.as_array()?.iter().filter_map(Value::as_float).collect();
+    channels.try_into().ok().map(Color)
 }
 
 /// An entry of a list that takes `list`, as a table that can become an inline one.

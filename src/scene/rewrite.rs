@@ -5,7 +5,7 @@
 //! that.
 
 use super::align::align;
-use super::fresh::{fresh, fresh_entry, leaf};
+use super::fresh::{color, fresh, fresh_entry, leaf};
 use super::keep::Keeper;
 use super::schema;
 use crate::value::{Color, Field, Takes};
@@ -282,11 +282,6 @@ fn edit_leaf(item: &mut Item, old: Option<&Value>, new: &Value) {
     // A colour that is written `#rrggbb` stays so as long as a code stands for it.
     let code = if value.is_str() { color(new).and_then(Color::to_hex) } else { None };
     replace(value, code.map_or_else(|| leaf(new), toml_edit::Value::from));
-}
-
-fn color(value: &Value) -> Option<Color> {
-    let channels: Vec<f64> = value.as_array()?.iter().filter_map(Value::as_float).collect();
-    channels.try_into().ok().map(Color)
 }
 
 /// Puts `new` where `place` is, with the comments and spaces around it.

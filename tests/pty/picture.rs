@@ -40,8 +40,8 @@ impl Picture {
                 let weight = part(0, x) * part(1, y);
                 area += weight;
                 let pixel = 3 * (y * self.size[0] + x);
-                for c in 0..3 {
-                    sum[c] += weight * linear(f64::from(self.rgb[pixel + c]) / 255.0);
+                for (sum, code) in sum.iter_mut().zip(&self.rgb[pixel..]) {
+                    *sum += weight * linear(f64::from(*code) / 255.0);
                 }
             }
         }

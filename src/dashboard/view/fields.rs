@@ -11,9 +11,11 @@ use crate::dashboard::panels::{FieldLine, Line};
 use crate::dashboard::places::wrapped;
 use crate::film::Display;
 use crate::scene::edit::Entry;
+use crate::value::{number, significant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::{Modifier, Style};
+use std::borrow::Cow;
 
 /// The unit of lengths: told under the cursor only.
 const LENGTH: &str = "scene units";
@@ -123,7 +125,7 @@ impl Fields<'_> {
             words_value if words && chosen => {
                 to.put("‹ ", value).put(words_value, value).put(" ›", value)
             }
-            given => to.put(given, value),
+            given => to.put(&brief(given), value),
         };
         // A word that nearly every number has would only be noise.
         let telling = chosen || field.unit != LENGTH;
@@ -189,4 +191,14 @@ pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     to.put_wide(skip(editor.text(), hidden), width, style);
     let column = editor.cursor_columns().saturating_sub(hidden).min(width) as u16;
     Some(Position { x: x + column, y })
+}
+
+/// A number in at most six significant digits: what an editor then holds has all of them.
+fn brief(value: &str) -> Cow<'_, str> {
+    /// Longest number shown with all its digits, in characters.
+    const SHORT: usize = 9;
+    match value.parse::<f64>() {
+        Ok(x) if value.len() > SHORT && x.is_finite() => number(significant(x, 6)).into(),
+        _ => value.into(),
+    }
 }

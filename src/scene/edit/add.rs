@@ -7,7 +7,7 @@ use super::rows::Word;
 use super::{Edit, Refusal, Subject};
 use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::Material;
-use crate::scene::{Object, Scene};
+use crate::scene::{Object, Scale, Scene, Step};
 use crate::shape::{Form, KINDS, Shape};
 use crate::value::{Color, clean, number, rounded_to, significant};
 use glam::DVec3;
@@ -78,13 +78,32 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
             own
         }
     };
-    next.objects.push(Object { name, material, shape, transform: Vec::new() });
+    let transform =
+        if shape.anchors().is_empty() { upright_steps(&shape, base, size) } else { Vec::new() };
+    next.objects.push(Object { name, material, shape, transform });
     let subject = Subject::Object(next.objects.len() - 1);
     Edit::checked(next, subject, format!("add {kind}"))
 }
 
-/// The length of a new thing: that of the solids that are there (the middle one of them), between a
-/// hundredth and half of the scene's; 1 in an empty scene.
+/// Steps that put a shape which has no place of its own upright on `base`, `size` large.
+fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<Step> {
+    // The canonical cylinder stands along z; meshes and compounds have y upwards as scenes have.
+    let mut steps = match shape {
+        Shape::UnitCylinder(_) => vec![Step::RotateX(-90.0)],
+        _ => Vec::new(),
+    };
+    let Some((low, high)) = shape.form().transformed(&chained(&steps)).bounds() else {
+        return Vec::new();
+    };
+    let factor = size / (high - low).max_element();
+    let foot = DVec3::new(0.5 * (low.x + high.x), low.y, 0.5 * (low.z + high.z));
+    let by = base - factor * foot;
+    steps.extend([Step::Scale(Scale([factor; 3])), Step::Translate(by.to_array())]);
+    steps
+}
+
+/// The length of a new thing: somewhat less than that of the solids that are there (the middle one of
+/// them), and than half of the scene's; 1 in an empty scene.
 fn usual_size(scene: &Scene) -> f64 {
     let Ball { radius, .. } = scene_bounds(scene);
     let solid = |object: &Object| {
@@ -99,7 +118,7 @@ fn usual_size(scene: &Scene) -> f64 {
         None if scene.objects.is_empty() => 1.0,
         None => 0.25 * radius,
     };
-    significant(size, 1)
+    significant(0.6 * size, 1)
 }
 
 /// Turns a flat thing that stands upright so that its front is towards the camera.

@@ -5,7 +5,7 @@ use super::{Edit, Refusal, Subject};
 use crate::camera::Camera;
 use crate::scene::{Object, Scene, Step};
 use crate::shape::Form;
-use crate::value::{clean, significant};
+use crate::value::{decade, rounded_to, significant};
 use glam::{DVec2, DVec3};
 
 /// Lowers (or lifts) an object until its lowest point rests on the highest surface below its middle,
@@ -106,11 +106,12 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
         forms.iter().filter(|f| is_solid(f)).filter_map(Form::bounds).collect();
     let walls: Vec<&Form> = forms.iter().filter(|form| !is_solid(form)).collect();
     let floors: Vec<&Form> = walls.iter().copied().filter(|form| is_level(form)).collect();
-    let scale = size.min_element();
+    // New places are round numbers: of a thing one metre wide, whole centimetres.
+    let grid = decade(size.min_element()) - 2;
     let candidate = |offset: DVec2| {
         let at = DVec3::new(aim.x + offset.x, aim.y, aim.z + offset.y);
         let ground = ground_under(&floors, at).unwrap_or(aim.y - size.y / 2.0);
-        DVec3::new(clean(at.x, scale), significant(ground, 13), clean(at.z, scale))
+        DVec3::new(rounded_to(at.x, grid), significant(ground, 13), rounded_to(at.z, grid))
     };
     let spread = size.x.max(size.z);
     let spots = (0..400).map(|i| {
