@@ -8,7 +8,7 @@ use super::{Edit, Refusal, Subject};
 use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::Material;
 use crate::scene::{Object, Scale, Scene, Step};
-use crate::shape::{Form, KINDS, Shape};
+use crate::shape::{Form, KINDS, Shape, chained};
 use crate::value::{Color, clean, number, rounded_to, significant};
 use glam::DVec3;
 
