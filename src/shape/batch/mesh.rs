@@ -181,7 +181,9 @@ impl<S: Real> Meshes<S> {
         let triangle = item.triangle(facet);
         // Neither the largest nor the smallest triangle may lose its area to the range of numbers.
         let flat = triangle.normal();
-        let flat = flat * (L::one() / flat.max_abs());
+        let largest = flat.max_abs();
+        let sound = largest.gt(L::zero());
+        let flat = V3::select(sound, flat * (L::one() / largest), V3::of([0.0, 0.0, 1.0]));
         let height = flat.dot(item.point(point) - triangle.corners[0]);
         let normal = item.normal(flat);
         let inverse = L::one() / normal.length2().sqrt();
