@@ -9,6 +9,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 use support::{picture, rendered};
+use zerkalo::asset::Assets;
 use zerkalo::film::Part;
 use zerkalo::scene::edit::{Subject, add_object, set};
 use zerkalo::scene::{Scene, SceneFile};
@@ -49,7 +50,7 @@ fn knot() -> Vec<u8> {
         for k in 0..AROUND {
             let at = |i: usize, k: usize| (i % ALONG * AROUND + k % AROUND) as i32;
             out.push(4);
-            for corner in [at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)] {
+            for corner in [at(i, k), at(i, k + 1), at(i + 1, k + 1), at(i + 1, k)] {
                 out.extend(corner.to_le_bytes());
             }
         }
@@ -99,6 +100,19 @@ fn the_files_are_what_makes_them() {
             fs::write(&path, &made).unwrap();
         }
         assert!(fs::read(&path).unwrap() == made, "{name}");
+    }
+}
+
+/// The volume inside a closed mesh whose fronts are outside.
+#[test]
+fn the_files_have_their_fronts_outside() {
+    for (name, volume) in [("knot.ply", 18.0..18.2), ("stone.obj", 1.0..2.0)] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/meshes").join(name);
+        let mesh = Assets::default().mesh(&path).unwrap();
+        let corner = |i: &u32| DVec3::from(mesh.mesh().positions[*i as usize].map(f64::from));
+        let cone = |t: &[u32; 3]| corner(&t[0]).dot(corner(&t[1]).cross(corner(&t[2]))) / 6.0;
+        let inside: f64 = mesh.mesh().triangles.iter().map(cone).sum();
+        assert!(volume.contains(&inside), "{name}: {inside}");
     }
 }
 
