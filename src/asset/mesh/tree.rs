@@ -225,9 +225,9 @@ impl Mesh {
                     continue;
                 }
                 let leaf = &self.leaves[branch.child[i] as usize];
-                for corner in &leaf.corners {
-                    for k in 0..leaf.count as usize {
-                        best = best.max((0..3).map(|a| along(a, corner[a][k])).sum());
+                for [x, y, z] in &leaf.corners {
+                    for ((x, y), z) in x.iter().zip(y).zip(z).take(leaf.count as usize) {
+                        best = best.max(along(0, *x) + along(1, *y) + along(2, *z));
                     }
                 }
             }
