@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use support::{begin, follow, parsed, picture, pool, rendered, settings, shipped, sized};
 use zerkalo::film::{Display, Estimator, Part, TILE};
 use zerkalo::render::Rendering;
-use zerkalo::render::schedule::{Stop, StoppedBy};
+use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::Precision;
 
@@ -342,4 +342,46 @@ fn noise_half_a_code_is_half_a_code_in_the_mirror_room() {
         let achieved = (sum / got.len() as f64 - own * own).max(0.0).sqrt();
         assert!(achieved <= 0.55, "seed {seed}: achieved {achieved} codes");
     }
+}
+
+/// A linear target on the physical mirror room, adaptive by linear error: the true RMSE is the target,
+/// against a reference of another seed.
+fn linear_target_is_met(size: [u32; 2], seeds: u64) {
+    let scene = sized(shipped("mirror-room-physical.toml"), size);
+    let pool = pool(2);
+    let values = |rendering: &Rendering| picture(rendering, Part::Both).concat();
+    let mut reference = begin(&scene, 1000, Precision::Auto);
+    let stop = Stop { spp: Some(3072), ..Stop::default() };
+    let linear = |stop| Settings { criterion: Criterion::Linear, ..settings(true, 0, stop) };
+    assert_eq!(follow(&mut reference, linear(stop), &pool), StoppedBy::Spp);
+    let noise = reference.film.noise(&reference.mix, &Display::default()).unwrap();
+    let (reference, own) = (values(&reference), noise.rmse_linear);
+    let target = 0.00068;
+    assert!(own < 0.3 * target, "the reference has an error of {own} itself");
+    let mut squares = Vec::new();
+    for seed in 0..seeds {
+        let mut rendering = begin(&scene, seed, Precision::Auto);
+        let stop = Stop { rmse_linear: Some(target), ..Stop::default() };
+        assert_eq!(follow(&mut rendering, linear(stop), &pool), StoppedBy::Rmse);
+        let got = values(&rendering);
+        let sum: f64 = got.iter().zip(&reference).map(|(g, r)| (g - r).powi(2)).sum();
+        let achieved = (sum / got.len() as f64 - own * own).sqrt();
+        let spp = rendering.film.samples() as f64 / f64::from(size[0] * size[1]);
+        println!("seed {seed}: {achieved:.6} at {spp:.1} samples per pixel, reference {own:.6}");
+        squares.push(achieved * achieved);
+    }
+    let achieved = mean(squares.iter().copied()).sqrt();
+    assert!(achieved <= 1.05 * target, "achieved {achieved} over {seeds} seeds");
+}
+
+#[test]
+fn a_linear_target_is_met() {
+    linear_target_is_met([96, 72], 4);
+}
+
+/// The picture that the speed figures are about.
+#[test]
+#[ignore = "half a minute: cargo test --test honesty -- --ignored --nocapture"]
+fn a_linear_target_is_met_at_full_size() {
+    linear_target_is_met([640, 480], 3);
 }

@@ -7,4 +7,7 @@ mod editing;
 mod files;
 mod mouse;
 mod random;
+mod roughness;
+#[path = "../support/mod.rs"]
+mod support;
 mod table;

@@ -1,0 +1,69 @@
+//! The roughness keys change what the mirror shows, and nothing else: not one bit.
+
+use crate::desk::Desk;
+use crate::support::{pool, rendered, sized};
+use zerkalo::render::{Guide, Rendering};
+use zerkalo::scene::{BUILT_IN, Scene};
+use zerkalo::value::Color;
+use zerkalo::world::{Precision, Sight};
+
+const SIZE: [u32; 2] = [96, 72];
+const SAMPLES: u32 = 16;
+
+/// The picture of a scene, uniform, always the same samples.
+fn picture(scene: &Scene) -> Rendering {
+    rendered(&sized(scene.clone(), SIZE), 0, Precision::Auto, SAMPLES)
+}
+
+/// Which pixels of two pictures differ in any bit.
+fn changed(a: &Rendering, b: &Rendering) -> Vec<bool> {
+    let [width, height] = SIZE.map(|n| n as usize);
+    let pixel = |r: &Rendering, i: usize| r.film.pixel(i % width, i / width, &r.mix);
+    (0..width * height).map(|i| pixel(a, i) != pixel(b, i)).collect()
+}
+
+/// With the ambient part of the materials that `of` names another: the paths that meet them see it.
+fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> Rendering {
+    let mut scene = scene.clone();
+    for (_, material) in scene.materials.iter_mut().filter(|(name, _)| of(name)) {
+        material.color = Color([0.9, 0.8, 0.7]);
+        material.ambient += 3.0;
+    }
+    picture(&scene)
+}
+
+#[test]
+fn roughness_changes_what_the_mirror_shows_and_not_a_bit_elsewhere() {
+    let mut desk = Desk::new(BUILT_IN);
+    let smooth = desk.scene().clone();
+    // From 0.04 to about 0.1: what is in shadow is lit evenly, and a little blur leaves its middle as it was.
+    desk.keys("] ] ] ] ] ] ] ] ] ]");
+    let rough = desk.scene().clone();
+    let roughness = |scene: &Scene| scene.materials["mirror"].roughness;
+    assert!(roughness(&rough) > 2.0 * roughness(&smooth), "{}", roughness(&rough));
+
+    let before = picture(&smooth);
+    let by_keys = changed(&before, &picture(&rough));
+    let met_mirror = changed(&before, &marked(&smooth, |name| name == "mirror"));
+    let unmet = |i: &usize| !met_mirror[*i];
+    let (mut same, mut wrong) = (0, Vec::new());
+    for i in (0..by_keys.len()).filter(unmet) {
+        if by_keys[i] { wrong.push(i) } else { same += 1 }
+    }
+    assert!(wrong.is_empty(), "pixels whose paths never met the mirror changed: {wrong:?}");
+    assert!(same > 1000, "only {same} pixels have nothing to do with the mirror");
+
+    // Pixels that show the mirror, and in it an object rather than the background.
+    let [width, height] = SIZE.map(|n| n as usize);
+    let size = [width, height];
+    let look = |points: &[[f64; 2]], seen: &mut [Sight]| before.world.look(points, seen);
+    let seen = Guide::new(size, size, look, &pool(2));
+    let mirror = smooth.objects.iter().position(|o| o.name == "mirror").unwrap() as u32;
+    let others = changed(&before, &marked(&smooth, |name| name != "mirror"));
+    let shows = |i: &usize| seen.sights()[*i].object == Some(mirror) && others[*i];
+    let reflections: Vec<usize> = (0..by_keys.len()).filter(shows).collect();
+    let blurred = reflections.iter().filter(|i| by_keys[**i]).count();
+    println!("{blurred} of {} reflections of objects changed", reflections.len());
+    assert!(reflections.len() > 300, "{}", reflections.len());
+    assert!(10 * blurred >= 9 * reflections.len(), "{blurred} of {}", reflections.len());
+}
