@@ -73,7 +73,7 @@ fn surfaces<L: Lanes>(geometry: &Geometry<L>, lines: &[Line]) -> Vec<Vec<Met>> {
 /// The length of a line inside; every surface must be the right way round, in turn.
 fn chord(name: &str, line: &Line, met: &[Met]) -> f64 {
     let told = || format!("{name}: {line:?} {met:?}");
-    assert!(met.len() % 2 == 0, "odd: {}", told());
+    assert!(met.len().is_multiple_of(2), "odd: {}", told());
     for (i, met) in met.iter().enumerate() {
         let cosine = met.normal.dot(line.1);
         assert!(if i % 2 == 0 { cosine < 0.0 } else { cosine > 0.0 }, "{}", told());
