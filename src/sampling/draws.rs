@@ -144,7 +144,11 @@ impl<L: Lanes> Draws<'_, L> {
     /// A number in [0, 1) for choice `number` of a path, from 0: one of two ways to go on.
     #[inline(always)]
     pub fn choice(&self, number: u32) -> L {
-        if number < CHOICES { self.joint(DIMENSIONS - CHOICES as usize + number as usize) } else { self.padded_choice(number - CHOICES) }
+        if number < CHOICES {
+            self.joint(DIMENSIONS - CHOICES as usize + number as usize)
+        } else {
+            self.padded_choice(number - CHOICES)
+        }
     }
 
     /// Dimension `d` of the joint set.
@@ -175,7 +179,8 @@ impl<L: Lanes> Draws<'_, L> {
     #[cold]
     fn padded_choice(&self, number: u32) -> L {
         let per_set = DIMENSIONS as u32;
-        let [x] = self.padded_set((number / per_set + 1) ^ 0x9e37_79b9, [(number % per_set) as usize]);
+        let [x] =
+            self.padded_set((number / per_set + 1) ^ 0x9e37_79b9, [(number % per_set) as usize]);
         x
     }
 

@@ -2,7 +2,7 @@
 
 use super::Scene;
 use super::check::Finding;
-use crate::material::{Highlight, Material};
+use crate::material::{Fresnel, Highlight, Material};
 use crate::value::{Color, number};
 
 impl Scene {
@@ -103,7 +103,8 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     let sum = m.diffuse * m.color.largest() + passed;
     (sum > 1.0 + 1e-9).then(|| {
         let key = if m.reflection > 0.0 { "reflection" } else { "diffuse" };
-        let through = if m.transmission > 0.0 { ", reflection and transmission" } else { " and reflection" };
+        let through =
+            if m.transmission > 0.0 { ", reflection and transmission" } else { " and reflection" };
         let found = format!(
             "diffuse x color, specular{through} add up to {}, more than the light that comes in",
             number((sum * 1000.0).round() / 1000.0)
