@@ -211,18 +211,18 @@ mod tests {
         }
         let straight = at::<Single>(50.0, 1.3, 1.3);
         let (sin, _) = 50f64.to_radians().sin_cos();
-        assert_eq!(straight.refracted.x.lane(3), sin as f32);
+        assert_eq!(Lanes::lane(straight.refracted.x, 3), sin as f32);
         assert!(straight.total.none());
-        assert_eq!(straight.reflectance().lane(0), 0.0);
+        assert_eq!(Lanes::lane(straight.reflectance(), 0), 0.0);
     }
 
     #[test]
     fn packets_equal_width_1() {
         for degrees in [0.0, 30.0, 41.810_3, 41.810_4, 60.0, 89.9] {
             let (wide, one) = (at::<Double>(degrees, 1.5, 1.0), at::<f64>(degrees, 1.5, 1.0));
-            assert_eq!(wide.refracted.lane(1), one.refracted.lane(0));
-            assert_eq!(wide.reflectance().lane(2), one.reflectance());
-            assert_eq!(wide.total.lane(0), one.total);
+            assert_eq!(Lanes::lane(wide.refracted.x, 1), one.refracted.x);
+            assert_eq!(Lanes::lane(wide.reflectance(), 2), one.reflectance());
+            assert_eq!(Mask::lane(wide.total, 0), one.total);
         }
     }
 }
