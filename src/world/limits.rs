@@ -198,7 +198,7 @@ mod tests {
         );
         // From inside, in another solid, or by Fresnel's equations, it is not so simple.
         let told = |scene: &Scene| biases(scene).concat();
-        let cube = "cube = { center = [0.0, 0.0, 0.0], size = 1.0 }";
+        let cube = "box = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0] }";
         assert!(told(&with(0.2, Fresnel::Constant, "[0.0, 0.0, 0.5]", BALL)).contains("no bound"));
         assert!(told(&with(0.2, Fresnel::Constant, outside, cube)).contains("no bound"));
         // 0.5^17 / (1 - 0.5)
