@@ -167,7 +167,7 @@ mod tests {
     fn extreme_25_nothing_is_lost_around_the_critical_angle() {
         for n in [1.0, 1.000_001, 1.5, 1e3] {
             let critical = (1.0f64 / n).asin().to_degrees();
-            for step in -1000..=1000 {
+            for step in -1000..=1000i32 {
                 let degrees = (critical + f64::from(step) * 1e-10 * 57.3).min(90.0);
                 let i = at::<f64>(degrees, n, 1.0);
                 let f = i.reflectance();
@@ -177,7 +177,7 @@ mod tests {
                     assert!((f + transmittance(&i) - 1.0).abs() < 1e-12, "{n} {degrees}");
                     // 1 - F = 4 n cos t / cos i at most, and cos^2 t = 2 d cot c at the distance d
                     // from the critical angle c.
-                    let d = f64::from(step.abs()) * 1e-10 * 57.3f64.to_radians();
+                    let d = f64::from(step.abs()) * 1e-10 * 57.3_f64.to_radians();
                     let cos_t = (2.0 * d * (n * n - 1.0).sqrt()).sqrt();
                     let jump = 4.0 * n * cos_t / (1.0 - 1.0 / (n * n)).sqrt();
                     assert!(f >= 1.0 - 1.01 * jump - 1e-5 * n, "{n} {degrees} {f}");
