@@ -8,13 +8,13 @@ use glam::DVec3;
 use std::hint::black_box;
 use std::sync::atomic::AtomicBool;
 use zerkalo::film::{Display, Estimator, Film, Header, Mix};
-use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
+use zerkalo::lanes::{Double, Lanes, Real, Single, V3};
 use zerkalo::render::pass;
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::shape::{Form, Geometry, Ray};
-use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Precision, Radiance, World};
+use zerkalo::world::{AnyWorld, Options, Precision, World};
 
 const SAMPLING: SampleSettings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
 
@@ -114,30 +114,28 @@ fn list_or_tree(c: &mut Criterion) {
     }
 }
 
-/// Whole paths in every 8th pixel of the physical mirror room: what a packet costs without the film.
+/// Sixteen samples in every pixel of a small physical mirror room on one thread, into the film: what
+/// the lanes bring to a whole render.
 fn paths<L: Lanes>(c: &mut Criterion) {
-    let scene = physical();
+    let mut scene = physical();
+    scene.film.size = [160, 120];
     let world = World::<L>::new(&scene);
-    let sampler = Sampler::<L>::new(SAMPLING, true);
-    let pixels: Vec<(u32, u32)> =
-        (0..60).flat_map(|y| (0..80).map(move |x| (8 * x + 3, 8 * y + 3))).collect();
-    let all = L::zero().le(L::zero());
-    assert!(all.all());
+    let scales = world.scales().to_vec();
+    let mix = Mix { weights: vec![[1.0; 3]; scales.len()] };
+    let estimator = Estimator::new(&scales, &mix, &Display::default());
+    let precision = name::<L>().to_string();
+    let header = Header { width: 160, height: 120, scales, seed: 1, precision };
+    let mut film = Film::new(header);
+    let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first: 0, count: 16 });
+    let wave = Wave { replicate: 0, jobs: jobs.collect(), estimate: false };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
     let mut group = c.benchmark_group("paths");
-    let samples = 16;
-    group.throughput(Throughput::Elements((pixels.len() * samples) as u64));
+    group.throughput(Throughput::Elements(160 * 120 * 16));
     group.bench_function(name::<L>(), |b| {
-        let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
         b.iter(|| {
-            for at in &pixels {
-                let outlook = world.outlook([at.0 as usize, at.1 as usize], [1, 1]);
-                for first in (0..samples).step_by(L::WIDTH) {
-                    let points = sampler.aligned(first as u32);
-                    let draws = points.of_pixel(*at, 0);
-                    let rays = world.view().rays_of(*at, draws.pixel());
-                    black_box(world.trace(rays, outlook.as_ref(), &draws, all, &mut radiance));
-                }
-            }
+            film.restart();
+            let go = AtomicBool::new(false);
+            pass::run_in(&world, &mut film, &wave, &SAMPLING, &estimator, &pool, &go)
         })
     });
 }

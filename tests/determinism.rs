@@ -18,11 +18,18 @@ const SEED: u64 = 29;
 /// Not a multiple of a tile: tiles at the edges are narrower than a packet.
 const SIZE: [u32; 2] = [37, 35];
 
-/// Scenes that between them have every lobe, highlight, kind of light, and several light groups.
+/// Scenes that between them have every lobe, highlight, kind of light, several light groups, and paths
+/// that branch.
 fn scenes() -> Vec<(String, Scene)> {
-    ["mirror-room.toml", "mirror-room-physical.toml", "light-groups.toml", "lobe-ggx.toml"]
-        .map(|name| (name.to_string(), sized(shipped(name), SIZE)))
-        .into()
+    [
+        "mirror-room.toml",
+        "mirror-room-physical.toml",
+        "light-groups.toml",
+        "lobe-ggx.toml",
+        "glass.toml",
+    ]
+    .map(|name| (name.to_string(), sized(shipped(name), SIZE)))
+    .into()
 }
 
 /// The film of samples `0..count` of both replicates.

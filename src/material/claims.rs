@@ -1,6 +1,6 @@
 //! What each model of reflection promises, so that tests can hold it to that.
 
-use super::{Highlight, Lobe, Masking};
+use super::{Fresnel, Highlight, Lobe, Masking};
 
 /// How much of the light that a model gets it gives back, at coefficient 1 and reflectance 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,4 +61,18 @@ impl Highlight {
 impl Masking {
     /// Every formula, in the order of the field table.
     pub const ALL: [Self; 2] = [Self::VCavity, Self::Smith];
+}
+
+impl Fresnel {
+    /// Every law, in the order of the field table.
+    pub const ALL: [Self; 4] = [Self::Constant, Self::Schlick, Self::Exact, Self::Dielectric];
+
+    /// What a transparent surface with this law promises of what it reflects and transmits together.
+    pub fn claims_of_transmission(self) -> Claims {
+        match self {
+            Self::Dielectric => Claims { reciprocal: true, energy: Energy::Kept },
+            // k_r and k_t are not weighted against each other; inner sides do not reflect.
+            _ => Claims { reciprocal: false, energy: Energy::Unbounded },
+        }
+    }
 }

@@ -36,6 +36,20 @@ pub const FIELDS: &[Field] = &[
         "Reflection coefficient k_r: weight of what the surface mirrors.",
     ),
     Field::preset(
+        "transmission",
+        COEFFICIENT,
+        "",
+        "0.0",
+        "Transmission coefficient k_t: weight of what shows through the surface; 0 is opaque.",
+    ),
+    Field::preset(
+        "index",
+        Takes::Number(Range::closed(0.1, 1e4)),
+        "",
+        "1.5",
+        "Index of refraction n of the inside; outside of everything it is 1.",
+    ),
+    Field::preset(
         "roughness",
         Takes::Number(Range::closed(0.0, 1e6)),
         "",
@@ -120,6 +134,11 @@ const FRESNELS: &[Choice] = &[
         name: "exact",
         doc: "Fresnel's equations for the index of refraction that F0 stands for",
     },
+    Choice {
+        name: "dielectric",
+        doc: "Fresnel's equations for `index`: `reflection` weighs the share F that is reflected, \
+              `transmission` the share 1 - F that is not",
+    },
 ];
 
 const METALS: &[Choice] = &[
@@ -132,7 +151,7 @@ const METALS: &[Choice] = &[
 #[cfg(test)]
 mod tests {
     use super::{FIELDS, METALS};
-    use crate::material::{Material, Metal};
+    use crate::material::{Fresnel, Material, Metal};
     use crate::value::Color;
 
     #[test]
@@ -154,6 +173,8 @@ mod tests {
             specular: f64::INFINITY,
             exponent: -1.0,
             reflection: -0.1,
+            transmission: -0.1,
+            index: 0.0,
             roughness: -1e-9,
             alpha: Some(-1.0),
             reflectance: Some(Color([1.1, 0.0, 0.0])),
@@ -167,6 +188,8 @@ mod tests {
             "specular",
             "exponent",
             "reflection",
+            "transmission",
+            "index",
             "roughness",
             "alpha",
             "reflectance",
@@ -177,5 +200,11 @@ mod tests {
         assert!(bad.faults().is_empty());
         bad.reflectance = Some(Color::WHITE);
         assert_eq!(bad.faults()[0].key, "metal");
+        let dielectric = Material { fresnel: Some(Fresnel::Dielectric), ..Material::default() };
+        assert!(dielectric.faults().is_empty());
+        bad = Material { metal: Some(Metal::Gold), ..dielectric.clone() };
+        assert_eq!(bad.faults()[0].key, "fresnel");
+        bad = Material { reflectance: Some(Color::WHITE), ..dielectric };
+        assert_eq!(bad.faults()[0].key, "fresnel");
     }
 }

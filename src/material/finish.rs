@@ -1,7 +1,7 @@
 //! A material, compiled: only numbers that the kernel needs.
 
 use super::fresnel::Reflectance;
-use super::{Highlight, Lobe, Masking, Material};
+use super::{Fresnel, Highlight, Lobe, Masking, Material};
 use crate::lanes::Real;
 
 /// Microfacet slopes below this are mirrors (for reflected rays) or this (for highlights of lights).
@@ -71,6 +71,18 @@ pub enum Spread<S> {
     Facets(Facets<S>),
 }
 
+/// How a surface lets light through.
+#[derive(Clone, Copy, Debug)]
+pub struct Transmission<S> {
+    /// k_t.
+    pub strength: S,
+    /// Index of refraction of the inside.
+    pub index: S,
+    /// Fresnel's equations share the light between reflection and transmission; otherwise k_r and k_t
+    /// are what they are.
+    pub dielectric: bool,
+}
+
 /// A material, compiled.
 #[derive(Clone, Copy, Debug)]
 pub struct Finish<S> {
@@ -82,8 +94,12 @@ pub struct Finish<S> {
     pub shine: Shine<S>,
     /// k_r and its spread, if it reflects at all.
     pub reflection: Option<(S, Spread<S>)>,
-    /// F of highlight and reflection.
+    /// k_t and what bends the light, if it lets any through.
+    pub transmission: Option<Transmission<S>>,
+    /// F of the highlight.
     pub reflectance: Reflectance<S>,
+    /// F of the reflection, as far as it does not depend on what lies on the other side.
+    pub mirrored: Reflectance<S>,
     /// Whether lights matter to it.
     pub wants_light: bool,
     /// Whether its back is like its front.
@@ -97,7 +113,7 @@ pub fn one_minus_cos_of_tan(r: f64) -> f64 {
 }
 
 impl<S: Real> Finish<S> {
-    /// Compiles `material`; `reflects`: the scene traces reflections at all.
+    /// Compiles `material`; `reflects`: the scene traces reflected and transmitted rays at all.
     pub fn new(material: &Material, reflects: bool) -> Self {
         let slope = material.slope().max(SMOOTH_ALPHA);
         let facets = |ggx| Facets::new(ggx, slope, material.masking);
@@ -119,14 +135,24 @@ impl<S: Real> Finish<S> {
             Lobe::Beckmann => Spread::Facets(facets(false)),
             Lobe::Ggx => Spread::Facets(facets(true)),
         };
-        let k_r = material.reflection;
+        let (k_r, k_t) = (material.reflection, material.transmission);
+        let dielectric = material.law() == Fresnel::Dielectric;
+        let transmission = (reflects && k_t > 0.0).then(|| Transmission {
+            strength: S::of(k_t),
+            index: S::of(material.index),
+            dielectric,
+        });
+        let reflectance = Reflectance::new(material);
+        let shared = dielectric && transmission.is_some();
         let black = material.diffuse == 0.0 || material.color.0 == [0.0; 3];
         Self {
             ambient: material.color.0.map(|c| S::of(c * material.ambient)),
             diffuse: material.color.0.map(|c| S::of(c * material.diffuse)),
             shine,
             reflection: (reflects && k_r > 0.0).then(|| (S::of(k_r), spread)),
-            reflectance: Reflectance::new(material),
+            transmission,
+            reflectance,
+            mirrored: if shared { Reflectance::white() } else { reflectance },
             wants_light: !black || material.specular != 0.0,
             two_sided: material.two_sided,
         }

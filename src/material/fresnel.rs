@@ -12,6 +12,12 @@ pub fn index_from_f0(f0: f64) -> f64 {
     (1.0 + root) / (1.0 - root)
 }
 
+/// Share of the light that a dielectric of index `n` reflects at normal incidence: its inverse,
+/// ((n - 1) / (n + 1))^2.
+pub fn f0_from_index(n: f64) -> f64 {
+    ((n - 1.0) / (n + 1.0)).powi(2)
+}
+
 /// A reflectance, compiled.
 #[derive(Clone, Copy, Debug)]
 pub struct Reflectance<S> {
@@ -24,11 +30,19 @@ pub struct Reflectance<S> {
 }
 
 impl<S: Real> Reflectance<S> {
+    /// 1 at every angle.
+    pub fn white() -> Self {
+        Self::new(&Material::default())
+    }
+
     /// Of a material: its F0 (white if it names none) under its law.
     pub fn new(material: &Material) -> Self {
         let f0 = material.f0().0;
         let law = material.law();
-        let index2 = f0.map(|f| index_from_f0(f).powi(2) - 1.0);
+        let index2 = match law {
+            Fresnel::Dielectric => [material.index.powi(2) - 1.0; 3],
+            _ => f0.map(|f| index_from_f0(f).powi(2) - 1.0),
+        };
         let total = f0.map(|f| f >= 1.0 - f64::powi(2.0, -24));
         Self {
             law,
@@ -43,7 +57,7 @@ impl<S: Real> Reflectance<S> {
     pub fn times<L: Lanes<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> V3<L> {
         match self.law {
             Fresnel::Constant => V3::splat(self.f0) * value,
-            Fresnel::Schlick | Fresnel::Exact => self.at(c()) * value,
+            Fresnel::Schlick | Fresnel::Exact | Fresnel::Dielectric => self.at(c()) * value,
         }
     }
 
@@ -60,6 +74,10 @@ impl<S: Real> Reflectance<S> {
                 rest.mul_add(k2 * k2 * k, f0)
             }
             Fresnel::Exact => V3::new(self.exact(c, 0), self.exact(c, 1), self.exact(c, 2)),
+            Fresnel::Dielectric => {
+                let f = self.exact(c, 0);
+                V3::new(f, f, f)
+            }
         }
     }
 

@@ -4,12 +4,14 @@ mod claims;
 mod fields;
 mod finish;
 mod fresnel;
+mod refraction;
 mod scatter;
 
 pub use claims::{Claims, Energy};
 pub use fields::FIELDS;
-pub use finish::{Facets, Finish, SMOOTH_ALPHA, Shine, Spread, one_minus_cos_of_tan};
-pub use fresnel::{Reflectance, index_from_f0};
+pub use finish::{Facets, Finish, SMOOTH_ALPHA, Shine, Spread, Transmission, one_minus_cos_of_tan};
+pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
+pub use refraction::{Interface, Split};
 pub use scatter::Reflected;
 
 use crate::value::{Checks, Color, Fault};
@@ -33,6 +35,10 @@ pub struct Material {
     pub highlight: Highlight,
     /// Reflection coefficient k_r of the traced reflection.
     pub reflection: f64,
+    /// Transmission coefficient k_t of what shows through the surface.
+    pub transmission: f64,
+    /// Index of refraction n of what the surface encloses; 1 outside of everything.
+    pub index: f64,
     /// Radius of the reflection cone's base at unit distance; 0: a perfect mirror.
     pub roughness: f64,
     /// How the reflected ray is spread.
@@ -102,6 +108,9 @@ pub enum Fresnel {
     Schlick,
     /// The Fresnel equations for the index of refraction that F0 stands for.
     Exact,
+    /// The Fresnel equations for the indices of refraction on both sides, F reflected and 1 - F
+    /// transmitted.
+    Dielectric,
 }
 
 /// Metals by reflectance at normal incidence.
@@ -140,6 +149,8 @@ impl Default for Material {
             exponent: 32.0,
             highlight: Highlight::Phong,
             reflection: 0.0,
+            transmission: 0.0,
+            index: 1.5,
             roughness: 0.0,
             lobe: Lobe::Cone,
             alpha: None,
@@ -153,9 +164,13 @@ impl Default for Material {
 }
 
 impl Material {
-    /// Reflectance at normal incidence: the metal's, the given one, or white.
+    /// Reflectance at normal incidence: the metal's, the given one, that of a dielectric, or white.
     pub fn f0(&self) -> Color {
-        self.metal.map(Metal::f0).or(self.reflectance).unwrap_or(Color::WHITE)
+        let own = match self.law() {
+            Fresnel::Dielectric => Color([f0_from_index(self.index); 3]),
+            _ => Color::WHITE,
+        };
+        self.metal.map(Metal::f0).or(self.reflectance).unwrap_or(own)
     }
 
     /// How reflectance depends on the angle.
@@ -178,6 +193,9 @@ impl Material {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<Fault> {
         let both = self.reflectance.is_some() && self.metal.is_some();
+        let dielectric = self.fresnel == Some(Fresnel::Dielectric);
+        let other = if self.metal.is_some() { "metal" } else { "reflectance" };
+        let twice = dielectric && (self.metal.is_some() || self.reflectance.is_some());
         Checks::new(FIELDS)
             .numbers("color", &self.color.0)
             .numbers("ambient", &[self.ambient])
@@ -185,6 +203,8 @@ impl Material {
             .numbers("specular", &[self.specular])
             .numbers("exponent", &[self.exponent])
             .numbers("reflection", &[self.reflection])
+            .numbers("transmission", &[self.transmission])
+            .numbers("index", &[self.index])
             .numbers("roughness", &[self.roughness])
             .maybe("alpha", self.alpha.as_ref().map(std::slice::from_ref))
             .maybe("reflectance", self.reflectance.as_ref().map(|c| &c.0[..]))
@@ -193,6 +213,13 @@ impl Material {
                     "metal",
                     "both metal and reflectance are given",
                     "only one of them: a metal stands for its reflectance",
+                )
+            }))
+            .and(twice.then(|| {
+                Fault::new(
+                    "fresnel",
+                    format!("`dielectric` together with {other}"),
+                    format!("no {other}: the index of refraction gives a dielectric's reflectance"),
                 )
             }))
             .faults()

@@ -188,7 +188,7 @@ impl<S: Real> Finish<S> {
         // The facet that would send this ray: half-way between view and reflected direction, whose
         // cosine with either is half the length of their sum (without cancellation at grazing angles).
         let cos = || ((direction - incident).length2().sqrt() * L::of(0.5)).min(L::one());
-        Reflected { direction, weight: self.reflectance.times(cos, weight) }
+        Reflected { direction, weight: self.mirrored.times(cos, weight) }
     }
 
     /// Reflection at a sampled microfacet. Below the surface G is zero, and so is the weight.
@@ -222,7 +222,7 @@ impl<S: Real> Finish<S> {
         let valid = vh.gt(L::zero()) & light.z.gt(L::zero()) & view.z.gt(L::zero());
         Reflected {
             direction: frame.to_world(light).renormalize(),
-            weight: self.reflectance.times(|| vh, weight).only(valid),
+            weight: self.mirrored.times(|| vh, weight).only(valid),
         }
     }
 

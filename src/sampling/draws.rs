@@ -32,6 +32,9 @@ pub struct SampleSettings {
     pub kind: SamplerKind,
 }
 
+/// The last dimensions of the joint set are for a path's first choices.
+const CHOICES: u32 = 2;
+
 /// The numbers that samples of a lane type start from.
 pub struct Sampler<L: Lanes> {
     settings: SampleSettings,
@@ -138,6 +141,16 @@ impl<L: Lanes> Draws<'_, L> {
         if bounce < 2 { (self.joint(d), self.joint(d + 1)) } else { self.padded(bounce - 2) }
     }
 
+    /// A number in [0, 1) for choice `number` of a path, from 0: one of two ways to go on.
+    #[inline(always)]
+    pub fn choice(&self, number: u32) -> L {
+        if number < CHOICES {
+            self.joint(DIMENSIONS - CHOICES as usize + number as usize)
+        } else {
+            self.padded_choice(number - CHOICES)
+        }
+    }
+
     /// Dimension `d` of the joint set.
     #[inline(always)]
     fn joint(&self, d: usize) -> L {
@@ -154,20 +167,34 @@ impl<L: Lanes> Draws<'_, L> {
         }
     }
 
-    /// Two numbers for lobe `pair` of the padded sets: four lobes share a set of eight dimensions,
-    /// whose indices are shuffled by a key of the set's own.
+    /// Two numbers for lobe `pair` of the padded sets: four lobes share a set.
     #[cold]
     fn padded(&self, pair: u32) -> (L, L) {
-        let set = pair / 4 + 1;
         let d = 2 * (pair % 4) as usize;
+        let [a, b] = self.padded_set((pair / 4 + 1) ^ 0x5bd1_e995, [d, d + 1]);
+        (a, b)
+    }
+
+    /// A number for choice `number` of the padded sets: eight choices share a set.
+    #[cold]
+    fn padded_choice(&self, number: u32) -> L {
+        let per_set = DIMENSIONS as u32;
+        let [x] =
+            self.padded_set((number / per_set + 1) ^ 0x9e37_79b9, [(number % per_set) as usize]);
+        x
+    }
+
+    /// Some dimensions of the padded set `set`, whose indices are shuffled by a key of its own.
+    #[inline(always)]
+    fn padded_set<const N: usize>(&self, set: u32, dimensions: [usize; N]) -> [L; N] {
         let Points { sampler, index, .. } = self.points;
-        let key = mix(self.key + L::Bits::splat(mix1(set ^ 0x5bd1_e995)));
+        let key = mix(self.key + L::Bits::splat(mix1(set)));
         let shuffled = owen(index.reverse(), key).reverse();
         let mut at = [0; MAX_WIDTH];
         for (lane, at) in at.iter_mut().enumerate().take(L::WIDTH) {
             *at = shuffled.lane(lane);
         }
-        let number = |d: usize| {
+        dimensions.map(|d| {
             let seed = mix(key ^ L::Bits::splat(sampler.apart[d]));
             match sampler.settings.kind {
                 SamplerKind::Random => L::unit(mix(mix(*index ^ seed) + key)),
@@ -176,7 +203,6 @@ impl<L: Lanes> Draws<'_, L> {
                     L::unit(owen(x, seed).reverse())
                 }
             }
-        };
-        (number(d), number(d + 1))
+        })
     }
 }

@@ -20,9 +20,19 @@ and every key with a default may be left out. Unknown keys are errors.
   above, for a turn about the vertical.
 - A colour is `[red, green, blue]`, linear, or `\"#rrggbb\"`, sRGB. It may exceed 1.
 - What a surface shows is a sum: `ambient` x colour x ambient light, and for each light `diffuse`
-  x colour x cosine plus `specular` x highlight, and `reflection` x what is mirrored. The parts
-  are not weighted against each other, and the sum may exceed 1; it is clipped only when it is
-  shown.
+  x colour x cosine plus `specular` x highlight, `reflection` x what is mirrored, and
+  `transmission` x what shows through. The parts are not weighted against each other, and the sum
+  may exceed 1; it is clipped only when it is shown.
+- A solid with `transmission` is filled with what has its `index` of refraction: light is bent by
+  Snell's law where it enters and leaves, and totally reflected past the critical angle. Where such
+  solids overlap, the one listed last fills the space and the surfaces of the others are not there:
+  a bubble is listed after its ball. At most four at one point are told apart. A compound is one
+  solid, whose first part with `transmission` gives the index. An open surface (plane, platform,
+  rectangle) is a thin pane: nothing bends.
+- A transparent solid reflects on its outer side only, and past the critical angle; with `fresnel =
+  \"dielectric\"` both sides share the light between `reflection` (x F) and `transmission` (x 1 - F)
+  as physics has it, so that glass has both at 1. What is transmitted is neither blurred nor
+  coloured. Transparent things cast shadows like all others.
 - `roughness` is the radius of the cone's base at unit distance, the tangent of half its opening
   angle. The square lobe has the side that gives the same area, sqrt(pi) x roughness; the
   microfacet lobes take the slope of equal second moment, `alpha` = roughness / (2 sqrt 2), unless

@@ -31,7 +31,7 @@ pub enum Filter {
 pub struct Trace {
     /// What is traced at all.
     pub level: Level,
-    /// The most surfaces that a path meets after the first: 0 is no reflection.
+    /// The most surfaces that a path meets after the first: 0 is no reflection and no transmission.
     pub depth: u32,
     /// A path ends when what it could still add is weighted by less than this.
     pub min_weight: f64,
@@ -150,7 +150,7 @@ pub const TRACE_FIELDS: &[Field] = &[
         Takes::Whole(Range::closed(0.0, 10000.0)),
         "surfaces",
         "16",
-        "The most surfaces that a path meets after the first; 0: no reflection.",
+        "The most surfaces that a path meets after the first; 0: no reflection, no transmission.",
     ),
     Field::preset(
         "min_weight",

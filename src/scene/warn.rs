@@ -2,7 +2,7 @@
 
 use super::Scene;
 use super::check::Finding;
-use crate::material::{Highlight, Material};
+use crate::material::{Fresnel, Highlight, Material};
 use crate::value::{Color, number};
 
 impl Scene {
@@ -95,12 +95,18 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
         Highlight::CookTorrance => m.specular.max(m.reflection),
     };
     let f0 = m.metal.map(|metal| metal.f0()).or(m.reflectance).unwrap_or(Color::WHITE).largest();
-    let sum = m.diffuse * m.color.largest() + mirrored * f0;
+    let passed = match m.law() {
+        // F and 1 - F of the same light.
+        Fresnel::Dielectric => mirrored.max(m.transmission),
+        _ => mirrored * f0 + m.transmission,
+    };
+    let sum = m.diffuse * m.color.largest() + passed;
     (sum > 1.0 + 1e-9).then(|| {
         let key = if m.reflection > 0.0 { "reflection" } else { "diffuse" };
+        let through =
+            if m.transmission > 0.0 { ", reflection and transmission" } else { " and reflection" };
         let found = format!(
-            "diffuse x color, specular and reflection add up to {}, more than the light that comes \
-             in",
+            "diffuse x color, specular{through} add up to {}, more than the light that comes in",
             number((sum * 1000.0).round() / 1000.0)
         );
         (key, found)

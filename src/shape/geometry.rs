@@ -124,6 +124,7 @@ impl<L: Lanes> Geometry<L> {
 
     /// The nearest of some items in front of each ray; of several at the same distance the one with
     /// the lowest number, so that neither the order in the tree nor the other rays of the packet decide.
+    #[inline(always)]
     pub fn closest(&self, ray: &Ray<L>, of: &Selection) -> Hit<L> {
         self.closest_of(ray, of, L::mask(true))
     }
@@ -158,6 +159,7 @@ impl<L: Lanes> Geometry<L> {
     }
 
     /// Which lanes of `wanted` meet any of some items at a distance in (0, limit).
+    #[inline(always)]
     pub fn blocked(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, by: &Selection) -> L::Mask {
         let mut blocked = L::mask(false);
         for (part, range) in &by.runs {

@@ -4,6 +4,7 @@ use super::groups::{Groups, Member};
 use super::guide::Sight;
 use super::inventory::Inventory;
 use super::limits;
+use super::media::Media;
 use super::outlook::{Outlook, Surroundings};
 use crate::camera::View;
 use crate::lanes::{Double, Lanes, Real, Single};
@@ -61,7 +62,9 @@ pub struct World<L: Lanes> {
     pub(super) smooth: bool,
     /// Things have colours of their own.
     pub(super) colored: bool,
-    /// The most reflections of a path.
+    /// What lets light through; `None`: nothing does.
+    pub(super) media: Option<Media<L>>,
+    /// The most surfaces that a path meets after the first.
     pub(super) depth: u32,
     pub(super) min_weight: f64,
     pub(super) fold: bool,
@@ -174,7 +177,7 @@ impl<L: Lanes> World<L> {
         let finishes: Vec<Finish<L::Scalar>> =
             used.iter().map(|m| Finish::new(m, reflects)).collect();
         let geometry = Geometry::new(&placed.forms);
-        let finish_of =
+        let finish_of: Vec<u32> =
             geometry.sources().iter().map(|item| finish_of_object[item.form][item.part]).collect();
 
         let lit = finishes.iter().any(|f| f.wants_light);
@@ -191,7 +194,7 @@ impl<L: Lanes> World<L> {
                 Some(Source { lamp, group, weight })
             })
             .collect();
-        let reflecting = finishes.iter().any(|f| f.reflection.is_some());
+        let going_on = finishes.iter().any(|f| f.reflection.is_some() || f.transmission.is_some());
         let glossy =
             |f: &Finish<_>| matches!(f.reflection, Some((_, s)) if !matches!(s, Spread::Mirror));
         let precision = if L::EPSILON > 1e-10 { "single" } else { "double" };
@@ -208,7 +211,13 @@ impl<L: Lanes> World<L> {
         let eye = (scene.camera.near == 0.0).then(|| view.eye());
         let forms = geometry.sources().iter().map(|s| &placed.forms[s.form]).collect();
         let lamps: Vec<_> = sources.iter().map(|s| s.lamp).collect();
-        let surroundings = Surroundings::new(forms, eye, &lamps);
+        let size = scene.film.size.map(|n| n as usize);
+        let farthest =
+            view.corners([0, 0], size).map(DVec3::length).into_iter().fold(0.0, f64::max);
+        let begin = (view.eye(), scene.camera.near * farthest);
+        let media = Media::new(&placed.forms, geometry.sources(), &finish_of, &finishes, begin);
+        let entered = media.as_ref().map_or(vec![false; finish_of.len()], Media::entered);
+        let surroundings = Surroundings::new(forms, eye, &entered, &lamps);
         Self {
             panorama: surroundings.outlook(&geometry, None),
             surroundings,
@@ -219,7 +228,7 @@ impl<L: Lanes> World<L> {
             smooth: geometry.is_smooth(),
             colored: geometry.is_colored(),
             shadows: level >= Level::Shadows && !geometry.is_empty(),
-            depth: if reflecting { scene.trace.depth } else { 0 },
+            depth: if going_on { scene.trace.depth } else { 0 },
             min_weight: scene.trace.min_weight,
             fold: scene.trace.horizon == Horizon::Fold,
             view,
@@ -227,6 +236,7 @@ impl<L: Lanes> World<L> {
             jitter: scene.film.filter == Filter::Box,
             glossy: finishes.iter().any(glossy),
             biases: limits::biases(scene),
+            media,
             geometry,
             finish_of,
             finishes,

@@ -38,6 +38,12 @@ impl Inventory {
         say(spread(|s| matches!(s, Spread::Square { .. })), "square lobe");
         say(spread(|s| matches!(s, Spread::Facets(f) if !f.ggx)), "Beckmann lobe");
         say(spread(|s| matches!(s, Spread::Facets(f) if f.ggx)), "GGX lobe");
+        let through = |dielectric: bool| {
+            let test = |f: &Finish<S>| f.transmission.as_ref().map(|t| t.dielectric);
+            finishes.iter().any(|f| test(f) == Some(dielectric))
+        };
+        say(through(false), "transmission");
+        say(through(true), "dielectric");
         let absorbs = scene.trace.horizon == Horizon::Absorb;
         say(absorbs && spread(|s| !matches!(s, Spread::Mirror)), "absorbing horizon");
         let count = |n: usize, what: &str| match n {

@@ -6,8 +6,10 @@ mod groups;
 mod guide;
 mod inventory;
 mod limits;
+mod media;
 mod outlook;
 mod path;
+mod through;
 
 pub use compile::{AnyWorld, Options, Precision, World};
 pub use groups::{Groups, MAX_GROUPS, Member};

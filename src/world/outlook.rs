@@ -27,8 +27,14 @@ pub(super) struct Surroundings {
 }
 
 impl Surroundings {
-    /// `eye`: where paths begin; `None`: not known.
-    pub fn new<S: Real>(forms: Vec<&Form>, eye: Option<DVec3>, lamps: &[Lamp<S>]) -> Self {
+    /// `eye`: where paths begin; `None`: not known. `entered`: for each item, whether paths get inside
+    /// it.
+    pub fn new<S: Real>(
+        forms: Vec<&Form>,
+        eye: Option<DVec3>,
+        entered: &[bool],
+        lamps: &[Lamp<S>],
+    ) -> Self {
         let bounds: Vec<Bound> = forms.into_iter().map(Bound::new).collect();
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let towards = lamps.iter().map(|lamp| match lamp {
@@ -37,11 +43,14 @@ impl Surroundings {
             }
             Lamp::Directional { towards } => Towards::Direction(vector(towards)),
         });
-        // The outside of a convex thing does not see itself, and only paths that begin inside get
-        // inside.
-        let hollow =
-            |b: &Bound| !b.is_convex() || !b.is_flat() && eye.is_none_or(|eye| b.ball().holds(eye));
-        Self { towards: towards.collect(), hollow: bounds.iter().map(hollow).collect(), bounds }
+        // The outside of a convex thing does not see itself, and only paths that begin inside, or are
+        // let in, get inside.
+        let hollow = |(b, entered): (&Bound, &bool)| {
+            let holds_eye = || eye.is_none_or(|eye| b.ball().holds(eye));
+            !b.is_convex() || !b.is_flat() && (*entered || holds_eye())
+        };
+        let hollow = bounds.iter().zip(entered).map(hollow).collect();
+        Self { towards: towards.collect(), hollow, bounds }
     }
 
     /// The outlook of camera rays inside `pencil`; `None`: of any rays.

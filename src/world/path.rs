@@ -20,25 +20,26 @@ pub struct Radiance<L> {
 pub struct Counts {
     /// Rays of every kind.
     pub rays: u64,
-    /// A glossy lobe was met.
+    /// A glossy lobe was met, or one of two rays was chosen by chance.
     pub glossy: bool,
 }
 
 /// Where a packet's paths are.
-struct Path<L> {
-    ray: Ray<L>,
+#[derive(Clone, Copy)]
+pub(super) struct Path<L> {
+    pub ray: Ray<L>,
     /// What radiance from along the ray counts.
-    weight: V3<L>,
+    pub weight: V3<L>,
 }
 
 /// The surfaces that a packet met.
-struct Met<L: Lanes> {
+pub(super) struct Met<L: Lanes> {
     /// Normal on the viewer's side that light is computed with.
-    normal: V3<L>,
+    pub normal: V3<L>,
     /// The surface's own, on the viewer's side: the same but on smooth meshes. Light comes from that side.
-    geometric: V3<L>,
+    pub geometric: V3<L>,
     /// Origin of rays that leave on the viewer's side.
-    start: V3<L>,
+    pub start: V3<L>,
     /// Tag of the finish.
     finish: L,
     /// Colour of the thing itself, which multiplies its finish's.
@@ -52,12 +53,12 @@ struct Met<L: Lanes> {
     /// Lanes whose finish has highlights.
     shining: L::Mask,
     /// Lanes whose finish reflects.
-    reflecting: L::Mask,
+    pub reflecting: L::Mask,
 }
 
 /// The first lane's tag, and the lanes of `mask` that share it; `None`: the mask is empty.
 #[inline(always)]
-fn first_tag<L: Lanes>(tags: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
+pub(super) fn first_tag<L: Lanes>(tags: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
     let bits = mask.bits();
     if bits == 0 {
         return None;
@@ -69,13 +70,22 @@ fn first_tag<L: Lanes>(tags: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
 impl<L: Lanes> Met<L> {
     /// Each finish that occurs among `lanes`, with its lanes.
     #[inline(always)]
-    fn finishes(&self, lanes: L::Mask) -> impl Iterator<Item = (usize, L::Mask)> {
+    pub fn finishes(&self, lanes: L::Mask) -> impl Iterator<Item = (usize, L::Mask)> {
         let (finish, mut left) = (self.finish, lanes);
         std::iter::from_fn(move || {
             let (tag, here) = first_tag(finish, left)?;
             left = left.and_not(here);
             Some((tag as usize, here))
         })
+    }
+
+    /// In `lanes` there is no surface.
+    #[inline(always)]
+    pub fn leave_out(&mut self, lanes: L::Mask) {
+        self.finished = self.finished.and_not(lanes);
+        self.lit = self.lit.and_not(lanes);
+        self.shining = self.shining.and_not(lanes);
+        self.reflecting = self.reflecting.and_not(lanes);
     }
 
     /// Takes what is `other`'s in `lanes`, which have nothing yet.
@@ -111,8 +121,12 @@ impl<L: Lanes> World<L> {
             *group = V3::zero();
         }
         let mut counts = Counts::default();
-        let mut path = Path { ray: Ray { origin, direction }, weight: V3::of([1.0; 3]) };
+        let ray = Ray { origin, direction };
         let mut outlook = outlook.unwrap_or(&self.panorama);
+        if let Some(media) = &self.media {
+            return self.trace_through(media, ray, outlook, draws, active, out);
+        }
+        let mut path = Path { ray, weight: V3::of([1.0; 3]) };
         let mut bounce = 0;
         loop {
             counts.rays += u64::from(active.bits().count_ones());
@@ -138,7 +152,7 @@ impl<L: Lanes> World<L> {
 
     /// The surfaces where the active rays end; `None`: there are no such rays.
     #[inline(always)]
-    fn meet(&self, ray: &Ray<L>, hit: &Hit<L>, active: L::Mask) -> Option<Met<L>> {
+    pub(super) fn meet(&self, ray: &Ray<L>, hit: &Hit<L>, active: L::Mask) -> Option<Met<L>> {
         let (item, here) = first_tag(hit.item, active)?;
         let mut met = self.face(ray, hit, item, here);
         if active.and_not(here).any() {
@@ -162,8 +176,6 @@ impl<L: Lanes> World<L> {
         let surface = self.geometry.surface(item, hit.facet, ray.at(hit.t));
         let front = surface.normal.dot(ray.direction).lt(L::zero());
         let geometric = V3::select(front, surface.normal, -surface.normal);
-        // Start above the surface by a few roundings of the largest number involved.
-        let lift = surface.reach.max(surface.point.max_abs()) * L::of(8.0 * L::EPSILON);
         let number = self.finish_of[item as usize];
         let finish = &self.finishes[number as usize];
         let mut normal = geometric;
@@ -184,7 +196,7 @@ impl<L: Lanes> World<L> {
             normal,
             geometric,
             tint,
-            start: geometric.mul_add(lift, surface.point),
+            start: geometric.mul_add(surface.lift(), surface.point),
             finish: L::tag(number),
             diffuse,
             finished,
@@ -196,7 +208,7 @@ impl<L: Lanes> World<L> {
 
     /// Adds what the surfaces return of ambient light and of every lamp.
     #[inline(always)]
-    fn light(
+    pub(super) fn light(
         &self,
         path: &Path<L>,
         met: &Met<L>,
@@ -251,7 +263,7 @@ impl<L: Lanes> World<L> {
 
     /// Turns the paths into the directions of reflections; returns the lanes that go on.
     #[inline(always)]
-    fn bounce(
+    pub(super) fn bounce(
         &self,
         path: &mut Path<L>,
         met: &Met<L>,

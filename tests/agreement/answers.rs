@@ -16,9 +16,12 @@ fn fresnel(material: &Material, c: f64) -> DVec3 {
         Fresnel::Constant => f0,
         Fresnel::Schlick => f0 + (1.0 - f0) * (1.0 - c).powi(5),
         Fresnel::Exact if f0 >= 1.0 => 1.0,
-        Fresnel::Exact => {
+        Fresnel::Exact | Fresnel::Dielectric => {
             // The mean of both polarisations (Fresnel), for light from a vacuum.
-            let n = (1.0 + f0.sqrt()) / (1.0 - f0.sqrt());
+            let n = match material.law() {
+                Fresnel::Dielectric => material.index,
+                _ => (1.0 + f0.sqrt()) / (1.0 - f0.sqrt()),
+            };
             let sin_t = (1.0 - c * c).max(0.0).sqrt() / n;
             let t = (1.0 - sin_t * sin_t).max(0.0).sqrt();
             let s = ((c - n * t) / (c + n * t)).powi(2);

@@ -80,6 +80,18 @@ impl Body {
         nearest
     }
 
+    /// Whether it is flat, with nothing inside.
+    pub fn is_open(&self) -> bool {
+        let pieces = &self.leaves[0].pieces;
+        matches!(self.tree, Tree::Leaf(_))
+            && matches!(pieces[..], [Piece::Polygon(..)] | [Piece::Plane(..)])
+    }
+
+    /// Whether `point` is inside.
+    pub fn holds(&self, point: DVec3) -> bool {
+        self.contains(&self.tree, point)
+    }
+
     fn contains(&self, tree: &Tree, point: DVec3) -> bool {
         let inside = |tree: &Tree| self.contains(tree, point);
         match tree {

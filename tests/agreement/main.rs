@@ -10,6 +10,7 @@ mod compounds;
 #[path = "../support/mod.rs"]
 mod support;
 mod surfaces;
+mod through;
 mod tracer;
 
 use compare::{Picture, keep, reference, rendered, small, variances_differ_by};
@@ -75,6 +76,8 @@ fn deliberate_errors_are_found() {
     ] {
         is_found(mutation, name, &scene, 4 * PLAIN);
     }
+    let transmission = scene("transmission.toml");
+    is_found(Mutation::NoBending, "transmission.toml", &transmission, PLAIN);
     for lobe in [Lobe::Cone, Lobe::Beckmann] {
         let mut scene = scene("roughness-0.3.toml");
         scene.materials.values_mut().for_each(|material| material.lobe = lobe);

@@ -3,6 +3,7 @@
 use crate::answers::{highlight, reflect};
 use crate::common::Numbers;
 use crate::compounds::Body;
+use crate::through::Way;
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::camera::ViewAngle;
@@ -23,14 +24,16 @@ pub enum Mutation {
     Absorb,
     /// The first light's cosine is left out.
     NoCosine,
+    /// Light that enters a solid goes straight on.
+    NoBending,
 }
 
 /// A scene to trace.
 pub struct Tracer<'a> {
-    scene: &'a Scene,
-    bodies: Vec<Body>,
+    pub scene: &'a Scene,
+    pub bodies: Vec<Body>,
     plain: Material,
-    mutation: Mutation,
+    pub mutation: Mutation,
 }
 
 /// Mean and variance of the mean of one pixel's samples.
@@ -40,11 +43,15 @@ pub struct Estimate {
     pub variance: DVec3,
 }
 
-struct Hit<'a> {
-    point: DVec3,
+pub struct Hit<'a> {
+    pub point: DVec3,
     /// On the viewer's side.
-    normal: DVec3,
-    material: &'a Material,
+    pub normal: DVec3,
+    pub material: &'a Material,
+    /// Number of the body.
+    pub body: usize,
+    /// Its outside or front.
+    pub front: bool,
     /// The back of something that has no finish there.
     bare: bool,
 }
@@ -83,6 +90,23 @@ impl<'a> Tracer<'a> {
             let Some(hit) = self.meet(origin, direction) else {
                 return radiance + weight * DVec3::from(self.scene.background.color.0);
             };
+            let through = trace.level == Level::Full && hit.material.transmission > 0.0;
+            if through && trace.depth > 0 {
+                let way = self.through(&hit, direction, numbers);
+                if matches!(way, Way::On(_)) && !hit.bare {
+                    radiance += weight * self.shade(&hit, -direction);
+                }
+                let next = match way {
+                    Way::Straight => Some((direction, DVec3::ONE)),
+                    Way::On(next) => next,
+                };
+                let Some((next, factor)) = next.filter(|_| bounce < trace.depth) else {
+                    return radiance;
+                };
+                weight *= factor;
+                (origin, direction) = (hit.point, next);
+                continue;
+            }
             if hit.bare {
                 return radiance;
             }
@@ -143,15 +167,20 @@ impl<'a> Tracer<'a> {
             Some((t, normal, i, leaf))
         });
         let (t, normal, i, leaf) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let name = &self.bodies[i].leaves[leaf].material;
-        let material = self.scene.materials.get(name).unwrap_or(&self.plain);
+        let material = self.material(&self.bodies[i].leaves[leaf].material);
         let front = normal.dot(direction) < 0.0;
         Some(Hit {
             point: origin + direction * t,
             normal: if front { normal } else { -normal },
             material,
+            body: i,
+            front,
             bare: !front && !material.two_sided,
         })
+    }
+
+    pub fn material(&self, name: &str) -> &Material {
+        self.scene.materials.get(name).unwrap_or(&self.plain)
     }
 
     /// Ambient light and every lamp.

@@ -4,7 +4,7 @@ use crate::setup::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use zerkalo::lanes::{Double, Frame, V3};
 use zerkalo::material::{
-    Claims, Energy, FIELDS, Finish, Fresnel, Highlight, Lobe, Masking, Material, Spread,
+    Claims, Energy, FIELDS, Finish, Fresnel, Highlight, Interface, Lobe, Masking, Material, Spread,
 };
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::value::{Color, Takes};
@@ -26,6 +26,41 @@ fn every_word_is_walked() {
     assert_eq!(read("lobe").iter().map(|m| m.lobe).collect::<Vec<_>>(), Lobe::ALL);
     assert_eq!(read("highlight").iter().map(|m| m.highlight).collect::<Vec<_>>(), Highlight::ALL);
     assert_eq!(read("masking").iter().map(|m| m.masking).collect::<Vec<_>>(), Masking::ALL);
+    assert_eq!(read("fresnel").iter().map(|m| m.law()).collect::<Vec<_>>(), Fresnel::ALL);
+}
+
+/// What a transparent surface reflects and transmits together, from outside and from inside, and the
+/// way back. A law that claims less is seen to give less.
+#[test]
+fn transparent_surfaces_keep_what_they_claim() {
+    for law in Fresnel::ALL {
+        let material = Material {
+            reflection: 1.0,
+            transmission: 1.0,
+            fresnel: Some(law),
+            ..Material::default()
+        };
+        let transmission = Finish::<f64>::new(&material, true).transmission.unwrap();
+        let n = V3::new(0.0, 0.0, 1.0);
+        let (mut lost, mut lopsided) = (0f64, 0f64);
+        for i in 0..900 {
+            let (sin, cos) = (0.1 * f64::from(i)).to_radians().sin_cos();
+            for (n_i, n_t) in [(1.0, material.index), (material.index, 1.0)] {
+                let incident = V3::new(sin, 0.0, -cos);
+                let there = Interface::new(incident, n, n_i, n_t);
+                let split = there.split(&transmission, n_i == 1.0);
+                lost = lost.max((split.reflected + split.transmitted + split.total - 1.0).abs());
+                if !there.total {
+                    let back = Interface::new(-there.refracted, -n, n_t, n_i);
+                    let back = back.split(&transmission, n_i != 1.0);
+                    lopsided = lopsided.max((back.reflected - split.reflected).abs());
+                }
+            }
+        }
+        let claims = law.claims_of_transmission();
+        assert_eq!(lost < 1e-12, claims.energy == Energy::Kept, "{law:?}: {lost}");
+        assert_eq!(lopsided < 1e-9, claims.reciprocal, "{law:?}: {lopsided}");
+    }
 }
 
 /// Pairs of directions on the same side of a surface, at many angles.

@@ -9,4 +9,5 @@ mod lanes;
 mod sampler;
 mod setup;
 mod stats;
+mod through;
 mod worlds;

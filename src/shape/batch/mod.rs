@@ -98,6 +98,15 @@ pub struct Surface<L> {
     pub reach: L,
 }
 
+impl<L: Lanes> Surface<L> {
+    /// How far from the point rays start that leave the surface: a few roundings of the largest number
+    /// involved.
+    #[inline(always)]
+    pub fn lift(&self) -> L {
+        self.reach.max(self.point.max_abs()) * L::of(8.0 * L::EPSILON)
+    }
+}
+
 /// One thing that rays meet, compiled for the lane type.
 pub trait Item<L: Lanes> {
     /// Distance at which each line through a ray meets the item first in front of the ray's origin, and

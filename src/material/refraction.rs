@@ -1,0 +1,232 @@
+//! Light at the boundary of two transparent media, in lanes: Snell's law and Fresnel's equations.
+//!
+//! Born and Wolf, *Principles of Optics*, sections 1.5.2 and 1.5.4.
+
+use super::finish::Transmission;
+use crate::lanes::{Lanes, Mask, V3};
+
+/// Where rays cross from one medium to another.
+#[derive(Clone, Copy, Debug)]
+pub struct Interface<L: Lanes> {
+    /// Unit direction of the refracted rays; meaningless where all is reflected.
+    pub refracted: V3<L>,
+    /// Lanes past the critical angle: nothing gets to the other side.
+    pub total: L::Mask,
+    /// Cosine of the angle of incidence.
+    cos_i: L,
+    /// Cosine of the angle of refraction; 0 past the critical angle.
+    cos_t: L,
+    /// Index of refraction on the side of the incident rays.
+    n_i: L,
+    /// Index of refraction on the other side.
+    n_t: L,
+}
+
+/// What reflected and transmitted rays count.
+#[derive(Clone, Copy, Debug)]
+pub struct Split<L> {
+    /// Factor of the finish's own reflection.
+    pub reflected: L,
+    /// Factor of what is seen through the surface.
+    pub transmitted: L,
+    /// Factor of a perfect reflection that takes the place of the transmitted ray.
+    pub total: L,
+}
+
+impl<L: Lanes> Interface<L> {
+    /// For rays along `incident` (unit) that meet a boundary with unit normal `n` on their side; the
+    /// media before and behind it have the indices `n_i` and `n_t`.
+    ///
+    /// sin t = (n_i / n_t) sin i, from the part of the direction along the boundary, so that grazing
+    /// rays keep their digits. Where the indices are equal the direction stays what it is.
+    #[inline(always)]
+    pub fn new(incident: V3<L>, n: V3<L>, n_i: L, n_t: L) -> Self {
+        let cos_i = -incident.dot(n);
+        let along = n.mul_add(cos_i, incident);
+        let ratio = n_i / n_t;
+        let same = n_i.le(n_t) & n_t.le(n_i);
+        let sin2_t = ratio * ratio * along.length2();
+        let total = sin2_t.ge(L::one()).and_not(same);
+        let cos_t = (L::one() - sin2_t).max(L::zero()).sqrt();
+        let bent = n.mul_add(-cos_t, along * ratio).renormalize();
+        Self {
+            refracted: V3::select(same, incident, bent),
+            total,
+            cos_i: cos_i.max(L::zero()),
+            cos_t: L::select(same, cos_i.max(L::zero()), cos_t),
+            n_i,
+            n_t,
+        }
+    }
+
+    /// Share of unpolarised light that is reflected there, for both polarisations: F is their mean.
+    #[inline(always)]
+    fn polarised(&self) -> (L, L) {
+        let Self { cos_i, cos_t, n_i, n_t, .. } = *self;
+        let share = |a: L, b: L| {
+            // Both are zero where nothing bends and the ray grazes: no boundary.
+            let r = (a - b) / (a + b).max(L::of(1e-30));
+            r * r
+        };
+        let s = share(n_i * cos_i, n_t * cos_t);
+        let p = share(n_t * cos_i, n_i * cos_t);
+        (L::select(self.total, L::one(), s), L::select(self.total, L::one(), p))
+    }
+
+    /// Share of unpolarised light that the boundary reflects, F.
+    #[inline(always)]
+    pub fn reflectance(&self) -> L {
+        let (s, p) = self.polarised();
+        (s + p) * L::of(0.5)
+    }
+
+    /// The same for a thin pane, a slab with this boundary on both sides, with all its inner
+    /// reflections: 2 F / (1 + F) for each polarisation.
+    #[inline(always)]
+    pub fn pane_reflectance(&self) -> L {
+        let (s, p) = self.polarised();
+        s / (L::one() + s) + p / (L::one() + p)
+    }
+
+    /// What the rays count by a boundary of this kind. `outer`: lanes that come from outside of a
+    /// solid. Without Fresnel's equations a solid reflects on its outer side only, so that light cannot
+    /// ring for ever between its inner walls; past the critical angle everything is reflected.
+    #[inline(always)]
+    pub fn split(&self, by: &Transmission<L::Scalar>, outer: L::Mask) -> Split<L> {
+        let k_t = L::splat(by.strength);
+        if by.dielectric {
+            let f = self.reflectance();
+            return Split {
+                reflected: f,
+                transmitted: (k_t * (L::one() - f)).only(!self.total),
+                total: L::zero(),
+            };
+        }
+        Split {
+            reflected: L::one().only(outer.and_not(self.total)),
+            transmitted: k_t.only(!self.total),
+            total: L::one().only(self.total),
+        }
+    }
+
+    /// What the rays count by a thin pane, which they cross without bending.
+    #[inline(always)]
+    pub fn split_by_pane(&self, by: &Transmission<L::Scalar>) -> Split<L> {
+        let k_t = L::splat(by.strength);
+        if !by.dielectric {
+            return Split { reflected: L::one(), transmitted: k_t, total: L::zero() };
+        }
+        let f = self.pane_reflectance();
+        Split { reflected: f, transmitted: k_t * (L::one() - f), total: L::zero() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::{Double, Single};
+    use crate::material::f0_from_index;
+
+    /// Rays at `degrees` from the normal +z, downwards.
+    fn at<L: Lanes>(degrees: f64, n_i: f64, n_t: f64) -> Interface<L> {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let up = V3::of([0.0, 0.0, 1.0]);
+        Interface::new(V3::of([sin, 0.0, -cos]), up, L::of(n_i), L::of(n_t))
+    }
+
+    /// Share of the energy that goes on: n_t cos t / (n_i cos i) times the squared amplitudes.
+    fn transmittance(i: &Interface<f64>) -> f64 {
+        let Interface { cos_i, cos_t, n_i, n_t, .. } = *i;
+        let s = 2.0 * n_i * cos_i / (n_i * cos_i + n_t * cos_t);
+        let p = 2.0 * n_i * cos_i / (n_t * cos_i + n_i * cos_t);
+        n_t * cos_t / (n_i * cos_i) * 0.5 * (s * s + p * p)
+    }
+
+    #[test]
+    fn closed_form_11_normal_incidence_brewster_and_critical_angle() {
+        for n in [1.0, 1.33, 1.5, 2.4, 1e3] {
+            let f = f0_from_index(n);
+            assert!((at::<f64>(0.0, 1.0, n).reflectance() - f).abs() < 1e-14);
+            assert!((at::<f64>(0.0, n, 1.0).reflectance() - f).abs() < 1e-14);
+            // A slab with all orders: R = 2 F / (1 + F), T = (1 - F) / (1 + F).
+            let pane = at::<f64>(0.0, 1.0, n).pane_reflectance();
+            assert!((pane - 2.0 * f / (1.0 + f)).abs() < 1e-14, "{n}");
+            assert!((1.0 - pane - (1.0 - f) / (1.0 + f)).abs() < 1e-14, "{n}");
+            // At Brewster's angle only one polarisation is reflected.
+            let (_, p) = at::<f64>(n.atan().to_degrees(), 1.0, n).polarised();
+            assert!(p < 1e-20, "{n}: {p}");
+            // Grazing light is reflected whole, but where there is no boundary.
+            let grazing = at::<f64>(90.0, 1.0, n).reflectance();
+            assert!((grazing - if n == 1.0 { 0.0 } else { 1.0 }).abs() < 1e-9, "{n}: {grazing}");
+        }
+    }
+
+    /// Extreme test 25: what is reflected and what goes on are all there is, next to the critical angle
+    /// and far from it, and nothing jumps at it.
+    #[test]
+    fn extreme_25_nothing_is_lost_around_the_critical_angle() {
+        for n in [1.0, 1.000_001, 1.5, 1e3] {
+            let critical = (1.0f64 / n).asin().to_degrees();
+            for step in -1000..=1000i32 {
+                let degrees = (critical + f64::from(step) * 1e-10 * 57.3).min(90.0);
+                let i = at::<f64>(degrees, n, 1.0);
+                let f = i.reflectance();
+                assert!((0.0..=1.0).contains(&f), "{n} {degrees} {f}");
+                assert_eq!(i.total, f == 1.0 && n > 1.0, "{n} {degrees}");
+                if !i.total && n > 1.0 {
+                    assert!((f + transmittance(&i) - 1.0).abs() < 1e-12, "{n} {degrees}");
+                    // 1 - F = 4 n cos t / cos i at most, and cos^2 t = 2 d cot c at the distance d
+                    // from the critical angle c.
+                    let d = f64::from(step.abs()) * 1e-10 * 57.3_f64.to_radians();
+                    let cos_t = (2.0 * d * (n * n - 1.0).sqrt()).sqrt();
+                    let jump = 4.0 * n * cos_t / (1.0 - 1.0 / (n * n)).sqrt();
+                    assert!(f >= 1.0 - 1.01 * jump - 1e-5 * n, "{n} {degrees} {f}");
+                }
+                for c in [i.refracted.x, i.refracted.y, i.refracted.z] {
+                    assert!(c.is_finite(), "{n} {degrees}");
+                }
+            }
+            for degrees in 0..=900 {
+                let degrees = f64::from(degrees) * 0.1;
+                for (n_i, n_t) in [(1.0, n), (n, 1.0)] {
+                    let i = at::<f64>(degrees, n_i, n_t);
+                    let f = i.reflectance();
+                    let t = if i.total || degrees == 90.0 { 1.0 - f } else { transmittance(&i) };
+                    assert!((f + t - 1.0).abs() < 1e-12, "{n_i} {n_t} {degrees}: {f} {t}");
+                    let single = at::<f32>(degrees, n_i, n_t).reflectance();
+                    assert!((0.0..=1.000_001).contains(&single), "{n_i} {n_t} {degrees}");
+                }
+            }
+        }
+    }
+
+    /// Snell's law, and the way back is the way there.
+    #[test]
+    fn bending_obeys_snell_and_can_be_turned_round() {
+        for degrees in [0.0, 1e-6, 20.0, 45.0, 70.0, 89.0, 89.999] {
+            let there = at::<f64>(degrees, 1.0, 1.5);
+            let t = there.refracted;
+            assert!((t.x - degrees.to_radians().sin() / 1.5).abs() < 1e-15);
+            assert!((t.length2() - 1.0).abs() < 1e-14 && t.z < 0.0);
+            let up = V3::of([0.0, 0.0, -1.0]);
+            let back = Interface::<f64>::new(-t, up, 1.5, 1.0).refracted;
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            assert!((back.x + sin).abs() < 1e-12 && (back.z - cos).abs() < 1e-9, "{degrees}");
+        }
+        let straight = at::<Single>(50.0, 1.3, 1.3);
+        let (sin, _) = 50f64.to_radians().sin_cos();
+        assert_eq!(Lanes::lane(straight.refracted.x, 3), sin as f32);
+        assert!(straight.total.none());
+        assert_eq!(Lanes::lane(straight.reflectance(), 0), 0.0);
+    }
+
+    #[test]
+    fn packets_equal_width_1() {
+        for degrees in [0.0, 30.0, 41.810_3, 41.810_4, 60.0, 89.9] {
+            let (wide, one) = (at::<Double>(degrees, 1.5, 1.0), at::<f64>(degrees, 1.5, 1.0));
+            assert_eq!(Lanes::lane(wide.refracted.x, 1), one.refracted.x);
+            assert_eq!(Lanes::lane(wide.reflectance(), 2), one.reflectance());
+            assert_eq!(Mask::lane(wide.total, 0), one.total);
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! The paths of worlds with surfaces that let light through: trees of reflected and transmitted rays.
+
+use super::compile::World;
+use super::media::{Crossing, Inside, Media};
+use super::outlook::Outlook;
+use super::path::{Counts, Met, Path, Radiance};
+use crate::lanes::{Lanes, Mask, V3};
+use crate::material::{Interface, Spread};
+use crate::sampling::Draws;
+use crate::shape::{Hit, Ray};
+
+/// At so many surfaces, counted from the eye, a path follows both the reflected and the transmitted ray;
+/// from then on one of them, by chance.
+const BOTH: usize = 2;
+
+/// A packet of paths on their way.
+#[derive(Clone, Copy)]
+struct Arm<L: Lanes> {
+    path: Path<L>,
+    lanes: L::Mask,
+    /// What the rays are inside.
+    inside: Inside<L>,
+    /// Surfaces met before.
+    bounce: u32,
+}
+
+/// Arms that wait until those that left the same surfaces are done.
+struct Waiting<L: Lanes> {
+    arms: [Option<Arm<L>>; BOTH],
+}
+
+impl<L: Lanes> Waiting<L> {
+    /// `arm` left a surface that is no farther from the eye than `BOTH`, and every arm left another.
+    fn push(&mut self, arm: Arm<L>) {
+        self.arms[arm.bounce as usize - 1] = Some(arm);
+    }
+
+    /// The one that left the surface farthest from the eye.
+    fn pop(&mut self) -> Option<Arm<L>> {
+        self.arms.iter_mut().rev().find_map(Option::take)
+    }
+}
+
+/// Two ways to go on from a surface.
+struct Ways<L> {
+    /// Direction of the reflected rays.
+    mirrored: V3<L>,
+    /// What they count.
+    mirrored_weight: V3<L>,
+    /// Direction of the transmitted rays.
+    passed: V3<L>,
+    /// What they count.
+    passed_weight: V3<L>,
+}
+
+impl<L: Lanes> World<L> {
+    /// [`World::trace`] for a world with `media`. In every lane what a surface transmits is traced
+    /// before what it reflects, whatever the other lanes do.
+    #[inline(never)]
+    pub(super) fn trace_through(
+        &self,
+        media: &Media<L>,
+        ray: Ray<L>,
+        outlook: &Outlook,
+        draws: &Draws<'_, L>,
+        lanes: L::Mask,
+        out: &mut Radiance<L>,
+    ) -> Counts {
+        let mut counts = Counts::default();
+        let inside = media.at_start(&ray);
+        let path = Path { ray, weight: V3::of([1.0; 3]) };
+        let mut waiting = Waiting { arms: [None; BOTH] };
+        let mut next = Some(Arm { path, lanes, inside, bounce: 0 });
+        while let Some(arm) = next.or_else(|| waiting.pop()) {
+            let outlook = if arm.bounce == 0 { outlook } else { &self.panorama };
+            next = self.follow(media, arm, outlook, draws, &mut waiting, out, &mut counts);
+        }
+        counts
+    }
+
+    /// Follows `arm` to the surfaces where it ends; returns how it goes on from there.
+    #[allow(clippy::too_many_arguments, reason = "what a path's step reads and what it writes")]
+    fn follow(
+        &self,
+        media: &Media<L>,
+        arm: Arm<L>,
+        outlook: &Outlook,
+        draws: &Draws<'_, L>,
+        waiting: &mut Waiting<L>,
+        out: &mut Radiance<L>,
+        counts: &mut Counts,
+    ) -> Option<Arm<L>> {
+        let Arm { path, inside, bounce, .. } = arm;
+        counts.rays += u64::from(arm.lanes.bits().count_ones());
+        let hit = self.geometry.closest(&path.ray, &outlook.seen);
+        let ended = hit.t.lt(L::of(L::MAX));
+        if let Some(group) = self.background {
+            out.groups[group] += path.weight.only(arm.lanes.and_not(ended));
+        }
+        let lanes = arm.lanes & ended;
+        let mut met = self.meet(&path.ray, &hit, lanes)?;
+        let crossing = self.crossing(media, &path.ray, &hit, &met, lanes, &inside);
+        if let Some(crossing) = &crossing {
+            met.leave_out(crossing.hidden);
+        }
+        self.light(&path, &met, outlook, out, counts);
+        if bounce == self.depth {
+            return None;
+        }
+        let bounce = bounce + 1;
+        let Some(crossing) = crossing else {
+            let mut path = path;
+            let lanes = self.bounce(&mut path, &met, draws, bounce - 1, counts);
+            return lanes.any().then_some(Arm { path, lanes, inside, bounce });
+        };
+        let ways = self.ways(&path, &met, &crossing, draws, bounce - 1, counts);
+        let worth = |weight: V3<L>| {
+            let strongest = weight.max_element();
+            strongest.gt(L::zero()) & strongest.ge(L::of(self.min_weight))
+        };
+        let mirrors = (met.reflecting | crossing.lanes) & worth(ways.mirrored_weight);
+        let passes = crossing.lanes & worth(ways.passed_weight);
+        let both = mirrors & passes;
+        let mirrored = Arm {
+            path: Path {
+                ray: Ray { origin: met.start, direction: ways.mirrored },
+                weight: ways.mirrored_weight,
+            },
+            lanes: both,
+            inside: Inside::select(crossing.lanes, &crossing.before, &inside),
+            bounce,
+        };
+        // Lanes that go through, and what their paths and those of the others count.
+        let (mut through, mut mirrored_weight, mut passed_weight) =
+            (passes, ways.mirrored_weight, ways.passed_weight);
+        if both.any() {
+            if bounce as usize <= BOTH {
+                waiting.push(mirrored);
+            } else {
+                counts.glossy = true;
+                let (r, t) = (mirrored_weight.max_element(), passed_weight.max_element());
+                let back = both & (draws.choice(bounce - 1 - BOTH as u32) * (r + t)).lt(r);
+                through = through.and_not(back);
+                let scaled = |v: V3<L>, k: L| V3::select(both, v * ((r + t) / k), v);
+                mirrored_weight = scaled(mirrored_weight, r);
+                passed_weight = scaled(passed_weight, t);
+            }
+        }
+        let lanes = mirrors | passes;
+        let path = Path {
+            ray: Ray {
+                origin: V3::select(through, crossing.beyond, met.start),
+                direction: V3::select(through, ways.passed, ways.mirrored),
+            },
+            weight: V3::select(through, passed_weight, mirrored_weight),
+        };
+        let inside = Inside::select(through, &crossing.behind, &mirrored.inside);
+        lanes.any().then_some(Arm { path, lanes, inside, bounce })
+    }
+
+    /// Where the rays of `lanes` meet surfaces that let light through; `None`: none of them does.
+    fn crossing(
+        &self,
+        media: &Media<L>,
+        ray: &Ray<L>,
+        hit: &Hit<L>,
+        met: &Met<L>,
+        lanes: L::Mask,
+        inside: &Inside<L>,
+    ) -> Option<Crossing<L>> {
+        let mut through = L::mask(false);
+        let mut index = L::one();
+        for (finish, here) in met.finishes(lanes) {
+            if let Some(transmission) = &self.finishes[finish].transmission {
+                through = through | here;
+                index = L::select(here, L::splat(transmission.index), index);
+            }
+        }
+        let at = (ray, hit, met.geometric);
+        through.any().then(|| media.cross(&self.geometry, at, through, inside, index))
+    }
+
+    /// How paths go on from the surfaces that they meet, of which some let light through.
+    fn ways(
+        &self,
+        path: &Path<L>,
+        met: &Met<L>,
+        crossing: &Crossing<L>,
+        draws: &Draws<'_, L>,
+        bounce: u32,
+        counts: &mut Counts,
+    ) -> Ways<L> {
+        let incident = path.ray.direction;
+        let interface = Interface::new(incident, met.geometric, crossing.n_i, crossing.n_t);
+        let straight = crossing.pane | crossing.hidden;
+        let mut ways = Ways {
+            mirrored: incident.reflect(met.geometric),
+            mirrored_weight: V3::zero(),
+            passed: V3::select(straight, incident, interface.refracted),
+            passed_weight: V3::zero(),
+        };
+        let mut numbers = None;
+        for (finish, lanes) in met.finishes(met.reflecting | crossing.lanes) {
+            let finish = &self.finishes[finish];
+            let mut own = L::one();
+            if let Some(transmission) = &finish.transmission {
+                let mut split = interface.split(transmission, crossing.outer);
+                if crossing.pane.any() {
+                    let pane = interface.split_by_pane(transmission);
+                    let choose = |a, b| L::select(crossing.pane, a, b);
+                    split.reflected = choose(pane.reflected, split.reflected);
+                    split.transmitted = choose(pane.transmitted, split.transmitted);
+                    split.total = choose(pane.total, split.total);
+                }
+                own = split.reflected.only(!crossing.hidden);
+                let passed = L::select(crossing.hidden, L::one(), split.transmitted);
+                ways.passed_weight = V3::select(lanes, path.weight * passed, ways.passed_weight);
+                let total = path.weight * split.total.only(!crossing.hidden);
+                ways.mirrored_weight = V3::select(lanes, total, ways.mirrored_weight);
+            }
+            let Some((strength, spread)) = &finish.reflection else { continue };
+            let lanes = lanes & own.gt(L::zero());
+            if lanes.none() {
+                continue;
+            }
+            let uv = if matches!(spread, Spread::Mirror) {
+                (L::zero(), L::zero())
+            } else {
+                counts.glossy = true;
+                *numbers.get_or_insert_with(|| draws.lobe(bounce))
+            };
+            let r = finish.reflect(*strength, spread, incident, met.geometric, uv, self.fold);
+            let weight = path.weight.times(r.weight) * own;
+            ways.mirrored = V3::select(lanes, r.direction, ways.mirrored);
+            ways.mirrored_weight = V3::select(lanes, weight, ways.mirrored_weight);
+        }
+        ways
+    }
+}

@@ -1,0 +1,246 @@
+//! Light through transparent things: slabs, furnaces, cameras inside, against closed forms.
+
+use crate::setup::*;
+use zerkalo::lanes::{Double, Lanes, Single, V3};
+use zerkalo::material::Interface;
+use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo::scene::Scene;
+use zerkalo::shape::{Geometry, Ray};
+use zerkalo::world::World;
+
+const SETTINGS: SampleSettings = SampleSettings { seed: 5, kind: SamplerKind::Sobol };
+
+/// Sums over groups of the samples `0..count` of every pixel, white lights.
+fn samples<L: Lanes>(scene: &Scene, count: u32) -> Vec<Vector> {
+    let world = World::<L>::new(scene);
+    let sampler = Sampler::<L>::new(SETTINGS, world.jitter());
+    let [width, height] = scene.film.size;
+    let mut out = Vec::new();
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for first in (0..count).step_by(L::WIDTH) {
+            for groups in trace(&world, &sampler, (x, y), 0, first) {
+                let all: Vec<_> = groups.into_iter().map(|g| (1.0, g)).collect();
+                out.push(combine(&all));
+            }
+        }
+    }
+    out
+}
+
+fn mean(samples: &[Vector]) -> Vector {
+    let all: Vec<_> = samples.iter().map(|s| (1.0 / samples.len() as f64, *s)).collect();
+    combine(&all)
+}
+
+const GLASS: &str = "ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\n\
+                     fresnel = \"dielectric\"\n";
+
+/// Extreme test 27: a slab of thickness t shifts a ray by t sin i (1 - cos i / sqrt(n^2 - sin^2 i)) and
+/// lets it go on in the old direction.
+#[test]
+fn extreme_27_a_slab_shifts_a_ray() {
+    let t = 0.75;
+    let slab = scene(&format!(
+        "[[object]]\nshape.box = {{ center = [0.0, 0.0, {}], size = [2e3, 2e3, {t}] }}",
+        -0.5 * t
+    ));
+    let form = slab.objects[0].shape.form();
+    let geometry = Geometry::<f64>::with_tree(&[form], false);
+    for n in [1.0, 1.33, 1.5, 2.4, 1e3] {
+        for i in 0..=899 {
+            let (sin, cos) = (f64::from(i) * 0.1).to_radians().sin_cos();
+            let direction = V3::new(sin, 0.0, -cos);
+            let mut ray = Ray { origin: V3::new(-sin, 0.0, cos), direction };
+            for (n_i, n_t) in [(1.0, n), (n, 1.0)] {
+                let hit = geometry.closest(&ray, geometry.all());
+                let surface = geometry.surface(hit.item.tag_lane(0), hit.facet, ray.at(hit.t));
+                let entering = surface.normal.dot(ray.direction) < 0.0;
+                assert_eq!(entering, n_i == 1.0 && ray.origin.z > 0.0);
+                let normal = if entering { surface.normal } else { -surface.normal };
+                let interface = Interface::new(ray.direction, normal, n_i, n_t);
+                assert!(!interface.total, "{n} {i}");
+                let origin = normal.mul_add(-surface.lift(), surface.point);
+                ray = Ray { origin, direction: interface.refracted };
+            }
+            // The ray would have gone on through the origin.
+            let shift = (ray.origin.x * -cos - ray.origin.z * sin).abs();
+            let expected = t * sin * (1.0 - cos / (n * n - sin * sin).sqrt());
+            assert!((shift - expected).abs() <= 1e-10 * t, "{n} {i}: {shift} {expected}");
+            let off = (ray.direction - direction).max_abs();
+            assert!(off < 1e-10, "{n} {i}: turned by {off}");
+        }
+    }
+}
+
+/// A red wall behind a slab, a green one behind the camera.
+fn between_walls(slab: &str) -> Scene {
+    scene(&format!(
+        "film = {{ size = [1, 1], filter = \"center\" }}
+        trace.depth = 10000
+        ambient.color = [1.0, 1.0, 1.0]
+        camera = {{ eye = [0.0, 0.0, 0.0], target = [0.0, 0.0, -1.0] }}
+        [materials]
+        red = {{ color = [1.0, 0.0, 0.0], diffuse = 0.0 }}
+        green = {{ color = [0.0, 1.0, 0.0], diffuse = 0.0 }}
+        [materials.glass]
+        {GLASS}
+        {slab}
+        [[object]]
+        material = \"red\"
+        shape.plane = {{ point = [0.0, 0.0, -9.0], normal = [0.0, 0.0, 1.0] }}
+        [[object]]
+        material = \"green\"
+        shape.plane = {{ point = [0.0, 0.0, 9.0], normal = [0.0, 0.0, -1.0] }}"
+    ))
+}
+
+/// Closed form 11: with all orders a slab reflects 2 F / (1 + F) and transmits (1 - F) / (1 + F) at
+/// normal incidence; a pane does by itself.
+#[test]
+fn closed_form_11_a_slab_with_all_orders() {
+    for n in [1.0, 1.5, 4.0, 1e3] {
+        let f = ((n - 1.0) / (n + 1.0f64)).powi(2);
+        let slab = format!(
+            "index = {n:?}\n[[object]]\nmaterial = \"glass\"\n\
+             shape.box = {{ center = [0.0, 0.0, -2.0], size = [9.0, 9.0, 1.0] }}"
+        );
+        let count = 1 << 14;
+        let all = samples::<Double>(&between_walls(&slab), count);
+        assert!(all.iter().all(|s| (s[0] + s[1] - 1.0).abs() < 1e-9), "something is lost");
+        let [t, r, _] = mean(&all);
+        let sigma = 0.5 / f64::from(count).sqrt();
+        assert!((r - 2.0 * f / (1.0 + f)).abs() < 4.0 * sigma, "{n}: {r}");
+        assert!((t - (1.0 - f) / (1.0 + f)).abs() < 4.0 * sigma, "{n}: {t}");
+        let pane = slab.replace("shape.box", "shape.rectangle").replace(
+            "9.0, 1.0] }",
+            "9.0], \
+             normal = [0.0, 0.0, 1.0] }",
+        );
+        let [t, r, _] = mean(&samples::<Double>(&between_walls(&pane), 8));
+        assert!((r - 2.0 * f / (1.0 + f)).abs() < 1e-12 && (r + t - 1.0).abs() < 1e-12, "{n}: {r}");
+    }
+}
+
+/// Things between camera and background. `inner`: keys of the material.
+fn ball_in_front(background: &str, depth: u32, inner: &str, objects: &str) -> Scene {
+    scene(&format!(
+        "film = {{ size = [24, 24] }}
+        trace.depth = {depth}
+        ambient.color = [0.5, 0.5, 0.5]
+        background.color = {background}
+        camera = {{ eye = [0.0, 0.0, 3.0], target = [0.0, 0.0, 0.0], view_angle.vertical = 45.0 }}
+        [materials]
+        tile = {{ color = [0.9, 0.5, 0.2] }}
+        [materials.m]
+        {inner}
+        {objects}"
+    ))
+}
+
+const BALL: &str =
+    "[[object]]\nmaterial = \"m\"\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }\n";
+const TILES: &str = "[[object]]\nmaterial = \"tile\"\n\
+    shape.box = { center = [0.3, 0.2, -2.0], size = [1.0, 0.7, 0.5] }\n";
+
+/// With light of 1 from everywhere a ball that loses nothing is invisible, whatever is nested in it.
+#[test]
+fn a_white_furnace_does_not_see_glass() {
+    let nested = "[[object]]\nmaterial = \"air\"\n\
+        shape.sphere = { center = [0.3, 0.2, 0.1], radius = 0.4 }\n\
+        [materials.air]\nindex = 1.0\n";
+    for index in [0.7, 1.0, 1.5, 1e3] {
+        let inner = format!("{GLASS}index = {index:?}\n");
+        // Light that a bubble turns in glass of index 1000 does not come out: its way is too narrow.
+        let bubble = if index < 100.0 { format!("{nested}{GLASS}") } else { String::new() };
+        for more in [String::new(), bubble] {
+            let scene = ball_in_front("[1.0, 1.0, 1.0]", 10_000, &inner, &format!("{BALL}{more}"));
+            for s in samples::<Double>(&scene, 16) {
+                assert!(s.iter().all(|c| (c - 1.0).abs() < 1e-9), "{index}: {s:?}");
+            }
+            for s in samples::<Single>(&scene, 16) {
+                assert!(s.iter().all(|c| (c - 1.0).abs() < 1e-3), "{index}: {s:?}");
+            }
+        }
+    }
+}
+
+/// Index 1 bends nothing and reflects nothing.
+#[test]
+fn index_1_is_invisible() {
+    let inner = format!("{GLASS}index = 1.0\n");
+    let background = "[0.3, 0.6, 0.9]";
+    let with = ball_in_front(background, 16, &inner, &format!("{BALL}{TILES}"));
+    let without = ball_in_front(background, 16, &inner, TILES);
+    let (with, without) = (samples::<Double>(&with, 8), samples::<Double>(&without, 8));
+    let apart = |(a, b): (&Vector, &Vector)| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-12);
+    assert_eq!(with.iter().zip(&without).filter(|p| apart(*p)).count(), 0);
+    assert!(without.iter().any(|s| s[0] > 0.4), "the box is not seen");
+}
+
+/// Who looks out of glass sees the outside up to the critical angle, 41.8 degrees, and beyond it only
+/// reflections; the same from the near plane, and from within a bubble in the glass.
+#[test]
+fn a_camera_inside_knows_what_it_is_in() {
+    let look = |degrees: f64, near: f64, fresnel: &str, more: &str| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let text = format!(
+            "film = {{ size = [1, 1], filter = \"center\" }}
+            trace.depth = 2
+            background.color = [1.0, 1.0, 1.0]
+            camera = {{ eye = [0.0, 0.0, 0.0], direction = [{sin}, 0.0, -{cos}], near = {near:?} }}
+            [materials.m]
+            ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\n{fresnel}
+            [materials.air]
+            ambient = 0.0\ndiffuse = 0.0\ntransmission = 1.0\nindex = 1.0
+            [[object]]
+            material = \"m\"
+            shape.box = {{ center = [0.0, 0.0, 0.0], size = [1e4, 1e4, 2.0] }}
+            {more}"
+        );
+        mean(&samples::<Double>(&scene(&text), 8))[0]
+    };
+    let bubble = "[[object]]\nmaterial = \"air\"\n\
+        shape.sphere = { center = [0.0, 0.0, 0.0], radius = 0.25 }";
+    for near in [0.0, 0.5] {
+        assert_eq!(look(41.8, near, "", ""), 1.0);
+        assert_eq!(look(41.82, near, "", ""), 0.0);
+        assert_eq!(look(60.0, near, "fresnel = \"dielectric\"", ""), 0.0);
+        let f = 0.04;
+        // Out at the first surface or at the second.
+        let seen = look(0.0, near, "fresnel = \"dielectric\"", "");
+        assert!((seen - (1.0 - f * f)).abs() < 1e-9, "{near}: {seen}");
+    }
+    // From the middle of a bubble rays leave it straight; then they are in glass.
+    assert_eq!(look(41.8, 0.0, "", bubble), 1.0);
+    assert_eq!(look(41.82, 0.0, "", bubble), 0.0);
+}
+
+/// C2: a material with fixed coefficients mirrors on its outer side only, so that k_r = 1 does not ring
+/// between inner walls; its light comes out by k_t.
+#[test]
+fn fixed_coefficients_reflect_outside_only() {
+    let inner =
+        "ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 0.5\nindex = 1.4286\n";
+    let scene = ball_in_front("[1.0, 1.0, 1.0]", 100, inner, BALL);
+    let all = samples::<Double>(&scene, 8);
+    // Reflected 1, and 0.5 in and 0.5 out.
+    let on_ball = all.iter().filter(|s| (s[0] - 1.25).abs() < 1e-12).count();
+    let beside = all.iter().filter(|s| s[0] == 1.0).count();
+    assert_eq!(on_ball + beside, all.len());
+    assert!(on_ball > all.len() / 3);
+}
+
+/// Every sample of a packet is what it is alone.
+#[test]
+fn packets_of_glass_equal_width_1() {
+    for file in ["glass", "transmission", "water-glass"] {
+        let mut scene = scene(&std::fs::read_to_string(format!("scenes/{file}.toml")).unwrap());
+        scene.film.size = [24, 20];
+        let (wide, one) = (samples::<Double>(&scene, 8), samples::<f64>(&scene, 8));
+        assert_eq!(wide.len(), one.len());
+        for (a, b) in wide.iter().zip(&one) {
+            // Powers of highlights differ by a few roundings.
+            assert!((0..3).all(|c| (a[c] - b[c]).abs() <= 1e-12 * (1.0 + b[c])), "{a:?} {b:?}");
+        }
+    }
+}
