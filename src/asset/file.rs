@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 
-/// Largest file that is read [bytes]: 2 GiB.
+/// Largest file that is read \[bytes\]: 2 GiB.
 pub const MAX_BYTES: u64 = 2 << 30;
 
 /// A file in memory.

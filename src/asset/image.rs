@@ -89,7 +89,7 @@ impl Image {
         self.size
     }
 
-    /// Memory that the pixels take [bytes].
+    /// Memory that the pixels take \[bytes\].
     pub fn bytes(&self) -> usize {
         match &self.texels {
             Texels::Bytes(t) => t.len(),

@@ -155,7 +155,7 @@ impl Reference {
 
     /// How far the film's expectation is from the reference's: the difference of the pictures' means
     /// in standard errors, and the root mean square of the pixels' differences that noise does not
-    /// explain [codes].
+    /// explain in codes.
     pub fn bias(&self, film: &Film, mix: &Mix) -> (f64, f64) {
         let [a, b] = replicates(film, mix);
         let (own, mean_variance) = own_error(&a, &b, &self.display);

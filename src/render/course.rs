@@ -69,7 +69,7 @@ impl Course {
         self.schedule.spp()
     }
 
-    /// The RMSE as displayed that the program itself would tell [codes].
+    /// The RMSE as displayed that the program itself would tell in codes.
     pub fn noise_codes(&self) -> Option<f64> {
         self.schedule.noise().map(|noise| noise.rmse_codes)
     }

@@ -65,7 +65,7 @@ impl TriangleMesh {
         }
     }
 
-    /// Memory that the mesh takes [bytes].
+    /// Memory that the mesh takes \[bytes\].
     pub fn bytes(&self) -> usize {
         12 * (self.positions.len() + self.triangles.len())
             + self.normals.as_ref().map_or(0, |n| 12 * n.len())

@@ -236,7 +236,7 @@ impl Mesh {
         best
     }
 
-    /// Memory that it takes [bytes].
+    /// Memory that it takes \[bytes\].
     pub fn bytes(&self) -> usize {
         self.mesh.bytes()
             + size_of::<Branch>() * self.branches.len()

@@ -210,7 +210,7 @@ fn blocked<L: Lanes>(items: &[impl Item<L>], ray: &Ray<L>, limit: L, wanted: L::
 /// What an item came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Source {
-    /// Position in the list given to [`compile`].
+    /// Position in the list given to `compile`.
     pub form: usize,
     /// Which part of a compound; 0 for all other forms. Part 0 stands for the whole compound where
     /// rays ask for items; its other parts never meet anything by themselves.
