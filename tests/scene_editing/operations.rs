@@ -16,7 +16,7 @@ type Act = (u8, usize, usize, f64);
 fn act() -> impl Strategy<Value = Act> {
     let amount =
         prop_oneof![prop::sample::select(vec![1.0, -1.0, 0.1, -0.1, 3.0, 0.0]), -90.0..90.0f64,];
-    (0..20u8, 0..1000usize, 0..1000usize, amount)
+    (0..21u8, 0..1000usize, 0..1000usize, amount)
 }
 
 const TEXTS: [&str; 12] =
