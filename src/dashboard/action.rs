@@ -152,6 +152,8 @@ pub enum Action {
     Restart,
     /// Asks when to stop: noise, samples, seconds.
     StopAt,
+    /// Shows what each noise costs here, and stops at the chosen one.
+    Quality,
     /// Writes the picture as PNG.
     ExportPng,
     /// Writes the picture as EXR.

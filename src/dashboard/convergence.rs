@@ -30,6 +30,17 @@ impl Convergence {
         &self.points
     }
 
+    /// After how many seconds of tracing the noise had fallen to `codes`, between two looks by a power
+    /// law. `None`: it has not, or had by the first look.
+    pub fn seconds_at(&self, codes: f64) -> Option<f64> {
+        // The last time that it fell through: lights may have been lit since.
+        let after = self.points.iter().rposition(|p| p.noise_codes > codes)? + 1;
+        let (before, after) = (self.points[after - 1], self.points.get(after)?);
+        let part =
+            (before.noise_codes / codes).ln() / (before.noise_codes / after.noise_codes).ln();
+        Some(before.seconds * (after.seconds / before.seconds).powf(part))
+    }
+
     /// Takes in a report. A picture begun anew begins the history anew.
     pub fn add(&mut self, report: &Report) {
         if report.generation != self.generation || report.samples < self.samples {

@@ -106,7 +106,9 @@ const READING: &[Hint] = &[("Up Down", "Up", "scroll"), ("Esc", "Esc", "close")]
 pub fn hints(model: &Model) -> &'static [Hint] {
     match &model.overlay {
         Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => return READING,
-        Some(Overlay::Palette(_) | Overlay::Pick(_) | Overlay::Question(_)) => return LIST,
+        Some(
+            Overlay::Palette(_) | Overlay::Pick(_) | Overlay::Quality { .. } | Overlay::Question(_),
+        ) => return LIST,
         Some(Overlay::Form(form)) if form.editor.is_none() => return FORM,
         Some(Overlay::Form(_) | Overlay::Prompt(_)) => return TYPING,
         None if model.inspector.editor.is_some() => return TYPING,

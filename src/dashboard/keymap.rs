@@ -214,6 +214,7 @@ pub const KEYMAP: &[Row] = &[
     row(C::Render, Pause, &[(Anywhere, &["Space"])], "pause or go on"),
     row(C::Render, Restart, &[(Anywhere, &["R"])], "begin the picture anew"),
     row(C::Render, StopAt, &[(Anywhere, &["T"])], "stop at …"),
+    row(C::Render, Quality, &[(Anywhere, &["N"])], "quality: what each costs"),
     row(C::Render, Threads(More), &[], "more threads"),
     row(C::Render, Threads(Less), &[], "fewer threads"),
     row(C::Render, Priority, &[], "low or normal priority"),

@@ -18,6 +18,7 @@ pub mod overlay;
 pub mod pacing;
 pub mod panels;
 pub mod places;
+pub mod quality;
 pub mod raster;
 pub mod run;
 #[cfg(test)]

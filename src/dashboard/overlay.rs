@@ -19,6 +19,11 @@ pub enum Overlay {
         /// First line shown.
         scroll: usize,
     },
+    /// What each quality costs: [`Model::qualities`](super::model::Model::qualities).
+    Quality {
+        /// Position of the chosen one.
+        cursor: usize,
+    },
     /// Finds an action by typing.
     Palette(Palette),
     /// One of a list.

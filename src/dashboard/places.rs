@@ -4,6 +4,7 @@
 use super::layout::Area;
 use super::model::Model;
 use super::overlay::Overlay;
+use crate::render::session::QUALITIES;
 
 /// Where an overlay lies. Parts without rows are not there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,6 +38,18 @@ impl Model {
                 let columns = 84.min(width - 2);
                 let rows = self.inventory(columns - 2).len() as u16;
                 whole(centred(columns, rows.saturating_add(2)))
+            }
+            Overlay::Quality { .. } => {
+                let frame = low(76, QUALITIES.len() as u16 + 4);
+                let inner = frame.inner();
+                let list = Area { height: inner.height.min(QUALITIES.len() as u16), ..inner };
+                let help = Area {
+                    x: inner.x + 3,
+                    y: inner.y + list.height,
+                    width: inner.width - 3,
+                    height: inner.height - list.height,
+                };
+                Place { frame, input: Area::default(), list, help }
             }
             Overlay::Palette(_) => {
                 let frame = centred(72, height.min(26) - 2);

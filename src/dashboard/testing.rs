@@ -2,7 +2,7 @@
 
 use crate::film::Noise;
 use crate::render::schedule::Spp;
-use crate::render::session::{Report, State};
+use crate::render::session::{QUALITIES, Report, State};
 
 /// A report about scene `generation` after `spp` samples in each pixel, ten thousand pixels.
 pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
@@ -22,6 +22,7 @@ pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
             worst_codes: 3.0 * codes,
         }),
         eta_seconds: None,
+        quality_seconds: [None; QUALITIES.len()],
         progress: None,
         bad_samples: 0,
         recent_samples_per_second: 1e7,

@@ -348,6 +348,10 @@ fn picture_stories() -> Vec<Story> {
                 && d.model.stop.seconds == Some(5.0)
                 && d.model.stop.noise_codes.is_none()
         }),
+        story(Quality, c(), "N Down Enter", |_, d| {
+            // From the target, half a code, to the next finer one.
+            d.model.stop.noise_codes == Some(0.25) && d.model.overlay.is_none()
+        }),
         story(Threads(Change::Up), c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(3))),
         story(Threads(Change::Down), c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(1))),
         story(Priority, c(), ":", |_, d| d.asked(|e| *e == Effect::LowPriority(true))),

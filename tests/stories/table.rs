@@ -95,6 +95,7 @@ fn every_action() -> Vec<Action> {
         Pause,
         Restart,
         StopAt,
+        Quality,
         ExportPng,
         ExportExr,
         ExportSized,
@@ -149,9 +150,9 @@ fn every_action() -> Vec<Action> {
             | SwitchLight | AddLight | NextLobe | AddObject | Duplicate | Delete | Rename
             | Drop | OwnMaterial | NextPanel | PreviousPanel | OnlyPicture | First | Last
             | Open | ClearField | Undo | Redo | Save | SaveAs | Reload | Quit | Pause | Restart
-            | StopAt | ExportPng | ExportExr | ExportSized | CancelExport | ResetExposure
-            | NextTone | NextChannel | PreviousChannel | Probe | Keep | Flip | Difference
-            | Priority | NextColors | Help | Palette | Inventory => vec![action],
+            | StopAt | Quality | ExportPng | ExportExr | ExportSized | CancelExport
+            | ResetExposure | NextTone | NextChannel | PreviousChannel | Probe | Keep | Flip
+            | Difference | Priority | NextColors | Help | Palette | Inventory => vec![action],
         }
     };
     one_of_each.into_iter().flat_map(variants).collect()

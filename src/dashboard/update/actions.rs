@@ -88,6 +88,7 @@ impl Turn<'_> {
             Action::Pause => self.pause(),
             Action::Restart => self.restart(),
             Action::StopAt => self.ask_stop(),
+            Action::Quality => self.open_qualities(),
             Action::ExportPng => self.export(Format::Png),
             Action::ExportExr => self.export(Format::Exr),
             Action::ExportSized => self.ask_export_size(),

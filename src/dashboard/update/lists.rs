@@ -8,6 +8,8 @@ use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::overlay::{Answer, Overlay, Palette, PickFor, Question};
 use crate::dashboard::panels::{OutlineLine, outline, outline_position, scrolled};
+use crate::render::schedule::Stop;
+use crate::render::session::QUALITIES;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
 
@@ -29,6 +31,7 @@ impl Turn<'_> {
             Some(Overlay::Inventory { scroll }) => {
                 *scroll = moved(*scroll, steps, inventory.saturating_sub(rows) + 1);
             }
+            Some(Overlay::Quality { cursor }) => *cursor = moved(*cursor, steps, QUALITIES.len()),
             Some(Overlay::Palette(palette)) => {
                 palette.cursor = moved(palette.cursor, steps, palette.found.len());
                 palette.scroll =
@@ -80,6 +83,11 @@ impl Turn<'_> {
     pub(super) fn open(&mut self, typed: Option<char>) {
         match &self.model.overlay {
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
+            Some(Overlay::Quality { cursor }) => {
+                let noise_codes = Some(QUALITIES[*cursor]);
+                self.model.overlay = None;
+                self.set_stop(Stop { noise_codes, rmse_linear: None, ..self.model.stop });
+            }
             Some(Overlay::Palette(palette)) => {
                 let row = palette.found.get(palette.cursor).map(|at| KEYMAP[*at]);
                 if let Some(row) = row {

@@ -6,6 +6,7 @@ use crate::dashboard::layout::{Area, Focus};
 use crate::dashboard::model::{Drag, Mode};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::panels::{Line, OutlineLine, outline};
+use crate::render::session::QUALITIES;
 use crate::scene::Scene;
 use crate::scene::edit::Subject;
 use glam::DVec3;
@@ -104,6 +105,7 @@ impl Turn<'_> {
                 (palette.scroll, palette.cursor, palette.found.len())
             }
             Some(Overlay::Pick(pick)) => (pick.scroll, pick.cursor, pick.entries.len()),
+            Some(Overlay::Quality { cursor }) => (0, *cursor, QUALITIES.len()),
             Some(Overlay::Question(question)) => (0, question.cursor, question.answers.len()),
             Some(Overlay::Form(form)) => {
                 let at = line_at(place.list, form.scroll, mouse);

@@ -5,7 +5,9 @@ use super::prompt::stop_text;
 use crate::dashboard::action::Change;
 use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::Colors;
+use crate::dashboard::overlay::Overlay;
 use crate::render::schedule::Stop;
+use crate::render::session::QUALITIES;
 
 impl Turn<'_> {
     pub(super) fn pause(&mut self) {
@@ -24,6 +26,14 @@ impl Turn<'_> {
         let told = stop_text(&stop);
         let told = if told == "none" { "never".to_string() } else { format!("at {told}") };
         self.say(format!("stops {told}"));
+    }
+
+    /// Shows what each quality costs, with the cursor on the one the work stops at.
+    pub(super) fn open_qualities(&mut self) {
+        let wanted = self.model.stop.noise_codes.unwrap_or(0.5);
+        let cursor = QUALITIES.iter().position(|codes| *codes <= wanted);
+        self.model.overlay =
+            Some(Overlay::Quality { cursor: cursor.unwrap_or(QUALITIES.len() - 1) });
     }
 
     pub(super) fn threads(&mut self, change: Change) {

@@ -2,7 +2,7 @@
 
 use super::fields::{Fields, typed};
 use super::frame::{overlay, scroll_mark};
-use super::text::{Row, columns, cut};
+use super::text::{Row, columns, cut, duration, durations};
 use super::theme::Theme;
 use crate::dashboard::hints::{HelpLine, help};
 use crate::dashboard::keymap::KEYMAP;
@@ -10,6 +10,7 @@ use crate::dashboard::layout::Area;
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::{Form, Overlay, Palette, Pick, Prompt, Question};
 use crate::dashboard::places::{Place, wrapped};
+use crate::dashboard::quality::Cost;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::Style;
@@ -20,6 +21,7 @@ pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Positio
     match model.overlay.as_ref()? {
         Overlay::Help { scroll } => keys(*scroll, &place, theme, buffer),
         Overlay::Inventory { scroll } => inventory(model, *scroll, &place, theme, buffer),
+        Overlay::Quality { cursor } => qualities(model, *cursor, &place, theme, buffer),
         Overlay::Palette(open) => return palette(open, &place, theme, buffer),
         Overlay::Pick(open) => pick(open, &place, theme, buffer),
         Overlay::Form(open) => return form(model, open, &place, theme, buffer),
@@ -72,6 +74,27 @@ fn inventory(model: &Model, scroll: usize, place: &Place, theme: &Theme, buffer:
     for (row, line) in (0..).zip(lines.iter().skip(first).take(rows)) {
         Row::new(buffer, place.list, row).put(line, theme.text());
     }
+}
+
+fn qualities(model: &Model, cursor: usize, place: &Place, theme: &Theme, buffer: &mut Buffer) {
+    overlay(place.frame, "quality", theme, buffer);
+    for (row, quality) in (0..place.list.height).zip(model.qualities()) {
+        let (mut to, name, rest) =
+            chosen(place.list, row, usize::from(row) == cursor, theme, buffer);
+        let cost = match quality.cost {
+            Cost::Reached(Some(seconds)) => format!("reached after {}", duration(seconds)),
+            Cost::Reached(None) => "reached".to_string(),
+            Cost::Left(from, to) => format!("{} more", durations(from, to)),
+            Cost::Unknown => "not known yet".to_string(),
+        };
+        let unit = if quality.noise_codes == 1.0 { "code" } else { "codes" };
+        let target = if quality.is_target { "→ " } else { "  " };
+        to.put_right("  ", 0, rest).put_right(&cost, 8, name);
+        to.put(target, theme.good()).put_wide(&quality.noise_codes.to_string(), 5, name).skip(1);
+        to.put_wide(unit, 5, name).skip(2).put(quality.looks, rest);
+    }
+    let about = "Halving the noise takes two to four times as long. Enter: stop there.";
+    say(about, theme.dim(), place.help, buffer);
 }
 
 /// A row of a list with a cursor.

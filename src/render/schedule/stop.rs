@@ -7,12 +7,7 @@ impl Schedule {
     /// A lower and an upper guess of the seconds left until the first of the targets, `seconds` after
     /// the work began.
     pub fn eta_seconds(&self, seconds: f64) -> Option<(f64, f64)> {
-        let per_ray = seconds / self.rays.max(1) as f64;
-        let by_noise =
-            self.target().and_then(|(_, t)| self.trend.rays_needed(t)).map(|(low, high)| {
-                let left = |rays: f64| (rays - self.rays as f64).max(0.0) * per_ray;
-                (left(low), left(high))
-            });
+        let by_noise = self.target().and_then(|(_, target)| self.seconds_to_error(target, seconds));
         let by_spp = self.settings.stop.spp.filter(|_| self.samples > 0).map(|spp| {
             let total = 2.0 * f64::from(spp.div_ceil(2)) * self.pixels() as f64;
             let left = (total / self.samples as f64 - 1.0).max(0.0) * seconds;
@@ -24,6 +19,28 @@ impl Schedule {
             .into_iter()
             .flatten()
             .reduce(|(low, high), (l, h)| (low.min(l), high.min(h)))
+    }
+
+    /// A lower and an upper guess of the seconds left until the noise as displayed has fallen to `codes`,
+    /// whatever the targets are, `seconds` after the work began. `None` before an error is known.
+    pub fn seconds_to_noise(&self, codes: f64, seconds: f64) -> Option<(f64, f64)> {
+        let noise = self.noise?;
+        if noise.rmse_codes <= codes {
+            return Some((0.0, 0.0));
+        }
+        let target = match self.settings.criterion {
+            Criterion::Codes => codes,
+            Criterion::Linear => codes * noise.rmse_linear / noise.rmse_codes,
+        };
+        self.seconds_to_error(target, seconds)
+    }
+
+    /// The same for an error in the unit of the criterion.
+    fn seconds_to_error(&self, target: f64, seconds: f64) -> Option<(f64, f64)> {
+        let (low, high) = self.trend.rays_needed(target)?;
+        let per_ray = seconds / self.rays.max(1) as f64;
+        let left = |rays: f64| (rays - self.rays as f64).max(0.0) * per_ray;
+        Some((left(low), left(high)))
     }
 
     /// How far the work is on its way to the nearest target, 0..1: the share of the work, as far as it

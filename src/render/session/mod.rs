@@ -28,7 +28,7 @@ use crate::render::wave::{Wave, WaveReport};
 use crate::scene::Scene;
 use crate::world::Sight;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
-pub use report::{Report, State};
+pub use report::{QUALITIES, Report, State};
 use snapshot::Slot;
 pub use snapshot::{Snapshot, TileMaps, View};
 use std::io;

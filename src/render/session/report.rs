@@ -4,6 +4,9 @@ use crate::film::Noise;
 use crate::render::schedule::{Spp, StoppedBy};
 use std::sync::Arc;
 
+/// The noise, in codes, of the qualities that a user chooses from: halves of one another.
+pub const QUALITIES: [f64; 6] = [4.0, 2.0, 1.0, 0.5, 0.25, 0.125];
+
 /// What the session is doing.
 #[derive(Clone, Debug, PartialEq)]
 pub enum State {
@@ -42,6 +45,8 @@ pub struct Report {
     pub noise: Option<Noise>,
     /// A lower and an upper guess of the seconds left.
     pub eta_seconds: Option<(f64, f64)>,
+    /// The same for each of the [`QUALITIES`], whatever the targets are.
+    pub quality_seconds: [Option<(f64, f64)>; QUALITIES.len()],
     /// Share of the work that is done, 0..=1.
     pub progress: Option<f64>,
     /// Samples that were lost because they were not finite or negative.
@@ -70,6 +75,7 @@ impl Report {
             first_picture_seconds: None,
             noise: None,
             eta_seconds: None,
+            quality_seconds: [None; QUALITIES.len()],
             progress: None,
             bad_samples: 0,
             recent_samples_per_second: 0.0,

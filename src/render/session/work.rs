@@ -1,7 +1,7 @@
 //! A scene in work: tracing it piece by piece, judging it, showing it.
 
 use super::pace::Pace;
-use super::report::{Report, State};
+use super::report::{QUALITIES, Report, State};
 use super::snapshot::{Frame, Snapshot, View};
 use super::{Shared, Traced};
 use crate::film::{Raster, TileNoise};
@@ -255,6 +255,7 @@ impl<T: Traced> Work<T> {
             first_picture_seconds: self.first_picture.map(|t| t.as_secs_f64()),
             noise: self.schedule.noise(),
             eta_seconds: self.schedule.eta_seconds(seconds),
+            quality_seconds: QUALITIES.map(|codes| self.schedule.seconds_to_noise(codes, seconds)),
             progress: self.schedule.progress(seconds),
             bad_samples: self.traced.film().bad_samples().count,
             recent_samples_per_second: self

@@ -41,6 +41,14 @@ pub fn tracing(screen: [u16; 2]) -> Model {
     }
     let last = Report {
         eta_seconds: Some((0.9, 1.6)),
+        quality_seconds: [
+            Some((0.0, 0.0)),
+            Some((0.0, 0.0)),
+            Some((0.0, 0.0)),
+            Some((0.9, 1.6)),
+            Some((3.4, 5.8)),
+            Some((13.0, 25.0)),
+        ],
         progress: Some(0.4),
         ..with_spread(report(1, 212, Some(0.9)))
     };
@@ -228,6 +236,7 @@ pub const STATES: &[Named] = &[
     ("help", |m| m.overlay = Some(Overlay::Help { scroll: 0 })),
     ("help-scrolled", |m| m.overlay = Some(Overlay::Help { scroll: 60 })),
     ("inventory", |m| m.overlay = Some(Overlay::Inventory { scroll: 0 })),
+    ("quality", |m| m.overlay = Some(Overlay::Quality { cursor: 3 })),
     ("palette", |m| {
         let found = (0..KEYMAP.len()).filter(|i| KEYMAP[*i].label.contains("light")).collect();
         let editor = Editor::new("light");
