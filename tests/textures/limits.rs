@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use zerkalo::asset::{Assets, Stage};
 use zerkalo::film::Part;
+use zerkalo::material::Fresnel;
 use zerkalo::scene::edit::{Entry, Subject, rows, set, step, toggle};
 use zerkalo::scene::{Document, Scene, SceneFile};
 use zerkalo::world::{AnyWorld, Options, Precision};
@@ -193,8 +194,17 @@ fn the_dashboard_edits_textures_and_reads_no_file_twice() {
 /// neighbouring pixels.
 #[test]
 fn textures_do_not_depend_on_packets() {
-    for name in ["bump.toml", "texture-uv.toml"] {
-        let scene = sized(shipped(name), [40, 30]);
+    let mut glass = shipped("bump.toml");
+    let plaster = glass.materials.get_mut("plaster").unwrap();
+    (plaster.diffuse, plaster.reflection, plaster.transmission) = (0.0, 1.0, 1.0);
+    plaster.fresnel = Some(Fresnel::Dielectric);
+    let mut smooth = glass.clone();
+    smooth.materials.get_mut("plaster").unwrap().bump = None;
+    let whole = |scene: &Scene| shown(&sized(scene.clone(), [40, 30]), Precision::Single);
+    assert!(whole(&glass) != whole(&smooth), "bumps bend what is seen through glass");
+    let shipped = ["bump.toml", "texture-uv.toml"].map(|name| (name, shipped(name)));
+    for (name, scene) in shipped.into_iter().chain([("bumped glass", glass)]) {
+        let scene = sized(scene, [40, 30]);
         for precision in [Precision::Single, Precision::Double] {
             let whole = rendered(&scene, 1, precision, 16);
             let mut single = crate::support::begin(&scene, 1, precision);
@@ -203,6 +213,7 @@ fn textures_do_not_depend_on_packets() {
                 crate::support::uniform(&mut single, first, 1, &pool);
             }
             assert!(picture(&whole, Part::Both) == picture(&single, Part::Both), "{name}");
+            assert_eq!(whole.film.bad_samples().count, 0, "{name}");
         }
     }
 }

@@ -100,7 +100,7 @@ impl Case {
         })
     }
 
-    /// `bare`: without kind and file.
+    /// The keys that say how it lies.
     fn lay(&self) -> String {
         let Lay { mapping, axis, scale, offset, .. } = self.lay;
         let axis = axis.map(|a| format!("axis = \"{a}\", ")).unwrap_or_default();
@@ -182,7 +182,10 @@ fn differences(case: &Case, shown: &[Vec<DVec3>; 2], desk: &Desk) -> [f64; 2] {
     [differing(&shown[0], &expected, 2e-5), differing(&shown[1], &expected, 4e-3)]
 }
 
-const ALLOWED: [f64; 2] = [0.002, 0.02];
+const ALLOWED: [f64; 2] = [0.001, 0.01];
+
+/// A share that something else differs in at least: many times what is allowed.
+const TOLD: f64 = 0.08;
 
 fn check(case: &Case, desk: &Desk) {
     let shown = [Precision::Double, Precision::Single].map(|p| case.shown(desk, p));
@@ -192,7 +195,7 @@ fn check(case: &Case, desk: &Desk) {
     for (neighbour, what) in neighbours(case) {
         let other = differences(&neighbour, &shown, desk);
         assert!(
-            other.iter().all(|share| *share > 0.15),
+            other.iter().all(|share| *share > TOLD),
             "{} is not told from {what}: {other:?}",
             case.name
         );
@@ -442,6 +445,6 @@ fn parts_of_compounds() {
         let found = differences(&part, &shown, &desk);
         assert!(found[0] <= ALLOWED[0] && found[1] <= ALLOWED[1], "{found:?}");
         part.lay.offset[0] += 0.2;
-        assert!(differences(&part, &shown, &desk).iter().all(|share| *share > 0.15));
+        assert!(differences(&part, &shown, &desk).iter().all(|share| *share > TOLD));
     }
 }
