@@ -195,7 +195,7 @@ fn planar<L: Lanes>(p: V3<L>) -> Coordinates<L> {
     Coordinates { u: p.x, v: p.y, du: unit(0, L::one()), dv: unit(1, L::one()) }
 }
 
-/// The angle around y in turns, and its gradient.
+/// The angle around y in turns, its gradient, and the square of the distance from y.
 #[inline(always)]
 fn around<L: Lanes>(p: V3<L>) -> (L, V3<L>, L) {
     let across2 = p.x.mul_add(p.x, p.z * p.z);

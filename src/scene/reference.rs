@@ -37,8 +37,8 @@ and every key with a default may be left out. Unknown keys are errors.
   shows it as it is: `color = [1.0, 1.0, 1.0]` with `texture.image = { file = \"wood.png\", scale =
   [2.0, 2.0] }` or `texture.checker = { even = \"#ffffff\", odd = \"#202020\" }`. A bump,
   `bump.image = { file = \"bricks.png\", height = 0.02 }`, turns the normals that light sees, in
-  highlights, reflections and refraction as well; the shape itself, its outline and its shadows stay. Where a bump would turn a normal away from the
-  viewer it is turned less.
+  highlights, reflections and refraction as well; the shape itself, its outline and its shadows stay.
+  Where a bump would turn a normal away from the viewer it is turned less.
 - Textures lie in the shape's own space, before its `transform`: an object takes its texture and its
   bumps along. There u points to the right, v up; on a plane, platform or rectangle up is along its `up`,
   or away from the viewer where it lies flat; around a cylinder or cone it is along the axis; a cube,

@@ -187,14 +187,14 @@ impl<L: Lanes> World<L> {
         let number = self.finish_of[item as usize];
         let finish = &self.finishes[number as usize];
         let mut normal = geometric;
-        let patch = Patch { item, facet: hit.facet, surface: &surface, lanes };
+        let patch = || Patch { item, facet: hit.facet, surface, lanes };
         if self.smooth {
-            normal = self.shading_normal(&patch, (front, geometric), ray.direction);
+            normal = self.shading_normal(&patch(), (front, geometric), ray.direction);
         }
         let mut tint = V3::of([1.0; 3]);
         let mut diffuse = V3::splat(finish.diffuse);
         if self.colored
-            && let Some(color) = self.own_color(&patch)
+            && let Some(color) = self.own_color(&patch())
         {
             (tint, diffuse) = (color, diffuse.times(color));
         }

@@ -21,14 +21,15 @@ pub(super) struct Skins<L: Lanes> {
     of_item: Vec<Option<Skin<L::Scalar>>>,
 }
 
-/// A packet's points on the surface of one item.
-pub(super) struct Patch<'a, L: Lanes> {
+/// A packet's points on the surface of one item. Made only where it is asked for, so that elsewhere
+/// nothing of it leaves the registers.
+pub(super) struct Patch<L: Lanes> {
     /// Tag of the item.
     pub item: u32,
     /// Tags of the triangles, on a mesh.
     pub facet: L,
     /// The points, with the normals that point outwards.
-    pub surface: &'a Surface<L>,
+    pub surface: Surface<L>,
     /// The lanes that are there.
     pub lanes: L::Mask,
 }
@@ -119,9 +120,9 @@ impl<L: Lanes> Skins<L> {
 fn coordinates<L: Lanes>(
     geometry: &Geometry<L>,
     projector: &Projector<L::Scalar>,
-    patch: &Patch<'_, L>,
+    patch: &Patch<L>,
 ) -> Coordinates<L> {
-    let surface = patch.surface;
+    let surface = &patch.surface;
     if projector.wants_uv()
         && let Some(own) = geometry.uv(patch.item, patch.facet, surface.point)
     {
@@ -139,7 +140,7 @@ impl<L: Lanes> World<L> {
 
     /// The colour of its own that a thing has, if it has one: that in its mesh's file, and its texture.
     #[inline(never)]
-    pub(super) fn own_color(&self, patch: &Patch<'_, L>) -> Option<V3<L>> {
+    pub(super) fn own_color(&self, patch: &Patch<L>) -> Option<V3<L>> {
         let painted = self.geometry.color(patch.item, patch.facet);
         let Some((projector, pattern)) = self.skin(patch.item).and_then(|s| s.pattern.as_ref())
         else {
@@ -156,7 +157,7 @@ impl<L: Lanes> World<L> {
     #[inline(never)]
     pub(super) fn shading_normal(
         &self,
-        patch: &Patch<'_, L>,
+        patch: &Patch<L>,
         (front, geometric): (L::Mask, V3<L>),
         direction: V3<L>,
     ) -> V3<L> {

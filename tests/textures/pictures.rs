@@ -347,6 +347,22 @@ fn bumps_on_things_that_are_transformed_and_painted() {
     }
 }
 
+/// Where an angle begins and ends, and where all of them meet.
+#[test]
+fn seams_and_poles() {
+    let desk = Desk::new();
+    for case in mappings().into_iter().filter(|c| c.lay.mapping.ends_with("ical")) {
+        let turned = Case {
+            transform: "{ rotate_y = 170 }, { rotate_x = 60 }, ",
+            scene_from_object: DAffine3::from_rotation_x(PI / 3.0)
+                * DAffine3::from_rotation_y(170f64.to_radians()),
+            ..case
+        };
+        check(&turned, &desk);
+        check(&Case { height: 0.03, ..turned }, &desk);
+    }
+}
+
 /// Far from the origin everything looks as it does there: coordinates have some 1e-10 of a unit left.
 #[test]
 fn textures_stay_where_they_are_far_from_the_origin() {
