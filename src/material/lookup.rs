@@ -36,6 +36,8 @@ pub struct Heights {
 fn between(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
     let size = f64::from(size);
     let x = match wrap {
+        // A triangle without area has no coordinates.
+        _ if !x.is_finite() => 0.0,
         Wrap::Repeat => x - x.floor(),
         Wrap::Clamp => x.clamp(-1.0, 2.0),
     };
