@@ -257,8 +257,9 @@ fn bumped(thing: &Thing, p: DVec3, n: DVec3) -> DVec3 {
     for way in [s, t] {
         let h = 1e-6;
         let grown = coordinates(thing, p + way * h, n) - coordinates(thing, p - way * h, n);
-        // Across a seam the angle jumps.
-        let grown = DVec2::from(grown.to_array().map(|x| if x.abs() > 1e-3 { 0.0 } else { x }));
+        // Across a seam the angle jumps by a turn.
+        let turn = thing.lay.scale[0];
+        let grown = grown - DVec2::new(turn * (grown.x / turn).round(), 0.0);
         out -= way * slope.dot(grown / (2.0 * h));
     }
     out.normalize()

@@ -56,7 +56,7 @@ fn bumps_by_every_mapping() {
 fn bumps_on_things_that_are_transformed_and_painted() {
     let desk = Desk::new();
     for case in mappings() {
-        check(&moved(Case { height: 0.03, ..case }), &desk);
+        check(&moved(Case { height: 0.08, ..case }), &desk);
     }
 }
 
@@ -72,7 +72,7 @@ fn seams_and_poles() {
             ..case
         };
         check(&turned, &desk);
-        check(&Case { height: 0.03, ..turned }, &desk);
+        check(&Case { height: 0.08, ..turned }, &desk);
     }
 }
 
@@ -81,7 +81,7 @@ fn seams_and_poles() {
 fn textures_stay_where_they_are_far_from_the_origin() {
     let desk = Desk::new();
     for case in mappings().into_iter().filter(|c| !matches!(c.solid, Solid::Floor(_))) {
-        check(&Case { far: DVec3::new(1e6, -3e5, 7e5), height: 0.02, ..case }, &desk);
+        check(&Case { far: DVec3::new(1e6, -3e5, 7e5), height: 0.05, ..case }, &desk);
     }
 }
 
