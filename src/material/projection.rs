@@ -219,8 +219,9 @@ fn cylindrical<L: Lanes>(p: V3<L>, height: L) -> Coordinates<L> {
     let (u, du, _) = around(p);
     let flat = height.le(L::zero());
     let per = (L::one() / L::select(flat, L::one(), height)).only(!flat);
-    let v = (p.y * per).max(L::of(RIM)).min(L::of(1.0 - RIM));
-    Coordinates { u, v, du, dv: unit(1, per) }
+    let (free, low, high) = (p.y * per, L::of(RIM), L::of(1.0 - RIM));
+    let inside = free.ge(low) & free.le(high);
+    Coordinates { u, v: free.max(low).min(high), du, dv: unit(1, per.only(inside)) }
 }
 
 /// Sides of a box from its lower corner on: which one, the normal says.

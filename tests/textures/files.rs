@@ -87,8 +87,7 @@ fn bricks() -> RgbImage {
             return Rgb([196, 188, 176]);
         }
         let tone = 0.8 + 0.35 * (hashed(number, 11) - 0.5);
-        let red = Rgb([code(0.78 * tone), code(0.40 * tone), code(0.29 * tone)]);
-        red
+        Rgb([code(0.78 * tone), code(0.40 * tone), code(0.29 * tone)])
     })
 }
 
