@@ -1,0 +1,179 @@
+//! Pictures of textured things against the direct evaluation, for every mapping, wrap and kind.
+
+use crate::cases::{
+    ALLOWED, Case, Desk, TOLD, ball, block, check, differences, differing, lay, mappings, moved,
+    sheet,
+};
+use crate::direct::{Lay, Solid};
+use crate::support::{picture, rendered};
+use glam::{DAffine3, DVec3};
+use std::f64::consts::{PI, TAU};
+use std::fmt::Write;
+use zerkalo::film::Part;
+use zerkalo::world::Precision;
+
+#[test]
+fn every_mapping_of_an_image() {
+    let desk = Desk::new();
+    for case in mappings() {
+        check(&case, &desk);
+    }
+}
+
+#[test]
+fn every_mapping_of_a_checker_on_things_that_are_transformed() {
+    let desk = Desk::new();
+    for case in mappings() {
+        // Where a side lies along a projection the edges of squares lie in it: nobody can say which.
+        if case.name == "planar block" {
+            continue;
+        }
+        check(&moved(Case { checker: true, ..case }), &desk);
+    }
+}
+
+#[test]
+fn wraps_and_filters() {
+    let desk = Desk::new();
+    for (name, clamp, nearest) in
+        [("clamped", true, false), ("nearest", false, true), ("clamped and nearest", true, true)]
+    {
+        let lay = Lay { clamp, nearest, ..lay("uv", [1.9, 1.8], [-0.4, -0.5]) };
+        check(&Case::new(name, sheet(), lay), &desk);
+    }
+}
+
+#[test]
+fn bumps_by_every_mapping() {
+    let desk = Desk::new();
+    for case in mappings() {
+        let height = 0.02 / case.lay.scale[0].min(1.0);
+        check(&Case { height, painted: false, ..case }, &desk);
+    }
+}
+
+#[test]
+fn bumps_on_things_that_are_transformed_and_painted() {
+    let desk = Desk::new();
+    for case in mappings() {
+        check(&moved(Case { height: 0.08, ..case }), &desk);
+    }
+}
+
+/// Where an angle begins and ends, and where all of them meet.
+#[test]
+fn seams_and_poles() {
+    let desk = Desk::new();
+    for case in mappings().into_iter().filter(|c| c.lay.mapping.ends_with("ical")) {
+        let turned = Case {
+            transform: "{ rotate_y = 170 }, { rotate_x = 60 }, ",
+            scene_from_object: DAffine3::from_rotation_x(PI / 3.0)
+                * DAffine3::from_rotation_y(170f64.to_radians()),
+            ..case
+        };
+        check(&turned, &desk);
+        check(&Case { height: 0.08, ..turned }, &desk);
+    }
+}
+
+/// Far from the origin everything looks as it does there: coordinates have some 1e-10 of a unit left.
+#[test]
+fn textures_stay_where_they_are_far_from_the_origin() {
+    let desk = Desk::new();
+    for case in mappings().into_iter().filter(|c| !matches!(c.solid, Solid::Floor(_))) {
+        check(&Case { far: DVec3::new(1e6, -3e5, 7e5), height: 0.05, ..case }, &desk);
+    }
+}
+
+/// A rectangle of two triangles whose file has texture coordinates is one with mapping `uv`.
+#[test]
+fn the_coordinates_of_a_mesh() {
+    let desk = Desk::new();
+    let sheet_text = "v -0.9 -0.7 0\nv 1.0 -0.7 0\nv 1.0 0.7 0\nv -0.9 0.7 0\n\
+                      vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
+    std::fs::write(desk.folder.path().join("sheet.obj"), sheet_text).unwrap();
+    for (name, mapping, height) in
+        [("uv mesh", "uv", 0.0), ("bumped uv mesh", "uv", 0.03), ("uv by itself", "auto", 0.02)]
+    {
+        let mut case = Case::new(name, sheet(), lay("uv", [1.6, 1.3], [0.0, 0.4]));
+        case.height = height;
+        case.shape = Some("shape.mesh = { file = \"sheet.obj\" }".into());
+        check(&case, &desk);
+        check(&moved(case.clone()), &desk);
+        let text = case.text().replace("mapping = \"uv\"", &format!("mapping = \"{mapping}\""));
+        let one =
+            |text: &str| picture(&rendered(&desk.scene(text), 1, Precision::Double, 1), Part::Both);
+        assert!(one(&text) == one(&case.text()), "{name}");
+    }
+}
+
+/// A ball of triangles with texture coordinates looks like a sphere with mapping `spherical`, the nearer
+/// the finer it is.
+#[test]
+fn a_mesh_of_a_sphere() {
+    let desk = Desk::new();
+    let mut error = Vec::new();
+    for sides in [24usize, 96] {
+        let rings = sides / 2;
+        let mut text = String::new();
+        for j in 0..=rings {
+            for i in 0..=sides {
+                let (u, v) = (i as f64 / sides as f64, j as f64 / rings as f64);
+                let ((s, c), (y, across)) =
+                    ((TAU * (u - 0.5)).sin_cos(), (PI * (v - 0.5)).sin_cos());
+                let [x, z] = [across * s, across * c];
+                writeln!(text, "v {x} {y} {z}\nvt {u} {v}\nvn {x} {y} {z}").unwrap();
+            }
+        }
+        for j in 0..rings {
+            for i in 0..sides {
+                let at = |i: usize, j: usize| {
+                    let n = j * (sides + 1) + i + 1;
+                    format!("{n}/{n}/{n}")
+                };
+                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                writeln!(text, "f {a} {b} {c} {d}").unwrap();
+            }
+        }
+        std::fs::write(desk.folder.path().join("ball.obj"), text).unwrap();
+        let mut case = Case::new("mesh", ball(), lay("spherical", [2.0, 1.0], [0.0, 0.0]));
+        case.height = 0.02;
+        let expected = case.expected(&desk);
+        case.lay.mapping = "uv";
+        case.shape = Some("shape.mesh = { file = \"ball.obj\" }".into());
+        case.transform = "{ scale = 0.9 }, { translate = [0.1, -0.05, 0.0] }, ";
+        // As high as on the sphere after the scale.
+        case.height /= 0.9;
+        let shown = case.shown(&desk, Precision::Double);
+        error.push(differing(&shown, &expected, 0.03));
+    }
+    println!("{error:?}");
+    assert!(error[1] < 0.05 && error[1] < 0.3 * error[0], "{error:?}");
+}
+
+/// A part of a compound has its own material, and its own place carries the texture.
+#[test]
+fn parts_of_compounds() {
+    let desk = Desk::new();
+    for checker in [false, true] {
+        let mut case = Case::new("part", block(), lay("box", [1.4, 1.1], [0.21, 0.17]));
+        (case.checker, case.height) = (checker, if checker { 0.0 } else { 0.03 });
+        let alone = moved(case);
+        let shape = format!(
+            "shape.union.of = [\n{{ shape.sphere = {{ center = [0, 0, 90], radius = 1 }}, material = \"other\" }},\n\
+             {{ {}, transform = [{}] }},\n]",
+            alone.shape(),
+            alone.transform.trim_end_matches(", "),
+        );
+        let mut part = Case { shape: Some(shape), transform: "", ..alone.clone() };
+        let text = part.text() + "[materials.other]\n";
+        let shown = [Precision::Double, Precision::Single].map(|p| {
+            let rendering = rendered(&desk.scene(&text), 1, p, 1);
+            picture(&rendering, Part::Both).into_iter().map(DVec3::from).collect::<Vec<_>>()
+        });
+        let found = differences(&part, &shown, &desk);
+        assert!(found[0] <= ALLOWED[0] && found[1] <= ALLOWED[1], "{found:?}");
+        part.lay.offset[0] += 0.2;
+        assert!(differences(&part, &shown, &desk).iter().all(|share| *share > TOLD));
+    }
+}
