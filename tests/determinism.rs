@@ -51,7 +51,7 @@ fn of_ranges(scene: &Scene, precision: Precision, ranges: &[(u32, u32)]) -> Film
 }
 
 #[test]
-fn extreme_29_threads_and_tile_orders_do_not_change_a_byte() {
+fn extreme_29_determinism() {
     for (name, scene) in scenes() {
         for precision in PRECISIONS {
             let expected = whole(&scene, precision, 19).bytes();

@@ -115,8 +115,9 @@ fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
     (sum * area, squares.sqrt() * area)
 }
 
+/// Closed form 9.
 #[test]
-fn closed_form_09_volumes() {
+fn extreme_09_volumes() {
     let lens = |r: f64, s: f64, d: f64| {
         PI * (r + s - d).powi(2) * (d * d + 2.0 * d * (r + s) - 3.0 * (r - s).powi(2)) / (12.0 * d)
     };
@@ -199,7 +200,7 @@ fn closed_form_09_volumes() {
 
 /// V(A or B) + V(A and B) = V(A) + V(B), on every line.
 #[test]
-fn closed_form_09_inclusion_and_exclusion_on_every_line() {
+fn extreme_09_inclusion_and_exclusion() {
     let solids = [
         ball(0.2, -0.1, 0.0, 0.9),
         block([-0.3, 0.2, 0.1], [1.1, 0.9, 1.5]),
@@ -290,7 +291,7 @@ fn tree_contains(tree: &Tree, parts: &[Form], p: DVec3) -> bool {
 /// Random trees of depth 8: surfaces in turn, and between them what the points themselves say. Half a
 /// million rays each way.
 #[test]
-fn extreme_08_extreme_04_parity_of_random_trees() {
+fn extreme_08_parity() {
     let mut seen = 0;
     for seed in 0..100 {
         let mut numbers = Numbers::new(800 + seed);
@@ -352,7 +353,7 @@ fn same_surfaces(name: &str, a: &Form, b: &Form, lines: &[Line]) {
 }
 
 #[test]
-fn extreme_09_algebra() {
+fn extreme_09_csg_algebra() {
     let lines = lines(9, 20_000);
     let mut numbers = Numbers::new(90);
     for n in 0..12 {
