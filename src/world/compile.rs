@@ -140,7 +140,8 @@ impl<L: Lanes> World<L> {
         let ambient = used.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3]);
         let groups = Groups::new(scene, lit, ambient);
         let extent = placed.extent(scene);
-        let scales = groups.scales::<L::Scalar>(scene, placed.origin, 0.1 * extent);
+        let clearance = |point| precision::clearance(&placed.forms, point);
+        let scales = groups.scales::<L::Scalar>(scene, placed.origin, 0.1 * extent, clearance);
         let sources: Vec<_> = groups
             .lights(scene)
             .into_iter()

@@ -14,18 +14,22 @@ use glam::DVec3;
 /// The largest extent over the thinnest thing: rays start 1/128 of it above a surface.
 const THINNEST: f64 = 8192.0;
 
-/// The largest extent over the narrowest gap between things, and between a lamp and things: eight times
-/// the height at which rays start.
+/// The largest extent over the narrowest gap between things: eight times the height at which rays start.
 const NARROWEST: f64 = 131_072.0;
 
-/// The largest extent over what a pixel shows of the thing nearest to the eye: the height at which rays
-/// start.
-const FINEST: f64 = 1_048_576.0;
+/// The largest extent over what a pixel shows of the thing nearest to the eye: 32 times the height at
+/// which rays start.
+const FINEST: f64 = 32_768.0;
 
-/// The least angle between the rays of neighbouring pixels \[radians\]: sixteen roundings of a direction.
-const LEAST_ANGLE: f64 = 1.0 / 1_048_576.0;
+/// The largest extent over the distance of a lamp from things: the height at which rays start is then
+/// 1/512 of it, and so is the error of the light's angle.
+const NEAREST: f64 = 2048.0;
 
-/// Gaps below this part of the extent are roundings of numbers that were meant to be equal.
+/// The least angle between the rays of neighbouring pixels \[radians\]: 64 roundings of a direction.
+const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
+
+/// Gaps below this part of the extent, and below a few roundings of the place in the file, are between
+/// numbers that were meant to be equal.
 const CLOSED: f64 = 1.0 / 17_592_186_044_416.0;
 
 /// The extent of a mesh over that of its details.
@@ -43,18 +47,23 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     }
     let view = View::new(&scene.camera, scene.film.size, origin);
     let angle = view.pixel_angle();
-    let nearest =
-        |p: DVec3| forms.iter().filter_map(|f| clearance(f, p)).fold(f64::INFINITY, f64::min);
-    let seen_from = nearest(view.eye()).max(scene.camera.near);
+    let seen_from = clearance(forms, view.eye()).max(scene.camera.near);
     if angle < LEAST_ANGLE || extent > FINEST * angle * seen_from {
         return false;
     }
     let lamps = scene.lights.iter().filter(|l| l.on).filter_map(|l| l.point);
-    let narrowest = lamps
-        .map(|lamp| nearest(DVec3::from(lamp.position) - origin))
-        .fold(f64::INFINITY, f64::min);
-    let limit = extent / NARROWEST;
-    narrowest >= limit && !has_gap(forms, CLOSED * extent..limit)
+    let mut distances = lamps.map(|lamp| clearance(forms, DVec3::from(lamp.position) - origin));
+    if distances.any(|distance| extent > NEAREST * distance) {
+        return false;
+    }
+    let rounded = 16.0 * f64::EPSILON * origin.abs().max_element();
+    !has_gap(forms, (CLOSED * extent).max(rounded)..extent / NARROWEST)
+}
+
+/// No more than the distance of `point` from the surfaces of `forms`; those in whose box it is, and of
+/// which nothing more is known, do not count.
+pub(super) fn clearance(forms: &[Form], point: DVec3) -> f64 {
+    forms.iter().filter_map(|form| clearance_of(form, point)).fold(f64::INFINITY, f64::min)
 }
 
 /// The smallest thickness of a solid, or the smaller edge of a flat thing. Of a compound that of its
@@ -92,7 +101,7 @@ fn thickness(form: &Form) -> f64 {
 
 /// No more than the distance of `point` from the surface; `None`: it is inside the thing's box, and
 /// nothing more is known.
-fn clearance(form: &Form, point: DVec3) -> Option<f64> {
+fn clearance_of(form: &Form, point: DVec3) -> Option<f64> {
     match form {
         Form::Sphere { center, radius } => Some((point.distance(*center) - radius).abs()),
         Form::Plane { normal, offset } => Some((normal.dot(point) - offset).abs()),
@@ -106,7 +115,7 @@ fn clearance(form: &Form, point: DVec3) -> Option<f64> {
             Some(above.max(box_away.unwrap_or(0.0)))
         }
         Form::Compound(compound) => {
-            let parts = compound.parts.iter().filter_map(|part| clearance(part, point));
+            let parts = compound.parts.iter().filter_map(|part| clearance_of(part, point));
             parts.reduce(f64::min)
         }
         Form::Ellipsoid { .. } | Form::Tapered { .. } | Form::Mesh { .. } => {

@@ -7,11 +7,13 @@ use zerkalo::film::{Display, Part};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
-const SIZE: [u32; 2] = [96, 72];
-const SAMPLES: u32 = 8;
+const SIZE: [u32; 2] = [48, 36];
+/// Enough that paths which a rounding turns aside, equally often to either side, are no noise.
+const SAMPLES: u32 = 64;
 
-/// What single precision may get wrong where `auto` takes it: a tenth of what is converged by default.
-const INVISIBLE: f64 = 0.05;
+/// What single precision may get wrong where `auto` takes it: a quarter of the noise at which pictures
+/// are converged by default.
+const INVISIBLE: f64 = 0.125;
 
 fn takes_single(scene: &Scene) -> bool {
     matches!(AnyWorld::compile(scene, &Options::default()), AnyWorld::Single(_))
@@ -33,7 +35,7 @@ fn error(scene: &Scene) -> f64 {
 /// A family of scenes.
 struct Family {
     name: &'static str,
-    /// The scene in which the proportion is this, from 1 down.
+    /// The scene in which the proportion is this, from 1/4 down.
     text: fn(f64) -> String,
     /// The smallest proportion that is tried.
     least: f64,
@@ -43,7 +45,7 @@ struct Family {
 
 fn camera(eye: [f64; 3], target: [f64; 3], degrees: f64) -> String {
     format!(
-        "[film]\nsize = [96, 72]\n[camera]\neye = {eye:?}\ntarget = {target:?}\n\
+        "[film]\nsize = [48, 36]\n[camera]\neye = {eye:?}\ntarget = {target:?}\n\
          view_angle.vertical = {degrees:e}\n[background]\ncolor = [0.2, 0.4, 0.6]\n\
          [ambient]\ncolor = [0.1, 0.1, 0.1]\n"
     )
@@ -181,7 +183,7 @@ const FAMILIES: [Family; 10] = [
     Family { name: "a thin shell around a lamp", text: thin_shell, least: 1e-7, visible: 1.0 },
     Family { name: "a low lamp", text: low_lamp, least: 1e-6, visible: 1.0 },
     Family { name: "a narrow view", text: narrow_view, least: 1e-6, visible: 1.0 },
-    Family { name: "a low eye", text: low_eye, least: 1e-6, visible: 1.0 },
+    Family { name: "a low eye", text: low_eye, least: 5e-7, visible: 1.0 },
     Family { name: "a round ground with a ball", text: round_ground, least: 1e-8, visible: 1.0 },
     Family { name: "a bare round ground", text: bare_round_ground, least: 1e-8, visible: 1.0 },
     Family { name: "things far apart", text: far_apart, least: 1e-7, visible: 1.0 },
@@ -193,9 +195,9 @@ const FAMILIES: [Family; 10] = [
 fn auto_takes_double_where_single_would_show() {
     let mut wrong = Vec::new();
     for Family { name, text, least, visible } in FAMILIES {
-        let (mut single_before, mut p, mut worst) = (true, 1.0, 0.0f64);
+        let (mut single_before, mut p, mut worst) = (true, 0.25, 0.0f64);
         let mut last = 0.0;
-        let begins_single = takes_single(&parsed(&text(1.0)));
+        let begins_single = takes_single(&parsed(&text(0.25)));
         while p >= least {
             let scene = parsed(&text(p));
             let single = takes_single(&scene);
@@ -275,4 +277,4 @@ fn shipped_scenes_stay_in_single_precision() {
 }
 
 /// In glass and between mirrors some paths end elsewhere after a rounding: noise, not error.
-const SHIPPED: f64 = 0.25;
+const SHIPPED: f64 = 0.1;
