@@ -256,6 +256,38 @@ fn auto_takes_single_where_proportions_are_harmless() {
     }
 }
 
+/// The numbered extremes that single precision cannot meet: `auto` switches to double.
+#[test]
+fn auto_takes_double_for_the_extremes_beyond_single() {
+    let seen = |eye: [f64; 3], degrees: f64, shape: &str| {
+        camera(eye, [0.0, 0.0, 0.0], degrees) + SUN + "[[object]]\nshape." + shape + "\n"
+    };
+    let ball = "sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }";
+    let cylinder = |height: f64| {
+        format!("cylinder = {{ base = [0, 0, 0], top = [0, {height:e}, 0], radius = 1.0 }}")
+    };
+    for (number, text) in [
+        (1, seen([1e6, 0.0, 0.0], 1e-4, ball)),
+        (2, seen([0.0, 1e9 + 1.7, 0.0], 40.0, "sphere = { center = [0, 0, 0], radius = 1e9 }")),
+        (3, seen([1.0, 0.0, 0.0], 1e-3, "sphere = { center = [0, 0, 0], radius = 1e-6 }")),
+        (11, seen([3.0, 2.0, 3.0], 40.0, &cylinder(1e-9))),
+        (11, seen([3.0, 2.0, 3.0], 40.0, &cylinder(1e9))),
+        (13, seen([3.0, 2.0, 3.0], 40.0, "box = { center = [0, 0, 0], size = [1, 1e-6, 1] }")),
+        (16, narrow_gap(1e-6)),
+        (17, seen([3.0, 2.0, 3.0], 1e-3, ball)),
+    ] {
+        // The camera of the ground looks along it.
+        let text = text.replace(
+            "target = [0.0, 0.0, 0.0]",
+            match number {
+                2 => "target = [1.0, 1e9, 0.0]",
+                _ => "target = [0.0, 0.0, 0.0]",
+            },
+        );
+        assert!(!takes_single(&parsed(&text)), "extreme {number}:\n{text}");
+    }
+}
+
 /// Everything that is shipped is traced in single precision, and nothing of that shows.
 #[test]
 fn shipped_scenes_stay_in_single_precision() {

@@ -171,7 +171,9 @@ fn extreme_12_along_a_generator() {
                 let middle = (low + high) / 2.0;
                 // On the generator: inside or outside by rounding, but finite. A little inside: the
                 // length between the ends.
-                for met in meet::<Double>(&form, &[(low - d * 3.0, d)]).into_iter().flatten() {
+                let along = [(low - d * 3.0, d)];
+                let single = meet::<Single>(&form, &along);
+                for met in meet::<Double>(&form, &along).into_iter().chain(single).flatten() {
                     assert!(met.t.is_finite() && met.normal.is_finite(), "s = {s}: {met:?}");
                 }
                 let center = own(DVec3::Z * 0.5);
