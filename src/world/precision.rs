@@ -21,6 +21,10 @@ const NARROWEST: f64 = 131_072.0;
 /// which rays start.
 const FINEST: f64 = 32_768.0;
 
+/// How much closer the eye may be to flat things: points are put back on a plane almost exactly, and its
+/// normal is the same everywhere.
+const FLAT: f64 = 8.0;
+
 /// The largest extent over the distance of a lamp from things: the height at which rays start is then
 /// 1/512 of it, and so is the error of the light's angle.
 const NEAREST: f64 = 2048.0;
@@ -47,7 +51,12 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     }
     let view = View::new(&scene.camera, scene.film.size, origin);
     let angle = view.pixel_angle();
-    let seen_from = clearance(forms, view.eye()).max(scene.camera.near);
+    let distance = |form: &Form| {
+        let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
+        Some(clearance_of(form, view.eye())? * if flat { FLAT } else { 1.0 })
+    };
+    let seen_from =
+        forms.iter().filter_map(distance).fold(f64::INFINITY, f64::min).max(scene.camera.near);
     if angle < LEAST_ANGLE || extent > FINEST * angle * seen_from {
         return false;
     }
