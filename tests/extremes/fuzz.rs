@@ -46,11 +46,14 @@ fn weaken_close_lamps(scene: &mut Scene) {
     }
 }
 
+/// The pictures of both replicates.
+type Replicates = [Vec<[f64; 3]>; 2];
+
 /// Renders a random scene, unless its text is refused; gives both replicates of each precision.
 fn rendered_twice(
     text: &str,
     count: &Count,
-) -> Result<Vec<(Precision, [Vec<[f64; 3]>; 2])>, TestCaseError> {
+) -> Result<Vec<(Precision, Replicates)>, TestCaseError> {
     let Ok(mut scene) = Scene::parse(text, "test") else {
         count.refused.fetch_add(1, Ordering::Relaxed);
         return Ok(Vec::new());
