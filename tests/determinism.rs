@@ -5,7 +5,8 @@ mod support;
 
 use std::fs;
 use std::process::Command;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use support::{Rng, all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
 use zerkalo::film::Film;
 use zerkalo::render::Rendering;
@@ -51,7 +52,7 @@ fn of_ranges(scene: &Scene, precision: Precision, ranges: &[(u32, u32)]) -> Film
 }
 
 #[test]
-fn extreme_29_threads_and_tile_orders_do_not_change_a_byte() {
+fn extreme_29_determinism() {
     for (name, scene) in scenes() {
         for precision in PRECISIONS {
             let expected = whole(&scene, precision, 19).bytes();
@@ -86,6 +87,40 @@ fn extreme_29_parts_added_in_any_order_are_the_whole() {
                 let mut sum = Film::new(films[0].header().clone());
                 order.iter().for_each(|i| sum.add(&films[*i]).unwrap());
                 assert!(sum.bytes() == expected, "{name} in {precision:?}, order {order:?}");
+            }
+        }
+    }
+}
+
+/// A render that is stopped somewhere in a wave, and another one, begun anew, that traces what is left.
+#[test]
+fn extreme_29_stopped_and_resumed() {
+    let pool = pool(2);
+    for (name, scene) in scenes() {
+        for precision in PRECISIONS {
+            let expected = whole(&scene, precision, 19).bytes();
+            for pause in [None, Some(0), Some(300), Some(2000)] {
+                let (mut begun, mut resumed) =
+                    (begin(&scene, SEED, precision), begin(&scene, SEED, precision));
+                for replicate in [0, 1] {
+                    let all = wave(&begun.film, replicate, 0, 19);
+                    let cancel = AtomicBool::new(pause.is_none());
+                    let report = std::thread::scope(|scope| {
+                        scope.spawn(|| {
+                            std::thread::sleep(Duration::from_micros(pause.unwrap_or(0)));
+                            cancel.store(true, Ordering::Relaxed);
+                        });
+                        begun.run(&all, &pool, &cancel)
+                    });
+                    let mut rest = all.clone();
+                    let mut done = report.reports.iter().map(Option::is_some);
+                    rest.jobs.retain(|_| !done.next().unwrap());
+                    assert!(pause.is_some() || rest.jobs.len() == all.jobs.len());
+                    trace(&mut resumed, &rest, &pool);
+                }
+                resumed.film.add(&begun.film).unwrap();
+                let same = resumed.film.bytes() == expected;
+                assert!(same, "{name} in {precision:?}, stopped after {pause:?} us");
             }
         }
     }

@@ -184,7 +184,7 @@ proptest! {
 }
 
 #[test]
-fn a_milliard_samples_neither_stall_nor_drift() {
+fn extreme_28_milliard_samples() {
     let scale = 2f64.powi(28);
     let mut film = film_of(1, 1, &[scale]);
     let white = Mix { weights: vec![[1.0; 3]] };
@@ -207,7 +207,7 @@ fn a_milliard_samples_neither_stall_nor_drift() {
 }
 
 #[test]
-fn sums_at_their_limit_are_flagged() {
+fn extreme_28_saturation_is_flagged() {
     // The limit is (2^63 - 1) / 2^28, about 3.4e10 radiance times samples.
     let (scale, white) = (2f64.powi(28), Mix { weights: vec![[1.0; 3]] });
     let mut film = film_of(1, 1, &[scale]);

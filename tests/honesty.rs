@@ -290,7 +290,7 @@ fn assert_honest(filter: Filter, adaptive: bool, spp: u32) {
 }
 
 #[test]
-fn extreme_30_uniform_estimates_are_honest() {
+fn extreme_30_estimator_honesty() {
     for filter in [Filter::Center, Filter::Box] {
         [32, 128, 1024].into_iter().for_each(|spp| assert_honest(filter, false, spp));
     }

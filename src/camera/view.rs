@@ -84,6 +84,15 @@ impl View {
         [self.u, self.v, self.w]
     }
 
+    /// The smallest angle between the rays through the middles of neighbouring pixels \[radians\]: at the
+    /// picture's corners, where pixels look smallest.
+    pub fn pixel_angle(&self) -> f64 {
+        // At the distance d along the ray a step across it by p turns the ray by about p / d, and one
+        // aslant by no less than p / d^2.
+        let step = self.right.length().min(self.down.length());
+        step / self.corner.length_squared()
+    }
+
     /// From the eye to the corners of a rectangle of the raster, on the picture plane at unit distance.
     pub fn corners(&self, [x, y]: [usize; 2], [width, height]: [usize; 2]) -> [DVec3; 4] {
         let (x0, y0) = (x as f64, y as f64);

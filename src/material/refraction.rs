@@ -164,7 +164,7 @@ mod tests {
     /// Extreme test 25: what is reflected and what goes on are all there is, next to the critical angle
     /// and far from it, and nothing jumps at it.
     #[test]
-    fn extreme_25_nothing_is_lost_around_the_critical_angle() {
+    fn extreme_25_total_reflection() {
         for n in [1.0, 1.000_001, 1.5, 1e3] {
             let critical = (1.0f64 / n).asin().to_degrees();
             for step in -1000..=1000i32 {

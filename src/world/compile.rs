@@ -6,6 +6,7 @@ use super::inventory::Inventory;
 use super::limits;
 use super::media::Media;
 use super::outlook::{Outlook, Surroundings};
+use super::precision;
 use super::skin::Skins;
 use crate::camera::View;
 use crate::lanes::{Double, Lanes, Real, Single};
@@ -33,13 +34,6 @@ pub struct Options {
     /// The precision.
     pub precision: Precision,
 }
-
-/// Beyond this ratio of the scene's extent to its thinnest thing, `auto` takes double precision: the
-/// rays that leave a surface start 2^-20 of the extent above it, 1/128 of that thing.
-const SINGLE_RATIO: f64 = 8192.0;
-
-/// The extent of a mesh over that of its details, as far as precision is concerned.
-const MESH_DETAILS: f64 = 64.0;
 
 /// A light of the world: the lamp, its group, its weight in the group's samples.
 pub(super) struct Source<S> {
@@ -113,44 +107,6 @@ impl Placed {
         let things = self.forms.iter().filter_map(Form::bounds).map(|(l, h)| l.abs().max(h.abs()));
         things.fold(eye.abs(), DVec3::max).max_element()
     }
-
-    /// The smallest thickness of a solid, or the smaller edge of a flat thing.
-    fn thinnest(&self) -> f64 {
-        self.forms.iter().map(thickness).fold(f64::INFINITY, f64::min)
-    }
-}
-
-/// The smallest thickness of a solid, or the smaller edge of a flat thing. Of a compound that of its
-/// thinnest part: what is left between cuts may be thinner.
-fn thickness(form: &Form) -> f64 {
-    match form {
-        Form::Parallelogram { u, v, .. } => u.length().min(v.length()),
-        Form::Convex { faces, corners } => faces
-            .iter()
-            .map(|f| {
-                let depths = corners.iter().map(|c| f.offset - f.normal.dot(*c));
-                depths.fold(0.0, f64::max)
-            })
-            .fold(f64::INFINITY, f64::min),
-        Form::Plane { .. } => f64::INFINITY,
-        Form::Sphere { radius, .. } => 2.0 * radius,
-        Form::Ellipsoid { .. } => {
-            form.bounds().map_or(f64::INFINITY, |(l, h)| (h - l).min_element())
-        }
-        Form::Tapered { scene_from_unit: m, .. } => {
-            // Between the faces of the box around the canonical solid: 2 by 2 by 1.
-            let rows = m.matrix3.inverse().transpose();
-            let across = rows.x_axis.length().max(rows.y_axis.length());
-            (2.0 / across).min(rows.z_axis.length().recip())
-        }
-        Form::Mesh { .. } => form.bounds().map_or(f64::INFINITY, |(l, h)| {
-            // Details are taken to be as large as this part of the whole.
-            (h - l).max_element() / MESH_DETAILS
-        }),
-        Form::Compound(compound) => {
-            compound.parts.iter().map(thickness).fold(f64::INFINITY, f64::min)
-        }
-    }
 }
 
 impl<L: Lanes> World<L> {
@@ -190,7 +146,8 @@ impl<L: Lanes> World<L> {
         let ambient = used.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3]);
         let groups = Groups::new(scene, lit, ambient);
         let extent = placed.extent(scene);
-        let scales = groups.scales::<L::Scalar>(scene, placed.origin, 0.1 * extent);
+        let clearance = |point| precision::clearance(&placed.forms, point);
+        let scales = groups.scales::<L::Scalar>(scene, placed.origin, 0.1 * extent, clearance);
         let sources: Vec<_> = groups
             .lights(scene)
             .into_iter()
@@ -322,7 +279,10 @@ impl AnyWorld {
         let single = match options.precision {
             Precision::Single => true,
             Precision::Double => false,
-            Precision::Auto => placed.extent(scene) <= SINGLE_RATIO * placed.thinnest(),
+            Precision::Auto => {
+                let extent = placed.extent(scene);
+                precision::single_suffices(scene, &placed.forms, placed.origin, extent)
+            }
         };
         if single {
             Self::Single(World::compile(scene, placed))

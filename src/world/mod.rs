@@ -9,6 +9,7 @@ mod limits;
 mod media;
 mod outlook;
 mod path;
+mod precision;
 mod skin;
 mod through;
 

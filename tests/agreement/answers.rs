@@ -111,6 +111,11 @@ fn around(w: DVec3) -> (DVec3, DVec3) {
     (u, DVec3::new(b, sign + w.y * w.y * a, -w.y))
 }
 
+/// The density that a lobe takes its own for, over what it is.
+fn believed(mutation: Mutation) -> f64 {
+    if mutation == Mutation::LobeDensity { 1.05 } else { 1.0 }
+}
+
 /// A reflected ray: its direction and the factor of what is seen there; `None`: nothing is.
 pub fn reflect(
     material: &Material,
@@ -154,7 +159,7 @@ pub fn reflect(
     }
     // The facet half-way between the two directions sends this ray.
     let f = fresnel(material, v.dot((v + direction).normalize()));
-    Some((direction, f * k))
+    Some((direction, f * k / if sharp { 1.0 } else { believed(mutation) }))
 }
 
 /// By the facets' distribution D cos, whichever it is.
@@ -182,5 +187,6 @@ fn facet(
     }
     // f N.L / density, where density = D N.H / (4 V.H).
     let g = masking(material, ggx, alpha, n, v, l);
-    Some((l, fresnel(material, vh) * (material.reflection * g * vh / (nv * nh))))
+    let weight = material.reflection * g * vh / (nv * nh) / believed(mutation);
+    Some((l, fresnel(material, vh) * weight))
 }

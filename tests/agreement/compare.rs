@@ -112,8 +112,8 @@ pub fn small(scene: Scene) -> Scene {
     sized(scene, SIZE)
 }
 
-/// Every pixel by the plain tracer; `None`: it does not know all that is in the scene.
-pub fn reference(scene: &Scene, samples: u32, mutation: Mutation) -> Option<Vec<Estimate>> {
+/// Every pixel by the plain tracer; `Err`: what is in the scene that it does not know.
+pub fn reference(scene: &Scene, samples: u32, mutation: Mutation) -> Result<Vec<Estimate>, String> {
     let tracer = Tracer::new(scene, mutation)?;
     let [width, height] = scene.film.size;
     let row = |y: u32| {
@@ -121,7 +121,7 @@ pub fn reference(scene: &Scene, samples: u32, mutation: Mutation) -> Option<Vec<
         (0..width).map(|x| tracer.pixel(x, y, samples, &mut numbers)).collect::<Vec<_>>()
     };
     let rows: Vec<Vec<Estimate>> = (0..height).into_par_iter().map(row).collect();
-    Some(rows.concat())
+    Ok(rows.concat())
 }
 
 /// The program's picture and half the difference of its replicates.

@@ -1,14 +1,16 @@
 //! Compounds in the plainest way: wherever a ray crosses the surface of a part, points just before and
 //! just behind tell whether the whole begins or ends there.
 
+use crate::meshes::Triangles;
 use crate::surfaces::{Piece, map, pieces};
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo::scene::Object;
 use zerkalo::shape::{Part, Shape};
 
-/// A simple shape: its pieces, and the maps between their space and the scene's.
+/// A simple shape: its pieces or its triangles, and the maps between their space and the scene's.
 pub struct Leaf {
     pieces: Vec<Piece>,
+    mesh: Option<Triangles>,
     own_from_scene: DAffine3,
     /// Normals are mapped by the inverse transpose.
     scene_from_own_normals: DMat3,
@@ -33,12 +35,31 @@ pub struct Body {
 /// How far before and behind a crossing points are asked, in lengths of the direction.
 const ASIDE: f64 = 1e-7;
 
+/// Distance, normal, leaf and triangle.
+type Meeting = (f64, DVec3, usize, usize);
+
 impl Leaf {
-    fn crossings(&self, origin: DVec3, direction: DVec3) -> Vec<(f64, DVec3)> {
+    /// Distances, normals, and which triangle it is.
+    fn crossings(&self, origin: DVec3, direction: DVec3) -> Vec<(f64, DVec3, usize)> {
         let origin = self.own_from_scene.transform_point3(origin);
         let direction = self.own_from_scene.transform_vector3(direction);
         let hits = self.pieces.iter().flat_map(|piece| piece.meet(origin, direction)).flatten();
-        hits.map(|(t, n)| (t, (self.scene_from_own_normals * n).normalize())).collect()
+        let hits = hits.map(|(t, n)| (t, n, 0));
+        let of_mesh = self.mesh.iter().flat_map(|mesh| mesh.meet(origin, direction));
+        hits.chain(of_mesh)
+            .map(|(t, n, i)| (t, (self.scene_from_own_normals * n).normalize(), i))
+            .collect()
+    }
+
+    /// The interpolated normal of triangle `i` at `point`; `None`: it has none but its own.
+    pub fn smooth(&self, i: usize, point: DVec3) -> Option<DVec3> {
+        let own = self.mesh.as_ref()?.smooth(i, self.own_from_scene.transform_point3(point))?;
+        Some(self.scene_from_own_normals * own)
+    }
+
+    /// The colour of its own at triangle `i`.
+    pub fn color(&self, i: usize) -> DVec3 {
+        self.mesh.as_ref().map_or(DVec3::ONE, |mesh| mesh.color(i))
     }
 
     fn contains(&self, point: DVec3) -> bool {
@@ -48,36 +69,41 @@ impl Leaf {
 }
 
 impl Body {
-    /// `None`: a shape that this tracer does not know.
-    pub fn new(object: &Object) -> Option<Self> {
+    /// `Err`: a shape that this tracer does not know.
+    pub fn new(object: &Object) -> Result<Self, String> {
         let place = object.transform.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all);
         let mut leaves = Vec::new();
         let tree = grow(&object.shape, &object.material, place, &mut leaves)?;
-        Some(Self { leaves, tree })
+        Ok(Self { leaves, tree })
     }
 
     /// Nearest distance beyond `from` (in lengths of `direction`) at which the ray meets the body, the
-    /// unit normal there on the front or outside, and which leaf it is.
-    pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<(f64, DVec3, usize)> {
-        let mut nearest: Option<(f64, DVec3, usize)> = None;
+    /// unit normal there on the front or outside, which leaf it is, and which of its triangles.
+    pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<Meeting> {
+        let mut nearest: Option<Meeting> = None;
         for (i, leaf) in self.leaves.iter().enumerate() {
-            for (t, normal) in leaf.crossings(origin, direction) {
+            for (t, normal, facet) in leaf.crossings(origin, direction) {
                 if t <= from || nearest.is_some_and(|n| n.0 <= t) {
                     continue;
                 }
                 if matches!(self.tree, Tree::Leaf(_)) {
-                    nearest = Some((t, normal, i));
+                    nearest = Some((t, normal, i, facet));
                     continue;
                 }
                 let inside = |t: f64| self.contains(&self.tree, origin + direction * t);
                 let (before, after) = (inside(t - ASIDE), inside(t + ASIDE));
                 if before != after {
                     let outward = after == (normal.dot(direction) < 0.0);
-                    nearest = Some((t, if outward { normal } else { -normal }, i));
+                    nearest = Some((t, if outward { normal } else { -normal }, i, facet));
                 }
             }
         }
         nearest
+    }
+
+    /// Whether it is made of triangles, whose inside nobody knows.
+    pub fn is_mesh(&self) -> bool {
+        self.leaves[0].mesh.is_some()
     }
 
     /// Whether it is flat, with nothing inside.
@@ -108,8 +134,8 @@ fn grow(
     material: &str,
     scene_from_own: DAffine3,
     leaves: &mut Vec<Leaf>,
-) -> Option<Tree> {
-    let mut all = |of: &[Part]| -> Option<Vec<Tree>> {
+) -> Result<Tree, String> {
+    let mut all = |of: &[Part]| -> Result<Vec<Tree>, String> {
         of.iter()
             .map(|part| {
                 let inner =
@@ -119,13 +145,19 @@ fn grow(
             })
             .collect()
     };
-    Some(match shape {
+    Ok(match shape {
         Shape::Union(u) => Tree::Union(all(&u.of)?),
         Shape::Intersection(i) => Tree::Intersection(all(&i.of)?),
         Shape::Difference(d) => Tree::Difference(all(&d.of)?),
         simple => {
+            let mesh = match simple {
+                Shape::MeshFile(file) => Some(Triangles::new(file)),
+                _ => None,
+            };
+            let pieces = if mesh.is_some() { Vec::new() } else { pieces(simple)? };
             leaves.push(Leaf {
-                pieces: pieces(simple)?,
+                pieces,
+                mesh,
                 own_from_scene: scene_from_own.inverse(),
                 scene_from_own_normals: scene_from_own.matrix3.inverse().transpose(),
                 material: material.to_string(),

@@ -115,12 +115,12 @@ pub fn map(step: &Step) -> DAffine3 {
     }
 }
 
-/// The pieces of a simple shape; `None`: a shape that this tracer does not know.
+/// The pieces of a simple shape but a mesh; `Err`: a shape that this tracer does not know.
 #[allow(unreachable_patterns, reason = "kinds that this tracer does not know may be added")]
-pub fn pieces(shape: &Shape) -> Option<Vec<Piece>> {
+pub fn pieces(shape: &Shape) -> Result<Vec<Piece>, String> {
     let v = |a: [f64; 3]| DVec3::from(a);
     let square = |side: f64| vec![[0.0, 0.0], [side, 0.0], [side, -side], [0.0, -side]];
-    Some(match shape {
+    Ok(match shape {
         Shape::Sphere(s) => vec![Piece::Sphere(v(s.center), s.radius)],
         Shape::Plane(p) => vec![Piece::Plane(v(p.point), v(p.normal).normalize())],
         Shape::Platform(p) => {
@@ -162,7 +162,7 @@ pub fn pieces(shape: &Shape) -> Option<Vec<Piece>> {
             let top = 1.0 - height / p.apex_height;
             frustum(v(p.corner), &square(p.side), height, top, p.rotation)
         }
-        _ => return None,
+        other => return Err(format!("a shape it has no pieces for: {other:?}")),
     })
 }
 

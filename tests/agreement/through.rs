@@ -46,6 +46,7 @@ impl Tracer<'_> {
 
     /// From `hit`, whose material lets light through, one way by chance.
     pub fn through(&self, hit: &Hit, direction: DVec3, numbers: &mut Numbers) -> Way {
+        // Meshes that let light through are refused: everything here is as light sees it.
         let (material, n) = (hit.material, hit.normal);
         let open = self.bodies[hit.body].is_open();
         let (before, n_i) = self.medium(hit.point + n * ASIDE);

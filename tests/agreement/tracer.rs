@@ -3,6 +3,7 @@
 use crate::answers::{highlight, reflect};
 use crate::common::Numbers;
 use crate::compounds::Body;
+use crate::meshes;
 use crate::through::Way;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -18,6 +19,8 @@ pub enum Mutation {
     None,
     /// Lobes are 5 % wider.
     WiderLobe,
+    /// Lobes believe to be 5 % more dense than they are.
+    LobeDensity,
     /// Shadow rays begin 1e-3 of a scene unit too far along the light's direction.
     ShadowOffset,
     /// Lobes that dip under the surface are lost.
@@ -47,6 +50,10 @@ pub struct Hit<'a> {
     pub point: DVec3,
     /// On the viewer's side.
     pub normal: DVec3,
+    /// The one that light sees: another on smooth meshes.
+    pub seen: DVec3,
+    /// Colour of its own.
+    pub tint: DVec3,
     pub material: &'a Material,
     /// Number of the body.
     pub body: usize,
@@ -57,14 +64,25 @@ pub struct Hit<'a> {
 }
 
 impl<'a> Tracer<'a> {
-    /// `None`: there is something in the scene that this tracer does not know.
-    pub fn new(scene: &'a Scene, mutation: Mutation) -> Option<Self> {
-        // Those have a direct evaluation of their own, in tests/textures.
-        if scene.materials.values().any(|m| m.texture.is_some() || m.bump.is_some()) {
-            return None;
+    /// `Err`: there is something in the scene that this tracer does not know.
+    pub fn new(scene: &'a Scene, mutation: Mutation) -> Result<Self, String> {
+        let bodies = scene.objects.iter().map(Body::new).collect::<Result<Vec<_>, _>>()?;
+        let tracer = Self { scene, bodies, plain: Material::default(), mutation };
+        for body in &tracer.bodies {
+            for leaf in &body.leaves {
+                let material = tracer.material(&leaf.material);
+                unknown_keys(material)?;
+                if body.is_mesh() && material.transmission > 0.0 {
+                    return Err("a mesh that lets light through".to_string());
+                }
+            }
         }
-        let bodies = scene.objects.iter().map(Body::new).collect::<Option<_>>()?;
-        Some(Self { scene, bodies, plain: Material::default(), mutation })
+        Ok(tracer)
+    }
+
+    /// Whether it asks every triangle of a mesh, which takes long.
+    pub fn is_slow(&self) -> bool {
+        self.bodies.iter().any(Body::is_mesh)
     }
 
     /// `samples` samples of the pixel `x`, `y`.
@@ -119,15 +137,11 @@ impl<'a> Tracer<'a> {
             if !reflects || bounce == trace.depth {
                 return radiance;
             }
-            let turned = reflect(
-                hit.material,
-                hit.normal,
-                -direction,
-                trace.horizon,
-                self.mutation,
-                numbers,
-            );
-            let Some((next, factor)) = turned else { return radiance };
+            let turned =
+                reflect(hit.material, hit.seen, -direction, trace.horizon, self.mutation, numbers);
+            let Some((mut next, factor)) = turned else { return radiance };
+            // What would go into the triangle goes as steeply out of it.
+            next -= 2.0 * next.dot(hit.normal).min(0.0) * hit.normal;
             weight *= factor;
             if weight.max_element() <= 0.0 || weight.max_element() < trace.min_weight {
                 return radiance;
@@ -167,15 +181,19 @@ impl<'a> Tracer<'a> {
     fn meet(&self, origin: DVec3, direction: DVec3) -> Option<Hit<'_>> {
         let from = Self::clearance(origin);
         let hits = self.bodies.iter().enumerate().filter_map(|(i, body)| {
-            let (t, normal, leaf) = body.meet(origin, direction, from)?;
-            Some((t, normal, i, leaf))
+            let (t, normal, leaf, facet) = body.meet(origin, direction, from)?;
+            Some((t, normal, i, &body.leaves[leaf], facet))
         });
-        let (t, normal, i, leaf) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let material = self.material(&self.bodies[i].leaves[leaf].material);
+        let (t, normal, i, leaf, facet) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let material = self.material(&leaf.material);
         let front = normal.dot(direction) < 0.0;
+        let (point, normal) = (origin + direction * t, if front { normal } else { -normal });
+        let smooth = leaf.smooth(facet, point);
         Some(Hit {
-            point: origin + direction * t,
-            normal: if front { normal } else { -normal },
+            point,
+            normal,
+            seen: smooth.map_or(normal, |smooth| meshes::seen(smooth, normal, direction)),
+            tint: leaf.color(facet),
             material,
             body: i,
             front,
@@ -190,15 +208,16 @@ impl<'a> Tracer<'a> {
     /// Ambient light and every lamp.
     fn shade(&self, hit: &Hit, view: DVec3) -> DVec3 {
         let m = hit.material;
-        let color = DVec3::from(m.color.0);
+        let color = DVec3::from(m.color.0) * hit.tint;
         let mut sum = color * m.ambient * DVec3::from(self.scene.ambient.color.0);
         for (i, light) in self.scene.lights.iter().enumerate().filter(|(_, l)| l.on) {
             let (towards, distance, irradiance) = arrival(light, hit.point);
-            let mut cos = hit.normal.dot(towards);
-            if cos <= 0.0 || self.in_shadow(hit.point, towards, distance) {
+            let mut cos = hit.seen.dot(towards);
+            let behind = cos <= 0.0 || hit.normal.dot(towards) <= 0.0;
+            if behind || self.in_shadow(hit.point, towards, distance) {
                 continue;
             }
-            let shine = highlight(m, hit.normal, view, towards);
+            let shine = highlight(m, hit.seen, view, towards);
             if i == 0 && self.mutation == Mutation::NoCosine {
                 cos = 1.0;
             }
@@ -233,4 +252,37 @@ fn arrival(light: &Light, point: DVec3) -> (DVec3, f64, DVec3) {
         Falloff::InverseSquare => strength / (distance * distance),
     };
     ((position - point) / distance, distance, irradiance)
+}
+
+/// What this tracer reads of a material.
+const KNOWN: [&str; 17] = [
+    "color",
+    "ambient",
+    "diffuse",
+    "specular",
+    "exponent",
+    "highlight",
+    "reflection",
+    "transmission",
+    "index",
+    "roughness",
+    "lobe",
+    "alpha",
+    "masking",
+    "fresnel",
+    "reflectance",
+    "metal",
+    "two_sided",
+];
+
+/// `Err`: the material says something that this tracer does not read.
+fn unknown_keys(material: &Material) -> Result<(), String> {
+    let table = |m: &Material| toml::Table::try_from(m).expect("materials are tables");
+    let plain = table(&Material::default());
+    for (key, value) in table(material) {
+        if !KNOWN.contains(&key.as_str()) && plain.get(&key) != Some(&value) {
+            return Err(format!("the material key `{key}`"));
+        }
+    }
+    Ok(())
 }

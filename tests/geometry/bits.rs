@@ -1,78 +1,10 @@
 //! The width-1 instances and the packets give the same bits.
 
 use crate::common::Numbers;
-use crate::rays::{Line, ball, every_kind, packets, surface};
-use glam::{DAffine3, DQuat, DVec3};
+use crate::rays::{Line, packets, surface};
+pub use crate::rays::{any_line, forms};
 use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
 use zerkalo::shape::{Form, Geometry, Ray};
-
-/// A ray of one kind or another around a form: through it, beside it, from inside, along the axes,
-/// from points of its surface, with zeros of both signs.
-pub fn any_line(numbers: &mut Numbers, form: &Form) -> Line {
-    let (center, radius) = ball(form).unwrap_or((DVec3::ZERO, 2.0));
-    let axis = |numbers: &mut Numbers| {
-        let zero = if numbers.bits() & 1 == 0 { 0.0 } else { -0.0 };
-        let mut d = DVec3::splat(zero);
-        let at = numbers.below(3);
-        d[at] = if numbers.bits() & 1 == 0 { 1.0 } else { -1.0 };
-        if numbers.below(2) == 0 {
-            d[(at + 1) % 3] = numbers.between(-1.0, 1.0);
-        }
-        d.normalize()
-    };
-    let target = center + numbers.in_cube(1.1 * radius);
-    let (low, high) = form.bounds().unwrap_or((DVec3::splat(-1.0), DVec3::ONE));
-    let corner = |numbers: &mut Numbers| {
-        let pick = |n: &mut Numbers, l: f64, h: f64| [l, h, 0.5 * (l + h)][n.below(3)];
-        DVec3::new(
-            pick(numbers, low.x, high.x),
-            pick(numbers, low.y, high.y),
-            pick(numbers, low.z, high.z),
-        )
-    };
-    match numbers.below(6) {
-        0 => {
-            let from = center + numbers.direction() * (3.0 * radius);
-            (from, (target - from).normalize())
-        }
-        1 => (target, numbers.direction()),
-        2 => {
-            let d = axis(numbers);
-            (target - d * (2.0 * radius), d)
-        }
-        3 => (corner(numbers), axis(numbers)),
-        4 => {
-            let d = axis(numbers);
-            (corner(numbers) - d * (2.0 * radius), d)
-        }
-        _ => {
-            let (from, to) = (corner(numbers), corner(numbers));
-            let d = (to - from).try_normalize().unwrap_or(DVec3::Y);
-            (from - d * if numbers.bits() & 1 == 0 { 0.0 } else { radius }, d)
-        }
-    }
-}
-
-/// Every kind as it is, turned, and scaled unevenly (spheres become ellipsoids).
-pub fn forms() -> Vec<(String, Form)> {
-    let mut out = Vec::new();
-    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);
-    let place = DVec3::new(0.3, -2.0, 1.0);
-    for (name, form) in every_kind() {
-        let maps = [
-            ("", DAffine3::IDENTITY),
-            (" turned", DAffine3::from_rotation_translation(turn, place)),
-            (
-                " uneven",
-                DAffine3::from_scale_rotation_translation(DVec3::new(1.0, -0.2, 3.0), turn, place),
-            ),
-        ];
-        for (how, map) in maps {
-            out.push((format!("{name}{how}"), form.clone().transformed(&map)));
-        }
-    }
-    out
-}
 
 fn lane_of<L: Lanes<Scalar = S>, S: Real + Lanes<Scalar = S>>(v: V3<L>, i: usize) -> V3<S> {
     let [x, y, z] = v.lane(i);

@@ -1,19 +1,12 @@
-//! What rays meet, against closed forms, exact arithmetic and the extremes of sizes and places.
+//! What rays meet, against closed forms and exact arithmetic.
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/rays.rs"]
+mod rays;
 
 mod bits;
-mod camera;
-mod cauchy;
-mod coincident;
-mod compound;
-mod degenerate;
 mod light;
 mod mirror;
-mod rays;
-mod shadow;
-mod sphere;
-mod tapered;
 mod transforms;
 mod tree;

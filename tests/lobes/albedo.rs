@@ -42,7 +42,7 @@ fn compare<L: Lanes>() {
 }
 
 #[test]
-fn extreme_23_albedo_of_cook_torrance() {
+fn extreme_23_furnace_of_cook_torrance() {
     compare::<Double>();
     compare::<Single>();
 }

@@ -199,14 +199,14 @@ fn walk<A: Lanes, B: Lanes>(cases: &[(Material, f64)]) {
 }
 
 #[test]
-fn extreme_22_directions_follow_their_density_in_double_precision() {
+fn extreme_22_chi_square() {
     walk::<f64, Double>(&cases());
 }
 
 /// In single precision a half-vector at 89.9 degrees is known to 2e-5: a fiftieth of the narrowest
 /// lobe's slope, and of a bin. From slope 0.05 on that is nothing, and so up to 60 degrees.
 #[test]
-fn extreme_22_directions_follow_their_density_in_single_precision() {
+fn extreme_22_chi_square_in_single_precision() {
     let mut cases = cases();
     cases.retain(|(m, degrees)| m.alpha > Some(0.01) || *degrees <= 60.0);
     walk::<f32, Single>(&cases);

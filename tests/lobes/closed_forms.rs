@@ -137,7 +137,7 @@ fn spread_of(lobe: Lobe, roughness: f64) -> Spread<f64> {
 /// direction by half a rounding, 6e-8, which is a share of 2e-6 of the cone of 0.01; for narrower
 /// cones the axis of a turned frame takes its place, and only a normal along z has digits for them.
 #[test]
-fn extreme_19_closed_form_3_cone_in_a_half_space() {
+fn extreme_19_cone_in_a_half_space() {
     for theta in half_angles() {
         let roughness = theta.tan().min(1e6);
         let spread = spread_of(Lobe::Cone, roughness);
@@ -183,7 +183,7 @@ fn square_reach(roughness: f64) -> f64 {
 }
 
 #[test]
-fn extreme_20_closed_form_5_square_in_a_half_space() {
+fn extreme_20_square_in_a_half_space() {
     for roughness in [1e-6, 1e-3, 0.05, 0.3, 2.0, 100.0] {
         let spread = spread_of(Lobe::Square, roughness);
         let reach = square_reach(roughness);
@@ -297,7 +297,7 @@ fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
 /// Extreme test 21: a lobe that half dips under the surface, seen at 89.999 degrees. Folded it keeps
 /// all light; absorbed it loses what the closed forms say.
 #[test]
-fn extreme_21_lobes_at_the_horizon() {
+fn extreme_21_lobe_at_the_horizon() {
     horizon::<f64>(1e-12);
     horizon::<Double>(1e-12);
     horizon::<Single>(1e-6);

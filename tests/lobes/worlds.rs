@@ -108,7 +108,7 @@ fn parallel_mirrors(depth: u32) -> Scene {
 /// beyond the depth limit is what the bias report says. In single precision rho itself is rounded by
 /// up to 3e-8, which 1000 images multiply, and so is each of the 10 000 terms of the sum.
 #[test]
-fn extreme_26_endless_mirrors() {
+fn extreme_26_parallel_mirrors() {
     let rho: f64 = 0.999;
     for depth in [16, 10_000] {
         let scene = parallel_mirrors(depth);

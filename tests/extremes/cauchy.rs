@@ -190,8 +190,9 @@ fn tally<L: Lanes>(
     tally
 }
 
+/// Closed form 8.
 #[test]
-fn closed_form_08_extreme_07_cauchy_for_every_kind() {
+fn extreme_07_cauchy() {
     for (i, (name, form)) in every_kind().into_iter().enumerate() {
         let (Some((center, radius)), Some((surface, volume))) =
             (ball(&form), surface_and_volume(&form))
@@ -286,7 +287,7 @@ fn slivers() -> Vec<(&'static str, Form)> {
 }
 
 #[test]
-fn extreme_13_extreme_08_slivers() {
+fn extreme_13_slivers() {
     for (i, (name, form)) in slivers().into_iter().enumerate() {
         let (low, high) = form.bounds().unwrap();
         let (surface, volume) = surface_and_volume(&form).unwrap();

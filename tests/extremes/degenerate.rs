@@ -1,8 +1,7 @@
 //! Rays that start inside, on faces, in the planes of faces, along the axes.
 
-use crate::bits::{any_line, forms};
 use crate::common::Numbers;
-use crate::rays::{Line, ball, blocked, closest, every_kind};
+use crate::rays::{Line, any_line, ball, blocked, closest, every_kind, forms};
 use glam::DVec3;
 use zerkalo::lanes::{Double, Lanes, Single};
 use zerkalo::shape::{Cuboid, Form, Geometry, Kind};
@@ -73,7 +72,7 @@ fn check_inside<L: Lanes>(name: &str, form: &Form, seed: u64, rays: usize) {
 }
 
 #[test]
-fn extreme_04_from_inside_only_the_exit_is_met() {
+fn extreme_04_camera_inside() {
     for (i, (name, form)) in forms().into_iter().enumerate() {
         if is_solid(&form) {
             check_inside::<Double>(&name, &form, 40 + i as u64, 100_000);
@@ -177,7 +176,7 @@ fn check_lattice<L: Lanes>() -> [usize; 3] {
 }
 
 #[test]
-fn extreme_06_a_box_is_its_slabs_in_exact_numbers() {
+fn extreme_06_ray_in_a_face() {
     let counts = check_lattice::<f64>();
     assert_eq!(check_lattice::<f32>(), counts);
     assert!(counts.iter().all(|c| *c > 1000), "misses, touches, hits: {counts:?}");

@@ -193,7 +193,7 @@ fn check_self_shadow(precision: Precision, place: DVec3, scales: &[f64], points:
 
 /// 392 settings of 8000 points in all.
 #[test]
-fn extreme_15_nothing_convex_shades_itself() {
+fn extreme_15_self_shadow() {
     check_self_shadow(Precision::Double, DVec3::ZERO, &SCALES, 8000);
     check_self_shadow(Precision::Single, DVec3::ZERO, &SCALES, 8000);
 }
@@ -201,7 +201,7 @@ fn extreme_15_nothing_convex_shades_itself() {
 /// A million units from the origin the file's own numbers end at 1e-10: things are as small as 1e-4.
 /// Recentring keeps single precision as good there as at the origin.
 #[test]
-fn extreme_15_nothing_convex_shades_itself_far_from_the_origin() {
+fn extreme_15_self_shadow_far_from_the_origin() {
     let place = DVec3::new(1e6, -1e6, 1e6);
     check_self_shadow(Precision::Double, place, &SCALES[1..], 4000);
     check_self_shadow(Precision::Single, place, &SCALES[1..], 4000);
@@ -256,7 +256,7 @@ fn check_gap(scale: f64, precision: Precision) {
 }
 
 #[test]
-fn extreme_16_no_light_leaks_through_a_gap() {
+fn extreme_16_thin_gap() {
     for scale in [1e-6, 1e-3, 1.0, 1e3, 1e6] {
         check_gap(scale, Precision::Double);
         check_gap(scale, Precision::Single);

@@ -4,7 +4,7 @@ use crate::common::Numbers;
 use crate::rays::{Line, Met, blocked, closest};
 use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::PI;
-use zerkalo::lanes::{Double, Lanes};
+use zerkalo::lanes::{Double, Lanes, Single};
 use zerkalo::shape::{Compound, CompoundTree as Tree, Cuboid, Cylinder, Form, Geometry, Kind};
 
 fn ball(x: f64, y: f64, z: f64, radius: f64) -> Form {
@@ -115,8 +115,9 @@ fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
     (sum * area, squares.sqrt() * area)
 }
 
+/// Closed form 9.
 #[test]
-fn closed_form_09_volumes() {
+fn extreme_09_volumes() {
     let lens = |r: f64, s: f64, d: f64| {
         PI * (r + s - d).powi(2) * (d * d + 2.0 * d * (r + s) - 3.0 * (r - s).powi(2)) / (12.0 * d)
     };
@@ -199,7 +200,7 @@ fn closed_form_09_volumes() {
 
 /// V(A or B) + V(A and B) = V(A) + V(B), on every line.
 #[test]
-fn closed_form_09_inclusion_and_exclusion_on_every_line() {
+fn extreme_09_inclusion_and_exclusion() {
     let solids = [
         ball(0.2, -0.1, 0.0, 0.9),
         block([-0.3, 0.2, 0.1], [1.1, 0.9, 1.5]),
@@ -290,8 +291,8 @@ fn tree_contains(tree: &Tree, parts: &[Form], p: DVec3) -> bool {
 /// Random trees of depth 8: surfaces in turn, and between them what the points themselves say. Half a
 /// million rays each way.
 #[test]
-fn extreme_08_extreme_04_parity_of_random_trees() {
-    let mut seen = 0;
+fn extreme_08_parity() {
+    let (mut seen, mut odd, mut asked) = (0, 0, 0);
     for seed in 0..100 {
         let mut numbers = Numbers::new(800 + seed);
         let mut parts = Vec::new();
@@ -303,6 +304,9 @@ fn extreme_08_extreme_04_parity_of_random_trees() {
         let double = geometry::<Double>(&form);
         let lines: Vec<Line> = (0..5_000).map(|_| line(&mut numbers)).collect();
         let all = surfaces(&double, &lines);
+        let single = surfaces(&geometry::<Single>(&form), &lines);
+        odd += lines.iter().zip(&single).filter(|(line, met)| !in_turn(line, met)).count();
+        asked += lines.len();
         let name = format!("tree {seed}");
         for (line, met) in lines.iter().zip(&all) {
             chord(&name, line, met);
@@ -333,6 +337,28 @@ fn extreme_08_extreme_04_parity_of_random_trees() {
         }
     }
     assert!(seen > 150_000, "{seen} surfaces");
+    // Single precision loses what is thinner than 2e-5 across, which a line here meets as seldom.
+    println!("single precision: {odd} of {asked} lines out of turn");
+    assert!(odd * 10_000 <= asked, "single precision: {odd} of {asked} lines out of turn");
+}
+
+/// Whether surfaces are entered and left in turn.
+fn in_turn(line: &Line, met: &[Met]) -> bool {
+    let turned = |(i, m): (usize, &Met)| (m.normal.dot(line.1) < 0.0) == (i % 2 == 0);
+    met.len().is_multiple_of(2) && met.iter().enumerate().all(turned)
+}
+
+/// How many lines meet other surfaces in single precision: another number, or more than 1e-5 of the
+/// distance apart over the cosine.
+fn differing(a: &Form, b: &Form, lines: &[Line]) -> usize {
+    let (a, b) = (geometry::<Single>(a), geometry::<Single>(b));
+    let apart =
+        |line: &Line, a: &Met, b: &Met| (a.t - b.t).abs() > 1e-5 * a.t / a.normal.dot(line.1).abs();
+    let both = surfaces(&a, lines).into_iter().zip(surfaces(&b, lines));
+    let differs = |(line, (a, b)): &(&Line, (Vec<Met>, Vec<Met>))| {
+        a.len() != b.len() || a.iter().zip(b).any(|(a, b)| apart(line, a, b))
+    };
+    lines.iter().zip(both).filter(differs).count()
 }
 
 /// The same surfaces, to 1e-12 of the distance; beside a tie's width at flat ends.
@@ -352,7 +378,7 @@ fn same_surfaces(name: &str, a: &Form, b: &Form, lines: &[Line]) {
 }
 
 #[test]
-fn extreme_09_algebra() {
+fn extreme_09_csg_algebra() {
     let lines = lines(9, 20_000);
     let mut numbers = Numbers::new(90);
     for n in 0..12 {
@@ -370,6 +396,14 @@ fn extreme_09_algebra() {
         let tree = Tree::Intersection(vec![Tree::Part(0), not_b]);
         let and_not = Form::Compound(Compound { parts: vec![a(), all, b()], tree });
         same_surfaces(&told("A - B = A and not B"), &difference(vec![a(), b()]), &and_not, &lines);
+        let single = [
+            differing(&union(vec![a(), a()]), &a(), &lines),
+            differing(&intersection(vec![a(), a()]), &a(), &lines),
+            differing(&difference(vec![a(), b()]), &and_not, &lines),
+        ];
+        println!("pair {n} in single precision: {single:?} of {} lines differ", lines.len());
+        let few = single.iter().all(|differ| differ * 10_000 <= lines.len());
+        assert!(few, "single precision, pair {n}: {single:?} of {}", lines.len());
         let swapped = (union(vec![a(), b()]), union(vec![b(), a()]));
         same_surfaces(&told("A or B = B or A"), &swapped.0, &swapped.1, &lines);
         // (A - B) - C = A - (B or C)

@@ -1,0 +1,238 @@
+//! Which precision a scene needs: single precision as long as nothing that it blurs can be seen.
+//!
+//! In single precision a coordinate is known to some 2^-23 of the scene's extent, and rays that leave a
+//! surface start 2^-20 of the extent above it. What is smaller than a few times that is lost: thin
+//! things, gaps between things, the surroundings of a lamp, and what a pixel shows of a thing close
+//! to the eye. Each of them has its ratio here; `tests/extremes/precision.rs` measures what single
+//! precision gets wrong at each.
+
+use crate::camera::View;
+use crate::scene::Scene;
+use crate::shape::Form;
+use glam::DVec3;
+
+/// The largest extent over the thinnest thing: rays start 1/128 of it above a surface.
+const THINNEST: f64 = 8192.0;
+
+/// The largest extent over the narrowest gap between things: eight times the height at which rays start.
+const NARROWEST: f64 = 131_072.0;
+
+/// The largest extent over what a pixel shows of the thing nearest to the eye: 32 times the height at
+/// which rays start.
+const FINEST: f64 = 32_768.0;
+
+/// How much closer the eye may be to flat things: points are put back on a plane almost exactly, and its
+/// normal is the same everywhere.
+const FLAT: f64 = 8.0;
+
+/// The largest extent over the distance of a lamp from things: the height at which rays start is then
+/// 1/512 of it, and so is the error of the light's angle.
+const NEAREST: f64 = 2048.0;
+
+/// The least angle between the rays of neighbouring pixels \[radians\]: 64 roundings of a direction.
+const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
+
+/// Gaps below this part of the extent, and below a few roundings of the place in the file, are between
+/// numbers that were meant to be equal.
+const CLOSED: f64 = 1.0 / 17_592_186_044_416.0;
+
+/// The extent of a mesh over that of its details.
+const MESH_DETAILS: f64 = 64.0;
+
+/// The most pairs of things that are looked at for gaps; a scene that crowded has no room for more.
+const MOST_PAIRS: usize = 1 << 20;
+
+/// Whether single precision shows `scene` as well as double does, as far as its proportions tell.
+/// `forms`: all things, around `origin`; `extent`: the largest coordinate of things and eye there.
+pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
+    let thinnest = forms.iter().map(thickness).fold(f64::INFINITY, f64::min);
+    if extent > THINNEST * thinnest {
+        return false;
+    }
+    let view = View::new(&scene.camera, scene.film.size, origin);
+    let angle = view.pixel_angle();
+    let distance = |form: &Form| {
+        let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
+        Some(clearance_of(form, view.eye())? * if flat { FLAT } else { 1.0 })
+    };
+    let seen_from =
+        forms.iter().filter_map(distance).fold(f64::INFINITY, f64::min).max(scene.camera.near);
+    if angle < LEAST_ANGLE || extent > FINEST * angle * seen_from {
+        return false;
+    }
+    let lamps = scene.lights.iter().filter(|l| l.on).filter_map(|l| l.point);
+    let mut distances = lamps.map(|lamp| clearance(forms, DVec3::from(lamp.position) - origin));
+    if distances.any(|distance| extent > NEAREST * distance) {
+        return false;
+    }
+    let rounded = 16.0 * f64::EPSILON * origin.abs().max_element();
+    !has_gap(forms, (CLOSED * extent).max(rounded)..extent / NARROWEST)
+}
+
+/// No more than the distance of `point` from the surfaces of `forms`; those in whose box it is, and of
+/// which nothing more is known, do not count.
+pub(super) fn clearance(forms: &[Form], point: DVec3) -> f64 {
+    forms.iter().filter_map(|form| clearance_of(form, point)).fold(f64::INFINITY, f64::min)
+}
+
+/// The smallest thickness of a solid, or the smaller edge of a flat thing. Of a compound that of its
+/// thinnest part: what is left between cuts is found as a gap.
+fn thickness(form: &Form) -> f64 {
+    match form {
+        Form::Parallelogram { u, v, .. } => u.length().min(v.length()),
+        Form::Convex { faces, corners } => faces
+            .iter()
+            .map(|f| {
+                let depths = corners.iter().map(|c| f.offset - f.normal.dot(*c));
+                depths.fold(0.0, f64::max)
+            })
+            .fold(f64::INFINITY, f64::min),
+        Form::Plane { .. } => f64::INFINITY,
+        Form::Sphere { radius, .. } => 2.0 * radius,
+        Form::Ellipsoid { .. } => {
+            form.bounds().map_or(f64::INFINITY, |(l, h)| (h - l).min_element())
+        }
+        Form::Tapered { scene_from_unit: m, .. } => {
+            // Between the faces of the box around the canonical solid: 2 by 2 by 1.
+            let rows = m.matrix3.inverse().transpose();
+            let across = rows.x_axis.length().max(rows.y_axis.length());
+            (2.0 / across).min(rows.z_axis.length().recip())
+        }
+        Form::Mesh { .. } => form.bounds().map_or(f64::INFINITY, |(l, h)| {
+            // Details are taken to be as large as this part of the whole.
+            (h - l).max_element() / MESH_DETAILS
+        }),
+        Form::Compound(compound) => {
+            compound.parts.iter().map(thickness).fold(f64::INFINITY, f64::min)
+        }
+    }
+}
+
+/// No more than the distance of `point` from the surface; `None`: it is inside the thing's box, and
+/// nothing more is known.
+fn clearance_of(form: &Form, point: DVec3) -> Option<f64> {
+    match form {
+        Form::Sphere { center, radius } => Some((point.distance(*center) - radius).abs()),
+        Form::Plane { normal, offset } => Some((normal.dot(point) - offset).abs()),
+        Form::Convex { faces, .. } => {
+            let beyond = faces.iter().map(|f| f.normal.dot(point) - f.offset);
+            Some(beyond.fold(f64::NEG_INFINITY, f64::max).abs())
+        }
+        Form::Parallelogram { corner, u, v } => {
+            let normal = u.cross(*v).normalize();
+            let (above, box_away) = (normal.dot(point - corner).abs(), box_distance(form, point));
+            Some(above.max(box_away.unwrap_or(0.0)))
+        }
+        Form::Compound(compound) => {
+            let parts = compound.parts.iter().filter_map(|part| clearance_of(part, point));
+            parts.reduce(f64::min)
+        }
+        Form::Ellipsoid { .. } | Form::Tapered { .. } | Form::Mesh { .. } => {
+            box_distance(form, point).filter(|d| *d > 0.0)
+        }
+    }
+}
+
+/// How far `point` is from the form's box: 0 inside it.
+fn box_distance(form: &Form, point: DVec3) -> Option<f64> {
+    let (low, high) = form.bounds()?;
+    Some((low - point).max(point - high).max(DVec3::ZERO).length())
+}
+
+/// A surface that another may come close to, within a box.
+enum Side {
+    Flat { normal: DVec3, offset: f64 },
+    Round { center: DVec3, radius: f64 },
+}
+
+/// A simple thing: its sides and its box.
+struct Piece {
+    sides: Vec<Side>,
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Piece {
+    fn new(form: &Form) -> Self {
+        let (low, high) =
+            form.bounds().unwrap_or((DVec3::splat(f64::NEG_INFINITY), DVec3::splat(f64::INFINITY)));
+        let sides = match form {
+            Form::Sphere { center, radius } => {
+                vec![Side::Round { center: *center, radius: *radius }]
+            }
+            Form::Plane { normal, offset } => vec![Side::Flat { normal: *normal, offset: *offset }],
+            Form::Convex { faces, .. } => {
+                faces.iter().map(|f| Side::Flat { normal: f.normal, offset: f.offset }).collect()
+            }
+            Form::Parallelogram { corner, u, v } => {
+                let normal = u.cross(*v).normalize();
+                vec![Side::Flat { normal, offset: normal.dot(*corner) }]
+            }
+            // Where the box touches it.
+            Form::Ellipsoid { .. } | Form::Tapered { .. } => DVec3::AXES
+                .into_iter()
+                .flat_map(|axis| [(axis, axis.dot(high)), (-axis, -axis.dot(low))])
+                .map(|(normal, offset)| Side::Flat { normal, offset })
+                .collect(),
+            Form::Mesh { .. } | Form::Compound(_) => Vec::new(),
+        };
+        Self { sides, low, high }
+    }
+
+    /// The sides that may come close to others', of a compound those of its parts. Those of a mesh are
+    /// its triangles, whose corners are in single precision.
+    fn all(forms: &[Form]) -> Vec<Self> {
+        let mut out = Vec::new();
+        for form in forms {
+            match form {
+                Form::Mesh { .. } => {}
+                Form::Compound(compound) => out.extend(compound.parts.iter().map(Self::new)),
+                simple => out.push(Self::new(simple)),
+            }
+        }
+        out
+    }
+
+    fn near(&self, other: &Self, limit: f64) -> bool {
+        (self.low - other.high).max(other.low - self.high).max_element() <= limit
+    }
+}
+
+/// How far two sides are apart where they run side by side; infinite if they do not.
+fn apart(a: &Side, b: &Side) -> f64 {
+    match (a, b) {
+        (Side::Flat { normal: n, offset: o }, Side::Flat { normal: m, offset: p }) => {
+            let along = n.dot(*m);
+            if along.abs() < 1.0 - 1e-9 { f64::INFINITY } else { (o - along.signum() * p).abs() }
+        }
+        (Side::Round { center, radius }, Side::Flat { normal, offset })
+        | (Side::Flat { normal, offset }, Side::Round { center, radius }) => {
+            ((normal.dot(*center) - offset).abs() - radius).abs()
+        }
+        (Side::Round { center: c, radius: r }, Side::Round { center: d, radius: s }) => {
+            let between = c.distance(*d);
+            (between - (r + s)).abs().min((between - (r - s).abs()).abs())
+        }
+    }
+}
+
+/// Whether sides of two things run at a distance within `range` of each other.
+fn has_gap(forms: &[Form], range: std::ops::Range<f64>) -> bool {
+    let mut pieces = Piece::all(forms);
+    pieces.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
+    let mut pairs = 0;
+    for (i, a) in pieces.iter().enumerate() {
+        for b in pieces[i + 1..].iter().take_while(|b| b.low.x <= a.high.x + range.end) {
+            pairs += 1;
+            if pairs > MOST_PAIRS {
+                return false;
+            }
+            if a.near(b, range.end)
+                && a.sides.iter().any(|s| b.sides.iter().any(|t| range.contains(&apart(s, t))))
+            {
+                return true;
+            }
+        }
+    }
+    false
+}

@@ -1,0 +1,93 @@
+//! The thirty numbered tests are all there: each stands where its tools are.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What each number is about, the test that holds it, and its file. Further tests may share a number.
+const EXTREMES: [(&str, &str, &str); 30] = [
+    ("a unit sphere from 1e2 .. 1e9 away", "sphere_far_away", "tests/extremes/sphere.rs"),
+    ("a sphere of radius 1e9 as ground", "sphere_as_ground", "tests/extremes/sphere.rs"),
+    ("a sphere of radius 1e-6", "tiny_sphere", "tests/extremes/sphere.rs"),
+    ("a camera inside a solid or a cavity", "camera_inside", "tests/extremes/degenerate.rs"),
+    ("rays tangent to round solids", "tangent_to_a_sphere", "tests/extremes/sphere.rs"),
+    ("rays in faces, with zeros of both signs", "ray_in_a_face", "tests/extremes/degenerate.rs"),
+    ("Cauchy's laws for every convex kind", "cauchy", "tests/extremes/cauchy.rs"),
+    ("parity, of random compounds too", "parity", "tests/extremes/compound.rs"),
+    ("algebra and volumes of compounds", "csg_algebra", "tests/extremes/compound.rs"),
+    ("faces that coincide within 4 ulp", "coincident_faces", "tests/extremes/coincident.rs"),
+    ("tapers of 1e-15, heights of 1e-9 and 1e9", "tapered_cylinders", "tests/extremes/tapered.rs"),
+    (
+        "rays along generators and through the apex",
+        "along_a_generator",
+        "tests/extremes/tapered.rs",
+    ),
+    ("boxes, prisms and pyramids of aspect 1e-6", "slivers", "tests/extremes/cauchy.rs"),
+    ("closed meshes met on edges and corners", "mesh_watertight", "tests/extremes/mesh.rs"),
+    ("self-shadow at scales 1e-6 .. 1e6", "self_shadow", "tests/extremes/shadow.rs"),
+    ("the shadow in a gap of 1e-6", "thin_gap", "tests/extremes/shadow.rs"),
+    ("odd cameras and rasters", "odd_cameras", "tests/extremes/camera.rs"),
+    ("bases around a million normals", "orthonormal_bases", "tests/extremes/camera.rs"),
+    ("a cone lobe before a half-space", "cone_in_a_half_space", "tests/lobes/closed_forms.rs"),
+    ("a square lobe before a half-space", "square_in_a_half_space", "tests/lobes/closed_forms.rs"),
+    ("lobes at 89.999 degrees", "lobe_at_the_horizon", "tests/lobes/closed_forms.rs"),
+    ("directions against their density", "chi_square", "tests/lobes/chi_square.rs"),
+    ("Cook-Torrance in a furnace", "furnace_of_cook_torrance", "tests/lobes/albedo.rs"),
+    ("Fresnel at every reflectance", "fresnel", "src/material/fresnel.rs"),
+    (
+        "total reflection around the critical angle",
+        "total_reflection",
+        "src/material/refraction.rs",
+    ),
+    ("10,000 images between two mirrors", "parallel_mirrors", "tests/lobes/worlds.rs"),
+    ("the shift by a slab at 0 .. 89.9 degrees", "slab_displacement", "tests/lobes/through.rs"),
+    ("1e9 samples in the film", "milliard_samples", "tests/film.rs"),
+    ("the same bytes from threads, orders, parts", "determinism", "tests/determinism.rs"),
+    ("the error told is the error left", "estimator_honesty", "tests/honesty.rs"),
+];
+
+fn files(folder: &Path, out: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            files(&path, out);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            out.push(path);
+        }
+    }
+}
+
+/// Names and files of all tests that begin with `extreme_`, but those that run on demand only.
+fn found() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut paths = Vec::new();
+    for folder in ["src", "tests"] {
+        files(&root.join(folder), &mut paths);
+    }
+    let mut found = Vec::new();
+    for path in paths {
+        let text = fs::read_to_string(&path).unwrap();
+        let lines: Vec<&str> = text.lines().map(str::trim).collect();
+        for pair in lines.windows(2) {
+            let name = pair[1].strip_prefix("fn ").and_then(|l| l.split('(').next());
+            if let Some(name) = name.filter(|n| pair[0] == "#[test]" && n.starts_with("extreme_")) {
+                let file = path.strip_prefix(root).unwrap().to_str().unwrap().to_string();
+                found.push((name.to_string(), file));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn all_thirty_are_there() {
+    let found = found();
+    for (i, (about, name, file)) in EXTREMES.iter().enumerate() {
+        let name = format!("extreme_{:02}_{name}", i + 1);
+        let places = found.iter().filter(|(n, f)| *n == name && f == file).count();
+        assert_eq!(places, 1, "{name} ({about}) in {file}");
+    }
+    for (name, file) in &found {
+        let number: usize = name[8..10].parse().unwrap();
+        assert!((1..=30).contains(&number) && &name[10..11] == "_", "{name} in {file}");
+    }
+}

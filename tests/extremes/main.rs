@@ -1,0 +1,27 @@
+//! The extremes: sizes, places and proportions at which programs of this kind fail. The thirty numbered
+//! tests (`audit.rs` knows where each stands), random scenes, the choice of precision, scenes scaled and
+//! shifted, and how fast the error falls.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../common/rays.rs"]
+mod rays;
+#[path = "../support/mod.rs"]
+mod support;
+
+mod audit;
+mod camera;
+mod cauchy;
+mod cavity;
+mod coincident;
+mod compound;
+mod degenerate;
+mod fuzz;
+mod mesh;
+mod precision;
+mod random;
+mod scaled;
+mod shadow;
+mod slopes;
+mod sphere;
+mod tapered;

@@ -1,0 +1,142 @@
+//! Closed meshes: no ray gets out between two triangles, at their edges, at their corners, or where
+//! they are slivers.
+
+use crate::common::Numbers;
+use crate::rays::{Line, closest, packets};
+use glam::{DAffine3, DQuat, DVec3};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::fmt::Write;
+use std::sync::Arc;
+use zerkalo::asset::{Assets, Mesh};
+use zerkalo::lanes::{Double, Lanes, Mask, Single};
+use zerkalo::shape::{Form, Geometry};
+
+/// An icosahedron around the origin, each of its triangles cut in four `times` times, its corners on
+/// the ellipsoid with these half-axes.
+fn icosphere(times: u32, axes: DVec3) -> Arc<Mesh> {
+    let golden = 0.5 * (1.0 + 5f64.sqrt());
+    let mut corners = Vec::new();
+    for axis in 0..3 {
+        for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
+            let mut corner = [0.0; 3];
+            (corner[axis], corner[(axis + 1) % 3]) = (a, b);
+            corners.push(DVec3::from(corner).normalize());
+        }
+    }
+    let near = |a: DVec3, b: DVec3| a.distance(b) < 1.1;
+    let mut triangles: Vec<[usize; 3]> = Vec::new();
+    for a in 0..12 {
+        for b in a + 1..12 {
+            for c in b + 1..12 {
+                let [p, q, r] = [a, b, c].map(|i| corners[i]);
+                if near(p, q) && near(q, r) && near(r, p) {
+                    let outward = (q - p).cross(r - p).dot(p) > 0.0;
+                    triangles.push(if outward { [a, b, c] } else { [a, c, b] });
+                }
+            }
+        }
+    }
+    for _ in 0..times {
+        let mut halves: HashMap<[usize; 2], usize> = HashMap::new();
+        let mut half = |a: usize, b: usize| {
+            *halves.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                corners.push((corners[a] + corners[b]).normalize());
+                corners.len() - 1
+            })
+        };
+        triangles = triangles
+            .iter()
+            .flat_map(|&[a, b, c]| {
+                let [x, y, z] = [half(a, b), half(b, c), half(c, a)];
+                [[a, x, z], [x, b, y], [z, y, c], [x, y, z]]
+            })
+            .collect();
+    }
+    let mut text = String::new();
+    for corner in corners {
+        let [x, y, z] = (corner * axes).to_array();
+        writeln!(text, "v {x:e} {y:e} {z:e}").unwrap();
+    }
+    for [a, b, c] in triangles {
+        writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).unwrap();
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ball.obj");
+    std::fs::write(&path, text).unwrap();
+    Assets::default().mesh(&path).unwrap()
+}
+
+/// How many of `rays` rays from inside the mesh to its corners, its edges and into its triangles do not
+/// meet it, as a camera or as a shadow asks.
+fn missed<L: Lanes>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: usize) -> usize {
+    const BLOCK: usize = 1 << 14;
+    let form = Form::Mesh { mesh: mesh.clone(), scene_from_mesh: place, smooth: false };
+    let geometry = Geometry::<L>::new(&[form]);
+    let triangles = &mesh.mesh().triangles;
+    let corner = |i: u32| DVec3::from(mesh.mesh().positions[i as usize].map(f64::from));
+    let block = |block: usize| {
+        let mut numbers = Numbers::new(14_000 + block as u64);
+        let lines: Vec<Line> = (0..BLOCK)
+            .map(|n| {
+                let [a, b, c] = triangles[numbers.below(triangles.len())].map(corner);
+                let f = numbers.unit();
+                let to = match n % 3 {
+                    0 => a,
+                    1 => a + (b - a) * f,
+                    _ => a + (b - a) * f + (c - b) * (f * numbers.unit()),
+                };
+                let from = numbers.in_cube(0.4) * axes;
+                let (from, to) = (place.transform_point3(from), place.transform_point3(to));
+                (from, (to - from).normalize())
+            })
+            .collect();
+        let lost = closest(&geometry, &lines).iter().filter(|met| met.is_none()).count();
+        let lit: usize = packets::<L>(&lines)
+            .map(|(ray, count)| {
+                let blocked = geometry.blocked(&ray, L::of(L::MAX), L::mask(true), geometry.all());
+                (0..count).filter(|lane| !blocked.lane(*lane)).count()
+            })
+            .sum();
+        lost + lit
+    };
+    (0..rays.div_ceil(BLOCK)).into_par_iter().map(block).sum()
+}
+
+/// The meshes: fine and coarse, turned and far from the origin for their size, and drawn out to a needle
+/// of 1e-6 and squeezed to a sheet of 1e-6, whose triangles are slivers.
+fn check(rays: usize) {
+    let turned = DAffine3::from_scale_rotation_translation(
+        DVec3::splat(3.7),
+        DQuat::from_euler(glam::EulerRot::XYZ, 0.4, 1.0, -2.0),
+        DVec3::new(12.3, -4.5, 6.7),
+    );
+    let (round, needle, sheet) =
+        (DVec3::ONE, DVec3::new(1e-6, 1.0, 1e-6), DVec3::new(1.0, 1e-6, 1.0));
+    for (name, times, axes, place) in [
+        ("icosahedron", 0, round, DAffine3::IDENTITY),
+        ("icosphere", 4, round, DAffine3::IDENTITY),
+        ("icosphere, turned", 3, round, turned),
+        ("needle", 2, needle, DAffine3::IDENTITY),
+        ("sheet", 2, sheet, DAffine3::IDENTITY),
+    ] {
+        let mesh = icosphere(times, axes);
+        assert_eq!(mesh.mesh().triangles.len(), 20 << (2 * times), "{name}");
+        let double = missed::<Double>(&mesh, place, axes, rays);
+        assert_eq!(double, 0, "{name}: of {rays} rays in double precision");
+        let single = missed::<Single>(&mesh, place, axes, rays);
+        assert_eq!(single, 0, "{name}: of {rays} rays in single precision");
+    }
+}
+
+/// Two million rays, each asked twice; ten times as many below.
+#[test]
+fn extreme_14_mesh_watertight() {
+    check(200_000);
+}
+
+#[test]
+#[ignore = "2e7 rays, a minute: cargo test --test extremes -- --ignored"]
+fn extreme_14_mesh_watertight_at_length() {
+    check(2_000_000);
+}

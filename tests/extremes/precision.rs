@@ -1,0 +1,304 @@
+//! `auto` takes double precision where single would show, and only there. In each family of scenes one
+//! proportion shrinks; what single precision gets wrong is measured as the RMSE beside double precision
+//! with the same samples, in codes.
+
+use crate::support::{all_shipped, parsed, picture, rendered, sized};
+use zerkalo::film::{Display, Part};
+use zerkalo::scene::Scene;
+use zerkalo::world::{AnyWorld, Options, Precision};
+
+const SIZE: [u32; 2] = [48, 36];
+/// Enough that paths which a rounding turns aside, equally often to either side, are no noise.
+const SAMPLES: u32 = 64;
+
+/// What single precision may get wrong where `auto` takes it: a quarter of the noise at which pictures
+/// are converged by default.
+const INVISIBLE: f64 = 0.125;
+
+fn takes_single(scene: &Scene) -> bool {
+    matches!(AnyWorld::compile(scene, &Options::default()), AnyWorld::Single(_))
+}
+
+/// The RMSE of single precision beside double [codes].
+fn error(scene: &Scene) -> f64 {
+    let display = Display::default();
+    let codes = |precision| -> Vec<f64> {
+        let rendering = rendered(scene, 3, precision, SAMPLES);
+        assert_eq!(rendering.film.bad_samples().count, 0);
+        picture(&rendering, Part::Both).iter().flat_map(|p| display.codes(*p)).collect()
+    };
+    let (single, double) = (codes(Precision::Single), codes(Precision::Double));
+    let sum: f64 = single.iter().zip(&double).map(|(a, b)| (a - b).powi(2)).sum();
+    (sum / single.len() as f64).sqrt()
+}
+
+/// A family of scenes.
+struct Family {
+    name: &'static str,
+    /// The scene in which the proportion is this, from 1/4 down.
+    text: fn(f64) -> String,
+    /// The smallest proportion that is tried.
+    least: f64,
+    /// How visible single precision's error is there at least [codes].
+    visible: f64,
+}
+
+fn camera(eye: [f64; 3], target: [f64; 3], degrees: f64) -> String {
+    format!(
+        "[film]\nsize = [48, 36]\n[camera]\neye = {eye:?}\ntarget = {target:?}\n\
+         view_angle.vertical = {degrees:e}\n[background]\ncolor = [0.2, 0.4, 0.6]\n\
+         [ambient]\ncolor = [0.1, 0.1, 0.1]\n"
+    )
+}
+
+const SUN: &str = "[[light]]\ndirectional = { direction = [-0.4, -1.0, -0.3] }\n";
+const FLOOR: &str = "[materials.floor]\ncolor = [0.6, 0.55, 0.5]\n[[object]]\n\
+    material = \"floor\"\nshape.platform = { center = [0.0, 0.0, 0.0], size = [8.0, 8.0] }\n";
+const RED: &str = "[materials.red]\ncolor = [0.8, 0.2, 0.1]\n\
+    specular = 0.5\nexponent = 80.0\nreflection = 0.3\n";
+
+/// A ball on a large floor, seen from close.
+fn small_ball(r: f64) -> String {
+    camera([2.0 * r, 2.5 * r, 5.0 * r], [0.0, r, 0.0], 40.0)
+        + SUN
+        + FLOOR
+        + RED
+        + &format!(
+            "[[object]]\nmaterial = \"red\"\n\
+             shape.sphere = {{ center = [0.0, {r:e}, 0.0], radius = {r:e} }}\n"
+        )
+}
+
+/// A lying sheet of this thickness, seen from close to its edge.
+fn thin_slab(t: f64) -> String {
+    camera([-4.0 * t, 3.0 * t, 6.0 * t], [0.0, 0.5 * t, 0.0], 40.0)
+        + SUN
+        + FLOOR
+        + RED
+        + &format!(
+            "[[object]]\nmaterial = \"red\"\nshape.box = {{ center = [1.0, {:e}, 0.0], \
+             size = [2.0, {t:e}, 3.0] }}\n",
+            0.5 * t
+        )
+}
+
+/// A pane of glass that lies this high above the floor.
+fn narrow_gap(g: f64) -> String {
+    camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0)
+        + SUN
+        + FLOOR
+        + &format!(
+            "[materials.glass]\nambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\n\
+             index = 1.5\nfresnel = \"dielectric\"\n[[object]]\nmaterial = \"glass\"\n\
+             shape.box = {{ center = [0.0, {:e}, 0.0], size = [2.0, 0.1, 2.0] }}\n",
+            0.05 + g
+        )
+}
+
+/// A hollow ball whose wall is this thin, with a lamp in it.
+fn thin_shell(t: f64) -> String {
+    camera([1.0, 2.5, 4.0], [0.0, 0.6, 0.0], 40.0)
+        + "[[light]]\npoint = { position = [0.1, 1.1, 0.1] }\n"
+        + FLOOR
+        + &format!(
+            "[[object]]\nshape.difference.of = [\n\
+             {{ shape.sphere = {{ center = [0.0, 1.0, 0.0], radius = 1.0 }} }},\n\
+             {{ shape.sphere = {{ center = [0.0, 1.0, 0.0], radius = {:?} }} }},\n]\n",
+            1.0 - t
+        )
+}
+
+/// A lamp this high above the floor, so bright that the floor shows.
+fn low_lamp(h: f64) -> String {
+    camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0)
+        + FLOOR
+        + &format!(
+            "[[light]]\npoint = {{ position = [0.3, {h:e}, 0.2] }}\nintensity = {:e}\n",
+            0.3 / h
+        )
+}
+
+/// Through a tube at the edges of things.
+fn narrow_view(a: f64) -> String {
+    camera([0.6, 1.4, 4.5], [0.4, 0.8, 0.1], 40.0 * a)
+        + SUN
+        + FLOOR
+        + RED
+        + "[[object]]\nmaterial = \"red\"\nshape.cube = { corner = [-0.4, 0.0, 0.1], edge = 0.8 }\n"
+}
+
+/// The eye this high above the floor, before the shadow of a far pole.
+fn low_eye(h: f64) -> String {
+    camera([0.3, h, 0.2], [0.3 - 4.0 * h, 0.0, 0.2 - 3.0 * h], 40.0)
+        + &format!("[[light]]\npoint = {{ position = [3.0, 4.0, {:?}] }}\n", 0.2 - 3.0 * h)
+        + FLOOR
+        + &format!(
+            "[[object]]\nshape.box = {{ center = [1.6, 1.5, {:?}], size = [0.5, 1.0, 1.0] }}\n",
+            0.7 - 3.0 * h
+        )
+}
+
+/// A ball on a ball: the ground is the reciprocal in radius.
+fn round_ground(p: f64) -> String {
+    let r = 1.0 / p;
+    camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0)
+        + SUN
+        + RED
+        + &format!(
+            "[[object]]\nshape.sphere = {{ center = [0.0, {:?}, 0.0], radius = {r:?} }}\n\
+             [[object]]\nmaterial = \"red\"\n\
+             shape.sphere = {{ center = [0.0, 0.5, 0.0], radius = 0.5 }}\n",
+            -r
+        )
+}
+
+/// Nothing but the ground, round, seen from a man's height.
+fn bare_round_ground(p: f64) -> String {
+    let r = 1.0 / p;
+    camera([0.0, 1.7, 0.0], [0.0, 1.2, -5.0], 40.0)
+        + SUN
+        + &format!(
+            "[[object]]\nshape.sphere = {{ center = [0.0, {:?}, 0.0], radius = {r:?} }}\n",
+            -r
+        )
+}
+
+/// Two balls so far apart, seen from one of them.
+fn far_apart(p: f64) -> String {
+    camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0)
+        + SUN
+        + FLOOR
+        + RED
+        + "[[object]]\nmaterial = \"red\"\nshape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.5 }\n"
+        + &format!(
+            "[[object]]\nshape.sphere = {{ center = [{:?}, 0.5, 0.0], radius = 0.5 }}\n",
+            1.0 / p
+        )
+}
+
+const FAMILIES: [Family; 10] = [
+    Family { name: "a small ball on a floor", text: small_ball, least: 1e-6, visible: 1.0 },
+    Family { name: "a thin slab", text: thin_slab, least: 1e-6, visible: 1.0 },
+    Family { name: "a narrow gap under glass", text: narrow_gap, least: 1e-7, visible: 1.0 },
+    Family { name: "a thin shell around a lamp", text: thin_shell, least: 1e-7, visible: 1.0 },
+    Family { name: "a low lamp", text: low_lamp, least: 1e-6, visible: 1.0 },
+    Family { name: "a narrow view", text: narrow_view, least: 1e-6, visible: 1.0 },
+    Family { name: "a low eye", text: low_eye, least: 5e-7, visible: 1.0 },
+    Family { name: "a round ground with a ball", text: round_ground, least: 1e-8, visible: 1.0 },
+    Family { name: "a bare round ground", text: bare_round_ground, least: 1e-8, visible: 1.0 },
+    Family { name: "things far apart", text: far_apart, least: 1e-7, visible: 1.0 },
+];
+
+/// Along each family: single precision first, then double, and where single is taken its error does not
+/// show; where double is taken at last, it would have.
+#[test]
+fn auto_takes_double_where_single_would_show() {
+    let mut wrong = Vec::new();
+    for Family { name, text, least, visible } in FAMILIES {
+        let (mut single_before, mut p, mut worst) = (true, 0.25, 0.0f64);
+        let mut last = 0.0;
+        let begins_single = takes_single(&parsed(&text(0.25)));
+        while p >= least {
+            let scene = parsed(&text(p));
+            let single = takes_single(&scene);
+            last = error(&scene);
+            println!(
+                "{name} {p:.1e}: {}, single precision is {last:.4} codes off",
+                if single { "single" } else { "double" }
+            );
+            if single {
+                worst = worst.max(last);
+                if !single_before {
+                    wrong.push(format!("{name}: single again at {p:e}"));
+                }
+            }
+            single_before = single;
+            p /= 4.0;
+        }
+        if !begins_single || single_before {
+            wrong.push(format!("{name}: no change of precision"));
+        }
+        if worst > INVISIBLE {
+            wrong.push(format!("{name}: {worst} codes off where single is taken"));
+        }
+        if last < visible {
+            wrong.push(format!("{name}: only {last} codes off at the end"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// What is small or far away as a whole is not hard: only proportions count.
+#[test]
+fn auto_takes_single_where_proportions_are_harmless() {
+    let at = |place: f64, size: f64| {
+        let x = |offset: f64| place + size * offset;
+        format!(
+            "[camera]\neye = [{:?}, {:?}, {:?}]\ntarget = [{:?}, {:?}, {:?}]\n\
+             [[light]]\npoint = {{ position = [{:?}, {:?}, {:?}] }}\n\
+             [[object]]\nshape.sphere = {{ center = [{:?}, {:?}, {:?}], radius = {size:?} }}\n",
+            x(1.0),
+            x(2.0),
+            x(8.0),
+            x(0.0),
+            x(0.0),
+            x(0.0),
+            x(3.0),
+            x(5.0),
+            x(3.0),
+            x(0.0),
+            x(0.0),
+            x(0.0)
+        )
+    };
+    for (place, size) in [(0.0, 1e-6), (0.0, 1e6), (1e6, 1.0), (-1e7, 10.0), (1e3, 1e-3)] {
+        assert!(takes_single(&parsed(&at(place, size))), "at {place:e}, of size {size:e}");
+    }
+}
+
+/// The numbered extremes that single precision cannot meet: `auto` switches to double.
+#[test]
+fn auto_takes_double_for_the_extremes_beyond_single() {
+    let seen = |eye: [f64; 3], degrees: f64, shape: &str| {
+        camera(eye, [0.0, 0.0, 0.0], degrees) + SUN + "[[object]]\nshape." + shape + "\n"
+    };
+    let ball = "sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }";
+    let cylinder = |height: f64| {
+        format!("cylinder = {{ base = [0, 0, 0], top = [0, {height:e}, 0], radius = 1.0 }}")
+    };
+    for (number, text) in [
+        (1, seen([1e6, 0.0, 0.0], 1e-4, ball)),
+        (2, bare_round_ground(1e-9)),
+        (3, seen([1.0, 0.0, 0.0], 1e-3, "sphere = { center = [0, 0, 0], radius = 1e-6 }")),
+        (11, seen([3.0, 2.0, 3.0], 40.0, &cylinder(1e-9))),
+        (11, seen([3.0, 2.0, 3.0], 40.0, &cylinder(1e9))),
+        (13, seen([3.0, 2.0, 3.0], 40.0, "box = { center = [0, 0, 0], size = [1, 1e-6, 1] }")),
+        (16, narrow_gap(1e-6)),
+        (17, seen([3.0, 2.0, 3.0], 1e-3, ball)),
+    ] {
+        assert!(!takes_single(&parsed(&text)), "extreme {number}:\n{text}");
+    }
+}
+
+/// Everything that is shipped is traced in single precision, and nothing of that shows.
+#[test]
+fn shipped_scenes_stay_in_single_precision() {
+    let mut wrong = Vec::new();
+    let mut worst = (0.0, String::new());
+    for (name, scene) in all_shipped() {
+        let codes = error(&sized(scene.clone(), SIZE));
+        if !takes_single(&scene) {
+            wrong.push(format!("{name}: double, {codes} codes"));
+        } else if codes > SHIPPED {
+            wrong.push(format!("{name}: {codes} codes off"));
+        }
+        if codes > worst.0 {
+            worst = (codes, name);
+        }
+    }
+    println!("worst: {} codes off in {}", worst.0, worst.1);
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// In glass and between mirrors some paths end elsewhere after a rounding: noise, not error.
+const SHIPPED: f64 = 0.1;

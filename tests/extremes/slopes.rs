@@ -1,0 +1,72 @@
+//! How fast the error falls with the number of samples, on the scenes that are made to show it.
+
+use crate::support::{begin_with, pool, shipped, sized, uniform};
+use zerkalo::film::Display;
+use zerkalo::measure::{Reference, Slope};
+use zerkalo::sampling::{SampleSettings, SamplerKind};
+use zerkalo::scene::Scene;
+use zerkalo::world::Precision;
+
+const SIZE: [u32; 2] = [24, 16];
+/// Samples per pixel, both replicates together.
+const FIRST: u32 = 64;
+const LAST: u32 = 2048;
+/// The reference has so many times the samples of the last point.
+const REFERENCE: u32 = 64;
+
+/// The slope of log RMSE against log samples, of several pictures by different seeds together.
+fn slope(scene: &Scene, kind: SamplerKind, reference: &Reference) -> Slope {
+    const SEEDS: u64 = 6;
+    let pool = pool(2);
+    let mut points = Vec::new();
+    let mut n = FIRST;
+    while n <= LAST {
+        let mut sum = 0.0;
+        for seed in 0..SEEDS {
+            // Seeds of its own, so that the points scatter independently.
+            let settings = SampleSettings { seed: u64::from(n) + seed, kind };
+            let mut rendering = begin_with(scene, settings, Precision::Auto);
+            uniform(&mut rendering, 0, n / 2, &pool);
+            sum += reference.errors(&rendering.film, &rendering.mix).rmse_linear.powi(2);
+        }
+        points.push((f64::from(n), (sum / SEEDS as f64).sqrt()));
+        n *= 2;
+    }
+    let slope = Slope::fit(&points).unwrap();
+    println!(
+        "{kind:?}: slope {:.3} +- {:.3} through {points:?}",
+        slope.value, slope.standard_error
+    );
+    slope
+}
+
+/// The slopes by Sobol points and by random numbers.
+fn slopes(name: &str) -> [Slope; 2] {
+    let scene = sized(shipped(name), SIZE);
+    let settings = SampleSettings { seed: 77, kind: SamplerKind::Sobol };
+    let mut best = begin_with(&scene, settings, Precision::Auto);
+    uniform(&mut best, 0, REFERENCE * LAST / 2, &pool(2));
+    let reference = Reference::of_film(&best.film, &best.mix, &Display::default());
+    println!("{name}: the reference's own RMSE is {:.1e}", reference.noise_linear());
+    [SamplerKind::Sobol, SamplerKind::Random].map(|kind| slope(&scene, kind, &reference))
+}
+
+fn check(name: &str, at_most: f64) {
+    let [sobol, random] = slopes(name);
+    assert!(sobol.value + 2.0 * sobol.standard_error <= at_most, "{name}: {sobol:?}");
+    // Of six points, four degrees of freedom: three standard errors are 96 %.
+    let error = 3.0 * random.standard_error;
+    assert!((random.value + 0.5).abs() <= error, "{name}, random: {random:?}");
+}
+
+/// Two dimensions: where in the lobe.
+#[test]
+fn a_lobe_alone_converges_like_two_dimensions() {
+    check("slope-lobe.toml", -0.70);
+}
+
+/// Four: where in the pixel and where in the lobe.
+#[test]
+fn a_lobe_with_anti_aliasing_converges_like_four_dimensions() {
+    check("slope-aa.toml", -0.58);
+}
