@@ -132,11 +132,11 @@ impl<S: Real> Sheaf<S> {
     }
 }
 
-/// The smallest and the largest lane.
+/// The smallest and the largest lane; lanes that are no number do not count.
 #[inline(always)]
 fn extremes<L: Lanes>(x: L) -> (L::Scalar, L::Scalar) {
-    let mut out = (x.lane(0), x.lane(0));
-    for i in 1..L::WIDTH {
+    let mut out = (L::Scalar::of(L::MAX), L::Scalar::of(-L::MAX));
+    for i in 0..L::WIDTH {
         let x = x.lane(i);
         out.0 = if x < out.0 { x } else { out.0 };
         out.1 = if x > out.1 { x } else { out.1 };
