@@ -125,7 +125,7 @@ fn main() {
     ];
     println!("nanoseconds per sample (times that of auto), {} x {}:", SIZE[0], SIZE[1]);
     print!("{:32}", "");
-    Acceleration::ALL.map(|a| print!(" {:>16}", a.name()));
+    Acceleration::ALL.iter().for_each(|a| print!(" {:>16}", a.name()));
     println!();
     for (name, scene) in &scenes {
         let all = times(Acceleration::ALL.map(|a| Bench::new(scene, a)).into());
@@ -133,10 +133,11 @@ fn main() {
         all.iter().for_each(|t| print!(" {:>8.0} ({:5.2})", t, t / all[0]));
         println!();
     }
-    let counts = [10, 30, 100, 300, 1000, 10_000];
-    let all = times(counts.map(|n| Bench::new(&crowd(n, &[BALL]), Acceleration::Auto)).into());
-    println!("nanoseconds per sample by number of spheres (times that of 100):");
-    for (count, t) in counts.iter().zip(&all) {
-        println!("  {count:6}: {t:8.0} ({:5.2})", t / all[2]);
+    let counts = [10, 30, 60, 95, 100, 300, 1000, 10_000];
+    let of = |by| times(counts.map(|n| Bench::new(&crowd(n, &[BALL]), by)).into());
+    let [auto, tree] = [Acceleration::Auto, Acceleration::Hierarchy].map(of);
+    println!("nanoseconds per sample by number of spheres (times that of 100), in a tree:");
+    for ((count, time), tree) in counts.iter().zip(&auto).zip(&tree) {
+        println!("  {count:6}: {time:8.0} ({:5.2}) {tree:8.0}", time / auto[4]);
     }
 }
