@@ -65,10 +65,8 @@ impl Rectangle {
             let at = view.project(point);
             let aside = view.project(point + right * stray - forward * stray);
             let margin = MARGIN_PX + (aside[0] - at[0]).abs().max((aside[1] - at[1]).abs());
-            for axis in 0..2 {
-                out.low[axis] = out.low[axis].min(at[axis] - margin);
-                out.high[axis] = out.high[axis].max(at[axis] + margin);
-            }
+            out.low = std::array::from_fn(|axis| out.low[axis].min(at[axis] - margin));
+            out.high = std::array::from_fn(|axis| out.high[axis].max(at[axis] + margin));
         }
         out
     }
