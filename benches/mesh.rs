@@ -1,91 +1,24 @@
-//! Meshes: time to build the tree, memory, and rays per second of processor time on one core: camera
-//! rays (eight neighbouring pixels) and rays between random points, together and apart.
+//! Meshes: time to build the tree, memory, and closest hits per second of processor time on one core:
+//! camera rays (blocks of neighbouring pixels of a picture of 1024 x 1024) and rays between random
+//! points; then, for rays whose directions differ more and more, together and apart.
 //!
-//! `cargo bench --bench mesh`. It prints one table; times are those of the thread, not of the clock, where
-//! the system tells them, so that a busy machine disturbs little.
+//! `cargo bench --bench mesh`; `-- --short` leaves out the last part.
 
+#[path = "common/mod.rs"]
+mod common;
+
+use common::{Random, ball, in_turns, towards};
 use std::hint::black_box;
 use std::time::Instant;
-use zerkalo::asset::{Mesh, TriangleMesh};
+use zerkalo::asset::Mesh;
 use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
 use zerkalo::shape::{Ray, facets};
 
-/// Rays of each measurement.
-const RAYS: usize = 1 << 17;
+/// Random rays of each measurement.
+const RAYS: usize = 1 << 19;
 
-/// A bumpy ball of about `2 x rings x sides` triangles.
-fn ball(rings: usize, sides: usize) -> TriangleMesh {
-    let mut positions = Vec::new();
-    for ring in 0..=rings {
-        let polar = std::f64::consts::PI * ring as f64 / rings as f64;
-        for side in 0..sides {
-            let around = std::f64::consts::TAU * side as f64 / sides as f64;
-            let d = [polar.sin() * around.cos(), polar.cos(), polar.sin() * around.sin()];
-            let bump = (9.0 * d[0]).sin() * (11.0 * d[1]).sin() * (10.0 * d[2]).sin();
-            positions.push(d.map(|x| (x * (1.0 + 0.15 * bump)) as f32));
-        }
-    }
-    let index = |ring: usize, side: usize| (ring * sides + side % sides) as u32;
-    let mut triangles = Vec::new();
-    for ring in 0..rings {
-        for side in 0..sides {
-            let [a, b] = [index(ring, side), index(ring, side + 1)];
-            let [c, d] = [index(ring + 1, side), index(ring + 1, side + 1)];
-            if ring > 0 {
-                triangles.push([a, b, c]);
-            }
-            if ring + 1 < rings {
-                triangles.push([b, d, c]);
-            }
-        }
-    }
-    TriangleMesh {
-        positions,
-        center: [0.0; 3],
-        triangles,
-        normals: None,
-        uvs: None,
-        colors: Vec::new(),
-        color_of: Vec::new(),
-        bounds: [[-1.2; 3], [1.2; 3]],
-        notes: Vec::new(),
-    }
-}
-
-/// Seconds of processor time of this thread, or of the clock.
-fn seconds(start: Instant) -> f64 {
-    let times = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
-    let nanoseconds = times.and_then(|t| t.split(' ').next()?.parse::<f64>().ok());
-    nanoseconds.map_or_else(|| start.elapsed().as_secs_f64(), |n| n * 1e-9)
-}
-
-/// Random numbers from 0 to 1 (xorshift: Marsaglia 2003).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// A point on the sphere of radius `r`.
-    fn point(&mut self, r: f64) -> [f64; 3] {
-        let (z, around) = (2.0 * self.next() - 1.0, std::f64::consts::TAU * self.next());
-        let across = (1.0 - z * z).sqrt();
-        [r * across * around.cos(), r * across * around.sin(), r * z]
-    }
-}
-
-fn unit(v: [f64; 3]) -> [f64; 3] {
-    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-    v.map(|x| x / length)
-}
-
-fn towards(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    unit(std::array::from_fn(|i| b[i] - a[i]))
-}
+/// Width and height of the picture whose camera rays are traced.
+const SIDE: usize = 1024;
 
 /// A packet from one ray per lane: origin and direction.
 fn packet<L: Lanes>(mut ray: impl FnMut(usize) -> ([f64; 3], [f64; 3])) -> Ray<L> {
@@ -97,23 +30,24 @@ fn packet<L: Lanes>(mut ray: impl FnMut(usize) -> ([f64; 3], [f64; 3])) -> Ray<L
     }
 }
 
-/// Camera rays, a strip of neighbouring pixels in each packet.
+/// Camera rays, a block of pixels two rows high in each packet.
 fn camera<L: Lanes>() -> Vec<Ray<L>> {
-    let side = (RAYS as f64).sqrt() as usize / L::WIDTH * L::WIDTH;
-    let eye = [0.0, 0.0, 3.5];
-    let pixel = |i: usize| 2.2 * (i as f64 / side as f64) - 1.1;
-    (0..side * side / L::WIDTH)
-        .map(|k| {
-            let (x, y) = (k * L::WIDTH % side, k * L::WIDTH / side);
-            packet(|i| (eye, towards(eye, [pixel(x + i), pixel(y), 0.0])))
+    let (eye, across) = ([0.0, 0.0, 3.5], L::WIDTH / 2);
+    let pixel = |i: usize| 2.2 * (i as f64 / SIDE as f64) - 1.1;
+    let corners = (0..SIDE / 2).flat_map(|y| (0..SIDE / across).map(move |x| (x, 2 * y)));
+    let block = |(x, y): (usize, usize)| {
+        packet(|i| {
+            let (x, y) = (across * x + i % across, y + i / across);
+            (eye, towards(eye, [pixel(x), pixel(y), 0.0]))
         })
-        .collect()
+    };
+    corners.map(block).collect()
 }
 
 /// Rays whose directions differ by at most `spread` in a packet; above 1: by anything.
-fn scattered<L: Lanes>(spread: f64) -> Vec<Ray<L>> {
-    let mut random = Random(88_172_645_463_325_252);
-    (0..RAYS / L::WIDTH)
+fn scattered<L: Lanes>(spread: f64, rays: usize) -> Vec<Ray<L>> {
+    let mut random = Random(7);
+    (0..rays / L::WIDTH)
         .map(|_| {
             let mut ends = (random.point(1.6), random.point(0.9));
             packet(|_| {
@@ -122,7 +56,7 @@ fn scattered<L: Lanes>(spread: f64) -> Vec<Ray<L>> {
                     return (ends.0, towards(ends.0, ends.1));
                 }
                 let (d, turn) = (towards(ends.0, ends.1), random.point(0.5 * spread));
-                (ends.0, unit(std::array::from_fn(|i| d[i] + turn[i])))
+                (ends.0, towards([0.0; 3], std::array::from_fn(|i| d[i] + turn[i])))
             })
         })
         .collect()
@@ -131,35 +65,34 @@ fn scattered<L: Lanes>(spread: f64) -> Vec<Ray<L>> {
 /// Millions of rays per second; `how`: together, apart, or as the packet itself suggests.
 fn speed<L: Lanes>(mesh: &Mesh, rays: &[Ray<L>], how: Option<bool>) -> f64 {
     let limit = L::of(L::MAX);
-    let mut best = f64::INFINITY;
-    for _ in 0..3 {
-        let clock = Instant::now();
-        let begin = seconds(clock);
-        let hits: u32 = rays
-            .iter()
-            .map(|ray| match how {
-                None => facets::closest(mesh, ray, limit),
-                Some(together) => facets::closest_by(mesh, ray, limit, together),
-            })
-            .map(|found| found.t.lt(limit).bits().count_ones())
-            .sum();
-        black_box(hits);
-        best = best.min(seconds(clock) - begin);
-    }
-    (rays.len() * L::WIDTH) as f64 / best / 1e6
+    let seconds = in_turns(
+        3,
+        &mut [&mut || {
+            let hits: u32 = rays
+                .iter()
+                .map(|ray| match how {
+                    None => facets::closest(mesh, ray, limit),
+                    Some(together) => facets::closest_by(mesh, ray, limit, together),
+                })
+                .map(|found| found.t.lt(limit).bits().count_ones())
+                .sum();
+            black_box(hits);
+        }],
+    );
+    (rays.len() * L::WIDTH) as f64 / seconds[0] / 1e6
 }
 
-fn table<L: Lanes>(mesh: &Mesh) {
-    let (near, far) = (camera::<L>(), scattered::<L>(9.0));
-    println!(
-        "  {}: camera {:.2}, random {:.2} million rays/s",
-        L::NAME,
-        speed(mesh, &near, None),
-        speed(mesh, &far, None)
-    );
+fn rays<L: Lanes>(mesh: &Mesh) -> [f64; 2] {
+    let camera = speed(mesh, &camera::<L>(), None);
+    let random = speed(mesh, &scattered::<L>(9.0, RAYS), None);
+    println!("  {}: camera {camera:.1}, random {random:.2} million rays/s", L::NAME);
+    [camera, random]
+}
+
+fn together_or_apart<L: Lanes>(mesh: &Mesh) {
     print!("  {}, together or apart:", L::NAME);
     for spread in [0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 9.0] {
-        let rays = scattered::<L>(spread);
+        let rays = scattered::<L>(spread, RAYS / 4);
         let [together, apart] = [true, false].map(|how| speed(mesh, &rays, Some(how)));
         print!("  {spread}: {together:.2} {apart:.2}");
     }
@@ -167,19 +100,31 @@ fn table<L: Lanes>(mesh: &Mesh) {
 }
 
 fn main() {
+    let short = std::env::args().any(|a| a == "--short");
+    let mut single = Vec::new();
     for (rings, sides) in [(16, 34), (132, 266), (500, 1001)] {
         let triangles = ball(rings, sides);
         let clock = Instant::now();
-        let begin = seconds(clock);
+        let begin = common::seconds(clock);
         let mesh = Mesh::new(triangles);
         let count = mesh.mesh().triangles.len();
         println!(
             "{count} triangles: tree in {:.3} s, {:.1} bytes a triangle, depth {}",
-            seconds(clock) - begin,
+            common::seconds(clock) - begin,
             mesh.bytes() as f64 / count as f64,
-            mesh.depth()
+            mesh.boxes().depth()
         );
-        table::<Single>(&mesh);
-        table::<Double>(&mesh);
+        single.push(rays::<Single>(&mesh));
+        rays::<Double>(&mesh);
+        if !short {
+            together_or_apart::<Single>(&mesh);
+            together_or_apart::<Double>(&mesh);
+        }
     }
+    let ratio = |k: usize| single[0][k] / single[2][k];
+    println!(
+        "time per ray, most triangles over fewest: camera {:.2}, random {:.2}",
+        ratio(0),
+        ratio(1)
+    );
 }

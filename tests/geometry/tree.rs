@@ -1,11 +1,11 @@
-//! A tree finds what a list finds.
+//! A tree, and boxes in either space, find what a list finds.
 
 use crate::bits::{any_line, forms};
 use crate::common::Numbers;
 use crate::rays::{Line, packets};
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, Lanes, Mask, Real, Single};
-use zerkalo::shape::{Form, Geometry};
+use zerkalo::shape::{Acceleration, Form, Geometry};
 
 /// A random scene of `count` items of every kind, crowded in the ball of radius 10 or lined up on a
 /// lattice, where many faces lie in common planes.
@@ -36,7 +36,18 @@ fn crowd(numbers: &mut Numbers, count: usize) -> Vec<Form> {
 
 fn compare<L: Lanes>(seed: u64, count: usize, forms: &[Form], lines: &[Line]) {
     let list = Geometry::<L>::with_tree(forms, false);
-    let tree = Geometry::<L>::with_tree(forms, true);
+    for how in [Acceleration::Hierarchy, Acceleration::Object, Acceleration::World] {
+        let other = Geometry::<L>::accelerated(forms, how);
+        compare_with(seed, (how.name(), count), (&list, &other), lines);
+    }
+}
+
+fn compare_with<L: Lanes>(
+    seed: u64,
+    (how, count): (&str, usize),
+    (list, tree): (&Geometry<L>, &Geometry<L>),
+    lines: &[Line],
+) {
     let mut numbers = Numbers::new(seed);
     for (packet, lanes) in packets::<L>(lines) {
         let (a, b) = (list.closest(&packet, list.all()), tree.closest(&packet, tree.all()));
@@ -50,24 +61,24 @@ fn compare<L: Lanes>(seed: u64, count: usize, forms: &[Form], lines: &[Line]) {
         for i in 0..lanes {
             let told = || {
                 let (o, d) = (packet.origin.lane(i), packet.direction.lane(i));
-                format!("{}, seed {seed}, {count} items, ray {o:?} {d:?}", L::NAME)
+                format!("{} {how}, seed {seed}, {count} items, ray {o:?} {d:?}", L::NAME)
             };
             let (s, t) = (a.t.lane(i).to_f64(), b.t.lane(i).to_f64());
-            assert!(s == t, "{}: list {s}, tree {t}", told());
+            assert!(s == t, "{}: list {s}, here {t}", told());
             assert!(
                 s >= L::MAX || a.item.tag_lane(i) == b.item.tag_lane(i),
-                "{}: at {s} list meets {}, tree {}",
+                "{}: at {s} list meets {}, here {}",
                 told(),
                 a.item.tag_lane(i),
                 b.item.tag_lane(i)
             );
         }
-        assert_eq!(c.bits(), d.bits(), "{}, seed {seed}, {count} items: blocked", L::NAME);
+        assert_eq!(c.bits(), d.bits(), "{} {how}, seed {seed}, {count} items: blocked", L::NAME);
     }
 }
 
 #[test]
-fn tree_and_list_give_identical_hits() {
+fn trees_boxes_and_lists_give_identical_hits() {
     for (seed, count) in
         [5, 8, 13, 24, 25, 40, 64, 100, 100, 200, 400, 2000].into_iter().enumerate()
     {

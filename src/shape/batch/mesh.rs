@@ -5,6 +5,7 @@
 use super::{Hit, OwnUv, Ray, Surface, reach};
 use crate::asset;
 use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::shape::extent::Extent;
 use crate::shape::facets;
 use crate::shape::facing::facing;
 use crate::shape::form::Form;
@@ -15,6 +16,8 @@ use std::sync::Arc;
 /// One mesh in its place.
 struct Placed<S> {
     mesh: Arc<asset::Mesh>,
+    /// A box around it in the scene: most rays need not be carried over.
+    extent: Extent<S>,
     /// Columns of the linear part.
     mesh_from_scene: [[S; 3]; 3],
     /// The middle of the mesh's box, in the scene and in the mesh: points are carried over relative to
@@ -52,6 +55,7 @@ impl<S: Real> Placed<S> {
         let outer = reach(form);
         Some(Self {
             mesh: mesh.clone(),
+            extent: Extent::new(form, false)?,
             mesh_from_scene: columns.map(|c| c.to_array().map(S::of)),
             center: scene_from_mesh.transform_point3(middle).to_array().map(S::of),
             mesh_center: middle.to_array().map(S::of),
@@ -162,8 +166,12 @@ impl<S: Real> Meshes<S> {
         hit: &mut Hit<L>,
     ) {
         for (tag, item) in (base + range.start as u32..).zip(&self.items[range]) {
+            let near = item.extent.meets(ray, hit.t);
+            if near.none() {
+                continue;
+            }
             let (inner, length) = item.ray(ray);
-            let limit = hit.t * length;
+            let limit = L::select(near, hit.t * length, L::of(-1.0));
             let found = facets::closest(&item.mesh, &inner, limit);
             let met = found.t.lt(limit);
             let before = hit.t;
@@ -186,6 +194,10 @@ impl<S: Real> Meshes<S> {
             let open = wanted.and_not(blocked);
             if open.none() {
                 break;
+            }
+            let open = open & item.extent.meets(ray, limit);
+            if open.none() {
+                continue;
             }
             let (inner, length) = item.ray(ray);
             let limit = L::select(open, limit * length, L::of(-1.0));

@@ -1,0 +1,138 @@
+//! What packets give over single rays, kind by kind: closest hits per second of packets and of the same
+//! kernel one lane wide, and the samples of a scene with glass.
+//!
+//! `cargo bench --bench packets`. One core; a kind's instances take turns.
+
+#[path = "common/mod.rs"]
+mod common;
+
+use common::{Random, ball, in_turns, towards};
+use glam::DAffine3;
+use std::hint::black_box;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use zerkalo::asset::Mesh;
+use zerkalo::film::{Display, Estimator, Film, Header, Mix};
+use zerkalo::lanes::{Double, Lanes, Real, Single, V3};
+use zerkalo::render::pass;
+use zerkalo::render::wave::{Job, Wave};
+use zerkalo::sampling::{SampleSettings, SamplerKind};
+use zerkalo::scene::{Document, Scene};
+use zerkalo::shape::{EXAMPLES, Form, Geometry, Ray};
+use zerkalo::world::World;
+
+/// Rays of each measurement.
+const RAYS: usize = 1 << 15;
+
+/// Times that they are traced.
+const ROUNDS: usize = 8;
+
+/// Rays from a sphere around the form towards its box, eight neighbours at a time.
+fn lines(form: &Form) -> Vec<([f64; 3], [f64; 3])> {
+    let mut random = Random(3);
+    let (low, high) = form.bounds().unwrap_or_else(|| (-glam::DVec3::ONE, glam::DVec3::ONE));
+    let (middle, size) = (0.5 * (low + high), (high - low).length());
+    let mut out = Vec::new();
+    while out.len() < RAYS {
+        let (from, to) = (random.point(1.5 * size), random.point(0.3 * size));
+        let from = std::array::from_fn(|i| from[i] + middle[i]);
+        for _ in 0..8 {
+            let aside = random.point(0.01 * size);
+            let to = std::array::from_fn(|i| to[i] + aside[i] + middle[i]);
+            out.push((from, towards(from, to)));
+        }
+    }
+    out
+}
+
+/// Something that traces the lines.
+fn tracer<L: Lanes>(form: &Form, lines: &[([f64; 3], [f64; 3])]) -> impl FnMut() + use<L> {
+    let geometry = Geometry::<L>::with_tree(std::slice::from_ref(form), false);
+    let vector = |v: [f64; 3]| v.map(L::Scalar::of);
+    let packet = |lines: &[([f64; 3], [f64; 3])]| Ray::<L> {
+        origin: V3::from_fn(|i| vector(lines[i].0)),
+        direction: V3::from_fn(|i| vector(lines[i].1)),
+    };
+    let rays: Vec<_> = lines.chunks_exact(L::WIDTH).map(packet).collect();
+    move || {
+        for _ in 0..ROUNDS {
+            for ray in &rays {
+                black_box(geometry.closest(black_box(ray), geometry.all()));
+            }
+        }
+    }
+}
+
+/// Something that traces eight samples in every pixel, tile by tile.
+fn renderer<L: Lanes>(scene: &Scene) -> impl FnMut() + use<L> {
+    let world = World::<L>::new(scene);
+    let scales = world.scales().to_vec();
+    let mix = Mix { weights: vec![[1.0; 3]; scales.len()] };
+    let estimator = Estimator::new(&scales, &mix, &Display::default());
+    let [width, height] = scene.film.size.map(|n| n as usize);
+    let mut film =
+        Film::new(Header { width, height, scales, seed: 1, precision: L::NAME.to_string() });
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    move || {
+        let sampling = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
+        film.restart();
+        for tile in 0..film.tile_count() as u32 {
+            let jobs = vec![Job { tile, first: 8, count: 8 }];
+            let wave = Wave { replicate: 0, jobs, estimate: false };
+            let go = AtomicBool::new(false);
+            pass::run_in(&world, &mut film, &wave, &sampling, &estimator, &pool, &go);
+        }
+    }
+}
+
+fn row(name: &str, millions: f64, seconds: &[f64]) {
+    let speed: Vec<f64> = seconds.iter().map(|s| millions / s).collect();
+    let [single, double, one, one_double] = speed[..] else { unreachable!("four instances") };
+    println!(
+        "{name:18} {single:8.1} {one:8.1} ({:4.1})   {double:8.1} {one_double:8.1} ({:4.1})",
+        single / one,
+        double / one_double
+    );
+}
+
+fn main() {
+    println!("millions per second of packets, of width 1 (packets over width 1)");
+    println!("{:18} {:>25}   {:>25}", "closest hits", Single::NAME, Double::NAME);
+    let mut forms: Vec<(&str, Form)> = Vec::new();
+    for (key, example) in EXAMPLES.iter().filter(|(key, _)| *key != "mesh") {
+        let scene = Scene::parse(&format!("[[object]]\n{example}\n"), key);
+        let Ok(scene) = scene else { panic!("{key}: the example is broken") };
+        forms.push((key, scene.objects[0].shape.form()));
+    }
+    let mesh = Arc::new(Mesh::new(ball(132, 266)));
+    let scene_from_mesh = DAffine3::IDENTITY;
+    forms.push(("mesh of 69,692", Form::Mesh { mesh, scene_from_mesh, smooth: false }));
+    for (name, form) in &forms {
+        let lines = lines(form);
+        let mut ways = (
+            tracer::<Single>(form, &lines),
+            tracer::<Double>(form, &lines),
+            tracer::<f32>(form, &lines),
+            tracer::<f64>(form, &lines),
+        );
+        let ways: &mut [&mut dyn FnMut()] =
+            &mut [&mut ways.0, &mut ways.1, &mut ways.2, &mut ways.3];
+        row(name, (lines.len() * ROUNDS) as f64 * 1e-6, &in_turns(5, ways));
+    }
+    println!("samples");
+    for name in ["mirror-room-physical", "transmission", "water-glass", "reflecting-tracks"] {
+        let path = Path::new("scenes").join(name).with_extension("toml");
+        let mut scene = Document::read(&path).unwrap_or_else(|e| panic!("{e}")).scene().clone();
+        scene.film.size = [160, 120];
+        let mut ways = (
+            renderer::<Single>(&scene),
+            renderer::<Double>(&scene),
+            renderer::<f32>(&scene),
+            renderer::<f64>(&scene),
+        );
+        let ways: &mut [&mut dyn FnMut()] =
+            &mut [&mut ways.0, &mut ways.1, &mut ways.2, &mut ways.3];
+        row(name, 160.0 * 120.0 * 8.0 * 1e-6, &in_turns(5, ways));
+    }
+}

@@ -1,0 +1,126 @@
+//! How rays are kept from things changes no bit of any picture.
+
+mod common;
+mod support;
+
+use common::Numbers;
+use std::fmt::Write;
+use support::{all_shipped, begin, parsed, pool, sized, trace, wave};
+use zerkalo::scene::{Acceleration, Scene};
+use zerkalo::world::{AnyWorld, Options, Precision};
+
+/// Not a multiple of a tile.
+const SIZE: [u32; 2] = [53, 37];
+
+/// The film of `count` samples in every pixel of both replicates.
+fn bytes(scene: &Scene, by: Acceleration, precision: Precision, count: u32) -> Vec<u8> {
+    let mut scene = scene.clone();
+    scene.trace.acceleration = by;
+    let mut rendering = begin(&scene, 5, precision);
+    let pool = pool(1);
+    for replicate in 0..2 {
+        let wave = wave(&rendering.film, replicate, 0, count);
+        trace(&mut rendering, &wave, &pool);
+    }
+    rendering.film.bytes()
+}
+
+fn same(name: &str, scene: &Scene, precision: Precision, count: u32) {
+    let expected = bytes(scene, Acceleration::Auto, precision, count);
+    for by in Acceleration::ALL {
+        let found = bytes(scene, by, precision, count);
+        assert!(found == expected, "{name} in {precision:?}: {} differs", by.name());
+    }
+}
+
+#[test]
+fn every_shipped_scene_is_the_same_picture() {
+    for (name, scene) in all_shipped() {
+        same(&name, &sized(scene, SIZE), Precision::Single, 9);
+    }
+}
+
+#[test]
+fn every_shipped_scene_is_the_same_picture_in_double_precision() {
+    for (name, scene) in all_shipped() {
+        same(&name, &sized(scene, [32, 24]), Precision::Double, 5);
+    }
+}
+
+/// Things of every kind with a space of its own, of all sizes, turned and stretched, around and behind the
+/// camera, which may stand in one of them.
+fn crowd(numbers: &mut Numbers, count: usize) -> Scene {
+    let shapes = [
+        "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }",
+        "cube = { corner = [-0.5, -0.5, 0.5], edge = 1.0 }",
+        "cylinder = { base = [0.0, -0.5, 0.0], top = [0.0, 0.5, 0.0], radius = 0.3 }",
+        "cone = { base = [0.0, -0.5, 0.0], apex = [0.0, 0.5, 0.0], radius = 0.5 }",
+        "rectangle = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0], normal = [0.0, 0.0, 1.0] }",
+        "mesh = { file = \"\" }",
+    ];
+    let far = if numbers.below(3) == 0 { 1e4 } else { 0.0 };
+    let [x, y, z] = (numbers.in_cube(3.0) + far).to_array();
+    let [a, b, c] = numbers.direction().to_array();
+    let near = if numbers.below(2) == 0 { 0.0 } else { 0.3 };
+    let angle = numbers.between(5.0, 140.0);
+    let mut text = format!(
+        "camera = {{ eye = [{x}, {y}, {z}], direction = [{a}, {b}, {c}], near = {near}, \
+         view_angle.vertical = {angle} }}\n\
+         light = [{{ name = \"a\", point = {{ position = [{}, {}, {}] }}, intensity = 30.0 }}, \
+         {{ name = \"b\", directional = {{ direction = [0.3, -1.0, 0.2] }}, intensity = 1.0 }}]\n\
+         [materials.matte]\ncolor = [0.7, 0.5, 0.3]\n\
+         [materials.mirror]\ndiffuse = 0.2\nreflection = 0.7\nroughness = 0.1\n\
+         [materials.glass]\ndiffuse = 0.1\ntransmission = 0.6\n",
+        far + 1.0,
+        far + 4.0,
+        far
+    );
+    for i in 0..count {
+        let material = ["matte", "mirror", "glass"][numbers.below(3)];
+        let shape = shapes[numbers.below(shapes.len())];
+        let mut size = || 10f64.powf(numbers.between(-1.5, 0.5));
+        let [sx, sy, sz] = if i % 2 == 0 { [size(), size(), size()] } else { [size(); 3] };
+        let [x, y, z] = (numbers.in_cube(5.0) + far).to_array();
+        let (turn, tilt) = (numbers.between(0.0, 360.0), numbers.between(0.0, 360.0));
+        write!(
+            text,
+            "[[object]]\nmaterial = \"{material}\"\nshape.{shape}\ntransform = [\
+             {{ scale = [{sx}, {sy}, {sz}] }}, {{ rotate_x = {tilt} }}, {{ rotate_y = {turn} }}, \
+             {{ translate = [{x}, {y}, {z}] }}]\n"
+        )
+        .unwrap();
+    }
+    parsed(&text)
+}
+
+#[test]
+fn random_scenes_are_the_same_picture() {
+    for seed in 0..24 {
+        let mut numbers = Numbers::new(seed);
+        let count = [1, 3, 12, 40, 130][numbers.below(5)];
+        let scene = sized(crowd(&mut numbers, count), [41, 29]);
+        let precision = if seed % 3 == 2 { Precision::Double } else { Precision::Single };
+        same(&format!("seed {seed}, {count} things"), &scene, precision, 3);
+    }
+}
+
+#[test]
+fn the_inventory_tells_how() {
+    let text = "[[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }\n\
+                [[object]]\nshape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }\n";
+    for (by, how) in [
+        (Acceleration::Auto, "list"),
+        (Acceleration::None, "bare list"),
+        (Acceleration::Projected, "screen rectangles"),
+        (Acceleration::Object, "boxes of their own"),
+        (Acceleration::World, "boxes"),
+        (Acceleration::Hierarchy, "tree"),
+    ] {
+        let mut scene = parsed(text);
+        scene.trace.acceleration = by;
+        let world = AnyWorld::compile(&scene, &Options::default());
+        let inventory = world.inventory().to_string();
+        assert!(inventory.contains(&format!("1 sphere ({how})")), "{}: {inventory}", by.name());
+        assert!(inventory.contains("1 plane (list)"), "{}: {inventory}", by.name());
+    }
+}
