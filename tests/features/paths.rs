@@ -100,6 +100,33 @@ fn grows_the_whole_tree(meant: &Scene, shown: &Scene) -> Verdict {
     Ok(())
 }
 
+/// Between two endless mirrors that glow with radiance 1 every pixel shows a sum, one term for each
+/// surface that a path meets: its weights are those of the reflections before it.
+fn glows_between(shown: &Scene, mirrors: [&str; 2], terms: impl Iterator<Item = f64>) -> Verdict {
+    let mut shown = shown.clone();
+    shown.objects.retain(|o| mirrors.contains(&o.name.as_str()));
+    let mut middle = DVec3::ZERO;
+    for object in &mut shown.objects {
+        let Shape::Rectangle(r) = &mut object.shape else { panic!("not a mirror") };
+        r.size = [1e4; 2];
+        middle += DVec3::from(r.center) / 2.0;
+    }
+    // From the middle towards the first of the two.
+    let Shape::Rectangle(first) = &shown.objects[0].shape else { unreachable!() };
+    shown.camera.target = Some(first.center);
+    shown.camera.eye = middle.to_array();
+    let own = material(&mut shown, "mirror");
+    (own.color, own.ambient, own.roughness) = (Color::WHITE, 1.0, 0.0);
+    shown.ambient.color = Color::WHITE;
+    shown.lights.clear();
+    let sum: f64 = terms.sum();
+    for shown in without_chance(&shown) {
+        let apart = (shown - DVec3::splat(sum)).abs().max_element();
+        ensure(apart < 1e-5, || format!("{shown} between the mirrors, not {sum}"))?;
+    }
+    Ok(())
+}
+
 #[test]
 fn b2_ray_tree() {
     let meant = shipped("ray-tree.toml");
@@ -114,13 +141,17 @@ fn b2_ray_tree() {
             ("no tree", &|s| s.trace.level = Level::Shadows),
         ],
     );
-    let facing = shipped("facing-mirrors.toml");
+    // 0.9^28 is the last power above 0.05; after 40 reflections depth would end it.
+    let powers = || (0..).map(|n| 0.9f64.powi(n)).take_while(|w| *w >= 0.05);
+    assert_eq!(powers().count(), 29);
     row(
         "facing-mirrors.toml",
-        |shown| agrees(&facing, shown, 48),
+        |shown| glows_between(shown, ["front mirror", "back mirror"], powers()),
         &[
-            ("a larger least weight", &|s| s.trace.min_weight = 0.5),
-            ("a smaller depth", &|s| s.trace.depth = 4),
+            ("no least weight", &|s| s.trace.min_weight = 0.0),
+            ("a larger least weight", &|s| s.trace.min_weight = 0.055),
+            ("a smaller depth", &|s| s.trace.depth = 27),
+            ("a smaller coefficient", &|s| material(s, "mirror").reflection = 0.89),
         ],
     );
 }
@@ -173,6 +204,8 @@ fn c4_old_faults() {
     let check = |shown: &Scene| {
         sees(&meant, shown)?;
         agrees(&meant, shown, 96)?;
+        // Twelve reflections without loss, and then an end.
+        glows_between(shown, ["left mirror", "right mirror"], [1.0; 13].into_iter())?;
         // The white ball, lit by more than 1, is as bright in the mirrors.
         let brightest = |s: &Scene| without_chance(s).iter().map(|p| p.x).fold(0.0, f64::max);
         let bright = brightest(shown);
@@ -189,7 +222,7 @@ fn c4_old_faults() {
                 };
                 ball.center[1] = 1.6;
             }),
-            ("fewer reflections between the mirrors", &|s| s.trace.depth = 3),
+            ("fewer reflections between the mirrors", &|s| s.trace.depth = 11),
             ("glass bent as elsewhere", &|s| material(s, "glass").index = 1.2),
         ],
     );

@@ -209,7 +209,11 @@ fn combined_otherwise(scene: &mut Scene, into: impl Fn(Vec<zerkalo::shape::Part>
             Shape::Difference(d) => d.of.clone(),
             _ => continue,
         };
-        object.shape = into(of);
+        let other = into(of);
+        // Of halves of space only some combinations have an end.
+        if other.faults().is_empty() {
+            object.shape = other;
+        }
     }
 }
 
