@@ -16,9 +16,12 @@ fn chord(radius: f64, degrees: f64) -> f64 {
     2.0 * radius * (degrees.to_radians() / 2.0).sin()
 }
 
+/// A camera after the motion of a name.
+type Moved<'a> = &'a dyn Fn(&Camera, &str) -> Camera;
+
 /// Moves and turns go as far as they should, keep what they should keep, and the picture shows the room
 /// from there. `moved` is the program's camera by the name of the motion.
-fn goes_where_it_should(room: &Scene, moved: &dyn Fn(&Camera, &str) -> Camera) -> Verdict {
+fn goes_where_it_should(room: &Scene, moved: Moved) -> Verdict {
     // Numbers of cameras are rounded to about a millionth of the distance to the target.
     let near = |what: &str, a: f64, b: f64| {
         ensure((a - b).abs() < 2e-5, || format!("{what}: {a} instead of {b}"))
@@ -77,7 +80,7 @@ fn program(camera: &Camera, motion: &str) -> Camera {
 fn a9_camera() {
     let room = shipped("mirror-room.toml");
     goes_where_it_should(&room, &program).unwrap();
-    let neighbours: [(&str, &dyn Fn(&Camera, &str) -> Camera); 4] = [
+    let neighbours: [(&str, Moved); 4] = [
         ("standing still", &|camera, _| camera.clone()),
         ("turning where it should go round", &|camera, motion| match motion {
             "orbit" => camera.look(20.0, 0.0),

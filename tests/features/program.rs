@@ -308,13 +308,16 @@ fn demonstrates_roughness([sharp, blurred]: [&Scene; 2]) -> Verdict {
     agrees(blurred, blurred, 48)
 }
 
+/// Two scenes, and what they have to show.
+type Demonstration<'a> = (&'a [Scene; 2], fn([&Scene; 2]) -> Verdict);
+
 #[test]
 fn a16_demonstrations() {
     let pair = |a: &str, b: &str| [shipped(a), shipped(b)];
     let viewpoints = pair("viewpoint-left.toml", "viewpoint-right.toml");
     let lights = pair("light-left.toml", "light-right.toml");
     let roughness = pair("roughness-0.toml", "roughness-0.3.toml");
-    let demonstrations: [(&[Scene; 2], fn([&Scene; 2]) -> Verdict); 3] = [
+    let demonstrations: [Demonstration; 3] = [
         (&viewpoints, demonstrates_viewpoints),
         (&lights, demonstrates_lights),
         (&roughness, demonstrates_roughness),
