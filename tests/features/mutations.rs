@@ -5,13 +5,15 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// A change of one line of the source: what stands in one place is replaced.
+/// A change of one expression in the source.
 pub struct Mutation {
     /// Name of the test that must fail.
     pub test: String,
     /// Source file.
     pub file: String,
+    /// The text around the expression and the expression, which stands in guillemets.
     replace: String,
+    /// An expression of the same type.
     by: String,
 }
 
@@ -19,33 +21,34 @@ pub struct Mutation {
 /// and one line for each of `test`, `file`, `replace`, `by`.
 pub fn all() -> BTreeMap<String, Mutation> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/features/mutations");
-    let files = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
-    files
-        .map(|path| {
-            let name = path.file_name().unwrap().to_str().unwrap().to_string();
-            let text = fs::read_to_string(&path).unwrap();
-            assert!(text.starts_with("# "), "{name} does not say what it is");
-            let value = |key: &str| {
-                let mut lines = text.lines().filter_map(|l| l.strip_prefix(key)?.strip_prefix(' '));
-                let first = lines.next().unwrap_or_else(|| panic!("{name} has no line `{key}`"));
-                assert!(lines.next().is_none(), "{name} has two lines `{key}`");
-                first.to_string()
-            };
-            let [test, file, replace, by] = ["test", "file", "replace", "by"].map(value);
-            (name, Mutation { test, file, replace, by })
-        })
-        .collect()
+    let read = |path: std::path::PathBuf| {
+        let name = path.file_name().unwrap().to_str().unwrap().to_string();
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with("# "), "{name} does not say what it is");
+        let value = |key: &str| {
+            let mut lines = text.lines().filter_map(|l| l.strip_prefix(key)?.strip_prefix(' '));
+            let first = lines.next().unwrap_or_else(|| panic!("{name} has no line `{key}`"));
+            assert!(lines.next().is_none(), "{name} has two lines `{key}`");
+            first.to_string()
+        };
+        let [test, file, replace, by] = ["test", "file", "replace", "by"].map(value);
+        (name, Mutation { test, file, replace, by })
+    };
+    fs::read_dir(&folder).unwrap().map(|entry| read(entry.unwrap().path())).collect()
 }
 
 #[test]
 fn every_mutation_applies_to_the_source() {
     let all = all();
-    assert!(all.len() >= 8, "only {}", all.len());
+    assert!(all.len() >= 30, "only {}", all.len());
     for (name, m) in all {
         let source = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(&m.file));
         let source = source.unwrap_or_else(|e| panic!("{name}: {}: {e}", m.file));
-        let found = source.matches(&m.replace).count();
-        assert_eq!(found, 1, "{name}: `{}` stands {found} times in {}", m.replace, m.file);
-        assert_ne!(m.replace, m.by, "{name}");
+        let parts: Vec<&str> = m.replace.split(['«', '»']).collect();
+        assert_eq!(parts.len(), 3, "{name}: `{}` needs one pair of guillemets", m.replace);
+        let text = parts.concat();
+        let found = source.matches(&text).count();
+        assert_eq!(found, 1, "{name}: `{text}` stands {found} times in {}", m.file);
+        assert_ne!(parts[1], m.by, "{name}");
     }
 }
