@@ -37,6 +37,7 @@ for name in $(ls "$mutations"); do
         }' "$file" > mutated
     cp mutated "$file"
 done
+sed -i.orig "1i #![allow(unused_parens)]" src/lib.rs
 cat >> src/lib.rs <<'RUST'
 
 /// Whether the mutation `name` is awake.
