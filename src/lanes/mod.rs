@@ -11,8 +11,8 @@
 //! | `f32`, `f64` | both | 1 | tests, benches, and kinds that resist packets |
 //!
 //! All operations up to `sqrt` are IEEE operations, so that every instance of one precision gives the
-//! same bits; [`Lanes::mul_add`] is fused exactly where the vectors fuse it. Only `sin_cos`, `ln` and
-//! `exp` may differ between the vector instances and the width-1 ones, by a few ulps.
+//! same bits; [`Lanes::mul_add`] is fused exactly where the vectors fuse it. Only `sin_cos`, `atan2`, `ln`
+//! and `exp` may differ between the vector instances and the width-1 ones, by a few ulps.
 
 mod scalar;
 mod vec3;
@@ -199,6 +199,8 @@ pub trait Lanes:
     fn sqrt(self) -> Self;
     /// Sine and cosine of radians.
     fn sin_cos(self) -> (Self, Self);
+    /// The angle of the point (`x`, `self`) from the x axis, in radians from -pi to pi.
+    fn atan2(self, x: Self) -> Self;
     /// Natural logarithm.
     fn ln(self) -> Self;
     /// e to the power `self`.

@@ -130,6 +130,10 @@ macro_rules! scalar_lanes {
                 <$float>::sin_cos(self)
             }
             #[inline(always)]
+            fn atan2(self, x: Self) -> Self {
+                <$float>::atan2(self, x)
+            }
+            #[inline(always)]
             fn ln(self) -> Self {
                 <$float>::ln(self)
             }

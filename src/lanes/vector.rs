@@ -156,6 +156,10 @@ macro_rules! vector_lanes {
                 $vector::sin_cos(self)
             }
             #[inline(always)]
+            fn atan2(self, x: Self) -> Self {
+                $vector::atan2(self, x)
+            }
+            #[inline(always)]
             fn ln(self) -> Self {
                 $vector::ln(self)
             }

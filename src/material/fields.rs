@@ -1,5 +1,6 @@
 //! What may be written in a material.
 
+use super::texture_fields::{BUMP_KINDS, TEXTURE_KINDS};
 use crate::value::{Choice, Field, Range, Takes};
 
 /// The keys of `[materials.NAME]`.
@@ -105,6 +106,20 @@ pub const FIELDS: &[Field] = &[
         "true",
         "Whether the back of a surface is finished like its front; otherwise the back is black.",
     ),
+    Field::without(
+        "texture",
+        Takes::OneOf(TEXTURE_KINDS),
+        "",
+        "one colour all over",
+        "What multiplies `color`, from place to place.",
+    ),
+    Field::without(
+        "bump",
+        Takes::OneOf(BUMP_KINDS),
+        "",
+        "as smooth as the shape",
+        "Heights that light sees on the surface; its outline stays as it is.",
+    ),
 ];
 
 const COEFFICIENT: Takes = Takes::Number(Range::COEFFICIENT);
@@ -195,7 +210,7 @@ mod tests {
             "reflectance",
         ];
         assert_eq!(keys, numbers);
-        assert_eq!(FIELDS.len(), numbers.len() + 6, "a new field? Check its range here");
+        assert_eq!(FIELDS.len(), numbers.len() + 8, "a new field? Check its range here");
         bad = Material { metal: Some(Metal::Gold), ..Material::default() };
         assert!(bad.faults().is_empty());
         bad.reflectance = Some(Color::WHITE);

@@ -4,15 +4,25 @@ mod claims;
 mod fields;
 mod finish;
 mod fresnel;
+mod lookup;
+mod projection;
 mod refraction;
 mod scatter;
+mod texture;
+mod texture_fields;
 
 pub use claims::{Claims, Energy};
 pub use fields::FIELDS;
 pub use finish::{Facets, Finish, SMOOTH_ALPHA, Shine, Spread, Transmission, one_minus_cos_of_tan};
 pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
+pub use lookup::{Heights, Pattern};
+pub use projection::{Coordinates, Projection, Projector};
 pub use refraction::{Interface, Split};
 pub use scatter::Reflected;
+pub use texture::{
+    Axis, Bump, Checker, HeightImage, ImageTexture, Mapping, Placement, Texture, TextureFilter,
+    Wrap,
+};
 
 use crate::value::{Checks, Color, Fault};
 use serde::{Deserialize, Serialize};
@@ -59,6 +69,12 @@ pub struct Material {
     pub metal: Option<Metal>,
     /// Whether the back of a surface is finished like its front; otherwise the back is black.
     pub two_sided: bool,
+    /// What multiplies the body colour.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub texture: Option<Texture>,
+    /// What turns the normals that light is computed with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bump: Option<Bump>,
 }
 
 /// The formula of a light's highlight.
@@ -159,6 +175,8 @@ impl Default for Material {
             reflectance: None,
             metal: None,
             two_sided: true,
+            texture: None,
+            bump: None,
         }
     }
 }
@@ -222,6 +240,8 @@ impl Material {
                     format!("no {other}: the index of refraction gives a dielectric's reflectance"),
                 )
             }))
+            .inner("texture", self.texture.as_ref().map(Texture::faults).unwrap_or_default())
+            .inner("bump", self.bump.as_ref().map(Bump::faults).unwrap_or_default())
             .faults()
     }
 }

@@ -3,6 +3,7 @@
 
 use super::Scene;
 use super::suggest::nearest;
+use crate::material::Mapping;
 use crate::value::{Fault, excerpt};
 use std::collections::HashMap;
 use std::fmt;
@@ -73,6 +74,9 @@ impl Scene {
         for object in &mut self.objects {
             object.shape.resolve(|name| library.mesh(name));
         }
+        for material in self.materials.values_mut() {
+            material.resolve(|name| library.image(name));
+        }
     }
 
     /// Everything wrong with the scene; a scene that was read has nothing wrong, an edited one may.
@@ -102,10 +106,51 @@ impl Scene {
         for (i, object) in self.objects.iter().enumerate() {
             add(&["object", &i.to_string()], object.faults());
         }
+        if findings.is_empty() {
+            self.missing_coordinates(&mut findings);
+        }
         self.missing_materials(&mut findings);
         self.same_names("light", self.lights.iter().map(|l| &l.name), &mut findings);
         self.same_names("object", self.objects.iter().map(|o| &o.name), &mut findings);
         findings
+    }
+
+    /// Materials whose textures ask for coordinates that the object's shape does not have. Shapes have no
+    /// faults.
+    fn missing_coordinates(&self, findings: &mut Vec<Finding>) {
+        let asks = |name: &str| {
+            let material = self.materials.get(name)?;
+            let texture = material.texture.as_ref().map(|t| t.placement().mapping);
+            let bump = material.bump.as_ref().map(|b| b.placement().mapping);
+            (texture == Some(Mapping::Uv))
+                .then_some("texture")
+                .or((bump == Some(Mapping::Uv)).then_some("bump"))
+        };
+        for (i, object) in self.objects.iter().enumerate() {
+            let materials = object.shape.part_materials(&object.material);
+            let asking: Vec<_> = materials.iter().map(|name| asks(name)).collect();
+            if asking.iter().all(Option::is_none) {
+                continue;
+            }
+            let spaces = object.shape.texture_spaces();
+            let lacking = |k: &usize| asking[*k].is_some() && !spaces[*k].has_uv();
+            let Some(part) = (0..spaces.len()).find(lacking) else { continue };
+            let what = match object.shape.file() {
+                Some(file) => format!("there are none in \"{}\"", excerpt(file)),
+                None if spaces.len() > 1 => format!("parts of a {} have none", object.shape.key()),
+                None => format!("a {} has none", object.shape.key()),
+            };
+            let found = format!(
+                "the {} of material \"{}\" asks for texture coordinates (mapping = \"uv\"), and {what}",
+                asking[part].unwrap_or_default(),
+                excerpt(materials[part]),
+            );
+            let help =
+                "Expected a mesh whose file has them, a rectangle or a platform. On other shapes \
+                        another mapping works: \"auto\" takes the one that suits the shape."
+                    .to_string();
+            findings.push(self.finding(&["object", &i.to_string(), "material"], found, help));
+        }
     }
 
     fn missing_materials(&self, findings: &mut Vec<Finding>) {

@@ -160,8 +160,9 @@ impl SceneFile {
         overwrite: bool,
     ) -> Result<(), SaveError> {
         let library = &scene.library;
-        let named = || scene.objects.iter().filter_map(|object| object.shape.file());
-        if let Some(file) = named().find(|file| library.loses(file, path)) {
+        let meshes = scene.objects.iter().filter_map(|object| object.shape.file());
+        let images = scene.materials.values().flat_map(|material| material.files());
+        if let Some(file) = meshes.chain(images).find(|file| library.loses(file, path)) {
             let file = crate::value::printable(file);
             return Err(SaveError::Failed {
                 path: path.to_path_buf(),

@@ -1,6 +1,6 @@
 //! Where the files are that a scene names.
 
-use crate::asset::{AssetError, Assets, Mesh};
+use crate::asset::{AssetError, Assets, Image, Mesh};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
@@ -41,6 +41,11 @@ impl Library {
     /// The mesh in the file that a scene calls `name`.
     pub(super) fn mesh(&self, name: &str) -> Result<Arc<Mesh>, AssetError> {
         self.assets.mesh(&self.folder().join(name))
+    }
+
+    /// The image in the file that a scene calls `name`.
+    pub(super) fn image(&self, name: &str) -> Result<Arc<Image>, AssetError> {
+        self.assets.image(&self.folder().join(name))
     }
 
     /// Whether `name`, which leads to a file from here, would not lead to it from the file `scene`.

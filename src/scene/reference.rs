@@ -33,6 +33,17 @@ and every key with a default may be left out. Unknown keys are errors.
   \"dielectric\"` both sides share the light between `reflection` (x F) and `transmission` (x 1 - F)
   as physics has it, so that glass has both at 1. What is transmitted is neither blurred nor
   coloured. Transparent things cast shadows like all others.
+- A texture multiplies the `color` of its material in the ambient and the diffuse part, so that white
+  shows it as it is: `color = [1.0, 1.0, 1.0]` with `texture.image = { file = \"wood.png\", scale =
+  [2.0, 2.0] }` or `texture.checker = { even = \"#ffffff\", odd = \"#202020\" }`. A bump,
+  `bump.image = { file = \"bricks.png\", height = 0.02 }`, turns the normals that light sees, in
+  highlights, reflections and refraction as well; the shape itself, its outline and its shadows stay. Where a bump would turn a normal away from the
+  viewer it is turned less.
+- Textures lie in the shape's own space, before its `transform`: an object takes its texture and its
+  bumps along. There u points to the right, v up; on a plane, platform or rectangle up is along its `up`,
+  or away from the viewer where it lies flat; around a cylinder or cone it is along the axis; a cube,
+  prism or pyramid is taken before its `rotation`. So `mapping = \"box\"` puts an image upright on every
+  side, as large as `scale` says, whatever the size of the thing.
 - `roughness` is the radius of the cone's base at unit distance, the tangent of half its opening
   angle. The square lobe has the side that gives the same area, sqrt(pi) x roughness; the
   microfacet lobes take the slope of equal second moment, `alpha` = roughness / (2 sqrt 2), unless
@@ -76,10 +87,14 @@ fn push(out: &mut String, text: &str) {
 fn nested(out: &mut String, field: &Field) {
     match field.takes {
         Takes::Choice(choices) => {
-            push(out, &format!("\n`{}`:\n\n", field.name));
+            let mut words = format!("\n`{}`:\n\n", field.name);
             for choice in choices {
                 // Writing into a String cannot fail.
-                let _ = writeln!(out, "- `\"{}\"`: {}", choice.name, choice.doc);
+                let _ = writeln!(words, "- `\"{}\"`: {}", choice.name, choice.doc);
+            }
+            // Several tables may have the same words.
+            if !out.contains(&words) {
+                push(out, &words);
             }
         }
         Takes::Table(fields) => {
@@ -90,6 +105,13 @@ fn nested(out: &mut String, field: &Field) {
         Takes::OneOf(fields) => {
             push(out, &format!("\n`{}`, exactly one of:\n\n", field.name));
             kinds(out, fields);
+            for kind in fields {
+                if let Takes::Table(inner) = kind.takes {
+                    push(out, &format!("\n`{}.{}`:\n\n", field.name, kind.name));
+                    table(out, inner);
+                    inner.iter().for_each(|field| nested(out, field));
+                }
+            }
         }
         Takes::ListOf(_) => steps(out),
         _ => {}

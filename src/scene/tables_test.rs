@@ -1,6 +1,7 @@
 //! The tables of fields against what serde really reads and writes.
 
 use super::*;
+use crate::material::{Bump, Checker, HeightImage, ImageTexture, Texture};
 use crate::shape::{EXAMPLES, KINDS, MAX_DEPTH, Part, Shape};
 use crate::value::{Field, Preset, Takes};
 use serde::Serialize;
@@ -59,6 +60,11 @@ fn inner(fields: &[Field], name: &str) -> &'static [Field] {
     }
 }
 
+/// The keys of a kind of texture or bump.
+fn texture(key: &str, kind: &str) -> &'static [Field] {
+    inner(inner(crate::material::FIELDS, key), kind)
+}
+
 #[test]
 fn tables_name_the_keys_that_are_read() {
     same_keys::<Scene>("scene", FIELDS);
@@ -75,6 +81,11 @@ fn tables_name_the_keys_that_are_read() {
         inner(crate::light::FIELDS, "directional"),
     );
     same_keys::<Material>("material", crate::material::FIELDS);
+    same_keys::<Texture>("texture", inner(crate::material::FIELDS, "texture"));
+    same_keys::<Bump>("bump", inner(crate::material::FIELDS, "bump"));
+    same_keys::<ImageTexture>("texture.image", texture("texture", "image"));
+    same_keys::<Checker>("texture.checker", texture("texture", "checker"));
+    same_keys::<HeightImage>("bump.image", texture("bump", "image"));
     same_keys::<Object>("object", OBJECT_FIELDS);
     same_keys::<Shape>("shape", KINDS);
     same_keys::<Part>("part", inner(inner(KINDS, "union"), "of"));
@@ -91,6 +102,9 @@ fn tables_tell_the_defaults_that_hold() {
     same_defaults::<Camera>("camera", crate::camera::FIELDS, "");
     same_defaults::<Light>("light", crate::light::FIELDS, "");
     same_defaults::<Material>("material", crate::material::FIELDS, "");
+    same_defaults::<ImageTexture>("texture.image", texture("texture", "image"), "");
+    same_defaults::<Checker>("texture.checker", texture("texture", "checker"), "");
+    same_defaults::<HeightImage>("bump.image", texture("bump", "image"), "");
     same_defaults::<Object>("object", OBJECT_FIELDS, EXAMPLES[0].1);
     same_defaults::<Rotate>(
         "rotate",
@@ -121,6 +135,9 @@ fn every_word_is_read() {
     words::<Trace>(TRACE_FIELDS);
     words::<Light>(crate::light::FIELDS);
     words::<Material>(crate::material::FIELDS);
+    words::<ImageTexture>(texture("texture", "image"));
+    words::<Checker>(texture("texture", "checker"));
+    words::<HeightImage>(texture("bump", "image"));
 }
 
 /// The example of each shape as a table of its own keys.

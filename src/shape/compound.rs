@@ -144,7 +144,7 @@ impl Part {
 }
 
 /// The parts of a compound kind; `None`: the shape is a simple one.
-fn parts_of(shape: &Shape) -> Option<&[Part]> {
+pub(super) fn parts_of(shape: &Shape) -> Option<&[Part]> {
     match shape {
         Shape::Union(Union { of })
         | Shape::Intersection(Intersection { of })

@@ -1,9 +1,10 @@
 //! Cone: from a disc to its apex.
 
+use super::tapered::axes_between;
 use super::tapered::{between, height, is_upright, no_axis};
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A right circular cone with its base closed.
@@ -61,5 +62,9 @@ impl Kind for Cone {
     /// Upright it looks the same from all sides.
     fn turn(&mut self, _: f64) -> bool {
         is_upright(self.base, self.apex)
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        axes_between(self.base, self.apex)
     }
 }

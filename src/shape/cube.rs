@@ -1,10 +1,11 @@
 //! Cube, standing upright.
 
 use super::kinds::turned_rotation;
+use super::texture::turned_axes;
 use super::upright::{lower_left, upright};
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A cube. Unturned it spans x to x + edge, y to y + edge and z - edge to z from its corner
@@ -69,6 +70,10 @@ impl Kind for Cube {
     fn turn(&mut self, degrees: f64) -> bool {
         self.rotation = turned_rotation(self.rotation, degrees);
         true
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        turned_axes(self.rotation)
     }
 }
 

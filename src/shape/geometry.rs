@@ -1,6 +1,6 @@
 //! All things of a scene, ready for rays: batches, and a tree over them where it pays.
 
-use super::batch::{Batch, Compiled, Hit, Meshes, Ray, Source, Surface, compile};
+use super::batch::{Batch, Compiled, Hit, Meshes, OwnUv, Ray, Source, Surface, compile};
 use super::form::Form;
 use super::tree::Tree;
 use crate::lanes::{Lanes, Mask, V3};
@@ -246,6 +246,12 @@ impl<L: Lanes> Geometry<L> {
     pub fn color(&self, item: u32, facet: L) -> Option<V3<L>> {
         let (meshes, base) = self.meshes()?;
         (item >= base).then(|| meshes.color((item - base) as usize, facet))?
+    }
+
+    /// The texture coordinates of its own that `item` has at `point`, near `facet`, if it has any.
+    pub fn uv(&self, item: u32, facet: L, point: V3<L>) -> Option<OwnUv<L>> {
+        let (meshes, base) = self.meshes()?;
+        (item >= base).then(|| meshes.uv((item - base) as usize, facet, point))?
     }
 }
 

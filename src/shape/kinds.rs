@@ -8,7 +8,7 @@ use super::{
 };
 use super::{Rectangle, Sphere, TaperedCylinder, Union, UnitCylinder};
 use crate::value::{Fault, Field, Takes, rounded_to};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// What every kind's description says of itself.
@@ -37,6 +37,12 @@ pub trait Kind {
     /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen from
     /// above. `false`: it has no key for that, and nothing was done.
     fn turn(&mut self, degrees: f64) -> bool;
+
+    /// The axes of the space in which textures lie on it ([`TextureSpace`](super::TextureSpace)), in its
+    /// own: right-handed, of unit length.
+    fn texture_axes(&self) -> DMat3 {
+        DMat3::IDENTITY
+    }
 }
 
 /// The angle `rotation + degrees` as it is written in a file: above -180, at most 180.
@@ -101,6 +107,13 @@ macro_rules! kinds {
                     $(Self::$kind(kind) => kind.faults(),)+
                 };
                 faults.into_iter().map(|f| f.under(self.key())).collect()
+            }
+
+            /// The axes of the space in which textures lie on it, in its own.
+            pub(super) fn texture_axes(&self) -> DMat3 {
+                match self {
+                    $(Self::$kind(kind) => kind.texture_axes(),)+
+                }
             }
 
             /// The kind with this key as [`Kind::standing`] makes it; `None`: no kind has it.

@@ -1,8 +1,9 @@
 //! Infinite plane.
 
+use super::texture::on_plane;
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes, turned};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A plane without end.
@@ -55,5 +56,12 @@ impl Kind for Plane {
     fn turn(&mut self, degrees: f64) -> bool {
         self.normal = turned(self.normal, degrees);
         true
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        match self.form() {
+            Form::Plane { normal, .. } => on_plane(normal),
+            _ => DMat3::IDENTITY,
+        }
     }
 }

@@ -1,8 +1,9 @@
 //! Platform: the ground that things stand on.
 
+use super::texture::on_plane;
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A horizontal rectangle that faces up.
@@ -58,5 +59,9 @@ impl Kind for Platform {
 
     fn turn(&mut self, _: f64) -> bool {
         false
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        on_plane(DVec3::Y)
     }
 }

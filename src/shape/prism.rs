@@ -1,10 +1,11 @@
 //! Right prism over a regular triangle.
 
 use super::kinds::turned_rotation;
+use super::texture::turned_axes;
 use super::upright::{lower_left, upright};
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A right prism. Unturned, an edge of its base runs from the corner along +x and the third vertex
@@ -75,5 +76,9 @@ impl Kind for Prism {
     fn turn(&mut self, degrees: f64) -> bool {
         self.rotation = turned_rotation(self.rotation, degrees);
         true
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        turned_axes(self.rotation)
     }
 }

@@ -2,10 +2,11 @@
 
 use super::cube::square;
 use super::kinds::turned_rotation;
+use super::texture::turned_axes;
 use super::upright::{lower_left, upright};
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A pyramid of height `apex_height`, cut off at `height`. If `apex_height` is not larger than
@@ -93,5 +94,9 @@ impl Kind for Pyramid {
     fn turn(&mut self, degrees: f64) -> bool {
         self.rotation = turned_rotation(self.rotation, degrees);
         true
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        turned_axes(self.rotation)
     }
 }

@@ -1,8 +1,9 @@
 //! Rectangle anywhere: the flat mirror.
 
 use super::{Form, Kind};
+
 use crate::value::{Checks, Fault, Field, Range, Takes, turned};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A flat rectangle. Its front is the side that `normal` points to.
@@ -109,6 +110,11 @@ impl Kind for Rectangle {
         self.normal = turned(self.normal, degrees);
         self.up = turned(self.up, degrees);
         true
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        let [right, up, front] = self.frame().unwrap_or([DVec3::X, DVec3::Y, DVec3::Z]);
+        DMat3::from_cols(right, up, front)
     }
 }
 

@@ -2,6 +2,7 @@
 //! common.
 
 use super::Form;
+use super::texture::around_axis;
 use crate::value::Fault;
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -19,6 +20,12 @@ pub(super) fn between(base: [f64; 3], top: [f64; 3], base_radius: f64, top_radiu
     let (u, v) = (axis / axis.abs().max_element()).normalize().any_orthonormal_pair();
     let linear = DMat3::from_cols(u * wide, v * wide, axis);
     Form::tapered(DAffine3::from_mat3_translation(linear, from), narrow / wide)
+}
+
+/// The axes in which textures lie on it: y from `base` to `top`.
+pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
+    let axis = DVec3::from_array(top) - DVec3::from_array(base);
+    around_axis((axis / axis.abs().max_element()).normalize())
 }
 
 /// The fault of an axis of length 0, which ends at the key `name`.

@@ -1,9 +1,10 @@
 //! Tapered cylinder: its radius changes evenly along the axis between two points.
 
+use super::tapered::axes_between;
 use super::tapered::{between, height, is_upright, no_axis};
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A circular cylinder that narrows or widens evenly, with its ends closed.
@@ -89,5 +90,9 @@ impl Kind for TaperedCylinder {
     /// Upright it looks the same from all sides.
     fn turn(&mut self, _: f64) -> bool {
         is_upright(self.base, self.top)
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        axes_between(self.base, self.top)
     }
 }

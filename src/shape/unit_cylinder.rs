@@ -1,9 +1,10 @@
 //! The tapered cylinder in its canonical place:
 //!   x^2 + y^2 <= (1 + (s - 1) z)^2, 0 <= z <= 1
 
+use super::texture::around_axis;
 use super::{Form, Kind};
 use crate::value::{Checks, Fault, Field, Range, Takes};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// The canonical tapered cylinder, to be placed by a transform: its axis runs from the origin to
@@ -45,5 +46,9 @@ impl Kind for UnitCylinder {
 
     fn turn(&mut self, _: f64) -> bool {
         false
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        around_axis(DVec3::Z)
     }
 }

@@ -6,6 +6,7 @@ use super::inventory::Inventory;
 use super::limits;
 use super::media::Media;
 use super::outlook::{Outlook, Surroundings};
+use super::skin::Skins;
 use crate::camera::View;
 use crate::lanes::{Double, Lanes, Real, Single};
 use crate::light::Lamp;
@@ -62,6 +63,8 @@ pub struct World<L: Lanes> {
     pub(super) smooth: bool,
     /// Things have colours of their own.
     pub(super) colored: bool,
+    /// Textures and bumps; `None`: there are none.
+    pub(super) skins: Option<Skins<L>>,
     /// What lets light through; `None`: nothing does.
     pub(super) media: Option<Media<L>>,
     /// The most surfaces that a path meets after the first.
@@ -180,6 +183,9 @@ impl<L: Lanes> World<L> {
         let finish_of: Vec<u32> =
             geometry.sources().iter().map(|item| finish_of_object[item.form][item.part]).collect();
 
+        let of_part = |s: &crate::shape::Source| used[finish_of_object[s.form][s.part] as usize];
+        let skins = Skins::new(scene, geometry.sources(), placed.origin, of_part);
+
         let lit = finishes.iter().any(|f| f.wants_light);
         let ambient = used.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3]);
         let groups = Groups::new(scene, lit, ambient);
@@ -201,6 +207,7 @@ impl<L: Lanes> World<L> {
         let inventory = Inventory::new(
             scene,
             geometry.to_string(),
+            &skins.as_ref().map(Skins::words).unwrap_or_default(),
             &finishes,
             &groups.members,
             sources.len(),
@@ -225,8 +232,9 @@ impl<L: Lanes> World<L> {
             background: (scene.background.color.0 != [0.0; 3])
                 .then(|| groups.find(&Member::Background))
                 .flatten(),
-            smooth: geometry.is_smooth(),
-            colored: geometry.is_colored(),
+            smooth: geometry.is_smooth() || skins.as_ref().is_some_and(Skins::is_bumped),
+            colored: geometry.is_colored() || skins.as_ref().is_some_and(Skins::is_colored),
+            skins,
             shadows: level >= Level::Shadows && !geometry.is_empty(),
             depth: if going_on { scene.trace.depth } else { 0 },
             min_weight: scene.trace.min_weight,

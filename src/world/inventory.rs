@@ -16,12 +16,14 @@ impl Inventory {
     pub(super) fn new<S>(
         scene: &Scene,
         geometry: String,
+        textures: &[&str],
         finishes: &[Finish<S>],
         members: &[Member],
         lamps: usize,
         precision: &str,
     ) -> Self {
         let mut parts = vec![geometry];
+        parts.extend(textures.iter().map(|word| word.to_string()));
         let mut say = |present: bool, what: &str| {
             if present {
                 parts.push(what.to_string());

@@ -9,6 +9,7 @@ mod limits;
 mod media;
 mod outlook;
 mod path;
+mod skin;
 mod through;
 
 pub use compile::{AnyWorld, Options, Precision, World};

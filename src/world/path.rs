@@ -3,6 +3,7 @@
 use super::compile::World;
 use super::groups::MAX_GROUPS;
 use super::outlook::Outlook;
+use super::skin::Patch;
 use crate::lanes::{Lanes, Mask, V3};
 use crate::material::Spread;
 use crate::sampling::Draws;
@@ -36,7 +37,7 @@ pub(super) struct Path<L> {
 pub(super) struct Met<L: Lanes> {
     /// Normal on the viewer's side that light is computed with.
     pub normal: V3<L>,
-    /// The surface's own, on the viewer's side: the same but on smooth meshes. Light comes from that side.
+    /// The surface's own, on the viewer's side: the same but on smooth meshes and bumps. Light comes from that side.
     pub geometric: V3<L>,
     /// Origin of rays that leave on the viewer's side.
     pub start: V3<L>,
@@ -86,6 +87,13 @@ impl<L: Lanes> Met<L> {
         self.lit = self.lit.and_not(lanes);
         self.shining = self.shining.and_not(lanes);
         self.reflecting = self.reflecting.and_not(lanes);
+    }
+
+    /// What would go into the surface goes as steeply out of it.
+    #[inline(always)]
+    pub fn outward(&self, direction: V3<L>) -> V3<L> {
+        let height = direction.dot(self.geometric).min(L::zero());
+        self.geometric.mul_add(height * L::of(-2.0), direction)
     }
 
     /// Takes what is `other`'s in `lanes`, which have nothing yet.
@@ -179,14 +187,14 @@ impl<L: Lanes> World<L> {
         let number = self.finish_of[item as usize];
         let finish = &self.finishes[number as usize];
         let mut normal = geometric;
+        let patch = Patch { item, facet: hit.facet, surface: &surface, lanes };
         if self.smooth {
-            let at = (surface.point, geometric);
-            normal = self.geometry.shading_normal((item, hit.facet), at, ray.direction);
+            normal = self.shading_normal(&patch, (front, geometric), ray.direction);
         }
         let mut tint = V3::of([1.0; 3]);
         let mut diffuse = V3::splat(finish.diffuse);
         if self.colored
-            && let Some(color) = self.geometry.color(item, hit.facet)
+            && let Some(color) = self.own_color(&patch)
         {
             (tint, diffuse) = (color, diffuse.times(color));
         }
@@ -285,9 +293,7 @@ impl<L: Lanes> World<L> {
             let r = finish.reflect(*strength, spread, incident, met.normal, uv, self.fold);
             let mut out = r.direction;
             if self.smooth {
-                // What would go into the surface goes as steeply out of it.
-                let height = out.dot(met.geometric).min(L::zero());
-                out = met.geometric.mul_add(height * L::of(-2.0), out);
+                out = met.outward(out);
             }
             path.ray.direction = V3::select(lanes, out, path.ray.direction);
             path.weight = V3::select(lanes, weight.times(r.weight), path.weight);

@@ -191,10 +191,10 @@ impl<L: Lanes> World<L> {
         counts: &mut Counts,
     ) -> Ways<L> {
         let incident = path.ray.direction;
-        let interface = Interface::new(incident, met.geometric, crossing.n_i, crossing.n_t);
+        let interface = Interface::new(incident, met.normal, crossing.n_i, crossing.n_t);
         let straight = crossing.pane | crossing.hidden;
         let mut ways = Ways {
-            mirrored: incident.reflect(met.geometric),
+            mirrored: incident.reflect(met.normal),
             mirrored_weight: V3::zero(),
             passed: V3::select(straight, incident, interface.refracted),
             passed_weight: V3::zero(),
@@ -229,10 +229,15 @@ impl<L: Lanes> World<L> {
                 counts.glossy = true;
                 *numbers.get_or_insert_with(|| draws.lobe(bounce))
             };
-            let r = finish.reflect(*strength, spread, incident, met.geometric, uv, self.fold);
+            let r = finish.reflect(*strength, spread, incident, met.normal, uv, self.fold);
             let weight = path.weight.times(r.weight) * own;
             ways.mirrored = V3::select(lanes, r.direction, ways.mirrored);
             ways.mirrored_weight = V3::select(lanes, weight, ways.mirrored_weight);
+        }
+        if self.smooth {
+            ways.mirrored = met.outward(ways.mirrored);
+            // What would stay before the surface goes as steeply behind it.
+            ways.passed = -met.outward(-ways.passed);
         }
         ways
     }

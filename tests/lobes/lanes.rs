@@ -55,6 +55,23 @@ fn sine_and_cosine<L: Lanes>() {
     assert!(sin <= 1.5 && cos <= 1.5, "{}: sin {sin}, cos {cos}", L::NAME);
 }
 
+/// Angles of points in all directions: within 3 roundings of 1, of angles up to pi. An axis gives no NaN.
+fn arc_tangent<L: Lanes>() {
+    let angle = |i: u32| std::f64::consts::PI * (2.0 * uniform(i) - 1.0);
+    let rounded = |x: f64| L::of(x).lane(0).to_f64();
+    let mut worst: f64 = 0.0;
+    for i in 0..100_000 {
+        let (y, x) = angle(i).sin_cos();
+        let (y, x) = (rounded(y * 3.0), rounded(x * 3.0));
+        let found = L::of(y).atan2(L::of(x)).lane(0).to_f64();
+        worst = worst.max((found - y.atan2(x)).abs() / L::EPSILON);
+    }
+    println!("{}: atan2 {worst:.2}", L::NAME);
+    assert!(worst <= 3.0, "{}: atan2 {worst}", L::NAME);
+    assert_eq!(L::of(0.0).atan2(L::of(0.0)).lane(0).to_f64(), 0.0);
+    assert_eq!(L::of(0.0).atan2(L::of(2.0)).lane(0).to_f64(), 0.0);
+}
+
 /// Logarithms of what Beckmann's lobe (1 - u) and Phong's highlight (a cosine, at least 1e-30) ask
 /// for, exponentials of what both highlights ask for.
 fn logarithm_and_exponential<L: Lanes>() {
@@ -81,6 +98,7 @@ fn logarithm_and_exponential<L: Lanes>() {
 #[test]
 fn elementary_functions_are_good_to_stated_ulps() {
     for_every_instance!(sine_and_cosine);
+    for_every_instance!(arc_tangent);
     for_every_instance!(logarithm_and_exponential);
 }
 

@@ -6,6 +6,7 @@ use super::tree::{put, read};
 use super::{Edit, Refusal, Subject};
 use crate::camera::{Camera, ViewAngle};
 use crate::light::{Directional, Falloff, Light, Point};
+use crate::material::{Bump, Material, Texture};
 use crate::scene::Scene;
 use crate::shape::Shape;
 use crate::value::{Field, Range, Takes, clean, number, rounded_to, significant};
@@ -65,6 +66,11 @@ pub(super) fn switch(
             {
                 object.shape = shape;
             }
+        }
+        Subject::Material(material) => {
+            let material =
+                next.materials.get_mut(material).ok_or_else(|| Refusal::gone(subject))?;
+            switch_texture(material, key, name);
         }
         _ => {}
     }
@@ -173,6 +179,18 @@ fn refit(light: &mut Light, factor: f64) -> String {
     }
     let (old, new) = (number(old), number(light.intensity));
     format!("Intensity {old} became {new}: as bright as before in the middle of the scene.")
+}
+
+/// A texture of another kind lies as the one before it.
+fn switch_texture(material: &mut Material, key: &str, name: &str) {
+    match (key, &material.texture, &material.bump) {
+        ("texture", None, _) => material.texture = Texture::new(name),
+        ("texture", Some(texture), _) if texture.key() != name => {
+            material.texture = texture.changed(name);
+        }
+        ("bump", _, None) => material.bump = Bump::new(name),
+        _ => {}
+    }
 }
 
 /// The picture stays (almost) what it was.

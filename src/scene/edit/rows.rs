@@ -114,6 +114,7 @@ impl Walk<'_> {
                     self.field(field, values, format!("{key}.{}", field.name), depth);
                 }
             }
+            (Takes::OneOf(_), None) => self.kind(field, None, key, depth),
             (Takes::OneOf(kinds), Some(Value::Table(values))) => {
                 let given = kinds.iter().find(|k| values.contains_key(k.name));
                 self.kind(field, given.map(|k| k.name), key.clone(), depth);
@@ -158,8 +159,9 @@ impl Walk<'_> {
         }
         row.entry = Entry::Kind;
         row.value = given.unwrap_or_default().to_string();
-        row.default = None;
-        row.is_default = false;
+        let optional = matches!(field.preset, Preset::Without(_));
+        row.default = row.default.filter(|_| optional);
+        row.is_default = optional && given.is_none();
         self.rows.push(row);
     }
 

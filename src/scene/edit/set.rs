@@ -20,8 +20,9 @@ pub fn set(scene: &Scene, subject: &Subject, key: &str, text: &str) -> Result<Ed
     let Some(field) = lookup(subject, key) else {
         return Err(Refusal::new(&format!("there is no key {key} here"), ""));
     };
+    let optional = matches!(field.preset, Preset::Without(_));
     match field.takes {
-        Takes::OneOf(kinds) => {
+        Takes::OneOf(kinds) if !(text.is_empty() && optional) => {
             let names: Vec<_> = kinds.iter().map(|k| k.name).collect();
             let name = names[word(field, text, &names)?];
             return kinds::switch(scene, subject, key, name);

@@ -93,8 +93,10 @@ pub fn toggle(scene: &Scene, subject: &Subject, key: &str, forward: bool) -> Res
             };
             let words: Vec<_> = kinds.iter().map(|k| k.name).collect();
             let at = words.iter().position(|w| Some(*w) == now);
-            let name = words[next(at, words.len(), forward, false).unwrap_or(0)];
-            return kinds::switch(scene, subject, key, name);
+            return match next(at, words.len(), forward, optional) {
+                Some(at) => kinds::switch(scene, subject, key, words[at]),
+                None => super::set(scene, subject, key, ""),
+            };
         }
         Takes::Choice(choices) => {
             let words: Vec<_> = choices.iter().map(|c| c.name).collect();
@@ -194,6 +196,14 @@ impl Rule {
                     Self::Rungs { floor: 0.0, range }
                 } else if range == Range::COORDINATE {
                     Self::Units { unit: step_length(scene), range }
+                } else if field.name == "scale" {
+                    // Of a texture.
+                    Self::Rungs { floor: 0.0, range }
+                } else if field.name == "offset" {
+                    Self::Units { unit: 0.05, range }
+                } else if field.name == "height" {
+                    // Of a bump: a hundredth of what it stands on, or less.
+                    Self::Units { unit: 0.005, range }
                 } else if matches!(field.name, "roughness" | "alpha") {
                     // From 0 to what can just be told from it at the far end of a room.
                     Self::Rungs { floor: 0.001, range }

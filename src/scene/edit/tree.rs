@@ -75,7 +75,13 @@ pub(super) fn write(scene: &Scene, subject: &Subject, values: Table) -> Result<S
                 new.shape.resolve_as(&old.shape);
             }
         }
-        Subject::Material(name) => fill(next.materials.get_mut(name), values)?,
+        Subject::Material(name) => {
+            fill(next.materials.get_mut(name), values)?;
+            let old = scene.materials.get(name);
+            if let (Some(new), Some(old)) = (next.materials.get_mut(name), old) {
+                new.resolve_as(old);
+            }
+        }
         Subject::Film => fill(Some(&mut next.film), values)?,
         Subject::Trace => fill(Some(&mut next.trace), values)?,
     }

@@ -2,17 +2,15 @@
 //!
 //! Coordinates of a mesh are in single precision whatever the lanes; all computation is in the lanes'.
 
-use super::{Hit, Ray, Surface, reach};
+use super::{Hit, OwnUv, Ray, Surface, reach};
 use crate::asset;
 use crate::lanes::{Lanes, Mask, Real, V3};
 use crate::shape::facets;
+use crate::shape::facing::facing;
 use crate::shape::form::Form;
 use glam::DVec3;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Least cosine between a shading normal and the direction to the viewer.
-const LEAST_COSINE: f64 = 0.02;
 
 /// One mesh in its place.
 struct Placed<S> {
@@ -100,6 +98,18 @@ impl<S: Real> Placed<S> {
         })
     }
 
+    /// Per lane the pairs of the vertices of the triangle tagged `facet`.
+    #[inline(always)]
+    fn pairs<L: Lanes<Scalar = S>>(&self, facet: L, of: &[[f32; 2]]) -> [[L; 2]; 3] {
+        let triangles = &self.mesh.mesh().triangles;
+        let number = |lane| (facet.tag_lane(lane) as usize).min(triangles.len() - 1);
+        let one = |vertex: usize, k: usize| {
+            let pair = |lane| of[triangles[number(lane)][vertex] as usize][k];
+            L::from_fn(|lane| S::of(f64::from(pair(lane))))
+        };
+        std::array::from_fn(|vertex| [one(vertex, 0), one(vertex, 1)])
+    }
+
     #[inline(always)]
     fn triangle<L: Lanes<Scalar = S>>(&self, facet: L) -> Triangle<L> {
         Triangle { corners: self.vertices(facet, &self.mesh.mesh().positions) }
@@ -112,6 +122,16 @@ impl<L: Lanes> Triangle<L> {
     fn normal(&self) -> V3<L> {
         let [a, b, c] = self.corners;
         (b - a).cross(c - a)
+    }
+
+    /// The gradients in the triangle's plane of the second and of the third corner's weight.
+    #[inline(always)]
+    fn gradients(&self) -> [V3<L>; 2] {
+        let [a, b, c] = self.corners;
+        let (to_b, to_c) = (b - a, c - a);
+        let normal = to_b.cross(to_c);
+        let inverse = L::one() / normal.length2();
+        [to_c.cross(normal) * inverse, normal.cross(to_b) * inverse]
     }
 
     /// Weights of the corners at the point nearest to `p`, about: positive, with the sum 1.
@@ -211,14 +231,31 @@ impl<S: Real> Meshes<S> {
         let [a, b, c] = item.vertices(facet, item.mesh.smooth_normals());
         let smooth = item.normal(a * weights[0] + b * weights[1] + c * weights[2]);
         let smooth = smooth * (L::one() / smooth.length2().sqrt());
-        let side = smooth.dot(normal);
-        let smooth = V3::select(side.lt(L::zero()), -smooth, smooth);
-        let short = (L::of(LEAST_COSINE) + smooth.dot(direction)).max(L::zero());
-        let bent = direction.mul_add(-short, smooth);
-        let bent = bent * (L::one() / bent.length2().sqrt());
         // Normals that cancel, or a triangle without area, leave no number.
-        let sound = bent.dot(normal).gt(L::zero());
-        V3::select(sound, bent, normal)
+        facing(smooth, normal, direction)
+    }
+
+    /// The texture coordinates of `item` at `point`, which lies near its triangles tagged `facet`;
+    /// `None`: its file has none.
+    #[inline(never)]
+    pub fn uv<L: Lanes<Scalar = S>>(
+        &self,
+        item: usize,
+        facet: L,
+        point: V3<L>,
+    ) -> Option<OwnUv<L>> {
+        let item = &self.items[item];
+        let triangle = item.triangle(facet);
+        let corners = item.pairs(facet, item.mesh.mesh().uvs.as_deref()?);
+        let weights = triangle.weights(item.point(point));
+        let gradient = triangle.gradients();
+        let along = |k: usize| {
+            let [a, b, c] = corners.map(|pair| pair[k]);
+            let value = a * weights[0] + b * weights[1] + c * weights[2];
+            (value, gradient[0] * (b - a) + gradient[1] * (c - a))
+        };
+        let ((u, du), (v, dv)) = (along(0), along(1));
+        Some(OwnUv { uv: [u, v], gradients: [du, dv] })
     }
 
     /// Base colour of the triangles tagged `facet` of `item`; `None`: its file names none.

@@ -98,6 +98,15 @@ pub struct Surface<L> {
     pub reach: L,
 }
 
+/// Texture coordinates that a shape has of its own, at one point.
+#[derive(Clone, Copy, Debug)]
+pub struct OwnUv<L> {
+    /// u to the right, v up.
+    pub uv: [L; 2],
+    /// Their gradients along the surface, in the shape's own axes.
+    pub gradients: [V3<L>; 2],
+}
+
 impl<L: Lanes> Surface<L> {
     /// How far from the point rays start that leave the surface: a few roundings of the largest number
     /// involved.

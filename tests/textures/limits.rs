@@ -1,0 +1,219 @@
+//! What bumps and textures are in the limit, what costs nothing, what is refused.
+
+use crate::support::{picture, rendered, shipped, sized};
+use glam::DVec3;
+use image::{ImageBuffer, Luma};
+use std::fs;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use zerkalo::asset::{Assets, Stage};
+use zerkalo::film::Part;
+use zerkalo::material::Fresnel;
+use zerkalo::scene::edit::{Entry, Subject, rows, set, step, toggle};
+use zerkalo::scene::{Document, Scene, SceneFile};
+use zerkalo::world::{AnyWorld, Options, Precision};
+
+fn shown(scene: &Scene, precision: Precision) -> Vec<[f64; 3]> {
+    picture(&rendered(scene, 1, precision, 4), Part::Both)
+}
+
+/// Heights of nothing, or an even image, change no bit; one texel higher does.
+#[test]
+fn a_bump_of_no_height_is_flat_to_the_bit() {
+    let bumpy = sized(shipped("bump.toml"), [64, 48]);
+    let with_height = |factor: f64| {
+        let mut scene = bumpy.clone();
+        for material in scene.materials.values_mut() {
+            if let Some(zerkalo::material::Bump::Image(image)) = &mut material.bump {
+                image.height *= factor;
+            }
+        }
+        scene
+    };
+    let mut flat = bumpy.clone();
+    flat.materials.values_mut().for_each(|material| material.bump = None);
+    for precision in [Precision::Single, Precision::Double] {
+        assert!(shown(&with_height(0.0), precision) == shown(&flat, precision));
+        assert!(shown(&with_height(1.0), precision) != shown(&flat, precision));
+    }
+}
+
+/// On a ramp all normals lean by the angle of its slope, so that light along the leaning normal is
+/// full, and across it, none.
+#[test]
+fn a_ramp_leans_by_the_angle_of_its_slope() {
+    let folder = tempfile::tempdir().unwrap();
+    // Heights from 0 to 1 over 64 pixels, in 16 bits.
+    let ramp = ImageBuffer::from_fn(64, 2, |x, _| Luma([((x * 65535 + 31) / 63) as u16]));
+    ramp.save(folder.path().join("ramp.png")).unwrap();
+    let (height, width) = (0.7, 2.0);
+    // From the first to the last pixel's middle.
+    let slope: f64 = height / (width * 63.0 / 64.0);
+    let leaning = DVec3::new(-slope, 0.0, 1.0).normalize();
+    let towards = |light: DVec3| {
+        let text = format!(
+            "[film]\nsize = [16, 16]\nfilter = \"center\"\n[trace]\nlevel = \"primary\"\n\
+             [camera]\neye = [0, 0, 3]\ntarget = [0, 0, 0]\nview_angle.vertical = 20\n\
+             [[light]]\ndirectional = {{ direction = {:?} }}\nfalloff = \"none\"\nintensity = 1\n\
+             [materials.m]\ncolor = [1, 1, 1]\n\
+             bump.image = {{ file = \"ramp.png\", height = {height}, mapping = \"uv\", wrap = \"clamp\" }}\n\
+             [[object]]\nmaterial = \"m\"\n\
+             shape.rectangle = {{ center = [0, 0, 0], size = [{width}, 2], normal = [0, 0, 1] }}\n",
+            (-light).to_array()
+        );
+        let name = folder.path().join("s.toml");
+        let scene = Scene::parse(&text, name.to_str().unwrap()).unwrap();
+        picture(&rendered(&scene, 1, Precision::Double, 1), Part::Both)
+    };
+    for light in [leaning, DVec3::Z, DVec3::new(0.3, 0.5, 0.8).normalize()] {
+        let expected = light.dot(leaning);
+        for pixel in towards(light) {
+            // 16 bits of height.
+            assert!((pixel[0] - expected).abs() < 1e-3, "{pixel:?} {expected}");
+        }
+        assert!((expected - light.z).abs() > 0.02, "a flat one would show {}", light.z);
+    }
+    // Light from behind the surface, but in front of the leaning normal, does not reach it.
+    let behind = DVec3::new(-0.9, 0.0, -0.1).normalize();
+    assert!(behind.dot(leaning) > 0.1);
+    assert!(towards(behind).iter().all(|pixel| pixel[0] == 0.0));
+}
+
+fn inventory(scene: &Scene) -> String {
+    AnyWorld::compile(scene, &Options::default()).inventory().to_string()
+}
+
+#[test]
+fn what_shows_nothing_is_not_compiled() {
+    let scene = |material: &str| {
+        let object =
+            "[[object]]\nmaterial = \"m\"\nshape.sphere = { center = [0, 0, 0], radius = 1 }";
+        Scene::parse(&format!("[materials.m]\n{material}\n{object}"), "scenes/none.toml").unwrap()
+    };
+    let plain = inventory(&scene(""));
+    for nothing in [
+        "texture.image = {}",
+        "bump.image = {}",
+        "bump.image = { file = \"textures/wood.png\", height = 0 }",
+    ] {
+        assert_eq!(inventory(&scene(nothing)), plain, "{nothing}");
+    }
+    for (something, word) in [
+        ("texture.image = { file = \"textures/wood.png\" }", "image texture"),
+        ("texture.checker = {}", "checker"),
+        ("bump.image = { file = \"textures/wood.png\" }", "bump"),
+    ] {
+        assert!(inventory(&scene(something)).contains(word), "{something}");
+    }
+}
+
+#[test]
+fn the_dashboard_edits_textures_and_reads_no_file_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.png", "b.png"] {
+        image::RgbImage::from_pixel(3, 2, image::Rgb([9, 99, 199]))
+            .save(folder.path().join(name))
+            .unwrap();
+    }
+    let path = folder.path().join("scene.toml");
+    let text = "# A ball.\n[materials.m]\ncolor = [1, 1, 1] # white\n\n\
+                [[object]]\nmaterial = \"m\"\nshape.sphere = { center = [0, 0, 0], radius = 1 }\n";
+    fs::write(&path, text).unwrap();
+    let reads = Arc::new(AtomicUsize::new(0));
+    let counter = reads.clone();
+    let assets = Arc::new(Assets::new(move |stage| {
+        if matches!(stage, Stage::Reading { .. }) {
+            counter.fetch_add(1, Ordering::SeqCst);
+        }
+    }));
+    let mut file = SceneFile::open_with(&path, assets).unwrap();
+    let mut scene = file.document().scene().clone();
+    let m = Subject::Material("m".into());
+    let row =
+        |scene: &Scene, key: &str| rows(scene, &m).unwrap().into_iter().find(|row| row.key == key);
+    let texture = row(&scene, "texture").unwrap();
+    assert_eq!(
+        (texture.entry, texture.value.as_str(), texture.is_default),
+        (Entry::Kind, "", true)
+    );
+    assert!(row(&scene, "texture.image.file").is_none());
+    for (key, text) in [
+        ("texture", "image"),
+        ("texture.image.file", "a.png"),
+        ("texture.image.scale", "4 2"),
+        ("texture.image.mapping", "planar"),
+        ("bump", "image"),
+        ("bump.image.file", "b.png"),
+        ("bump.image.height", "0.1"),
+    ] {
+        scene = set(&scene, &m, key, text).unwrap_or_else(|e| panic!("{key}: {e}")).scene;
+    }
+    assert_eq!(reads.load(Ordering::SeqCst), 2);
+    let missing = set(&scene, &m, "texture.image.file", "c.png").unwrap_err().to_string();
+    assert!(missing.contains("no such file"), "{missing}");
+    let uv = set(&scene, &m, "bump.image.mapping", "uv").unwrap_err().to_string();
+    assert!(uv.contains("texture coordinates") && uv.contains("auto"), "{uv}");
+    scene = step(&scene, &m, "texture.image.offset", Some(0), 1.0).unwrap().scene;
+    assert_eq!(row(&scene, "texture.image.offset").unwrap().value, "0.05, 0");
+    scene = step(&scene, &m, "texture.image.scale", Some(1), -1.0).unwrap().scene;
+    scene = step(&scene, &m, "bump.image.height", None, -1.0).unwrap().scene;
+    assert_eq!(row(&scene, "bump.image.height").unwrap().value, "0.095");
+
+    // Another kind lies as the one before; the round of kinds has a place for none.
+    let checker = toggle(&scene, &m, "texture", true).unwrap().scene;
+    assert_eq!(row(&checker, "texture.checker.mapping").unwrap().value, "planar");
+    let none = toggle(&checker, &m, "texture", true).unwrap().scene;
+    assert!(none.materials["m"].texture.is_none());
+    assert!(toggle(&none, &m, "texture", true).unwrap().scene.materials["m"].texture.is_some());
+    assert!(set(&scene, &m, "bump", "").unwrap().scene.materials["m"].bump.is_none());
+
+    let mut document: Document = file.document().clone();
+    document.apply(&scene);
+    let written = document.text();
+    assert!(written.starts_with("# A ball.\n") && written.contains("# white"), "{written}");
+    assert!(
+        written.contains(
+            "texture.image = { file = \"a.png\", mapping = \"planar\", scale = [4.0, 1.8], offset = [0.05, 0.0] }"
+        ),
+        "{written}"
+    );
+    let again = Scene::parse(written, path.to_str().unwrap()).unwrap();
+    assert_eq!(again, scene);
+    let before = reads.load(Ordering::SeqCst);
+    let moved = set(&scene, &m, "color", "0.5 0.5 0.5").unwrap().scene;
+    assert!(shown(&sized(moved, [8, 8]), Precision::Auto).len() == 64);
+    assert_eq!(reads.load(Ordering::SeqCst), before);
+
+    // In another folder the files would not be found.
+    let elsewhere = tempfile::tempdir().unwrap();
+    let refused = file.save_as(&elsewhere.path().join("s.toml"), &scene, false).unwrap_err();
+    assert!(refused.to_string().contains("a.png"), "{refused}");
+}
+
+/// A picture of a scene with textures is the same whatever its packets are: one pixel's samples, or
+/// neighbouring pixels.
+#[test]
+fn textures_do_not_depend_on_packets() {
+    let mut glass = shipped("bump.toml");
+    let plaster = glass.materials.get_mut("plaster").unwrap();
+    (plaster.diffuse, plaster.reflection, plaster.transmission) = (0.0, 1.0, 1.0);
+    plaster.fresnel = Some(Fresnel::Dielectric);
+    let mut smooth = glass.clone();
+    smooth.materials.get_mut("plaster").unwrap().bump = None;
+    let whole = |scene: &Scene| shown(&sized(scene.clone(), [40, 30]), Precision::Single);
+    assert!(whole(&glass) != whole(&smooth), "bumps bend what is seen through glass");
+    let shipped = ["bump.toml", "texture-uv.toml"].map(|name| (name, shipped(name)));
+    for (name, scene) in shipped.into_iter().chain([("bumped glass", glass)]) {
+        let scene = sized(scene, [40, 30]);
+        for precision in [Precision::Single, Precision::Double] {
+            let whole = rendered(&scene, 1, precision, 16);
+            let mut single = crate::support::begin(&scene, 1, precision);
+            let pool = crate::support::pool(1);
+            for first in 0..16 {
+                crate::support::uniform(&mut single, first, 1, &pool);
+            }
+            assert!(picture(&whole, Part::Both) == picture(&single, Part::Both), "{name}");
+            assert_eq!(whole.film.bad_samples().count, 0, "{name}");
+        }
+    }
+}

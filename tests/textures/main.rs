@@ -1,0 +1,9 @@
+//! Textures and bumps: pictures against a direct evaluation, the files of the shipped scenes, and what is
+//! refused.
+
+mod direct;
+mod files;
+mod limits;
+mod pictures;
+#[path = "../support/mod.rs"]
+mod support;
