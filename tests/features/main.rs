@@ -41,4 +41,5 @@ mod paths;
 mod program;
 mod shapes;
 mod table;
+mod textures;
 mod tracks;

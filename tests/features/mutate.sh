@@ -37,7 +37,8 @@ for name in $(ls "$mutations"); do
         }' "$file" > mutated
     cp mutated "$file"
 done
-sed -i.orig "1i #![allow(unused_parens)]" src/lib.rs
+{ echo '#![allow(unused_parens)]'; cat src/lib.rs; } > mutated
+cp mutated src/lib.rs
 cat >> src/lib.rs <<'RUST'
 
 /// Whether the mutation `name` is awake.
