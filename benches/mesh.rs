@@ -177,7 +177,7 @@ fn main() {
             "{count} triangles: tree in {:.3} s, {:.1} bytes a triangle, depth {}",
             seconds(clock) - begin,
             mesh.bytes() as f64 / count as f64,
-            mesh.depth()
+            mesh.boxes().depth()
         );
         table::<Single>(&mesh);
         table::<Double>(&mesh);

@@ -92,6 +92,13 @@ impl View {
             .map(|(x, y)| self.corner + self.right * x + self.down * y)
     }
 
+    /// Where a point in front of the eye is seen on the raster \[pixels\].
+    pub fn project(&self, point: DVec3) -> [f64; 2] {
+        let to = point - self.eye;
+        let on_plane = to / to.dot(self.w) - self.corner;
+        [self.right, self.down].map(|pixel| on_plane.dot(pixel) / pixel.length_squared())
+    }
+
     /// Origins and unit directions of rays through the points `(x, y) + (dx, dy)` of the raster, in
     /// pixels; `(x, y) = at(lane)`. They begin on the near plane.
     #[inline(always)]

@@ -3,6 +3,7 @@
 use crate::film::Tone;
 use crate::measure::Topic;
 use crate::sampling::SamplerKind;
+use crate::scene::Acceleration;
 use crate::world::Precision;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -97,6 +98,10 @@ pub struct RenderArgs {
     /// Precision of the geometry; auto: double where the scene's proportions need it
     #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]
     pub precision: PrecisionArg,
+    /// How rays are kept from things that they cannot meet, instead of as the scene says; the picture
+    /// stays the same
+    #[arg(long, value_parser = acceleration())]
+    pub acceleration: Option<Acceleration>,
     /// Where samples lie: sobol spreads them evenly, random is for comparison
     #[arg(long, value_enum, default_value_t = SamplerArg::Sobol)]
     pub sampler: SamplerArg,
@@ -125,7 +130,7 @@ pub struct MeasureArgs {
     /// Noise levels to reach, in 8-bit codes
     #[arg(long, value_name = "CODES,..", value_parser = positive, value_delimiter = ',', default_value = "2,1,0.5,0.25")]
     pub noise: Vec<f64>,
-    /// Compare only these settings, such as: adaptivity,precision,threads,sampler,lobe,level,depth,min-weight,rays-per-pixel
+    /// Compare only these settings, such as: adaptivity,precision,threads,sampler,lobe,level,depth,min-weight,rays-per-pixel,acceleration
     #[arg(long, value_name = "SETTING,..", value_delimiter = ',', conflicts_with = "full")]
     pub only: Vec<Topic>,
     /// Compare all settings, which takes about five minutes
@@ -244,6 +249,15 @@ fn tone() -> impl TypedValueParser<Value = Tone> {
     names.map(|given| {
         let named = Tone::NAMED.into_iter().find(|(name, _)| *name == given);
         named.map(|(_, tone)| tone).unwrap_or_default()
+    })
+}
+
+/// Parses the name of an acceleration.
+fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
+    let names = PossibleValuesParser::new(Acceleration::ALL.map(Acceleration::name));
+    names.map(|given| {
+        let named = Acceleration::ALL.into_iter().find(|a| a.name() == given);
+        named.unwrap_or_default()
     })
 }
 

@@ -158,6 +158,9 @@ fn failed_write(error: WriteError) -> Failure {
 /// The scene with the size that the command line asks for.
 fn sized(scene: &Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     let mut scene = scene.clone();
+    if let Some(acceleration) = args.acceleration {
+        scene.trace.acceleration = acceleration;
+    }
     if let Some(size) = args.size {
         scene.film.size = size;
         if let Some(fault) = scene.faults().first() {

@@ -5,7 +5,7 @@ use crate::material::Lobe;
 use crate::render::schedule::{Criterion, Settings, Stop};
 use crate::render::{Course, Options};
 use crate::sampling::{SampleSettings, SamplerKind};
-use crate::scene::{Level, Scene};
+use crate::scene::{Acceleration, Level, Scene};
 use crate::world::{self, Precision};
 use std::io;
 use std::str::FromStr;
@@ -34,6 +34,8 @@ pub enum Topic {
     MinWeight,
     /// The most samples of a glossy pixel.
     RaysPerPixel,
+    /// How rays are kept from things that they cannot meet.
+    Acceleration,
 }
 
 impl Topic {
@@ -49,6 +51,7 @@ impl Topic {
         (Self::Depth, "depth", "What fewer reflections give, and get wrong"),
         (Self::MinWeight, "min-weight", "What ending weak paths gives, and gets wrong"),
         (Self::RaysPerPixel, "rays-per-pixel", "What a cap on glossy pixels gives, and leaves"),
+        (Self::Acceleration, "acceleration", "What boxes, rectangles and trees cost and save"),
     ];
 
     /// Its name on the command line.
@@ -65,7 +68,12 @@ impl Topic {
     pub fn unbiased(self) -> bool {
         matches!(
             self,
-            Self::Default | Self::Adaptivity | Self::Precision | Self::Threads | Self::Sampler
+            Self::Default
+                | Self::Adaptivity
+                | Self::Precision
+                | Self::Threads
+                | Self::Sampler
+                | Self::Acceleration
         )
     }
 }
@@ -229,6 +237,11 @@ impl Plan {
                 .into_iter()
                 .filter(|_| reflects)
                 .map(|cap| edited(format!("{cap} samples"), &|s| s.film.rays_per_pixel = cap))
+                .collect(),
+            Topic::Acceleration => Acceleration::ALL
+                .into_iter()
+                .filter(|by| *by != scene.trace.acceleration)
+                .map(|by| edited(by.name().to_string(), &|s| s.trace.acceleration = by))
                 .collect(),
         }
     }

@@ -21,7 +21,7 @@ mod settings;
 mod suggest;
 mod warn;
 
-pub use crate::shape::{Rotate, STEP_FIELDS, Scale, Step};
+pub use crate::shape::{Acceleration, Rotate, STEP_FIELDS, Scale, Step};
 pub use check::Finding;
 pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};

@@ -1,5 +1,6 @@
 //! What holds for the whole picture: raster, tracing, background, ambient light.
 
+use crate::shape::Acceleration;
 use crate::value::{Checks, Choice, Color, Fault, Field, Range, Takes};
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +38,8 @@ pub struct Trace {
     pub min_weight: f64,
     /// What becomes of a reflected ray that would dip under the surface.
     pub horizon: Horizon,
+    /// How rays are kept from things that they cannot meet.
+    pub acceleration: Acceleration,
 }
 
 /// What is traced.
@@ -85,7 +88,13 @@ impl Default for FilmSettings {
 
 impl Default for Trace {
     fn default() -> Self {
-        Self { level: Level::Full, depth: 16, min_weight: 0.0, horizon: Horizon::Fold }
+        Self {
+            level: Level::Full,
+            depth: 16,
+            min_weight: 0.0,
+            horizon: Horizon::Fold,
+            acceleration: Acceleration::Auto,
+        }
     }
 }
 
@@ -168,6 +177,13 @@ pub const TRACE_FIELDS: &[Field] = &[
         "",
         "\"fold\"",
         "What becomes of a reflected ray that would dip under the surface.",
+    ),
+    Field::preset(
+        "acceleration",
+        Takes::Choice(Acceleration::CHOICES),
+        "",
+        "\"auto\"",
+        "How rays are kept from things that they cannot meet. It changes the time, never the picture.",
     ),
 ];
 

@@ -1,6 +1,7 @@
 //! All things of a scene, ready for rays: batches, and a tree over them where it pays.
 
 use super::batch::{Batch, Compiled, Hit, Meshes, OwnUv, Ray, Source, Surface, compile};
+use super::extent::{Acceleration, Extent};
 use super::form::Form;
 use super::tree::Tree;
 use crate::lanes::{Lanes, Mask, V3};
@@ -23,9 +24,11 @@ struct Part<L: Lanes> {
 pub struct Geometry<L: Lanes> {
     parts: Vec<Part<L>>,
     all: Selection,
-    tree: Option<Tree<L>>,
+    tree: Option<Tree>,
     /// `(part, number in the part)` of the tree's items.
     tree_items: Vec<(u32, u32)>,
+    /// For each item a box that is asked first, if it has one; empty: none has.
+    extents: Vec<Option<Extent<L::Scalar>>>,
     /// `source[item]`: which form, in the order given to [`Geometry::new`], and which part of it.
     source: Vec<Source>,
     counts: Vec<String>,
@@ -43,25 +46,51 @@ pub struct Selection {
 impl<L: Lanes> Geometry<L> {
     /// Compiles `forms`, as a list or with a tree by their number.
     pub fn new(forms: &[Form]) -> Self {
-        let bounded = forms.iter().filter(|f| f.bounds().is_some()).count();
-        Self::with_tree(forms, bounded >= TREE_FROM)
+        Self::accelerated(forms, Acceleration::Auto)
     }
 
     /// Compiles `forms` with or without a tree, whatever their number.
     pub fn with_tree(forms: &[Form], tree: bool) -> Self {
+        Self::compiled(forms, if tree { Acceleration::Hierarchy } else { Acceleration::Auto }, tree)
+    }
+
+    /// Compiles `forms` with what `acceleration` says.
+    pub fn accelerated(forms: &[Form], acceleration: Acceleration) -> Self {
+        let many = || forms.iter().filter(|f| f.bounds().is_some()).count() >= TREE_FROM;
+        let tree = match acceleration {
+            Acceleration::Auto => many(),
+            Acceleration::Hierarchy => true,
+            _ => false,
+        };
+        Self::compiled(forms, acceleration, tree)
+    }
+
+    fn compiled(forms: &[Form], acceleration: Acceleration, tree: bool) -> Self {
         let mut out = Self {
             parts: Vec::new(),
             all: Selection::default(),
             tree: None,
             tree_items: Vec::new(),
+            extents: Vec::new(),
             source: Vec::new(),
             counts: Vec::new(),
+        };
+        let how_listed = match acceleration {
+            Acceleration::Auto | Acceleration::Hierarchy => "list",
+            Acceleration::None => "bare list",
+            Acceleration::Projected => "screen rectangles",
+            Acceleration::Object => "boxes of their own",
+            Acceleration::World => "boxes",
         };
         let mut bounds = Vec::new();
         for Compiled { batch, sources, noun, detail, infinite } in compile(forms) {
             let base = out.source.len() as u32;
             let in_tree = tree && !infinite;
-            let how = if in_tree { "tree" } else { "list" };
+            let how = match (in_tree, infinite) {
+                (true, _) => "tree",
+                (_, true) => "list",
+                _ => how_listed,
+            };
             let count = sources.iter().filter(|s| s.part == 0).count();
             let name = if count == 1 { noun.0 } else { noun.1 };
             out.counts.push(format!("{count} {name}{detail} ({how})"));
@@ -79,6 +108,11 @@ impl<L: Lanes> Geometry<L> {
         }
         out.tree = (!bounds.is_empty()).then(|| Tree::new(&bounds));
         out.all.tree = out.tree.is_some();
+        if matches!(acceleration, Acceleration::Object | Acceleration::World) {
+            let own = acceleration == Acceleration::Object;
+            let of = |source: &Source| Extent::new(&forms[source.form], own);
+            out.extents = out.source.iter().map(of).collect();
+        }
         out
     }
 
@@ -134,6 +168,9 @@ impl<L: Lanes> Geometry<L> {
     pub fn closest_of(&self, ray: &Ray<L>, of: &Selection, wanted: L::Mask) -> Hit<L> {
         // What nobody wants goes no way.
         let mut hit = Hit::nearer_than(L::select(wanted, L::of(L::MAX), L::of(-1.0)));
+        if !self.extents.is_empty() {
+            return self.closest_in_boxes(ray, of, hit);
+        }
         for (part, range) in &of.runs {
             let part = &self.parts[*part as usize];
             part.batch.closest(indices(range), part.base, ray, &mut hit);
@@ -145,22 +182,66 @@ impl<L: Lanes> Geometry<L> {
     }
 
     #[inline(never)]
-    fn closest_in(&self, tree: &Tree<L>, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
-        tree.walk(ray, hit.t, |item, _| {
+    fn closest_in(&self, tree: &Tree, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
+        tree.walk(ray, hit.t, |item, limit| {
             let (part, i) = self.tree_items[item];
             let part = &self.parts[part as usize];
             // As near is near enough: of equal distances the lowest tag counts.
-            let mut one = Hit::nearer_than(hit.t * L::of(1.0 + 2.0 * L::EPSILON));
+            let mut one = Hit::nearer_than(limit * L::of(1.0 + 2.0 * L::EPSILON));
             part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut one);
+            // Lanes of no interest have met nothing.
+            one.t = L::select(one.t.gt(L::zero()), one.t, L::of(L::MAX));
             hit.take(&one);
             hit.t
         });
         hit
     }
 
+    /// The items of `of` whose box a ray enters, as numbers of a part and in it.
+    #[inline(always)]
+    fn boxed<'a>(
+        &'a self,
+        of: &'a Selection,
+    ) -> impl Iterator<Item = (&'a Part<L>, u32, Option<&'a Extent<L::Scalar>>)> {
+        of.runs.iter().flat_map(move |(part, range)| {
+            let part = &self.parts[*part as usize];
+            range.clone().map(move |i| (part, i, self.extents[(part.base + i) as usize].as_ref()))
+        })
+    }
+
+    #[inline(never)]
+    fn closest_in_boxes(&self, ray: &Ray<L>, of: &Selection, mut hit: Hit<L>) -> Hit<L> {
+        for (part, i, extent) in self.boxed(of) {
+            if extent.is_none_or(|extent| extent.meets(ray, hit.t).any()) {
+                part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut hit);
+            }
+        }
+        hit
+    }
+
+    #[inline(never)]
+    fn blocked_in_boxes(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, by: &Selection) -> L::Mask {
+        let mut blocked = L::mask(false);
+        for (part, i, extent) in self.boxed(by) {
+            let open = wanted.and_not(blocked);
+            let open = extent.map_or(open, |extent| open & extent.meets(ray, limit));
+            if open.any() {
+                let new = part.batch.blocked(indices(&(i..i + 1)), ray, limit, open);
+                blocked = blocked | (new & open);
+                if wanted.and_not(blocked).none() {
+                    break;
+                }
+            }
+        }
+        blocked
+    }
+
     /// Which lanes of `wanted` meet any of some items at a distance in (0, limit).
     #[inline(always)]
     pub fn blocked(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, by: &Selection) -> L::Mask {
+        if !self.extents.is_empty() {
+            return self.blocked_in_boxes(ray, limit, wanted, by);
+        }
         let mut blocked = L::mask(false);
         for (part, range) in &by.runs {
             let open = wanted.and_not(blocked);
@@ -179,7 +260,7 @@ impl<L: Lanes> Geometry<L> {
     #[inline(never)]
     fn blocked_in(
         &self,
-        tree: &Tree<L>,
+        tree: &Tree,
         ray: &Ray<L>,
         limit: L,
         wanted: L::Mask,
@@ -188,7 +269,7 @@ impl<L: Lanes> Geometry<L> {
         let limit_of = |blocked| L::select(wanted.and_not(blocked), limit, L::of(-1.0));
         tree.walk(ray, limit_of(blocked), |item, left| {
             let (part, i) = self.tree_items[item];
-            let open = wanted.and_not(blocked);
+            let open = left.gt(L::zero());
             let batch = &self.parts[part as usize].batch;
             let new = batch.blocked(indices(&(i..i + 1)), ray, left, open);
             blocked = blocked | (new & open);

@@ -1,126 +1,83 @@
-//! A bounding volume hierarchy for scenes with many items, walked by whole packets.
+//! A bounding volume hierarchy for scenes with many items: packets that stay together walk it together,
+//! others ray by ray.
 
 use super::batch::Ray;
+use super::extent::padded;
+use super::walk::{Beam, Sheaf, TURNS, apart, together, with_stack};
+use crate::asset::{Boxes, Built};
 use crate::lanes::{Lanes, Mask, Real, V3};
-use glam::{DVec3, Vec3A};
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::builder::build_bvh2;
-use obvhs::{BvhBuildParams, bvh2::Bvh2};
-use std::time::Duration;
+use glam::DVec3;
+use obvhs::BvhBuildParams;
 
-/// One box of the tree.
-struct Node<S> {
-    low: [S; 3],
-    high: [S; 3],
-    /// First child, or first entry of `order` for a leaf.
-    first: u32,
-    /// Number of items in a leaf; 0: an inner node with children `first` and `first + 1`.
-    count: u32,
+/// Packets whose directions differ by no more than this (length of the difference of unit vectors),
+/// and whose origins differ by no more than this share of the items' extent, go together. Measured by
+/// `benches/kernel.rs`, group `rays of a tree`.
+const TOGETHER: f64 = 0.05;
+
+/// A tree of boxes over items, one item a leaf.
+pub struct Tree {
+    boxes: Boxes,
+    /// For each leaf its item.
+    items: Vec<u32>,
+    /// Largest edge of the box around all items.
+    size: f64,
 }
 
-/// A binary tree of boxes over items.
-pub struct Tree<L: Lanes> {
-    nodes: Vec<Node<L::Scalar>>,
-    /// Items in the order of the leaves.
-    order: Vec<u32>,
-    depth: usize,
-}
-
-/// The boxes of the builder are single precision: rounded outward by a few units in the last place
-/// of the largest coordinate, which is also what an item's own test may err by, in any direction.
-fn padded(low: DVec3, high: DVec3) -> Aabb {
-    let reach = low.abs().max(high.abs()).max_element();
-    let pad = DVec3::splat(reach * f64::from(4.0 * f32::EPSILON));
-    Aabb::new(Vec3A::from((low - pad).as_vec3()), Vec3A::from((high + pad).as_vec3()))
-}
-
-impl<L: Lanes> Tree<L> {
-    /// Over the boxes of all items, in item order.
+impl Tree {
+    /// Over the boxes of all items, at least one, in item order.
     pub fn new(bounds: &[(DVec3, DVec3)]) -> Self {
-        let boxes: Vec<Aabb> = bounds.iter().map(|(low, high)| padded(*low, *high)).collect();
-        let mut spent = Duration::ZERO;
-        let bvh: Bvh2 = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut spent);
-        let corner = |v: Vec3A| v.to_array().map(|c| L::Scalar::of(f64::from(c)));
-        let nodes = bvh
-            .nodes
-            .iter()
-            .map(|n| Node {
-                low: corner(n.aabb().min),
-                high: corner(n.aabb().max),
-                first: n.first_index,
-                count: n.prim_count,
-            })
-            .collect();
-        let depth = bvh.max_depth.max(96);
-        Self { nodes, order: bvh.primitive_indices, depth }
+        // The boxes of the builder are single precision.
+        let corners = |i: usize| {
+            let [low, high] = padded(bounds[i], f64::from(f32::EPSILON));
+            [low.as_vec3().to_array(), high.as_vec3().to_array()]
+        };
+        let Built { boxes, order, leaves } =
+            Boxes::build(bounds.len(), corners, 1, BvhBuildParams::medium_build());
+        let items = leaves.iter().map(|(first, _)| order[*first as usize]).collect();
+        let low = bounds.iter().map(|b| b.0).fold(DVec3::INFINITY, DVec3::min);
+        let high = bounds.iter().map(|b| b.1).fold(DVec3::NEG_INFINITY, DVec3::max);
+        Self { boxes, items, size: (high - low).max_element() }
     }
 
-    /// Calls `leaf(item, limit)` for the items whose boxes the packet may meet, nearer ones first as
-    /// far as the tree knows; `leaf` returns the distance beyond which nothing matters any more.
-    /// Items at that very distance are still called for.
+    /// Calls `leaf(item, limit)` for the items whose boxes rays may enter no farther than `limit`, nearer
+    /// ones first as far as the tree knows; lanes whose limit is negative are of no interest. `leaf`
+    /// returns the distances beyond which nothing matters any more. Items at that very distance are
+    /// still called for.
     #[inline(always)]
-    pub fn walk(&self, ray: &Ray<L>, mut limit: L, mut leaf: impl FnMut(usize, L) -> L) {
-        let safe = |d: L| L::one() / d.abs().max(L::of(1e-30)).copysign(d);
-        let inverse = V3::new(safe(ray.direction.x), safe(ray.direction.y), safe(ray.direction.z));
+    pub fn walk<L: Lanes>(&self, ray: &Ray<L>, limit: L, mut leaf: impl FnMut(usize, L) -> L) {
+        let wanted = limit.gt(L::zero()).bits();
+        if wanted == 0 {
+            return;
+        }
         // What an item's own test rounds off of a distant origin must not be cut off by its box: the
         // boxes grow by a few roundings of the origin.
         let pad = ray.origin.max_abs() * L::of(4.0 * L::EPSILON);
-        let pad = V3::new(pad, pad, pad);
-        let line = Line { above: ray.origin + pad, below: ray.origin - pad, inverse };
-        let mut stack: Vec<u32> = Vec::with_capacity(self.depth);
-        if self.nodes.is_empty() || entry(&self.nodes[0], &line, limit).is_none() {
+        let beam = Beam::new(ray, V3::new(pad, pad, pad));
+        let boxes = &self.boxes;
+        if self.is_together(ray, wanted) {
+            let bounds = Sheaf::around(&beam, wanted);
+            let leaf = |number: usize, limit| leaf(self.items[number] as usize, limit);
+            with_stack!(boxes, 1, stack =>
+                together(boxes, (&beam, bounds.as_ref()), limit, stack, leaf));
             return;
         }
-        stack.push(0);
-        while let Some(at) = stack.pop() {
-            let node = &self.nodes[at as usize];
-            if node.count > 0 {
-                for i in node.first..node.first + node.count {
-                    limit = leaf(self.order[i as usize] as usize, limit);
-                }
-                continue;
-            }
-            let left = entry(&self.nodes[node.first as usize], &line, limit);
-            let right = entry(&self.nodes[node.first as usize + 1], &line, limit);
-            match (left, right) {
-                (Some(l), Some(r)) => {
-                    let (near, far) = if l <= r { (0, 1) } else { (1, 0) };
-                    stack.push(node.first + far);
-                    stack.push(node.first + near);
-                }
-                (Some(_), None) => stack.push(node.first),
-                (None, Some(_)) => stack.push(node.first + 1),
-                (None, None) => {}
-            }
+        let numbers = L::from_fn(|lane| L::Scalar::of(lane as f64));
+        let leaf = |lane: usize, number: usize, limit: L::Scalar| {
+            let number_of = L::of(lane as f64);
+            let here = numbers.le(number_of) & numbers.ge(number_of);
+            let limit = L::select(here, L::splat(limit), L::of(-1.0));
+            leaf(self.items[number] as usize, limit).lane(lane)
+        };
+        with_stack!(boxes, TURNS, stack =>
+            apart(boxes, (&beam, limit), wanted, stack, |_| (), leaf));
+    }
+
+    /// Whether the wanted rays of a packet are worth going together.
+    #[inline(always)]
+    fn is_together<L: Lanes>(&self, ray: &Ray<L>, wanted: u32) -> bool {
+        if L::WIDTH == 1 || wanted.count_ones() < 2 {
+            return false;
         }
+        ray.spread(wanted, TOGETHER, TOGETHER * self.size)
     }
-}
-
-/// A packet as the box test wants it.
-struct Line<L> {
-    /// Origins, moved up and down by their rounding.
-    above: V3<L>,
-    below: V3<L>,
-    /// One over the direction, never infinite.
-    inverse: V3<L>,
-}
-
-/// Where the first of the lanes that meet a box no farther than `limit` enters it; `None` if none
-/// does.
-///
-/// The far side is moved out by two roundings, so that no hit is lost (Ize 2013, *Robust BVH Ray
-/// Traversal*).
-#[inline(always)]
-fn entry<L: Lanes>(node: &Node<L::Scalar>, line: &Line<L>, limit: L) -> Option<f64> {
-    let t0 = (V3::splat(node.low) - line.above).times(line.inverse);
-    let t1 = (V3::splat(node.high) - line.below).times(line.inverse);
-    let near = t0.x.min(t1.x).max(t0.y.min(t1.y)).max(t0.z.min(t1.z)).max(L::zero());
-    let far = t0.x.max(t1.x).min(t0.y.max(t1.y)).min(t0.z.max(t1.z));
-    let far = far * L::of(1.0 + 4.0 * L::EPSILON);
-    let meets = near.le(far) & near.le(limit);
-    let bits = meets.bits();
-    if bits == 0 {
-        return None;
-    }
-    Some(near.lane(bits.trailing_zeros() as usize).to_f64())
 }

@@ -5,14 +5,14 @@ use super::guide::Sight;
 use super::inventory::Inventory;
 use super::limits;
 use super::media::Media;
-use super::outlook::{Outlook, Surroundings};
+use super::outlook::{Culling, Outlook, Rectangle, Surroundings};
 use super::skin::Skins;
 use crate::camera::View;
 use crate::lanes::{Double, Lanes, Real, Single};
 use crate::light::Lamp;
 use crate::material::{Finish, Material, Spread};
 use crate::scene::{Filter, Horizon, Level, Scene};
-use crate::shape::{Form, Geometry, Pencil};
+use crate::shape::{Acceleration, Form, Geometry};
 use glam::{DAffine3, DVec3};
 
 /// The precision that a scene is traced in.
@@ -73,7 +73,7 @@ pub struct World<L: Lanes> {
     pub(super) fold: bool,
     pub(super) view: View,
     pub(super) panorama: Outlook,
-    surroundings: Surroundings,
+    culling: Culling,
     groups: Groups,
     names: Vec<String>,
     scales: Vec<f64>,
@@ -179,7 +179,8 @@ impl<L: Lanes> World<L> {
         }
         let finishes: Vec<Finish<L::Scalar>> =
             used.iter().map(|m| Finish::new(m, reflects)).collect();
-        let geometry = Geometry::new(&placed.forms);
+        let acceleration = scene.trace.acceleration;
+        let geometry = Geometry::accelerated(&placed.forms, acceleration);
         let finish_of: Vec<u32> =
             geometry.sources().iter().map(|item| finish_of_object[item.form][item.part]).collect();
 
@@ -216,7 +217,7 @@ impl<L: Lanes> World<L> {
         let view = View::new(&scene.camera, scene.film.size, placed.origin);
         // Rays that begin on the near plane may begin inside a thing.
         let eye = (scene.camera.near == 0.0).then(|| view.eye());
-        let forms = geometry.sources().iter().map(|s| &placed.forms[s.form]).collect();
+        let forms = || geometry.sources().iter().map(|s| &placed.forms[s.form]);
         let lamps: Vec<_> = sources.iter().map(|s| s.lamp).collect();
         let size = scene.film.size.map(|n| n as usize);
         let farthest =
@@ -224,10 +225,22 @@ impl<L: Lanes> World<L> {
         let begin = (view.eye(), scene.camera.near * farthest);
         let media = Media::new(&placed.forms, geometry.sources(), &finish_of, &finishes, begin);
         let entered = media.as_ref().map_or(vec![false; finish_of.len()], Media::entered);
-        let surroundings = Surroundings::new(forms, eye, &entered, &lamps);
+        let mut panorama = Outlook::everything(&geometry, lamps.len());
+        let culling = match acceleration {
+            Acceleration::Auto => {
+                let of = Surroundings::new(forms().collect(), eye, &entered, &lamps);
+                panorama = of.outlook(&geometry, None);
+                // A tree knows better what camera rays meet.
+                if geometry.has_tree() { Culling::Nothing } else { Culling::Pencils(of) }
+            }
+            Acceleration::Projected => {
+                Culling::Rectangles(forms().map(|form| Rectangle::of(form, &view)).collect())
+            }
+            _ => Culling::Nothing,
+        };
         Self {
-            panorama: surroundings.outlook(&geometry, None),
-            surroundings,
+            panorama,
+            culling,
             ambient: groups.find(&Member::Ambient),
             background: (scene.background.color.0 != [0.0; 3])
                 .then(|| groups.find(&Member::Background))
@@ -280,15 +293,10 @@ impl<L: Lanes> World<L> {
         &self.view
     }
 
-    /// What camera rays through a rectangle of the raster may meet; `None`: a tree knows better.
+    /// What camera rays through a rectangle of the raster may meet; `None`: that is not ruled out here.
     pub fn outlook(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Outlook> {
-        if self.geometry.has_tree() {
-            return None;
-        }
-        let [_, _, forward] = self.view.frame();
-        let corners = self.view.corners(origin, extent);
-        let pencil = Pencil { apex: self.view.eye(), forward, corners };
-        Some(self.surroundings.outlook(&self.geometry, Some(&pencil)))
+        let lamps = self.sources.len();
+        self.culling.outlook(&self.geometry, lamps, &self.view, (origin, extent))
     }
 
     /// What it contains.

@@ -2,6 +2,7 @@
 //! that may stand between what they see and a light. Most parts see one or two things, and nothing
 //! shades them: the others are never asked.
 
+use crate::camera::View;
 use crate::lanes::{Lanes, Real};
 use crate::light::Lamp;
 use crate::shape::{Ball, Bound, Form, Geometry, Pencil, Selection, Towards};
@@ -14,6 +15,96 @@ pub struct Outlook {
     pub(super) seen: Selection,
     /// For each light of the world, what shadow rays may meet.
     pub(super) shading: Vec<Selection>,
+}
+
+impl Outlook {
+    /// Everything, for `lamps` lights.
+    pub(super) fn everything<L: Lanes>(geometry: &Geometry<L>, lamps: usize) -> Self {
+        Self { seen: geometry.all().clone(), shading: vec![geometry.all().clone(); lamps] }
+    }
+}
+
+/// How the rays of a part of the picture are kept from things that they cannot meet.
+pub(super) enum Culling {
+    /// By a pencil of lines from the eye, and what stands between it and the lights.
+    Pencils(Surroundings),
+    /// By rectangles on the screen.
+    Rectangles(Vec<Rectangle>),
+    /// Not at all, or by the geometry itself.
+    Nothing,
+}
+
+/// The part of the raster that a thing may be seen on \[pixels\]: smallest and largest coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rectangle {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+/// Room for the rounding of rays in single precision \[pixels, and of the coordinates that take part\].
+const MARGIN_PX: f64 = 0.25;
+const STRAY: f64 = 1e-5;
+
+impl Rectangle {
+    /// Of a form: around the corners of its box, if all are in front of the eye.
+    pub fn of(form: &Form, view: &View) -> Self {
+        let everywhere = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
+        let Some((low, high)) = form.bounds() else { return everywhere };
+        let [right, _, forward] = view.frame();
+        let reach = low.abs().max(high.abs()).max(view.eye().abs()).max_element();
+        let mut out = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
+        for corner in 0..8 {
+            let pick = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
+            let point = DVec3::new(pick(0), pick(1), pick(2));
+            let depth = (point - view.eye()).dot(forward);
+            let stray = STRAY * reach;
+            if depth <= 2.0 * stray {
+                return everywhere;
+            }
+            // A step to the side by what may be lost shows how large it is on the raster.
+            let at = view.project(point);
+            let aside = view.project(point + right * stray - forward * stray);
+            let margin = MARGIN_PX + (aside[0] - at[0]).abs().max((aside[1] - at[1]).abs());
+            for axis in 0..2 {
+                out.low[axis] = out.low[axis].min(at[axis] - margin);
+                out.high[axis] = out.high[axis].max(at[axis] + margin);
+            }
+        }
+        out
+    }
+
+    fn overlaps(&self, origin: [usize; 2], extent: [usize; 2]) -> bool {
+        (0..2).all(|axis| {
+            let begin = origin[axis] as f64;
+            self.low[axis] <= begin + extent[axis] as f64 && self.high[axis] >= begin
+        })
+    }
+}
+
+impl Culling {
+    /// What camera rays through a rectangle of the raster may meet, and the shadow rays from where they
+    /// end, to `lamps` lights; `None`: nothing is ruled out.
+    pub fn outlook<L: Lanes>(
+        &self,
+        geometry: &Geometry<L>,
+        lamps: usize,
+        view: &View,
+        (origin, extent): ([usize; 2], [usize; 2]),
+    ) -> Option<Outlook> {
+        match self {
+            Self::Pencils(surroundings) => {
+                let [_, _, forward] = view.frame();
+                let corners = view.corners(origin, extent);
+                let pencil = Pencil { apex: view.eye(), forward, corners };
+                Some(surroundings.outlook(geometry, Some(&pencil)))
+            }
+            Self::Rectangles(of) => {
+                let seen = geometry.select(|item| of[item as usize].overlaps(origin, extent));
+                Some(Outlook { seen, ..Outlook::everything(geometry, lamps) })
+            }
+            Self::Nothing => None,
+        }
+    }
 }
 
 /// What outlooks are found from.

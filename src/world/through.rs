@@ -70,48 +70,53 @@ impl<L: Lanes> World<L> {
         let inside = media.at_start(&ray);
         let path = Path { ray, weight: V3::of([1.0; 3]) };
         let mut waiting = Waiting { arms: [None; BOTH] };
-        let mut next = Some(Arm { path, lanes, inside, bounce: 0 });
-        while let Some(arm) = next.or_else(|| waiting.pop()) {
+        let mut arm = Arm { path, lanes, inside, bounce: 0 };
+        loop {
             let outlook = if arm.bounce == 0 { outlook } else { &self.panorama };
-            next = self.follow(media, arm, outlook, draws, &mut waiting, out, &mut counts);
+            if !self.follow(media, &mut arm, outlook, draws, &mut waiting, out, &mut counts) {
+                match waiting.pop() {
+                    Some(next) => arm = next,
+                    None => return counts,
+                }
+            }
         }
-        counts
     }
 
-    /// Follows `arm` to the surfaces where it ends; returns how it goes on from there.
+    /// Follows `arm` to the surfaces where it ends and turns it into what goes on from there; false: nothing
+    /// does.
     #[allow(clippy::too_many_arguments, reason = "what a path's step reads and what it writes")]
     fn follow(
         &self,
         media: &Media<L>,
-        arm: Arm<L>,
+        arm: &mut Arm<L>,
         outlook: &Outlook,
         draws: &Draws<'_, L>,
         waiting: &mut Waiting<L>,
         out: &mut Radiance<L>,
         counts: &mut Counts,
-    ) -> Option<Arm<L>> {
-        let Arm { path, inside, bounce, .. } = arm;
+    ) -> bool {
+        let Arm { path, inside, bounce, .. } = *arm;
         counts.rays += u64::from(arm.lanes.bits().count_ones());
-        let hit = self.geometry.closest(&path.ray, &outlook.seen);
+        let hit = self.geometry.closest_of(&path.ray, &outlook.seen, arm.lanes);
         let ended = hit.t.lt(L::of(L::MAX));
         if let Some(group) = self.background {
             out.groups[group] += path.weight.only(arm.lanes.and_not(ended));
         }
         let lanes = arm.lanes & ended;
-        let mut met = self.meet(&path.ray, &hit, lanes)?;
+        let Some(mut met) = self.meet(&path.ray, &hit, lanes) else { return false };
         let crossing = self.crossing(media, &path.ray, &hit, &met, lanes, &inside);
         if let Some(crossing) = &crossing {
             met.leave_out(crossing.hidden);
         }
         self.light(&path, &met, outlook, out, counts);
         if bounce == self.depth {
-            return None;
+            return false;
         }
         let bounce = bounce + 1;
         let Some(crossing) = crossing else {
-            let mut path = path;
-            let lanes = self.bounce(&mut path, &met, draws, bounce - 1, counts);
-            return lanes.any().then_some(Arm { path, lanes, inside, bounce });
+            arm.lanes = self.bounce(&mut arm.path, &met, draws, bounce - 1, counts);
+            arm.bounce = bounce;
+            return arm.lanes.any();
         };
         let ways = self.ways(&path, &met, &crossing, draws, bounce - 1, counts);
         let worth = |weight: V3<L>| {
@@ -155,7 +160,8 @@ impl<L: Lanes> World<L> {
             weight: V3::select(through, passed_weight, mirrored_weight),
         };
         let inside = Inside::select(through, &crossing.behind, &mirrored.inside);
-        lanes.any().then_some(Arm { path, lanes, inside, bounce })
+        *arm = Arm { path, lanes, inside, bounce };
+        lanes.any()
     }
 
     /// Where the rays of `lanes` meet surfaces that let light through; `None`: none of them does.

@@ -8,7 +8,7 @@ mod ply;
 mod stl;
 mod tree;
 
-pub use tree::{Branch, Leaf, Mesh, WIDE};
+pub use tree::{Leaf, Mesh};
 
 use super::error::{AssetError, Place};
 use super::file::Source;

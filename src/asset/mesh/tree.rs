@@ -1,39 +1,13 @@
-//! The tree of boxes over a mesh's triangles, built once per mesh: up to eight boxes a branch, up to
-//! eight triangles a leaf, each coordinate of the eight side by side, so that either one ray meets
-//! eight of them at once or a packet one after the other.
-//!
-//! A binary tree by a library, its nodes joined as long as a branch has room, the largest first
-//! (Wald, Benthin and Boulos 2008, *Getting Rid of Packets*).
+//! The tree of boxes over a mesh's triangles, built once per mesh: up to eight triangles a leaf, each
+//! coordinate of the eight side by side, so that either one ray meets eight of them at once or a packet
+//! one after the other.
 
 use super::TriangleMesh;
 use super::normals::smooth;
-use glam::Vec3A;
+use crate::asset::boxes::{Boxes, Built, LEAF, WIDE};
 use obvhs::BvhBuildParams;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
 use std::fmt;
 use std::sync::OnceLock;
-use std::time::Duration;
-
-/// Boxes of a branch, and triangles of a leaf.
-pub const WIDE: usize = 8;
-
-/// Eight boxes of the tree. Empty ones have their corners exchanged, at infinity.
-#[derive(Clone, Debug, PartialEq)]
-#[repr(align(32))]
-pub struct Branch {
-    /// Smallest coordinates of the boxes, by axis.
-    pub low: [[f32; WIDE]; 3],
-    /// Largest coordinates of the boxes, by axis.
-    pub high: [[f32; WIDE]; 3],
-    /// Number of the branch or leaf in each box.
-    pub child: [u32; WIDE],
-    /// Bit `i`: box `i` holds a leaf.
-    pub leaves: u8,
-    /// Number of boxes; the first ones.
-    pub count: u8,
-}
 
 /// Up to eight triangles. The places without one hold NaN.
 #[derive(Clone, Debug)]
@@ -41,27 +15,16 @@ pub struct Branch {
 pub struct Leaf {
     /// Corners, by number in the triangle and axis.
     pub corners: [[[f32; WIDE]; 3]; 3],
-    /// Number of the first triangle in the mesh; the others follow it.
-    pub first: u32,
-    /// Number of triangles.
-    pub count: u32,
 }
 
-const NO_BOX: Branch = Branch {
-    low: [[f32::INFINITY; WIDE]; 3],
-    high: [[f32::NEG_INFINITY; WIDE]; 3],
-    child: [0; WIDE],
-    leaves: 0,
-    count: 0,
-};
-
-/// A mesh with the tree over it: about 75 bytes a triangle for the tree, 12 for its indices, and 12
+/// A mesh with the tree over it: about 65 bytes a triangle for the tree, 12 for its indices, and 12
 /// to 32 for each vertex.
 pub struct Mesh {
     mesh: TriangleMesh,
-    branches: Vec<Branch>,
+    boxes: Boxes,
     leaves: Vec<Leaf>,
-    depth: usize,
+    /// Number of the first triangle in each leaf; the others follow it.
+    firsts: Vec<u32>,
     smooth: OnceLock<Vec<[f32; 3]>>,
 }
 
@@ -81,91 +44,13 @@ impl fmt::Debug for Mesh {
     }
 }
 
-impl Mesh {
-    /// Builds the tree; the triangles take the order of its leaves.
-    pub fn new(mut mesh: TriangleMesh) -> Self {
-        let boxes: Vec<Aabb> = mesh
-            .triangles
-            .iter()
-            .map(|t| {
-                let [a, b, c] = t.map(|i| Vec3A::from_array(mesh.positions[i as usize]));
-                Aabb::new(a.min(b).min(c), a.max(b).max(c))
-            })
-            .collect();
-        // Large leaves: a ray meets all of one at the price of one.
-        let params = BvhBuildParams {
-            max_prims_per_leaf: WIDE as u32,
-            collapse_traversal_cost: 8.0,
-            ..BvhBuildParams::fast_build()
-        };
-        let mut spent = Duration::ZERO;
-        let binary = build_bvh2(&boxes, params, &mut spent);
-        drop(boxes);
-        let order = &binary.primitive_indices;
-        mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();
-        if !mesh.color_of.is_empty() {
-            mesh.color_of = order.iter().map(|i| mesh.color_of[*i as usize]).collect();
-        }
-        let mut out = Self {
-            mesh,
-            branches: Vec::new(),
-            leaves: Vec::new(),
-            depth: 0,
-            smooth: OnceLock::new(),
-        };
-        out.join(&binary);
-        out
-    }
-
-    /// Makes branches and leaves of the nodes of a binary tree.
-    fn join(&mut self, binary: &Bvh2) {
-        let nodes = &binary.nodes;
-        let mut todo = vec![(0usize, 0usize, 1usize)];
-        self.branches.push(NO_BOX);
-        let mut inside = Vec::with_capacity(WIDE);
-        while let Some((node, branch, depth)) = todo.pop() {
-            self.depth = self.depth.max(depth);
-            inside.clear();
-            inside.push(node);
-            while inside.len() < WIDE {
-                let area = |i: usize| nodes[i].aabb().half_area();
-                let opened = (0..inside.len())
-                    .filter(|k| !nodes[inside[*k]].is_leaf())
-                    .max_by(|a, b| area(inside[*a]).total_cmp(&area(inside[*b])));
-                let Some(opened) = opened else { break };
-                let first = nodes[inside[opened]].first_index as usize;
-                inside[opened] = first;
-                inside.push(first + 1);
-            }
-            let mut new = Branch { count: inside.len() as u8, ..NO_BOX };
-            for (i, node) in inside.iter().enumerate() {
-                let n = &nodes[*node];
-                let (low, high) = (n.aabb().min.to_array(), n.aabb().max.to_array());
-                for axis in 0..3 {
-                    new.low[axis][i] = low[axis];
-                    new.high[axis][i] = high[axis];
-                }
-                if n.is_leaf() {
-                    new.leaves |= 1 << i;
-                    new.child[i] = self.leaves.len() as u32;
-                    let leaf = self.leaf(n.first_index, n.prim_count);
-                    self.leaves.push(leaf);
-                } else {
-                    new.child[i] = self.branches.len() as u32;
-                    todo.push((*node, self.branches.len(), depth + 1));
-                    self.branches.push(NO_BOX);
-                }
-            }
-            self.branches[branch] = new;
-        }
-    }
-
-    fn leaf(&self, first: u32, count: u32) -> Leaf {
-        let mut leaf = Leaf { corners: [[[f32::NAN; WIDE]; 3]; 3], first, count };
-        let triangles = &self.mesh.triangles[first as usize..][..count as usize];
+impl Leaf {
+    fn new(mesh: &TriangleMesh, first: u32, count: u32) -> Self {
+        let mut leaf = Self { corners: [[[f32::NAN; WIDE]; 3]; 3] };
+        let triangles = &mesh.triangles[first as usize..][..count as usize];
         for (i, triangle) in triangles.iter().enumerate() {
             for (corner, vertex) in leaf.corners.iter_mut().zip(triangle) {
-                let position = self.mesh.positions[*vertex as usize];
+                let position = mesh.positions[*vertex as usize];
                 for (axis, x) in corner.iter_mut().zip(position) {
                     axis[i] = x;
                 }
@@ -173,15 +58,38 @@ impl Mesh {
         }
         leaf
     }
+}
+
+impl Mesh {
+    /// Builds the tree; the triangles take the order of its leaves.
+    pub fn new(mut mesh: TriangleMesh) -> Self {
+        let corners = |i: usize| {
+            let [a, b, c] = mesh.triangles[i].map(|v| mesh.positions[v as usize]);
+            let of = |f: fn(f32, f32) -> f32| std::array::from_fn(|k| f(f(a[k], b[k]), c[k]));
+            [of(f32::min), of(f32::max)]
+        };
+        // Large leaves: a ray meets all of one at the price of one.
+        let quality =
+            BvhBuildParams { collapse_traversal_cost: 8.0, ..BvhBuildParams::fast_build() };
+        let Built { boxes, order, leaves } =
+            Boxes::build(mesh.triangles.len(), corners, WIDE, quality);
+        mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();
+        if !mesh.color_of.is_empty() {
+            mesh.color_of = order.iter().map(|i| mesh.color_of[*i as usize]).collect();
+        }
+        let firsts = leaves.iter().map(|(first, _)| *first).collect();
+        let leaves = leaves.iter().map(|(first, count)| Leaf::new(&mesh, *first, *count)).collect();
+        Self { mesh, boxes, leaves, firsts, smooth: OnceLock::new() }
+    }
 
     /// The triangles, in the order of the leaves.
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
     }
 
-    /// The branches; the first is the root.
-    pub fn branches(&self) -> &[Branch] {
-        &self.branches
+    /// The tree over the leaves.
+    pub fn boxes(&self) -> &Boxes {
+        &self.boxes
     }
 
     /// The leaves.
@@ -189,9 +97,9 @@ impl Mesh {
         &self.leaves
     }
 
-    /// The most branches on a way from the root to a leaf.
-    pub fn depth(&self) -> usize {
-        self.depth
+    /// Number of the first triangle in a leaf; the others follow it.
+    pub fn first(&self, leaf: usize) -> u32 {
+        self.firsts[leaf]
     }
 
     /// A unit normal per vertex: the file's, or the mean over the triangles around it, computed when
@@ -212,21 +120,22 @@ impl Mesh {
             if bound <= best {
                 continue;
             }
-            let branch = &self.branches[branch as usize];
+            let branch = &self.boxes.branches()[branch as usize];
             let first = todo.len();
-            for i in 0..usize::from(branch.count) {
-                let reach = |a| along(a, branch.low[a][i]).max(along(a, branch.high[a][i]));
+            for i in branch.places() {
+                let reach = |a| along(a, branch.sides[a][i]).max(along(a, branch.sides[a + 3][i]));
                 let bound: f64 = (0..3).map(reach).sum();
                 if bound <= best {
                     continue;
                 }
-                if branch.leaves >> i & 1 == 0 {
+                if branch.child[i] & LEAF == 0 {
                     todo.push((branch.child[i], bound));
                     continue;
                 }
-                let leaf = &self.leaves[branch.child[i] as usize];
+                let leaf = &self.leaves[(branch.child[i] & !LEAF) as usize];
                 for [x, y, z] in &leaf.corners {
-                    for ((x, y), z) in x.iter().zip(y).zip(z).take(leaf.count as usize) {
+                    for ((x, y), z) in x.iter().zip(y).zip(z) {
+                        // Of NaN and a number the number.
                         best = best.max(along(0, *x) + along(1, *y) + along(2, *z));
                     }
                 }
@@ -239,8 +148,8 @@ impl Mesh {
     /// Memory that it takes \[bytes\].
     pub fn bytes(&self) -> usize {
         self.mesh.bytes()
-            + size_of::<Branch>() * self.branches.len()
-            + size_of::<Leaf>() * self.leaves.len()
+            + self.boxes.bytes()
+            + (size_of::<Leaf>() + size_of::<u32>()) * self.leaves.len()
             + self.smooth.get().map_or(0, |n| 12 * n.len())
     }
 }

@@ -37,6 +37,17 @@ impl<L: Lanes> Ray<L> {
     pub fn at(&self, t: L) -> V3<L> {
         self.direction.mul_add(t, self.origin)
     }
+
+    /// Whether the rays of some lanes, at least one, differ by no more than `turn` in direction (length
+    /// of the difference of unit vectors) and `shift` in any coordinate of the origin.
+    #[inline(always)]
+    pub(super) fn spread(&self, lanes: u32, turn: f64, shift: f64) -> bool {
+        let lane = lanes.trailing_zeros() as usize;
+        let turned = self.direction - V3::splat(self.direction.lane(lane));
+        let shifted = self.origin - V3::splat(self.origin.lane(lane));
+        let near = turned.length2().le(L::of(turn * turn)) & shifted.max_abs().le(L::of(shift));
+        near.bits() & lanes == lanes
+    }
 }
 
 /// The nearest crossing found so far.

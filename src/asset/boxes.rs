@@ -1,0 +1,150 @@
+//! A tree of boxes, up to eight a branch, each coordinate of the eight side by side, so that one ray, or
+//! what bounds a packet of rays, meets eight of them at once.
+//!
+//! A binary tree by a library, its nodes joined as long as a branch has room, the largest first
+//! (Wald, Benthin and Boulos 2008, *Getting Rid of Packets*).
+
+use glam::Vec3A;
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use std::time::Duration;
+
+/// Boxes of a branch.
+pub const WIDE: usize = 8;
+
+/// Marks a child that is a leaf.
+pub const LEAF: u32 = 1 << 31;
+
+/// Eight boxes of a tree. Places without one hold a box that nothing meets.
+#[derive(Clone, Debug)]
+#[repr(align(32))]
+pub struct Branch {
+    /// Smallest coordinates of the boxes on the three axes, then the largest.
+    pub sides: [[f32; WIDE]; 6],
+    /// What is in each box: the number of a branch, or of a leaf and [`LEAF`].
+    pub child: [u32; WIDE],
+}
+
+const NO_BOX: Branch = Branch {
+    sides: [
+        [f32::INFINITY; WIDE],
+        [f32::INFINITY; WIDE],
+        [f32::INFINITY; WIDE],
+        [f32::NEG_INFINITY; WIDE],
+        [f32::NEG_INFINITY; WIDE],
+        [f32::NEG_INFINITY; WIDE],
+    ],
+    child: [LEAF; WIDE],
+};
+
+impl Branch {
+    /// Numbers of the places that hold a box.
+    pub fn places(&self) -> impl Iterator<Item = usize> {
+        (0..WIDE).filter(|i| self.sides[0][*i] <= self.sides[3][*i])
+    }
+}
+
+/// The tree.
+#[derive(Debug)]
+pub struct Boxes {
+    branches: Vec<Branch>,
+    depth: usize,
+}
+
+/// What a tree was built into.
+pub struct Built {
+    /// The tree.
+    pub boxes: Boxes,
+    /// The things in the order of the leaves.
+    pub order: Vec<u32>,
+    /// For each leaf its first place in `order` and its number of things.
+    pub leaves: Vec<(u32, u32)>,
+}
+
+impl Boxes {
+    /// Over `count` things, at least one; `corners`: of the box around each. At most `in_leaf` of them
+    /// share a leaf.
+    pub fn build(
+        count: usize,
+        corners: impl Fn(usize) -> [[f32; 3]; 2],
+        in_leaf: usize,
+        quality: BvhBuildParams,
+    ) -> Built {
+        let around = |i: usize| {
+            let [low, high] = corners(i).map(Vec3A::from_array);
+            Aabb::new(low, high)
+        };
+        let boxes: Vec<Aabb> = (0..count).map(around).collect();
+        let params = BvhBuildParams { max_prims_per_leaf: in_leaf as u32, ..quality };
+        let binary = build_bvh2(&boxes, params, &mut Duration::default());
+        let mut built = Built {
+            boxes: Self { branches: Vec::new(), depth: 0 },
+            order: Vec::new(),
+            leaves: Vec::new(),
+        };
+        built.join(&binary);
+        built.order = binary.primitive_indices;
+        built
+    }
+
+    /// The branches; the first is the root.
+    pub fn branches(&self) -> &[Branch] {
+        &self.branches
+    }
+
+    /// The most branches on a way from the root to a leaf.
+    pub fn depth(&self) -> usize {
+        self.depth
+    }
+
+    /// Memory that it takes \[bytes\].
+    pub fn bytes(&self) -> usize {
+        size_of::<Branch>() * self.branches.len()
+    }
+}
+
+impl Built {
+    /// Makes branches and leaves of the nodes of a binary tree.
+    fn join(&mut self, binary: &Bvh2) {
+        let nodes = &binary.nodes;
+        let mut todo = vec![(0usize, 0usize, 1usize)];
+        let branches = &mut self.boxes.branches;
+        branches.push(NO_BOX);
+        let mut inside = Vec::with_capacity(WIDE);
+        while let Some((node, branch, depth)) = todo.pop() {
+            self.boxes.depth = self.boxes.depth.max(depth);
+            inside.clear();
+            inside.push(node);
+            while inside.len() < WIDE {
+                let area = |i: usize| nodes[i].aabb().half_area();
+                let opened = (0..inside.len())
+                    .filter(|k| !nodes[inside[*k]].is_leaf())
+                    .max_by(|a, b| area(inside[*a]).total_cmp(&area(inside[*b])));
+                let Some(opened) = opened else { break };
+                let first = nodes[inside[opened]].first_index as usize;
+                inside[opened] = first;
+                inside.push(first + 1);
+            }
+            let mut new = NO_BOX;
+            for (i, node) in inside.iter().enumerate() {
+                let n = &nodes[*node];
+                let (low, high) = (n.aabb().min.to_array(), n.aabb().max.to_array());
+                for axis in 0..3 {
+                    new.sides[axis][i] = low[axis];
+                    new.sides[axis + 3][i] = high[axis];
+                }
+                if n.is_leaf() {
+                    new.child[i] = LEAF | self.leaves.len() as u32;
+                    self.leaves.push((n.first_index, n.prim_count));
+                } else {
+                    new.child[i] = branches.len() as u32;
+                    todo.push((*node, branches.len(), depth + 1));
+                    branches.push(NO_BOX);
+                }
+            }
+            branches[branch] = new;
+        }
+    }
+}

@@ -1,0 +1,367 @@
+//! Rays through a tree of boxes: a packet together, or one ray by itself.
+//!
+//! A packet that stays together meets a branch's eight boxes at once by what bounds its rays: the
+//! smallest and the largest of their origins and inverse directions on each axis (Boulos, Wald and
+//! Shirley 2006, *Geometric and Arithmetic Culling Methods for Entire Ray Packets*). Each ray by itself
+//! meets only the few boxes that are left. A single ray meets eight boxes by the same operations, as a
+//! packet whose bounds coincide.
+
+use super::batch::Ray;
+use crate::asset::{Boxes, Branch, LEAF, WIDE};
+use crate::lanes::{Lanes, Mask, Real, V3};
+
+/// A packet as boxes want it.
+#[derive(Clone, Copy)]
+pub struct Beam<L> {
+    /// Origins, moved up and down by what the things' own tests round off.
+    above: V3<L>,
+    below: V3<L>,
+    /// One over the directions, never infinite.
+    inverse: V3<L>,
+}
+
+impl<L: Lanes> Beam<L> {
+    /// Rays that meet boxes as if these were larger by `pad` on both sides of each axis.
+    #[inline(always)]
+    pub fn new(ray: &Ray<L>, pad: V3<L>) -> Self {
+        let safe = |d: L| L::one() / d.abs().max(L::of(1e-30)).copysign(d);
+        let d = ray.direction;
+        let inverse = V3::new(safe(d.x), safe(d.y), safe(d.z));
+        Self { above: ray.origin + pad, below: ray.origin - pad, inverse }
+    }
+
+    /// Which rays enter box `i` of a branch no farther than `limit`.
+    #[inline(always)]
+    fn meets(&self, branch: &Branch, i: usize, limit: L) -> L::Mask {
+        let corner = |k: usize| {
+            let axis = |a: usize| all(branch.sides[k + a][i]);
+            V3::new(axis(0), axis(1), axis(2))
+        };
+        self.enters(corner(0), corner(3), limit)
+    }
+
+    /// Which rays enter the box between the corners `low` and `high` no farther than `limit`.
+    #[inline(always)]
+    pub fn enters(&self, low: V3<L>, high: V3<L>, limit: L) -> L::Mask {
+        let a = (low - self.above).times(self.inverse);
+        let b = (high - self.below).times(self.inverse);
+        let near = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z)).max(L::zero());
+        let far = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z)) * grown();
+        near.le(far) & near.le(limit)
+    }
+}
+
+/// Bounds of rays that run the same way along each axis: of one ray, or of several.
+#[derive(Clone, Copy, Default)]
+pub struct Sheaf<S> {
+    /// By axis, which side of a box they meet first: as in [`Branch::sides`].
+    near: [usize; 3],
+    /// What is taken from the near sides, and from the far ones.
+    near_origin: [S; 3],
+    far_origin: [S; 3],
+    /// The smallest and the largest inverse direction.
+    inverse: [[S; 3]; 2],
+}
+
+impl<S: Real> Sheaf<S> {
+    /// Of the ray of one lane.
+    #[inline(always)]
+    pub fn only<L: Lanes<Scalar = S>>(beam: &Beam<L>, lane: usize) -> Self {
+        let inverse = beam.inverse.lane(lane);
+        Self::new([beam.above.lane(lane), beam.below.lane(lane)], [inverse; 2])
+    }
+
+    /// Of the rays of some lanes, at least one; `None`: they do not run the same way.
+    #[inline(always)]
+    pub fn around<L: Lanes<Scalar = S>>(beam: &Beam<L>, lanes: u32) -> Option<Self> {
+        let d = beam.inverse;
+        for axis in [d.x, d.y, d.z] {
+            let down = axis.lt(L::zero()).bits() & lanes;
+            if down != 0 && down != lanes {
+                return None;
+            }
+        }
+        let first = lanes.trailing_zeros() as usize;
+        let here = L::from_fn(|i| L::Scalar::of(f64::from(lanes >> i & 1))).gt(L::zero());
+        let ends = |v: V3<L>| {
+            let v = V3::select(here, v, V3::splat(v.lane(first)));
+            let [x, y, z] = [extremes(v.x), extremes(v.y), extremes(v.z)];
+            [[x.0, y.0, z.0], [x.1, y.1, z.1]]
+        };
+        let [_, above] = ends(beam.above);
+        let [below, _] = ends(beam.below);
+        Some(Self::new([above, below], ends(d)))
+    }
+
+    #[inline(always)]
+    fn new([above, below]: [[S; 3]; 2], inverse: [[S; 3]; 2]) -> Self {
+        let back = inverse[0].map(|d| d < S::default());
+        let origin =
+            |far: bool| std::array::from_fn(|a| if back[a] == far { above[a] } else { below[a] });
+        let near = std::array::from_fn(|a| if back[a] { a + 3 } else { a });
+        Self { near, near_origin: origin(false), far_origin: origin(true), inverse }
+    }
+
+    /// Where at the earliest one of the rays enters boxes whose `side`s are given, as in
+    /// [`Branch::sides`], and which of them one may enter no farther than `limit`. `ONE`: it is one ray.
+    ///
+    /// Differences and products are monotonic even when rounded, so that the bounds hold for whatever
+    /// [`Beam::meets`] finds.
+    #[inline(always)]
+    pub fn meets<const ONE: bool, L: Lanes<Scalar = S>>(
+        &self,
+        side: impl Fn(usize) -> L,
+        limit: L,
+    ) -> (L, u32) {
+        let of = |far: bool| {
+            let k = |a: usize| if far { (self.near[a] + 3) % 6 } else { self.near[a] };
+            V3::new(side(k(0)), side(k(1)), side(k(2)))
+        };
+        let [low, high] = self.inverse.map(V3::splat);
+        let near = of(false) - V3::splat(self.near_origin);
+        let far = of(true) - V3::splat(self.far_origin);
+        let (mut first, mut last) = (near.times(low), far.times(low));
+        if !ONE {
+            let (a, b) = (near.times(high), far.times(high));
+            first = V3::new(first.x.min(a.x), first.y.min(a.y), first.z.min(a.z));
+            last = V3::new(last.x.max(b.x), last.y.max(b.y), last.z.max(b.z));
+        }
+        let first = first.x.max(first.y).max(first.z).max(L::zero());
+        let last = last.x.min(last.y).min(last.z) * grown();
+        (first, (first.le(last) & first.le(limit)).bits())
+    }
+}
+
+/// The smallest and the largest lane.
+#[inline(always)]
+fn extremes<L: Lanes>(x: L) -> (L::Scalar, L::Scalar) {
+    let mut out = (x.lane(0), x.lane(0));
+    for i in 1..L::WIDTH {
+        let x = x.lane(i);
+        out.0 = if x < out.0 { x } else { out.0 };
+        out.1 = if x > out.1 { x } else { out.1 };
+    }
+    out
+}
+
+/// The far side of a box moves out by some roundings, so that no hit is lost (Ize 2013, *Robust BVH
+/// Ray Traversal*).
+#[inline(always)]
+fn grown<L: Lanes>() -> L {
+    L::of(1.0 + 8.0 * L::EPSILON)
+}
+
+/// One number in all lanes.
+#[inline(always)]
+pub fn all<L: Lanes>(x: f32) -> L {
+    L::splat(L::Scalar::of(f64::from(x)))
+}
+
+/// Part `part` of eight numbers, in lanes; lanes beyond them repeat.
+#[inline(always)]
+pub fn lanes_of<L: Lanes>(numbers: &[f32; WIDE], part: usize) -> L {
+    L::from_fn(|i| L::Scalar::of(f64::from(numbers[(part * L::WIDTH + i) % WIDE])))
+}
+
+/// The lanes of a part that do not repeat.
+#[inline(always)]
+pub const fn fresh() -> u32 {
+    (1 << WIDE) - 1
+}
+
+/// What waits to be visited: a child of a branch, and where it is entered.
+#[derive(Clone, Copy, Default)]
+pub struct Entry<S> {
+    child: u32,
+    near: S,
+}
+
+/// Entries of the stack for trees of usual depth: seven a level, and one.
+pub const STACK: usize = 128;
+
+/// Entries of the stack for any tree but those that nobody has.
+pub const DEEP_STACK: usize = 1024;
+
+/// Calls `$walk` with `$stack`, room for `$walks` walks through a tree, usually on the processor's own.
+macro_rules! with_stack {
+    ($boxes:expr, $walks:expr, $stack:ident => $walk:expr) => {{
+        use crate::shape::walk::{DEEP_STACK, Entry, STACK};
+        let room = 7 * $boxes.depth() + 1;
+        if room <= STACK {
+            let $stack = &mut [Entry::default(); STACK * $walks][..];
+            $walk
+        } else if room <= DEEP_STACK {
+            let $stack = &mut [Entry::default(); DEEP_STACK * $walks][..];
+            $walk
+        } else {
+            let $stack = &mut vec![Entry::default(); room * $walks][..];
+            $walk
+        }
+    }};
+}
+pub(super) use with_stack;
+
+/// Puts an entry on the stack, above those that are entered later, of the ones from `base` on.
+#[inline(always)]
+fn push<S: Real>(stack: &mut [Entry<S>], base: usize, top: &mut usize, entry: Entry<S>) {
+    let mut at = *top;
+    while at > base && stack[at - 1].near < entry.near {
+        stack[at] = stack[at - 1];
+        at -= 1;
+    }
+    stack[at] = entry;
+    *top += 1;
+}
+
+/// So many rays of a packet that go apart take turns: while one waits for its next branch or leaf to
+/// come from memory, others go on.
+pub const TURNS: usize = 4;
+
+/// One of them.
+#[derive(Clone, Copy, Default)]
+struct Walker<S> {
+    lane: usize,
+    ray: Sheaf<S>,
+    limit: S,
+    /// Where it goes next, and its place on the stack.
+    child: u32,
+    top: usize,
+}
+
+/// Calls `leaf(lane, leaf, limit)` for the leaves whose boxes the ray of a lane enters no farther than its
+/// limit, nearer ones first; `leaf` returns the distance beyond which nothing matters to that ray any
+/// more. `lanes`: those that go. `soon(leaf)` is called before a leaf is needed.
+#[inline(always)]
+pub fn apart<L: Lanes>(
+    boxes: &Boxes,
+    (beam, limit): (&Beam<L>, L),
+    mut lanes: u32,
+    stack: &mut [Entry<L::Scalar>],
+    soon: impl Fn(usize),
+    mut leaf: impl FnMut(usize, usize, L::Scalar) -> L::Scalar,
+) {
+    let room = stack.len() / TURNS;
+    let mut walkers = [Walker::default(); TURNS];
+    while lanes != 0 {
+        let mut count = 0;
+        for (i, walker) in walkers.iter_mut().enumerate() {
+            if lanes == 0 {
+                break;
+            }
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let (ray, limit) = (Sheaf::only(beam, lane), limit.lane(lane));
+            *walker = Walker { lane, ray, limit, child: 0, top: i * room };
+            count += 1;
+        }
+        let mut going = (1u32 << count) - 1;
+        while going != 0 {
+            let mut left = going;
+            while left != 0 {
+                let i = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let walker = &mut walkers[i % TURNS];
+                if walker.child & LEAF != 0 {
+                    let number = (walker.child & !LEAF) as usize;
+                    walker.limit = leaf(walker.lane, number, walker.limit);
+                } else {
+                    walker.open::<L>(boxes, stack);
+                }
+                if !walker.next(i * room, stack) {
+                    going &= !(1 << i);
+                } else if walker.child & LEAF != 0 {
+                    soon((walker.child & !LEAF) as usize);
+                } else {
+                    let sides = &boxes.branches()[walker.child as usize].sides;
+                    std::hint::black_box((sides[0][0], sides[2][0], sides[4][0]));
+                }
+            }
+        }
+    }
+}
+
+impl<S: Real> Walker<S> {
+    /// Puts those boxes of the branch at hand on the stack that the ray enters.
+    #[inline(always)]
+    fn open<L: Lanes<Scalar = S>>(&mut self, boxes: &Boxes, stack: &mut [Entry<S>]) {
+        let branch = &boxes.branches()[self.child as usize];
+        let base = self.top;
+        for part in 0..WIDE.div_ceil(L::WIDTH) {
+            let side = |k: usize| lanes_of::<L>(&branch.sides[k], part);
+            let (near, bits) = self.ray.meets::<true, L>(side, L::splat(self.limit));
+            let mut bits = bits & fresh();
+            while bits != 0 {
+                let i = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                let child = branch.child[(part * L::WIDTH + i) % WIDE];
+                push(stack, base, &mut self.top, Entry { child, near: near.lane(i) });
+            }
+        }
+    }
+
+    /// Takes the next entry off the stack that still matters; false: there is none above `bottom`.
+    #[inline(always)]
+    fn next(&mut self, bottom: usize, stack: &[Entry<S>]) -> bool {
+        while self.top > bottom {
+            self.top -= 1;
+            let entry = stack[self.top];
+            if entry.near <= self.limit {
+                self.child = entry.child;
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// Calls `leaf(leaf, limit)` for the leaves whose boxes a packet may enter no farther than `limit`, those
+/// first that are nearer as far as `bounds` knows; `leaf` returns the distances beyond which nothing
+/// matters any more. `bounds`: of the lanes whose limit is not negative, if they have any.
+#[inline(always)]
+pub fn together<L: Lanes>(
+    boxes: &Boxes,
+    (beam, bounds): (&Beam<L>, Option<&Sheaf<L::Scalar>>),
+    mut limit: L,
+    stack: &mut [Entry<L::Scalar>],
+    mut leaf: impl FnMut(usize, L) -> L,
+) {
+    let mut farthest = extremes(limit).1;
+    let (mut top, mut child) = (0, 0);
+    loop {
+        if child & LEAF != 0 {
+            limit = leaf((child & !LEAF) as usize, limit);
+            farthest = extremes(limit).1;
+        } else {
+            let branch = &boxes.branches()[child as usize];
+            let base = top;
+            for part in 0..WIDE.div_ceil(L::WIDTH) {
+                let side = |k: usize| lanes_of(&branch.sides[k], part);
+                let (near, bits) = match bounds {
+                    Some(bounds) => bounds.meets::<false, L>(side, L::splat(farthest)),
+                    // Of no use to order them; but empty places are known.
+                    None => (L::zero(), side(0).le(side(3)).bits()),
+                };
+                let mut bits = bits & fresh() & ((1 << L::WIDTH) - 1);
+                while bits != 0 {
+                    let i = bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    let place = part * L::WIDTH + i;
+                    if beam.meets(branch, place, limit).any() {
+                        let child = branch.child[place];
+                        push(stack, base, &mut top, Entry { child, near: near.lane(i) });
+                    }
+                }
+            }
+        }
+        loop {
+            if top == 0 {
+                return;
+            }
+            top -= 1;
+            if stack[top].near <= farthest {
+                break;
+            }
+        }
+        child = stack[top].child;
+    }
+}
