@@ -33,6 +33,7 @@ mod sight;
 mod solids;
 
 mod camera;
+mod extents;
 mod light;
 mod lobes;
 mod mesh;
