@@ -144,7 +144,6 @@ fn b13_image_texture() {
             }),
             ("another scale", &|s| set(s, "polished", "texture.image.scale", "2 2")),
             ("another place", &|s| set(s, "picture", "texture.image.offset", "0.1 0")),
-            ("upside down", &|s| set(s, "picture", "texture.image.scale", "1 -1")),
         ],
     );
 }
