@@ -1,0 +1,70 @@
+#!/bin/sh
+# Tries the mutations of this folder. A copy of the source gets all of them at once, each asleep until the
+# environment variable ZERKALO_MUTANT has its name, so that it is compiled once. Then every test that must
+# notice a mutation runs with it, and has to fail.
+#
+#     tests/features/mutate.sh [NAME ...]
+#
+# MUTATE_IN: folder for the copy, kept afterwards. Status 1: a mutation was not noticed.
+set -eu
+root=$(cd "$(dirname "$0")/../.." && pwd)
+if [ -n "${MUTATE_IN:-}" ]; then
+    scratch=$MUTATE_IN
+    mkdir -p "$scratch"
+else
+    scratch=$(mktemp -d)
+    trap 'rm -rf "$scratch"' EXIT
+fi
+tar -C "$root" --exclude=./target --exclude=./.git -cf - . | tar -C "$scratch" -xf -
+cd "$scratch"
+export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$scratch/target}"
+mutations=tests/features/mutations
+value() { sed -n "s/^$2 //p" "$mutations/$1"; }
+
+for name in $(ls "$mutations"); do
+    file=$(value "$name" file)
+    # `before «this» after` becomes `before (if mutant { by } else { this }) after`, literally.
+    name=$name replace=$(value "$name" replace) by=$(value "$name" by) awk '
+        BEGIN {
+            split(ENVIRON["replace"], part, "«|»")
+            text = part[1] part[2] part[3]
+            new = "(if crate::mutant(\"" ENVIRON["name"] "\") { " ENVIRON["by"] " } else { " part[2] " })"
+        }
+        {
+            at = index($0, text)
+            if (at) $0 = substr($0, 1, at - 1) part[1] new part[3] substr($0, at + length(text))
+            print
+        }' "$file" > mutated
+    cp mutated "$file"
+done
+{ echo '#![allow(unused_parens)]'; cat src/lib.rs; } > mutated
+cp mutated src/lib.rs
+cat >> src/lib.rs <<'RUST'
+
+/// Whether the mutation `name` is awake.
+pub fn mutant(name: &str) -> bool {
+    static AWAKE: std::sync::OnceLock<String> = std::sync::OnceLock::new();
+    AWAKE.get_or_init(|| std::env::var("ZERKALO_MUTANT").unwrap_or_default()) == name
+}
+RUST
+cargo test --quiet --test features --no-run
+
+if [ $# -eq 0 ]; then
+    set -- $(ls "$mutations")
+fi
+status=0
+for name in "$@"; do
+    test=$(value "$name" test)
+    # Without the mutation the copy is as the original.
+    if ! cargo test --quiet --test features "$test" > before.log 2>&1; then
+        outcome="FAILS WITHOUT IT, TOO"
+    elif ZERKALO_MUTANT=$name cargo test --quiet --test features "$test" > mutate.log 2>&1; then
+        outcome="NOT NOTICED"
+    else
+        # The words after the place of the panic.
+        outcome="noticed: $(sed -n '/panicked at/{n;p;q;}' mutate.log | cut -c 1-110)"
+    fi
+    printf '%-30s %-28s %s\n' "$name" "$test" "$outcome"
+    case $outcome in noticed*) ;; *) status=1 ;; esac
+done
+exit $status

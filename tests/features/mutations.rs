@@ -1,0 +1,54 @@
+//! Changes of the source that a row's test must notice. `mutate.sh` tries them; here they are kept from
+//! rotting.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+/// A change of one expression in the source.
+pub struct Mutation {
+    /// Name of the test that must fail.
+    pub test: String,
+    /// Source file.
+    pub file: String,
+    /// The text around the expression and the expression, which stands in guillemets.
+    replace: String,
+    /// An expression of the same type.
+    by: String,
+}
+
+/// All mutations by the names of their files. Each file has a line of words for people, beginning with #,
+/// and one line for each of `test`, `file`, `replace`, `by`.
+pub fn all() -> BTreeMap<String, Mutation> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/features/mutations");
+    let read = |path: std::path::PathBuf| {
+        let name = path.file_name().unwrap().to_str().unwrap().to_string();
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with("# "), "{name} does not say what it is");
+        let value = |key: &str| {
+            let mut lines = text.lines().filter_map(|l| l.strip_prefix(key)?.strip_prefix(' '));
+            let first = lines.next().unwrap_or_else(|| panic!("{name} has no line `{key}`"));
+            assert!(lines.next().is_none(), "{name} has two lines `{key}`");
+            first.to_string()
+        };
+        let [test, file, replace, by] = ["test", "file", "replace", "by"].map(value);
+        (name, Mutation { test, file, replace, by })
+    };
+    fs::read_dir(&folder).unwrap().map(|entry| read(entry.unwrap().path())).collect()
+}
+
+#[test]
+fn every_mutation_applies_to_the_source() {
+    let all = all();
+    assert!(all.len() >= 30, "only {}", all.len());
+    for (name, m) in all {
+        let source = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(&m.file));
+        let source = source.unwrap_or_else(|e| panic!("{name}: {}: {e}", m.file));
+        let parts: Vec<&str> = m.replace.split(['«', '»']).collect();
+        assert_eq!(parts.len(), 3, "{name}: `{}` needs one pair of guillemets", m.replace);
+        let text = parts.concat();
+        let found = source.matches(&text).count();
+        assert_eq!(found, 1, "{name}: `{text}` stands {found} times in {}", m.file);
+        assert_ne!(parts[1], m.by, "{name}");
+    }
+}

@@ -1,0 +1,161 @@
+//! Shapes as functions of points, negative inside: what a ray must not enter before it ends, and on
+//! whose zero it must end. Flat things and triangles are met by formula.
+
+use crate::surfaces::map;
+use glam::{DAffine3, DVec3};
+use zerkalo::scene::{Object, Step};
+use zerkalo::shape::{Part, Shape};
+
+/// Below zero inside, zero on the surface, above zero outside.
+pub type Inside = Box<dyn Fn(DVec3) -> f64 + Sync>;
+/// Distances at which the ray from a point in a direction meets it.
+pub type Crossings = Box<dyn Fn(DVec3, DVec3) -> Vec<f64> + Sync>;
+
+/// What an object is to a ray.
+pub enum Thing {
+    Solid(Inside),
+    Thin(Crossings),
+}
+
+impl Thing {
+    /// Of anything but a mesh.
+    pub fn new(object: &Object) -> Self {
+        let v = |a: [f64; 3]| DVec3::from(a);
+        match &object.shape {
+            Shape::Platform(p) => {
+                let [x, z] = p.size;
+                Self::Thin(flat(v(p.center), DVec3::X * (0.5 * x), DVec3::NEG_Z * (0.5 * z)))
+            }
+            Shape::Rectangle(r) => {
+                let right = v(r.up).cross(v(r.normal)).normalize();
+                let up = v(r.normal).cross(right).normalize();
+                let [width, height] = r.size;
+                Self::Thin(flat(v(r.center), right * (0.5 * width), up * (0.5 * height)))
+            }
+            shape => Self::Solid(placed(inside(shape), &object.transform)),
+        }
+    }
+}
+
+/// The parallelogram of the points `center` + a `u` + b `v` with |a|, |b| up to 1, for u and v at a right
+/// angle.
+fn flat(center: DVec3, u: DVec3, v: DVec3) -> Crossings {
+    let normal = u.cross(v);
+    Box::new(move |origin, direction| {
+        let t = normal.dot(center - origin) / normal.dot(direction);
+        let at = origin + direction * t - center;
+        let within = |axis: DVec3| at.dot(axis).abs() <= axis.length_squared();
+        if t > 0.0 && within(u) && within(v) { vec![t] } else { Vec::new() }
+    })
+}
+
+/// Triangles, by solving origin + t direction = a + x (b - a) + y (c - a).
+pub fn triangles(list: Vec<[DVec3; 3]>, scene_from_mesh: DAffine3) -> Crossings {
+    let placed = move |t: &[DVec3; 3]| t.map(|corner| scene_from_mesh.transform_point3(corner));
+    let list: Vec<[DVec3; 3]> = list.iter().map(placed).collect();
+    Box::new(move |origin, direction| {
+        let meet = |[a, b, c]: &[DVec3; 3]| {
+            let (u, v) = (b - a, c - a);
+            let across = direction.cross(v);
+            let volume = u.dot(across);
+            let x = (origin - a).dot(across) / volume;
+            let turned = (origin - a).cross(u);
+            let y = direction.dot(turned) / volume;
+            let t = v.dot(turned) / volume;
+            (x >= 0.0 && y >= 0.0 && x + y <= 1.0 && t > 0.0).then_some(t)
+        };
+        list.iter().filter_map(meet).collect()
+    })
+}
+
+fn placed(inside: Inside, steps: &[Step]) -> Inside {
+    if steps.is_empty() {
+        return inside;
+    }
+    let own_from_scene = placement(steps).inverse();
+    Box::new(move |p| inside(own_from_scene.transform_point3(p)))
+}
+
+/// The steps, the first one first.
+pub fn placement(steps: &[Step]) -> DAffine3 {
+    steps.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all)
+}
+
+fn inside(shape: &Shape) -> Inside {
+    let v = |a: [f64; 3]| DVec3::from(a);
+    let box_of = |p: DVec3, half: DVec3| (p.abs() - half).max_element();
+    match shape.clone() {
+        Shape::Sphere(s) => Box::new(move |p| p.distance(v(s.center)) - s.radius),
+        Shape::Plane(s) => Box::new(move |p| v(s.normal).normalize().dot(p - v(s.point))),
+        Shape::Cuboid(b) => Box::new(move |p| box_of(p - v(b.center), v(b.size) / 2.0)),
+        Shape::Cube(c) => {
+            let half = DVec3::splat(c.edge / 2.0);
+            let middle = v(c.corner) + DVec3::new(half.x, half.y, -half.z);
+            Box::new(move |p| box_of(unturned(p - middle, c.rotation), half))
+        }
+        Shape::Pyramid(s) => {
+            let foot = v(s.corner) + DVec3::new(s.side / 2.0, 0.0, -s.side / 2.0);
+            let height = s.height.min(s.apex_height);
+            Box::new(move |p| {
+                let q = unturned(p - foot, s.rotation);
+                // Half the width of the cross section.
+                let half = s.side / 2.0 * (1.0 - q.y / s.apex_height);
+                (q.x.abs() - half).max(q.z.abs() - half).max(-q.y).max(q.y - height)
+            })
+        }
+        Shape::Prism(s) => {
+            // From the centroid to each of the three sides.
+            let in_radius = s.side / 12f64.sqrt();
+            let foot = v(s.corner) + DVec3::new(s.side / 2.0, 0.0, -in_radius);
+            let sides = [90.0, 210.0, 330.0].map(|a: f64| {
+                let (z, x) = a.to_radians().sin_cos();
+                DVec3::new(x, 0.0, z)
+            });
+            Box::new(move |p| {
+                let q = unturned(p - foot, s.rotation);
+                let outmost = sides.iter().map(|n| n.dot(q)).fold(f64::MIN, f64::max);
+                (outmost - in_radius).max(-q.y).max(q.y - s.height)
+            })
+        }
+        Shape::Cylinder(c) => round(v(c.base), v(c.top), [c.radius; 2]),
+        Shape::Cone(c) => round(v(c.base), v(c.apex), [c.radius, 0.0]),
+        Shape::TaperedCylinder(c) => round(v(c.base), v(c.top), [c.base_radius, c.top_radius]),
+        // Its canonical form: x^2 + y^2 = (1 + (s - 1) z)^2 between z = 0 and z = 1.
+        Shape::UnitCylinder(c) => {
+            Box::new(move |p| (p.x.hypot(p.y) - (1.0 + (c.s - 1.0) * p.z)).max(-p.z).max(p.z - 1.0))
+        }
+        Shape::Union(u) => {
+            let parts = parts(&u.of);
+            Box::new(move |p| parts.iter().map(|f| f(p)).fold(f64::MAX, f64::min))
+        }
+        Shape::Intersection(i) => {
+            let parts = parts(&i.of);
+            Box::new(move |p| parts.iter().map(|f| f(p)).fold(f64::MIN, f64::max))
+        }
+        Shape::Difference(d) => {
+            let parts = parts(&d.of);
+            Box::new(move |p| parts[1..].iter().map(|f| -f(p)).fold(parts[0](p), f64::max))
+        }
+        other => panic!("no function for {}", other.key()),
+    }
+}
+
+fn parts(of: &[Part]) -> Vec<Inside> {
+    of.iter().map(|part| placed(inside(&part.shape), &part.transform)).collect()
+}
+
+/// Undoes a turn about the vertical, counter-clockwise seen from above.
+fn unturned(p: DVec3, degrees: f64) -> DVec3 {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    // Seen from above x goes to the right and z down.
+    DVec3::new(p.x * cos - p.z * sin, p.y, p.x * sin + p.z * cos)
+}
+
+fn round(base: DVec3, top: DVec3, [r0, r1]: [f64; 2]) -> Inside {
+    let (axis, length) = ((top - base).normalize(), base.distance(top));
+    Box::new(move |p| {
+        let along = axis.dot(p - base);
+        let out = (p - base - axis * along).length();
+        (out - (r0 + (r1 - r0) * along / length)).max(-along).max(along - length)
+    })
+}

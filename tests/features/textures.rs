@@ -1,0 +1,212 @@
+//! Textures and bumps: images looked up by the formulas of two mappings.
+
+use crate::beside::without_chance;
+use crate::row::{Verdict, ensure, number, row};
+use crate::sight::{RASTER, centers, sighting, sights};
+use crate::support::{shipped, sized};
+use glam::{DVec2, DVec3};
+use std::f64::consts::{PI, TAU};
+use zerkalo::scene::edit::{self, Subject};
+use zerkalo::scene::{Level, Scene};
+use zerkalo::shape::Shape;
+
+/// An image of `scenes/textures`, its pixels from the lowest row up.
+struct Pixels {
+    size: [usize; 2],
+    /// Codes divided by 255.
+    codes: Vec<DVec3>,
+}
+
+impl Pixels {
+    fn open(name: &str) -> Self {
+        let path = format!("{}/scenes/textures/{name}", env!("CARGO_MANIFEST_DIR"));
+        let image = image::open(&path).unwrap_or_else(|e| panic!("{path}: {e}")).to_rgb8();
+        let (width, height) = image.dimensions();
+        let rows = (0..height).rev().flat_map(|y| (0..width).map(move |x| (x, y)));
+        let code = |(x, y)| DVec3::from(image.get_pixel(x, y).0.map(|c| f64::from(c) / 255.0));
+        Self { size: [width as usize, height as usize], codes: rows.map(code).collect() }
+    }
+
+    /// The mean of the four pixels around a point, `of` each; the image repeats.
+    fn at(&self, uv: DVec2, of: impl Fn(DVec3) -> DVec3) -> DVec3 {
+        let [width, height] = self.size;
+        let (x, y) = (uv.x * width as f64 - 0.5, uv.y * height as f64 - 0.5);
+        let pixel = |dx: f64, dy: f64| {
+            let i = (x.floor() + dx).rem_euclid(width as f64) as usize;
+            let j = (y.floor() + dy).rem_euclid(height as f64) as usize;
+            of(self.codes[j * width + i])
+        };
+        let (a, b) = (x - x.floor(), y - y.floor());
+        let low = pixel(0.0, 0.0).lerp(pixel(1.0, 0.0), a);
+        low.lerp(pixel(0.0, 1.0).lerp(pixel(1.0, 1.0), a), b)
+    }
+
+    /// The linear colour.
+    fn color(&self, uv: DVec2) -> DVec3 {
+        let linear =
+            |c: f64| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
+        self.at(uv, |code| code.map(linear))
+    }
+
+    /// Grey, 0 to 1.
+    fn height(&self, uv: DVec2) -> f64 {
+        self.at(uv, |code| code).element_sum() / 3.0
+    }
+}
+
+/// Only camera rays, and no highlights.
+fn plain(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    scene.trace.level = Level::Primary;
+    scene.materials.values_mut().for_each(|m| m.specular = 0.0);
+    scene
+}
+
+/// Longitude from +z towards +x and latitude, of a unit vector.
+fn angles(n: DVec3) -> [f64; 2] {
+    [n.x.atan2(n.z), n.y.asin()]
+}
+
+/// Whole turns and from pole to pole become 1.
+fn spherical(n: DVec3, scale: [f64; 2]) -> DVec2 {
+    let [longitude, latitude] = angles(n);
+    DVec2::new(0.5 + longitude / TAU, 0.5 + latitude / PI) * DVec2::from(scale)
+}
+
+/// The pixels that show object `name`, as their number and the point seen.
+fn points(scene: &Scene, name: &str) -> Vec<(usize, DVec3)> {
+    let object = number(scene, name) as u32;
+    let scene = sized(scene.clone(), RASTER);
+    let seen = sights(&scene).into_iter().zip(centers(RASTER)).enumerate();
+    seen.filter(|(_, (sight, _))| sight.object == Some(object))
+        .map(|(i, (sight, center))| {
+            let ray = sighting(&scene.camera, RASTER, center);
+            (i, ray.origin + ray.direction * f64::from(sight.depth))
+        })
+        .collect()
+}
+
+fn ball(scene: &Scene, name: &str) -> (DVec3, f64) {
+    match &scene.objects[number(scene, name)].shape {
+        Shape::Sphere(s) => (s.center.into(), s.radius),
+        other => panic!("{name} is a {}", other.key()),
+    }
+}
+
+/// The picture at the wall and the ball show their images, multiplied by what they would show without.
+fn wears_images(meant: &Scene, shown: &Scene) -> Verdict {
+    let mut bare = plain(meant);
+    bare.materials.values_mut().for_each(|m| m.texture = None);
+    let (bare, shown) = (without_chance(&bare), without_chance(&plain(shown)));
+    let (sheet, wood) = (Pixels::open("sheet.png"), Pixels::open("wood.png"));
+    let (center, radius) = ball(meant, "ball");
+    let mut pixels: Vec<(usize, DVec3)> = Vec::new();
+    for (i, p) in points(meant, "picture") {
+        // 1.1 wide and 0.8 high around (-0.75, 1.55).
+        let uv = DVec2::new((p.x + 0.75) / 1.1 + 0.5, (p.y - 1.55) / 0.8 + 0.5);
+        pixels.push((i, sheet.color(uv)));
+    }
+    ensure(pixels.len() > 40, || format!("{} pixels of the picture", pixels.len()))?;
+    for (i, p) in points(meant, "ball") {
+        pixels.push((i, wood.color(spherical((p - center) / radius, [3.0, 2.0]))));
+    }
+    ensure(pixels.len() > 120, || format!("{} pixels in all", pixels.len()))?;
+    for (i, color) in pixels {
+        let expected = color * bare[i];
+        let apart = (shown[i] - expected).abs().max_element();
+        ensure(apart < 2e-3, || format!("pixel {i}: {} instead of {expected}", shown[i]))?;
+    }
+    Ok(())
+}
+
+/// Writes `text` behind `key` of a material.
+fn set(scene: &mut Scene, material: &str, key: &str, text: &str) {
+    let subject = Subject::Material(material.into());
+    let edit = edit::set(scene, &subject, key, text);
+    *scene = edit.unwrap_or_else(|refusal| panic!("{key} {text}: {refusal:?}")).scene;
+}
+
+#[test]
+fn b13_image_texture() {
+    let meant = shipped("texture-image.toml");
+    row(
+        "texture-image.toml",
+        |shown| wears_images(&meant, shown),
+        &[
+            ("no image", &|s| s.materials.get_mut("picture").unwrap().texture = None),
+            ("one colour", &|s| {
+                let picture = s.materials.get_mut("picture").unwrap();
+                (picture.texture, picture.color) = (None, zerkalo::value::Color([0.5; 3]));
+            }),
+            ("another mapping", &|s| set(s, "picture", "texture.image.mapping", "planar")),
+            ("another mapping of the ball", &|s| {
+                set(s, "polished", "texture.image.mapping", "box");
+            }),
+            ("another scale", &|s| set(s, "polished", "texture.image.scale", "2 2")),
+            ("another place", &|s| set(s, "picture", "texture.image.offset", "0.1 0")),
+        ],
+    );
+}
+
+/// The ball's normals are those of a surface raised by the image's heights; its outline stays.
+fn is_raised(meant: &Scene, shown: &Scene) -> Verdict {
+    let picture = without_chance(&plain(shown));
+    let heights = Pixels::open("brick-heights.png");
+    let (center, radius) = ball(meant, "plaster ball");
+    let (scale, height) = ([3.0, 1.5], 0.02);
+    let own = &meant.materials["plaster"];
+    let color = DVec3::from(own.color.0);
+    let light = &meant.lights[0];
+    let lamp = DVec3::from(light.point.as_ref().unwrap().position);
+    let eye = DVec3::from(meant.camera.eye);
+    let seen = points(shown, "plaster ball");
+    ensure(seen == points(meant, "plaster ball"), || "another outline".into())?;
+    let step = heights.size.map(|n| 1.0 / n as f64);
+    let mut bent = 0;
+    for (i, p) in seen {
+        let n = (p - center) / radius;
+        let uv = spherical(n, scale);
+        // Heights a pixel to both sides.
+        let [along_u, along_v] = [DVec2::X * step[0], DVec2::Y * step[1]].map(|d| {
+            height * (heights.height(uv + d) - heights.height(uv - d)) / (2.0 * d.element_sum())
+        });
+        let [longitude, latitude] = angles(n);
+        let east = DVec3::new(longitude.cos(), 0.0, -longitude.sin());
+        let north = n.cross(east);
+        let slope = east * (along_u * scale[0] / (TAU * radius * latitude.cos()))
+            + north * (along_v * scale[1] / (PI * radius));
+        let raised = (n - slope).normalize();
+        if raised.dot((eye - p).normalize()) < 0.05 {
+            continue;
+        }
+        bent += usize::from(raised.dot(n) < 0.99);
+        let to = (lamp - p).normalize();
+        let cos = if n.dot(to) > 0.0 { raised.dot(to).max(0.0) } else { 0.0 };
+        let expected = color * DVec3::from(meant.ambient.color.0) * own.ambient
+            + color * (own.diffuse * light.intensity * cos);
+        let apart = (picture[i] - expected).abs().max_element();
+        ensure(apart < 3e-3, || format!("pixel {i}: {} instead of {expected}", picture[i]))?;
+    }
+    ensure(bent > 20, || format!("only {bent} pixels are bent"))
+}
+
+#[test]
+fn b14_bump_texture() {
+    let meant = shipped("bump.toml");
+    row(
+        "bump.toml",
+        |shown| is_raised(&meant, shown),
+        &[
+            ("flat", &|s| s.materials.get_mut("plaster").unwrap().bump = None),
+            ("sunken", &|s| set(s, "plaster", "bump.image.height", "-0.02")),
+            ("half as high", &|s| set(s, "plaster", "bump.image.height", "0.01")),
+            ("another scale", &|s| set(s, "plaster", "bump.image.scale", "3 2")),
+            ("another mapping", &|s| set(s, "plaster", "bump.image.mapping", "box")),
+            ("as colours", &|s| {
+                s.materials.get_mut("plaster").unwrap().bump = None;
+                set(s, "plaster", "texture", "image");
+                set(s, "plaster", "texture.image.file", "textures/brick-heights.png");
+            }),
+        ],
+    );
+}

@@ -1,0 +1,73 @@
+//! The scene of the reflecting tracks.
+
+use crate::beside::{agrees, exactly};
+use crate::row::{ensure, row, shape};
+use crate::sight::sees;
+use crate::support::parsed;
+use std::fmt::Write;
+use zerkalo::scene::{Level, Scene};
+use zerkalo::value::Color;
+
+/// The scene by its formula.
+fn by_formula() -> Scene {
+    let mut text = String::from(
+        "film.size = [640, 480]\n\
+         camera = { eye = [5, 0, 40], target = [0, 0, 0], up = [0, 1, 0], view_angle.horizontal = 40 }\n\
+         background.color = [0, 0, 0]\n\
+         light = [{ point.position = [2, 2, 1] }, { point.position = [-3, 5, 3] }]\n\
+         [materials.large]\ncolor = [0.6, 0.6, 0.4]\ndiffuse = 0.2\nspecular = 0.4\nexponent = 10\n\
+         reflection = 1\ntransmission = 0.2\nindex = 1.4286\n\
+         [[object]]\nmaterial = \"large\"\nshape.sphere = { center = [20, 0, -40], radius = 15 }\n",
+    );
+    for i in 0..40 {
+        for j in 0..10 {
+            let (x, y, z) = (i - 9, 7.0 - 5.0 * f64::from(i).sqrt(), 6 - j * j);
+            let (red, blue) = (0.02 * f64::from(i * j), 0.01 * f64::from(i * j));
+            write!(
+                text,
+                "[materials.track-{i}-{j}]\ncolor = [{red}, 0.7, {blue}]\ndiffuse = 0.4\n\
+                 specular = 0.4\nexponent = 10\n[[object]]\nmaterial = \"track-{i}-{j}\"\n\
+                 shape.sphere = {{ center = [{x}, {y:?}, {z}], radius = 0.8 }}\n"
+            )
+            .unwrap();
+        }
+    }
+    parsed(&text)
+}
+
+#[test]
+fn c1_reflecting_tracks() {
+    let meant = by_formula();
+    assert_eq!(meant.objects.len(), 401);
+    let without_rays_by_chance = |scene: &Scene| {
+        let mut scene = scene.clone();
+        scene.trace.level = Level::Shadows;
+        scene
+    };
+    let check = |shown: &Scene| {
+        ensure(shown.film.size == [640, 480], || format!("{:?} pixels", shown.film.size))?;
+        sees(&meant, shown)?;
+        exactly(&without_rays_by_chance(&meant), &without_rays_by_chance(shown))?;
+        agrees(&meant, shown, 16)
+    };
+    row(
+        "reflecting-tracks.toml",
+        check,
+        &[
+            ("the large ball a plane", &|s| {
+                s.objects[0].shape = shape("plane = { point = [20, 0, -25], normal = [0, 0, 1] }");
+            }),
+            ("nothing reflected", &|s| {
+                s.materials.values_mut().for_each(|m| m.reflection = 0.0);
+            }),
+            ("another colour", &|s| {
+                s.materials.values_mut().for_each(|m| m.color = Color([0.7; 3]))
+            }),
+            ("half the balls", &|s| s.objects.truncate(201)),
+            ("one light", &|s| s.lights.truncate(1)),
+            ("the angle across the height", &|s| {
+                s.camera.view_angle = zerkalo::camera::ViewAngle::Vertical(40.0);
+            }),
+        ],
+    );
+}
