@@ -39,9 +39,13 @@ pub struct EditArgs {
     /// Precision of the geometry; auto: double where the scene's proportions need it
     #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]
     pub precision: PrecisionArg,
-    /// Colours of the terminal: 24-bit, 256, 16 or none; auto: as the environment tells
+    /// Colours of the terminal: 24-bit, 256, 16 or none; auto: as environment and terminal tell
     #[arg(long, value_enum, default_value_t = ColorArg::Auto)]
     pub color: ColorArg,
+    /// Send this many kilobytes a second to the terminal [default: over SSH what the line carries, as
+    /// measured; else everything]
+    #[arg(long, value_name = "KB", value_parser = bandwidth, allow_negative_numbers = true)]
+    pub bandwidth: Option<f64>,
     /// Write how long the answers to keys and mouse took, as CSV, and print the distribution at the
     /// end
     #[arg(long, value_name = "FILE.csv", hide = true)]
@@ -194,7 +198,7 @@ pub enum PrecisionArg {
 /// Values of `--color`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ColorArg {
-    /// As the environment tells
+    /// As environment and terminal tell
     Auto,
     /// 24-bit
     True,
@@ -256,6 +260,11 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
     number.ok_or_else(|| "expected a number greater than 0".to_string())
+}
+
+fn bandwidth(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|x: &f64| (1.0..=1e6).contains(x));
+    number.ok_or_else(|| "expected a number from 1 to 1000000".to_string())
 }
 
 fn exposure(text: &str) -> Result<f64, String> {
