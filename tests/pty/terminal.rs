@@ -101,7 +101,8 @@ impl Terminal {
                 drop(output);
                 if willing.load(Ordering::Relaxed) {
                     let place = format!("\x1b[{};{}R", row + 1, column + 1);
-                    let answer = |text: &str| if text.is_empty() { place.clone() } else { text.into() };
+                    let answer =
+                        |text: &str| if text.is_empty() { place.clone() } else { text.into() };
                     let all: String = asked.into_iter().map(answer).collect();
                     // The program may have ended meanwhile.
                     let _ = answers.lock().unwrap().write_all(all.as_bytes());
