@@ -40,9 +40,13 @@ pub struct EditArgs {
     /// Precision of the geometry; auto: double where the scene's proportions need it
     #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]
     pub precision: PrecisionArg,
-    /// Colours of the terminal: 24-bit, 256, 16 or none; auto: as the environment tells
+    /// Colours of the terminal: 24-bit, 256, 16 or none; auto: as environment and terminal tell
     #[arg(long, value_enum, default_value_t = ColorArg::Auto)]
     pub color: ColorArg,
+    /// Send this many kilobytes a second to the terminal [default: over SSH what the line carries, as
+    /// measured; else everything]
+    #[arg(long, value_name = "KB", value_parser = bandwidth, allow_negative_numbers = true)]
+    pub bandwidth: Option<f64>,
     /// Write how long the answers to keys and mouse took, as CSV, and print the distribution at the
     /// end
     #[arg(long, value_name = "FILE.csv", hide = true)]
@@ -199,7 +203,7 @@ pub enum PrecisionArg {
 /// Values of `--color`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ColorArg {
-    /// As the environment tells
+    /// As environment and terminal tell
     Auto,
     /// 24-bit
     True,
@@ -272,6 +276,11 @@ fn positive(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "expected a number greater than 0".to_string())
 }
 
+fn bandwidth(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|x: &f64| (1.0..=1e6).contains(x));
+    number.ok_or_else(|| "expected a number from 1 to 1000000".to_string())
+}
+
 fn exposure(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|x: &f64| x.abs() <= 64.0);
     number.ok_or_else(|| "expected a number from -64 to 64".to_string())
@@ -339,5 +348,10 @@ mod tests {
         let edit = cli.unwrap().edit;
         assert_eq!((edit.color, edit.threads), (ColorArg::Indexed, Some(2)));
         assert!(Cli::try_parse_from(["zerkalo", "--color", "17"]).is_err());
+        let slow = Cli::try_parse_from(["zerkalo", "--bandwidth", "12.5"]).unwrap().edit;
+        assert_eq!(slow.bandwidth, Some(12.5));
+        for wrong in ["0", "-3", "inf", "nan", "fast"] {
+            assert!(Cli::try_parse_from(["zerkalo", "--bandwidth", wrong]).is_err(), "{wrong}");
+        }
     }
 }

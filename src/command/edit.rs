@@ -6,6 +6,7 @@ use super::{Failure, all_threads, say, warn};
 use crate::asset::Assets;
 use crate::dashboard::message::Exported;
 use crate::dashboard::run::{Colors, DEFAULT_STOP, Setup, run as run_dashboard};
+use crate::dashboard::terminal::Surroundings;
 use crate::film::Display;
 use crate::render::Options;
 use crate::render::schedule::{Criterion, Settings};
@@ -22,8 +23,9 @@ use std::sync::Arc;
 const BUILT_IN_NAME: &str = "mirror-room.toml";
 
 pub fn run(args: &EditArgs) -> Result<(), Failure> {
-    let variable = |name: &str| env::var(name).unwrap_or_default();
-    if !io::stdout().is_terminal() || variable("TERM") == "dumb" {
+    let surroundings = Surroundings::of(|name| env::var(name).ok());
+    let terminals = io::stdin().is_terminal() && io::stdout().is_terminal();
+    if !terminals || surroundings.term == "dumb" {
         let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
         return Err(Failure::Usage(format!(
             "the dashboard needs a terminal; `zerkalo render {scene} -o PICTURE.png` renders without \
@@ -52,7 +54,9 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
             rays_per_pixel: 0,
             stop: DEFAULT_STOP,
         },
-        colors: colors(args.color, variable),
+        colors: colors(args.color),
+        surroundings,
+        bandwidth: args.bandwidth.map(|kilobytes| 1e3 * kilobytes),
         trace: args.trace.clone(),
     };
     let ended = run_dashboard(setup).map_err(|error| Failure::Failed(error.to_string()))?;
@@ -95,70 +99,13 @@ fn told(exported: &Exported) -> String {
     format!("{path}  {width}x{height}  {:.0} spp  noise {noise}", exported.spp)
 }
 
-/// How many colours the terminal has, by what the user says or the environment tells.
-fn colors(asked: ColorArg, variable: impl Fn(&str) -> String) -> Colors {
-    /// Terminals that have 24-bit colour and do not say so by their name's ending.
-    const TRUE: [&str; 8] = [
-        "xterm-kitty",
-        "alacritty",
-        "foot",
-        "wezterm",
-        "xterm-ghostty",
-        "contour",
-        "iterm",
-        "iterm2",
-    ];
+/// How many colours the user says that the terminal has, if so.
+fn colors(asked: ColorArg) -> Option<Colors> {
     match asked {
-        ColorArg::True => return Colors::True,
-        ColorArg::Indexed => return Colors::Indexed,
-        ColorArg::Sixteen => return Colors::Sixteen,
-        ColorArg::None => return Colors::Mono,
-        ColorArg::Auto => {}
-    }
-    let term = variable("TERM");
-    if !variable("NO_COLOR").is_empty() || term.starts_with("vt") {
-        Colors::Mono
-    } else if ["truecolor", "24bit"].contains(&variable("COLORTERM").as_str())
-        || ["-direct", "-truecolor"].iter().any(|end| term.ends_with(end))
-        || TRUE.contains(&term.as_str())
-    {
-        Colors::True
-    } else if ["linux", "ansi", "xterm-color", "screen", "cygwin"].contains(&term.as_str()) {
-        Colors::Sixteen
-    } else {
-        Colors::Indexed
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn colours_follow_the_user_then_the_environment() {
-        for (term, colorterm, no_color, expected) in [
-            ("xterm-256color", "truecolor", "", Colors::True),
-            ("xterm-256color", "24bit", "", Colors::True),
-            ("xterm-256color", "", "", Colors::Indexed),
-            ("tmux-direct", "", "", Colors::True),
-            ("xterm-kitty", "", "", Colors::True),
-            ("linux", "", "", Colors::Sixteen),
-            ("vt100", "", "", Colors::Mono),
-            ("xterm-256color", "truecolor", "1", Colors::Mono),
-            ("", "", "", Colors::Indexed),
-        ] {
-            let variable = |name: &str| {
-                let value = match name {
-                    "TERM" => term,
-                    "COLORTERM" => colorterm,
-                    "NO_COLOR" => no_color,
-                    other => panic!("{other}"),
-                };
-                value.to_string()
-            };
-            assert_eq!(colors(ColorArg::Auto, variable), expected, "{term} {colorterm} {no_color}");
-            assert_eq!(colors(ColorArg::True, variable), Colors::True);
-            assert_eq!(colors(ColorArg::None, variable), Colors::Mono);
-        }
+        ColorArg::True => Some(Colors::True),
+        ColorArg::Indexed => Some(Colors::Indexed),
+        ColorArg::Sixteen => Some(Colors::Sixteen),
+        ColorArg::None => Some(Colors::Mono),
+        ColorArg::Auto => None,
     }
 }

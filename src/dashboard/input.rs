@@ -51,6 +51,13 @@ pub struct Key {
     pub shift: bool,
 }
 
+impl Key {
+    /// Without modifiers.
+    pub fn plain(code: Code) -> Self {
+        Self { code, ctrl: false, alt: false, shift: false }
+    }
+}
+
 /// What the mouse did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MouseKind {

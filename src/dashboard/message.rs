@@ -1,6 +1,7 @@
 //! What comes in and what goes out: everything that `update` learns, and everything that it asks for.
 
 use super::input::{Key, Mouse};
+use super::link::Reading;
 use crate::film::{Display, Linear};
 use crate::render::schedule::Stop;
 use crate::render::session::Snapshot;
@@ -33,6 +34,8 @@ pub enum Message {
     Exported(Result<Exported, String>),
     /// How far the render of [`Effect::ExportSized`] is, 0..=1.
     ExportProgress(f64),
+    /// What is known of the line to the terminal.
+    Line(Option<Reading>),
     /// Time has passed. At least once a second while something on the screen depends on it
     /// ([`Model::wakes_at`](super::model::Model::wakes_at)).
     Tick,

@@ -1,9 +1,10 @@
 //! The dashboard: edit the scene, watch it converge.
 //!
-//! Three parts that only meet in data. `update` decides: it turns a [`Message`](message::Message)
-//! into a changed [`Model`](model::Model) and a list of [`Effect`](message::Effect)s, without clock,
-//! file or terminal. `view` shows: it draws a model into a buffer of cells. `run` acts: terminal,
-//! renderer, files, time.
+//! Parts that only meet in data. `update` decides: it turns a [`Message`](message::Message) into a
+//! changed [`Model`](model::Model) and a list of [`Effect`](message::Effect)s, without clock, file or
+//! terminal. `view` shows: it draws a model into a buffer of cells. `pacing` chooses which of them go
+//! out now, within what `link` says that the line carries. `run` acts: renderer, files, time; and
+//! `terminal` is what lies at the other end of the line.
 
 pub mod action;
 pub mod convergence;
@@ -12,6 +13,7 @@ pub mod hints;
 pub mod input;
 pub mod keymap;
 pub mod layout;
+pub mod link;
 pub mod message;
 pub mod model;
 pub mod overlay;
@@ -21,6 +23,7 @@ pub mod places;
 pub mod quality;
 pub mod raster;
 pub mod run;
+pub mod terminal;
 #[cfg(test)]
 mod testing;
 pub mod update;

@@ -5,6 +5,7 @@ use super::editor::Editor;
 use super::input::Button;
 use super::keymap::Context;
 use super::layout::{Focus, Layout, Request, layout};
+use super::link::Reading;
 use super::message::{Channel, Format};
 use super::overlay::Overlay;
 use super::places::wrapped;
@@ -176,6 +177,8 @@ pub struct Model {
     pub most_threads: usize,
     /// The tracing threads have low priority.
     pub low_priority: bool,
+    /// What is known of the line to the terminal, if that is not here.
+    pub line: Option<Reading>,
     /// A notice instead of the hints.
     pub notice: Option<Notice>,
     /// A render at another size.
@@ -255,6 +258,7 @@ impl Model {
             threads: start.threads.max(1),
             most_threads: start.most_threads.max(1),
             low_priority: false,
+            line: None,
             notice: None,
             export: None,
             first_time: true,

@@ -4,12 +4,14 @@
 //! Nothing here knows a scene, a terminal or a screen's layout.
 
 mod ansi;
+mod coarse;
 mod false_color;
 mod indexed;
 mod nearest;
 mod oklab;
 mod settle;
 
+pub use coarse::blocks;
 pub use false_color::{Scale, depth, difference, magnitude, normals, object_color, objects};
 pub use indexed::nearest as nearest_indexed;
 pub use oklab::Oklab;
@@ -85,6 +87,40 @@ pub struct PictureCell {
     pub fg: Ink,
     /// Colour behind it.
     pub bg: Ink,
+}
+
+impl PictureCell {
+    /// How the upper and the lower half look in a terminal of dark ground that follows xterm.
+    pub fn halves(&self) -> [Oklab; 2] {
+        let rgb = |ink, plain| match ink {
+            Ink::Plain => plain,
+            Ink::Rgb(rgb) => rgb,
+            Ink::Indexed(index) => indexed::rgb(index),
+        };
+        let (fg, bg) = (rgb(self.fg, PLAIN_FG), rgb(self.bg, PLAIN_BG));
+        match self.glyph {
+            '▀' => [Oklab::of(fg), Oklab::of(bg)],
+            '▄' => [Oklab::of(bg), Oklab::of(fg)],
+            glyph => [ansi::mixture(fg, bg, ansi::coverage(glyph)); 2],
+        }
+    }
+}
+
+impl PictureCell {
+    /// The colours of the upper and the lower half, if it shows two of 24 bits.
+    pub fn colors(&self) -> Option<[[u8; 3]; 2]> {
+        let halves = match self.glyph {
+            '▀' => [self.fg, self.bg],
+            '▄' => [self.bg, self.fg],
+            ' ' => [self.bg; 2],
+            '█' => [self.fg; 2],
+            _ => return None,
+        };
+        match halves {
+            [Ink::Rgb(upper), Ink::Rgb(lower)] => Some([upper, lower]),
+            _ => None,
+        }
+    }
 }
 
 impl Default for PictureCell {

@@ -1,22 +1,5 @@
 use super::*;
 
-impl PictureCell {
-    /// How the upper and the lower half look in a terminal of dark ground that follows xterm.
-    pub(super) fn halves(&self) -> [Oklab; 2] {
-        let rgb = |ink, plain| match ink {
-            Ink::Plain => plain,
-            Ink::Rgb(rgb) => rgb,
-            Ink::Indexed(index) => indexed::rgb(index),
-        };
-        let (fg, bg) = (rgb(self.fg, PLAIN_FG), rgb(self.bg, PLAIN_BG));
-        match self.glyph {
-            '▀' => [Oklab::of(fg), Oklab::of(bg)],
-            '▄' => [Oklab::of(bg), Oklab::of(fg)],
-            glyph => [ansi::mixture(fg, bg, ansi::coverage(glyph)); 2],
-        }
-    }
-}
-
 const RED: [u8; 3] = [255, 0, 0];
 const SKY: [u8; 3] = [90, 140, 220];
 

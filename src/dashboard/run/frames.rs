@@ -1,78 +1,183 @@
 //! From the model to the terminal's bytes: a frame is drawn, thinned out, encoded, sent.
 
-use super::terminal::Tty;
 use super::writer::{Writer, Written};
+use crate::dashboard::link::{Link, Queue, Reading, Start};
 use crate::dashboard::model::Model;
-use crate::dashboard::pacing::Pacing;
-use crate::dashboard::view::View;
+use crate::dashboard::pacing::{Pacing, Wanted};
+use crate::dashboard::terminal::{Capabilities, Tty, cursor_question};
+use crate::dashboard::view::{View, is_settled};
 use crossbeam_channel::Receiver;
-use ratatui::backend::{Backend, CrosstermBackend};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Frames on their way to the terminal, one at a time.
+/// What is shown at once by terminals that know this mode, and then.
+const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
+
+/// Frames on their way to the terminal.
 pub struct Frames {
     view: View,
     pacing: Pacing,
+    link: Link,
+    queue: Option<Queue>,
+    synchronised: bool,
     writer: Writer,
     wanted: Buffer,
-    /// Where the cursor is shown, if it is.
+    /// Where the cursor ought to be shown, if it ought to.
     cursor: Option<Position>,
+    facts: Facts,
+}
+
+/// What a frame has to know of the model, as it was when it was drawn.
+#[derive(Clone, Copy, Debug, Default)]
+struct Facts {
+    version: u64,
+    samples: f64,
+    settled: bool,
+}
+
+/// What became of an attempt to draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drawn {
+    /// Nothing may be sent now; nothing was drawn.
+    Nothing,
+    /// Only the picture differs, and has to wait.
+    Waiting,
+    /// The screen is as it ought to be, in what matters.
+    Same,
+    /// A frame was sent without the picture.
+    Text,
+    /// A frame was sent.
+    Picture,
 }
 
 impl Frames {
-    /// For a terminal that shows nothing.
-    pub(super) fn new(tty: Arc<Tty>) -> io::Result<Self> {
-        // Which colours there are is the dashboard's to say, not that of a library that looks at the
-        // environment by itself.
-        crossterm::style::force_color_output(true);
+    /// For a terminal that shows nothing. `bandwidth`: bytes a second that the user wants to be sent.
+    pub fn new(tty: Arc<Tty>, terminal: &Capabilities, bandwidth: Option<f64>) -> io::Result<Self> {
+        let queue = terminal.surroundings.ssh.as_deref().and_then(Queue::find);
         Ok(Self {
             view: View::default(),
             pacing: Pacing::new(),
+            link: Link::new(Start::of(terminal, queue.is_some(), bandwidth)),
+            queue,
+            synchronised: terminal.synchronised,
             writer: Writer::new(tty)?,
             wanted: Buffer::empty(Rect::ZERO),
             cursor: None,
+            facts: Facts::default(),
         })
     }
 
-    /// Whether the terminal has taken the last frame.
+    /// Whether the last frame has been written.
     pub fn ready(&self) -> bool {
         self.writer.ready()
     }
 
-    /// See [`Pacing::due`].
-    pub fn due(&self, now: Duration, answers: bool) -> Duration {
-        self.pacing.due(now, answers)
+    /// What the user is told about the line.
+    pub fn reading(&self) -> Option<Reading> {
+        self.link.reading()
     }
 
-    /// Draws the model and sends what has to change, if anything has; whether that is so. Only when
-    /// [`Frames::ready`].
-    pub fn draw(&mut self, model: &Model, now: Duration) -> io::Result<bool> {
-        let [width, height] = model.screen;
-        self.wanted.resize(Rect { x: 0, y: 0, width, height });
-        self.wanted.reset();
-        let cursor = self.view.draw(model, &mut self.wanted);
-        let outgoing = self.pacing.outgoing(&self.wanted, now);
-        if !outgoing.clear && outgoing.cells.is_empty() && cursor == self.cursor {
-            return Ok(false);
+    /// The user has done something.
+    pub fn act(&mut self, now: Duration) {
+        self.link.act(now);
+    }
+
+    /// The terminal has answered the question after a frame.
+    pub fn answered(&mut self, at: Duration) {
+        self.link.answered(at);
+    }
+
+    /// How long to wait for answers at the end; nothing if there are none.
+    pub fn awaits(&self) -> Option<Duration> {
+        self.link.awaits()
+    }
+
+    /// Whether questions are still to be answered.
+    pub fn is_waiting(&self) -> bool {
+        self.link.is_waiting()
+    }
+
+    /// Takes note of how things stand with the line.
+    pub fn look(&mut self, now: Duration) {
+        self.link.look(now);
+        if self.link.asks_kernel(now) {
+            self.link.held_back(now, self.queue.as_ref().and_then(Queue::bytes));
         }
-        self.cursor = cursor;
+    }
+
+    /// When a new picture could be sent, or at least a text about it.
+    pub fn hungry_at(&self, now: Duration, answers: bool) -> Duration {
+        match self.link.allowance(now, answers) {
+            Some(_) => now,
+            None => self.link.wakes_at(now, true),
+        }
+    }
+
+    /// When to draw again; `None`: when something happens. `changed`: the model is another one;
+    /// `answers`: what is drawn shows what the user has just done.
+    pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
+        let rest = self.pacing.rest();
+        let text = changed || rest.text;
+        if !text && !rest.visible {
+            let hidden = rest.hidden?.max(self.link.flush_at());
+            let may = self.link.allowance(now, false).is_some_and(|allowance| allowance.picture);
+            return Some(if may { hidden } else { hidden.max(self.link.wakes_at(now, false)) });
+        }
+        match self.link.allowance(now, answers) {
+            Some(allowance) if allowance.picture || text => Some(now),
+            _ => Some(self.link.wakes_at(now, text)),
+        }
+    }
+
+    /// Draws the model, if it has `changed`, and sends what the line has room for. `subject` counts up
+    /// when the picture is another one than the same with more samples. Only when [`Frames::ready`].
+    pub fn draw(
+        &mut self,
+        model: &Model,
+        now: Duration,
+        changed: bool,
+        answers: bool,
+        subject: u64,
+    ) -> Drawn {
+        let Some(allowance) = self.link.allowance(now, answers) else { return Drawn::Nothing };
+        if changed {
+            self.redraw(model);
+        }
+        let (picture, uncovered) = self.view.place();
+        let Facts { version, samples, settled } = self.facts;
+        let wanted = Wanted {
+            cells: &self.wanted,
+            cursor: self.cursor,
+            picture,
+            uncovered,
+            subject,
+            version,
+            samples,
+            settled,
+        };
         let mut bytes = self.writer.buffer();
-        let mut encoder = CrosstermBackend::new(&mut bytes);
-        encoder.hide_cursor()?;
-        if outgoing.clear {
-            encoder.clear()?;
+        if self.synchronised {
+            bytes.extend(SYNCHRONISED[0]);
         }
-        encoder.draw(outgoing.cells.iter().map(|(x, y, cell)| (*x, *y, cell)))?;
-        if let Some(position) = cursor {
-            encoder.set_cursor_position(position)?;
-            encoder.show_cursor()?;
+        let empty = bytes.len();
+        let frame = self.pacing.frame(&wanted, now, allowance, self.link.threshold(), &mut bytes);
+        if bytes.len() == empty {
+            bytes.clear();
+            self.writer.keep(bytes);
+            return if self.pacing.rest().visible { Drawn::Waiting } else { Drawn::Same };
         }
+        if self.synchronised {
+            bytes.extend(SYNCHRONISED[1]);
+        }
+        if let Some(through) = self.link.question() {
+            bytes.extend(cursor_question(through).as_bytes());
+        }
+        self.link.sent(now, bytes.len(), frame.picture, frame.flushed);
         self.writer.send(bytes);
-        Ok(true)
+        if frame.picture { Drawn::Picture } else { Drawn::Text }
     }
 
     /// Tells when the frame on its way has been written.
@@ -83,5 +188,17 @@ impl Frames {
     /// Takes note that the frame on its way has been written; when that was.
     pub fn written_at(&mut self, frame: Written) -> io::Result<Instant> {
         self.writer.done(frame)
+    }
+
+    fn redraw(&mut self, model: &Model) {
+        let [width, height] = model.screen;
+        self.wanted.resize(Rect { x: 0, y: 0, width, height });
+        self.wanted.reset();
+        self.cursor = self.view.draw(model, &mut self.wanted);
+        self.facts = Facts {
+            version: model.picture_version,
+            samples: model.snapshot.as_ref().map_or(0.0, |s| s.report.spp.mean),
+            settled: is_settled(model),
+        };
     }
 }

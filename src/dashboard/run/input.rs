@@ -1,12 +1,9 @@
-//! From the terminal's events to the dashboard's messages.
+//! From what the terminal sends to the dashboard's messages.
 
-use crate::dashboard::input::{Button, Code, Key, Mouse, MouseKind};
+use crate::dashboard::input::{Mouse, MouseKind};
 use crate::dashboard::message::Message;
+use crate::dashboard::terminal::{Keyboard, Timed};
 use crossbeam_channel::{Receiver, unbounded};
-use crossterm::event::{
-    self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseButton, MouseEvent,
-    MouseEventKind,
-};
 use std::io;
 use std::thread;
 use std::time::Instant;
@@ -21,20 +18,20 @@ pub struct Input {
 }
 
 /// Starts a thread that reads the terminal. After an error it ends.
-pub fn read() -> io::Result<Receiver<io::Result<Input>>> {
+pub fn read(mut keyboard: Keyboard) -> io::Result<Receiver<io::Result<Timed>>> {
     let (sender, receiver) = unbounded();
     thread::Builder::new().name("reader".into()).spawn(move || {
         loop {
-            let input = match event::read() {
-                Ok(event) => {
-                    message(event).map(|message| Ok(Input { at: Instant::now(), message }))
+            match keyboard.wait(None) {
+                Ok(came) => {
+                    if came.into_iter().any(|event| sender.send(Ok(event)).is_err()) {
+                        break;
+                    }
                 }
-                Err(error) => Some(Err(error)),
-            };
-            let Some(input) = input else { continue };
-            let failed = input.is_err();
-            if sender.send(input).is_err() || failed {
-                break;
+                Err(error) => {
+                    let _ = sender.send(Err(error));
+                    break;
+                }
             }
         }
     })?;
@@ -65,102 +62,10 @@ pub fn join(queue: &mut Vec<Input>, input: Input) {
     queue.push(input);
 }
 
-fn message(event: Event) -> Option<Message> {
-    match event {
-        Event::Key(event) => key(event).map(Message::Key),
-        Event::Mouse(event) => mouse(event).map(Message::Mouse),
-        Event::Paste(text) => Some(Message::Paste(text)),
-        Event::Resize(columns, rows) => Some(Message::Resize([columns, rows])),
-        Event::FocusGained | Event::FocusLost => None,
-    }
-}
-
-fn key(event: KeyEvent) -> Option<Key> {
-    if event.kind == KeyEventKind::Release {
-        return None;
-    }
-    let code = match event.code {
-        KeyCode::Char(c) => Code::Char(c),
-        KeyCode::Enter => Code::Enter,
-        KeyCode::Esc => Code::Esc,
-        KeyCode::Tab | KeyCode::BackTab => Code::Tab,
-        KeyCode::Backspace => Code::Backspace,
-        KeyCode::Delete => Code::Delete,
-        KeyCode::Left => Code::Left,
-        KeyCode::Right => Code::Right,
-        KeyCode::Up => Code::Up,
-        KeyCode::Down => Code::Down,
-        KeyCode::Home => Code::Home,
-        KeyCode::End => Code::End,
-        KeyCode::PageUp => Code::PageUp,
-        KeyCode::PageDown => Code::PageDown,
-        KeyCode::F(n) => Code::F(n),
-        _ => return None,
-    };
-    let with = |modifier| event.modifiers.contains(modifier);
-    let character = matches!(code, Code::Char(_));
-    let back = event.code == KeyCode::BackTab;
-    Some(Key {
-        code,
-        ctrl: with(KeyModifiers::CONTROL),
-        alt: with(KeyModifiers::ALT),
-        shift: back || with(KeyModifiers::SHIFT) && !character,
-    })
-}
-
-fn mouse(event: MouseEvent) -> Option<Mouse> {
-    let kind = match event.kind {
-        MouseEventKind::Down(b) => MouseKind::Press(button(b)),
-        MouseEventKind::Up(b) => MouseKind::Release(button(b)),
-        MouseEventKind::Drag(b) => MouseKind::Drag(button(b)),
-        MouseEventKind::ScrollUp => MouseKind::Scroll(1),
-        MouseEventKind::ScrollDown => MouseKind::Scroll(-1),
-        MouseEventKind::Moved | MouseEventKind::ScrollLeft | MouseEventKind::ScrollRight => {
-            return None;
-        }
-    };
-    let modified = event.modifiers.intersects(KeyModifiers::CONTROL | KeyModifiers::ALT);
-    Some(Mouse { kind, column: event.column, row: event.row, modified })
-}
-
-fn button(button: MouseButton) -> Button {
-    match button {
-        MouseButton::Left => Button::Left,
-        MouseButton::Middle => Button::Middle,
-        MouseButton::Right => Button::Right,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn pressed(code: KeyCode, modifiers: KeyModifiers) -> String {
-        key(KeyEvent::new(code, modifiers)).map_or(String::new(), |key| key.to_string())
-    }
-
-    #[test]
-    fn keys_have_the_names_of_the_key_table() {
-        let none = KeyModifiers::NONE;
-        for (code, modifiers, name) in [
-            (KeyCode::Char('a'), none, "a"),
-            (KeyCode::Char('A'), KeyModifiers::SHIFT, "A"),
-            (KeyCode::Char('s'), KeyModifiers::CONTROL, "Ctrl-s"),
-            (KeyCode::Char(' '), none, "Space"),
-            (KeyCode::Left, KeyModifiers::SHIFT, "Shift-Left"),
-            (KeyCode::Up, KeyModifiers::ALT, "Alt-Up"),
-            (KeyCode::BackTab, KeyModifiers::SHIFT, "Shift-Tab"),
-            (KeyCode::BackTab, none, "Shift-Tab"),
-            (KeyCode::PageDown, none, "PageDown"),
-            (KeyCode::F(2), none, "F2"),
-            (KeyCode::CapsLock, none, ""),
-        ] {
-            assert_eq!(pressed(code, modifiers), name);
-        }
-        let release =
-            KeyEvent::new_with_kind(KeyCode::Enter, KeyModifiers::NONE, KeyEventKind::Release);
-        assert_eq!(key(release), None);
-    }
+    use crate::dashboard::input::{Button, Code, Key};
 
     fn at(kind: MouseKind, column: u16) -> Input {
         let mouse = Mouse { kind, column, row: 1, modified: false };

@@ -8,26 +8,26 @@ mod hands;
 mod input;
 mod names;
 mod signals;
-pub mod terminal;
 mod trace;
 mod writer;
 
 use super::message::{Effect, Exported, Message};
 use super::model::{Model, Start};
+use super::terminal::{Event, Keyboard, Reply, Screen, Surroundings, Timed, probe, size};
 use super::update::update;
 use crate::render::Options;
 use crate::render::schedule::{Settings, Stop};
-use crate::render::session::State;
+use crate::render::session::{Snapshot, State};
 use crate::scene::{SceneErrors, SceneFile};
 use crossbeam_channel::{Receiver, after, never, select};
-use frames::Frames;
+use frames::{Drawn, Frames};
 use hands::{Hands, Tools};
 use input::Input;
+use signals::Told;
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use terminal::Screen;
 use trace::Trace;
 
 pub use super::model::Colors;
@@ -42,8 +42,12 @@ pub struct Setup {
     pub options: Options,
     /// How samples are allotted, and when the work is done at first.
     pub settings: Settings,
-    /// How many colours the terminal has.
-    pub colors: Colors,
+    /// How many colours the terminal has; `None`: as it turns out.
+    pub colors: Option<Colors>,
+    /// What the environment tells about the terminal.
+    pub surroundings: Surroundings,
+    /// Bytes a second that are sent, whatever the line may carry; `None`: what it carries.
+    pub bandwidth: Option<f64>,
     /// Where to write how long answers took.
     pub trace: Option<PathBuf>,
 }
@@ -64,7 +68,7 @@ pub struct Ended {
 /// # Errors
 /// If the terminal cannot be used (any more) or there are no threads. The terminal is restored.
 pub fn run(setup: Setup) -> io::Result<Ended> {
-    let Setup { file, threads, options, settings, colors, trace } = setup;
+    let Setup { file, threads, options, settings, colors, surroundings, bandwidth, trace } = setup;
     let (start, file) = match file {
         Ok(file) => (Ok(Arc::new(file.document().scene().clone())), Ok(file)),
         Err((path, errors)) => (Err(errors), Err(path)),
@@ -73,16 +77,21 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         Ok(file) => (file.path().map(PathBuf::from), file.document().name().to_string()),
         Err(path) => (Some(path.clone()), String::new()),
     };
-    let hands = Hands::new(Tools { file, threads, options, settings })?;
+    let mut hands = Hands::new(Tools { file, threads, options, settings })?;
+    if let Ok(scene) = &start {
+        // While the terminal is asked what it can do.
+        hands.show(Arc::clone(scene));
+    }
     let screen = Screen::enter()?;
     let signals = signals::watch(screen.tty())?;
-    let (columns, rows) = crossterm::terminal::size()?;
+    let mut keyboard = Keyboard::new(&surroundings);
+    let terminal = probe(&screen.tty(), &mut keyboard, surroundings)?;
     let model = Model::new(Start {
         path,
         name,
         scene: start,
-        screen: [columns, rows],
-        colors,
+        screen: size()?,
+        colors: colors.unwrap_or(terminal.colors),
         stop: settings.stop,
         threads,
         most_threads: std::thread::available_parallelism().map_or(threads, usize::from),
@@ -90,15 +99,22 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     let mut dashboard = Dashboard {
         model,
         hands,
-        frames: Frames::new(screen.tty())?,
+        frames: Frames::new(screen.tty(), &terminal, bandwidth)?,
         trace: Trace::new(trace.is_some()),
         began: Instant::now(),
         shown: 0,
+        subject: 0,
+        told: Duration::ZERO,
         changed: true,
         quit: false,
     };
-    dashboard.begin();
-    let result = dashboard.watch(&input::read()?, &signals, screen.left());
+    // So that the renderer learns how large the picture is.
+    dashboard.take(Message::Resize(dashboard.model.screen));
+    let input = input::read(keyboard)?;
+    let result = dashboard.watch(&input, &signals, screen.left());
+    if result.is_ok() {
+        dashboard.await_answers(&input);
+    }
     // What is still to be written may take a while: it need not be waited for on an empty screen.
     drop(screen);
     let finished = dashboard.hands.finish();
@@ -123,26 +139,21 @@ struct Dashboard {
     began: Instant,
     /// The scene whose picture the model has: its number.
     shown: u64,
+    /// Counts up when the picture is another one than the same with more samples.
+    subject: u64,
+    /// When the line was told about last.
+    told: Duration,
     /// The screen may have to change.
     changed: bool,
     quit: bool,
 }
 
 impl Dashboard {
-    fn begin(&mut self) {
-        if !self.model.file.blank {
-            let scene = Arc::clone(self.model.scene());
-            self.hands.show(scene);
-        }
-        // So that the renderer learns how large the picture is.
-        self.take(Message::Resize(self.model.screen));
-    }
-
     /// Lets things happen until the end; the exit status of a signal.
     fn watch(
         &mut self,
-        input: &Receiver<io::Result<Input>>,
-        signals: &Receiver<u8>,
+        input: &Receiver<io::Result<Timed>>,
+        signals: &Told,
         left: &Receiver<()>,
     ) -> io::Result<Option<u8>> {
         let bell = self.hands.session().bell().clone();
@@ -151,7 +162,7 @@ impl Dashboard {
         let silence = never();
         let mut waiting = Vec::new();
         while !self.quit {
-            let wait = self.draw()?;
+            let wait = self.draw();
             // A picture is made when the last one has been taken: not before it can be shown.
             let (bell, hungry) = match self.hungry() {
                 None => (&silence, None),
@@ -163,7 +174,7 @@ impl Dashboard {
                 None => never(),
             };
             select! {
-                recv(input) -> event => input::join(&mut waiting, event.map_err(io::Error::other)??),
+                recv(input) -> came => self.note(came.map_err(io::Error::other)??, &mut waiting),
                 recv(bell) -> rung => match rung {
                     Ok(()) => self.take_snapshot(),
                     // Its panic has been told already.
@@ -175,14 +186,19 @@ impl Dashboard {
                         self.trace.written(self.frames.written_at(frame)?);
                     }
                 }
-                recv(signals) -> status => return Ok(status.ok()),
+                recv(signals.end) -> status => return Ok(status.ok()),
+                recv(signals.resized) -> _ => {
+                    let message = Message::Resize(size()?);
+                    input::join(&mut waiting, Input { at: Instant::now(), message });
+                }
                 recv(left) -> _ => return Err(io::Error::other("the dashboard has failed")),
                 recv(timer) -> _ => self.wake(),
             }
-            while let Ok(event) = input.try_recv() {
-                input::join(&mut waiting, event?);
+            while let Ok(came) = input.try_recv() {
+                self.note(came?, &mut waiting);
             }
             for Input { at, message } in waiting.drain(..) {
+                self.frames.act(self.began.elapsed());
                 let scene = self.take(message);
                 self.trace.event(at, scene);
             }
@@ -193,10 +209,41 @@ impl Dashboard {
         Ok(None)
     }
 
+    /// Something came from the terminal: an answer counts at once, what the user did is `waiting`.
+    fn note(&mut self, Timed { at, event }: Timed, waiting: &mut Vec<Input>) {
+        let message = match event {
+            Event::Key(key) => Message::Key(key),
+            Event::Mouse(mouse) => Message::Mouse(mouse),
+            Event::Paste(text) => Message::Paste(text),
+            Event::Reply(Reply::Cursor { .. }) => {
+                self.frames.answered(at.saturating_duration_since(self.began));
+                return;
+            }
+            Event::Reply(_) => return,
+        };
+        input::join(waiting, Input { at, message });
+    }
+
+    /// At the end: what the terminal still has to answer shall not be typed into a shell.
+    fn await_answers(&mut self, input: &Receiver<io::Result<Timed>>) {
+        let end = self.frames.awaits().map(|wait| Instant::now() + wait);
+        while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
+            match input.recv_timeout(left) {
+                Ok(Ok(came)) => self.note(came, &mut Vec::new()),
+                _ => break,
+            }
+            if !self.frames.is_waiting() {
+                break;
+            }
+        }
+    }
+
     /// Takes what happened into the model and does what that asks for; the number of the scene if the
     /// answer needs a new picture.
     fn take(&mut self, message: Message) -> Option<u64> {
         let mut awaited = None;
+        let is_snapshot = matches!(message, Message::Snapshot(_));
+        let version = self.model.picture_version;
         for effect in update(&mut self.model, message, self.began.elapsed()) {
             self.quit |= effect == Effect::Quit;
             let scene = match &effect {
@@ -211,6 +258,9 @@ impl Dashboard {
                 awaited = number;
             }
         }
+        if version != self.model.picture_version && awaited.is_none() && !is_snapshot {
+            self.subject += 1;
+        }
         self.changed = true;
         awaited
     }
@@ -223,7 +273,11 @@ impl Dashboard {
     fn take_snapshot(&mut self) {
         if let Some(snapshot) = self.hands.session().take() {
             let failed = matches!(snapshot.report.state, State::Failed(_));
+            let raster = |s: &Snapshot| s.picture.as_ref().map(|p| [p.cols, p.rows]);
             if snapshot.picture.is_some() || failed {
+                let old = self.model.snapshot.as_deref().and_then(raster);
+                let another = self.shown != snapshot.report.generation;
+                self.subject += u64::from(another || old != raster(&snapshot));
                 self.shown = snapshot.report.generation;
             }
             self.take(Message::Snapshot(Box::new(snapshot)));
@@ -234,7 +288,7 @@ impl Dashboard {
     /// the last one.
     fn hungry(&self) -> Option<Duration> {
         let now = self.began.elapsed();
-        let due = self.frames.due(now, self.trace.answers(u64::MAX));
+        let due = self.frames.hungry_at(now, self.trace.answers(u64::MAX));
         self.frames.ready().then(|| due.saturating_sub(now))
     }
 
@@ -247,28 +301,46 @@ impl Dashboard {
 
     /// Draws if there is something to draw and the terminal can take it. How long to wait for what
     /// happens by itself, if anything.
-    fn draw(&mut self) -> io::Result<Option<Duration>> {
+    fn draw(&mut self) -> Option<Duration> {
         let now = self.began.elapsed();
-        let wakes = self.model.wakes_at();
+        self.frames.look(now);
+        if self.changed && self.told + TELL_INTERVAL <= now {
+            self.told = now;
+            self.take(Message::Line(self.frames.reading()));
+        }
         let mut due = None;
-        if self.changed && self.frames.ready() && !self.quit {
-            let at = self.frames.due(now, self.trace.answers(self.shown));
-            if at <= now {
-                let sent = self.frames.draw(&self.model, now)?;
-                self.trace.sent(self.shown);
-                if !sent {
-                    // The screen was the answer already.
-                    self.trace.written(Instant::now());
+        if self.frames.ready() && !self.quit {
+            let answers = self.trace.answers(self.shown);
+            due = self.frames.due(now, self.changed, answers);
+            if due.is_some_and(|at| at <= now) {
+                let drawn = self.frames.draw(&self.model, now, self.changed, answers, self.subject);
+                self.changed &= drawn == Drawn::Nothing;
+                match drawn {
+                    Drawn::Nothing | Drawn::Waiting => {}
+                    Drawn::Same => {
+                        // The screen was the answer already.
+                        self.trace.sent(self.shown);
+                        self.trace.written(Instant::now());
+                    }
+                    // No picture answers by its number.
+                    Drawn::Text => self.trace.sent(0),
+                    Drawn::Picture => self.trace.sent(self.shown),
                 }
-                self.changed = false;
-            } else {
-                due = Some(at);
+                let answers = self.trace.answers(self.shown);
+                due = if self.frames.ready() {
+                    self.frames.due(now, self.changed, answers)
+                } else {
+                    None
+                };
             }
         }
-        let next = wakes.into_iter().chain(due).min();
-        Ok(next.map(|at| at.saturating_sub(now)))
+        let next = self.model.wakes_at().into_iter().chain(due).min();
+        next.map(|at| at.saturating_sub(now))
     }
 }
+
+/// What the status line tells about the line to the terminal is not older than this.
+const TELL_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Without a better idea the work is done at half a step of an 8-bit file.
 pub const DEFAULT_STOP: Stop =

@@ -1,6 +1,6 @@
 //! Frames on their way to the terminal: a slow one holds up its thread, never the dashboard.
 
-use super::terminal::Tty;
+use crate::dashboard::terminal::Tty;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub struct Writer {
 
 impl Writer {
     /// Starts the thread.
-    pub(super) fn new(tty: Arc<Tty>) -> io::Result<Self> {
+    pub fn new(tty: Arc<Tty>) -> io::Result<Self> {
         let (frames, inbox) = bounded::<Vec<u8>>(1);
         let (outbox, written) = bounded(1);
         thread::Builder::new().name("writer".into()).spawn(move || {
@@ -50,6 +50,11 @@ impl Writer {
     /// An empty buffer.
     pub fn buffer(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.spare)
+    }
+
+    /// Takes back an empty buffer.
+    pub fn keep(&mut self, buffer: Vec<u8>) {
+        self.spare = buffer;
     }
 
     /// Sends a frame. Only when [`Writer::ready`].

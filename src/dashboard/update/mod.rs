@@ -106,6 +106,10 @@ impl<'a> Turn<'a> {
                     export.progress = progress;
                 }
             }
+            Message::Line(line) => {
+                self.follow = false;
+                self.model.line = line;
+            }
             Message::Tick => self.follow = false,
         }
     }

@@ -5,11 +5,12 @@ use crate::dashboard::layout::Area;
 use crate::dashboard::message::Channel;
 use crate::dashboard::model::{Compared, Model};
 use crate::dashboard::raster::{
-    Ink, PictureCells, Raster, Scale, depth, difference, normals, objects,
+    Ink, PictureCell, PictureCells, Raster, Scale, depth, difference, normals, objects,
 };
 use crate::film::{Display, Linear, TILE};
 use crate::render::session::{Snapshot, State};
 use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use std::sync::Arc;
 
@@ -195,20 +196,39 @@ fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
 
 /// Puts cells into `area`, from its upper left corner; what does not fit is left out.
 pub fn paint(cells: &PictureCells, area: Area, buffer: &mut Buffer) {
-    let color = |ink| match ink {
-        Ink::Plain => Color::Reset,
-        Ink::Rgb([r, g, b]) => Color::Rgb(r, g, b),
-        Ink::Indexed(index) => Color::Indexed(index),
-    };
     for row in 0..area.height.min(cells.rows) {
         for column in 0..area.width.min(cells.columns) {
             let Some(cell) = cells.cell(column, row) else { continue };
             if let Some(to) = buffer.cell_mut((area.x + column, area.y + row)) {
+                let [fg, bg] = colors(cell);
                 to.set_char(cell.glyph);
-                to.set_style(Style::new().fg(color(cell.fg)).bg(color(cell.bg)));
+                to.set_style(Style::new().fg(fg).bg(bg));
             }
         }
     }
+}
+
+/// Where cells that were painted into `area` are now, and which of them nothing else was drawn over.
+pub fn uncovered(cells: &PictureCells, area: Area, buffer: &Buffer) -> (Rect, Vec<bool>) {
+    let Area { x, y, width, height } = area;
+    let (width, height) = (width.min(cells.columns), height.min(cells.rows));
+    let place = Rect { x, y, width, height }.intersection(buffer.area);
+    let uncovered = place.positions().map(|at| {
+        let (Some(cell), now) = (cells.cell(at.x - x, at.y - y), &buffer[at]) else {
+            return false;
+        };
+        let same_glyph = now.symbol().chars().eq([cell.glyph]);
+        same_glyph && [now.fg, now.bg] == colors(cell) && now.modifier.is_empty()
+    });
+    (place, uncovered.collect())
+}
+
+fn colors(cell: &PictureCell) -> [Color; 2] {
+    [cell.fg, cell.bg].map(|ink| match ink {
+        Ink::Plain => Color::Reset,
+        Ink::Rgb([r, g, b]) => Color::Rgb(r, g, b),
+        Ink::Indexed(index) => Color::Indexed(index),
+    })
 }
 
 #[cfg(test)]

@@ -23,8 +23,9 @@ use super::model::Model;
 use super::overlay::Overlay;
 use super::raster::{Colors, PictureCells};
 use image::Imager;
+pub use image::is_settled;
 use ratatui::buffer::Buffer;
-use ratatui::layout::Position;
+use ratatui::layout::{Position, Rect};
 use text::{Row, rect};
 use theme::Theme;
 
@@ -35,6 +36,9 @@ pub struct View {
     /// What the picture was made for.
     made_for: Option<Version>,
     picture: PictureCells,
+    /// Where the picture was drawn last, and which of its cells nothing lies over.
+    place: Rect,
+    uncovered: Vec<bool>,
 }
 
 /// What the picture's cells depend on.
@@ -53,10 +57,16 @@ impl View {
         &self.picture
     }
 
+    /// Where the picture was drawn last, and which of its cells, row by row, nothing was drawn over.
+    pub fn place(&self) -> (Rect, &[bool]) {
+        (self.place, &self.uncovered)
+    }
+
     /// Draws `model` on the whole of `buffer`, which is empty and as large as the model's screen.
     /// Where text is being typed, if it is.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme::new(model.colors);
+        (self.place, self.uncovered) = (Rect::ZERO, Vec::new());
         let Some(layout) = model.layout() else {
             too_small(model.screen, buffer);
             return None;
@@ -81,6 +91,9 @@ impl View {
         }
         if model.overlay.is_some() {
             cursor = overlay::draw(model, &theme, buffer);
+        }
+        if !model.file.blank {
+            (self.place, self.uncovered) = image::uncovered(&self.picture, layout.image, buffer);
         }
         cursor
     }

@@ -4,7 +4,9 @@ use super::text::{Row, columns, duration, durations, number};
 use super::theme::Theme;
 use crate::dashboard::hints::{Hint, hints};
 use crate::dashboard::layout::Area;
+use crate::dashboard::link::Mode;
 use crate::dashboard::model::{Model, Tone};
+use crate::dashboard::terminal::Multiplexer;
 use crate::render::schedule::StoppedBy;
 use crate::render::session::{Report, State};
 use ratatui::buffer::Buffer;
@@ -77,6 +79,9 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         let text = format!("{} bad samples", report.bad_samples);
         parts.push(part(3, vec![(text, theme.warn())]));
     }
+    if let Some(line) = &model.line {
+        parts.push(part(6, vec![plain(rate(line.rate)), dim(" "), dim(mode(line.mode))]));
+    }
     let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
     parts.push(part(7, vec![dim(precision)]));
     let threads = match report.threads {
@@ -86,6 +91,28 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     let priority = if model.low_priority { ", low priority" } else { "" };
     parts.push(part(5, vec![dim(&threads), dim(priority)]));
     parts
+}
+
+/// `118 KB/s`, to two or three digits, so that it does not flicker.
+fn rate(bytes_per_second: f64) -> String {
+    let kilobytes = bytes_per_second / 1e3;
+    match kilobytes {
+        ..10.0 => format!("{kilobytes:.1} KB/s"),
+        ..1000.0 => format!("{kilobytes:.0} KB/s"),
+        _ => format!("{:.1} MB/s", kilobytes / 1e3),
+    }
+}
+
+/// How it is known what has arrived.
+fn mode(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Local => "here",
+        Mode::Answers(None) => "answered",
+        Mode::Answers(Some(Multiplexer::Tmux)) => "answered through tmux",
+        Mode::Answers(Some(Multiplexer::Screen)) => "answered through screen",
+        Mode::Queue => "by the kernel's queue",
+        Mode::Fixed => "fixed",
+    }
 }
 
 fn state(model: &Model, report: &Report, theme: &Theme) -> (String, Style) {
@@ -174,6 +201,12 @@ fn fitting(all: &[Hint], width: usize) -> Vec<Hint> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rates_have_few_digits() {
+        let shown = [2000.0, 9940.0, 29_600.0, 118_400.0, 2.34e6].map(rate);
+        assert_eq!(shown, ["2.0 KB/s", "9.9 KB/s", "30 KB/s", "118 KB/s", "2.3 MB/s"]);
+    }
 
     #[test]
     fn hints_are_dropped_whole_and_the_way_to_help_stays() {

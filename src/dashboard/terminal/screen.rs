@@ -1,6 +1,7 @@
 //! The terminal as the dashboard needs it, and back: raw mode, alternate screen, mouse, paste.
 
 use crossbeam_channel::{Receiver, Sender, bounded};
+use rustix::termios::{OptionalActions, Termios, tcgetattr, tcgetwinsize, tcsetattr};
 use std::io::{self, Write};
 use std::panic;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,25 +27,42 @@ pub struct Screen {
 }
 
 /// What the threads share that write to the terminal.
-pub(super) struct Tty {
+pub struct Tty {
     out: Mutex<Box<dyn Write + Send>>,
     entered: AtomicBool,
-    raw: bool,
+    /// The modes of stdin as they were.
+    before: Option<Termios>,
     leaving: Sender<()>,
 }
 
+/// Columns and rows of the terminal that stdout leads to.
+///
+/// # Errors
+/// If stdout is no terminal.
+pub fn size() -> io::Result<[u16; 2]> {
+    let size = tcgetwinsize(io::stdout())?;
+    // Some lines do not tell a size: it is zero then.
+    Ok(if size.ws_col == 0 || size.ws_row == 0 { [80, 24] } else { [size.ws_col, size.ws_row] })
+}
+
 impl Screen {
-    /// Takes the terminal that stdout leads to.
+    /// Takes the terminal that stdin comes from and stdout leads to.
+    ///
+    /// # Errors
+    /// If stdin is no terminal or stdout cannot be written.
     pub fn enter() -> io::Result<Self> {
-        crossterm::terminal::enable_raw_mode()?;
+        let before = tcgetattr(io::stdin())?;
+        let mut raw = before.clone();
+        raw.make_raw();
+        tcsetattr(io::stdin(), OptionalActions::Now, &raw)?;
         // From here on `Drop` restores the terminal, even if entering fails half-way.
-        Self::over(Box::new(io::stdout()), true)
+        Self::over(Box::new(io::stdout()), Some(before))
     }
 
-    fn over(out: Box<dyn Write + Send>, raw: bool) -> io::Result<Self> {
+    fn over(out: Box<dyn Write + Send>, before: Option<Termios>) -> io::Result<Self> {
         let (leaving, left) = bounded(1);
-        let tty =
-            Arc::new(Tty { out: Mutex::new(out), entered: AtomicBool::new(true), raw, leaving });
+        let out = Mutex::new(out);
+        let tty = Arc::new(Tty { out, entered: AtomicBool::new(true), before, leaving });
         let screen = Self { tty, left };
         let tty = Arc::clone(&screen.tty);
         let report = panic::take_hook();
@@ -62,7 +80,8 @@ impl Screen {
         &self.left
     }
 
-    pub(super) fn tty(&self) -> Arc<Tty> {
+    /// What writes to the terminal; for threads.
+    pub fn tty(&self) -> Arc<Tty> {
         Arc::clone(&self.tty)
     }
 }
@@ -94,8 +113,9 @@ impl Tty {
             // If the terminal has gone there is nothing left to restore.
             let _ = out.write_all(LEAVE.as_bytes()).and_then(|()| out.flush());
         }
-        if self.raw {
-            let _ = crossterm::terminal::disable_raw_mode();
+        if let Some(before) = &self.before {
+            // What has come and was not read yet, such as late replies, is for nobody else.
+            let _ = tcsetattr(io::stdin(), OptionalActions::Flush, before);
         }
         let _ = self.leaving.try_send(());
     }
@@ -140,7 +160,7 @@ mod tests {
     #[test]
     fn what_is_entered_is_left_once() {
         let paper = Paper::default();
-        let screen = Screen::over(Box::new(paper.clone()), false).unwrap();
+        let screen = Screen::over(Box::new(paper.clone()), None).unwrap();
         let tty = screen.tty();
         tty.write(b"frame").unwrap();
         drop(screen);
@@ -169,7 +189,7 @@ mod tests {
     #[test]
     fn a_panic_in_any_thread_gives_the_terminal_back_and_says_so() {
         let paper = Paper::default();
-        let screen = Screen::over(Box::new(paper.clone()), false).unwrap();
+        let screen = Screen::over(Box::new(paper.clone()), None).unwrap();
         assert!(screen.left().try_recv().is_err());
         thread::spawn(|| panic!("as the test wants it")).join().unwrap_err();
         screen.left().recv_timeout(Duration::from_secs(10)).expect("told that it was left");
@@ -180,7 +200,7 @@ mod tests {
 
     #[test]
     fn a_terminal_that_does_not_read_does_not_hold_up_the_end() {
-        let screen = Screen::over(Box::new(Paper::default()), false).unwrap();
+        let screen = Screen::over(Box::new(Paper::default()), None).unwrap();
         let tty = screen.tty();
         let _busy = tty.out.lock().unwrap();
         let begun = Instant::now();

@@ -1,0 +1,121 @@
+//! What the kernel has sent over the connection of SSH and nobody has confirmed (proc(5),
+//! `/proc/net/tcp`). It sees the way to the next host only.
+
+use std::fs;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+
+/// The connection of SSH.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Queue {
+    local: SocketAddr,
+    remote: SocketAddr,
+}
+
+impl Queue {
+    /// By `SSH_CONNECTION`, if the kernel knows that connection.
+    pub fn find(ssh_connection: &str) -> Option<Self> {
+        let queue = Self::named(ssh_connection)?;
+        queue.bytes().is_some().then_some(queue)
+    }
+
+    /// Bytes that are not confirmed; `None`: the connection is not known.
+    pub fn bytes(&self) -> Option<usize> {
+        let tables = ["/proc/net/tcp", "/proc/net/tcp6"];
+        tables.into_iter().find_map(|path| self.found(&fs::read_to_string(path).ok()?))
+    }
+
+    /// `client-address client-port server-address server-port`.
+    fn named(text: &str) -> Option<Self> {
+        let fields: Vec<_> = text.split_whitespace().collect();
+        let [client, client_port, server, server_port] = fields[..] else { return None };
+        let address = |ip: &str, port: &str| {
+            // A scope such as `%eth0` is not part of the table's addresses.
+            let ip = ip.split('%').next()?.parse().ok()?;
+            Some(SocketAddr::new(unmapped(ip), port.parse().ok()?))
+        };
+        Some(Self { local: address(server, server_port)?, remote: address(client, client_port)? })
+    }
+
+    fn found(&self, table: &str) -> Option<usize> {
+        table.lines().skip(1).find_map(|line| {
+            let mut fields = line.split_whitespace().skip(1);
+            let [local, remote] = [fields.next()?, fields.next()?].map(address);
+            let queues = fields.nth(1)?;
+            let is_it = local? == self.local && remote? == self.remote;
+            is_it.then(|| usize::from_str_radix(queues.split(':').next()?, 16).ok())?
+        })
+    }
+}
+
+/// An address of the table: the 32-bit words of the IP address in the machine's order, in hexadecimal,
+/// and the port.
+fn address(text: &str) -> Option<SocketAddr> {
+    let (words, port) = text.split_once(':')?;
+    let mut bytes = Vec::with_capacity(16);
+    for at in (0..words.len()).step_by(8) {
+        let word = u32::from_str_radix(words.get(at..at + 8)?, 16).ok()?;
+        bytes.extend(word.to_ne_bytes());
+    }
+    let ip = match <[u8; 4]>::try_from(&*bytes) {
+        Ok(v4) => IpAddr::V4(Ipv4Addr::from(v4)),
+        Err(_) => IpAddr::V6(Ipv6Addr::from(<[u8; 16]>::try_from(&*bytes).ok()?)),
+    };
+    Some(SocketAddr::new(unmapped(ip), u16::from_str_radix(port, 16).ok()?))
+}
+
+/// IPv4 over a socket of IPv6 is IPv4.
+fn unmapped(ip: IpAddr) -> IpAddr {
+    match ip {
+        IpAddr::V6(v6) => v6.to_ipv4_mapped().map_or(ip, IpAddr::V4),
+        IpAddr::V4(_) => ip,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+    use std::net::{TcpListener, TcpStream};
+
+    #[test]
+    #[cfg(target_endian = "little")]
+    fn rows_are_found_by_both_addresses() {
+        let head = "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt\n";
+        let v4 = "   0: 0200000A:0016 0100000A:1388 01 00003E80:00000000 01:00000014 00000000  0\n";
+        let v6 = "   1: 0000000000000000FFFF00000200000A:0016 0000000000000000FFFF00000100000A:1389 \
+                  01 00000010:00000000 01:00000014\n";
+        let table = format!("{head}{v4}{v6}");
+        let found = |text: &str| Queue::named(text).and_then(|queue| queue.found(&table));
+        assert_eq!(found("10.0.0.1 5000 10.0.0.2 22"), Some(16_000));
+        assert_eq!(found("10.0.0.1 5001 10.0.0.2 22"), Some(16));
+        assert_eq!(found("::ffff:10.0.0.1 5001 ::ffff:10.0.0.2 22"), Some(16));
+        assert_eq!(found("10.0.0.1 5002 10.0.0.2 22"), None);
+        for wrong in ["", "10.0.0.1 22", "a b c d", "10.0.0.1 5000 10.0.0.2 99999"] {
+            assert_eq!(found(wrong), None, "{wrong}");
+        }
+        assert_eq!(
+            Queue::named("10.0.0.1 5000 10.0.0.2 22").unwrap().found("nonsense\n0:\n"),
+            None
+        );
+    }
+
+    /// A connection of this very test: what nobody reads stays.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn the_kernel_tells_what_is_held_back() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let mut server = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let (_client, from) = listener.accept().unwrap();
+        let remote = listener.local_addr().unwrap();
+        let text = format!("{} {} {} {}", remote.ip(), remote.port(), from.ip(), from.port());
+        let Some(queue) = Queue::find(&text) else {
+            // Some containers hide the table.
+            assert!(!std::path::Path::new("/proc/net/tcp").exists(), "{text} is not found");
+            return;
+        };
+        assert_eq!(queue.bytes(), Some(0));
+        server.set_nonblocking(true).unwrap();
+        while server.write(&[0; 1 << 16]).is_ok() {}
+        assert!(queue.bytes().is_some_and(|bytes| bytes > 1 << 16));
+    }
+}

@@ -1,0 +1,306 @@
+//! Cells as bytes, and few of them: a colour is sent only if the pen has another one, of the glyphs
+//! that look alike that one is taken for which the pen has to change least, and the cursor moves by
+//! the shortest way.
+
+use ratatui::buffer::Cell;
+use ratatui::style::{Color, Modifier};
+use std::io::Write;
+use unicode_width::UnicodeWidthStr;
+
+/// Attributes: their bit, the code that sets them, and the one that resets them.
+const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
+    (Modifier::BOLD, 1, 22),
+    (Modifier::DIM, 2, 22),
+    (Modifier::ITALIC, 3, 23),
+    (Modifier::UNDERLINED, 4, 24),
+    (Modifier::SLOW_BLINK, 5, 25),
+    (Modifier::RAPID_BLINK, 6, 25),
+    (Modifier::REVERSED, 7, 27),
+    (Modifier::HIDDEN, 8, 28),
+    (Modifier::CROSSED_OUT, 9, 29),
+];
+
+/// Attributes with which a space is not only its ground.
+const LINES: Modifier = Modifier::REVERSED.union(Modifier::UNDERLINED).union(Modifier::CROSSED_OUT);
+
+/// What the terminal writes with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Pen {
+    fg: Color,
+    bg: Color,
+    modifier: Modifier,
+}
+
+/// What a terminal of some width has been told about its pen and its cursor.
+#[derive(Clone, Debug)]
+pub struct Encoder {
+    pen: Pen,
+    /// Column and row where the next character appears, if that is certain.
+    at: Option<(u16, u16)>,
+    columns: u16,
+}
+
+impl Encoder {
+    /// For a terminal whose pen has been reset.
+    pub fn new(columns: u16) -> Self {
+        let pen = Pen { fg: Color::Reset, bg: Color::Reset, modifier: Modifier::empty() };
+        Self { pen, at: None, columns }
+    }
+
+    /// Empties the terminal.
+    pub fn clear(&mut self, out: &mut Vec<u8>) {
+        *self = Self::new(self.columns);
+        out.extend(b"\x1b[m\x1b[2J");
+    }
+
+    /// Writes a cell.
+    pub fn cell(&mut self, out: &mut Vec<u8>, x: u16, y: u16, cell: &Cell) {
+        self.go(out, x, y);
+        let (symbol, pen) = self.cheapest(cell);
+        self.set(out, pen);
+        out.extend(symbol.as_bytes());
+        let width = symbol.width() as u16;
+        // At the right edge terminals differ, and about unusual widths, too.
+        self.at = (width == 1 && x + 1 < self.columns).then_some((x + 1, y));
+    }
+
+    /// Moves the cursor.
+    pub fn go(&mut self, out: &mut Vec<u8>, x: u16, y: u16) {
+        let before = self.at.replace((x, y));
+        let counted = |n: u16, letter: char| match n {
+            1 => format!("\x1b[{letter}"),
+            n => format!("\x1b[{n}{letter}"),
+        };
+        let relative = match before {
+            Some(at) if at == (x, y) => return,
+            Some((from, row)) if row == y && from < x => Some(counted(x - from, 'C')),
+            Some((from, row)) if row == y => Some(counted(from - x, 'D')),
+            Some((_, row)) if row + 1 == y && x == 0 => Some("\r\n".to_string()),
+            Some((column, row)) if column == x && row < y => Some(counted(y - row, 'B')),
+            _ => None,
+        };
+        let absolute = match (x, y) {
+            (0, 0) => "\x1b[H".to_string(),
+            (0, y) => format!("\x1b[{}H", y + 1),
+            (x, y) => format!("\x1b[{};{}H", y + 1, x + 1),
+        };
+        let way = relative.filter(|way| way.len() <= absolute.len()).unwrap_or(absolute);
+        out.extend(way.as_bytes());
+    }
+
+    /// Of what looks like `cell` the symbol and the pen that need the fewest changes.
+    fn cheapest<'a>(&self, cell: &'a Cell) -> (&'a str, Pen) {
+        let Cell { fg, bg, modifier, .. } = *cell;
+        let symbol = cell.symbol();
+        let pen = |fg, bg| Pen { fg, bg, modifier };
+        let plain = (symbol, pen(fg, bg));
+        let halves = match symbol {
+            _ if modifier.intersects(LINES) => return plain,
+            " " => [bg, bg],
+            "█" => [fg, fg],
+            "▀" => [fg, bg],
+            "▄" => [bg, fg],
+            _ => return plain,
+        };
+        let [upper, lower] = halves;
+        let same = upper == lower;
+        // The terminal's own colours are other ones in front than behind.
+        let movable = upper != Color::Reset && lower != Color::Reset;
+        let ways: &[(&str, Pen)] = match (movable, same) {
+            (true, true) => &[(" ", pen(self.pen.fg, upper)), ("█", pen(upper, self.pen.bg))],
+            (true, false) => &[("▀", pen(upper, lower)), ("▄", pen(lower, upper))],
+            (false, _) if symbol == " " => &[(" ", pen(self.pen.fg, bg))],
+            (false, _) => &[plain],
+        };
+        let changes = |(symbol, pen): &(&str, Pen)| {
+            let colors = usize::from(pen.fg != self.pen.fg) + usize::from(pen.bg != self.pen.bg);
+            // Much the most of it are the colours; then the glyph.
+            16 * colors + symbol.len()
+        };
+        ways.iter().min_by_key(|way| changes(way)).copied().unwrap_or(plain)
+    }
+
+    fn set(&mut self, out: &mut Vec<u8>, pen: Pen) {
+        if pen == self.pen {
+            return;
+        }
+        let plain = Pen { fg: Color::Reset, bg: Color::Reset, modifier: Modifier::empty() };
+        let mut codes = Vec::new();
+        if pen != plain {
+            let gone = self.pen.modifier - pen.modifier;
+            let mut lost = Modifier::empty();
+            for (attribute, _, reset) in ATTRIBUTES {
+                if gone.contains(attribute) {
+                    codes.push(reset.to_string());
+                    // One code takes back all attributes that it belongs to.
+                    let with = ATTRIBUTES.iter().filter(|(_, _, other)| *other == reset);
+                    with.for_each(|(attribute, _, _)| lost |= *attribute);
+                }
+            }
+            let missing = pen.modifier - (self.pen.modifier - lost);
+            for (attribute, set, _) in ATTRIBUTES {
+                if missing.contains(attribute) {
+                    codes.push(set.to_string());
+                }
+            }
+            for (new, old, base) in [(pen.fg, self.pen.fg, 30), (pen.bg, self.pen.bg, 40)] {
+                if new != old {
+                    codes.push(color_code(new, base));
+                }
+            }
+        }
+        // Writing to memory does not fail.
+        let _ = write!(out, "\x1b[{}m", codes.join(";"));
+        self.pen = pen;
+    }
+}
+
+/// The parameters that choose a colour; `base`: 30 in front, 40 behind (ISO 8613-6 for those with
+/// numbers).
+fn color_code(color: Color, base: u8) -> String {
+    let dark = |n: u8| (base + n).to_string();
+    let bright = |n: u8| (base + 60 + n).to_string();
+    match color {
+        Color::Reset => dark(9),
+        Color::Black => dark(0),
+        Color::Red => dark(1),
+        Color::Green => dark(2),
+        Color::Yellow => dark(3),
+        Color::Blue => dark(4),
+        Color::Magenta => dark(5),
+        Color::Cyan => dark(6),
+        Color::Gray => dark(7),
+        Color::DarkGray => bright(0),
+        Color::LightRed => bright(1),
+        Color::LightGreen => bright(2),
+        Color::LightYellow => bright(3),
+        Color::LightBlue => bright(4),
+        Color::LightMagenta => bright(5),
+        Color::LightCyan => bright(6),
+        Color::White => bright(7),
+        Color::Rgb(r, g, b) => format!("{};2;{r};{g};{b}", base + 8),
+        Color::Indexed(index) => format!("{};5;{index}", base + 8),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use ratatui::buffer::Buffer;
+    use ratatui::layout::Rect;
+    use ratatui::style::Style;
+    use std::num::NonZeroU16;
+
+    const SIZE: [u16; 2] = [9, 5];
+
+    fn encoded(cells: &[(u16, u16, Cell)]) -> String {
+        let (mut encoder, mut out) = (Encoder::new(80), Vec::new());
+        cells.iter().for_each(|(x, y, cell)| encoder.cell(&mut out, *x, *y, cell));
+        String::from_utf8(out).unwrap()
+    }
+
+    fn half(symbol: &'static str, fg: u8, bg: u8) -> Cell {
+        let mut cell = Cell::new(symbol);
+        cell.set_style(Style::new().fg(Color::Rgb(fg, 0, 0)).bg(Color::Rgb(bg, 0, 0)));
+        cell
+    }
+
+    #[test]
+    fn only_what_changes_is_sent() {
+        let cells = [(0, 0, half("▀", 1, 2)), (1, 0, half("▀", 1, 3)), (2, 0, half("▀", 3, 1))];
+        let bytes = encoded(&cells);
+        let expected = "\x1b[H\x1b[38;2;1;0;0;48;2;2;0;0m▀\x1b[48;2;3;0;0m▀▄";
+        assert_eq!(bytes, expected);
+        let cells = [(5, 1, half("▀", 1, 2)), (6, 1, half(" ", 7, 2)), (7, 1, half("▀", 1, 1))];
+        assert_eq!(encoded(&cells), "\x1b[2;6H\x1b[38;2;1;0;0;48;2;2;0;0m▀ █");
+    }
+
+    #[test]
+    fn the_shortest_way() {
+        let x = |x, y| (x, y, Cell::new("x"));
+        let bytes = encoded(&[x(3, 2), x(5, 2), x(20, 2), x(2, 2), x(3, 4), x(0, 5), x(0, 7)]);
+        let expected = "\x1b[3;4Hx\x1b[Cx\x1b[14Cx\x1b[19Dx\x1b[2Bx\r\nx\x1b[8Hx";
+        assert_eq!(bytes, expected);
+    }
+
+    fn color() -> impl Strategy<Value = Color> {
+        prop_oneof![
+            Just(Color::Reset),
+            (0u8..3).prop_map(|n| Color::Rgb(n, 20, 30)),
+            (0u8..3).prop_map(Color::Indexed),
+        ]
+    }
+
+    fn any_cell() -> impl Strategy<Value = Cell> {
+        let symbol = prop_oneof![Just("▀"), Just("▄"), Just("█"), Just(" "), Just("a"), Just("é")];
+        // Bold and dim at once look different from terminal to terminal; nothing here is.
+        let weight =
+            prop_oneof![Just(Modifier::empty()), Just(Modifier::BOLD), Just(Modifier::DIM)];
+        let style = prop_oneof![
+            Just(Modifier::empty()),
+            Just(Modifier::ITALIC),
+            Just(Modifier::UNDERLINED),
+            Just(Modifier::ITALIC | Modifier::UNDERLINED),
+        ];
+        let parts = (symbol, color(), color(), weight, style);
+        parts.prop_map(|(symbol, fg, bg, weight, style)| {
+            let mut cell = Cell::new(symbol);
+            let modifier = weight | style;
+            cell.set_style(Style::new().fg(fg).bg(bg).add_modifier(modifier));
+            cell
+        })
+    }
+
+    /// How a cell looks: what does not show does not count.
+    fn look(cell: &vt100::Cell) -> (String, String) {
+        let [fg, bg] = [cell.fgcolor(), cell.bgcolor()].map(|color| format!("{color:?}"));
+        let attributes =
+            format!("{}{}{}{}", cell.bold(), cell.dim(), cell.italic(), cell.underline());
+        let plain = "Default";
+        match cell.contents() {
+            "▀" => (format!("{fg}/{bg}"), attributes),
+            "▄" if fg != plain && bg != plain => (format!("{bg}/{fg}"), attributes),
+            "█" if fg != plain => (format!("{fg}/{fg}"), attributes),
+            " " | "" if bg != plain && !cell.underline() => (format!("{bg}/{bg}"), attributes),
+            " " | "" if !cell.underline() => ("empty".into(), attributes),
+            text => (format!("{text} {fg} {bg}"), attributes),
+        }
+    }
+
+    proptest! {
+        /// An emulator shows what was encoded, in any order and over anything that was there.
+        #[test]
+        fn what_is_encoded_is_shown(
+            cells in prop::collection::vec((0..SIZE[0], 0..SIZE[1], any_cell()), 1..120),
+        ) {
+            let [columns, rows] = SIZE;
+            let [wide, high] = SIZE.map(|n| NonZeroU16::new(n).unwrap());
+            let mut parser = vt100::Parser::new(high, wide, 0);
+            let mut expected = Buffer::empty(Rect::new(0, 0, columns, rows));
+            let mut encoder = Encoder::new(columns);
+            let mut out = Vec::new();
+            encoder.clear(&mut out);
+            for (x, y, cell) in &cells {
+                encoder.cell(&mut out, *x, *y, cell);
+                expected[(*x, *y)] = cell.clone();
+            }
+            parser.process(&out);
+            for y in 0..rows {
+                for x in 0..columns {
+                    // The same cell, sent alone and as it is.
+                    let cell = &expected[(x, y)];
+                    let mut alone = vt100::Parser::new(high, wide, 0);
+                    let mut bytes = Vec::new();
+                    let mut encoder = Encoder::new(columns);
+                    let pen = Pen { fg: cell.fg, bg: cell.bg, modifier: cell.modifier };
+                    encoder.set(&mut bytes, pen);
+                    bytes.extend(cell.symbol().as_bytes());
+                    alone.process(&bytes);
+                    let shown = look(parser.screen().cell(y, x).unwrap());
+                    prop_assert_eq!(shown, look(alone.screen().cell(0, 0).unwrap()), "{} {}", x, y);
+                }
+            }
+        }
+    }
+}
