@@ -15,6 +15,9 @@ mod compare;
 #[allow(dead_code, reason = "of tests/agreement; not all of it is needed here")]
 #[path = "../agreement/compounds.rs"]
 mod compounds;
+#[allow(dead_code, reason = "of tests/agreement; not all of it is needed here")]
+#[path = "../agreement/meshes.rs"]
+mod meshes;
 #[path = "../support/mod.rs"]
 mod support;
 #[allow(dead_code, reason = "of tests/agreement; not all of it is needed here")]
