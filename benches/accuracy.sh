@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Measures what docs/accuracy.md names and puts the tables and drawings there anew. For a quiet machine.
 #
+#     cargo build --release
 #     benches/accuracy.sh [KEY...]      only the blocks with these keys
 #
 # In docs/accuracy.md a block between `<!-- measured: KEY SCENE OPTIONS -->` and `<!-- end -->` is replaced by what
@@ -11,7 +12,7 @@ cd "$(dirname "$0")/.."
 
 page=docs/accuracy.md
 day="$(date +%F)"
-cargo build --release --quiet
+zerkalo="${ZERKALO:-target/release/zerkalo}"
 scratch="$(mktemp -d)"
 trap 'rm -rf "$scratch"' EXIT
 
@@ -22,7 +23,7 @@ while read -r key scene options; do
     fi
     echo "$key: $scene $options" >&2
     # shellcheck disable=SC2086 # Options are words.
-    target/release/zerkalo measure "scenes/$scene.toml" $options \
+    "$zerkalo" measure "scenes/$scene.toml" $options \
         --plot "docs/images/accuracy-$key.svg" --csv "benches/runs/$day-accuracy-$key.csv" \
         > "$scratch/$key.txt" < /dev/null
     awk -v key="$key" -v text="$scratch/$key.txt" '
