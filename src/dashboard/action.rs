@@ -142,6 +142,10 @@ pub enum Action {
     SaveAs,
     /// Reads the file again.
     Reload,
+    /// Takes up the unsaved edits of a session that broke off.
+    Recover,
+    /// Gives the terminal to the shell until it calls back.
+    Suspend,
     /// Ends the program; asks if there are unsaved edits.
     Quit,
 

@@ -75,6 +75,11 @@ impl Frames {
         })
     }
 
+    /// Nothing is known any more of what the terminal shows.
+    pub fn forget(&mut self) {
+        self.pacing = Pacing::new();
+    }
+
     /// Whether the last frame has been written.
     pub fn ready(&self) -> bool {
         self.writer.ready()

@@ -69,7 +69,8 @@ impl Turn<'_> {
                 self.model.history.mark_saved(scene);
                 self.model.last_edit = None;
                 self.notify(Tone::Good, format!("saved {}", self.model.file.name), Some(3.0));
-                if std::mem::take(&mut self.model.quit_when_saved) {
+                // What was edited while the file was written is not left behind.
+                if std::mem::take(&mut self.model.quit_when_saved) && !self.model.is_unsaved() {
                     self.emit(Effect::Quit);
                 }
             }
@@ -214,7 +215,7 @@ impl Turn<'_> {
 }
 
 /// With a capital at the beginning.
-fn capital(text: &str) -> String {
+pub(super) fn capital(text: &str) -> String {
     let mut chars = text.chars();
     chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
 }
