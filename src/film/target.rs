@@ -203,7 +203,9 @@ impl Target {
     fn explained(&self, error: &io::Error, directory: &Path) -> WriteError {
         let shown = directory.display();
         match error.kind() {
-            ErrorKind::AlreadyExists => self.error("there is such a file already", "name another one"),
+            ErrorKind::AlreadyExists => {
+                self.error("there is such a file already", "name another one")
+            }
             ErrorKind::NotFound if !directory.exists() => self.error(
                 format!("the directory {shown} does not exist"),
                 "create it first or name another one",

@@ -98,7 +98,8 @@ impl Recovery {
             }
             None => format!("{:.40}", name.replace('/', "-")),
         };
-        homes.extend(state.map(|folder| (folder.to_path_buf(), format!("{called}.unsaved").into())));
+        homes
+            .extend(state.map(|folder| (folder.to_path_buf(), format!("{called}.unsaved").into())));
         Self { homes, own: None }
     }
 

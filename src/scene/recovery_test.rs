@@ -75,10 +75,7 @@ fn sessions_side_by_side_have_files_of_their_own() {
     assert_eq!(found.lost.len(), 6);
     assert!(found.lost.windows(2).all(|pair| pair[0].written >= pair[1].written));
     found.lost.into_iter().for_each(super::Lost::discard);
-    assert_eq!(
-        names(folder.path()),
-        [".a.toml.unsaved", ".a.toml.unsaved-2", ".a.toml.unsaved-5"]
-    );
+    assert_eq!(names(folder.path()), [".a.toml.unsaved", ".a.toml.unsaved-2", ".a.toml.unsaved-5"]);
 }
 
 #[test]
@@ -144,7 +141,10 @@ fn links_lead_to_the_same_edits_and_nothing_is_read_through_a_planted_one() {
     symlink(&path, &link).unwrap();
     let mut keeper = of(&link);
     keeper.keep("one", None).unwrap();
-    assert_eq!(keeper.path(), Some(&*fs::canonicalize(folder.path()).unwrap().join(".a.toml.unsaved")));
+    assert_eq!(
+        keeper.path(),
+        Some(&*fs::canonicalize(folder.path()).unwrap().join(".a.toml.unsaved"))
+    );
     let mode = fs::metadata(keeper.path().unwrap()).unwrap().permissions().mode();
     assert_eq!(mode & 0o777, 0o600, "for nobody else's eyes");
     drop(keeper);

@@ -93,7 +93,10 @@ mod tests {
         for wrong in ["", "10.0.0.1 22", "a b c d", "10.0.0.1 5000 10.0.0.2 99999"] {
             assert_eq!(found(wrong), None, "{wrong}");
         }
-        assert_eq!(Queue::named("10.0.0.1 5000 10.0.0.2 22").unwrap().found("nonsense\n0:\n"), None);
+        assert_eq!(
+            Queue::named("10.0.0.1 5000 10.0.0.2 22").unwrap().found("nonsense\n0:\n"),
+            None
+        );
     }
 
     /// A connection of this very test: what nobody reads stays.

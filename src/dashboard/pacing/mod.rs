@@ -179,7 +179,8 @@ impl Pacing {
             for (x, y, cell) in row {
                 // A wide character takes the cells beside it as well.
                 let width = unicode_width::UnicodeWidthStr::width(cell.symbol()).max(1) as u16;
-                for x in (*x..x.saturating_add(width)).take_while(|x| *x < wanted.cells.area.width) {
+                for x in (*x..x.saturating_add(width)).take_while(|x| *x < wanted.cells.area.width)
+                {
                     self.shown[(x, *y)] = wanted.cells[(x, *y)].clone();
                     if let Some(at) = wanted.place(x, *y) {
                         self.sight.covered(at);

@@ -371,7 +371,10 @@ mod tests {
         assert!(fs::read_to_string(&hidden).unwrap().contains("64"));
         let (files, inbox) = opened(&path);
         let offered = inbox.recv_timeout(PATIENCE).unwrap();
-        assert!(matches!(&offered, Message::LeftBehind(left) if left.scene == scene), "{offered:?}");
+        assert!(
+            matches!(&offered, Message::LeftBehind(left) if left.scene == scene),
+            "{offered:?}"
+        );
         files.take_up();
         files.journal(Some(Arc::clone(&scene)));
         files.save(Arc::clone(&scene), None, false);

@@ -55,11 +55,7 @@ pub enum Drawn {
 
 impl Frames {
     /// For a terminal that shows nothing. `bandwidth`: bytes a second that the user wants to be sent.
-    pub fn new(
-        tty: Arc<Tty>,
-        terminal: &Capabilities,
-        bandwidth: Option<f64>,
-    ) -> io::Result<Self> {
+    pub fn new(tty: Arc<Tty>, terminal: &Capabilities, bandwidth: Option<f64>) -> io::Result<Self> {
         let queue = terminal.surroundings.ssh.as_deref().and_then(Queue::find);
         Ok(Self {
             view: View::default(),

@@ -144,11 +144,8 @@ mod tests {
             ("xterm-256color", "truecolor", "1", Colors::Mono),
             ("", "", "", Colors::Indexed),
         ] {
-            let found = surroundings(&[
-                ("TERM", term),
-                ("COLORTERM", color_term),
-                ("NO_COLOR", no_color),
-            ]);
+            let found =
+                surroundings(&[("TERM", term), ("COLORTERM", color_term), ("NO_COLOR", no_color)]);
             assert_eq!(found.colors(), expected, "{term} {color_term} {no_color}");
         }
     }

@@ -59,8 +59,7 @@ pub fn probe(
         found.learn(reply);
         matches!(reply, Reply::Attributes(_))
     })?;
-    if let (Some(_), Some(multiplexer)) =
-        (&found.surroundings.ssh, found.surroundings.multiplexer)
+    if let (Some(_), Some(multiplexer)) = (&found.surroundings.ssh, found.surroundings.multiplexer)
     {
         let asked = Instant::now();
         tty.write(cursor_question(Some(multiplexer)).as_bytes())?;
@@ -103,7 +102,9 @@ impl Capabilities {
     /// Takes an answer into account.
     pub fn learn(&mut self, reply: &Reply) {
         match reply {
-            Reply::Attributes(attributes) => self.sixel = attributes.iter().skip(1).any(|a| *a == 4),
+            Reply::Attributes(attributes) => {
+                self.sixel = attributes.iter().skip(1).any(|a| *a == 4)
+            }
             Reply::Mode { mode: SYNCHRONISED, setting } => {
                 self.synchronised = [1, 2, 3].contains(setting);
             }

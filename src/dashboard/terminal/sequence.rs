@@ -97,8 +97,8 @@ pub fn console(last: u8) -> Option<Event> {
 
 /// The three bytes after `ESC [ M`.
 pub fn old_mouse(bytes: &[u8]) -> Option<Event> {
-    let [button, column, row] = bytes.iter().map(|b| b.checked_sub(32)).collect::<Option<Vec<_>>>()?
-        [..]
+    let [button, column, row] =
+        bytes.iter().map(|b| b.checked_sub(32)).collect::<Option<Vec<_>>>()?[..]
     else {
         return None;
     };

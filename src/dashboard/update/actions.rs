@@ -24,7 +24,17 @@ fn needs_no_scene(action: Action) -> bool {
     use Action::*;
     matches!(
         action,
-        Help | Palette | Quit | Suspend | Recover | Reload | Leave | Cursor(_) | First | Last | Page(_) | NextColors
+        Help | Palette
+            | Quit
+            | Suspend
+            | Recover
+            | Reload
+            | Leave
+            | Cursor(_)
+            | First
+            | Last
+            | Page(_)
+            | NextColors
     )
 }
 
