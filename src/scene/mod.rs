@@ -31,7 +31,7 @@ pub use included::{BUILT_IN, built_in, starter};
 pub use library::Library;
 pub use message::{Message, SceneErrors};
 pub use object::{OBJECT_FIELDS, Object};
-pub use recovery::{Found, Lost, Recovery, state_folder, sweep};
+pub use recovery::{Found, Lost, Recovery, kept_in, state_folder, sweep};
 pub use reference::reference;
 pub use schema::FIELDS;
 pub use settings::{

@@ -305,6 +305,15 @@ fn read(kept: Kept) -> io::Result<Lost> {
     Ok(Lost { kept, text, base, written })
 }
 
+/// Files in `folder` that hold unsaved edits.
+pub fn kept_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_kept = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().contains(".unsaved");
+    let mut kept: Vec<_> = entries.filter(is_kept).map(|entry| entry.path()).collect();
+    kept.sort();
+    kept
+}
+
 /// Removes what programs have left half-written in `folder` that were killed.
 pub fn sweep(folder: &Path) {
     let [prefix, suffix] = TEMPORARY;

@@ -1,6 +1,7 @@
 //! The dashboard at work: terminal, keys, renderer, files, time. One thread decides and draws; whatever
 //! could keep it waiting has a thread of its own.
 
+mod examine;
 mod exports;
 mod files;
 mod frames;
@@ -34,6 +35,7 @@ use std::time::{Duration, Instant};
 use trace::Trace;
 
 pub use super::model::Colors;
+pub use examine::{Examined, examine};
 
 /// What a dashboard is started with.
 pub struct Setup {
