@@ -3,7 +3,7 @@
 use super::*;
 use std::io::Write;
 use std::process::{Command, Stdio};
-use zerkalo::dashboard::run::terminal::{ENTER, LEAVE, Screen};
+use zerkalo::dashboard::terminal::{ENTER, LEAVE, Screen};
 
 fn signal(name: &str, id: u32) {
     let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
@@ -58,7 +58,7 @@ fn a_panic_is_told_on_a_restored_terminal() {
         "--ignored",
         "--nocapture",
     ];
-    let start = Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &[] };
+    let start = Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &[], answers: true };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 0, "{bytes}");
     let [entered, left, told, after] = [ENTER, LEAVE, "as the test wants it", "still alive"]
@@ -83,7 +83,7 @@ fn without_a_terminal_one_line_tells_what_to_do() {
 
     let command = [PROGRAM];
     let env = [("TERM", "dumb")];
-    let start = Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &env };
+    let start = Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &env, answers: true };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 2);
     assert!(bytes.contains("zerkalo render") && !bytes.contains('\x1b'), "{bytes:?}");
@@ -125,6 +125,42 @@ fn pasted_text_presses_no_keys() {
     wait_for_picture(&terminal);
     terminal.send("\x1b[200~qqq]]]x\x1b[201~");
     // The program goes on, and nothing was edited: it ends without a question.
+    terminal.send("?");
+    terminal.wait_for_text("orbit left");
+    terminal.send("\x1b");
+    terminal.wait_until_gone("orbit left");
+    terminal.send("q");
+    assert_eq!(terminal.end().0, 0);
+}
+
+/// Over SSH, as far as the program knows.
+const SSH: &[(&str, &str)] = &[("SSH_CONNECTION", "192.0.2.1 50000 192.0.2.2 22")];
+
+#[test]
+fn a_terminal_that_never_answers_is_served_slowly() {
+    let desk = Desk::new();
+    let (folder, size) = (desk.0.path(), [120, 36]);
+    let start = Start { command: &[PROGRAM], folder, size, env: SSH, answers: false };
+    let mut terminal = Terminal::start(&start);
+    wait_for_picture(&terminal);
+    terminal.wait_for_text("KB/s fixed");
+    terminal.send("?");
+    terminal.wait_for_text("orbit left");
+    terminal.send("\x1bq");
+    assert_eq!(terminal.end().0, 0);
+}
+
+#[test]
+fn answers_may_stay_away_and_come_late() {
+    let desk = Desk::new();
+    let (folder, size) = (desk.0.path(), [120, 36]);
+    let start = Start { command: &[PROGRAM], folder, size, env: SSH, answers: true };
+    let mut terminal = Terminal::start(&start);
+    // On this machine the answer comes too soon to be trusted: nobody far away has given it.
+    terminal.wait_for_text("KB/s fixed");
+    wait_for_picture(&terminal);
+    // Replies that nobody asked for press no keys.
+    terminal.send("\x1b[24;80R\x1b]11;rgb:1e1e/1e1e/2e2e\x1b\\\x1b[?2026;2$y\x1b_Gi=31;OK\x1b\\\x1b[>0;276;0c");
     terminal.send("?");
     terminal.wait_for_text("orbit left");
     terminal.send("\x1b");

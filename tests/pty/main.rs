@@ -36,7 +36,7 @@ impl Desk {
     /// The dashboard in a terminal of `size` columns and rows.
     fn open(&self, args: &[&str], size: [u16; 2]) -> Terminal {
         let command = [&[PROGRAM], args].concat();
-        Terminal::start(&Start { command: &command, folder: self.0.path(), size, env: &[] })
+        Terminal::start(&Start { command: &command, folder: self.0.path(), size, env: &[], answers: true })
     }
 
     /// What `zerkalo render` writes.

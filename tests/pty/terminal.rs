@@ -5,6 +5,7 @@ use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_p
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -23,12 +24,21 @@ struct Output {
 /// One program at a time: each wants all processors.
 static TURN: Mutex<()> = Mutex::new(());
 
+/// What keys and answers are written to.
+type Keyboard = Arc<Mutex<Box<dyn Write + Send>>>;
+
+/// Questions of programs, and the answers of a terminal with synchronised output.
+const ANSWERS: [(&[u8], &str); 3] =
+    [(b"\x1b[c", "\x1b[?62;22c"), (b"\x1b[?2026$p", "\x1b[?2026;2$y"), (b"\x1b[6n", "")];
+
 /// A program in its terminal.
 pub struct Terminal {
     master: Box<dyn MasterPty + Send>,
     /// Kept open, so that the state of the terminal can be asked for after the program's end.
     slave: Option<Box<dyn SlavePty + Send>>,
-    keyboard: Box<dyn Write + Send>,
+    keyboard: Keyboard,
+    /// Questions are answered.
+    answering: Arc<AtomicBool>,
     child: Box<dyn Child + Send + Sync>,
     output: Arc<(Mutex<Output>, Condvar)>,
     before: String,
@@ -45,6 +55,8 @@ pub struct Start<'a> {
     pub size: [u16; 2],
     /// Environment, beside that of the tests.
     pub env: &'a [(&'a str, &'a str)],
+    /// The terminal answers questions.
+    pub answers: bool,
 }
 
 impl Terminal {
@@ -71,22 +83,37 @@ impl Terminal {
         let output = Arc::new((Mutex::new(output), Condvar::new()));
         let mut reader = pair.master.try_clone_reader().unwrap();
         let shared = Arc::clone(&output);
+        let keyboard: Keyboard = Arc::new(Mutex::new(pair.master.take_writer().unwrap()));
+        let answering = Arc::new(AtomicBool::new(start.answers));
+        let (answers, willing) = (Arc::clone(&keyboard), Arc::clone(&answering));
         std::thread::spawn(move || {
             let mut buffer = vec![0; 1 << 16];
+            let mut begun = Vec::new();
             loop {
                 let read = reader.read(&mut buffer).unwrap_or(0);
+                let asked = questions(&mut begun, &buffer[..read]);
                 let mut output = shared.0.lock().unwrap();
                 output.ended = read == 0;
                 output.parser.process(&buffer[..read]);
                 output.bytes.extend_from_slice(&buffer[..read]);
+                let (row, column) = output.parser.screen().cursor_position();
                 shared.1.notify_all();
+                drop(output);
+                if willing.load(Ordering::Relaxed) {
+                    let place = format!("\x1b[{};{}R", row + 1, column + 1);
+                    let answer = |text: &str| if text.is_empty() { place.clone() } else { text.into() };
+                    let all: String = asked.into_iter().map(answer).collect();
+                    // The program may have ended meanwhile.
+                    let _ = answers.lock().unwrap().write_all(all.as_bytes());
+                }
                 if read == 0 {
                     break;
                 }
             }
         });
         Self {
-            keyboard: pair.master.take_writer().unwrap(),
+            keyboard,
+            answering,
             master: pair.master,
             slave: Some(pair.slave),
             child,
@@ -98,8 +125,14 @@ impl Terminal {
 
     /// Sends what the keyboard, the mouse or the clipboard would send.
     pub fn send(&mut self, keys: &str) {
-        self.keyboard.write_all(keys.as_bytes()).unwrap();
-        self.keyboard.flush().unwrap();
+        let mut keyboard = self.keyboard.lock().unwrap();
+        keyboard.write_all(keys.as_bytes()).unwrap();
+        keyboard.flush().unwrap();
+    }
+
+    /// From now on questions are answered, or not.
+    pub fn answer(&self, answering: bool) {
+        self.answering.store(answering, Ordering::Relaxed);
     }
 
     /// Waits until the screen is as `wanted`; on failure prints it and `what` was waited for.
@@ -193,6 +226,25 @@ impl Terminal {
         );
         (status, all)
     }
+}
+
+/// The answers that `bytes`, after what has `begun` before, ask for; what may be the beginning of
+/// another question is remembered.
+fn questions(begun: &mut Vec<u8>, bytes: &[u8]) -> Vec<&'static str> {
+    begun.extend_from_slice(bytes);
+    let mut answers = Vec::new();
+    let mut read = 0;
+    for at in 0..begun.len() {
+        for (question, answer) in ANSWERS {
+            if begun[at..].starts_with(question) {
+                answers.push(answer);
+                read = at + question.len();
+            }
+        }
+    }
+    let longest = ANSWERS.iter().map(|(question, _)| question.len()).max().unwrap_or(0);
+    begun.drain(..read.max(begun.len().saturating_sub(longest - 1)));
+    answers
 }
 
 /// A test that fails leaves no program behind.

@@ -27,6 +27,8 @@ pub const TEXT_INTERVAL: Duration = Duration::from_millis(500);
 const FRAME_SPAN: Duration = Duration::from_millis(100);
 /// Fewest, first and most bytes of a frame.
 const BUDGET: [f64; 3] = [2e3, 8e3, 200e3];
+/// Most frames on their way.
+const MOST_FLIGHTS: usize = 6;
 /// Bytes of text that may be sent beside frames on their way.
 const BESIDE: usize = 1500;
 /// Bytes that are measured too roughly to say that a line has become slower.
@@ -124,7 +126,9 @@ pub struct Link {
 struct Held {
     bytes: f64,
     asked: Option<Duration>,
-    /// Since when it has always held something back, and what was sent before.
+    /// Bytes that it had got rid of then.
+    gone: f64,
+    /// Since when it has always held something back, and what it had got rid of before.
     busy: Option<(Duration, f64)>,
     sent: f64,
 }
@@ -207,7 +211,8 @@ impl Link {
 
     /// What may be sent now; `answers`: it shows what the user has just done. `None`: nothing.
     pub fn allowance(&self, now: Duration, answers: bool) -> Option<Allowance> {
-        let bytes = self.budget();
+        // A small frame, because its answer is to tell how long the way is.
+        let bytes = if self.is_learning(now) { SMALL } else { self.budget() };
         let due = |interval| self.last_frame.is_none_or(|last| answers || last + interval <= now);
         if due(FRAME_INTERVAL) && self.has_room(now, answers) {
             let flush = if self.flush_at <= now { bytes / 2 } else { 0 };
@@ -236,7 +241,7 @@ impl Link {
             Mode::Fixed => frame.max(self.free_at),
         };
         let at = if text { room.min(after(TEXT_INTERVAL)) } else { room };
-        at.max(now + Duration::from_millis(1))
+        if at > now { at } else { now + QUEUE_INTERVAL }
     }
 
     /// When a slice of differences that nobody sees may go.
@@ -276,7 +281,7 @@ impl Link {
         let Some((flight, arrived)) = self.flights.answered(at) else { return false };
         self.losses = 0;
         let took = at.saturating_sub(flight.sent);
-        if flight.alone && (self.round_trip.is_none() || self.is_learning(at)) {
+        if flight.alone && flight.bytes <= SMALL && self.is_learning(at) {
             self.round_trip = Some(took);
             self.learned = at;
         }
@@ -303,20 +308,31 @@ impl Link {
             return;
         };
         let held = &mut self.held_back;
-        held.bytes = bytes as f64;
-        held.asked = Some(now);
+        let gone = held.sent - bytes as f64;
+        let before = held.asked.replace(now).map(|asked| (asked, held.gone));
+        (held.bytes, held.gone) = (bytes as f64, gone);
+        let (since, at_first) = match (before, held.busy) {
+            // The line has nothing to do: it is at least as fast as what it has taken.
+            (Some(before), _) if bytes == 0 => before,
+            (_, Some(busy)) => busy,
+            _ => {
+                held.busy = Some((now, gone));
+                return;
+            }
+        };
+        let span = now.saturating_sub(since);
+        let rate = (gone - at_first) / span.as_secs_f64().max(1e-3);
         if bytes == 0 {
             held.busy = None;
+            if rate <= self.rate {
+                return;
+            }
+        } else if span < FRAME_SPAN {
             return;
+        } else {
+            held.busy = Some((now, gone));
         }
-        let gone = held.sent - held.bytes;
-        let (since, before) = *held.busy.get_or_insert((now, gone));
-        let span = now.saturating_sub(since);
-        if span >= FRAME_SPAN {
-            let rate = ((gone - before) / span.as_secs_f64()).max(BUDGET[0]);
-            self.rate = (1.0 - NEWEST) * self.rate + NEWEST * rate;
-            self.held_back.busy = Some((now, gone));
-        }
+        self.rate = (1.0 - NEWEST) * self.rate + NEWEST * rate.max(BUDGET[0]);
     }
 
     /// Time has passed: answers that have not come by now are not waited for.
@@ -356,12 +372,11 @@ impl Link {
         match self.mode {
             Mode::Local => true,
             Mode::Answers(_) => {
-                let most = match (now < self.acting_until, self.is_learning(now)) {
-                    (true, _) => 1 + usize::from(answers),
-                    // So that the next question is answered with nothing before it.
-                    (false, true) => 1,
-                    (false, false) => 2,
-                };
+                if self.is_learning(now) {
+                    return self.flights.is_empty();
+                }
+                let acting = now < self.acting_until;
+                let most = if acting { 1 + usize::from(answers) } else { self.flights_at_once() };
                 self.flights.pictures() < most
             }
             Mode::Queue => {
@@ -375,8 +390,16 @@ impl Link {
         }
     }
 
+    /// Frames on their way that keep the line busy: one that it carries, and what the way holds.
+    fn flights_at_once(&self) -> usize {
+        let way = self.round_trip.unwrap_or_default().as_secs_f64() / FRAME_SPAN.as_secs_f64();
+        (1 + way.round() as usize).clamp(2, MOST_FLIGHTS)
+    }
+
+    /// Whether the next frame is to tell how long the way is: not while somebody acts.
     fn is_learning(&self, now: Duration) -> bool {
-        self.learned + LEARN_INTERVAL <= now
+        let known = self.round_trip.is_some() && now < self.learned + LEARN_INTERVAL;
+        matches!(self.mode, Mode::Answers(_)) && !known && now >= self.acting_until
     }
 
     fn lost_at(&self) -> Option<Duration> {

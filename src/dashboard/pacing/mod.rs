@@ -12,7 +12,7 @@ mod sight;
 mod tests;
 
 use super::link::Allowance;
-use encode::Encoder;
+pub use encode::Encoder;
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::{Position, Rect};
 use sight::Sight;
@@ -223,6 +223,7 @@ impl Pacing {
         let idle_at = if wanted.settled { now } else { self.since + IDLE };
         let mut frame = Frame::default();
         self.rest.visible = !visible.is_empty();
+        self.fresh &= self.rest.visible;
         if !visible.is_empty() && allowance.picture {
             let all = visible.len();
             let exact = |at: usize| &wanted.cells[position(area, at)];
@@ -246,7 +247,6 @@ impl Pacing {
             self.send(wanted, part, out);
             self.rest.visible = self.sight.has_visible();
         } else if visible.is_empty() && allowance.picture && idle_at <= now && allowance.flush > 0 {
-            self.fresh = false;
             let mut hidden = self.sight.hidden();
             let exact = |at: usize| &wanted.cells[position(area, at)];
             let room = allowance.flush.min(allowance.bytes);

@@ -33,9 +33,9 @@ mod tests {
         let black = Some([0; 3]);
         let pixels = [white, black, white, black, black, None, white, white, white];
         let found = blocks(&pixels, 3, 2);
-        // Half of the light of white is code 188; a third 156.
-        let mean = Some([156; 3]);
-        assert_eq!(found[..3], [mean, mean, Some([188; 3])]);
+        // A quarter of the light of white is code 137.
+        let mean = Some([137; 3]);
+        assert_eq!(found[..3], [mean, mean, white]);
         assert_eq!(found[3..6], [mean, mean, None]);
         assert_eq!(found[6..], [white, white, white]);
         assert_eq!(blocks(&[], 0, 2), []);

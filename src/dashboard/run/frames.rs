@@ -28,8 +28,6 @@ pub struct Frames {
     /// Where the cursor ought to be shown, if it ought to.
     cursor: Option<Position>,
     facts: Facts,
-    /// There may be text that was not looked at for lack of room.
-    unsaid: bool,
 }
 
 /// What a frame has to know of the model, as it was when it was drawn.
@@ -43,8 +41,10 @@ struct Facts {
 /// What became of an attempt to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drawn {
-    /// Nothing may be sent now.
+    /// Nothing may be sent now; nothing was drawn.
     Nothing,
+    /// Only the picture differs, and has to wait.
+    Waiting,
     /// The screen is as it ought to be, in what matters.
     Same,
     /// A frame was sent without the picture.
@@ -67,7 +67,6 @@ impl Frames {
             wanted: Buffer::empty(Rect::ZERO),
             cursor: None,
             facts: Facts::default(),
-            unsaid: true,
         })
     }
 
@@ -126,7 +125,7 @@ impl Frames {
     /// `answers`: what is drawn shows what the user has just done.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
         let rest = self.pacing.rest();
-        let text = changed || rest.text || self.unsaid;
+        let text = changed || rest.text;
         if !text && !rest.visible {
             let hidden = rest.hidden?.max(self.link.flush_at());
             let may = self.link.allowance(now, false).is_some_and(|allowance| allowance.picture);
@@ -170,11 +169,10 @@ impl Frames {
         }
         let empty = bytes.len();
         let frame = self.pacing.frame(&wanted, now, allowance, self.link.threshold(), &mut bytes);
-        self.unsaid = false;
         if bytes.len() == empty {
             bytes.clear();
             self.writer.keep(bytes);
-            return if self.pacing.rest().visible { Drawn::Nothing } else { Drawn::Same };
+            return if self.pacing.rest().visible { Drawn::Waiting } else { Drawn::Same };
         }
         if self.synchronised {
             bytes.extend(SYNCHRONISED[1]);

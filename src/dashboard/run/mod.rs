@@ -350,7 +350,7 @@ impl Dashboard {
                 let drawn = self.frames.draw(&self.model, now, self.changed, answers, self.subject);
                 self.changed &= drawn == Drawn::Nothing;
                 match drawn {
-                    Drawn::Nothing => {}
+                    Drawn::Nothing | Drawn::Waiting => {}
                     Drawn::Same => {
                         // The screen was the answer already.
                         self.trace.sent(self.shown);

@@ -5,13 +5,13 @@
 use super::drawn;
 use super::states::{STATES, tracing};
 use crate::dashboard::model::{Colors, Model};
+use crate::dashboard::pacing::Encoder;
 use crate::film::Display;
 use crate::render::schedule::{Criterion, Settings, Stop};
 use crate::render::session::{Session, Snapshot, State, View};
 use crate::render::{Options, Rendering};
 use crate::sampling::{SampleSettings, SamplerKind};
 use crate::world;
-use ratatui::backend::{Backend, CrosstermBackend};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -65,14 +65,12 @@ fn paint() {
                 model.colors = colors;
                 let (buffer, _) = drawn(&model);
                 let mut bytes = Vec::new();
-                let mut encoder = CrosstermBackend::new(&mut bytes);
-                encoder.clear().unwrap();
-                encoder
-                    .draw(buffer.content().iter().enumerate().map(|(i, cell)| {
-                        let (x, y) = buffer.pos_of(i);
-                        (x, y, cell)
-                    }))
-                    .unwrap();
+                let mut encoder = Encoder::new(buffer.area.width);
+                encoder.clear(&mut bytes);
+                for (i, cell) in buffer.content().iter().enumerate() {
+                    let (x, y) = buffer.pos_of(i);
+                    encoder.cell(&mut bytes, x, y, cell);
+                }
                 let file = format!("{name}-{}x{}-{level}.ans", screen[0], screen[1]);
                 std::fs::write(Path::new(&folder).join(file), bytes).unwrap();
             }

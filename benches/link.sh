@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# How long answers take over a slow line: `cargo bench --bench link` behind an OpenSSH server, plain and
+# inside tmux. Installs what is missing where it may.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+missing=()
+[ -x /usr/sbin/sshd ] || missing+=(openssh-server)
+command -v ssh >/dev/null || missing+=(openssh-client)
+command -v tmux >/dev/null || missing+=(tmux)
+if [ ${#missing[@]} -gt 0 ]; then
+    if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null &&
+        apt-get install -y --no-install-recommends "${missing[@]}" >/dev/null 2>&1; then
+        echo "installed: ${missing[*]}"
+    else
+        echo "not here and not to be installed: ${missing[*]}; what needs them is skipped"
+    fi
+fi
+echo "machine: $(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | xargs), $(nproc) cores; $(date +%F)"
+echo "line: 1 Mbit/s, 50 ms each way; 160x45 cells; from a key to the first change of the picture"
+cargo bench --quiet --bench link "$@"

@@ -1,0 +1,158 @@
+//! From a key to the first change of the picture over a slow line: the program itself behind a real
+//! OpenSSH server on loopback, with a relay between that limits it to 1 Mbit/s and delays everything by
+//! 50 ms, plain and inside tmux. `benches/link.sh` installs what it needs.
+
+#[path = "../../tests/pty/terminal.rs"]
+mod terminal;
+
+mod relay;
+mod server;
+
+use relay::Relay;
+use server::Server;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use terminal::{Start, Terminal};
+use zerkalo::dashboard::raster::Oklab;
+use zerkalo::scene::BUILT_IN;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
+const SIZE: [u16; 2] = [160, 45];
+/// Bytes a second: 1 Mbit/s.
+const RATE: f64 = 125e3;
+const ONE_WAY: Duration = Duration::from_millis(50);
+const KEYS: usize = 40;
+
+/// Two steps to the right, two to the left: the camera stays about where it is.
+const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[C", "\x1b[D", "\x1b[D"];
+
+fn main() {
+    // `cargo test --benches` only wants to know whether it runs.
+    if !std::env::args().any(|argument| argument == "--bench") {
+        return;
+    }
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("room.toml"), BUILT_IN).unwrap();
+    let server = match Server::start(folder.path()) {
+        Ok(server) => server,
+        Err(why) => return println!("skipped: {why}"),
+    };
+    println!("{:42} {:>7} {:>7} {:>7} {:>7}  bytes/s while converging", "", "median", "p95", "max", "keys");
+    let room = folder.path().join("room.toml");
+    let program = format!("COLORTERM=truecolor {PROGRAM} {}", room.display());
+    measure("plain", &server, folder.path(), &program, true);
+    measure("plain, answers lost after the start", &server, folder.path(), &program, false);
+    let fixed = format!("{program} --bandwidth 30");
+    measure("plain, --bandwidth 30", &server, folder.path(), &fixed, true);
+    if Command::new("tmux").arg("-V").output().is_err() {
+        return println!("inside tmux: skipped, there is no tmux");
+    }
+    for (name, passthrough) in [("tmux, passthrough", "on"), ("tmux, no passthrough", "off")] {
+        let settings = folder.path().join("tmux.conf");
+        let text = format!(
+            "set -g allow-passthrough {passthrough}\nset -g status off\nset -g escape-time 10\n\
+             set -as terminal-features ',*:RGB'\n"
+        );
+        fs::write(&settings, text).unwrap();
+        let socket = format!("zerkalo-bench-{}", std::process::id());
+        let command = format!("tmux -L {socket} -f {} new-session '{program}'", settings.display());
+        measure(name, &server, folder.path(), &command, true);
+        let _ = Command::new("tmux").args(["-L", &socket, "kill-server"]).status();
+    }
+}
+
+/// Opens the dashboard, lets it converge, presses keys.
+fn measure(name: &str, server: &Server, folder: &Path, program: &str, answering: bool) {
+    let relay = Relay::start(server.address, RATE, ONE_WAY).unwrap();
+    let command = server.ssh(relay.address, program);
+    let words: Vec<&str> = command.iter().map(String::as_str).collect();
+    let start = Start { command: &words, folder, size: SIZE, env: &[], answers: true };
+    let mut terminal = Terminal::start(&start);
+    terminal.wait_for_text("spp");
+    terminal.answer(answering);
+    // Noise that is not reached: it converges all the time.
+    terminal.send("T");
+    terminal.wait_for_text("top at");
+    terminal.send("\x15noise 0.01\r");
+    std::thread::sleep(Duration::from_secs(if answering { 3 } else { 12 }));
+    let busy = busy(&relay, &mut terminal);
+    let mut seconds: Vec<f64> = (0..KEYS).map(|i| pressed(&mut terminal, i)).collect();
+    seconds.sort_by(f64::total_cmp);
+    let quantile = |share: f64| seconds[((share * KEYS as f64).ceil() as usize).max(1) - 1];
+    println!(
+        "{name:42} {:5.3} s {:5.3} s {:5.3} s {KEYS:7}  {:.0} % of the line; {}",
+        quantile(0.5),
+        quantile(0.95),
+        quantile(1.0),
+        100.0 * busy,
+        status(&terminal),
+    );
+    // The connection breaks off.
+    drop(terminal);
+}
+
+/// The share of the line that is used in the second after another picture has begun.
+fn busy(relay: &Relay, terminal: &mut Terminal) -> f64 {
+    let mut shares = Vec::new();
+    for i in 0..6 {
+        terminal.send(ARROWS[i % ARROWS.len()]);
+        std::thread::sleep(Duration::from_millis(300));
+        let (before, begun) = (relay.carried(), Instant::now());
+        std::thread::sleep(Duration::from_millis(700));
+        let carried = (relay.carried() - before) as f64;
+        shares.push(carried / begun.elapsed().as_secs_f64() / RATE);
+        std::thread::sleep(Duration::from_millis(1500));
+    }
+    shares.iter().sum::<f64>() / shares.len() as f64
+}
+
+/// Presses a key; seconds until the picture is clearly another one.
+fn pressed(terminal: &mut Terminal, i: usize) -> f64 {
+    // Not in step with anything.
+    std::thread::sleep(Duration::from_millis(1500 + 37 * (i as u64 % 11)));
+    let before = terminal.screen(colors);
+    let begun = Instant::now();
+    terminal.send(ARROWS[i % ARROWS.len()]);
+    terminal.wait_for("another picture", |screen| {
+        let now = colors(screen);
+        let changed = before.iter().filter(|(at, old)| {
+            let new = now.get(at).copied().unwrap_or([0; 3]);
+            Oklab::of(**old).distance(Oklab::of(new)) > 0.12
+        });
+        (changed.count() >= 25).then_some(())
+    });
+    begun.elapsed().as_secs_f64()
+}
+
+/// The colours behind the picture's cells.
+fn colors(screen: &vt100::Screen) -> BTreeMap<(u16, u16), [u8; 3]> {
+    let (rows, columns) = screen.size();
+    let cells = (0..rows.get()).flat_map(|row| (0..columns.get()).map(move |column| (row, column)));
+    let color = |(row, column)| {
+        let cell = screen.cell(row, column)?;
+        let color = if cell.contents() == "▄" || cell.contents() == "█" {
+            cell.fgcolor()
+        } else {
+            cell.bgcolor()
+        };
+        match color {
+            vt100::Color::Rgb(r, g, b) => Some(((row, column), [r, g, b])),
+            _ => None,
+        }
+    };
+    cells.filter_map(color).collect()
+}
+
+/// What the status line says about the line.
+fn status(terminal: &Terminal) -> String {
+    terminal.screen(|screen| {
+        let text = screen.contents();
+        let line = text.lines().find(|line| line.contains("B/s")).unwrap_or_default();
+        let parts: Vec<_> = line.split("  ").filter(|part| part.contains("B/s")).collect();
+        parts.first().map_or("no rate is shown".to_string(), |part| part.trim().to_string())
+    })
+}

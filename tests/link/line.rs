@@ -1,0 +1,104 @@
+//! A line of some rate and delay with a terminal at its end that answers, in counted time.
+
+use std::collections::VecDeque;
+use std::num::NonZeroU16;
+use std::time::Duration;
+use zerkalo::dashboard::link::{Link, Mode, Start};
+use zerkalo::dashboard::pacing::{Pacing, Wanted};
+
+/// The line, the terminal, and the program's idea of both.
+pub struct Line {
+    pub link: Link,
+    pub pacing: Pacing,
+    pub parser: vt100::Parser,
+    pub now: Duration,
+    /// Bytes a second.
+    rate: f64,
+    one_way: Duration,
+    free_at: Duration,
+    /// Frames on the line: when they are there.
+    coming: VecDeque<(Duration, Vec<u8>)>,
+    answers: VecDeque<Duration>,
+    /// Answers come back.
+    pub answering: bool,
+    pub sent: Vec<Sent>,
+}
+
+/// A frame that was sent.
+#[derive(Clone, Copy, Debug)]
+pub struct Sent {
+    pub bytes: usize,
+    /// What it was allowed to be.
+    pub budget: usize,
+    pub flushed: usize,
+}
+
+const STEP: Duration = Duration::from_millis(1);
+
+impl Line {
+    /// `round_trip`: of an empty line.
+    pub fn new([columns, rows]: [u16; 2], rate: f64, round_trip: Duration) -> Self {
+        let start = Start {
+            mode: Mode::Answers(None),
+            round_trip: Some(round_trip),
+            queue: false,
+            fixed_rate: 30e3,
+        };
+        let [columns, rows] = [columns, rows].map(|n| NonZeroU16::new(n).unwrap());
+        Self {
+            link: Link::new(start),
+            pacing: Pacing::new(),
+            parser: vt100::Parser::new(rows, columns, 0),
+            now: Duration::ZERO,
+            rate,
+            one_way: round_trip / 2,
+            free_at: Duration::ZERO,
+            coming: VecDeque::new(),
+            answers: VecDeque::new(),
+            answering: true,
+            sent: Vec::new(),
+        }
+    }
+
+    /// Lets so much time pass while `wanted` is to be shown.
+    pub fn pass(&mut self, wanted: &Wanted, time: Duration) {
+        let end = self.now + time;
+        while self.now < end {
+            self.now += STEP;
+            self.arrive();
+            self.link.look(self.now);
+            if let Some(allowance) = self.link.allowance(self.now, false) {
+                let mut bytes = Vec::new();
+                let threshold = self.link.threshold();
+                let frame = self.pacing.frame(wanted, self.now, allowance, threshold, &mut bytes);
+                if !bytes.is_empty() {
+                    self.link.sent(self.now, bytes.len(), frame.picture, frame.flushed);
+                    let [size, budget] = [bytes.len(), allowance.bytes];
+                    self.sent.push(Sent { bytes: size, budget, flushed: frame.flushed });
+                    let took = Duration::from_secs_f64(size as f64 / self.rate);
+                    self.free_at = self.free_at.max(self.now) + took;
+                    self.coming.push_back((self.free_at + self.one_way, bytes));
+                }
+            }
+        }
+    }
+
+    /// Bytes sent in all.
+    pub fn total(&self) -> usize {
+        self.sent.iter().map(|sent| sent.bytes).sum()
+    }
+
+    fn arrive(&mut self) {
+        while self.coming.front().is_some_and(|(at, _)| *at <= self.now) {
+            let (at, bytes) = self.coming.pop_front().unwrap();
+            self.parser.process(&bytes);
+            if self.answering && self.link.question().is_some() {
+                self.answers.push_back(at + self.one_way);
+            }
+        }
+        while self.answers.front().is_some_and(|at| *at <= self.now) {
+            let at = self.answers.pop_front().unwrap();
+            self.link.answered(at);
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! A screen of 160 x 45 cells: a picture that converges, and a line of text below.
+
+use crate::support;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::{Color, Style};
+use zerkalo::dashboard::pacing::Wanted;
+use zerkalo::dashboard::raster::{Colors, Ink, Oklab, PictureCells, Raster};
+use zerkalo::film::{Display, Part};
+use zerkalo::render::Rendering;
+use zerkalo::render::schedule::{Schedule, Step, Stop};
+use zerkalo::scene::Scene;
+use zerkalo::world::Precision;
+
+pub const SCREEN: [u16; 2] = [160, 45];
+/// All but the last row show the picture.
+const PICTURE: Rect = Rect { x: 0, y: 0, width: SCREEN[0], height: SCREEN[1] - 1 };
+
+/// A picture at work: a sample per half cell at first.
+pub struct Work {
+    rendering: Rendering,
+    schedule: Schedule,
+    pool: rayon::ThreadPool,
+    cells: Buffer,
+    uncovered: Vec<bool>,
+    subject: u64,
+    version: u64,
+    samples: f64,
+    pub done: bool,
+}
+
+impl Work {
+    /// A scene, until it has so many samples per pixel.
+    pub fn new(scene: &Scene, spp: u32) -> Self {
+        let size = [PICTURE.width, 2 * PICTURE.height].map(u32::from);
+        let scene = support::sized(scene.clone(), size);
+        let rendering = support::begin(&scene, 0, Precision::Auto);
+        let stop = Stop { spp: Some(spp), ..Stop::default() };
+        let schedule = rendering.schedule(support::settings(false, 0, stop));
+        let [width, height] = SCREEN;
+        Self {
+            rendering,
+            schedule,
+            pool: support::pool(2),
+            cells: Buffer::empty(Rect { x: 0, y: 0, width, height }),
+            uncovered: vec![true; usize::from(PICTURE.width) * usize::from(PICTURE.height)],
+            subject: 0,
+            version: 0,
+            samples: 0.0,
+            done: false,
+        }
+    }
+
+    /// Traces one wave; afterwards it may be done.
+    pub fn wave(&mut self) {
+        match self.schedule.next(0.0) {
+            Step::Rest(_) => self.done = true,
+            Step::Trace(wave) => {
+                let report = support::trace(&mut self.rendering, &wave, &self.pool);
+                self.schedule.complete(&wave, &report);
+            }
+        }
+        let film = &self.rendering.film;
+        let counts = film.tile(0).map_or([0, 0], |tile| tile.counts());
+        self.samples = f64::from(counts[0] + counts[1]);
+        self.version += 1;
+        let radiance = support::picture(&self.rendering, Part::Both);
+        let display = Display::default();
+        let [width, height] = [PICTURE.width, 2 * PICTURE.height].map(usize::from);
+        let raster = Raster::from_fn(width, height, |i| display.codes_8(radiance[i]));
+        self.cells.reset();
+        let picture = PictureCells::new(&raster, Colors::True, self.done);
+        for (cell, at) in picture.cells.iter().zip(PICTURE.positions()) {
+            let [fg, bg] = [cell.fg, cell.bg].map(|ink| match ink {
+                Ink::Rgb([r, g, b]) => Color::Rgb(r, g, b),
+                _ => Color::Reset,
+            });
+            self.cells[at].set_char(cell.glyph).set_style(Style::new().fg(fg).bg(bg));
+        }
+        let text = format!(" {} samples per pixel, wave {}", self.samples, self.version);
+        self.cells.set_string(0, PICTURE.height, text, Style::new());
+    }
+
+    /// Another picture from here on.
+    pub fn edit(&mut self, scene: &Scene, spp: u32) {
+        let Self { subject, version, .. } = *self;
+        *self = Self { subject: subject + 1, version, ..Self::new(scene, spp) };
+    }
+
+    pub fn wanted(&self) -> Wanted<'_> {
+        Wanted {
+            cells: &self.cells,
+            cursor: None,
+            picture: PICTURE,
+            uncovered: &self.uncovered,
+            subject: self.subject,
+            version: self.version,
+            samples: self.samples,
+            settled: self.done,
+        }
+    }
+
+    /// Mean OKLab distance of what is shown from what ought to be, over the halves of all cells.
+    pub fn error(&self, screen: &vt100::Screen) -> f64 {
+        let distances = PICTURE.positions().map(|at| {
+            let wanted = &self.cells[at];
+            let wanted = halves(wanted.symbol(), [wanted.fg, wanted.bg].map(rgb));
+            let cell = screen.cell(at.y, at.x).unwrap();
+            let shown = halves(cell.contents(), [cell.fgcolor(), cell.bgcolor()].map(emulated));
+            let distance = |i: usize| f64::from(Oklab::of(wanted[i]).distance(Oklab::of(shown[i])));
+            distance(0) + distance(1)
+        });
+        distances.sum::<f64>() / (2.0 * f64::from(PICTURE.area()))
+    }
+
+    /// Whether text and picture are shown as they ought to be.
+    pub fn is_exact(&self, screen: &vt100::Screen) -> bool {
+        let row = |y: u16| screen.contents_between(y, 0, y, SCREEN[0]);
+        let text: String = (0..SCREEN[0]).map(|x| self.cells[(x, PICTURE.height)].symbol()).collect();
+        self.error(screen) == 0.0 && row(PICTURE.height).trim_end() == text.trim_end()
+    }
+}
+
+fn halves(glyph: &str, [fg, bg]: [[u8; 3]; 2]) -> [[u8; 3]; 2] {
+    match glyph {
+        "▀" => [fg, bg],
+        "▄" => [bg, fg],
+        "█" => [fg; 2],
+        " " | "" => [bg; 2],
+        other => panic!("{other:?} is no picture"),
+    }
+}
+
+fn rgb(color: Color) -> [u8; 3] {
+    match color {
+        Color::Rgb(r, g, b) => [r, g, b],
+        _ => [0; 3],
+    }
+}
+
+fn emulated(color: vt100::Color) -> [u8; 3] {
+    match color {
+        vt100::Color::Rgb(r, g, b) => [r, g, b],
+        _ => [0; 3],
+    }
+}
