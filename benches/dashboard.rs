@@ -52,7 +52,8 @@ fn main() {
 /// Starts the program in `folder` and waits for its first picture.
 fn opened(folder: &Path, more: &[&str]) -> Terminal {
     let command = [&[PROGRAM, "room.toml"], more].concat();
-    let terminal = Terminal::start(&Start { command: &command, folder, size: SIZE, env: &[], answers: true });
+    let terminal =
+        Terminal::start(&Start { command: &command, folder, size: SIZE, env: &[], answers: true });
     terminal.wait_for_text("spp");
     std::thread::sleep(Duration::from_millis(500));
     terminal

@@ -41,7 +41,10 @@ fn main() {
         Ok(server) => server,
         Err(why) => return println!("skipped: {why}"),
     };
-    println!("{:42} {:>7} {:>7} {:>7} {:>7}  bytes/s while converging", "", "median", "p95", "max", "keys");
+    println!(
+        "{:42} {:>7} {:>7} {:>7} {:>7}  bytes/s while converging",
+        "", "median", "p95", "max", "keys"
+    );
     let room = folder.path().join("room.toml");
     let program = format!("COLORTERM=truecolor {PROGRAM} {}", room.display());
     measure("plain", &server, folder.path(), &program, true);

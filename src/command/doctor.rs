@@ -67,7 +67,10 @@ impl Found {
         row("background", self.background());
         row("whole frames", self.whole_frames());
         row("still pictures", self.stills());
-        row("keyboard", "as terminals send keys since the VT100; nothing is asked of it".to_string());
+        row(
+            "keyboard",
+            "as terminals send keys since the VT100; nothing is asked of it".to_string(),
+        );
         row("text", self.text());
         row("line", self.line());
         row("known arrived by", self.arrival());
@@ -211,7 +214,9 @@ impl Found {
         match examined.mode {
             Mode::Local => "being written: whoever reads is here".to_string(),
             Mode::Answers(None) => "answers of the terminal".to_string(),
-            Mode::Answers(Some(_)) => "answers of the terminal, through what is between".to_string(),
+            Mode::Answers(Some(_)) => {
+                "answers of the terminal, through what is between".to_string()
+            }
             Mode::Queue => "what the kernel has not sent yet (/proc/net/tcp)".to_string(),
             Mode::Fixed => "nothing: a fixed rate is sent; --bandwidth sets it".to_string(),
         }
@@ -267,7 +272,9 @@ impl Found {
             }
         }
         if tmux && asked.is_some_and(|terminal| terminal.passthrough.is_none()) {
-            hints.push("set -g allow-passthrough on in ~/.tmux.conf: answers come from the terminal");
+            hints.push(
+                "set -g allow-passthrough on in ~/.tmux.conf: answers come from the terminal",
+            );
         }
         if tmux && few_colors {
             hints.push("set -as terminal-features ',*:RGB' in ~/.tmux.conf: 24-bit colour");
@@ -300,13 +307,8 @@ mod tests {
             found.map(|(_, value)| value.to_string())
         });
         let terminal = Capabilities::unasked(surroundings.clone());
-        let examined = Examined {
-            terminal,
-            mode: Mode::Local,
-            cells: [120, 36],
-            pixels: None,
-            rate: None,
-        };
+        let examined =
+            Examined { terminal, mode: Mode::Local, cells: [120, 36], pixels: None, rate: None };
         Found {
             surroundings,
             examined: if asked { Ok(examined) } else { Err("stdin or stdout is no terminal") },

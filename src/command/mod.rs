@@ -15,8 +15,8 @@ mod stats;
 
 pub use cpu::require as require_cpu;
 
-use args::{Cli, Command};
 use crate::value::printable;
+use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use std::ffi::OsString;

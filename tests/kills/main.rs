@@ -306,5 +306,11 @@ fn two_hundred_kills_damage_nothing_and_lose_nothing_old() {
             ));
         }
     }
-    assert!(failures.is_empty(), "{} of {}:\n{}", failures.len(), results.len(), failures.join("\n"));
+    assert!(
+        failures.is_empty(),
+        "{} of {}:\n{}",
+        failures.len(),
+        results.len(),
+        failures.join("\n")
+    );
 }

@@ -116,7 +116,8 @@ impl Work {
     /// Whether text and picture are shown as they ought to be.
     pub fn is_exact(&self, screen: &vt100::Screen) -> bool {
         let row = |y: u16| screen.contents_between(y, 0, y, SCREEN[0]);
-        let text: String = (0..SCREEN[0]).map(|x| self.cells[(x, PICTURE.height)].symbol()).collect();
+        let text: String =
+            (0..SCREEN[0]).map(|x| self.cells[(x, PICTURE.height)].symbol()).collect();
         self.error(screen) == 0.0 && row(PICTURE.height).trim_end() == text.trim_end()
     }
 }

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 use zerkalo::dashboard::terminal::{ENTER, LEAVE, Screen};
 
-fn signal(name: &str, id: u32) {
+pub fn signal(name: &str, id: u32) {
     let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
     assert!(sent.unwrap().success());
 }
@@ -58,7 +58,8 @@ fn a_panic_is_told_on_a_restored_terminal() {
         "--ignored",
         "--nocapture",
     ];
-    let start = Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &[], answers: true };
+    let start =
+        Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &[], answers: true };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 0, "{bytes}");
     let [entered, left, told, after] = [ENTER, LEAVE, "as the test wants it", "still alive"]
@@ -83,7 +84,13 @@ fn without_a_terminal_one_line_tells_what_to_do() {
 
     let command = [PROGRAM];
     let env = [("TERM", "dumb")];
-    let start = Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &env, answers: true };
+    let start = Start {
+        command: &command,
+        folder: desk.0.path(),
+        size: [80, 24],
+        env: &env,
+        answers: true,
+    };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 2);
     assert!(bytes.contains("zerkalo render") && !bytes.contains('\x1b'), "{bytes:?}");

@@ -4,6 +4,7 @@
 mod editing;
 mod life;
 mod picture;
+mod stopping;
 mod terminal;
 
 use std::fs;
@@ -36,7 +37,13 @@ impl Desk {
     /// The dashboard in a terminal of `size` columns and rows.
     fn open(&self, args: &[&str], size: [u16; 2]) -> Terminal {
         let command = [&[PROGRAM], args].concat();
-        Terminal::start(&Start { command: &command, folder: self.0.path(), size, env: &[], answers: true })
+        Terminal::start(&Start {
+            command: &command,
+            folder: self.0.path(),
+            size,
+            env: &[],
+            answers: true,
+        })
     }
 
     /// What `zerkalo render` writes.

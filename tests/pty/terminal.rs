@@ -72,6 +72,7 @@ impl Terminal {
         }
         command.env("TERM", "xterm-256color");
         command.env("COLORTERM", "truecolor");
+        command.env("XDG_STATE_HOME", start.folder.join("state"));
         for (name, value) in start.env {
             command.env(name, value);
         }
@@ -101,7 +102,8 @@ impl Terminal {
                 drop(output);
                 if willing.load(Ordering::Relaxed) {
                     let place = format!("\x1b[{};{}R", row + 1, column + 1);
-                    let answer = |text: &str| if text.is_empty() { place.clone() } else { text.into() };
+                    let answer =
+                        |text: &str| if text.is_empty() { place.clone() } else { text.into() };
                     let all: String = asked.into_iter().map(answer).collect();
                     // The program may have ended meanwhile.
                     let _ = answers.lock().unwrap().write_all(all.as_bytes());

@@ -21,8 +21,7 @@ const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
 ];
 
 /// Attributes with which a space is not only its ground.
-const LINES: Modifier =
-    Modifier::REVERSED.union(Modifier::UNDERLINED).union(Modifier::CROSSED_OUT);
+const LINES: Modifier = Modifier::REVERSED.union(Modifier::UNDERLINED).union(Modifier::CROSSED_OUT);
 
 /// What the terminal writes with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -236,7 +235,8 @@ mod tests {
     fn any_cell() -> impl Strategy<Value = Cell> {
         let symbol = prop_oneof![Just("▀"), Just("▄"), Just("█"), Just(" "), Just("a"), Just("é")];
         // Bold and dim at once look different from terminal to terminal; nothing here is.
-        let weight = prop_oneof![Just(Modifier::empty()), Just(Modifier::BOLD), Just(Modifier::DIM)];
+        let weight =
+            prop_oneof![Just(Modifier::empty()), Just(Modifier::BOLD), Just(Modifier::DIM)];
         let style = prop_oneof![
             Just(Modifier::empty()),
             Just(Modifier::ITALIC),
