@@ -160,6 +160,8 @@ pub enum Action {
     ExportPng,
     /// Writes the picture as EXR.
     ExportExr,
+    /// Copies the path of the last picture that was written.
+    CopyPath,
     /// Renders at another size, asked for, into a file.
     ExportSized,
     /// Ends a running export of another size.

@@ -184,6 +184,8 @@ pub enum Effect {
     TakeUp,
     /// The edits that were left behind are not wanted.
     Discard,
+    /// Put the path of this file into the clipboard of the terminal.
+    Copy(PathBuf),
     /// Give the terminal to the shell until it calls back.
     Suspend,
     /// End the program.

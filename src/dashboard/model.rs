@@ -183,6 +183,8 @@ pub struct Model {
     pub notice: Option<Notice>,
     /// A render at another size.
     pub export: Option<RunningExport>,
+    /// The last picture that was written.
+    pub last_export: Option<PathBuf>,
     /// Nothing has been pressed yet: the hints are those for a first time.
     pub first_time: bool,
     /// A mouse button that is held down.
@@ -265,6 +267,7 @@ impl Model {
             line: None,
             notice: None,
             export: None,
+            last_export: None,
             first_time: true,
             drag: None,
             last_edit: None,

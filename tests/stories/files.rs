@@ -216,3 +216,16 @@ fn edits_bring_back_a_scene_whose_file_is_spoilt() {
     let effects = press(&mut model, "o");
     assert!(matches!(effects[..], [Effect::Save { overwrite: true, .. }]), "{effects:?}");
 }
+
+#[test]
+fn the_path_of_the_last_picture_is_copied_unless_it_steers() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("y");
+    assert!(desk.notice().contains("No picture"));
+    desk.keys("p P y");
+    assert!(desk.asked(|e| *e == Effect::Copy("room-1.exr".into())));
+    desk.effects.clear();
+    desk.model.last_export = Some("a\nreboot\n.png".into());
+    desk.keys("y");
+    assert!(desk.effects.is_empty() && desk.notice().contains("not copied"));
+}

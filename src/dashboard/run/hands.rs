@@ -158,7 +158,7 @@ impl Hands {
             Effect::TakeUp => self.files.take_up(),
             Effect::Discard => self.files.discard(),
             // The loop's own.
-            Effect::Quit | Effect::Suspend => {}
+            Effect::Quit | Effect::Suspend | Effect::Copy(_) => {}
         }
         None
     }

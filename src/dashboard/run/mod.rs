@@ -274,6 +274,9 @@ impl Dashboard {
         for effect in update(&mut self.model, message, self.began.elapsed()) {
             self.quit |= effect == Effect::Quit;
             self.suspend |= effect == Effect::Suspend;
+            if let Effect::Copy(path) = &effect {
+                self.frames.copy(&names::full(path));
+            }
             let scene = match &effect {
                 Effect::Show(scene) => Some(Arc::clone(scene)),
                 _ => None,

@@ -33,13 +33,18 @@ pub fn numbered<E>(
     None
 }
 
+/// The path from the root on.
+pub fn full(path: &Path) -> String {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    path.to_string_lossy().into_owned()
+}
+
 /// Where scp finds `path` on this machine: `user@host:/absolute/path`, after `-P PORT ` if that is
 /// not the usual one; quoted for a shell where needed.
 pub fn scp(path: &Path) -> String {
     let variable = |name| env::var(name).unwrap_or_default();
-    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let user = Some(variable("USER")).filter(|u| !u.is_empty()).unwrap_or(variable("LOGNAME"));
-    scp_from(&variable("SSH_CONNECTION"), &user, &host_name(), &path.to_string_lossy())
+    scp_from(&variable("SSH_CONNECTION"), &user, &host_name(), &full(path))
 }
 
 /// `connection`: `SSH_CONNECTION` as sshd sets it, "client port server port"; else empty.

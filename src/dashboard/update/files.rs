@@ -201,9 +201,10 @@ impl Turn<'_> {
                 }
                 let noise = noise_codes.map_or(String::new(), |n| format!("  noise {n:.2}"));
                 let text = format!(
-                    "{}  {width}x{height}  {spp:.0} spp{noise}  ·  scp {scp} .",
+                    "{}  {width}x{height}  {spp:.0} spp{noise}  ·  y copies the path  ·  scp {scp} .",
                     path.display()
                 );
+                self.model.last_export = Some(path);
                 self.notify(Tone::Good, text, None);
             }
             Err(reason) => {
@@ -211,6 +212,23 @@ impl Turn<'_> {
                 self.notify(Tone::Bad, capital(&reason), None);
             }
         }
+    }
+}
+
+impl Turn<'_> {
+    pub(super) fn copy_path(&mut self) {
+        let Some(path) = self.model.last_export.clone() else {
+            self.say("No picture was written yet · p writes one");
+            return;
+        };
+        let shown = path.display().to_string();
+        if printable(&shown) != shown {
+            // Pasted into a shell it could do what nobody wants.
+            self.refuse("The path has characters in it that steer terminals: it is not copied");
+            return;
+        }
+        self.emit(Effect::Copy(path));
+        self.say(format!("the path of {shown} is in the terminal's clipboard, if it allows that"));
     }
 }
 
