@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::num::NonZeroU16;
 use std::time::Duration;
-use zerkalo::dashboard::link::{Link, Mode, Start};
+use zerkalo::dashboard::link::{FRAME_INTERVAL, Link, Mode, Start};
 use zerkalo::dashboard::pacing::{Pacing, Wanted};
 
 /// The line, the terminal, and the program's idea of both.
@@ -63,11 +63,15 @@ impl Line {
     /// Lets so much time pass while `wanted` is to be shown.
     pub fn pass(&mut self, wanted: &Wanted, time: Duration) {
         let end = self.now + time;
+        // Nothing becomes different without an answer, or in less time.
+        let mut next = self.now;
         while self.now < end {
             self.now += STEP;
             self.arrive();
             self.link.look(self.now);
-            if let Some(allowance) = self.link.allowance(self.now, false) {
+            let allowance = self.link.allowance(self.now, false);
+            if let Some(allowance) = allowance.filter(|_| next <= self.now) {
+                next = self.now + FRAME_INTERVAL;
                 let mut bytes = Vec::new();
                 let threshold = self.link.threshold();
                 let frame = self.pacing.frame(wanted, self.now, allowance, threshold, &mut bytes);
@@ -80,6 +84,13 @@ impl Line {
                     self.coming.push_back((self.free_at + self.one_way, bytes));
                 }
             }
+        }
+    }
+
+    /// Lets everything arrive that is on the line.
+    pub fn drain(&mut self) {
+        for (_, bytes) in self.coming.drain(..) {
+            self.parser.process(&bytes);
         }
     }
 
