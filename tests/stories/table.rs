@@ -91,12 +91,15 @@ fn every_action() -> Vec<Action> {
         Save,
         SaveAs,
         Reload,
+        Recover,
+        Suspend,
         Quit,
         Pause,
         Restart,
         StopAt,
         ExportPng,
         ExportExr,
+        CopyPath,
         ExportSized,
         CancelExport,
         Exposure(Change::Up),
@@ -148,10 +151,12 @@ fn every_action() -> Vec<Action> {
             Frame | ResetCamera | StoreView | MoveMode | TurnMode | FlyMode | Leave | NextLight
             | SwitchLight | AddLight | NextLobe | AddObject | Duplicate | Delete | Rename
             | Drop | OwnMaterial | NextPanel | PreviousPanel | OnlyPicture | First | Last
-            | Open | ClearField | Undo | Redo | Save | SaveAs | Reload | Quit | Pause | Restart
-            | StopAt | ExportPng | ExportExr | ExportSized | CancelExport | ResetExposure
-            | NextTone | NextChannel | PreviousChannel | Probe | Keep | Flip | Difference
-            | Priority | NextColors | Help | Palette | Inventory => vec![action],
+            | Open | ClearField | Undo | Redo | Save | SaveAs | Reload | Recover | Suspend
+            | Quit | Pause | Restart | StopAt | ExportPng | ExportExr | CopyPath | ExportSized
+            | CancelExport | ResetExposure | NextTone | NextChannel | PreviousChannel | Probe
+            | Keep | Flip | Difference | Priority | NextColors | Help | Palette | Inventory => {
+                vec![action]
+            }
         }
     };
     one_of_each.into_iter().flat_map(variants).collect()
