@@ -344,5 +344,10 @@ mod tests {
         let edit = cli.unwrap().edit;
         assert_eq!((edit.color, edit.threads), (ColorArg::Indexed, Some(2)));
         assert!(Cli::try_parse_from(["zerkalo", "--color", "17"]).is_err());
+        let slow = Cli::try_parse_from(["zerkalo", "--bandwidth", "12.5"]).unwrap().edit;
+        assert_eq!(slow.bandwidth, Some(12.5));
+        for wrong in ["0", "-3", "inf", "nan", "fast"] {
+            assert!(Cli::try_parse_from(["zerkalo", "--bandwidth", wrong]).is_err(), "{wrong}");
+        }
     }
 }

@@ -16,11 +16,11 @@ view_angle.vertical = 60.0
 color = [0.05, 0.05, 0.05]
 [[light]]
 point = { position = [1.0, 3.0, 1.0] }
-intensity = 60.0
+intensity = 8.0
 [materials.mirror]
 diffuse = 0.0
 reflection = 0.9
-roughness = 0.6
+roughness = 0.4
 [materials.red]
 color = [0.9, 0.2, 0.1]
 [materials.white]

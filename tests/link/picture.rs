@@ -9,6 +9,7 @@ use zerkalo::dashboard::raster::{Colors, Ink, Oklab, PictureCells, Raster};
 use zerkalo::film::{Display, Part};
 use zerkalo::render::Rendering;
 use zerkalo::render::schedule::{Schedule, Step, Stop};
+use zerkalo::render::session::Traced;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 

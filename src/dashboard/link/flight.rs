@@ -50,6 +50,11 @@ impl Flights {
         self.queue.front().map(|(flight, _)| flight.sent)
     }
 
+    /// When the newest was sent.
+    pub fn newest(&self) -> Option<Duration> {
+        self.queue.back().map(|(flight, _)| flight.sent)
+    }
+
     /// How many have parts of the picture.
     pub fn pictures(&self) -> usize {
         self.queue.iter().filter(|(flight, _)| flight.picture).count()

@@ -11,12 +11,14 @@
 
 mod flight;
 mod queue;
+mod start;
 #[cfg(test)]
 mod tests;
 
-use super::terminal::{Capabilities, Multiplexer};
+use super::terminal::Multiplexer;
 use flight::{Flight, Flights};
 pub use queue::Queue;
+pub use start::Start;
 use std::time::Duration;
 
 /// Frames come no faster than this.
@@ -50,9 +52,6 @@ const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
 pub const DEFAULT_RATE: f64 = 30e3;
 /// The share of the line that goes to differences which nobody sees.
 const FLUSH_SHARE: f64 = 0.25;
-/// An answer that comes sooner over SSH was not given by the terminal.
-const TOO_SOON: Duration = Duration::from_millis(3);
-
 /// How it is known what has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
@@ -64,19 +63,6 @@ pub enum Mode {
     Queue,
     /// It is not known.
     Fixed,
-}
-
-/// What is known about the line at the start.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Start {
-    /// How it is known what has arrived.
-    pub mode: Mode,
-    /// How long the terminal's answer takes, if it is known.
-    pub round_trip: Option<Duration>,
-    /// Whether the kernel can be asked.
-    pub queue: bool,
-    /// What goes out in a second when nothing can be known, in bytes.
-    pub fixed_rate: f64,
 }
 
 /// What a frame may contain.
@@ -112,6 +98,8 @@ pub struct Link {
     learned: Duration,
     flights: Flights,
     losses: u32,
+    /// When the user began to act.
+    acting_since: Duration,
     acting_until: Duration,
     last_frame: Option<Duration>,
     /// When what was sent at a known rate is through.
@@ -133,26 +121,6 @@ struct Held {
     sent: f64,
 }
 
-impl Start {
-    /// By what the terminal has answered. `queue`: whether the kernel can be asked; `rate`: what the
-    /// user wants to be sent in a second, whatever the line may carry.
-    pub fn of(terminal: &Capabilities, queue: bool, rate: Option<f64>) -> Self {
-        let otherwise = if queue { Mode::Queue } else { Mode::Fixed };
-        let multiplexer = terminal.surroundings.multiplexer;
-        let (mode, round_trip) = match (rate, &terminal.surroundings.ssh) {
-            (Some(_), _) => (Mode::Fixed, None),
-            (None, None) => (Mode::Local, None),
-            (None, Some(_)) => match (multiplexer, terminal.passthrough, terminal.round_trip) {
-                (Some(_), Some(took), _) => (Mode::Answers(multiplexer), Some(took)),
-                (Some(_), None, _) | (None, _, None) => (otherwise, None),
-                (None, _, Some(took)) if took < TOO_SOON => (otherwise, None),
-                (None, _, took) => (Mode::Answers(None), took),
-            },
-        };
-        Self { mode, round_trip, queue, fixed_rate: rate.unwrap_or(DEFAULT_RATE) }
-    }
-}
-
 impl Link {
     /// A line of which `start` is known.
     pub fn new(start: Start) -> Self {
@@ -166,6 +134,7 @@ impl Link {
             start,
             flights: Flights::default(),
             losses: 0,
+            acting_since: Duration::ZERO,
             acting_until: Duration::ZERO,
             last_frame: None,
             free_at: Duration::ZERO,
@@ -192,6 +161,9 @@ impl Link {
 
     /// The user has done something.
     pub fn act(&mut self, now: Duration) {
+        if now >= self.acting_until {
+            self.acting_since = now;
+        }
         self.acting_until = now + ACTING;
     }
 
@@ -377,7 +349,10 @@ impl Link {
                 }
                 let acting = now < self.acting_until;
                 let most = if acting { 1 + usize::from(answers) } else { self.flights_at_once() };
-                self.flights.pictures() < most
+                // The first answer does not wait for what was sent when nobody did anything.
+                let newest = self.flights.newest();
+                let first = acting && answers && newest.is_some_and(|at| at < self.acting_since);
+                first || self.flights.pictures() < most
             }
             Mode::Queue => {
                 let most = LEAST_QUEUE.max(self.rate * FRAME_SPAN.as_secs_f64());

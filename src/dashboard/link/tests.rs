@@ -1,5 +1,5 @@
 use super::*;
-use crate::dashboard::terminal::Surroundings;
+use crate::dashboard::terminal::{Capabilities, Surroundings};
 
 fn ms(n: u64) -> Duration {
     Duration::from_millis(n)
@@ -86,6 +86,20 @@ fn who_acts_waits_for_one_frame_only() {
     assert_eq!(beside, Allowance { bytes: BESIDE, picture: false, flush: 0 });
     link.sent(now + ms(2), BESIDE, false, 0);
     assert_eq!(link.allowance(now + ms(3), true), None);
+}
+
+#[test]
+fn the_first_answer_does_not_wait_for_what_was_sent_before() {
+    let mut link = Link::new(start(Mode::Answers(None)));
+    (0..2).for_each(|i| link.sent(ms(40 * i), 8000, true, 0));
+    let now = ms(80);
+    assert_eq!(link.allowance(now, false), None);
+    link.act(now);
+    assert!(link.allowance(now, true).unwrap().picture);
+    link.sent(now, 8000, true, 0);
+    // The next one does.
+    link.act(ms(110));
+    assert!(!link.allowance(ms(110), true).is_some_and(|allowance| allowance.picture));
 }
 
 #[test]

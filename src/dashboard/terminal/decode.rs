@@ -301,10 +301,10 @@ impl Decoder {
 /// Whether bytes that came together after a lone ESC can only be the rest of a reply: nobody types
 /// these so fast.
 fn is_rest_of_reply(bytes: &[u8]) -> bool {
-    match bytes {
-        [b'[', b'?' | b'>' | b'0'..=b'9', _, ..] => true,
-        [b']' | b'P', b'0'..=b'9' | b'>', _, ..] => true,
-        [b'_', b'G', _, ..] => true,
-        _ => false,
-    }
+    matches!(
+        bytes,
+        [b'[', b'?' | b'>' | b'0'..=b'9', _, ..]
+            | [b']' | b'P', b'0'..=b'9' | b'>', _, ..]
+            | [b'_', b'G', _, ..]
+    )
 }

@@ -203,6 +203,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn rates_have_few_digits() {
+        let shown = [2000.0, 9940.0, 29_600.0, 118_400.0, 2.34e6].map(rate);
+        assert_eq!(shown, ["2.0 KB/s", "9.9 KB/s", "30 KB/s", "118 KB/s", "2.3 MB/s"]);
+    }
+
+    #[test]
     fn hints_are_dropped_whole_and_the_way_to_help_stays() {
         let all: &[Hint] =
             &[("a", "a", "first"), ("b", "b", "second"), (":", ":", "all"), ("?", "?", "keys")];
