@@ -4,20 +4,25 @@
 use super::args::DoctorArgs;
 use super::{Failure, say};
 use crate::dashboard::link::{DEFAULT_RATE, Mode};
+use crate::dashboard::places::wrapped;
 use crate::dashboard::run::{Colors, Examined, examine};
 use crate::dashboard::terminal::{Capabilities, Multiplexer, Surroundings};
 use crate::scene::{kept_in, state_folder};
 use crate::value::printable;
 use std::env;
 use std::io::{self, IsTerminal};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
+
+/// Columns of the report, and of the names in it.
+const COLUMNS: usize = 80;
+const NAME: usize = 17;
 
 pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
     let surroundings = Surroundings::of(variable);
     let why_not = if surroundings.term == "dumb" {
-        Some("TERM=dumb")
+        Some("it understands nothing, and the dashboard does not open in it")
     } else if !io::stdin().is_terminal() || !io::stdout().is_terminal() {
         Some("stdin or stdout is no terminal")
     } else {
@@ -59,31 +64,28 @@ struct Found {
 impl Found {
     fn report(&self) -> String {
         let mut lines = vec![format!("zerkalo {}", env!("CARGO_PKG_VERSION")), String::new()];
-        let mut row = |name: &str, what: String| lines.push(format!("{name:<17}{what}"));
-        row("terminal", self.terminal());
-        row("between", self.between());
-        row("size", self.size());
-        row("colours", self.colors());
-        row("background", self.background());
-        row("whole frames", self.whole_frames());
-        row("still pictures", self.stills());
-        row(
-            "keyboard",
-            "as terminals send keys since the VT100; nothing is asked of it".to_string(),
-        );
-        row("text", self.text());
-        row("line", self.line());
-        row("known arrived by", self.arrival());
-        row("round trip", self.round_trip());
-        row("rate", self.rate());
-        row("unsaved edits", self.unsaved());
-        for path in &self.kept {
-            row("", format!("kept there: {}", shown(path)));
+        let row = |name: &str, what: String| indented(&format!("{name:<NAME$}"), &what);
+        lines.push(row("terminal", self.terminal()));
+        lines.push(row("between", self.between()));
+        lines.push(row("colours", self.colors()));
+        if let Ok(Examined { terminal, mode, cells, pixels, rate }) = &self.examined {
+            lines.push(row("background", background(terminal)));
+            lines.push(row("size", size(*cells, *pixels)));
+            lines.push(row("whole frames", whole_frames(terminal)));
+            lines.push(row("still pictures", stills(terminal)));
+            lines.push(row("keyboard", "plain key sequences; nothing special is needed".into()));
+            lines.push(row("known arrived by", arrival(*mode)));
+            lines.push(row("round trip", round_trip(terminal)));
+            lines.push(row("rate", self.rate(*mode, *rate)));
         }
+        lines.push(row("line", self.line()));
+        lines.push(row("text", self.text()));
+        lines.push(row("unsaved edits", self.unsaved()));
+        lines.extend(self.kept.iter().map(|path| row("", format!("kept: {}", shown(path)))));
         let hints = self.hints();
         if !hints.is_empty() {
             lines.extend([String::new(), "hints".to_string()]);
-            lines.extend(hints.iter().map(|hint| format!("  {hint}")));
+            lines.extend(hints.iter().map(|hint| indented("- ", hint)));
         }
         lines.join("\n")
     }
@@ -133,13 +135,6 @@ impl Found {
         }
     }
 
-    fn size(&self) -> String {
-        let Ok(examined) = &self.examined else { return unknown() };
-        let [columns, rows] = examined.cells;
-        let pixels = examined.pixels.map_or(String::new(), |[w, h]| format!(", {w} x {h} pixels"));
-        format!("{columns} x {rows} cells{pixels}")
-    }
-
     /// The level, and why: the first that says so of NO_COLOR, COLORTERM, TERM, the terminal.
     fn colors(&self) -> String {
         let Surroundings { term, color_term, no_color, .. } = &self.surroundings;
@@ -157,36 +152,6 @@ impl Found {
             format!("TERM={}", printable(term))
         };
         format!("{}: {why}; --color overrides, # switches in the dashboard", level.name())
-    }
-
-    fn background(&self) -> String {
-        match self.asked().and_then(|terminal| terminal.background) {
-            None => unknown(),
-            Some([r, g, b]) => {
-                // Rec. 601 luma, enough to tell night from day.
-                let luma = 0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b);
-                let shade = if luma < 128.0 { "dark" } else { "light" };
-                format!("#{r:02x}{g:02x}{b:02x}, {shade}")
-            }
-        }
-    }
-
-    fn whole_frames(&self) -> String {
-        match self.asked().map(|terminal| terminal.synchronised) {
-            None => unknown(),
-            Some(true) => "shown at once (mode 2026)".to_string(),
-            Some(false) => "shown as they come (no mode 2026)".to_string(),
-        }
-    }
-
-    fn stills(&self) -> String {
-        match self.asked().map(|terminal| (terminal.kitty_graphics, terminal.sixel)) {
-            None => unknown(),
-            Some((true, true)) => "kitty's protocol and sixel".to_string(),
-            Some((true, false)) => "kitty's protocol".to_string(),
-            Some((false, true)) => "sixel".to_string(),
-            Some((false, false)) => "neither kitty's protocol nor sixel".to_string(),
-        }
     }
 
     fn text(&self) -> String {
@@ -209,36 +174,12 @@ impl Found {
         }
     }
 
-    fn arrival(&self) -> String {
-        let Ok(examined) = &self.examined else { return unknown() };
-        match examined.mode {
-            Mode::Local => "being written: whoever reads is here".to_string(),
-            Mode::Answers(None) => "answers of the terminal".to_string(),
-            Mode::Answers(Some(_)) => {
-                "answers of the terminal, through what is between".to_string()
-            }
-            Mode::Queue => "what the kernel has not sent yet (/proc/net/tcp)".to_string(),
-            Mode::Fixed => "nothing: a fixed rate is sent; --bandwidth sets it".to_string(),
-        }
-    }
-
-    fn round_trip(&self) -> String {
-        let ms = |time: Duration| format!("{:.1} ms", 1e3 * time.as_secs_f64());
-        let Some(terminal) = self.asked() else { return unknown() };
-        match (terminal.round_trip, terminal.passthrough) {
-            (None, _) => "nobody answers".to_string(),
-            (Some(near), Some(far)) => format!("{}; to what is between {}", ms(far), ms(near)),
-            (Some(near), None) => ms(near),
-        }
-    }
-
-    fn rate(&self) -> String {
-        let Ok(examined) = &self.examined else { return unknown() };
+    fn rate(&self, mode: Mode, rate: Option<f64>) -> String {
         let kilobytes = |rate: f64| format!("{:.0} KB/s", 1e-3 * rate);
-        match (examined.rate, self.asked_for_rate) {
+        match (rate, self.asked_for_rate) {
             (Some(rate), _) => format!("{}, measured", kilobytes(rate)),
-            (None, true) => "cannot be measured: nobody answers".to_string(),
-            (None, false) if examined.mode == Mode::Fixed => {
+            (None, true) => "cannot be measured: the terminal itself does not answer".to_string(),
+            (None, false) if mode == Mode::Fixed => {
                 format!("{}, fixed; doctor --rate measures", kilobytes(DEFAULT_RATE))
             }
             (None, false) => "not measured; doctor --rate does".to_string(),
@@ -289,11 +230,68 @@ impl Found {
     }
 }
 
-fn unknown() -> String {
-    "unknown".to_string()
+/// `what` in lines of at most `COLUMNS` after `name` and below.
+fn indented(name: &str, what: &str) -> String {
+    let lines = wrapped(what, (COLUMNS - name.len()) as u16);
+    name.to_string() + &lines.join(&format!("\n{:1$}", "", name.len()))
 }
 
-fn shown(path: &std::path::Path) -> String {
+fn background(terminal: &Capabilities) -> String {
+    match terminal.background {
+        None => "unknown".to_string(),
+        Some([r, g, b]) => {
+            // Rec. 601 luma, enough to tell night from day.
+            let luma = 0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b);
+            let shade = if luma < 128.0 { "dark" } else { "light" };
+            format!("#{r:02x}{g:02x}{b:02x}, {shade}")
+        }
+    }
+}
+
+fn size([columns, rows]: [u16; 2], pixels: Option<[u16; 2]>) -> String {
+    let pixels = pixels.map_or(String::new(), |[w, h]| format!(", {w} x {h} pixels"));
+    format!("{columns} x {rows} cells{pixels}")
+}
+
+fn whole_frames(terminal: &Capabilities) -> String {
+    let how = match terminal.synchronised {
+        true => "shown at once (mode 2026)",
+        false => "shown as they come (no mode 2026)",
+    };
+    how.to_string()
+}
+
+fn stills(terminal: &Capabilities) -> String {
+    let ways = match (terminal.kitty_graphics, terminal.sixel) {
+        (true, true) => "kitty's protocol and sixel",
+        (true, false) => "kitty's protocol",
+        (false, true) => "sixel",
+        (false, false) => "neither kitty's protocol nor sixel",
+    };
+    ways.to_string()
+}
+
+fn arrival(mode: Mode) -> String {
+    let how = match mode {
+        Mode::Local => "being written: whoever reads is here",
+        Mode::Answers(None) => "answers of the terminal",
+        Mode::Answers(Some(_)) => "answers of the terminal, through what is between",
+        Mode::Queue => "what the kernel has not sent yet (/proc/net/tcp)",
+        Mode::Fixed => "nothing: a fixed rate is sent; --bandwidth sets it",
+    };
+    how.to_string()
+}
+
+fn round_trip(terminal: &Capabilities) -> String {
+    let ms = |time: Duration| format!("{:.1} ms", 1e3 * time.as_secs_f64());
+    match (terminal.round_trip, terminal.passthrough) {
+        (None, _) => "nobody answers".to_string(),
+        (Some(near), Some(far)) => format!("{}; to what is between {}", ms(far), ms(near)),
+        (Some(near), None) => ms(near),
+    }
+}
+
+fn shown(path: &Path) -> String {
     printable(&path.display().to_string())
 }
 
@@ -395,7 +393,7 @@ mod tests {
     #[test]
     fn without_a_terminal_the_environment_tells() {
         let found = found(&[("TERM", "linux"), ("NO_COLOR", "1")], false);
-        check(&found, &["not asked: stdin", "no colour: NO_COLOR is set"], &["answers"]);
+        check(&found, &["not asked: stdin", "no colour: NO_COLOR is set"], &["round trip"]);
     }
 
     #[test]

@@ -27,7 +27,7 @@ fn pause_and_go_on(how: impl Fn(&mut Terminal)) {
     terminal.send("\"$ZERKALO\" room.toml\n");
     wait_for_picture(&terminal);
     terminal.send("]");
-    terminal.wait_for_text("●");
+    terminal.wait_for_text("room.toml ●");
     how(&mut terminal);
     terminal.wait_for("the shell", |screen| {
         (!screen.alternate_screen() && !screen.hide_cursor()).then_some(())
@@ -42,9 +42,9 @@ fn pause_and_go_on(how: impl Fn(&mut Terminal)) {
     terminal.resize([120, 36]);
     terminal.send("fg\n");
     wait_for_picture(&terminal);
-    terminal.wait_for_text("●");
+    terminal.wait_for_text("room.toml ●");
     terminal.send("u");
-    terminal.wait_until_gone("●");
+    terminal.wait_until_gone("room.toml ●");
     terminal.send("q");
     terminal.wait_for("the shell again", |screen| (!screen.alternate_screen()).then_some(()));
     terminal.send("echo status $?\n");
@@ -108,7 +108,7 @@ fn edits_outlive_a_kill_and_are_offered_to_the_next() {
     let mut terminal = desk.open(&["room.toml"], [120, 36]);
     wait_for_picture(&terminal);
     terminal.send("]");
-    terminal.wait_for_text("●");
+    terminal.wait_for_text("room.toml ●");
     signal("TERM", terminal.process_id());
     let (status, bytes) = terminal.end();
     assert_eq!(status, 143);
@@ -121,7 +121,7 @@ fn edits_outlive_a_kill_and_are_offered_to_the_next() {
     terminal.send("r");
     terminal.wait_for_text("recovered");
     terminal.send("\x13");
-    terminal.wait_until_gone("●");
+    terminal.wait_until_gone("room.toml ●");
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
     let saved = fs::read_to_string(desk.path("room.toml")).unwrap();
@@ -147,7 +147,7 @@ fn edits_of_a_scene_without_a_file_and_of_one_that_cannot_be_written_beside() {
     let mut terminal = open(&[PROGRAM]);
     wait_for_picture(&terminal);
     terminal.send("]");
-    terminal.wait_for_text("●");
+    terminal.wait_for_text("mirror-room.toml ●");
     signal("HUP", terminal.process_id());
     assert_eq!(terminal.end().0, 129);
     let kept: Vec<_> = fs::read_dir(state.join("zerkalo")).unwrap().collect();

@@ -53,12 +53,18 @@ pub fn examine(surroundings: Surroundings, measure: bool) -> io::Result<Examined
     }
     let queue = terminal.surroundings.ssh.as_deref().and_then(Queue::find);
     let mode = Start::of(&terminal, queue.is_some(), None).mode;
-    let rate = match (measure, terminal.round_trip) {
-        (true, Some(round_trip)) => {
-            let (through, round_trip) = match terminal.passthrough {
-                Some(round_trip) => (multiplexer, round_trip),
-                None => (None, round_trip),
-            };
+    // Answers of somebody in between say nothing about the line.
+    let through = match mode {
+        Mode::Local => Some(None),
+        Mode::Answers(through) => Some(through),
+        Mode::Queue | Mode::Fixed => None,
+    };
+    let round_trip = match through {
+        Some(Some(_)) => terminal.passthrough,
+        _ => terminal.round_trip,
+    };
+    let rate = match (through, round_trip) {
+        (Some(through), Some(round_trip)) if measure => {
             rate(&tty, &mut keyboard, through, round_trip)?
         }
         _ => None,

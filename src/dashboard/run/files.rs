@@ -4,7 +4,7 @@
 use super::journal::Journal;
 use crate::dashboard::message::Message;
 use crate::scene::{DiskState, Document, SaveError, Scene, SceneErrors, SceneFile};
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, unbounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ enum Job {
     Save { scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool },
     Load,
     Journal(Option<Arc<Scene>>),
-    Secure,
+    Secure(Sender<()>),
     TakeUp,
     Discard,
 }
@@ -88,9 +88,11 @@ impl Files {
         self.give(Job::Journal(scene));
     }
 
-    /// Unsaved edits are written now.
-    pub fn secure(&self) {
-        self.give(Job::Secure);
+    /// Unsaved edits are written now. Waits for that at most as long as `patience`.
+    pub fn secure(&self, patience: Duration) {
+        let (done, told) = bounded(1);
+        self.give(Job::Secure(done));
+        let _ = told.recv_timeout(patience);
     }
 
     /// The edits of the last [`Message::LeftBehind`] are what is unsaved now.
@@ -197,7 +199,11 @@ impl Clerk {
                 self.tell(Message::Loaded(Box::new(loaded)));
             }
             Job::Journal(scene) => self.journal.note(scene, Instant::now()),
-            Job::Secure => self.write_journal(),
+            Job::Secure(done) => {
+                self.write_journal();
+                // Nobody waits any more if it has taken long.
+                let _ = done.try_send(());
+            }
             Job::TakeUp => {
                 let spoilt = self.path.as_deref().filter(|_| self.file.is_none());
                 if let Some(file) = self.journal.take_up(spoilt) {
@@ -383,7 +389,8 @@ mod tests {
         assert!(fs::read_to_string(&path).unwrap().contains("64"));
         let (files, _inbox) = opened(&path);
         files.journal(Some(Arc::new(Scene::parse(starter(), "a").unwrap())));
-        files.secure();
+        files.secure(PATIENCE);
+        assert!(hidden.exists());
         files.journal(None);
         assert_eq!(files.finish(), None);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);

@@ -11,6 +11,7 @@ use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What low priority means: the tracing threads only take what nobody else wants.
 const LOW_PRIORITY: i32 = 19;
@@ -170,9 +171,9 @@ impl Hands {
         }
     }
 
-    /// Unsaved edits are written now, whatever comes.
-    pub fn secure(&self) {
-        self.files.secure();
+    /// Unsaved edits are written now, whatever comes. Waits for that at most as long as `patience`.
+    pub fn secure(&self, patience: Duration) {
+        self.files.secure(patience);
     }
 
     /// Ends the work, but waits for what is being written: returns what was done meanwhile, and where

@@ -14,6 +14,8 @@ use std::time::Duration;
 const SETTLED: Duration = Duration::from_millis(90);
 /// and while they go on coming, when the first has waited for so long.
 const LONGEST: Duration = Duration::from_millis(400);
+/// How long stopping waits for unsaved edits to be written.
+const SECURED_WITHIN: Duration = Duration::from_secs(2);
 /// Who has not been stopped by then will not be.
 const STOPS_WITHIN: Duration = Duration::from_millis(500);
 
@@ -65,7 +67,7 @@ impl Dashboard {
     /// program is to end instead.
     pub(super) fn suspend(&mut self, whom: Whom, line: &Line) -> Option<u8> {
         // It may never go on.
-        self.hands.secure();
+        self.hands.secure(SECURED_WITHIN);
         self.await_answers(&line.input);
         line.tty.suspend();
         let mut stopped = stop(whom).is_ok();

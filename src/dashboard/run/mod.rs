@@ -128,7 +128,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     let line = Line { tty: screen.tty(), input, signals, left: screen.left().clone() };
     let result = dashboard.watch(&line);
     // First of all, and whatever else there is to write.
-    dashboard.hands.secure();
+    dashboard.hands.secure(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
         dashboard.await_answers(&line.input);
     }
