@@ -28,8 +28,12 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let terminals = io::stdin().is_terminal() && io::stdout().is_terminal();
     if !terminals || surroundings.term == "dumb" {
         let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
+        let why = match terminals {
+            true => "TERM=dumb: a terminal that cannot place text shows no dashboard",
+            false => "the dashboard needs a terminal",
+        };
         return Err(Failure::Usage(format!(
-            "the dashboard needs a terminal; `zerkalo render {scene} -o PICTURE.png` renders without \
+            "{why}; `zerkalo render {scene} -o PICTURE.png` renders without \
              one"
         )));
     }

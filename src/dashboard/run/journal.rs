@@ -104,13 +104,10 @@ impl Journal {
 
     /// Looks for what was left behind. `file`: the scene's, if it can be read.
     pub fn search(&mut self, file: Result<&SceneFile, &Path>) -> Vec<Message> {
-        let path = file.map_or_else(Some, SceneFile::path);
-        let folder =
-            path.and_then(Path::parent).map(|folder| match folder.as_os_str().is_empty() {
-                true => Path::new("."),
-                false => folder,
-            });
-        folder.into_iter().chain(self.state.as_deref()).for_each(sweep);
+        // Half-written scenes lie beside them, half-written pictures in the working directory.
+        let beside = file.map_or_else(Some, SceneFile::path).and_then(Path::parent);
+        let beside = beside.filter(|folder| !folder.as_os_str().is_empty());
+        [Some(Path::new(".")), beside, self.state.as_deref()].into_iter().flatten().for_each(sweep);
         let Found { mut lost, unreadable, elsewhere } = self.recovery.find();
         let mut messages: Vec<_> = unreadable
             .iter()
