@@ -2,6 +2,7 @@
 #![cfg(unix)]
 
 mod editing;
+mod hostile;
 mod life;
 mod picture;
 mod stopping;
