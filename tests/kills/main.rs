@@ -70,8 +70,10 @@ impl Plan {
         let mut numbers = Numbers::new(0x5eed_0000 + number as u64);
         let death = DEATHS[number % DEATHS.len()];
         // What has to be two seconds old has to live for more than that.
-        let most = if death == Death::Kill { 3.5 } else { 1.6 };
-        let moment = numbers.between(0.0, most);
+        let [least, most] = if death == Death::Kill { [1.0, 4.5] } else { [0.0, 1.6] };
+        let moment = numbers.between(least, most);
+        // Whoever saves loses nothing that way: only who does not tells whether edits are kept.
+        let saves = numbers.below(2) == 0;
         // Some press keys without a pause, others think.
         let pause = [0.03, 0.12, 0.5][numbers.below(3)];
         let mut at = 0.0;
@@ -79,7 +81,7 @@ impl Plan {
         while at < moment {
             // Saving and exporting are rarer than edits.
             let key = match numbers.below(12) {
-                0 => SAVE,
+                0 if saves => SAVE,
                 1 => SAVE + 1 + numbers.below(2),
                 _ => numbers.below(SAVE),
             };
