@@ -60,7 +60,7 @@ const ROOMS: &[(&str, &[&str])] = &[
 
 /// Crates that only some rooms know.
 const CRATES: &[(&str, &[&str])] = &[
-    ("base64", &["asset"]),
+    ("base64", &["asset", "dashboard"]),
     ("clap", &["command"]),
     ("colorous", &["dashboard"]),
     ("crossbeam_channel", &["render", "dashboard"]),

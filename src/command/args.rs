@@ -64,6 +64,8 @@ pub enum Command {
     Check(CheckArgs),
     /// Write a commented starter scene
     New(NewArgs),
+    /// Tell what the terminal and the line to it can do, and what would make them better
+    Doctor(DoctorArgs),
 }
 
 /// Arguments of `zerkalo render`.
@@ -187,6 +189,14 @@ pub struct CheckArgs {
 pub struct NewArgs {
     /// The scene file to write; must not exist
     pub file: PathBuf,
+}
+
+/// Arguments of `zerkalo doctor`.
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
+    /// Measure how fast the line is, too, which takes a second or some
+    #[arg(long)]
+    pub rate: bool,
 }
 
 /// Values of `--precision`.

@@ -11,7 +11,8 @@ use crate::film::Display;
 use crate::render::Options;
 use crate::render::schedule::{Criterion, Settings};
 use crate::sampling::{SampleSettings, SamplerKind};
-use crate::scene::{BUILT_IN, SceneErrors, SceneFile};
+use crate::scene::{BUILT_IN, Recovery, SceneErrors, SceneFile, state_folder};
+use crate::value::printable;
 use crate::world;
 use std::env;
 use std::fs::File;
@@ -27,20 +28,26 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let terminals = io::stdin().is_terminal() && io::stdout().is_terminal();
     if !terminals || surroundings.term == "dumb" {
         let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
+        let why = match terminals {
+            true => "TERM=dumb: a terminal that cannot place text shows no dashboard",
+            false => "the dashboard needs a terminal",
+        };
         return Err(Failure::Usage(format!(
-            "the dashboard needs a terminal; `zerkalo render {scene} -o PICTURE.png` renders without \
+            "{why}; `zerkalo render {scene} -o PICTURE.png` renders without \
              one"
         )));
     }
     let reading = Told::new();
+    let state = state_folder(|name| env::var_os(name));
     let file = match &args.scene {
-        Some(path) => opened(path, reading.assets.clone())?,
+        Some(path) => opened(path, reading.assets.clone(), state.as_deref())?,
         None => SceneFile::untitled(BUILT_IN.to_string(), BUILT_IN_NAME)
             .map_err(|errors| (PathBuf::new(), errors)),
     };
     reading.hush();
     let setup = Setup {
         file,
+        state,
         threads: args.threads.map_or_else(all_threads, usize::from),
         options: Options {
             world: world::Options { precision: args.precision.precision() },
@@ -66,6 +73,10 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
             Err(why) => warn(why),
         }
     }
+    if let Some(path) = &ended.kept {
+        let path = path.display();
+        warn(&format!("unsaved edits are kept in {path}; the next start offers them"));
+    }
     ended.latencies.iter().for_each(|line| warn(line));
     ended.signalled.map_or(Ok(()), |status| Err(Failure::Signalled(status)))
 }
@@ -75,6 +86,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
 fn opened(
     path: &Path,
     assets: Arc<Assets>,
+    state: Option<&Path>,
 ) -> Result<Result<SceneFile, (PathBuf, SceneErrors)>, Failure> {
     match SceneFile::open_with(path, assets) {
         Ok(file) => Ok(Ok(file)),
@@ -82,10 +94,20 @@ fn opened(
             let readable = File::open(path).and_then(|file| file.metadata());
             match readable.is_ok_and(|metadata| metadata.is_file()) {
                 true => Ok(Err((path.to_path_buf(), errors))),
-                false => Err(Failure::Failed(errors.to_string())),
+                false => Err(Failure::Failed(errors.to_string() + &lost(path, state))),
             }
         }
     }
+}
+
+/// A hint at edits of a scene whose file is gone, if there are any.
+fn lost(path: &Path, state: Option<&Path>) -> String {
+    let found = Recovery::of(Some(path), "", state).find();
+    let hint = |path: &Path| {
+        let path = printable(&path.display().to_string());
+        format!("\nUnsaved edits of it are kept in {path}, which is a scene file itself.")
+    };
+    found.lost.first().map_or(String::new(), |lost| hint(lost.path()))
 }
 
 /// `mirror-room-1.png  640x480  212 spp  noise 0.50 codes`

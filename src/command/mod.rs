@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod cpu;
+mod doctor;
 mod edit;
 mod files;
 mod measure;
@@ -14,9 +15,11 @@ mod stats;
 
 pub use cpu::require as require_cpu;
 
+use crate::value::printable;
 use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
+use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -44,6 +47,7 @@ pub fn main() -> ExitCode {
         Some(Command::Measure(args)) => measure::run(args),
         Some(Command::Check(args)) => check::run(args),
         Some(Command::New(args)) => new::run(args),
+        Some(Command::Doctor(args)) => doctor::run(args),
         None => edit::run(&cli.edit),
     };
     let (status, message) = match result {
@@ -67,10 +71,24 @@ fn understood() -> Cli {
             let names: Vec<_> =
                 Cli::command().get_subcommands().map(|c| c.get_name().to_string()).collect();
             let why = format!("`{first}` is no command; commands: {}", names.join(", "));
-            Cli::command().error(ErrorKind::InvalidSubcommand, why).exit()
+            end(&Cli::command().error(ErrorKind::InvalidSubcommand, why))
         }
-        error.exit()
+        end(&error)
     })
+}
+
+/// Tells what is wrong with the command line, or what was asked about it, and ends the program.
+fn end(error: &clap::Error) -> ! {
+    // What was typed, or found by a shell's pattern, shall not steer the terminal.
+    let steers = |argument: OsString| {
+        let argument = argument.to_string_lossy();
+        printable(&argument) != argument
+    };
+    if std::env::args_os().any(steers) {
+        warn(error.render().to_string().trim_end());
+        std::process::exit(error.exit_code());
+    }
+    error.exit()
 }
 
 /// One thread per processor.
@@ -80,10 +98,15 @@ fn all_threads() -> usize {
 
 /// A line on stderr; if nobody can read it, that is no reason to fail.
 fn warn(message: &str) {
-    let _ = writeln!(std::io::stderr(), "{message}");
+    let _ = writeln!(std::io::stderr(), "{}", shown(message));
 }
 
 /// A line on stdout; as [`warn`].
 fn say(message: &str) {
-    let _ = writeln!(std::io::stdout(), "{message}");
+    let _ = writeln!(std::io::stdout(), "{}", shown(message));
+}
+
+/// Lines without anything in them that could steer a terminal: they may hold names of files.
+fn shown(message: &str) -> String {
+    message.split('\n').map(printable).collect::<Vec<_>>().join("\n")
 }

@@ -142,6 +142,10 @@ pub enum Action {
     SaveAs,
     /// Reads the file again.
     Reload,
+    /// Takes up the unsaved edits of a session that broke off.
+    Recover,
+    /// Gives the terminal to the shell until it calls back.
+    Suspend,
     /// Ends the program; asks if there are unsaved edits.
     Quit,
 
@@ -158,6 +162,8 @@ pub enum Action {
     ExportPng,
     /// Writes the picture as EXR.
     ExportExr,
+    /// Copies the path of the last picture that was written.
+    CopyPath,
     /// Renders at another size, asked for, into a file.
     ExportSized,
     /// Ends a running export of another size.

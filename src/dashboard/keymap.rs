@@ -186,10 +186,13 @@ pub const KEYMAP: &[Row] = &[
     row(C::File, Save, &[(Anywhere, &["Ctrl-s"])], "save"),
     row(C::File, SaveAs, &[(Anywhere, &["W"])], "save as"),
     row(C::File, Reload, &[(Anywhere, &["Ctrl-o"])], "read the file again"),
+    row(C::File, Recover, &[], "recover edits of a broken session"),
+    row(C::File, Suspend, &[(Anywhere, &["Ctrl-z"]), (Overlay, &["Ctrl-z"])], "suspend to the shell"),
     row(C::File, Quit, &[(Anywhere, &["q", "Ctrl-c"]), (Overlay, &["Ctrl-c"])], "quit"),
 
     row(C::Picture, ExportPng, &[(Anywhere, &["p"])], "write a PNG"),
     row(C::Picture, ExportExr, &[(Anywhere, &["P"])], "write an EXR"),
+    row(C::Picture, CopyPath, &[(Anywhere, &["y"])], "copy the path of the last picture"),
     row(C::Picture, ExportSized, &[(Anywhere, &["Ctrl-e"])], "render at another size"),
     row(C::Picture, CancelExport, &[(Anywhere, &["Ctrl-x"])], "cancel the running export"),
     row(C::Picture, Exposure(More), &[(Anywhere, &["=", "+"])], "exposure up"),
@@ -218,7 +221,7 @@ pub const KEYMAP: &[Row] = &[
     row(C::Render, Threads(More), &[], "more threads"),
     row(C::Render, Threads(Less), &[], "fewer threads"),
     row(C::Render, Priority, &[], "low or normal priority"),
-    row(C::Render, NextColors, &[], "next colour mode of the terminal"),
+    row(C::Render, NextColors, &[(Anywhere, &["#"])], "next colour mode of the terminal"),
 
     row(C::Help, Help, &[(Anywhere, &["?", "F1"])], "all keys"),
     row(C::Help, Palette, &[(Anywhere, &[":", "Ctrl-p"])], "find an action"),

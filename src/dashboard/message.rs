@@ -8,6 +8,7 @@ use crate::render::session::Snapshot;
 use crate::scene::{SaveError, Scene, SceneErrors};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What happened.
 #[derive(Debug)]
@@ -30,6 +31,10 @@ pub enum Message {
     Loaded(Box<Result<Arc<Scene>, SceneErrors>>),
     /// Somebody else has written the file since it was last read or written.
     ChangedOnDisk,
+    /// A program that did not end by itself has left unsaved edits of this scene.
+    LeftBehind(LeftBehind),
+    /// Something about unsaved edits that the user ought to know.
+    Trouble(String),
     /// A picture was written, or not, and why.
     Exported(Result<Exported, String>),
     /// How far the render of [`Effect::ExportSized`] is, 0..=1.
@@ -39,6 +44,17 @@ pub enum Message {
     /// Time has passed. At least once a second while something on the screen depends on it
     /// ([`Model::wakes_at`](super::model::Model::wakes_at)).
     Tick,
+}
+
+/// Unsaved edits of a program that did not end by itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeftBehind {
+    /// The scene with the edits.
+    pub scene: Arc<Scene>,
+    /// How long ago they were kept.
+    pub age: Duration,
+    /// The scene's file is not what it was then.
+    pub changed: bool,
 }
 
 /// A picture that was written.
@@ -162,6 +178,16 @@ pub enum Effect {
     },
     /// End the render of `ExportSized`; nothing is written.
     CancelExport,
+    /// Keep these unsaved edits where the next start finds them; `None`: there are none any more.
+    Journal(Option<Arc<Scene>>),
+    /// The edits that were left behind are the unsaved ones of this program now.
+    TakeUp,
+    /// The edits that were left behind are not wanted.
+    Discard,
+    /// Put the path of this file into the clipboard of the terminal.
+    Copy(PathBuf),
+    /// Give the terminal to the shell until it calls back.
+    Suspend,
     /// End the program.
     Quit,
 }

@@ -6,7 +6,7 @@ use super::input::Button;
 use super::keymap::Context;
 use super::layout::{Focus, Layout, Request, layout};
 use super::link::Reading;
-use super::message::{Channel, Format};
+use super::message::{Channel, Format, LeftBehind};
 use super::overlay::Overlay;
 use super::places::wrapped;
 pub use super::raster::Colors;
@@ -183,6 +183,8 @@ pub struct Model {
     pub notice: Option<Notice>,
     /// A render at another size.
     pub export: Option<RunningExport>,
+    /// The last picture that was written.
+    pub last_export: Option<PathBuf>,
     /// Nothing has been pressed yet: the hints are those for a first time.
     pub first_time: bool,
     /// A mouse button that is held down.
@@ -191,6 +193,10 @@ pub struct Model {
     pub last_edit: Option<Duration>,
     /// A save that was asked for so as to quit afterwards.
     pub quit_when_saved: bool,
+    /// Unsaved edits of a session that broke off, about which is not decided.
+    pub left_behind: Option<LeftBehind>,
+    /// The unsaved edits that were last asked to be kept.
+    pub journaled: Option<Arc<Scene>>,
     /// The raster that snapshots were last asked for.
     pub raster: Option<[usize; 2]>,
     /// Counts up whenever the cells of the picture may have to be others.
@@ -261,10 +267,13 @@ impl Model {
             line: None,
             notice: None,
             export: None,
+            last_export: None,
             first_time: true,
             drag: None,
             last_edit: None,
             quit_when_saved: false,
+            left_behind: None,
+            journaled: None,
             raster: None,
             picture_version: 0,
         }

@@ -152,4 +152,8 @@ pub enum Answer {
     Overwrite(Option<PathBuf>),
     /// Asks for another name.
     SaveAs,
+    /// Takes up the edits that were left behind.
+    TakeUp,
+    /// Throws them away.
+    Discard,
 }

@@ -60,6 +60,8 @@ static FORMATS: [Format; 2] = [
 pub struct Target {
     path: PathBuf,
     format: usize,
+    /// There must be no file yet.
+    fresh: bool,
 }
 
 /// Why a picture cannot be written: the path, what is wrong, what would help.
@@ -90,7 +92,7 @@ impl Target {
             .as_ref()
             .and_then(|e| FORMATS.iter().position(|f| e.eq_ignore_ascii_case(f.extension)));
         match known {
-            Some(format) => Ok(Self { path, format }),
+            Some(format) => Ok(Self { path, format, fresh: false }),
             None => {
                 let known: Vec<_> = FORMATS.iter().map(|f| format!(".{}", f.extension)).collect();
                 Err(WriteError {
@@ -103,6 +105,12 @@ impl Target {
                 })
             }
         }
+    }
+
+    /// The same, but a file that is there, or comes into being before this one is complete, is not
+    /// overwritten: writing fails.
+    pub fn fresh(self) -> Self {
+        Self { fresh: true, ..self }
     }
 
     /// The file that is to be written.
@@ -132,7 +140,11 @@ impl Target {
         encode(&mut out).and_then(|()| out.flush()).map_err(explain)?;
         let temporary = out.into_inner().map_err(|e| explain(e.into_error()))?;
         temporary.as_file().sync_all().map_err(explain)?;
-        temporary.persist(&file).map_err(|e| explain(e.error))?;
+        let put = match self.fresh {
+            true => temporary.persist_noclobber(&file),
+            false => temporary.persist(&file),
+        };
+        put.map_err(|e| explain(e.error))?;
         // Makes the new name durable. Not every system lets a directory be opened or synced; the
         // picture is complete either way.
         if let Ok(directory) = File::open(&directory) {
@@ -173,6 +185,8 @@ impl Target {
             builder.permissions(fs::Permissions::from_mode(0o666));
         }
         let made = builder.tempfile_in(&directory).and_then(|temporary| {
+            // The sign that it is not a left-over; where files cannot be locked nobody removes those.
+            let _ = temporary.as_file().try_lock();
             if let Some(existing) = &existing {
                 temporary.as_file().set_permissions(existing.permissions())?;
             }
@@ -189,6 +203,9 @@ impl Target {
     fn explained(&self, error: &io::Error, directory: &Path) -> WriteError {
         let shown = directory.display();
         match error.kind() {
+            ErrorKind::AlreadyExists => {
+                self.error("there is such a file already", "name another one")
+            }
             ErrorKind::NotFound if !directory.exists() => self.error(
                 format!("the directory {shown} does not exist"),
                 "create it first or name another one",
@@ -297,6 +314,18 @@ mod tests {
             assert_eq!(fs::read(&path).unwrap(), b"old");
             assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
         }
+    }
+
+    #[test]
+    fn what_is_to_be_fresh_overwrites_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let target = Target::from_path(&path).unwrap().fresh();
+        target.replace(|sink| sink.write_all(b"new")).unwrap();
+        let error = target.replace(|sink| sink.write_all(b"newer")).unwrap_err().to_string();
+        assert!(error.contains("such a file already"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::rendering::Rendering;
 use super::session::Report;
 use crate::film::{Depth, Display, Picture, Target, Tone, WriteError};
 use crate::sampling::SamplerKind;
+use crate::value::fnv1a64;
 
 /// How a picture came to be, as far as its rendering does not know.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,14 +41,9 @@ impl Rendering {
     }
 }
 
-/// 64-bit FNV-1a hash of a scene's text, which tells whether a picture was made from it.
-/// Fowler, Noll, Vo: offset basis and prime as in draft-eastlake-fnv.
+/// A hash of a scene's text, which tells whether a picture was made from it.
 pub fn scene_hash(text: &str) -> String {
-    const OFFSET_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
-    const PRIME: u64 = 0x0000_0100_0000_01b3;
-    let hash =
-        text.bytes().fold(OFFSET_BASIS, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(PRIME));
-    format!("fnv1a64:{hash:016x}")
+    format!("fnv1a64:{:016x}", fnv1a64(text.as_bytes()))
 }
 
 /// Keys and values for the file.
@@ -91,15 +87,4 @@ fn metadata(
         ),
     ];
     entries.into_iter().map(|(key, value)| (key.to_string(), value)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    /// Test vectors of the FNV draft.
-    #[test]
-    fn the_hash_is_fnv_1a() {
-        assert_eq!(super::scene_hash(""), "fnv1a64:cbf29ce484222325");
-        assert_eq!(super::scene_hash("a"), "fnv1a64:af63dc4c8601ec8c");
-        assert_eq!(super::scene_hash("foobar"), "fnv1a64:85944171f73967e8");
-    }
 }

@@ -1,10 +1,11 @@
 //! A scene and the file that it is kept in: opening, saving without harm, noticing other writers.
 
+use super::recovery::{TEMPORARY, claim};
 use super::{Document, Scene, SceneErrors};
 use crate::asset::Assets;
+use crate::value::{fnv1a64, printable};
 use std::fmt;
 use std::fs::{self, File};
-use std::hash::{DefaultHasher, Hasher};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -49,7 +50,7 @@ pub enum SaveError {
 
 impl fmt::Display for SaveError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let shown = |path: &PathBuf| crate::value::printable(&path.display().to_string());
+        let shown = |path: &PathBuf| printable(&path.display().to_string());
         match self {
             Self::Untitled => f.write_str("this scene has no file yet; save it under a name"),
             Self::Changed(path) => write!(
@@ -83,7 +84,7 @@ impl SceneFile {
     /// As [`Scene::read`].
     pub fn open_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         let document = Document::read_with(path, assets)?;
-        let fingerprint = fingerprint(document.text().as_bytes());
+        let fingerprint = fnv1a64(document.text().as_bytes());
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }
 
@@ -93,6 +94,47 @@ impl SceneFile {
     /// As [`Scene::parse`].
     pub fn untitled(text: String, name: &str) -> Result<Self, SceneErrors> {
         Ok(Self { path: None, document: Document::parse(text, name)?, fingerprint: 0 })
+    }
+
+    /// A scene that was begun from the file at `path`, where something else is now; saving it puts
+    /// `text` in the place of that.
+    ///
+    /// # Errors
+    /// As [`Scene::parse`].
+    pub fn recovered(path: &Path, text: String) -> Result<Self, SceneErrors> {
+        let document = Document::parse(text, &path.display().to_string())?;
+        let fingerprint = content(path).ok().flatten().unwrap_or_default();
+        Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
+    }
+
+    /// Reads `text`, which would stand in this file, as a scene; messages call it `name`.
+    ///
+    /// # Errors
+    /// As [`Scene::parse`].
+    pub fn parse(&self, text: &str, name: &str) -> Result<Scene, SceneErrors> {
+        Scene::parse_in(text, name, self.document.scene().library.clone())
+    }
+
+    /// A hash of the bytes that this program last read from or wrote to the file; `None`: there is
+    /// none yet.
+    pub fn fingerprint(&self) -> Option<u64> {
+        self.path.as_ref().map(|_| self.fingerprint)
+    }
+
+    /// Whether `text` is what the file held when this program last read or wrote it; without a file,
+    /// what the scene was begun with.
+    pub fn holds(&self, text: &str) -> bool {
+        match self.path {
+            Some(_) => fnv1a64(text.as_bytes()) == self.fingerprint,
+            None => text == self.document.text(),
+        }
+    }
+
+    /// What saving `scene`, which has no faults, would write.
+    pub fn text_of(&self, scene: &Scene) -> String {
+        let mut document = self.document.clone();
+        document.apply(scene);
+        document.text().to_string()
     }
 
     /// Where it is kept.
@@ -144,7 +186,7 @@ impl SceneFile {
         let mut document = self.document.clone();
         document.apply(scene);
         replace(&path, document.text(), true)?;
-        self.fingerprint = fingerprint(document.text().as_bytes());
+        self.fingerprint = fnv1a64(document.text().as_bytes());
         self.document = document;
         Ok(())
     }
@@ -163,7 +205,7 @@ impl SceneFile {
         let meshes = scene.objects.iter().filter_map(|object| object.shape.file());
         let images = scene.materials.values().flat_map(|material| material.files());
         if let Some(file) = meshes.chain(images).find(|file| library.loses(file, path)) {
-            let file = crate::value::printable(file);
+            let file = printable(file);
             return Err(SaveError::Failed {
                 path: path.to_path_buf(),
                 what: format!("from there \"{file}\", which the scene names, would not be found"),
@@ -174,16 +216,10 @@ impl SceneFile {
         replace(path, document.text(), overwrite)?;
         library.move_to(path);
         self.path = Some(path.to_path_buf());
-        self.fingerprint = fingerprint(document.text().as_bytes());
+        self.fingerprint = fnv1a64(document.text().as_bytes());
         self.document = document;
         Ok(())
     }
-}
-
-fn fingerprint(bytes: &[u8]) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    hasher.write(bytes);
-    hasher.finish()
 }
 
 /// The fingerprint of what is in the file; `None`: there is no file.
@@ -192,7 +228,7 @@ fn content(path: &Path) -> io::Result<Option<u64>> {
         Ok(file) if file.metadata()?.is_file() => {
             let mut bytes = Vec::new();
             file.take(1 << 30).read_to_end(&mut bytes)?;
-            Ok(Some(fingerprint(&bytes)))
+            Ok(Some(fnv1a64(&bytes)))
         }
         Ok(_) => Err(ErrorKind::InvalidInput.into()),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
@@ -226,7 +262,8 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
     let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty());
     let directory = parent.unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".zerkalo-").suffix(".tmp");
+    let [prefix, suffix] = TEMPORARY;
+    builder.prefix(prefix).suffix(suffix);
     // An existing file keeps its permissions; a new one gets those that the user's umask leaves.
     #[cfg(unix)]
     {
@@ -234,6 +271,7 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     let written = builder.tempfile_in(directory).and_then(|mut temporary| {
+        claim(&temporary);
         if let Some(existing) = &existing {
             temporary.as_file().set_permissions(existing.permissions())?;
         }
@@ -257,7 +295,7 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
 }
 
 fn explain(error: &io::Error, directory: &Path) -> String {
-    let shown = directory.display();
+    let shown = printable(&directory.display().to_string());
     match error.kind() {
         ErrorKind::NotFound => format!("the directory {shown} does not exist; create it first"),
         ErrorKind::NotADirectory => format!("{shown} is not a directory"),

@@ -14,6 +14,7 @@ mod locate;
 mod message;
 mod object;
 mod read;
+mod recovery;
 mod reference;
 mod rewrite;
 mod schema;
@@ -30,6 +31,7 @@ pub use included::{BUILT_IN, built_in, starter};
 pub use library::Library;
 pub use message::{Message, SceneErrors};
 pub use object::{OBJECT_FIELDS, Object};
+pub use recovery::{Found, Lost, Recovery, kept_in, state_folder, sweep};
 pub use reference::reference;
 pub use schema::FIELDS;
 pub use settings::{
@@ -74,5 +76,7 @@ pub struct Scene {
 
 #[cfg(test)]
 mod file_test;
+#[cfg(test)]
+mod recovery_test;
 #[cfg(test)]
 mod tables_test;

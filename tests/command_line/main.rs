@@ -1,5 +1,6 @@
 //! The program itself, as users and scripts meet it.
 
+mod hostile;
 mod refusals;
 #[cfg(unix)]
 mod signals;

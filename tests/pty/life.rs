@@ -5,7 +5,7 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 use zerkalo::dashboard::terminal::{ENTER, LEAVE, Screen};
 
-fn signal(name: &str, id: u32) {
+pub fn signal(name: &str, id: u32) {
     let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
     assert!(sent.unwrap().success());
 }

@@ -2,8 +2,10 @@
 #![cfg(unix)]
 
 mod editing;
+mod hostile;
 mod life;
 mod picture;
+mod stopping;
 mod terminal;
 
 use std::fs;

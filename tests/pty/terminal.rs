@@ -72,6 +72,7 @@ impl Terminal {
         }
         command.env("TERM", "xterm-256color");
         command.env("COLORTERM", "truecolor");
+        command.env("XDG_STATE_HOME", start.folder.join("state"));
         for (name, value) in start.env {
             command.env(name, value);
         }

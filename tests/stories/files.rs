@@ -4,7 +4,7 @@ use crate::desk::{Desk, FILE, ROOM};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo::dashboard::message::{Effect, Message};
+use zerkalo::dashboard::message::{Effect, LeftBehind, Message};
 use zerkalo::dashboard::model::{Colors, Model, Start};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::{begin, update};
@@ -184,4 +184,48 @@ fn the_built_in_scene_is_ready_at_once() {
     assert!(effects.contains(&Effect::Raster(raster)), "{effects:?}");
     let effects = update(&mut model, Message::Resize([120, 36]), Duration::ZERO);
     assert!(matches!(effects[..], [Effect::Raster(new)] if new != raster));
+}
+
+#[test]
+fn an_edit_made_while_the_file_was_written_holds_back_the_end() {
+    let mut model = start(Some(FILE), ROOM);
+    let effects = press(&mut model, "Left q s Left");
+    let save = effects.into_iter().find_map(|e| match e {
+        Effect::Save { scene, .. } => Some(scene),
+        _ => None,
+    });
+    let saved = Message::Saved(save.unwrap(), Ok(FILE.into()));
+    let effects = update(&mut model, saved, Duration::ZERO);
+    assert!(!effects.contains(&Effect::Quit) && model.is_unsaved());
+}
+
+#[test]
+fn edits_bring_back_a_scene_whose_file_is_spoilt() {
+    let mut model = start(Some(FILE), "[camera");
+    begin(&mut model);
+    let scene = Arc::new(Scene::parse(ROOM, FILE).unwrap());
+    let left = LeftBehind { scene: Arc::clone(&scene), age: Duration::ZERO, changed: true };
+    update(&mut model, Message::LeftBehind(left), Duration::ZERO);
+    let effects = press(&mut model, "r");
+    assert!(effects.contains(&Effect::Show(Arc::clone(&scene))), "{effects:?}");
+    assert!(effects.contains(&Effect::TakeUp) && effects.contains(&Effect::Journal(Some(scene))));
+    assert!(model.is_unsaved() && !model.file.blank);
+    // What stands in the file is not overwritten unasked.
+    let effects = press(&mut model, "Ctrl-s");
+    assert!(effects.is_empty() && matches!(model.overlay, Some(Overlay::Question(_))));
+    let effects = press(&mut model, "o");
+    assert!(matches!(effects[..], [Effect::Save { overwrite: true, .. }]), "{effects:?}");
+}
+
+#[test]
+fn the_path_of_the_last_picture_is_copied_unless_it_steers() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("y");
+    assert!(desk.notice().contains("No picture"));
+    desk.keys("p P y");
+    assert!(desk.asked(|e| *e == Effect::Copy("room-1.exr".into())));
+    desk.effects.clear();
+    desk.model.last_export = Some("a\nreboot\n.png".into());
+    desk.keys("y");
+    assert!(desk.effects.is_empty() && desk.notice().contains("not copied"));
 }

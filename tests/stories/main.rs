@@ -7,6 +7,7 @@ mod editing;
 mod files;
 mod mouse;
 mod random;
+mod recovery;
 mod roughness;
 #[path = "../support/mod.rs"]
 mod support;

@@ -91,6 +91,8 @@ fn every_action() -> Vec<Action> {
         Save,
         SaveAs,
         Reload,
+        Recover,
+        Suspend,
         Quit,
         Pause,
         Restart,
@@ -98,6 +100,7 @@ fn every_action() -> Vec<Action> {
         Quality,
         ExportPng,
         ExportExr,
+        CopyPath,
         ExportSized,
         CancelExport,
         Exposure(Change::Up),
@@ -149,10 +152,13 @@ fn every_action() -> Vec<Action> {
             Frame | ResetCamera | StoreView | MoveMode | TurnMode | FlyMode | Leave | NextLight
             | SwitchLight | AddLight | NextLobe | AddObject | Duplicate | Delete | Rename
             | Drop | OwnMaterial | NextPanel | PreviousPanel | OnlyPicture | First | Last
-            | Open | ClearField | Undo | Redo | Save | SaveAs | Reload | Quit | Pause | Restart
-            | StopAt | Quality | ExportPng | ExportExr | ExportSized | CancelExport
-            | ResetExposure | NextTone | NextChannel | PreviousChannel | Probe | Keep | Flip
-            | Difference | Priority | NextColors | Help | Palette | Inventory => vec![action],
+            | Open | ClearField | Undo | Redo | Save | SaveAs | Reload | Recover | Suspend
+            | Quit | Pause | Restart | StopAt | Quality | ExportPng | ExportExr | CopyPath
+            | ExportSized | CancelExport | ResetExposure | NextTone | NextChannel
+            | PreviousChannel | Probe | Keep | Flip | Difference | Priority | NextColors | Help
+            | Palette | Inventory => {
+                vec![action]
+            }
         }
     };
     one_of_each.into_iter().flat_map(variants).collect()

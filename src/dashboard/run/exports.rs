@@ -11,7 +11,6 @@ use crate::render::{Options, Rendering};
 use crate::sampling::SamplerKind;
 use crate::scene::Scene;
 use crossbeam_channel::Sender;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -52,19 +51,14 @@ impl Studio {
             sampler: self.sampler,
             adaptive: self.adaptive,
         };
-        let path = names::reserve(&self.folder, &self.stem, format.extension())
-            .map_err(|e| format!("cannot write a picture of {}: {e}", self.stem))?;
-        let written =
-            Target::from_path(&path).map_err(|error| error.to_string()).and_then(|target| {
-                let display = rendering.display();
-                let written = rendering.write(report, &origin, display, Depth::Eight, &target);
-                written.map_err(|error| error.to_string())
-            });
-        if let Err(why) = written {
-            // The name was reserved with an empty file.
-            let _ = fs::remove_file(&path);
-            return Err(why);
-        }
+        let display = rendering.display();
+        let write = |path: &Path| {
+            let target = Target::from_path(path)?.fresh();
+            rendering.write(report, &origin, display, Depth::Eight, &target)
+        };
+        let path = names::numbered(&self.folder, &self.stem, format.extension(), write)
+            .ok_or_else(|| format!("all names for pictures of {} are in use", self.stem))?
+            .map_err(|error| error.to_string())?;
         Ok(Exported {
             scp: names::scp(&path),
             path,

@@ -1,15 +1,16 @@
 //! The scene's file, in a thread of its own: a slow disk holds up nobody, and somebody else's writing
 //! is noticed.
 
+use super::journal::Journal;
 use crate::dashboard::message::Message;
 use crate::scene::{DiskState, Document, SaveError, Scene, SceneErrors, SceneFile};
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, unbounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 /// How often the file is looked at.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
@@ -17,6 +18,10 @@ const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 enum Job {
     Save { scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool },
     Load,
+    Journal(Option<Arc<Scene>>),
+    Secure(Sender<()>),
+    TakeUp,
+    Discard,
 }
 
 /// The scene file as it was last read or written; nothing if it never could be read.
@@ -39,13 +44,18 @@ impl Paper {
 pub struct Files {
     jobs: Option<Sender<Job>>,
     paper: Paper,
-    thread: Option<JoinHandle<()>>,
+    thread: Option<JoinHandle<Option<PathBuf>>>,
 }
 
 impl Files {
     /// Starts the thread for a file that has been opened, or for one at a path that cannot be read
-    /// yet. Results go to `results`.
-    pub fn new(file: Result<SceneFile, PathBuf>, results: Sender<Message>) -> io::Result<Self> {
+    /// yet. Results go to `results`. `state`: the folder for unsaved edits that cannot be kept beside
+    /// their scene.
+    pub fn new(
+        file: Result<SceneFile, PathBuf>,
+        state: Option<PathBuf>,
+        results: Sender<Message>,
+    ) -> io::Result<Self> {
         let (jobs, inbox) = unbounded();
         let paper = Paper::default();
         let (path, file) = match file {
@@ -55,7 +65,9 @@ impl Files {
         // A file that could be read is compared at the first look; what is wrong with another one is
         // known already.
         let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
-        let clerk = Clerk { path, file, seen, paper: paper.clone(), results };
+        let name = file.as_ref().map_or("", |file| file.document().name());
+        let journal = Journal::new(path.as_deref(), name, state);
+        let clerk = Clerk { path, file, seen, journal, paper: paper.clone(), results };
         let thread = thread::Builder::new().name("files".into()).spawn(|| clerk.run(inbox))?;
         Ok(Self { jobs: Some(jobs), paper, thread: Some(thread) })
     }
@@ -68,6 +80,43 @@ impl Files {
     /// Reads the file: a [`Message::Loaded`] follows.
     pub fn load(&self) {
         self.give(Job::Load);
+    }
+
+    /// The scene has unsaved edits, and is this now; `None`: it has none any more. They are written
+    /// where the next start finds them: soon, or at the end.
+    pub fn journal(&self, scene: Option<Arc<Scene>>) {
+        self.give(Job::Journal(scene));
+    }
+
+    /// Unsaved edits are written now. Waits for that at most as long as `patience`.
+    pub fn secure(&self, patience: Duration) {
+        let (done, told) = bounded(1);
+        self.give(Job::Secure(done));
+        let _ = told.recv_timeout(patience);
+    }
+
+    /// The edits of the last [`Message::LeftBehind`] are what is unsaved now.
+    pub fn take_up(&self) {
+        self.give(Job::TakeUp);
+    }
+
+    /// The edits of the last [`Message::LeftBehind`] are not wanted.
+    pub fn discard(&self) {
+        self.give(Job::Discard);
+    }
+
+    /// Waits for what is being written; where unsaved edits are kept, if there are any.
+    pub fn finish(mut self) -> Option<PathBuf> {
+        self.join()
+    }
+
+    fn join(&mut self) -> Option<PathBuf> {
+        drop(self.jobs.take());
+        match self.thread.take()?.join() {
+            Ok(kept) => kept,
+            Err(_) if thread::panicking() => None,
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
     }
 
     /// What the file holds.
@@ -84,12 +133,7 @@ impl Files {
 /// Waits for what is being written.
 impl Drop for Files {
     fn drop(&mut self) {
-        drop(self.jobs.take());
-        if let Some(Err(panic)) = self.thread.take().map(JoinHandle::join)
-            && !thread::panicking()
-        {
-            std::panic::resume_unwind(panic);
-        }
+        self.join();
     }
 }
 
@@ -108,27 +152,81 @@ struct Clerk {
     file: Option<SceneFile>,
     /// The state of the file when it was last read, written or looked at.
     seen: Stamp,
+    journal: Journal,
     paper: Paper,
     results: Sender<Message>,
 }
 
 impl Clerk {
-    fn run(mut self, inbox: Receiver<Job>) {
+    /// Works until there is nobody to work for. Where unsaved edits are kept, if there are any.
+    fn run(mut self, inbox: Receiver<Job>) -> Option<PathBuf> {
         self.publish();
-        loop {
-            let message = match inbox.recv_timeout(CHECK_INTERVAL) {
-                Ok(Job::Save { scene, path, overwrite }) => {
-                    let saved = self.save(&scene, path, overwrite);
-                    Message::Saved(scene, saved)
-                }
-                Ok(Job::Load) => Message::Loaded(Box::new(self.load())),
-                Err(RecvTimeoutError::Timeout) if self.changed() => Message::ChangedOnDisk,
-                Err(RecvTimeoutError::Timeout) => continue,
-                Err(RecvTimeoutError::Disconnected) => break,
-            };
-            // Nobody listens any more when the program ends.
-            let _ = self.results.send(message);
+        for message in self.journal.search(whole(&self.file, &self.path)) {
+            self.tell(message);
         }
+        let mut looked = Instant::now();
+        loop {
+            let next_look = looked + CHECK_INTERVAL;
+            let due = self.journal.due().map_or(next_look, |due| due.min(next_look));
+            match inbox.recv_deadline(due) {
+                Ok(job) => self.work(job),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            let now = Instant::now();
+            if self.journal.due().is_some_and(|due| due <= now) {
+                self.write_journal();
+            }
+            if next_look <= now {
+                looked = now;
+                if self.changed() {
+                    self.tell(Message::ChangedOnDisk);
+                }
+            }
+        }
+        self.write_journal();
+        self.journal.path().map(Path::to_path_buf)
+    }
+
+    fn work(&mut self, job: Job) {
+        match job {
+            Job::Save { scene, path, overwrite } => {
+                let saved = self.save(&scene, path, overwrite);
+                self.tell(Message::Saved(scene, saved));
+            }
+            Job::Load => {
+                let loaded = self.load();
+                self.tell(Message::Loaded(Box::new(loaded)));
+            }
+            Job::Journal(scene) => self.journal.note(scene, Instant::now()),
+            Job::Secure(done) => {
+                self.write_journal();
+                // Nobody waits any more if it has taken long.
+                let _ = done.try_send(());
+            }
+            Job::TakeUp => {
+                let spoilt = self.path.as_deref().filter(|_| self.file.is_none());
+                if let Some(file) = self.journal.take_up(spoilt) {
+                    self.file = Some(file);
+                    self.publish();
+                }
+            }
+            Job::Discard => {
+                self.journal.discard();
+                let next = self.journal.offer(whole(&self.file, &self.path));
+                next.into_iter().for_each(|message| self.tell(message));
+            }
+        }
+    }
+
+    fn write_journal(&mut self) {
+        let told = self.file.as_ref().and_then(|file| self.journal.write(file));
+        told.into_iter().for_each(|message| self.tell(message));
+    }
+
+    fn tell(&self, message: Message) {
+        // Nobody listens any more when the program ends.
+        let _ = self.results.send(message);
     }
 
     /// Whether somebody has written the file since it was read, written or told about.
@@ -147,7 +245,7 @@ impl Clerk {
 
     fn save(
         &mut self,
-        scene: &Scene,
+        scene: &Arc<Scene>,
         path: Option<PathBuf>,
         overwrite: bool,
     ) -> Result<PathBuf, SaveError> {
@@ -155,12 +253,14 @@ impl Clerk {
             let what = "it holds something that is no scene".to_string();
             return Err(SaveError::Failed { path: self.path.clone().unwrap_or_default(), what });
         };
+        self.journal.saving(file, scene);
         match path {
             Some(path) => file.save_as(&path, scene, overwrite)?,
             None => file.save(scene, overwrite)?,
         }
         let path = file.path().ok_or(SaveError::Untitled)?.to_path_buf();
         self.seen = stamp(&path);
+        self.journal.saved(scene, &path);
         self.path = Some(path.clone());
         self.publish();
         Ok(path)
@@ -190,6 +290,14 @@ impl Clerk {
     }
 }
 
+/// The file, or where it is.
+fn whole<'a>(
+    file: &'a Option<SceneFile>,
+    path: &'a Option<PathBuf>,
+) -> Result<&'a SceneFile, &'a Path> {
+    file.as_ref().ok_or(path.as_deref().unwrap_or(Path::new("")))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -201,7 +309,7 @@ mod tests {
     fn opened(path: &Path) -> (Files, Receiver<Message>) {
         let (results, inbox) = unbounded();
         let file = SceneFile::open(path).map_err(|_| path.to_path_buf());
-        (Files::new(file, results).unwrap(), inbox)
+        (Files::new(file, None, results).unwrap(), inbox)
     }
 
     fn loaded(message: Message) -> Result<Arc<Scene>, SceneErrors> {
@@ -255,12 +363,46 @@ mod tests {
     }
 
     #[test]
+    fn edits_are_kept_at_the_end_unless_they_were_saved_or_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.toml");
+        fs::write(&path, starter()).unwrap();
+        let mut scene = Scene::parse(starter(), "a").unwrap();
+        scene.film.size = [64, 48];
+        let scene = Arc::new(scene);
+        let hidden = folder.path().join(".a.toml.unsaved");
+        let (files, _inbox) = opened(&path);
+        files.journal(Some(Arc::clone(&scene)));
+        assert_eq!(files.finish(), Some(hidden.clone()));
+        assert!(fs::read_to_string(&hidden).unwrap().contains("64"));
+        let (files, inbox) = opened(&path);
+        let offered = inbox.recv_timeout(PATIENCE).unwrap();
+        assert!(
+            matches!(&offered, Message::LeftBehind(left) if left.scene == scene),
+            "{offered:?}"
+        );
+        files.take_up();
+        files.journal(Some(Arc::clone(&scene)));
+        files.save(Arc::clone(&scene), None, false);
+        assert_eq!(files.finish(), None);
+        assert!(!hidden.exists());
+        assert!(fs::read_to_string(&path).unwrap().contains("64"));
+        let (files, _inbox) = opened(&path);
+        files.journal(Some(Arc::new(Scene::parse(starter(), "a").unwrap())));
+        files.secure(PATIENCE);
+        assert!(hidden.exists());
+        files.journal(None);
+        assert_eq!(files.finish(), None);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
     fn what_was_given_is_done_before_the_end() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new.toml");
         let (results, _inbox) = unbounded();
         let untitled = SceneFile::untitled(starter().to_string(), "starter").unwrap();
-        let files = Files::new(Ok(untitled), results).unwrap();
+        let files = Files::new(Ok(untitled), None, results).unwrap();
         let scene = Scene::parse(starter(), "starter").unwrap();
         files.save(Arc::new(scene), Some(path.clone()), false);
         drop(files);

@@ -4,7 +4,7 @@ use super::writer::{Writer, Written};
 use crate::dashboard::link::{Link, Queue, Reading, Start};
 use crate::dashboard::model::Model;
 use crate::dashboard::pacing::{Pacing, Wanted};
-use crate::dashboard::terminal::{Capabilities, Tty, cursor_question};
+use crate::dashboard::terminal::{Capabilities, Tty, copied, cursor_question};
 use crate::dashboard::view::{View, is_settled};
 use crossbeam_channel::Receiver;
 use ratatui::buffer::Buffer;
@@ -28,6 +28,8 @@ pub struct Frames {
     /// Where the cursor ought to be shown, if it ought to.
     cursor: Option<Position>,
     facts: Facts,
+    /// For the clipboard: goes out with the next frame.
+    copied: String,
 }
 
 /// What a frame has to know of the model, as it was when it was drawn.
@@ -67,7 +69,18 @@ impl Frames {
             wanted: Buffer::empty(Rect::ZERO),
             cursor: None,
             facts: Facts::default(),
+            copied: String::new(),
         })
+    }
+
+    /// Puts `text` into the clipboard of the terminal, with the next frame.
+    pub fn copy(&mut self, text: &str) {
+        self.copied = copied(text);
+    }
+
+    /// Nothing is known any more of what the terminal shows.
+    pub fn forget(&mut self) {
+        self.pacing = Pacing::new();
     }
 
     /// Whether the last frame has been written.
@@ -164,7 +177,7 @@ impl Frames {
         }
         let empty = bytes.len();
         let frame = self.pacing.frame(&wanted, now, allowance, self.link.threshold(), &mut bytes);
-        if bytes.len() == empty {
+        if bytes.len() == empty && self.copied.is_empty() {
             bytes.clear();
             self.writer.keep(bytes);
             return if self.pacing.rest().visible { Drawn::Waiting } else { Drawn::Same };
@@ -172,6 +185,7 @@ impl Frames {
         if self.synchronised {
             bytes.extend(SYNCHRONISED[1]);
         }
+        bytes.extend(std::mem::take(&mut self.copied).as_bytes());
         if let Some(through) = self.link.question() {
             bytes.extend(cursor_question(through).as_bytes());
         }

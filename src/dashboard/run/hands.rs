@@ -11,6 +11,7 @@ use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What low priority means: the tracing threads only take what nobody else wants.
 const LOW_PRIORITY: i32 = 19;
@@ -19,6 +20,8 @@ const LOW_PRIORITY: i32 = 19;
 pub struct Tools {
     /// The scene's file; or where it is, as long as it cannot be read.
     pub file: Result<SceneFile, PathBuf>,
+    /// The folder for unsaved edits that cannot be kept beside their scene.
+    pub state: Option<PathBuf>,
     /// Tracing threads.
     pub threads: usize,
     /// How scenes are compiled and sampled.
@@ -45,14 +48,14 @@ pub struct Hands {
 impl Hands {
     /// Starts the threads.
     pub fn new(tools: Tools) -> io::Result<Self> {
-        let Tools { file, threads, options, settings } = tools;
+        let Tools { file, state, threads, options, settings } = tools;
         let (results, done) = unbounded();
         let stem = match &file {
             Ok(file) => stem(file.path(), file.document().name()),
             Err(path) => stem(Some(path), ""),
         };
         let session = Session::new(threads, options.clone(), settings)?;
-        let files = Files::new(file, results.clone())?;
+        let files = Files::new(file, state, results.clone())?;
         let studio = Studio {
             paper: files.paper(),
             folder: PathBuf::new(),
@@ -152,8 +155,11 @@ impl Hands {
                     sized.cancel();
                 }
             }
+            Effect::Journal(scene) => self.files.journal(scene),
+            Effect::TakeUp => self.files.take_up(),
+            Effect::Discard => self.files.discard(),
             // The loop's own.
-            Effect::Quit => {}
+            Effect::Quit | Effect::Suspend | Effect::Copy(_) => {}
         }
         None
     }
@@ -165,16 +171,23 @@ impl Hands {
         }
     }
 
-    /// Ends the work, but waits for what is being written: returns what was done meanwhile.
-    pub fn finish(mut self) -> Vec<Message> {
+    /// Unsaved edits are written now, whatever comes. Waits for that at most as long as `patience`.
+    pub fn secure(&self, patience: Duration) {
+        self.files.secure(patience);
+    }
+
+    /// Ends the work, but waits for what is being written: returns what was done meanwhile, and where
+    /// unsaved edits are kept, if there are any.
+    pub fn finish(mut self) -> (Vec<Message>, Option<PathBuf>) {
         if let Some(sized) = self.sized.take() {
             sized.end();
         }
         let Self { session, files, results, done, .. } = self;
+        let kept = files.finish();
         // Tasks are done in order: when this one is done, so are the pictures asked for before.
         session.with(|_, _| ());
-        drop((session, files, results));
-        done.into_iter().collect()
+        drop((session, results));
+        (done.into_iter().collect(), kept)
     }
 
     fn export(&mut self, format: Format) {

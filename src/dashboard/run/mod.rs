@@ -1,11 +1,14 @@
 //! The dashboard at work: terminal, keys, renderer, files, time. One thread decides and draws; whatever
 //! could keep it waiting has a thread of its own.
 
+mod examine;
 mod exports;
 mod files;
 mod frames;
 mod hands;
 mod input;
+mod journal;
+mod life;
 mod names;
 mod signals;
 mod trace;
@@ -23,7 +26,8 @@ use crossbeam_channel::{Receiver, after, never, select};
 use frames::{Drawn, Frames};
 use hands::{Hands, Tools};
 use input::Input;
-use signals::Told;
+use life::{Line, Resizing};
+use signals::{HUNG_UP, Whom};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -31,11 +35,14 @@ use std::time::{Duration, Instant};
 use trace::Trace;
 
 pub use super::model::Colors;
+pub use examine::{Examined, examine};
 
 /// What a dashboard is started with.
 pub struct Setup {
     /// The scene's file; or where it is and why it cannot be read.
     pub file: Result<SceneFile, (PathBuf, SceneErrors)>,
+    /// The folder for unsaved edits that cannot be kept beside their scene.
+    pub state: Option<PathBuf>,
     /// Tracing threads, at least 1.
     pub threads: usize,
     /// How scenes are compiled and sampled.
@@ -59,6 +66,8 @@ pub struct Ended {
     pub signalled: Option<u8>,
     /// Pictures that were written after the screen was left.
     pub exported: Vec<Result<Exported, String>>,
+    /// Where unsaved edits are kept, which the next start offers.
+    pub kept: Option<PathBuf>,
     /// How long answers took, a line each; empty unless asked for.
     pub latencies: Vec<String>,
 }
@@ -68,7 +77,8 @@ pub struct Ended {
 /// # Errors
 /// If the terminal cannot be used (any more) or there are no threads. The terminal is restored.
 pub fn run(setup: Setup) -> io::Result<Ended> {
-    let Setup { file, threads, options, settings, colors, surroundings, bandwidth, trace } = setup;
+    let Setup { file, state, threads, options, settings, colors, surroundings, bandwidth, trace } =
+        setup;
     let (start, file) = match file {
         Ok(file) => (Ok(Arc::new(file.document().scene().clone())), Ok(file)),
         Err((path, errors)) => (Err(errors), Err(path)),
@@ -77,15 +87,17 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         Ok(file) => (file.path().map(PathBuf::from), file.document().name().to_string()),
         Err(path) => (Some(path.clone()), String::new()),
     };
-    let mut hands = Hands::new(Tools { file, threads, options, settings })?;
+    let mut hands = Hands::new(Tools { file, state, threads, options, settings })?;
     if let Ok(scene) = &start {
         // While the terminal is asked what it can do.
         hands.show(Arc::clone(scene));
     }
     let screen = Screen::enter()?;
-    let signals = signals::watch(screen.tty())?;
+    let signals = signals::watch(screen.tty(), signals::PATIENCE)?;
     let mut keyboard = Keyboard::new(&surroundings);
-    let terminal = probe(&screen.tty(), &mut keyboard, surroundings)?;
+    let Ok(terminal) = probe(&screen.tty(), &mut keyboard, surroundings) else {
+        return Ok(Ended { signalled: Some(HUNG_UP), ..Ended::default() });
+    };
     let model = Model::new(Start {
         path,
         name,
@@ -104,26 +116,31 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         began: Instant::now(),
         shown: 0,
         subject: 0,
+        resizing: Resizing::default(),
         told: Duration::ZERO,
         changed: true,
+        suspend: false,
         quit: false,
     };
     // So that the renderer learns how large the picture is.
     dashboard.take(Message::Resize(dashboard.model.screen));
     let input = input::read(keyboard)?;
-    let result = dashboard.watch(&input, &signals, screen.left());
-    if result.is_ok() {
-        dashboard.await_answers(&input);
+    let line = Line { tty: screen.tty(), input, signals, left: screen.left().clone() };
+    let result = dashboard.watch(&line);
+    // First of all, and whatever else there is to write.
+    dashboard.hands.secure(Duration::ZERO);
+    if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
+        dashboard.await_answers(&line.input);
     }
     // What is still to be written may take a while: it need not be waited for on an empty screen.
     drop(screen);
-    let finished = dashboard.hands.finish();
+    let (finished, kept) = dashboard.hands.finish();
     let exported = finished.into_iter().filter_map(|message| match message {
         Message::Exported(result) => Some(result),
         _ => None,
     });
     let mut ended =
-        Ended { signalled: result?, exported: exported.collect(), latencies: Vec::new() };
+        Ended { signalled: result?, exported: exported.collect(), kept, latencies: Vec::new() };
     if let Some(path) = trace {
         dashboard.trace.write(&path)?;
         ended.latencies = dashboard.trace.summary();
@@ -141,21 +158,19 @@ struct Dashboard {
     shown: u64,
     /// Counts up when the picture is another one than the same with more samples.
     subject: u64,
+    /// The terminal's size may change again at once.
+    resizing: Resizing,
     /// When the line was told about last.
     told: Duration,
     /// The screen may have to change.
     changed: bool,
+    suspend: bool,
     quit: bool,
 }
 
 impl Dashboard {
     /// Lets things happen until the end; the exit status of a signal.
-    fn watch(
-        &mut self,
-        input: &Receiver<io::Result<Timed>>,
-        signals: &Told,
-        left: &Receiver<()>,
-    ) -> io::Result<Option<u8>> {
+    fn watch(&mut self, line: &Line) -> io::Result<Option<u8>> {
         let bell = self.hands.session().bell().clone();
         let done = self.hands.done().clone();
         let written = self.frames.written().clone();
@@ -174,7 +189,11 @@ impl Dashboard {
                 None => never(),
             };
             select! {
-                recv(input) -> came => self.note(came.map_err(io::Error::other)??, &mut waiting),
+                recv(line.input) -> came => match came {
+                    Ok(Ok(came)) => self.note(came, &mut waiting),
+                    // The terminal is gone.
+                    Ok(Err(_)) | Err(_) => return Ok(Some(HUNG_UP)),
+                },
                 recv(bell) -> rung => match rung {
                     Ok(()) => self.take_snapshot(),
                     // Its panic has been told already.
@@ -183,19 +202,22 @@ impl Dashboard {
                 recv(done) -> message => message.into_iter().for_each(|m| self.take_done(m)),
                 recv(written) -> frame => {
                     if let Ok(frame) = frame {
-                        self.trace.written(self.frames.written_at(frame)?);
+                        match self.frames.written_at(frame) {
+                            Ok(at) => self.trace.written(at),
+                            Err(_) => return Ok(Some(HUNG_UP)),
+                        }
                     }
                 }
-                recv(signals.end) -> status => return Ok(status.ok()),
-                recv(signals.resized) -> _ => {
-                    let message = Message::Resize(size()?);
-                    input::join(&mut waiting, Input { at: Instant::now(), message });
+                recv(line.signals) -> told => {
+                    if let Some(status) = told.ok().and_then(|told| self.heed(told, line)) {
+                        return Ok(Some(status));
+                    }
                 }
-                recv(left) -> _ => return Err(io::Error::other("the dashboard has failed")),
+                recv(line.left) -> _ => return Err(io::Error::other("the dashboard has failed")),
                 recv(timer) -> _ => self.wake(),
             }
-            while let Ok(came) = input.try_recv() {
-                self.note(came?, &mut waiting);
+            while let Ok(Ok(came)) = line.input.try_recv() {
+                self.note(came, &mut waiting);
             }
             for Input { at, message } in waiting.drain(..) {
                 self.frames.act(self.began.elapsed());
@@ -204,6 +226,11 @@ impl Dashboard {
             }
             while let Ok(message) = done.try_recv() {
                 self.take_done(message);
+            }
+            if std::mem::take(&mut self.suspend)
+                && let Some(status) = self.suspend(Whom::Group, line)
+            {
+                return Ok(Some(status));
             }
         }
         Ok(None)
@@ -246,6 +273,10 @@ impl Dashboard {
         let version = self.model.picture_version;
         for effect in update(&mut self.model, message, self.began.elapsed()) {
             self.quit |= effect == Effect::Quit;
+            self.suspend |= effect == Effect::Suspend;
+            if let Effect::Copy(path) = &effect {
+                self.frames.copy(&names::full(path));
+            }
             let scene = match &effect {
                 Effect::Show(scene) => Some(Arc::clone(scene)),
                 _ => None,
@@ -303,6 +334,12 @@ impl Dashboard {
     /// happens by itself, if anything.
     fn draw(&mut self) -> Option<Duration> {
         let now = self.began.elapsed();
+        if let Some(due) = self.resizing.due() {
+            if due > now {
+                return Some(due - now);
+            }
+            self.resize();
+        }
         self.frames.look(now);
         if self.changed && self.told + TELL_INTERVAL <= now {
             self.told = now;

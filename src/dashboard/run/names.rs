@@ -1,34 +1,50 @@
 //! Names: of pictures that overwrite nothing, and for fetching them from afar.
 
 use std::env;
-use std::fs::{self, OpenOptions};
-use std::io::{self, ErrorKind};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The most pictures of one scene and format in one folder.
 const MOST: u32 = 100_000;
 
-/// Creates an empty file in `folder` under the first name of `STEM-1.EXTENSION`, `STEM-2.EXTENSION`
-/// and so on that is free, and thereby keeps the name from everybody else.
-pub fn reserve(folder: &Path, stem: &str, extension: &str) -> io::Result<PathBuf> {
+/// The first path of `STEM-1.EXTENSION`, `STEM-2.EXTENSION` and so on in `folder` at which `write` can
+/// make a new file. `write` has to fail if there is one already. So the name stands for nothing before
+/// the file is complete.
+pub fn numbered<E>(
+    folder: &Path,
+    stem: &str,
+    extension: &str,
+    write: impl Fn(&Path) -> Result<(), E>,
+) -> Option<Result<PathBuf, E>> {
+    // A link that leads nowhere is there, too.
+    let is_taken = |path: &Path| path.symlink_metadata().is_ok();
     for number in 1..=MOST {
         let path = folder.join(format!("{stem}-{number}.{extension}"));
-        match OpenOptions::new().write(true).create_new(true).open(&path) {
-            Ok(_) => return Ok(path),
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-            Err(error) => return Err(error),
+        if is_taken(&path) {
+            continue;
+        }
+        match write(&path) {
+            Ok(()) => return Some(Ok(path)),
+            // Somebody has taken the name meanwhile.
+            Err(_) if is_taken(&path) => {}
+            Err(error) => return Some(Err(error)),
         }
     }
-    Err(io::Error::new(ErrorKind::AlreadyExists, format!("{MOST} names are in use")))
+    None
+}
+
+/// The path from the root on.
+pub fn full(path: &Path) -> String {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    path.to_string_lossy().into_owned()
 }
 
 /// Where scp finds `path` on this machine: `user@host:/absolute/path`, after `-P PORT ` if that is
 /// not the usual one; quoted for a shell where needed.
 pub fn scp(path: &Path) -> String {
     let variable = |name| env::var(name).unwrap_or_default();
-    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let user = Some(variable("USER")).filter(|u| !u.is_empty()).unwrap_or(variable("LOGNAME"));
-    scp_from(&variable("SSH_CONNECTION"), &user, &host_name(), &path.to_string_lossy())
+    scp_from(&variable("SSH_CONNECTION"), &user, &host_name(), &full(path))
 }
 
 /// `connection`: `SSH_CONNECTION` as sshd sets it, "client port server port"; else empty.
@@ -70,13 +86,24 @@ mod tests {
     fn nothing_is_overwritten() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("room-2.png"), "old").unwrap();
+        let write = |path: &Path| fs::File::create_new(path).map(drop);
         let names: Vec<_> = (0..3)
-            .map(|_| reserve(folder.path(), "room", "png").unwrap())
+            .map(|_| numbered(folder.path(), "room", "png", write).unwrap().unwrap())
             .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
             .collect();
         assert_eq!(names, ["room-1.png", "room-3.png", "room-4.png"]);
         assert_eq!(fs::read(folder.path().join("room-2.png")).unwrap(), b"old");
-        assert!(reserve(&folder.path().join("nowhere"), "room", "png").is_err());
+        assert!(numbered(&folder.path().join("nowhere"), "room", "png", write).unwrap().is_err());
+        // Who comes first has the name.
+        let late = |path: &Path| {
+            let number = fs::read_dir(folder.path()).unwrap().count();
+            if number < 6 {
+                fs::write(path, "somebody else's").unwrap();
+            }
+            write(path)
+        };
+        let path = numbered(folder.path(), "room", "png", late).unwrap().unwrap();
+        assert!(path.ends_with("room-7.png"), "{path:?}");
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! Signals: those that end the program, which the dashboard is told and has a while to do by itself,
-//! and the one that tells of a new size.
+//! and those that tell of a new size, or to stop and to go on.
 
 use crate::dashboard::terminal::Tty;
-use crossbeam_channel::{Receiver, bounded};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGWINCH};
+use crossbeam_channel::{Receiver, unbounded};
+use rustix::process::{Signal, getpid, kill_current_process_group, kill_process};
+use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGWINCH};
 use signal_hook::iterator::Signals;
 use std::io;
 use std::sync::Arc;
@@ -11,38 +12,68 @@ use std::thread;
 use std::time::Duration;
 
 /// How long the dashboard may take to end after a signal.
-const PATIENCE: Duration = Duration::from_secs(5);
+pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 
 /// What shells add to a signal's number to make an exit status.
 const SIGNALLED: i32 = 128;
 
-/// What signals say.
-pub(super) struct Told {
-    /// The exit status that a signal asks for: 129, 130 or 143.
-    pub end: Receiver<u8>,
+/// The exit status of a program whose terminal has gone: as if it had been told (SIGHUP).
+pub(super) const HUNG_UP: u8 = (SIGNALLED + SIGHUP) as u8;
+
+/// What a signal says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Told {
+    /// End, with this exit status: 129, 130 or 143.
+    End(u8),
     /// The terminal may have another size.
-    pub resized: Receiver<()>,
+    Resized,
+    /// Stop until told to go on.
+    Stop,
+    /// Go on.
+    Continue,
 }
 
-/// Listens to signals. If the program is still there a while after it should have ended, the terminal
-/// is restored and the program ended from here.
-pub(super) fn watch(tty: Arc<Tty>) -> io::Result<Told> {
-    let mut signals = Signals::new([SIGHUP, SIGINT, SIGTERM, SIGWINCH])?;
-    let (ender, end) = bounded(1);
-    let (resizer, resized) = bounded(1);
+/// Whom a stop concerns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Whom {
+    /// This process.
+    Itself,
+    /// Everybody whom the shell has started together, as when its user presses Ctrl-Z.
+    Group,
+}
+
+/// Listens to signals. If the program is still there `patience` after it should have ended, the
+/// terminal is restored and the program ended from here.
+pub(super) fn watch(tty: Arc<Tty>, patience: Duration) -> io::Result<Receiver<Told>> {
+    let mut signals = Signals::new([SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])?;
+    let (teller, told) = unbounded();
     thread::Builder::new().name("signals".into()).spawn(move || {
         for signal in signals.forever() {
-            if signal == SIGWINCH {
-                // One that has not been heard yet says all.
-                let _ = resizer.try_send(());
-                continue;
+            let what = match signal {
+                SIGWINCH => Told::Resized,
+                SIGTSTP => Told::Stop,
+                SIGCONT => Told::Continue,
+                _ => Told::End((SIGNALLED + signal) as u8),
+            };
+            // Nobody listens any more when the program ends.
+            let _ = teller.send(what);
+            if let Told::End(status) = what {
+                thread::sleep(patience);
+                tty.leave();
+                std::process::exit(status.into());
             }
-            let status = SIGNALLED + signal;
-            let _ = ender.send(status as u8);
-            thread::sleep(PATIENCE);
-            tty.leave();
-            std::process::exit(status);
         }
     })?;
-    Ok(Told { end, resized })
+    Ok(told)
+}
+
+/// Stops until somebody says to go on; a moment may pass before it happens. It does not happen if there
+/// is no shell that could say so: the kernel sees to that for every signal that stops but SIGSTOP. Of
+/// those SIGTSTP is listened to here, so it is another one.
+pub(super) fn stop(whom: Whom) -> io::Result<()> {
+    match whom {
+        Whom::Itself => kill_process(getpid(), Signal::TTIN)?,
+        Whom::Group => kill_current_process_group(Signal::TTIN)?,
+    }
+    Ok(())
 }

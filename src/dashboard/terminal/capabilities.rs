@@ -87,7 +87,7 @@ impl Surroundings {
             "iterm2",
         ];
         let term = self.term.as_str();
-        if self.no_color || term.starts_with("vt") {
+        if self.no_color || term == "dumb" || term.starts_with("vt") {
             Colors::Mono
         } else if ["truecolor", "24bit"].contains(&self.color_term.as_str())
             || ["-direct", "-truecolor"].iter().any(|end| term.ends_with(end))

@@ -2,6 +2,7 @@
 //! back. Nothing here knows what is shown.
 
 mod capabilities;
+mod clipboard;
 mod decode;
 mod keyboard;
 mod probe;
@@ -12,6 +13,7 @@ mod tests;
 
 use super::input::{Key, Mouse};
 pub use capabilities::{Capabilities, Multiplexer, Surroundings};
+pub(in crate::dashboard) use clipboard::copied;
 pub use decode::Decoder;
 pub use keyboard::{Keyboard, Timed};
 pub(in crate::dashboard) use probe::cursor_question;

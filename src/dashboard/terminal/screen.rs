@@ -13,8 +13,9 @@ use std::time::{Duration, Instant};
 /// with coordinates that do not end at column 223; an empty screen.
 pub const ENTER: &str = "\x1b[?1049h\x1b[?25l\x1b[?2004h\x1b[?1002h\x1b[?1006h\x1b[2J";
 
-/// Takes [`ENTER`] back, in the opposite order, and resets colours and attributes.
-pub const LEAVE: &str = "\x1b[0m\x1b[?1006l\x1b[?1002l\x1b[?2004l\x1b[?25h\x1b[?1049l";
+/// Shows what a frame may have held back, takes [`ENTER`] back, in the opposite order, and resets
+/// colours and attributes.
+pub const LEAVE: &str = "\x1b[?2026l\x1b[0m\x1b[?1006l\x1b[?1002l\x1b[?2004l\x1b[?25h\x1b[?1049l";
 
 /// How long leaving waits for a frame that the terminal is slow to take.
 const PATIENCE: Duration = Duration::from_secs(3);
@@ -45,6 +46,16 @@ pub fn size() -> io::Result<[u16; 2]> {
     Ok(if size.ws_col == 0 || size.ws_row == 0 { [80, 24] } else { [size.ws_col, size.ws_row] })
 }
 
+/// Sets the modes of stdin, also if signals come meanwhile.
+fn set_modes(modes: &Termios, when: OptionalActions) -> io::Result<()> {
+    loop {
+        match tcsetattr(io::stdin(), when, modes) {
+            Err(rustix::io::Errno::INTR) => {}
+            done => return Ok(done?),
+        }
+    }
+}
+
 impl Screen {
     /// Takes the terminal that stdin comes from and stdout leads to.
     ///
@@ -54,7 +65,7 @@ impl Screen {
         let before = tcgetattr(io::stdin())?;
         let mut raw = before.clone();
         raw.make_raw();
-        tcsetattr(io::stdin(), OptionalActions::Now, &raw)?;
+        set_modes(&raw, OptionalActions::Now)?;
         // From here on `Drop` restores the terminal, even if entering fails half-way.
         Self::over(Box::new(io::stdout()), Some(before))
     }
@@ -105,8 +116,15 @@ impl Tty {
 
     /// Gives the terminal back. The second time nothing happens.
     pub fn leave(&self) {
+        if self.suspend() {
+            let _ = self.leaving.try_send(());
+        }
+    }
+
+    /// Gives the terminal back for a while; whether it had to be.
+    pub fn suspend(&self) -> bool {
         if !self.entered.swap(false, Ordering::AcqRel) {
-            return;
+            return false;
         }
         // A terminal that has stopped reading shall not keep the program from ending.
         if let Some(mut out) = self.lock_within(PATIENCE) {
@@ -115,9 +133,25 @@ impl Tty {
         }
         if let Some(before) = &self.before {
             // What has come and was not read yet, such as late replies, is for nobody else.
-            let _ = tcsetattr(io::stdin(), OptionalActions::Flush, before);
+            let _ = set_modes(before, OptionalActions::Flush);
         }
-        let _ = self.leaving.try_send(());
+        true
+    }
+
+    /// Takes the terminal again, whatever others have done to it meanwhile.
+    ///
+    /// # Errors
+    /// If it is gone.
+    pub fn resume(&self) -> io::Result<()> {
+        if let Some(before) = &self.before {
+            let mut raw = before.clone();
+            raw.make_raw();
+            set_modes(&raw, OptionalActions::Now)?;
+        }
+        let mut out = self.out.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        self.entered.store(true, Ordering::Release);
+        out.write_all(ENTER.as_bytes())?;
+        out.flush()
     }
 
     fn lock_within(&self, limit: Duration) -> Option<MutexGuard<'_, Box<dyn Write + Send>>> {
@@ -170,6 +204,20 @@ mod tests {
     }
 
     #[test]
+    fn a_terminal_that_was_lent_is_taken_again() {
+        let paper = Paper::default();
+        let screen = Screen::over(Box::new(paper.clone()), None).unwrap();
+        let tty = screen.tty();
+        assert!(tty.suspend() && !tty.suspend());
+        tty.write(b"a frame for nobody").unwrap();
+        tty.resume().unwrap();
+        tty.write(b"frame").unwrap();
+        assert!(screen.left().try_recv().is_err());
+        drop(screen);
+        assert_eq!(paper.text(), format!("{ENTER}{LEAVE}{ENTER}frame{LEAVE}"));
+    }
+
+    #[test]
     fn every_mode_that_is_set_is_reset() {
         let modes = |text: &str, end: char| -> Vec<String> {
             let modes = text.split("\x1b[?").skip(1).filter_map(|mode| mode.split_once(end));
@@ -179,7 +227,8 @@ mod tests {
         let mut set = modes(ENTER, 'h');
         set.retain(|mode| !mode.contains('l'));
         let mut reset = modes(LEAVE, 'l');
-        reset.retain(|mode| !mode.contains('h'));
+        // A frame sets and resets this one by itself, unless it is cut off.
+        reset.retain(|mode| !mode.contains('h') && mode != "2026");
         reset.reverse();
         assert_eq!(set, ["1049", "2004", "1002", "1006"]);
         assert_eq!(set, reset);

@@ -3,7 +3,7 @@
 use super::Turn;
 use crate::dashboard::action::{Action, Change, Pace, Way};
 use crate::dashboard::layout::Focus;
-use crate::dashboard::message::Format;
+use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::{Compared, Inspector, Mode};
 use crate::dashboard::overlay::Overlay;
 
@@ -24,7 +24,17 @@ fn needs_no_scene(action: Action) -> bool {
     use Action::*;
     matches!(
         action,
-        Help | Palette | Quit | Reload | Leave | Cursor(_) | First | Last | Page(_) | NextColors
+        Help | Palette
+            | Quit
+            | Suspend
+            | Recover
+            | Reload
+            | Leave
+            | Cursor(_)
+            | First
+            | Last
+            | Page(_)
+            | NextColors
     )
 }
 
@@ -84,6 +94,8 @@ impl Turn<'_> {
             Action::Save => self.save(),
             Action::SaveAs => self.ask_path(),
             Action::Reload => self.reload(),
+            Action::Recover => self.ask_recovery(),
+            Action::Suspend => self.emit(Effect::Suspend),
             Action::Quit => self.quit(),
             Action::Pause => self.pause(),
             Action::Restart => self.restart(),
@@ -91,6 +103,7 @@ impl Turn<'_> {
             Action::Quality => self.open_qualities(),
             Action::ExportPng => self.export(Format::Png),
             Action::ExportExr => self.export(Format::Exr),
+            Action::CopyPath => self.copy_path(),
             Action::ExportSized => self.ask_export_size(),
             Action::CancelExport => self.cancel_export(),
             Action::Exposure(change) => self.exposure(steps(change, Pace::Coarse)),

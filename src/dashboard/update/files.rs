@@ -69,7 +69,8 @@ impl Turn<'_> {
                 self.model.history.mark_saved(scene);
                 self.model.last_edit = None;
                 self.notify(Tone::Good, format!("saved {}", self.model.file.name), Some(3.0));
-                if std::mem::take(&mut self.model.quit_when_saved) {
+                // What was edited while the file was written is not left behind.
+                if std::mem::take(&mut self.model.quit_when_saved) && !self.model.is_unsaved() {
                     self.emit(Effect::Quit);
                 }
             }
@@ -200,9 +201,10 @@ impl Turn<'_> {
                 }
                 let noise = noise_codes.map_or(String::new(), |n| format!("  noise {n:.2}"));
                 let text = format!(
-                    "{}  {width}x{height}  {spp:.0} spp{noise}  ·  scp {scp} .",
+                    "{}  {width}x{height}  {spp:.0} spp{noise}  ·  y copies the path  ·  scp {scp} .",
                     path.display()
                 );
+                self.model.last_export = Some(path);
                 self.notify(Tone::Good, text, None);
             }
             Err(reason) => {
@@ -213,8 +215,25 @@ impl Turn<'_> {
     }
 }
 
+impl Turn<'_> {
+    pub(super) fn copy_path(&mut self) {
+        let Some(path) = self.model.last_export.clone() else {
+            self.say("No picture was written yet · p writes one");
+            return;
+        };
+        let shown = path.display().to_string();
+        if printable(&shown) != shown {
+            // Pasted into a shell it could do what nobody wants.
+            self.refuse("The path has characters in it that steer terminals: it is not copied");
+            return;
+        }
+        self.emit(Effect::Copy(path));
+        self.say(format!("the path of {shown} is in the terminal's clipboard, if it allows that"));
+    }
+}
+
 /// With a capital at the beginning.
-fn capital(text: &str) -> String {
+pub(super) fn capital(text: &str) -> String {
     let mut chars = text.chars();
     chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
 }

@@ -204,6 +204,8 @@ impl Turn<'_> {
             Answer::Load => self.emit(super::Effect::Load),
             Answer::Overwrite(path) => self.write(path, true),
             Answer::SaveAs => self.ask_path(),
+            Answer::TakeUp => self.take_up(),
+            Answer::Discard => self.discard_left_behind(),
         }
     }
 }

@@ -13,6 +13,7 @@ mod mirror;
 mod mouse;
 mod objects;
 mod prompt;
+mod recovery;
 mod render;
 
 use super::message::{Effect, Message};
@@ -23,6 +24,7 @@ use crate::render::session::State;
 use crate::scene::Scene;
 use crate::scene::edit::{Edit, Refusal, Subject};
 use crate::value::printable;
+use files::capital;
 use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
@@ -99,6 +101,11 @@ impl<'a> Turn<'a> {
             Message::Saved(scene, result) => self.saved(scene, result),
             Message::Loaded(result) => self.loaded(*result),
             Message::ChangedOnDisk => self.changed_on_disk(),
+            Message::LeftBehind(left) => self.left_behind(left),
+            Message::Trouble(text) => {
+                self.follow = false;
+                self.notify(Tone::Bad, capital(&text), None);
+            }
             Message::Exported(result) => self.exported(result),
             Message::ExportProgress(progress) => {
                 self.follow = false;
@@ -254,6 +261,7 @@ impl<'a> Turn<'a> {
             self.repaint();
         }
         self.settle_panels();
+        self.journal();
     }
 
     fn settle_panels(&mut self) {

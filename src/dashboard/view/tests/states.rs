@@ -3,7 +3,7 @@
 use crate::dashboard::editor::Editor;
 use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::layout::Focus;
-use crate::dashboard::message::{Channel, Format};
+use crate::dashboard::message::{Channel, Format, LeftBehind, Message};
 use crate::dashboard::model::{
     Colors, Compared, Inspector, Mode, Model, Notice, RunningExport, Start, Tone,
 };
@@ -12,12 +12,14 @@ use crate::dashboard::overlay::{
 };
 use crate::dashboard::panels::{Line, scrolled};
 use crate::dashboard::testing::report;
+use crate::dashboard::update::update;
 use crate::film::{Mix, Probe};
 use crate::render::schedule::{Spp, Stop, StoppedBy};
 use crate::render::session::{Report, Snapshot, State, TileMaps};
 use crate::scene::edit::{self, Subject};
 use crate::scene::{Scene, built_in};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// A name, and what makes the state of a model that has been tracing for a while.
 pub type Named = (&'static str, fn(&mut Model));
@@ -275,6 +277,11 @@ pub const STATES: &[Named] = &[
             ('c', "cancel".to_string(), Answer::Nothing),
         ];
         m.overlay = Some(Overlay::Question(Question { text, answers, cursor: 0 }));
+    }),
+    ("left-behind", |m| {
+        let age = Duration::from_secs(720);
+        let left = LeftBehind { scene: Arc::new(built_in()), age, changed: true };
+        update(m, Message::LeftBehind(left), Duration::ZERO);
     }),
     ("file-became-unreadable", broken),
     ("broken-file", |m| {

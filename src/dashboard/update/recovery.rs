@@ -1,0 +1,122 @@
+//! Unsaved edits: those of a program that was killed, and those of this one, which may be.
+
+use super::Turn;
+use crate::dashboard::message::{Effect, LeftBehind};
+use crate::dashboard::model::Tone;
+use crate::dashboard::overlay::Answer;
+use std::sync::Arc;
+use std::time::Duration;
+
+impl Turn<'_> {
+    /// Edits were found that nobody saved.
+    pub(super) fn left_behind(&mut self, left: LeftBehind) {
+        self.follow = false;
+        self.model.left_behind = Some(left);
+        if self.model.overlay.is_some() || self.model.editor().is_some() {
+            let text = "Edits of a session that broke off are kept · : recover takes them up";
+            self.notify(Tone::Plain, text, None);
+        } else {
+            self.ask_recovery();
+        }
+    }
+
+    pub(super) fn ask_recovery(&mut self) {
+        let Some(left) = &self.model.left_behind else {
+            self.say("No session with this scene has broken off");
+            return;
+        };
+        let mut text = format!(
+            "A session with {} broke off {} with unsaved edits.",
+            self.model.file.name,
+            ago(left.age)
+        );
+        if self.model.file.blank {
+            text += " The file has been spoilt since.";
+        } else if left.changed {
+            text += " The file has been changed since.";
+        }
+        self.ask(
+            text,
+            &[
+                ('r', "recover them: undo leads back to the file", Answer::TakeUp),
+                ('f', "look at the file, decide later", Answer::Nothing),
+                ('d', "discard them", Answer::Discard),
+            ],
+        );
+    }
+
+    pub(super) fn take_up(&mut self) {
+        let Some(left) = self.model.left_behind.take() else { return };
+        let scene = left.scene;
+        self.end_gesture();
+        if std::mem::take(&mut self.model.file.blank) {
+            self.model.history.restart(Arc::clone(&scene));
+            // What the file holds is no scene, so not this one.
+            self.model.history.mark_saved(Arc::default());
+            self.model.file.saved = scene;
+        } else if !self.model.history.record(scene, "recovered edits", false) {
+            self.emit(Effect::Discard);
+            self.say("the file has them already");
+            return;
+        }
+        self.emit(Effect::TakeUp);
+        self.show();
+        self.say("recovered, not yet saved · Ctrl-s saves, u goes back");
+    }
+
+    pub(super) fn discard_left_behind(&mut self) {
+        if self.model.left_behind.take().is_some() {
+            self.emit(Effect::Discard);
+            self.say("discarded");
+        }
+    }
+
+    /// Has what is unsaved kept where the next start finds it, or forgotten: what is left on purpose
+    /// is not kept.
+    pub(super) fn journal(&mut self) {
+        let quit = self.effects.iter().position(|effect| *effect == Effect::Quit);
+        let unsaved = quit.is_none() && !self.model.file.blank && self.model.is_unsaved();
+        let scene = unsaved.then(|| Arc::clone(self.model.history.scene()));
+        let same = match (&scene, &self.model.journaled) {
+            (Some(now), Some(before)) => Arc::ptr_eq(now, before),
+            (None, None) => true,
+            _ => false,
+        };
+        if !same {
+            self.model.journaled.clone_from(&scene);
+            self.effects.insert(quit.unwrap_or(self.effects.len()), Effect::Journal(scene));
+        }
+    }
+}
+
+/// `12 minutes ago`.
+fn ago(age: Duration) -> String {
+    let minutes = age.as_secs() / 60;
+    let (count, unit) = match minutes {
+        0 => return "a moment ago".to_string(),
+        1..120 => (minutes, "minute"),
+        120..2880 => (minutes / 60, "hour"),
+        _ => (minutes / 1440, "day"),
+    };
+    format!("{count} {unit}{} ago", if count == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ago;
+    use std::time::Duration;
+
+    #[test]
+    fn ages_in_words() {
+        for (seconds, words) in [
+            (59, "a moment ago"),
+            (60, "1 minute ago"),
+            (7199, "119 minutes ago"),
+            (7200, "2 hours ago"),
+            (172_799, "47 hours ago"),
+            (172_800, "2 days ago"),
+        ] {
+            assert_eq!(ago(Duration::from_secs(seconds)), words);
+        }
+    }
+}

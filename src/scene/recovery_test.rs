@@ -1,0 +1,222 @@
+//! Unsaved edits on a real file system. Two of these in one process are to each other what two
+//! processes are: a lock belongs to an open file.
+
+use super::{Found, Recovery, state_folder, sweep};
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+fn of(path: &Path) -> Recovery {
+    Recovery::of(Some(path), "", None)
+}
+
+fn texts(found: &Found) -> Vec<&str> {
+    found.lost.iter().map(|lost| lost.text.as_str()).collect()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<_> =
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn what_is_kept_is_found_once_its_keeper_is_gone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.toml");
+    let mut keeper = of(&path);
+    assert!(keeper.find().lost.is_empty());
+    for text in ["one\n", "two\n", "three\r\nwithout end"] {
+        keeper.keep(text, Some(0xabc)).unwrap();
+        assert_eq!(names(folder.path()), [".a.toml.unsaved"], "nothing half-written is left");
+        let found = of(&path).find();
+        assert!(found.lost.is_empty() && found.elsewhere && found.unreadable.is_empty());
+    }
+    drop(keeper);
+    let seeker = of(&path);
+    let found = seeker.find();
+    assert_eq!(texts(&found), ["three\r\nwithout end"]);
+    assert_eq!((found.lost[0].base, found.elsewhere), (Some(0xabc), false));
+    // While somebody decides about it, nobody else is asked.
+    assert!(of(&path).find().elsewhere);
+    drop(found);
+    let mut heir = of(&path);
+    let lost = heir.find().lost.pop().unwrap();
+    heir.take_up(lost);
+    assert!(of(&path).find().elsewhere);
+    heir.keep("four", None).unwrap();
+    assert_eq!(names(folder.path()), [".a.toml.unsaved"]);
+    heir.forget();
+    assert_eq!(names(folder.path()), [""; 0]);
+}
+
+#[test]
+fn sessions_side_by_side_have_files_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.toml");
+    let mut keepers: Vec<_> = (0..9).map(|_| of(&path)).collect();
+    for (i, keeper) in keepers.iter_mut().enumerate() {
+        keeper.keep(&format!("{i}"), None).unwrap();
+    }
+    assert_eq!(names(folder.path()).len(), 9);
+    assert!(of(&path).keep("one too many", None).is_err());
+    keepers[4].forget();
+    let mut late = of(&path);
+    late.keep("late", None).unwrap();
+    assert!(late.path().unwrap().ends_with(".a.toml.unsaved-5"));
+    // Others are not disturbed by what a keeper rewrites, nor by what it takes away.
+    keepers[3].keep("3 again", None).unwrap();
+    keepers.truncate(2);
+    let found = of(&path).find();
+    assert!(found.elsewhere);
+    assert_eq!(found.lost.len(), 6);
+    assert!(found.lost.windows(2).all(|pair| pair[0].written >= pair[1].written));
+    found.lost.into_iter().for_each(super::Lost::discard);
+    assert_eq!(names(folder.path()), [".a.toml.unsaved", ".a.toml.unsaved-2", ".a.toml.unsaved-5"]);
+}
+
+#[test]
+fn a_file_that_others_take_away_is_made_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.toml");
+    let mut keeper = of(&path);
+    keeper.keep("one", None).unwrap();
+    fs::remove_file(keeper.path().unwrap()).unwrap();
+    let mut other = of(&path);
+    other.keep("other", None).unwrap();
+    keeper.keep("two", None).unwrap();
+    drop((keeper, other));
+    let found = of(&path).find();
+    let mut found = texts(&found);
+    found.sort_unstable();
+    assert_eq!(found, ["other", "two"]);
+    // Forgetting takes away what is its own, and nothing else.
+    let mut keeper = of(&folder.path().join("b.toml"));
+    keeper.keep("one", None).unwrap();
+    let hidden = keeper.path().unwrap().to_path_buf();
+    fs::remove_file(&hidden).unwrap();
+    fs::write(&hidden, "somebody else's").unwrap();
+    keeper.forget();
+    assert_eq!(fs::read_to_string(&hidden).unwrap(), "somebody else's");
+}
+
+#[test]
+fn what_cannot_be_read_is_told_and_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.toml");
+    let hidden = |n: &str| folder.path().join(format!(".a.toml.unsaved{n}"));
+    fs::write(hidden(""), "").unwrap();
+    fs::write(hidden("-2"), "# Unsaved edits, kept by zerkalo. The file was none.\n\n").unwrap();
+    fs::write(hidden("-3"), b"name = \"\xff\"").unwrap();
+    fs::create_dir(hidden("-4")).unwrap();
+    fs::write(hidden("-5"), "plain = true").unwrap();
+    let large = File::create(hidden("-6")).unwrap();
+    large.set_len((64 << 20) + 1).unwrap();
+    let found = of(&path).find();
+    assert_eq!(texts(&found), ["plain = true"], "empty ones are nothing");
+    assert_eq!(found.lost[0].base, None);
+    let why: Vec<_> = found.unreadable.iter().map(|(_, why)| why.as_str()).collect();
+    assert_eq!(
+        why,
+        ["it is not UTF-8 text", "it is not a regular file", "it is larger than 64 MiB"]
+    );
+    assert_eq!(
+        names(folder.path()),
+        [".a.toml.unsaved-3", ".a.toml.unsaved-4", ".a.toml.unsaved-5", ".a.toml.unsaved-6"]
+    );
+}
+
+#[test]
+#[cfg(unix)]
+fn links_lead_to_the_same_edits_and_nothing_is_read_through_a_planted_one() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let folder = tempfile::tempdir().unwrap();
+    let other = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.toml");
+    fs::write(&path, "").unwrap();
+    let link = other.path().join("link.toml");
+    symlink(&path, &link).unwrap();
+    let mut keeper = of(&link);
+    keeper.keep("one", None).unwrap();
+    assert_eq!(
+        keeper.path(),
+        Some(&*fs::canonicalize(folder.path()).unwrap().join(".a.toml.unsaved"))
+    );
+    let mode = fs::metadata(keeper.path().unwrap()).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o600, "for nobody else's eyes");
+    drop(keeper);
+    assert_eq!(texts(&of(&path).find()), ["one"]);
+    symlink("/dev/zero", folder.path().join(".a.toml.unsaved-2")).unwrap();
+    let found = of(&path).find();
+    assert!(matches!(&found.unreadable[..], [(_, why)] if why == "it is not a regular file"));
+}
+
+#[test]
+fn where_the_scene_cannot_have_them_beside_it_the_state_folder_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = folder.path().join("deep/state");
+    // Its folder does not exist, so nothing can be written there.
+    let gone = PathBuf::from("/proc/nowhere/a.toml");
+    let with = |path: Option<&Path>| Recovery::of(path, "mirror/room.toml", Some(&state));
+    let mut keeper = with(Some(&gone));
+    keeper.keep("one", None).unwrap();
+    assert!(keeper.path().unwrap().starts_with(&state));
+    drop(keeper);
+    assert_eq!(texts(&with(Some(&gone)).find()), ["one"]);
+    assert!(texts(&with(Some(Path::new("/proc/nowhere/b.toml"))).find()).is_empty());
+    let mut untitled = with(None);
+    untitled.keep("two", None).unwrap();
+    assert!(untitled.path().unwrap().ends_with("mirror-room.toml.unsaved"));
+    assert!(Recovery::of(None, "a", None).keep("three", None).is_err());
+}
+
+#[test]
+fn names_as_long_as_they_can_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = folder.path().join("state");
+    let long = folder.path().join("ä".repeat(125) + ".toml");
+    let mut keeper = Recovery::of(Some(&long), "", Some(&state));
+    keeper.keep("one", None).unwrap();
+    assert!(keeper.path().unwrap().starts_with(&state));
+    assert_eq!(names(folder.path()), ["state"]);
+}
+
+#[test]
+fn the_state_folder_is_where_the_user_wants_it() {
+    let with = |state: Option<&str>, home: Option<&str>| {
+        state_folder(|name| match name {
+            "XDG_STATE_HOME" => state.map(OsString::from),
+            _ => home.map(OsString::from),
+        })
+    };
+    assert_eq!(with(Some("/s"), Some("/h")), Some("/s/zerkalo".into()));
+    // The specification: relative paths are to be ignored.
+    assert_eq!(with(Some("s"), Some("/h")), Some("/h/.local/state/zerkalo".into()));
+    assert_eq!(with(None, None), None);
+}
+
+#[test]
+fn only_old_leftovers_are_swept_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let old = SystemTime::now() - Duration::from_secs(3600);
+    let file = |name: &str| {
+        let file = File::create(folder.path().join(name)).unwrap();
+        file.set_modified(old).unwrap();
+        file
+    };
+    file(".zerkalo-abc.tmp");
+    file("scene.tmp");
+    file(".zerkalo-notes");
+    let busy = file(".zerkalo-busy.tmp");
+    busy.try_lock().unwrap();
+    File::create(folder.path().join(".zerkalo-new.tmp")).unwrap();
+    sweep(folder.path());
+    assert_eq!(
+        names(folder.path()),
+        [".zerkalo-busy.tmp", ".zerkalo-new.tmp", ".zerkalo-notes", "scene.tmp"]
+    );
+    sweep(&folder.path().join("nowhere"));
+}

@@ -1,0 +1,228 @@
+//! Names and texts from elsewhere that would like to steer a terminal, and scenes that would like to
+//! read what is none of their business.
+
+use super::*;
+
+/// Sets the clipboard (OSC 52), colours (C0 and C1), and reorders what follows.
+const EVIL: &str =
+    "\u{1b}]52;c;cm0gLXJm\u{7}\u{1b}[31m\u{9b}32m\u{9d}52;c;AA\u{9c}\u{202e}\r\u{8}\u{200b}";
+
+/// Whether anything in `text` is more than letters and line ends.
+fn steers(text: &str) -> bool {
+    text.chars().any(|c| {
+        (c.is_control() && c != '\n')
+            || ('\u{200b}'..='\u{200f}').contains(&c)
+            || ('\u{202a}'..='\u{202e}').contains(&c)
+    })
+}
+
+fn check(what: &str, run: &Run) {
+    assert!(!steers(&run.out), "{what}: {:?}", run.out);
+    assert!(!steers(&run.err), "{what}: {:?}", run.err);
+    assert!(!run.err.contains("panicked"), "{what}: {:?}", run.err);
+}
+
+/// `text` as a string of TOML, with escapes.
+fn toml(text: &str) -> String {
+    let escaped: String = text.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
+    format!("\"{escaped}\"")
+}
+
+#[test]
+#[cfg(unix)]
+fn names_of_files_steer_no_terminal() {
+    let desk = Desk::new();
+    let scene = format!("{EVIL}.toml");
+    let (picture, other) = (format!("{EVIL}.png"), format!("{EVIL}.exr"));
+    fs::write(desk.path(&scene), SCENE).unwrap();
+    fs::write(desk.path("bad.toml"), SCENE.replace("radius = 0.5", "radius = -1.0")).unwrap();
+    let evil_bad = format!("bad{EVIL}.toml");
+    fs::copy(desk.path("bad.toml"), desk.path(&evil_bad)).unwrap();
+    let (json, csv) = (format!("{EVIL}.json"), format!("{EVIL}.csv"));
+    let folder = format!("{EVIL}/a.png");
+    let quick = ["--seconds", "0.1", "--repetitions", "1", "--size", "16x12", "--noise", "8"];
+    for (args, status) in [
+        (vec!["check", &scene], 0),
+        (vec!["check", &evil_bad], 1),
+        (vec!["check", EVIL], 1),
+        (vec!["render", &scene, "-o", &picture, "--spp", "2", "--size", "16x12"], 0),
+        (
+            vec!["render", &scene, "-o", &other, "--spp", "2", "--size", "16x12", "--stats", &json],
+            0,
+        ),
+        (vec!["render", &scene, "-o", EVIL], 2),
+        (vec!["render", &scene, "-o", &folder], 1),
+        (vec!["render", &scene, "-o", &picture, "--stats", &picture], 2),
+        (vec!["render", &scene, "-o", &picture, "--stats", &folder], 1),
+        (vec!["render", &scene, "-o", &picture, "--size", EVIL], 2),
+        (vec!["render", &scene, "-o", &picture, EVIL], 2),
+        ([&["measure", &scene, "--json", &json, "--csv", &csv], &quick[..]].concat(), 0),
+        (vec!["measure", &scene, "--plot", EVIL], 2),
+        (vec!["measure", &scene, "--only", EVIL], 2),
+        (vec!["measure", &scene, "--reference", EVIL], 1),
+        (vec!["new", &scene], 1),
+        (vec!["new", &format!("new{EVIL}.toml")], 0),
+        (vec![EVIL], 2),
+        (vec![EVIL, EVIL], 2),
+        (vec![&format!("--{EVIL}")], 2),
+    ] {
+        let run = desk.run(&args);
+        check(&format!("{args:?}"), &run);
+        assert_eq!(run.status, status, "{args:?}: {}", run.err);
+    }
+}
+
+#[test]
+fn what_a_scene_says_steers_no_terminal() {
+    let desk = Desk::new();
+    let evil = toml(EVIL);
+    for (what, text) in [
+        ("names", SCENE.replace("\"ball\"", &evil).replace("\"lamp\"", &toml(&format!("l{EVIL}")))),
+        ("a material", SCENE.replace("\"red\"", &evil)),
+        ("materials", SCENE.replace("[materials.red]", &format!("[materials.{evil}]"))),
+        ("a key", format!("{SCENE}\n[trace]\n{evil} = 1\n")),
+        ("a word", format!("{SCENE}\n[trace]\nlevel = {evil}\n")),
+        (
+            "a mesh",
+            format!(
+                "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = {evil} }}\n"
+            ),
+        ),
+        (
+            "a view",
+            format!("{SCENE}\n[views.{evil}]\neye = [0.0, 1.0, 0.0]\ntarget = [0.0, 0.0, 0.0]\n"),
+        ),
+        (
+            "a doubt",
+            SCENE
+                .replace("reflection = 0.9", "reflection = 1.9")
+                .replace("materials.mirror", &format!("materials.{evil}"))
+                .replace("\"mirror\"", &evil),
+        ),
+        ("raw bytes", format!("# {EVIL}\n{SCENE}")),
+        ("half a string", format!("{SCENE}\nname = \"{EVIL}")),
+    ] {
+        fs::write(desk.path("evil.toml"), text).unwrap();
+        check(what, &desk.run(&["check", "evil.toml"]));
+        let args = ["render", "evil.toml", "-o", "a.png", "--spp", "2", "--size", "16x12"];
+        check(what, &desk.run(&args));
+    }
+}
+
+#[test]
+fn what_mesh_files_say_steers_no_terminal() {
+    let desk = Desk::new();
+    for (name, text) in [
+        ("m.obj", format!("mtllib {EVIL}\no {EVIL}\nv 0 0 0\nf 1 2 {EVIL}\n")),
+        ("m.ply", format!("ply\nformat ascii 1.0\ncomment {EVIL}\nelement {EVIL} 3\nend_header\n")),
+        ("m.stl", format!("solid {EVIL}\nfacet {EVIL}\nendsolid\n")),
+        (
+            "m.gltf",
+            format!(
+                "{{\"asset\":{{\"version\":{0}}},\"buffers\":[{{\"uri\":{0},\"byteLength\":9}}]}}",
+                serde_json::json!(EVIL)
+            ),
+        ),
+    ] {
+        fs::write(desk.path(name), text).unwrap();
+        let scene = format!(
+            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
+        );
+        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        let run = desk.run(&["check", "mesh.toml"]);
+        assert_eq!(run.status, 1, "{name}");
+        check(name, &run);
+    }
+}
+
+#[test]
+fn the_environment_steers_no_terminal() {
+    let desk = Desk::new();
+    let mut command = desk.command(&["doctor"]);
+    for name in ["TERM", "COLORTERM", "SSH_CONNECTION", "LC_ALL", "XDG_STATE_HOME", "TMUX"] {
+        let value = if name == "XDG_STATE_HOME" { format!("/{EVIL}") } else { EVIL.to_string() };
+        command.env(name, value);
+    }
+    let run = Run::from(command.output().unwrap());
+    assert_eq!(run.status, 0, "{}", run.err);
+    check("doctor", &run);
+    assert!(run.out.contains("not asked"), "{}", run.out);
+}
+
+/// Devices, pipes and folders are no meshes, whatever they are called, and are not waited for.
+#[test]
+#[cfg(unix)]
+fn a_scene_reads_regular_files_only() {
+    use std::os::unix::fs::symlink;
+    let desk = Desk::new();
+    symlink("/dev/zero", desk.path("zero.obj")).unwrap();
+    fs::create_dir(desk.path("folder.obj")).unwrap();
+    let made = Command::new("mkfifo").arg(desk.path("pipe.obj")).status();
+    assert!(made.unwrap().success());
+    for name in ["zero.obj", "folder.obj", "pipe.obj", "/dev/stdin", "/dev/zero"] {
+        let scene = format!(
+            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
+        );
+        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        let run = desk.run(&["check", "mesh.toml"]);
+        assert_eq!(run.status, 1, "{name}: {}", run.out);
+        assert!(run.err.contains("mesh.toml:"), "{name}: {}", run.err);
+    }
+}
+
+/// Files that a scene's file names in turn are looked for in its own folder and below.
+#[test]
+fn files_of_files_stay_in_their_folder() {
+    let desk = Desk::new();
+    fs::create_dir(desk.path("meshes")).unwrap();
+    fs::write(desk.path("secret.bin"), [0; 36]).unwrap();
+    let secret = desk.path("secret.bin");
+    for uri in ["../secret.bin", "./../secret.bin", "x/../../secret.bin", secret.to_str().unwrap()]
+    {
+        let gltf = serde_json::json!({
+            "asset": {"version": "2.0"},
+            "buffers": [{"uri": uri, "byteLength": 36}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                           "min": [0, 0, 0], "max": [0, 0, 0]}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "nodes": [{"mesh": 0}],
+            "scenes": [{"nodes": [0]}],
+            "scene": 0
+        });
+        fs::write(desk.path("meshes/m.gltf"), gltf.to_string()).unwrap();
+        let scene = format!(
+            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"meshes/m.gltf\" }}\n"
+        );
+        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        let run = desk.run(&["check", "mesh.toml"]);
+        assert_eq!(run.status, 1, "{uri}: {}", run.out);
+        assert!(run.err.contains("folder"), "{uri}: {}", run.err);
+    }
+}
+
+/// What a scene wants to be large is refused before memory is taken for it.
+#[test]
+fn sizes_are_checked_before_anything_is_allocated() {
+    let desk = Desk::new();
+    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\n\
+                  property float x\nproperty float y\nproperty float z\nelement face 4000000000\n\
+                  property list uchar int vertex_indices\nend_header\n";
+    fs::write(desk.path("m.ply"), header).unwrap();
+    let mut stl = vec![0; 80];
+    stl.extend(u32::MAX.to_le_bytes());
+    fs::write(desk.path("m.stl"), stl).unwrap();
+    for name in ["m.ply", "m.stl"] {
+        let scene = format!(
+            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
+        );
+        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        // With so little memory only what refuses in time can still tell why.
+        let program = env!("CARGO_BIN_EXE_zerkalo");
+        let mut command = Command::new("sh");
+        command.arg("-c").arg(format!("ulimit -v 2000000; exec '{program}' check mesh.toml"));
+        let run = Run::from(command.current_dir(desk.0.path()).output().unwrap());
+        assert_eq!(run.status, 1, "{name}: {}", run.err);
+        assert!(run.err.contains(name), "{name}: {}", run.err);
+    }
+}

@@ -1,0 +1,89 @@
+//! What a scene becomes by keys, known without the program: the states that its file and what is kept
+//! may have.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+use zerkalo::dashboard::message::{Effect, Message};
+use zerkalo::dashboard::model::{Colors, Model, Start};
+use zerkalo::dashboard::update::{begin, update};
+use zerkalo::render::schedule::Stop;
+use zerkalo::scene::Document;
+
+/// A scene that is soon rendered.
+pub const SCENE: &str = r#"# A ball before a mirror.
+[film]
+size = [24, 18]
+
+[camera]
+eye = [0.0, 1.0, 4.0]   # at the door
+target = [0.0, 0.5, 0.0]
+
+[[light]]
+name = "lamp"
+point = { position = [2.0, 4.0, 3.0] }
+intensity = 1.0 # changed by keys
+
+[materials.red]
+color = [0.8, 0.2, 0.1]
+
+[materials.mirror]
+reflection = 0.9
+roughness = 0.3
+
+[[object]]
+name = "ball"
+material = "red"
+shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.5 }
+
+[[object]]
+name = "mirror"
+material = "mirror"
+shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0, 0.0, 1.0] }
+"#;
+
+/// Keys: names and what a keyboard sends. Edits whose result does not depend on when they come.
+pub const KEYS: [(&str, &[u8]); 10] = [
+    ("'", b"'"),
+    (";", b";"),
+    ("]", b"]"),
+    ("[", b"["),
+    ("Left", b"\x1b[D"),
+    ("Up", b"\x1b[A"),
+    ("PageUp", b"\x1b[5~"),
+    ("Ctrl-s", b"\x13"),
+    ("p", b"p"),
+    ("P", b"P"),
+];
+/// Of those the one that saves.
+pub const SAVE: usize = 7;
+
+/// The file's text, if it were saved after none of the `keys`, the first, the first two and so on.
+pub fn states(keys: &[usize]) -> Vec<String> {
+    let path = PathBuf::from("scene.toml");
+    let mut document = Document::parse(SCENE.to_string(), "scene.toml").expect("a scene");
+    let mut model = Model::new(Start {
+        path: Some(path.clone()),
+        name: "scene.toml".into(),
+        scene: Ok(Arc::new(document.scene().clone())),
+        screen: [60, 18],
+        colors: Colors::Indexed,
+        stop: Stop::default(),
+        threads: 1,
+        most_threads: 1,
+    });
+    begin(&mut model);
+    let mut texts = vec![SCENE.to_string()];
+    for (i, key) in keys.iter().enumerate() {
+        let now = Duration::from_secs(i as u64);
+        let key = Message::Key(KEYS[*key].0.parse().expect("a key"));
+        for effect in update(&mut model, key, now) {
+            if let Effect::Save { scene, .. } = effect {
+                update(&mut model, Message::Saved(scene, Ok(path.clone())), now);
+            }
+        }
+        document.apply(model.history.scene());
+        texts.push(document.text().to_string());
+    }
+    texts
+}

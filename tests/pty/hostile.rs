@@ -1,0 +1,48 @@
+//! A scene from somebody else, whose names would like to steer the terminal.
+
+use super::*;
+use zerkalo::scene::BUILT_IN;
+
+/// Sets the clipboard (OSC 52), colours (C0 and C1), and reorders what follows.
+const EVIL: &str = "\u{1b}]52;c;cm0=\u{7}\u{9b}32m\u{202e}x";
+
+#[test]
+fn names_in_the_dashboard_steer_nothing() {
+    let desk = Desk::new();
+    let escaped: String = EVIL.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
+    let scene = BUILT_IN
+        .replace("\"ball\"", &format!("\"ball{escaped}\""))
+        .replace("name = \"lamp\"", &format!("name = \"{escaped}\""))
+        + &format!("\n[views.\"{escaped}\"]\neye = [0.0, 1.0, 3.0]\ntarget = [0.0, 0.0, 0.0]\n");
+    let name = format!("evil{EVIL}.toml");
+    fs::write(desk.path(&name), scene).unwrap();
+    let mut terminal = desk.open(&[&name], [140, 40]);
+    wait_for_picture(&terminal);
+    terminal.wait_for_text("u{1b}]52");
+    // Through the outline, the inspector, renaming, viewpoints, and a picture whose path is refused.
+    for keys in [
+        "\t", "\x1b[B", "\x1b[B", "\x1b[B", "\x1b[B", "\x1b[B", "\t", "\x1b", "e", "\x1b", "1",
+        "l", "x", "u",
+    ] {
+        terminal.send(keys);
+        std::thread::sleep(std::time::Duration::from_millis(150));
+    }
+    terminal.send("p");
+    terminal.wait_for_text("-1.png");
+    terminal.send("y");
+    terminal.wait_for_text("not copied");
+    // Broken on the disk: the messages about it hold what it says.
+    terminal.send("]");
+    terminal.wait_for_text("toml ●");
+    fs::write(desk.path(&name), format!("[camera]\n\"{escaped}\" = 1\n")).unwrap();
+    terminal.wait_for_text("keep my edits");
+    terminal.send("r");
+    terminal.wait_for_text("nknown");
+    terminal.send("\x03");
+    terminal.wait_for_text("discard them and quit");
+    terminal.send("d");
+    let (_, bytes) = terminal.end();
+    for part in ["\x1b]52", "\u{9b}", "\u{202e}", "\x1b]0;", "\x07"] {
+        assert!(!bytes.contains(part), "{part:?}");
+    }
+}

@@ -1,0 +1,119 @@
+//! Stories of unsaved edits: what is kept while one edits, and what the next start makes of it.
+
+use crate::desk::{Desk, ROOM};
+use std::sync::Arc;
+use std::time::Duration;
+use zerkalo::dashboard::message::{Effect, LeftBehind, Message};
+use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::scene::Scene;
+
+/// What was asked to be kept since the last look: the scenes, `None` for nothing.
+fn kept(desk: &mut Desk) -> Vec<Option<Arc<Scene>>> {
+    let effects = std::mem::take(&mut desk.effects);
+    let kept = effects.into_iter().filter_map(|effect| match effect {
+        Effect::Journal(scene) => Some(scene),
+        _ => None,
+    });
+    kept.collect()
+}
+
+fn left_behind(desk: &Desk, changed: bool) -> LeftBehind {
+    let mut scene = desk.scene().clone();
+    scene.trace.depth = 7;
+    LeftBehind { scene: Arc::new(scene), age: Duration::from_secs(720), changed }
+}
+
+#[test]
+fn every_edit_is_kept_until_it_is_saved_undone_or_left() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("Tab Down p v Esc");
+    assert!(kept(&mut desk).is_empty(), "nothing was edited");
+    desk.keys("Left Left");
+    let scenes = kept(&mut desk);
+    assert_eq!(scenes.len(), 2);
+    assert_eq!(scenes[1].as_ref(), Some(desk.model.history.scene()));
+    desk.keys("u");
+    assert_eq!(kept(&mut desk).last(), Some(&None), "two steps of one gesture were undone");
+    desk.keys("Left Ctrl-s");
+    assert_eq!(kept(&mut desk).last(), Some(&None));
+    desk.keys("u");
+    assert!(matches!(&kept(&mut desk)[..], [Some(_)]), "the file has what was undone");
+    desk.keys("q `d`");
+    let end: Vec<_> = desk.effects.iter().rev().take(2).collect();
+    assert_eq!(end, [&Effect::Quit, &Effect::Journal(None)]);
+}
+
+#[test]
+fn what_is_being_filled_in_is_kept_when_it_is_confirmed() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("a Enter");
+    assert!(matches!(desk.model.overlay, Some(Overlay::Form(_))) && kept(&mut desk).is_empty());
+    desk.keys("Enter");
+    assert_eq!(kept(&mut desk).len(), 1);
+}
+
+#[test]
+fn edits_that_were_left_behind_are_offered_and_taken_up() {
+    let mut desk = Desk::new(ROOM);
+    let left = left_behind(&desk, false);
+    desk.send(Message::LeftBehind(left.clone()));
+    let Some(Overlay::Question(question)) = &desk.model.overlay else { panic!() };
+    assert!(question.text.contains("12 minutes ago") && !question.text.contains("changed"));
+    desk.effects.clear();
+    desk.keys("Enter");
+    assert_eq!(**desk.model.history.scene(), *left.scene);
+    assert!(desk.model.is_unsaved() && desk.asked(|e| *e == Effect::TakeUp));
+    assert!(desk.asked(|e| matches!(e, Effect::Show(_))));
+    assert!(matches!(&kept(&mut desk)[..], [Some(_)]));
+    desk.keys("u");
+    assert_eq!(desk.text(), ROOM, "undo leads back to the file");
+    desk.keys("U Ctrl-s");
+    assert!(desk.text().contains("depth = 7") && !desk.model.is_unsaved());
+}
+
+#[test]
+fn whoever_looks_at_the_file_first_finds_them_again() {
+    let mut desk = Desk::new(ROOM);
+    desk.send(Message::LeftBehind(left_behind(&desk, true)));
+    let Some(Overlay::Question(question)) = &desk.model.overlay else { panic!() };
+    assert!(question.text.contains("changed since"), "{}", question.text);
+    desk.keys("`f` Left");
+    assert!(!desk.asked(|e| matches!(e, Effect::TakeUp | Effect::Discard)));
+    desk.palette("recover edits of a broken session").keys("`d`");
+    assert!(desk.asked(|e| *e == Effect::Discard) && desk.model.is_unsaved());
+    desk.palette("recover edits of a broken session");
+    assert!(desk.model.overlay.is_none() && desk.notice().contains("No session"));
+}
+
+#[test]
+fn whoever_is_busy_is_not_interrupted() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("a");
+    desk.send(Message::LeftBehind(left_behind(&desk, false)));
+    assert!(matches!(desk.model.overlay, Some(Overlay::Pick(_))));
+    assert!(desk.notice().contains("recover"));
+    desk.keys("Esc");
+    desk.palette("recover edits of a broken session").keys("`r`");
+    assert_eq!(desk.scene().trace.depth, 7);
+}
+
+#[test]
+fn edits_that_change_nothing_are_done_with() {
+    let mut desk = Desk::new(ROOM);
+    let same = LeftBehind { scene: Arc::clone(desk.model.scene()), ..left_behind(&desk, true) };
+    desk.send(Message::LeftBehind(same));
+    desk.keys("Enter");
+    assert!(desk.asked(|e| *e == Effect::Discard) && !desk.asked(|e| *e == Effect::TakeUp));
+    assert!(!desk.model.is_unsaved());
+}
+
+#[test]
+fn suspending_asks_for_nothing_else() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("Left");
+    desk.effects.clear();
+    desk.keys("Ctrl-z");
+    assert_eq!(desk.effects, [Effect::Suspend]);
+    desk.keys("? Ctrl-z");
+    assert_eq!(desk.effects, [Effect::Suspend, Effect::Suspend]);
+}
