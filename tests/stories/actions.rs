@@ -303,6 +303,9 @@ fn file_stories() -> Vec<Story> {
 fn picture_stories() -> Vec<Story> {
     let c = || Subject::Camera;
     let probe = |d: &Desk| d.model.probe.unwrap();
+    let fine = |way, keys, at: [usize; 2]| {
+        story(MoveProbe(way, Pace::Fine), c(), keys, move |_, d| probe(d) == at)
+    };
     vec![
         story(ExportPng, c(), "p", |_, d| {
             d.asked(|e| *e == Effect::Export(Format::Png))
@@ -331,16 +334,10 @@ fn picture_stories() -> Vec<Story> {
         story(MoveProbe(Way::Up, Pace::Coarse), c(), "i Up", move |_, d| probe(d)[1] < 24),
         story(CopyPath, c(), "p y", |_, d| d.asked(|e| matches!(e, Effect::Copy(_)))),
         story(MoveProbe(Way::Down, Pace::Coarse), c(), "i Down", move |_, d| probe(d)[1] > 24),
-        story(MoveProbe(Way::Left, Pace::Fine), c(), "i Shift-Left", move |_, d| {
-            probe(d) == [31, 24]
-        }),
-        story(MoveProbe(Way::Right, Pace::Fine), c(), "i Shift-Right", move |_, d| {
-            probe(d) == [33, 24]
-        }),
-        story(MoveProbe(Way::Up, Pace::Fine), c(), "i Shift-Up", move |_, d| probe(d) == [32, 23]),
-        story(MoveProbe(Way::Down, Pace::Fine), c(), "i Shift-Down", move |_, d| {
-            probe(d) == [32, 25]
-        }),
+        fine(Way::Left, "i Shift-Left", [31, 24]),
+        fine(Way::Right, "i Shift-Right", [33, 24]),
+        fine(Way::Up, "i Shift-Up", [32, 23]),
+        fine(Way::Down, "i Shift-Down", [32, 25]),
         story(Keep, c(), "k", |_, d| d.model.comparison.kept.is_some()),
         story(Flip, c(), "k c", |_, d| d.model.comparison.shown == Compared::Kept),
         story(Difference, c(), "k C", |_, d| d.model.comparison.shown == Compared::Difference),
