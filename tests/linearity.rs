@@ -180,15 +180,19 @@ shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
         let there = rendered(&moved(&dyadic, by), 4, precision, 8).film.bytes();
         assert!(here == there, "{precision:?}");
     }
-    // Others are rounded there to 2^-32 of a unit, which single precision hides and double shows. A
-    // sample at an edge may fall to the other side, none of these does.
+    // Others are rounded there to 2^-32 of a unit, which double precision shows; in single it is hidden,
+    // unless a number lies so close to the middle between two that it is rounded to the other one (a
+    // coefficient of a thin ellipsoid in extents.toml: 2.7e-8). A sample at an edge may fall to the
+    // other side, none of these does.
     for (name, scene) in all_shipped() {
         let scene = sized(scene, SIZE);
         for precision in PRECISIONS {
             let (here, there) = (values(&scene, precision), values(&moved(&scene, by), precision));
             let apart = here.iter().zip(&there).map(|(a, b)| (a - b).abs()).sum::<f64>()
                 / here.iter().sum::<f64>();
-            assert!(apart < 1e-8, "{name} in {precision:?}: {apart:e}");
+            let limit =
+                if precision == Precision::Single { 0.5 * f64::from(f32::EPSILON) } else { 1e-8 };
+            assert!(apart < limit, "{name} in {precision:?}: {apart:e}");
         }
     }
 }
