@@ -14,6 +14,7 @@ mod signals;
 mod trace;
 mod writer;
 
+use super::link::Reading;
 use super::message::{Effect, Exported, Message};
 use super::model::{Model, Start};
 use super::terminal::{Event, Keyboard, Reply, Screen, Surroundings, Timed, probe, size};
@@ -341,9 +342,12 @@ impl Dashboard {
             self.resize();
         }
         self.frames.look(now);
-        if self.changed && self.told + TELL_INTERVAL <= now {
+        let reading = self.frames.reading();
+        let mode = |line: &Option<Reading>| line.as_ref().map(|line| line.mode);
+        let other = mode(&reading) != mode(&self.model.line);
+        if other || self.changed && self.told + TELL_INTERVAL <= now {
             self.told = now;
-            self.take(Message::Line(self.frames.reading()));
+            self.take(Message::Line(reading));
         }
         let mut due = None;
         if self.frames.ready() && !self.quit {
