@@ -51,6 +51,8 @@ fn main() {
 
 /// Starts the program in `folder` and waits for its first picture.
 fn opened(folder: &Path, more: &[&str]) -> Terminal {
+    // What the session before has left behind would be asked about.
+    let _ = fs::remove_file(folder.join(".room.toml.unsaved"));
     let command = [&[PROGRAM, "room.toml"], more].concat();
     let terminal =
         Terminal::start(&Start { command: &command, folder, size: SIZE, env: &[], answers: true });
