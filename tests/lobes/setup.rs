@@ -138,3 +138,22 @@ pub fn trace<L: Lanes>(
 pub fn scene(text: &str) -> Scene {
     Scene::parse(text, "test").unwrap()
 }
+
+const SETTINGS: SampleSettings = SampleSettings { seed: 3, kind: SamplerKind::Sobol };
+
+/// Sums over groups of the samples `0..count` of every pixel, white lights.
+pub fn samples<L: Lanes>(scene: &Scene, count: u32) -> Vec<Vector> {
+    let world = World::<L>::new(scene);
+    let sampler = Sampler::<L>::new(SETTINGS, world.jitter());
+    let [width, height] = scene.film.size;
+    let mut out = Vec::new();
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for first in (0..count).step_by(L::WIDTH) {
+            for groups in trace(&world, &sampler, (x, y), 0, first) {
+                let all: Vec<_> = groups.into_iter().map(|g| (1.0, g)).collect();
+                out.push(combine(&all));
+            }
+        }
+    }
+    out
+}

@@ -3,28 +3,8 @@
 use crate::setup::*;
 use zerkalo::lanes::{Double, Lanes, Single};
 use zerkalo::material::{Lobe, Masking};
-use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, Options, Precision, World};
-
-const SETTINGS: SampleSettings = SampleSettings { seed: 3, kind: SamplerKind::Sobol };
-
-/// Sums over groups of the samples `0..count` of every pixel, white lights.
-fn picture<L: Lanes>(scene: &Scene, count: u32) -> Vec<Vector> {
-    let world = World::<L>::new(scene);
-    let sampler = Sampler::<L>::new(SETTINGS, world.jitter());
-    let [width, height] = scene.film.size;
-    let mut out = Vec::new();
-    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-        for first in (0..count).step_by(L::WIDTH) {
-            for groups in trace(&world, &sampler, (x, y), 0, first) {
-                let all: Vec<_> = groups.into_iter().map(|g| (1.0, g)).collect();
-                out.push(combine(&all));
-            }
-        }
-    }
-    out
-}
+use zerkalo::world::{AnyWorld, Options, Precision};
 
 /// A ball in a white furnace returns exactly rho, in every sample, by every lobe that claims to keep
 /// energy; at its silhouette lobes dip under the surface and are folded up.
@@ -44,7 +24,7 @@ fn furnace<L: Lanes>() {
             let mut material = reflector(lobe, Masking::VCavity, roughness);
             material.reflection = rho;
             scene.materials.insert("m".to_string(), material);
-            let samples = picture::<L>(&scene, 16);
+            let samples = samples::<L>(&scene, 16);
             let on_ball = samples.iter().filter(|s| **s == [rho; 3]).count();
             let beside = samples.iter().filter(|s| **s == [1.0; 3]).count();
             assert_eq!(on_ball + beside, samples.len(), "{} {lobe:?} {roughness}", L::NAME);
@@ -69,7 +49,7 @@ fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
         for material in scene.materials.values_mut().filter(|m| m.reflection > 0.0) {
             (material.lobe, material.roughness) = (lobe, roughness);
         }
-        picture::<Double>(scene, 4)
+        samples::<Double>(scene, 4)
     };
     let mirror = with(&mut scene, Lobe::Mirror, 0.0);
     assert!(mirror.iter().any(|s| s[0] > 0.0));
@@ -121,13 +101,13 @@ fn extreme_26_parallel_mirrors() {
         assert!(told[0].contains(&format!("depth {depth} ")), "{told:?}");
         assert!(told[0].contains(&format!("at most {cut:.2e}")), "{told:?}");
         let (infinite, truncated) = (1.0 / (1.0 - rho), (1.0 - first) / (1.0 - rho));
-        for sample in picture::<Double>(&scene, 4) {
+        for sample in samples::<Double>(&scene, 4) {
             let [r, g, b] = sample;
             assert!((r / truncated - 1.0).abs() < 1e-10, "{r} for {truncated}");
             assert!(infinite - r <= cut * (1.0 + 1e-9), "more is missing than reported");
             assert!((g / r - 0.5).abs() < 1e-12 && (b / r - 0.25).abs() < 1e-12);
         }
-        for [r, ..] in picture::<Single>(&scene, 8) {
+        for [r, ..] in samples::<Single>(&scene, 8) {
             assert!((r / truncated - 1.0).abs() < 1e-4, "single: {r} for {truncated}");
         }
     }
@@ -141,7 +121,7 @@ const DIM: f64 = 1e-4;
 /// Samples of the width-1 instance and of the packets, side by side: shares that differ at all and
 /// by more than 1e-3, largest difference of the others (both relative), relative difference of the means.
 fn compare<One: Lanes, Many: Lanes>(scene: &Scene) -> [f64; 4] {
-    let (one, many) = (picture::<One>(scene, 16), picture::<Many>(scene, 16));
+    let (one, many) = (samples::<One>(scene, 16), samples::<Many>(scene, 16));
     assert_eq!(one.len(), many.len());
     let (mut any, mut far, mut near) = (0.0, 0.0, 0.0f64);
     let (mut sum, mut sum_many) = (0.0, 0.0);
