@@ -32,7 +32,7 @@ pub use display::{Display, Tone, quantised_8, quantised_16};
 pub use exr_read::{ReadPicture, read_exr};
 pub use linear::Linear;
 pub use mix::{Mix, Part};
-pub use noise::{Estimator, Noise, TileNoise};
+pub use noise::{Estimator, Mse, Noise, TileNoise};
 pub use png::png_of_rgb;
 pub use probe::Probe;
 pub use raster::{Raster, Stale};

@@ -54,8 +54,9 @@ impl Film {
             probe.difference = Some([0, 1, 2].map(|c| 0.5 * (a[c] - b[c]).abs()));
         }
         if let Some(noise) = Estimator::new(self.scales(), mix, display).tile_so_far(tile) {
-            probe.tile_rmse_linear = Some(noise.linear_mse.sqrt());
-            probe.tile_rmse_codes = Some(noise.codes_mse.sqrt());
+            let noise = noise.of_all();
+            probe.tile_rmse_linear = Some(noise.linear.sqrt());
+            probe.tile_rmse_codes = Some(noise.codes.sqrt());
         }
         Some(probe)
     }

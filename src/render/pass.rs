@@ -84,7 +84,12 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     /// Samples of all pixels of a tile: packets of one pixel where enough aligned samples are asked
     /// for, of several pixels at one index elsewhere.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
-        let mut work = Work::new(replicate, self.world.outlook(origin, tile.extent()));
+        let outlook = self.world.outlook(origin, tile.extent());
+        if outlook.as_ref().is_some_and(|outlook| self.world.is_black(outlook)) {
+            tile.advance(replicate, job.count);
+            return Counts::default();
+        }
+        let mut work = Work::new(replicate, outlook);
         let width = L::WIDTH as u32;
         let end = job.first + job.count;
         let part: Vec<(usize, usize)>;

@@ -14,6 +14,13 @@ use std::ops::Range;
 /// (`benches/acceleration.rs`).
 pub const TREE_FROM: usize = 96;
 
+impl Selection {
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.runs.is_empty() && !self.tree
+    }
+}
+
 /// One batch and where its items stand in the numbering of all items.
 struct Part<L: Lanes> {
     batch: Batch<L>,
@@ -130,6 +137,24 @@ impl<L: Lanes> Geometry<L> {
             }
         }
         Selection { runs, tree: self.all.tree }
+    }
+
+    /// Those `items` of a tree, and all that are in none.
+    pub fn select_few(&self, items: &[u32]) -> Selection {
+        let mut runs = self.all.runs.clone();
+        for item in items {
+            let part = self.parts.partition_point(|part| part.end <= *item);
+            let i = item - self.parts[part].base;
+            runs.push((part as u32, i..i + 1));
+        }
+        runs.sort_unstable_by_key(|(part, range)| (*part, range.start));
+        Selection { runs, tree: false }
+    }
+
+    /// The items that stand in a tree, in ascending order.
+    pub fn in_tree(&self) -> Vec<u32> {
+        let item = |(part, i): &(u32, u32)| self.parts[*part as usize].base + i;
+        self.tree_items.iter().map(item).collect()
     }
 
     /// Whether the bounded items stand in a tree.

@@ -5,8 +5,9 @@ use super::guide::Sight;
 use super::inventory::Inventory;
 use super::limits;
 use super::media::Media;
-use super::outlook::{Culling, Outlook, Rectangle, Surroundings};
+use super::outlook::{Culling, Outlook, Surroundings};
 use super::precision;
+use super::screen::{Cells, Rectangle};
 use super::skin::Skins;
 use crate::camera::View;
 use crate::lanes::{Double, Lanes, Real, Single};
@@ -41,6 +42,8 @@ pub(super) struct Source<S> {
     pub group: usize,
     /// `None`: 1 in every channel.
     pub weight: Option<[S; 3]>,
+    /// Light up to this, a 64th of the film's step, is as good as none.
+    pub negligible: S,
 }
 
 /// A scene, compiled for the lane type `L`.
@@ -155,7 +158,8 @@ impl<L: Lanes> World<L> {
             .filter_map(|(light, group, weight)| {
                 let lamp = Lamp::new(&scene.lights[light], placed.origin)?;
                 let weight = (weight != [1.0; 3]).then(|| weight.map(L::Scalar::of));
-                Some(Source { lamp, group, weight })
+                let negligible = L::Scalar::of(1.0 / (64.0 * scales[group]));
+                Some(Source { lamp, group, weight, negligible })
             })
             .collect();
         let going_on = finishes.iter().any(|f| f.reflection.is_some() || f.transmission.is_some());
@@ -187,8 +191,16 @@ impl<L: Lanes> World<L> {
             Acceleration::Auto => {
                 let of = Surroundings::new(forms().collect(), eye, &entered, &lamps);
                 panorama = of.outlook(&geometry, None);
-                // A tree knows better what camera rays meet.
-                if geometry.has_tree() { Culling::Nothing } else { Culling::Pencils(of) }
+                if geometry.has_tree() {
+                    let things = geometry.in_tree().into_iter();
+                    let seen = |item: u32| {
+                        let source = geometry.sources()[item as usize];
+                        (item, Rectangle::of(&placed.forms[source.form], &view))
+                    };
+                    Culling::Cells(Cells::new(size, things.map(seen)))
+                } else {
+                    Culling::Pencils(of)
+                }
             }
             Acceleration::Projected => {
                 Culling::Rectangles(forms().map(|form| Rectangle::of(form, &view)).collect())
@@ -254,6 +266,11 @@ impl<L: Lanes> World<L> {
     pub fn outlook(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Outlook> {
         let lamps = self.sources.len();
         self.culling.outlook(&self.geometry, lamps, &self.view, (origin, extent))
+    }
+
+    /// Whether all camera rays that have this outlook meet nothing, and nothing is black.
+    pub fn is_black(&self, outlook: &Outlook) -> bool {
+        self.background.is_none() && outlook.seen.is_empty()
     }
 
     /// What it contains.

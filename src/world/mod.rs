@@ -10,6 +10,7 @@ mod media;
 mod outlook;
 mod path;
 mod precision;
+mod screen;
 mod skin;
 mod through;
 

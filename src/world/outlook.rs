@@ -2,6 +2,7 @@
 //! that may stand between what they see and a light. Most parts see one or two things, and nothing
 //! shades them: the others are never asked.
 
+use super::screen::{Cells, Rectangle};
 use crate::camera::View;
 use crate::lanes::{Lanes, Real};
 use crate::light::Lamp;
@@ -30,53 +31,10 @@ pub(super) enum Culling {
     Pencils(Surroundings),
     /// By rectangles on the screen.
     Rectangles(Vec<Rectangle>),
+    /// By lists of the few things of a tree that are seen in each part of the screen.
+    Cells(Cells),
     /// Not at all, or by the geometry itself.
     Nothing,
-}
-
-/// The part of the raster that a thing may be seen on \[pixels\]: smallest and largest coordinates.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Rectangle {
-    low: [f64; 2],
-    high: [f64; 2],
-}
-
-/// Room for the rounding of rays in single precision \[pixels, and of the coordinates that take part\].
-const MARGIN_PX: f64 = 0.25;
-const STRAY: f64 = 1e-5;
-
-impl Rectangle {
-    /// Of a form: around the corners of its box, if all are in front of the eye.
-    pub fn of(form: &Form, view: &View) -> Self {
-        let everywhere = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
-        let Some((low, high)) = form.bounds() else { return everywhere };
-        let [right, _, forward] = view.frame();
-        let reach = low.abs().max(high.abs()).max(view.eye().abs()).max_element();
-        let mut out = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
-        for corner in 0..8 {
-            let pick = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
-            let point = DVec3::new(pick(0), pick(1), pick(2));
-            let depth = (point - view.eye()).dot(forward);
-            let stray = STRAY * reach;
-            if depth <= 2.0 * stray {
-                return everywhere;
-            }
-            // A step to the side by what may be lost shows how large it is on the raster.
-            let at = view.project(point);
-            let aside = view.project(point + right * stray - forward * stray);
-            let margin = MARGIN_PX + (aside[0] - at[0]).abs().max((aside[1] - at[1]).abs());
-            out.low = std::array::from_fn(|axis| out.low[axis].min(at[axis] - margin));
-            out.high = std::array::from_fn(|axis| out.high[axis].max(at[axis] + margin));
-        }
-        out
-    }
-
-    fn overlaps(&self, origin: [usize; 2], extent: [usize; 2]) -> bool {
-        (0..2).all(|axis| {
-            let begin = origin[axis] as f64;
-            self.low[axis] <= begin + extent[axis] as f64 && self.high[axis] >= begin
-        })
-    }
 }
 
 impl Culling {
@@ -98,6 +56,10 @@ impl Culling {
             }
             Self::Rectangles(of) => {
                 let seen = geometry.select(|item| of[item as usize].overlaps(origin, extent));
+                Some(Outlook { seen, ..Outlook::everything(geometry, lamps) })
+            }
+            Self::Cells(cells) => {
+                let seen = geometry.select_few(&cells.seen(origin, extent)?);
                 Some(Outlook { seen, ..Outlook::everything(geometry, lamps) })
             }
             Self::Nothing => None,

@@ -56,8 +56,11 @@ impl Law {
 
 /// The block that a tile with `count` samples per replicate gets next: about a quarter more, a power
 /// of two and at least a packet, so that blocks stay aligned to what makes the sequence even; or what is missing
-/// to such a block.
+/// to such a block; before the first packet is full, as many again.
 fn block(count: u32) -> u32 {
+    if count < PACKET {
+        return (count + 1).next_power_of_two() - count;
+    }
     match to_packet(count) {
         0 => 1 << (count / 4).max(PACKET).ilog2(),
         rest => rest,

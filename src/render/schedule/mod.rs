@@ -22,12 +22,10 @@ pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
 use trend::Trend;
 
-/// Samples per replicate that every tile gets before its estimate is believed.
-const FLOOR: u32 = 16;
-/// The same for tiles in which a path met a glossy lobe.
-const GLOSSY_FLOOR: u32 = 32;
-/// Estimates begin here: below, they say little and cost as much as the samples.
-const FIRST_ESTIMATE: u32 = 4;
+/// Samples per replicate that every tile gets before samples go where the noise is. Estimates begin here:
+/// below, they say little and cost as much as the samples. Sixteen would spend a third of the mirror
+/// room's samples, and two thirds of the reflecting tracks', on tiles without any noise.
+const FLOOR: u32 = 4;
 /// From the first packet on, samples are given in multiples of the widest packet that renders; only a
 /// tile's last block may be shorter.
 pub const PACKET: u32 = if Single::WIDTH > 8 { Single::WIDTH as u32 } else { 8 };
@@ -175,7 +173,8 @@ impl Schedule {
 
     /// The latest estimate of each tile's RMSE in codes, row by row; 0 before the first.
     pub fn tile_noise_codes(&self) -> Vec<f32> {
-        self.tiles.iter().map(|t| t.mse(Criterion::Codes).sqrt() as f32).collect()
+        let codes = |t: &Tile| t.error.map_or(0.0, |(_, e)| e.of_all().codes.sqrt() as f32);
+        self.tiles.iter().map(codes).collect()
     }
 
     /// Samples traced so far, over all pixels.
@@ -235,10 +234,10 @@ impl Schedule {
         self.estimate = true;
         let common = self.common_count();
         if common < FLOOR || !self.settings.adaptive {
-            return self.uniform(common);
+            self.uniform(common)
+        } else {
+            self.by_gain()
         }
-        let floor = self.glossy_floor();
-        if floor.is_empty() { self.by_gain() } else { floor }
     }
 
     /// Samples per replicate of the tiles that no cap holds back (of all if every one is capped).
@@ -252,7 +251,7 @@ impl Schedule {
         let grown = match common {
             // To the next power of two; a picture that was to have fewer samples may have stopped
             // between two of them.
-            n if n < FLOOR => (n + 1).next_power_of_two() - n,
+            n if n < PACKET => (n + 1).next_power_of_two() - n,
             n => (self.uniform_growth(n) / PACKET * PACKET).max(PACKET) + to_packet(n),
         };
         let limit = self.settings.stop.spp.map_or(FULL, |spp| spp.div_ceil(2)).min(FULL);
@@ -260,8 +259,7 @@ impl Schedule {
         let after = common + count;
         let last = after == limit;
         let aims = self.target().is_some() || self.settings.stop.seconds.is_some();
-        let due =
-            if aims { after >= FIRST_ESTIMATE } else { after / 2 >= self.estimated_at.max(2) };
+        let due = if aims { after >= FLOOR } else { after / 2 >= self.estimated_at.max(2) };
         self.estimate = due || last;
         if self.estimate {
             self.estimated_at = after;
@@ -280,19 +278,6 @@ impl Schedule {
         let factor = (noise / target).powf(1.0 / self.trend.slope());
         let half_way = (0.5 * f64::from(done) * (factor - 1.0).clamp(0.0, 2.0)) as u32;
         if self.settings.stop.seconds.is_some() { half_way.min(eighth) } else { half_way }
-    }
-
-    /// The second half of the floor for the tiles that met a glossy lobe, as far as the sample count
-    /// allows it.
-    fn glossy_floor(&self) -> Vec<Job> {
-        let wanting = |t: &Tile| {
-            if t.glossy { GLOSSY_FLOOR.min(self.cap(t)).saturating_sub(t.done) } else { 0 }
-        };
-        let pixels: u64 =
-            self.tiles.iter().filter(|t| wanting(t) > 0).map(|t| u64::from(t.pixels)).sum();
-        let allowed = u32::try_from(self.samples_left() / pixels.max(1)).unwrap_or(FULL);
-        let allowed = allowed / PACKET * PACKET;
-        self.jobs(|t| wanting(t).min(allowed))
     }
 
     fn jobs(&self, count: impl Fn(&Tile) -> u32) -> Vec<Job> {

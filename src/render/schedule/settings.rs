@@ -1,6 +1,6 @@
 //! What the scheduler is asked for, and why it ended.
 
-use crate::film::TileNoise;
+use crate::film::Mse;
 
 /// What "noise" means when tiles compete for samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,10 +12,10 @@ pub enum Criterion {
 }
 
 impl Criterion {
-    pub(super) fn of(self, error: TileNoise) -> f64 {
+    pub(super) fn of(self, error: Mse) -> f64 {
         match self {
-            Self::Codes => error.codes_mse,
-            Self::Linear => error.linear_mse,
+            Self::Codes => error.codes,
+            Self::Linear => error.linear,
         }
     }
 }

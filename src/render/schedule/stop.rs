@@ -1,7 +1,7 @@
 //! When the work is done, and how long it will take.
 
 use super::tile::Tile;
-use super::{Criterion, FLOOR, FULL, GLOSSY_FLOOR, Schedule, StoppedBy};
+use super::{Criterion, FLOOR, FULL, Schedule, StoppedBy};
 
 impl Schedule {
     /// A lower and an upper guess of the seconds left until the first of the targets, `seconds` after
@@ -101,10 +101,6 @@ impl Schedule {
 
     /// Whether every tile has had its floor, so that the pooled error is to be believed.
     fn floors_reached(&self) -> bool {
-        let floor = |t: &Tile| {
-            let wanted = if self.settings.adaptive && t.glossy { GLOSSY_FLOOR } else { FLOOR };
-            t.done >= wanted.min(self.cap(t))
-        };
-        self.tiles.iter().all(floor)
+        self.tiles.iter().all(|t| t.done >= FLOOR.min(self.cap(t)))
     }
 }

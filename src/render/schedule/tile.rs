@@ -68,22 +68,22 @@ impl Tile {
         (self.rays as f64 / samples.max(1.0)).max(1.0)
     }
 
-    /// Latest mean squared error; 0 before the first estimate.
+    /// Latest mean squared error, as it is told; 0 before the first estimate.
     pub fn mse(&self, criterion: Criterion) -> f64 {
-        self.error.map_or(0.0, |(_, e)| criterion.of(e))
+        self.error.map_or(0.0, |(_, e)| criterion.of(e.told))
     }
 
-    /// The estimates on record and the latest: counts and mean squared errors.
+    /// The estimates to decide by, those on record and the latest: counts and mean squared errors.
     pub fn estimates(&self, criterion: Criterion) -> impl Iterator<Item = (f64, f64)> {
         let latest = self.error.filter(|e| self.history.last() != Some(e));
         let all = self.history.iter().copied().chain(latest);
-        all.map(move |(n, e)| (f64::from(n), criterion.of(e)))
+        all.map(move |(n, e)| (f64::from(n), criterion.of(e.guide)))
     }
 
     /// The last doubling on record: counts and errors before and after.
     pub fn last_doubling(&self, criterion: Criterion) -> Option<[(f64, f64); 2]> {
         let [.., before, after] = self.history.as_slice() else { return None };
-        Some([before, after].map(|(n, e)| (f64::from(*n), criterion.of(*e))))
+        Some([before, after].map(|(n, e)| (f64::from(*n), criterion.of(e.guide))))
     }
 
     /// The slope p of RMSE ~ n^-p.
@@ -94,7 +94,7 @@ impl Tile {
     pub fn slope(&self, criterion: Criterion, pooled: f64) -> f64 {
         const PRIOR_DOUBLINGS: f64 = 2.0;
         let [(n0, first), .., (n1, last)] = self.history.as_slice() else { return pooled };
-        let (before, after) = (criterion.of(*first), criterion.of(*last));
+        let (before, after) = (criterion.of(first.guide), criterion.of(last.guide));
         if !(before > 0.0 && after > 0.0) {
             return pooled;
         }

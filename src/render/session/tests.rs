@@ -2,7 +2,7 @@
 //! nothing.
 
 use super::*;
-use crate::film::{Header, Noise, TILE, TileNoise};
+use crate::film::{Header, Mse, Noise, TILE, TileNoise};
 use crate::render::schedule::{Criterion, Spp, Stop, StoppedBy};
 use crate::render::wave::JobReport;
 use crate::world::Groups;
@@ -44,8 +44,8 @@ impl Double {
         let tile = slot.open();
         assert_eq!(tile.counts()[wave.replicate], job.first, "each index once, in order");
         tile.advance(wave.replicate, job.count);
-        let error =
-            TileNoise { codes_mse: 1.0 / f64::from(job.first + 1), linear_mse: 0.0, pixels: 256 };
+        let mse = Mse { codes: 1.0 / f64::from(job.first + 1), linear: 0.0 };
+        let error = TileNoise { told: mse, guide: mse, pixels: 256 };
         JobReport { rays: 1, glossy: false, error: wave.estimate.then_some(error) }
     }
 }

@@ -9,7 +9,7 @@ fn adaptive_spp_is_the_mean_and_goes_where_the_noise_is() {
     assert_eq!(reason, StoppedBy::Spp);
     let spp = schedule.spp();
     assert!(spp.mean <= 200.0 && spp.mean > 199.9, "{spp:?}");
-    assert_eq!(spp.min, 32);
+    assert_eq!(spp.min, 2 * FLOOR);
     assert!(spp.max > 500, "{spp:?}");
 }
 

@@ -53,7 +53,7 @@ fn a_higher_aim_goes_on_where_the_lower_one_ended() {
             while let Step::Trace(wave) = schedule.next(0.0) {
                 let even = |j: &Job| {
                     let end = j.first + j.count;
-                    end.is_multiple_of(PACKET) || (end < FLOOR && end.is_power_of_two())
+                    end.is_multiple_of(PACKET) || (end < PACKET && end.is_power_of_two())
                 };
                 ends.push(wave.jobs.iter().all(even));
                 let report = model.run(&wave);
@@ -81,13 +81,8 @@ fn estimates_made_anew_replace_the_old_ones() {
     assert_eq!((schedule.noise(), schedule.eta_seconds(1.0)), (None, None));
     // The picture is displayed three times as bright: so is its error.
     model.truth.iter_mut().for_each(|t| t.sigma *= 3.0);
-    let estimates: Vec<_> = (0..36)
-        .map(|tile| {
-            let mse = model.estimate(tile);
-            let error = TileNoise { linear_mse: mse, codes_mse: mse, pixels: PIXELS };
-            Some((schedule.tiles[tile].done, error))
-        })
-        .collect();
+    let estimates: Vec<_> =
+        (0..36).map(|tile| Some((schedule.tiles[tile].done, model.estimate(tile)))).collect();
     schedule.set_estimates(&estimates);
     let after = schedule.noise().unwrap();
     assert!((after.rmse_codes / before.rmse_codes - 3.0).abs() < 1e-9);

@@ -5,7 +5,7 @@ mod changes;
 mod stops;
 
 use super::*;
-use crate::film::TileNoise;
+use crate::film::{Mse, TileNoise};
 use crate::render::wave::JobReport;
 
 /// Pixels of a whole tile.
@@ -76,14 +76,19 @@ impl Model {
     }
 
     /// The estimate from A - B, if the film holds equally many of both.
-    fn estimate(&self, tile: usize) -> f64 {
+    fn estimate(&self, tile: usize) -> TileNoise {
         let n = f64::from(self.counts[0][tile]);
         let [a, b] = [&self.walks[0][tile], &self.walks[1][tile]];
-        if a.is_empty() {
-            return self.true_mse(tile);
-        }
-        let squares: f64 = a.iter().zip(b).map(|(a, b)| ((a - b) / n).powi(2)).sum();
-        squares / 4.0 / a.len() as f64
+        let mse = |codes: f64| Mse { codes, linear: codes * 1e-6 };
+        let [guide, told] = [0, 1].map(|half| {
+            if a.is_empty() {
+                return mse(self.true_mse(tile));
+            }
+            let values = a.iter().zip(b).skip(half).step_by(2);
+            let squares: f64 = values.map(|(a, b)| ((a - b) / n).powi(2)).sum();
+            mse(squares / 2.0 / a.len() as f64)
+        });
+        TileNoise { told, guide, pixels: PIXELS }
     }
 
     /// The squared error that the picture (A + B) / 2 really has.
@@ -124,10 +129,7 @@ impl Model {
         }
         // As the film does: no estimate while B lags.
         let level = self.counts[0][tile] == self.counts[1][tile];
-        let error = (wave.estimate && level).then(|| {
-            let mse = self.estimate(tile);
-            TileNoise { codes_mse: mse, linear_mse: mse * 1e-6, pixels: PIXELS }
-        });
+        let error = (wave.estimate && level).then(|| self.estimate(tile));
         let rays = u64::from(job.count) * u64::from(self.pixels[tile]) * truth.rays_per_sample;
         JobReport { rays, glossy: truth.glossy, error }
     }

@@ -105,7 +105,7 @@ fn whichever_comes_first() {
 #[test]
 fn a_picture_without_error_ends_at_the_floor() {
     let (schedule, reason) = model_of(CALM).finish(until(noise(0.5), true));
-    assert_eq!((reason, schedule.spp().max), (StoppedBy::Noise, 32));
+    assert_eq!((reason, schedule.spp().max), (StoppedBy::Noise, 2 * FLOOR));
 }
 
 #[test]
