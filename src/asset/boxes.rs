@@ -1,13 +1,13 @@
 //! A tree of boxes, up to eight a branch, each coordinate of the eight side by side, so that one ray, or
 //! what bounds a packet of rays, meets eight of them at once.
 //!
-//! A binary tree by a library, its nodes joined as long as a branch has room, the largest first
-//! (Wald, Benthin and Boulos 2008, *Getting Rid of Packets*).
+//! A binary tree by a library, its nodes joined so that branches are few and full.
 
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::builder::build_bvh2;
 use std::time::Duration;
 
@@ -109,6 +109,7 @@ impl Built {
     /// Makes branches and leaves of the nodes of a binary tree.
     fn join(&mut self, binary: &Bvh2) {
         let nodes = &binary.nodes;
+        let groups = Groups::of(nodes);
         let mut todo = vec![(0usize, 0usize, 1usize)];
         let branches = &mut self.boxes.branches;
         branches.push(NO_BOX);
@@ -116,17 +117,7 @@ impl Built {
         while let Some((node, branch, depth)) = todo.pop() {
             self.boxes.depth = self.boxes.depth.max(depth);
             inside.clear();
-            inside.push(node);
-            while inside.len() < WIDE {
-                let area = |i: usize| nodes[i].aabb().half_area();
-                let opened = (0..inside.len())
-                    .filter(|k| !nodes[inside[*k]].is_leaf())
-                    .max_by(|a, b| area(inside[*a]).total_cmp(&area(inside[*b])));
-                let Some(opened) = opened else { break };
-                let first = nodes[inside[opened]].first_index as usize;
-                inside[opened] = first;
-                inside.push(first + 1);
-            }
+            groups.inside(nodes, node, &mut inside);
             let mut new = NO_BOX;
             for (i, node) in inside.iter().enumerate() {
                 let n = &nodes[*node];
@@ -145,6 +136,82 @@ impl Built {
                 }
             }
             branches[branch] = new;
+        }
+    }
+}
+
+/// How the nodes of a binary tree are joined to branches so that a random ray meets the fewest: the sum
+/// of the areas of the boxes around branches is the least (Ylitie, Karras and Laine 2017, *Efficient
+/// Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*, without their choice of leaves).
+struct Groups {
+    /// For each node and each number of boxes from 1 to [`WIDE`], how many of these the first child's part
+    /// of the tree takes, and how many the second's; none: the node's own box is one of them. For one box:
+    /// the split of the branch that the node becomes.
+    splits: Vec<[[u8; 2]; WIDE]>,
+}
+
+impl Groups {
+    fn of(nodes: &[Bvh2Node]) -> Self {
+        let mut splits = vec![[[0; 2]; WIDE]; nodes.len()];
+        // The least sum of areas of a node's part of the tree in at most so many boxes.
+        let mut costs = vec![[0.0f32; WIDE]; nodes.len()];
+        let mut order = vec![0];
+        for at in 0.. {
+            let Some(node) = order.get(at) else { break };
+            let node: &Bvh2Node = &nodes[*node];
+            if !node.is_leaf() {
+                let first = node.first_index as usize;
+                order.extend([first, first + 1]);
+            }
+        }
+        for number in order.into_iter().rev() {
+            let node = &nodes[number];
+            if node.is_leaf() {
+                continue;
+            }
+            let first = node.first_index as usize;
+            let least = |boxes: usize| {
+                let splits = (1..boxes).map(|k| {
+                    (costs[first][k - 1] + costs[first + 1][boxes - k - 1], [k, boxes - k])
+                });
+                let least = splits.min_by(|a, b| a.0.total_cmp(&b.0));
+                least.map_or((f32::INFINITY, [0; 2]), |(cost, split)| {
+                    (cost, split.map(|boxes| boxes as u8))
+                })
+            };
+            let (inside, split) = least(WIDE);
+            let mut cost = [inside + node.aabb().half_area(); WIDE];
+            splits[number][0] = split;
+            for boxes in 2..=WIDE {
+                let (apart, split) = least(boxes);
+                (cost[boxes - 1], splits[number][boxes - 1]) = if apart < cost[0] {
+                    (apart, split)
+                } else {
+                    (cost[0], [0; 2])
+                };
+            }
+            costs[number] = cost;
+        }
+        Self { splits }
+    }
+
+    /// Collects the nodes whose boxes the branch holds that `node` becomes.
+    fn inside(&self, nodes: &[Bvh2Node], node: usize, out: &mut Vec<usize>) {
+        let mut todo = Vec::with_capacity(WIDE);
+        let split = |todo: &mut Vec<(usize, u8)>, node: usize, [left, right]: [u8; 2]| {
+            let first = nodes[node].first_index as usize;
+            todo.extend([(first + 1, right), (first, left)]);
+        };
+        if nodes[node].is_leaf() {
+            out.push(node);
+        } else {
+            split(&mut todo, node, self.splits[node][0]);
+        }
+        while let Some((node, boxes)) = todo.pop() {
+            match self.splits[node][usize::from(boxes) - 1] {
+                both if boxes > 1 && both != [0; 2] => split(&mut todo, node, both),
+                _ => out.push(node),
+            }
         }
     }
 }

@@ -3,8 +3,8 @@
 
 use super::batch::Ray;
 use super::extent::padded;
-use super::walk::{Beam, Sheaf, TURNS, apart, together, with_stack};
-use crate::asset::{Boxes, Built};
+use super::walk::{Beam, Sheaf, apart, together, with_stack};
+use crate::asset::{Boxes, Built, WIDE};
 use crate::lanes::{Lanes, Mask, Real, V3};
 use glam::DVec3;
 use obvhs::BvhBuildParams;
@@ -60,9 +60,9 @@ impl Tree {
         if self.is_together(ray, wanted) {
             let bounds = Sheaf::around(&beam, wanted);
             let leaf = |number: usize, limit| leaf(self.items[number] as usize, limit);
-            with_stack!(boxes, 1, stack =>
-                together(boxes, (&beam, bounds.as_ref()), limit, stack, leaf));
-            return;
+            return with_stack::<_, _, 128, 512>(WIDE, boxes, |stack| {
+                together(boxes, (&beam, bounds.as_ref()), limit, stack, leaf)
+            });
         }
         let numbers = L::from_fn(|lane| L::Scalar::of(lane as f64));
         let leaf = |lane: usize, number: usize, limit: L::Scalar| {
@@ -71,8 +71,9 @@ impl Tree {
             let limit = L::select(here, L::splat(limit), L::of(-1.0));
             leaf(self.items[number] as usize, limit).lane(lane)
         };
-        with_stack!(boxes, TURNS, stack =>
-            apart(boxes, (&beam, limit), wanted, stack, |_| (), leaf));
+        with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {
+            apart(boxes, (&beam, limit), wanted, stack, |_| (), leaf)
+        });
     }
 
     /// Whether the wanted rays of a packet are worth going together.

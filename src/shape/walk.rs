@@ -8,7 +8,7 @@
 
 use super::batch::Ray;
 use crate::asset::{Boxes, Branch, LEAF, WIDE};
-use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::lanes::{Lanes, MAX_WIDTH, Mask, Real, V3, prefetch};
 
 /// A packet as boxes want it.
 #[derive(Clone, Copy)]
@@ -54,8 +54,9 @@ impl<L: Lanes> Beam<L> {
 /// Bounds of rays that run the same way along each axis: of one ray, or of several.
 #[derive(Clone, Copy, Default)]
 pub struct Sheaf<S> {
-    /// By axis, which side of a box they meet first: as in [`Branch::sides`].
+    /// By axis, which side of a box they meet first, and which last: as in [`Branch::sides`].
     near: [usize; 3],
+    far: [usize; 3],
     /// What is taken from the near sides, and from the far ones.
     near_origin: [S; 3],
     far_origin: [S; 3],
@@ -64,13 +65,6 @@ pub struct Sheaf<S> {
 }
 
 impl<S: Real> Sheaf<S> {
-    /// Of the ray of one lane.
-    #[inline(always)]
-    pub fn only<L: Lanes<Scalar = S>>(beam: &Beam<L>, lane: usize) -> Self {
-        let inverse = beam.inverse.lane(lane);
-        Self::new([beam.above.lane(lane), beam.below.lane(lane)], [inverse; 2])
-    }
-
     /// Of the rays of some lanes, at least one; `None`: they do not run the same way.
     #[inline(always)]
     pub fn around<L: Lanes<Scalar = S>>(beam: &Beam<L>, lanes: u32) -> Option<Self> {
@@ -83,23 +77,19 @@ impl<S: Real> Sheaf<S> {
         }
         let first = lanes.trailing_zeros() as usize;
         let here = L::from_fn(|i| L::Scalar::of(f64::from(lanes >> i & 1))).gt(L::zero());
-        let ends = |v: V3<L>| {
-            let v = V3::select(here, v, V3::splat(v.lane(first)));
-            let [x, y, z] = [extremes(v.x), extremes(v.y), extremes(v.z)];
-            [[x.0, y.0, z.0], [x.1, y.1, z.1]]
-        };
-        let [_, above] = ends(beam.above);
-        let [below, _] = ends(beam.below);
-        Some(Self::new([above, below], ends(d)))
-    }
-
-    #[inline(always)]
-    fn new([above, below]: [[S; 3]; 2], inverse: [[S; 3]; 2]) -> Self {
-        let back = inverse[0].map(|d| d < S::default());
+        let (_, above) = ends(beam.above, here, first);
+        let (below, _) = ends(beam.below, here, first);
+        let (low, high) = ends(d, here, first);
+        let back = low.map(|d| d < S::default());
         let origin =
             |far: bool| std::array::from_fn(|a| if back[a] == far { above[a] } else { below[a] });
-        let near = std::array::from_fn(|a| if back[a] { a + 3 } else { a });
-        Self { near, near_origin: origin(false), far_origin: origin(true), inverse }
+        Some(Self {
+            near: std::array::from_fn(|a| if back[a] { a + 3 } else { a }),
+            far: std::array::from_fn(|a| if back[a] { a } else { a + 3 }),
+            near_origin: origin(false),
+            far_origin: origin(true),
+            inverse: [low, high],
+        })
     }
 
     /// Where at the earliest one of the rays enters boxes whose `side`s are given, as in
@@ -112,14 +102,11 @@ impl<S: Real> Sheaf<S> {
         &self,
         side: impl Fn(usize) -> L,
         limit: L,
-    ) -> (L, u32) {
-        let of = |far: bool| {
-            let k = |a: usize| if far { (self.near[a] + 3) % 6 } else { self.near[a] };
-            V3::new(side(k(0)), side(k(1)), side(k(2)))
-        };
+    ) -> (L, L::Mask) {
+        let of = |[x, y, z]: [usize; 3]| V3::new(side(x), side(y), side(z));
         let [low, high] = self.inverse.map(V3::splat);
-        let near = of(false) - V3::splat(self.near_origin);
-        let far = of(true) - V3::splat(self.far_origin);
+        let near = of(self.near) - V3::splat(self.near_origin);
+        let far = of(self.far) - V3::splat(self.far_origin);
         let (mut first, mut last) = (near.times(low), far.times(low));
         if !ONE {
             let (a, b) = (near.times(high), far.times(high));
@@ -128,8 +115,16 @@ impl<S: Real> Sheaf<S> {
         }
         let first = first.x.max(first.y).max(first.z).max(L::zero());
         let last = last.x.min(last.y).min(last.z) * grown();
-        (first, (first.le(last) & first.le(limit)).bits())
+        (first, first.le(last) & first.le(limit))
     }
+}
+
+/// The smallest and the largest coordinates in the lanes `here`, of which `first` is one.
+#[inline(always)]
+fn ends<L: Lanes>(v: V3<L>, here: L::Mask, first: usize) -> ([L::Scalar; 3], [L::Scalar; 3]) {
+    let v = V3::select(here, v, V3::splat(v.lane(first)));
+    let [x, y, z] = [extremes(v.x), extremes(v.y), extremes(v.z)];
+    ([x.0, y.0, z.0], [x.1, y.1, z.1])
 }
 
 /// The smallest and the largest lane; lanes that are no number do not count.
@@ -176,30 +171,23 @@ pub struct Entry<S> {
     near: S,
 }
 
-/// Entries of the stack for trees of usual depth: seven a level, and one.
-pub const STACK: usize = 128;
-
-/// Entries of the stack for any tree but those that nobody has.
-pub const DEEP_STACK: usize = 1024;
-
-/// Calls `$walk` with `$stack`, room for `$walks` walks through a tree, usually on the processor's own.
-macro_rules! with_stack {
-    ($boxes:expr, $walks:expr, $stack:ident => $walk:expr) => {{
-        use crate::shape::walk::{DEEP_STACK, Entry, STACK};
-        let room = 7 * $boxes.depth() + 1;
-        if room <= STACK {
-            let $stack = &mut [Entry::default(); STACK * $walks][..];
-            $walk
-        } else if room <= DEEP_STACK {
-            let $stack = &mut [Entry::default(); DEEP_STACK * $walks][..];
-            $walk
-        } else {
-            let $stack = &mut vec![Entry::default(); room * $walks][..];
-            $walk
-        }
-    }};
+/// Calls `walk` with so many `things` for each branch on a way through a tree, usually on the processor's
+/// own stack.
+#[inline(always)]
+pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
+    things: usize,
+    boxes: &Boxes,
+    walk: impl FnOnce(&mut [T]) -> R,
+) -> R {
+    let room = things * boxes.depth();
+    if room <= SMALL {
+        walk(&mut [T::default(); SMALL])
+    } else if room <= LARGE {
+        walk(&mut [T::default(); LARGE])
+    } else {
+        walk(&mut vec![T::default(); room])
+    }
 }
-pub(super) use with_stack;
 
 /// Puts an entry on the stack, above those that are entered later, of the ones from `base` on.
 #[inline(always)]
@@ -213,102 +201,174 @@ fn push<S: Real>(stack: &mut [Entry<S>], base: usize, top: &mut usize, entry: En
     *top += 1;
 }
 
-/// So many rays of a packet that go apart take turns: while one waits for its next branch or leaf to
-/// come from memory, others go on.
-pub const TURNS: usize = 4;
+/// The boxes of a branch that a ray enters and that it has not visited.
+#[derive(Clone, Copy, Default)]
+pub struct Frame {
+    /// By place, where the box is entered: the bits of a float, rounded down, the last three of them the
+    /// place, so that the least key is the nearest box. [`NO_KEY`] and above: none.
+    keys: [u32; WIDE],
+    branch: u32,
+    /// How many there are.
+    left: u32,
+}
 
-/// One of them.
+/// The bits of infinity.
+const NO_KEY: u32 = 0x7f80_0000;
+
+/// The bits of a key that tell the place.
+const PLACE: u32 = WIDE as u32 - 1;
+
+/// One of the rays that take turns.
 #[derive(Clone, Copy, Default)]
 struct Walker<S> {
-    lane: usize,
     ray: Sheaf<S>,
     limit: S,
-    /// Where it goes next, and its place on the stack.
+    /// Where it goes next.
     child: u32,
-    top: usize,
+    /// The number of its frames.
+    frames: usize,
 }
 
 /// Calls `leaf(lane, leaf, limit)` for the leaves whose boxes the ray of a lane enters no farther than its
 /// limit, nearer ones first; `leaf` returns the distance beyond which nothing matters to that ray any
-/// more. `lanes`: those that go. `soon(leaf)` is called before a leaf is needed.
-#[inline(always)]
+/// more. `lanes`: those that go. `soon(leaf)` is called before a leaf is needed. `frames`: as many for each
+/// lane as the tree is deep.
+///
+/// The rays take turns: while one waits for its next branch or leaf to come from memory, others go on.
+#[inline(never)]
 pub fn apart<L: Lanes>(
     boxes: &Boxes,
     (beam, limit): (&Beam<L>, L),
-    mut lanes: u32,
-    stack: &mut [Entry<L::Scalar>],
+    lanes: u32,
+    frames: &mut [Frame],
     soon: impl Fn(usize),
     mut leaf: impl FnMut(usize, usize, L::Scalar) -> L::Scalar,
 ) {
-    let room = stack.len() / TURNS;
-    let mut walkers = [Walker::default(); TURNS];
-    while lanes != 0 {
-        let mut count = 0;
-        for (i, walker) in walkers.iter_mut().enumerate() {
-            if lanes == 0 {
-                break;
+    let room = boxes.depth();
+    let mut walkers = Walker::each(beam, limit);
+    // Those whose next is a branch, and those whose next is a leaf.
+    let (mut at_branch, mut at_leaf) = (lanes, 0u32);
+    while at_branch | at_leaf != 0 {
+        let (mut branches, mut leaves) = (at_branch, at_leaf);
+        (at_branch, at_leaf) = (0, 0);
+        let mut go = |lane: usize, child: u32| {
+            if child & LEAF != 0 {
+                at_leaf |= 1 << lane;
+                soon((child & !LEAF) as usize);
+            } else {
+                at_branch |= 1 << lane;
+                fetch(&boxes.branches()[child as usize]);
             }
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            let (ray, limit) = (Sheaf::only(beam, lane), limit.lane(lane));
-            *walker = Walker { lane, ray, limit, child: 0, top: i * room };
-            count += 1;
+        };
+        while branches != 0 {
+            let lane = branches.trailing_zeros() as usize % L::WIDTH;
+            branches &= branches - 1;
+            let (walker, frames) = (&mut walkers[lane], &mut frames[lane * room..][..room]);
+            if walker.open::<L>(boxes, frames) || walker.next(boxes, frames) {
+                go(lane, walker.child);
+            }
         }
-        let mut going = (1u32 << count) - 1;
-        while going != 0 {
-            let mut left = going;
-            while left != 0 {
-                let i = left.trailing_zeros() as usize;
-                left &= left - 1;
-                let walker = &mut walkers[i % TURNS];
-                if walker.child & LEAF != 0 {
-                    let number = (walker.child & !LEAF) as usize;
-                    walker.limit = leaf(walker.lane, number, walker.limit);
-                } else {
-                    walker.open::<L>(boxes, stack);
-                }
-                if !walker.next(i * room, stack) {
-                    going &= !(1 << i);
-                } else if walker.child & LEAF != 0 {
-                    soon((walker.child & !LEAF) as usize);
-                } else {
-                    let sides = &boxes.branches()[walker.child as usize].sides;
-                    std::hint::black_box((sides[0][0], sides[2][0], sides[4][0]));
-                }
+        while leaves != 0 {
+            let lane = leaves.trailing_zeros() as usize % L::WIDTH;
+            leaves &= leaves - 1;
+            let (walker, frames) = (&mut walkers[lane], &mut frames[lane * room..][..room]);
+            walker.limit = leaf(lane, (walker.child & !LEAF) as usize, walker.limit);
+            if walker.next(boxes, frames) {
+                go(lane, walker.child);
             }
         }
     }
 }
 
+/// Begins to bring a branch from memory.
+#[inline(always)]
+fn fetch(branch: &Branch) {
+    let [a, _, b, _, c, _] = &branch.sides;
+    prefetch(a);
+    prefetch(b);
+    prefetch(c);
+    prefetch(&branch.child);
+}
+
+/// Takes the least key; the others stay.
+#[inline(always)]
+fn take(keys: &mut [u32; WIDE]) -> u32 {
+    let least = keys.iter().fold(u32::MAX, |least, key| least.min(*key));
+    *keys = keys.map(|key| if key == least { NO_KEY } else { key });
+    least
+}
+
 impl<S: Real> Walker<S> {
-    /// Puts those boxes of the branch at hand on the stack that the ray enters.
+    /// Each lane's, at the root.
     #[inline(always)]
-    fn open<L: Lanes<Scalar = S>>(&mut self, boxes: &Boxes, stack: &mut [Entry<S>]) {
-        let branch = &boxes.branches()[self.child as usize];
-        let base = self.top;
-        for part in 0..WIDE.div_ceil(L::WIDTH) {
-            let side = |k: usize| lanes_of::<L>(&branch.sides[k], part);
-            let (near, bits) = self.ray.meets::<true, L>(side, L::splat(self.limit));
-            let mut bits = bits & fresh();
-            while bits != 0 {
-                let i = bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                let child = branch.child[(part * L::WIDTH + i) % WIDE];
-                push(stack, base, &mut self.top, Entry { child, near: near.lane(i) });
-            }
+    fn each<L: Lanes<Scalar = S>>(beam: &Beam<L>, limit: L) -> [Self; MAX_WIDTH] {
+        let d = beam.inverse;
+        let back = [d.x, d.y, d.z].map(|d| d.lt(L::zero()).bits() as usize);
+        let select = |yes: V3<L>, no: V3<L>| {
+            let axis = |d: L, yes, no| L::select(d.lt(L::zero()), yes, no);
+            V3::new(axis(d.x, yes.x, no.x), axis(d.y, yes.y, no.y), axis(d.z, yes.z, no.z))
+        };
+        let near_origin = select(beam.below, beam.above);
+        let far_origin = select(beam.above, beam.below);
+        let mut each = [Self::default(); MAX_WIDTH];
+        for (lane, walker) in each.iter_mut().enumerate().take(L::WIDTH) {
+            let back = back.map(|back| back >> lane & 1);
+            walker.limit = limit.lane(lane);
+            walker.ray = Sheaf {
+                near: std::array::from_fn(|a| a + 3 * back[a]),
+                far: std::array::from_fn(|a| a + 3 - 3 * back[a]),
+                near_origin: near_origin.lane(lane),
+                far_origin: far_origin.lane(lane),
+                inverse: [d.lane(lane); 2],
+            };
         }
+        each
     }
 
-    /// Takes the next entry off the stack that still matters; false: there is none above `bottom`.
+    /// Goes to the nearest of the boxes of the branch at hand that the ray enters and makes a frame of the
+    /// others; false: it enters none.
     #[inline(always)]
-    fn next(&mut self, bottom: usize, stack: &[Entry<S>]) -> bool {
-        while self.top > bottom {
-            self.top -= 1;
-            let entry = stack[self.top];
-            if entry.near <= self.limit {
-                self.child = entry.child;
+    fn open<L: Lanes<Scalar = S>>(&mut self, boxes: &Boxes, frames: &mut [Frame]) -> bool {
+        let branch = &boxes.branches()[self.child as usize];
+        let (mut keys, mut met) = ([NO_KEY; WIDE], 0);
+        for part in 0..WIDE.div_ceil(L::WIDTH) {
+            let side = |k: usize| lanes_of::<L>(&branch.sides[k], part);
+            let (near, enters) = self.ray.meets::<true, L>(side, L::splat(self.limit));
+            let first = part * L::WIDTH;
+            met |= (enters.bits() & fresh()) << first;
+            // Less than half of what the key leaves out, but more than rounding to single precision.
+            let near = L::select(enters, near * L::of(1.0 - 2e-7), L::of(f64::INFINITY));
+            for (i, key) in keys[first..].iter_mut().enumerate().take(L::WIDTH) {
+                let bits = (near.lane(i).to_f64() as f32).to_bits();
+                *key = bits & !(PLACE | 1 << 31) | (first + i) as u32;
+            }
+        }
+        if met == 0 {
+            return false;
+        }
+        let place = take(&mut keys) & PLACE;
+        // Written even if nothing is left: a branch less to foretell.
+        let left = met.count_ones() - 1;
+        frames[self.frames] = Frame { keys, branch: self.child, left };
+        self.frames += usize::from(left != 0);
+        self.child = branch.child[place as usize];
+        true
+    }
+
+    /// Goes to the nearest box of the last frame that still matters; false: there is none.
+    #[inline(always)]
+    fn next(&mut self, boxes: &Boxes, frames: &mut [Frame]) -> bool {
+        while self.frames > 0 {
+            let frame = &mut frames[self.frames - 1];
+            let least = take(&mut frame.keys);
+            if S::of(f64::from(f32::from_bits(least & !PLACE))) <= self.limit {
+                frame.left -= 1;
+                self.frames -= usize::from(frame.left == 0);
+                let branch = &boxes.branches()[frame.branch as usize];
+                self.child = branch.child[(least & PLACE) as usize];
                 return true;
             }
+            self.frames -= 1;
         }
         false
     }
@@ -336,12 +396,12 @@ pub fn together<L: Lanes>(
             let base = top;
             for part in 0..WIDE.div_ceil(L::WIDTH) {
                 let side = |k: usize| lanes_of(&branch.sides[k], part);
-                let (near, bits) = match bounds {
+                let (near, met) = match bounds {
                     Some(bounds) => bounds.meets::<false, L>(side, L::splat(farthest)),
                     // Of no use to order them; but empty places are known.
-                    None => (L::zero(), side(0).le(side(3)).bits()),
+                    None => (L::zero(), side(0).le(side(3))),
                 };
-                let mut bits = bits & fresh() & ((1 << L::WIDTH) - 1);
+                let mut bits = met.bits() & fresh() & ((1 << L::WIDTH) - 1);
                 while bits != 0 {
                     let i = bits.trailing_zeros() as usize;
                     bits &= bits - 1;
