@@ -7,8 +7,8 @@ use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::builder::build_bvh2;
+use obvhs::bvh2::node::Bvh2Node;
 use std::time::Duration;
 
 /// Boxes of a branch.
@@ -184,11 +184,8 @@ impl Groups {
             splits[number][0] = split;
             for boxes in 2..=WIDE {
                 let (apart, split) = least(boxes);
-                (cost[boxes - 1], splits[number][boxes - 1]) = if apart < cost[0] {
-                    (apart, split)
-                } else {
-                    (cost[0], [0; 2])
-                };
+                (cost[boxes - 1], splits[number][boxes - 1]) =
+                    if apart < cost[0] { (apart, split) } else { (cost[0], [0; 2]) };
             }
             costs[number] = cost;
         }

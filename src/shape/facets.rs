@@ -9,14 +9,15 @@ use super::walk::{Beam, Sheaf, all, apart, fresh, lanes_of, together, with_stack
 use crate::asset::{Leaf, Mesh, WIDE};
 use crate::lanes::{Frame, Lanes, MAX_WIDTH, Mask, Real, V3, prefetch};
 
-/// Packets go together whose directions differ by no more than this over the root of the number of
-/// triangles (length of the difference of unit vectors), and whose origins by no more than that share of
-/// the mesh's size. Measured by `benches/mesh.rs`, lines `together or apart`: packets are faster up to
-/// differences of 0.5 with 1,000 triangles, 0.12 with 70,000, 0.03 with a million.
-const TOGETHER: f64 = 30.0;
+/// Packets go together whose directions differ by no more than this for each lane over the root of the
+/// number of triangles (length of the difference of unit vectors), and whose origins by no more than that
+/// share of the mesh's size. Measured by `benches/mesh.rs`, lines `together or apart`: packets of eight are
+/// faster up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million; those of
+/// four up to half of that.
+const TOGETHER: f64 = 2.5;
 
-/// At most so much, however few triangles there are.
-const TOGETHER_AT_MOST: f64 = 0.5;
+/// At most so much for each lane, however few triangles there are.
+const TOGETHER_AT_MOST: f64 = 0.04;
 
 /// The nearest triangle of each lane.
 #[derive(Clone, Copy, Debug)]
@@ -229,6 +230,7 @@ fn is_together<L: Lanes>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     let [low, high] = mesh.mesh().bounds;
     let size = (0..3).map(|i| f64::from(high[i]) - f64::from(low[i])).fold(0.0, f64::max);
     let turn = (TOGETHER / (mesh.mesh().triangles.len() as f64).sqrt()).min(TOGETHER_AT_MOST);
+    let turn = turn * L::WIDTH as f64;
     ray.spread(wanted, turn, turn * size)
 }
 
