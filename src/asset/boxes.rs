@@ -212,3 +212,61 @@ impl Groups {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Boxes of about `size` along a spiral, some of them at one place.
+    fn corners(i: usize, size: f32) -> [[f32; 3]; 2] {
+        let at = (i - i % 3) as f32;
+        let middle = [at.sin() * at, at.cos() * at, 0.3 * at];
+        [middle.map(|x| x - size), middle.map(|x| x + size * (1.0 + (i % 5) as f32))]
+    }
+
+    /// Everything lies in one leaf, in all the boxes on the way to it, and branches are well filled.
+    fn holds(count: usize, size: f32, in_leaf: usize) {
+        let built =
+            Boxes::build(count, |i| corners(i, size), in_leaf, BvhBuildParams::fast_build());
+        let (boxes, mut met) = (&built.boxes, vec![0; count]);
+        let mut todo = vec![(0u32, 1, Vec::new())];
+        let (mut filled, mut deepest) = (0, 0);
+        while let Some((branch, depth, around)) = todo.pop() {
+            deepest = depth.max(deepest);
+            let branch = &boxes.branches()[branch as usize];
+            for place in branch.places() {
+                filled += 1;
+                let mut around: Vec<[f32; 6]> = around.clone();
+                around.push(branch.sides.map(|side| side[place]));
+                let child = branch.child[place];
+                if child & LEAF == 0 {
+                    todo.push((child, depth + 1, around));
+                    continue;
+                }
+                let (first, things) = built.leaves[(child & !LEAF) as usize];
+                assert!((1..=in_leaf).contains(&(things as usize)), "{things} things in a leaf");
+                for thing in &built.order[first as usize..][..things as usize] {
+                    met[*thing as usize] += 1;
+                    let [low, high] = corners(*thing as usize, size);
+                    let inside =
+                        |b: &[f32; 6]| (0..3).all(|a| b[a] <= low[a] && high[a] <= b[a + 3]);
+                    assert!(around.iter().all(inside), "{thing} of {count}");
+                }
+            }
+        }
+        assert!(met.iter().all(|n| *n == 1), "{count} things, {in_leaf} a leaf: {met:?}");
+        assert_eq!(deepest, boxes.depth());
+        let fill = filled as f64 / boxes.branches().len() as f64;
+        assert!(count < 500 || fill > 5.0, "{fill} boxes in a branch of {count} things");
+    }
+
+    #[test]
+    fn everything_is_in_one_leaf_and_in_the_boxes_above_it() {
+        for count in [1, 2, 3, 7, 8, 9, 64, 65, 1000] {
+            for size in [0.0, 0.1, 30.0] {
+                holds(count, size, 1);
+                holds(count, size, 8);
+            }
+        }
+    }
+}

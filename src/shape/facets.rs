@@ -4,8 +4,9 @@
 //! triangles at a time. Both compute each triangle by the same operations, so that a ray meets the
 //! same triangle at the same distance either way.
 
+use super::apart::apart;
 use super::batch::Ray;
-use super::walk::{Beam, Sheaf, all, apart, fresh, lanes_of, together, with_stack};
+use super::walk::{Beam, Sheaf, all, fresh, lanes_of, together, with_stack};
 use crate::asset::{Leaf, Mesh, WIDE};
 use crate::lanes::{Frame, Lanes, MAX_WIDTH, Mask, Real, V3, prefetch};
 

@@ -1,9 +1,10 @@
 //! A bounding volume hierarchy for scenes with many items: packets that stay together walk it together,
 //! others ray by ray.
 
+use super::apart::apart;
 use super::batch::Ray;
 use super::extent::padded;
-use super::walk::{Beam, Sheaf, apart, together, with_stack};
+use super::walk::{Beam, Sheaf, together, with_stack};
 use crate::asset::{Boxes, Built, WIDE};
 use crate::lanes::{Lanes, Mask, Real, V3};
 use glam::DVec3;
