@@ -1,9 +1,9 @@
 //! The rays of a packet through a tree of boxes, each by itself, in turns: while one waits for its next
 //! branch or leaf to come from memory, the others go on.
 //!
-//! A ray meets the eight boxes of a branch at once and goes to the nearest; what is left waits in a frame
-//! and is ordered only as far as it is asked for, by least keys of which the processor finds one without
-//! a jump: with random rays what costs is to foretell jumps, and memory.
+//! A ray meets the eight boxes of a branch at once and goes to the nearest. The others wait in a frame,
+//! not in order: the nearest of them is looked for when it is needed, without a jump. For what costs time
+//! with random rays, but for memory, is jumps that the processor foretells wrongly.
 
 use super::walk::{Beam, Sheaf, fresh, lanes_of};
 use crate::asset::{Boxes, Branch, LEAF, WIDE};
@@ -142,7 +142,7 @@ impl<S: Real> Walker<S> {
             let (near, enters) = self.ray.meets::<true, L>(side, L::splat(self.limit));
             let first = part * L::WIDTH;
             met |= (enters.bits() & fresh()) << first;
-            // Less than half of what the key leaves out, but more than rounding to single precision.
+            // Less by more than rounding to single precision may add: no key is beyond its box.
             let near = L::select(enters, near * L::of(1.0 - 2e-7), L::of(f64::INFINITY));
             for (i, key) in keys[first..].iter_mut().enumerate().take(L::WIDTH) {
                 let bits = (near.lane(i).to_f64() as f32).to_bits();
