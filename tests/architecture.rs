@@ -78,6 +78,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("ratatui", &["dashboard"]),
     ("rayon", &["render"]),
     ("rustix", &["render", "dashboard"]),
+    ("safe_arch", &["lanes"]),
     ("serde", &["command", "scene", "shape", "material", "light", "camera", "value"]),
     ("serde_json", &["command"]),
     ("signal_hook", &["command", "dashboard"]),

@@ -1,14 +1,14 @@
 //! A tree of boxes, up to eight a branch, each coordinate of the eight side by side, so that one ray, or
 //! what bounds a packet of rays, meets eight of them at once.
 //!
-//! A binary tree by a library, its nodes joined as long as a branch has room, the largest first
-//! (Wald, Benthin and Boulos 2008, *Getting Rid of Packets*).
+//! A binary tree by a library, its nodes joined so that branches are few and full.
 
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
+use obvhs::bvh2::node::Bvh2Node;
 use std::time::Duration;
 
 /// Boxes of a branch.
@@ -109,6 +109,7 @@ impl Built {
     /// Makes branches and leaves of the nodes of a binary tree.
     fn join(&mut self, binary: &Bvh2) {
         let nodes = &binary.nodes;
+        let groups = Groups::of(nodes);
         let mut todo = vec![(0usize, 0usize, 1usize)];
         let branches = &mut self.boxes.branches;
         branches.push(NO_BOX);
@@ -116,17 +117,7 @@ impl Built {
         while let Some((node, branch, depth)) = todo.pop() {
             self.boxes.depth = self.boxes.depth.max(depth);
             inside.clear();
-            inside.push(node);
-            while inside.len() < WIDE {
-                let area = |i: usize| nodes[i].aabb().half_area();
-                let opened = (0..inside.len())
-                    .filter(|k| !nodes[inside[*k]].is_leaf())
-                    .max_by(|a, b| area(inside[*a]).total_cmp(&area(inside[*b])));
-                let Some(opened) = opened else { break };
-                let first = nodes[inside[opened]].first_index as usize;
-                inside[opened] = first;
-                inside.push(first + 1);
-            }
+            groups.inside(nodes, node, &mut inside);
             let mut new = NO_BOX;
             for (i, node) in inside.iter().enumerate() {
                 let n = &nodes[*node];
@@ -145,6 +136,137 @@ impl Built {
                 }
             }
             branches[branch] = new;
+        }
+    }
+}
+
+/// How the nodes of a binary tree are joined to branches so that a random ray meets the fewest: the sum
+/// of the areas of the boxes around branches is the least (Ylitie, Karras and Laine 2017, *Efficient
+/// Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*, without their choice of leaves).
+struct Groups {
+    /// For each node and each number of boxes from 1 to [`WIDE`], how many of these the first child's part
+    /// of the tree takes, and how many the second's; none: the node's own box is one of them. For one box:
+    /// the split of the branch that the node becomes.
+    splits: Vec<[[u8; 2]; WIDE]>,
+}
+
+impl Groups {
+    fn of(nodes: &[Bvh2Node]) -> Self {
+        let mut splits = vec![[[0; 2]; WIDE]; nodes.len()];
+        // The least sum of areas of a node's part of the tree in at most so many boxes.
+        let mut costs = vec![[0.0f32; WIDE]; nodes.len()];
+        let mut order = vec![0];
+        for at in 0.. {
+            let Some(node) = order.get(at) else { break };
+            let node: &Bvh2Node = &nodes[*node];
+            if !node.is_leaf() {
+                let first = node.first_index as usize;
+                order.extend([first, first + 1]);
+            }
+        }
+        for number in order.into_iter().rev() {
+            let node = &nodes[number];
+            if node.is_leaf() {
+                continue;
+            }
+            let first = node.first_index as usize;
+            let least = |boxes: usize| {
+                let splits = (1..boxes).map(|k| {
+                    (costs[first][k - 1] + costs[first + 1][boxes - k - 1], [k, boxes - k])
+                });
+                let least = splits.min_by(|a, b| a.0.total_cmp(&b.0));
+                least.map_or((f32::INFINITY, [0; 2]), |(cost, split)| {
+                    (cost, split.map(|boxes| boxes as u8))
+                })
+            };
+            let (inside, split) = least(WIDE);
+            let mut cost = [inside + node.aabb().half_area(); WIDE];
+            splits[number][0] = split;
+            for boxes in 2..=WIDE {
+                let (apart, split) = least(boxes);
+                (cost[boxes - 1], splits[number][boxes - 1]) =
+                    if apart < cost[0] { (apart, split) } else { (cost[0], [0; 2]) };
+            }
+            costs[number] = cost;
+        }
+        Self { splits }
+    }
+
+    /// Collects the nodes whose boxes the branch holds that `node` becomes.
+    fn inside(&self, nodes: &[Bvh2Node], node: usize, out: &mut Vec<usize>) {
+        let mut todo = Vec::with_capacity(WIDE);
+        let split = |todo: &mut Vec<(usize, u8)>, node: usize, [left, right]: [u8; 2]| {
+            let first = nodes[node].first_index as usize;
+            todo.extend([(first + 1, right), (first, left)]);
+        };
+        if nodes[node].is_leaf() {
+            out.push(node);
+        } else {
+            split(&mut todo, node, self.splits[node][0]);
+        }
+        while let Some((node, boxes)) = todo.pop() {
+            match self.splits[node][usize::from(boxes) - 1] {
+                both if boxes > 1 && both != [0; 2] => split(&mut todo, node, both),
+                _ => out.push(node),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Boxes of about `size` along a spiral, some of them at one place.
+    fn corners(i: usize, size: f32) -> [[f32; 3]; 2] {
+        let at = (i - i % 3) as f32;
+        let middle = [at.sin() * at, at.cos() * at, 0.3 * at];
+        [middle.map(|x| x - size), middle.map(|x| x + size * (1.0 + (i % 5) as f32))]
+    }
+
+    /// Everything lies in one leaf, in all the boxes on the way to it, and branches are well filled.
+    fn holds(count: usize, size: f32, in_leaf: usize) {
+        let built =
+            Boxes::build(count, |i| corners(i, size), in_leaf, BvhBuildParams::fast_build());
+        let (boxes, mut met) = (&built.boxes, vec![0; count]);
+        let mut todo = vec![(0u32, 1, Vec::new())];
+        let (mut filled, mut deepest) = (0, 0);
+        while let Some((branch, depth, around)) = todo.pop() {
+            deepest = depth.max(deepest);
+            let branch = &boxes.branches()[branch as usize];
+            for place in branch.places() {
+                filled += 1;
+                let mut around: Vec<[f32; 6]> = around.clone();
+                around.push(branch.sides.map(|side| side[place]));
+                let child = branch.child[place];
+                if child & LEAF == 0 {
+                    todo.push((child, depth + 1, around));
+                    continue;
+                }
+                let (first, things) = built.leaves[(child & !LEAF) as usize];
+                assert!((1..=in_leaf).contains(&(things as usize)), "{things} things in a leaf");
+                for thing in &built.order[first as usize..][..things as usize] {
+                    met[*thing as usize] += 1;
+                    let [low, high] = corners(*thing as usize, size);
+                    let inside =
+                        |b: &[f32; 6]| (0..3).all(|a| b[a] <= low[a] && high[a] <= b[a + 3]);
+                    assert!(around.iter().all(inside), "{thing} of {count}");
+                }
+            }
+        }
+        assert!(met.iter().all(|n| *n == 1), "{count} things, {in_leaf} a leaf: {met:?}");
+        assert_eq!(deepest, boxes.depth());
+        let fill = filled as f64 / boxes.branches().len() as f64;
+        assert!(count < 500 || fill > 5.0, "{fill} boxes in a branch of {count} things");
+    }
+
+    #[test]
+    fn everything_is_in_one_leaf_and_in_the_boxes_above_it() {
+        for count in [1, 2, 3, 7, 8, 9, 64, 65, 1000] {
+            for size in [0.0, 0.1, 30.0] {
+                holds(count, size, 1);
+                holds(count, size, 8);
+            }
         }
     }
 }

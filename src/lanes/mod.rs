@@ -39,7 +39,7 @@ pub type Single = wide::f32x16;
 pub type Double = wide::f64x8;
 
 /// The widest instance: arrays indexed by lane have this length.
-pub const MAX_WIDTH: usize = 16;
+pub const MAX_WIDTH: usize = if cfg!(target_feature = "avx512f") { 16 } else { 8 };
 
 /// One lane: `f32` or `f64`.
 pub trait Real: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
@@ -260,4 +260,14 @@ const ROUNDER: f64 = 6_755_399_441_055_744.0;
 #[inline(always)]
 fn round_i64(x: f64) -> i64 {
     ((x + ROUNDER).to_bits() as i64).wrapping_sub(ROUNDER.to_bits() as i64)
+}
+
+/// Begins to bring the cache line in which `thing` begins from memory, where the processor can be asked
+/// to; nothing waits for it.
+#[inline(always)]
+pub fn prefetch<T>(thing: &T) {
+    #[cfg(target_arch = "x86_64")]
+    safe_arch::prefetch_t0(thing);
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = thing;
 }

@@ -93,13 +93,15 @@ fn nested(out: &mut String, field: &Field) {
                 let _ = writeln!(words, "- `\"{}\"`: {}", choice.name, choice.doc);
             }
             // Several tables may have the same words.
-            if !out.contains(&words) {
-                push(out, &words);
+            if out.contains(&words) {
+                words = format!("\n`{}`: the same words as above.\n", field.name);
             }
+            push(out, &words);
         }
         Takes::Table(fields) => {
             push(out, &format!("\n`{}`:\n\n", field.name));
             table(out, fields);
+            fields.iter().for_each(|field| nested(out, field));
         }
         Takes::OneOf(_) if field.name == "shape" => shapes(out),
         Takes::OneOf(fields) => {
@@ -124,6 +126,7 @@ fn shapes(out: &mut String) {
         push(out, &format!("```toml\n{example}\n```\n\n"));
         if let Takes::Table(fields) = kind.takes {
             table(out, fields);
+            fields.iter().for_each(|field| nested(out, field));
         }
     }
 }
@@ -179,4 +182,30 @@ fn value(field: &Field) -> String {
 fn row(out: &mut String, cells: &[&str]) {
     let cells: Vec<_> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
     push(out, &format!("| {} |\n", cells.join(" | ")));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In the section where a row refers to what is below, it is below.
+    #[test]
+    fn what_is_said_to_be_below_is_there() {
+        let text = reference();
+        let mut words = 0;
+        for section in text.split("\n## ").flat_map(|part| part.split("\n### ")) {
+            for (at, row) in section.match_indices("\n| `") {
+                let line = section[at + row.len()..].lines().next().unwrap();
+                let (name, rest) = line.split_once('`').unwrap();
+                if rest.starts_with(" | a word, see below |") {
+                    let below = &section[at..];
+                    let told = [":\n\n- `\"", ": the same words as above.\n"];
+                    let told = told.map(|told| below.contains(&format!("\n`{name}`{told}")));
+                    assert!(told.contains(&true), "{line}");
+                    words += 1;
+                }
+            }
+        }
+        assert!(words > 15, "only {words} rows with words");
+    }
 }

@@ -4,19 +4,21 @@
 //! triangles at a time. Both compute each triangle by the same operations, so that a ray meets the
 //! same triangle at the same distance either way.
 
+use super::apart::apart;
 use super::batch::Ray;
-use super::walk::{Beam, Sheaf, TURNS, all, apart, fresh, lanes_of, together, with_stack};
+use super::walk::{Beam, Sheaf, all, fresh, lanes_of, together, with_stack};
 use crate::asset::{Leaf, Mesh, WIDE};
-use crate::lanes::{Frame, Lanes, Mask, Real, V3};
+use crate::lanes::{Frame, Lanes, MAX_WIDTH, Mask, Real, V3, prefetch};
 
-/// Packets go together whose directions differ by no more than this over the root of the number of
-/// triangles (length of the difference of unit vectors), and whose origins by no more than that share of
-/// the mesh's size. Measured by `benches/mesh.rs`, lines `together or apart`: packets are faster up to
-/// differences of 0.5 with 1,000 triangles, 0.12 with 70,000, 0.03 with a million.
-const TOGETHER: f64 = 30.0;
+/// Packets go together whose directions differ by no more than this for each lane over the root of the
+/// number of triangles (length of the difference of unit vectors), and whose origins by no more than that
+/// share of the mesh's size. Measured by `benches/mesh.rs`, lines `together or apart`: packets of eight are
+/// faster up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million; those of
+/// four up to half of that.
+const TOGETHER: f64 = 2.5;
 
-/// At most so much, however few triangles there are.
-const TOGETHER_AT_MOST: f64 = 0.5;
+/// At most so much for each lane, however few triangles there are.
+const TOGETHER_AT_MOST: f64 = 0.04;
 
 /// The nearest triangle of each lane.
 #[derive(Clone, Copy, Debug)]
@@ -50,12 +52,22 @@ impl<L: Lanes> Pierce<L> {
         Self { origin: ray.origin, frame: Frame::around(ray.direction) }
     }
 
+    /// Of each lane what describes its ray: origin and frame.
+    #[inline(always)]
+    fn each(&self) -> [[[L::Scalar; 3]; 4]; MAX_WIDTH] {
+        let Frame { t, b, n } = self.frame;
+        let mut each = [[[L::Scalar::default(); 3]; 4]; MAX_WIDTH];
+        for (lane, one) in each.iter_mut().enumerate().take(L::WIDTH) {
+            *one = [self.origin, t, b, n].map(|v| v.lane(lane));
+        }
+        each
+    }
+
     /// The ray of one lane in every lane.
     #[inline(always)]
-    fn only(&self, lane: usize) -> Self {
-        let all = |v: V3<L>| V3::splat(v.lane(lane));
-        let Frame { t, b, n } = self.frame;
-        Self { origin: all(self.origin), frame: Frame { t: all(t), b: all(b), n: all(n) } }
+    fn only(one: &[[L::Scalar; 3]; 4]) -> Self {
+        let [origin, t, b, n] = one.map(V3::splat);
+        Self { origin, frame: Frame { t, b, n } }
     }
 
     /// Where the ray meets a triangle, at a positive distance, on either side.
@@ -123,7 +135,7 @@ impl<const ANY: bool> Walk<'_, ANY> {
                     high.z.max(c.z),
                 ];
                 let bits = match &bounds {
-                    Some(bounds) => bounds.meets::<false, L>(|k| sides[k], L::of(L::MAX)).1,
+                    Some(bounds) => bounds.meets::<false, L>(|k| sides[k], L::of(L::MAX)).1.bits(),
                     None => fresh(),
                 };
                 let mut bits = bits & fresh() & ((1 << L::WIDTH) - 1);
@@ -146,7 +158,9 @@ impl<const ANY: bool> Walk<'_, ANY> {
             }
             found.t
         };
-        with_stack!(boxes, 1, stack => together(boxes, (beam, bounds.as_ref()), limit, stack, leaf));
+        with_stack::<_, _, 128, 512>(WIDE, boxes, |stack| {
+            together(boxes, (beam, bounds.as_ref()), limit, stack, leaf)
+        });
         found
     }
 
@@ -163,15 +177,15 @@ impl<const ANY: bool> Walk<'_, ANY> {
     /// Each lane by itself.
     #[inline(always)]
     fn apart<L: Lanes>(&self, (ray, beam): (&Ray<L>, &Beam<L>), limit: L) -> Facet<L> {
-        let pierce = Pierce::new(ray);
+        let rays = Pierce::new(ray).each();
         let wanted = limit.gt(L::zero()).bits();
-        let mut found = [(L::Scalar::default(), 0u32); crate::lanes::MAX_WIDTH];
+        let mut found = [(L::Scalar::default(), 0u32); MAX_WIDTH];
         for (lane, found) in found.iter_mut().enumerate().take(L::WIDTH) {
             *found = (limit.lane(lane), 0);
         }
         let leaf = |lane: usize, number: usize, limit: L::Scalar| {
             let leaf = &self.mesh.leaves()[number];
-            let pierce = pierce.only(lane);
+            let pierce = Pierce::<L>::only(&rays[lane]);
             let (best, triangle) = &mut found[lane];
             for part in 0..WIDE.div_ceil(L::WIDTH) {
                 let (t, met) = pierce.meet(Pierce::corners(leaf, part));
@@ -189,12 +203,13 @@ impl<const ANY: bool> Walk<'_, ANY> {
             if ANY && *best < limit { L::Scalar::of(-1.0) } else { *best }
         };
         let soon = |number: usize| {
-            let [a, b, c] = &self.mesh.leaves()[number].corners;
-            std::hint::black_box((a[0][0], a[2][0], b[1][0], c[0][0], c[2][0]));
+            let rows = self.mesh.leaves()[number].corners.as_flattened();
+            rows.iter().step_by(2).for_each(prefetch);
         };
         let boxes = self.mesh.boxes();
-        with_stack!(boxes, TURNS, stack =>
-            apart(boxes, (beam, limit), wanted, stack, soon, leaf));
+        with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {
+            apart(boxes, (beam, limit), wanted, stack, soon, leaf)
+        });
         let t = L::from_fn(|i| found[i].0);
         let t = if ANY { L::select(t.lt(limit), L::of(-1.0), limit) } else { t };
         let mut triangle = L::tag(0);
@@ -216,6 +231,7 @@ fn is_together<L: Lanes>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     let [low, high] = mesh.mesh().bounds;
     let size = (0..3).map(|i| f64::from(high[i]) - f64::from(low[i])).fold(0.0, f64::max);
     let turn = (TOGETHER / (mesh.mesh().triangles.len() as f64).sqrt()).min(TOGETHER_AT_MOST);
+    let turn = turn * L::WIDTH as f64;
     ray.spread(wanted, turn, turn * size)
 }
 

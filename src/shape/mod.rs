@@ -1,5 +1,6 @@
 //! Shapes: what users describe, one kind a file, and what rays meet, one batch per form.
 
+mod apart;
 mod batch;
 mod bound;
 mod cast;

@@ -1,10 +1,10 @@
-//! Rays through a tree of boxes: a packet together, or one ray by itself.
+//! Packets of rays through a tree of boxes, together.
 //!
 //! A packet that stays together meets a branch's eight boxes at once by what bounds its rays: the
 //! smallest and the largest of their origins and inverse directions on each axis (Boulos, Wald and
 //! Shirley 2006, *Geometric and Arithmetic Culling Methods for Entire Ray Packets*). Each ray by itself
-//! meets only the few boxes that are left. A single ray meets eight boxes by the same operations, as a
-//! packet whose bounds coincide.
+//! meets only the few boxes that are left. A single ray (`apart.rs`) meets eight boxes by the same
+//! operations, as a packet whose bounds coincide.
 
 use super::batch::Ray;
 use crate::asset::{Boxes, Branch, LEAF, WIDE};
@@ -14,10 +14,10 @@ use crate::lanes::{Lanes, Mask, Real, V3};
 #[derive(Clone, Copy)]
 pub struct Beam<L> {
     /// Origins, moved up and down by what the things' own tests round off.
-    above: V3<L>,
-    below: V3<L>,
+    pub(super) above: V3<L>,
+    pub(super) below: V3<L>,
     /// One over the directions, never infinite.
-    inverse: V3<L>,
+    pub(super) inverse: V3<L>,
 }
 
 impl<L: Lanes> Beam<L> {
@@ -54,23 +54,17 @@ impl<L: Lanes> Beam<L> {
 /// Bounds of rays that run the same way along each axis: of one ray, or of several.
 #[derive(Clone, Copy, Default)]
 pub struct Sheaf<S> {
-    /// By axis, which side of a box they meet first: as in [`Branch::sides`].
-    near: [usize; 3],
+    /// By axis, which side of a box they meet first, and which last: as in [`Branch::sides`].
+    pub(super) near: [usize; 3],
+    pub(super) far: [usize; 3],
     /// What is taken from the near sides, and from the far ones.
-    near_origin: [S; 3],
-    far_origin: [S; 3],
+    pub(super) near_origin: [S; 3],
+    pub(super) far_origin: [S; 3],
     /// The smallest and the largest inverse direction.
-    inverse: [[S; 3]; 2],
+    pub(super) inverse: [[S; 3]; 2],
 }
 
 impl<S: Real> Sheaf<S> {
-    /// Of the ray of one lane.
-    #[inline(always)]
-    pub fn only<L: Lanes<Scalar = S>>(beam: &Beam<L>, lane: usize) -> Self {
-        let inverse = beam.inverse.lane(lane);
-        Self::new([beam.above.lane(lane), beam.below.lane(lane)], [inverse; 2])
-    }
-
     /// Of the rays of some lanes, at least one; `None`: they do not run the same way.
     #[inline(always)]
     pub fn around<L: Lanes<Scalar = S>>(beam: &Beam<L>, lanes: u32) -> Option<Self> {
@@ -83,23 +77,19 @@ impl<S: Real> Sheaf<S> {
         }
         let first = lanes.trailing_zeros() as usize;
         let here = L::from_fn(|i| L::Scalar::of(f64::from(lanes >> i & 1))).gt(L::zero());
-        let ends = |v: V3<L>| {
-            let v = V3::select(here, v, V3::splat(v.lane(first)));
-            let [x, y, z] = [extremes(v.x), extremes(v.y), extremes(v.z)];
-            [[x.0, y.0, z.0], [x.1, y.1, z.1]]
-        };
-        let [_, above] = ends(beam.above);
-        let [below, _] = ends(beam.below);
-        Some(Self::new([above, below], ends(d)))
-    }
-
-    #[inline(always)]
-    fn new([above, below]: [[S; 3]; 2], inverse: [[S; 3]; 2]) -> Self {
-        let back = inverse[0].map(|d| d < S::default());
+        let (_, above) = ends(beam.above, here, first);
+        let (below, _) = ends(beam.below, here, first);
+        let (low, high) = ends(d, here, first);
+        let back = low.map(|d| d < S::default());
         let origin =
             |far: bool| std::array::from_fn(|a| if back[a] == far { above[a] } else { below[a] });
-        let near = std::array::from_fn(|a| if back[a] { a + 3 } else { a });
-        Self { near, near_origin: origin(false), far_origin: origin(true), inverse }
+        Some(Self {
+            near: std::array::from_fn(|a| if back[a] { a + 3 } else { a }),
+            far: std::array::from_fn(|a| if back[a] { a } else { a + 3 }),
+            near_origin: origin(false),
+            far_origin: origin(true),
+            inverse: [low, high],
+        })
     }
 
     /// Where at the earliest one of the rays enters boxes whose `side`s are given, as in
@@ -112,14 +102,11 @@ impl<S: Real> Sheaf<S> {
         &self,
         side: impl Fn(usize) -> L,
         limit: L,
-    ) -> (L, u32) {
-        let of = |far: bool| {
-            let k = |a: usize| if far { (self.near[a] + 3) % 6 } else { self.near[a] };
-            V3::new(side(k(0)), side(k(1)), side(k(2)))
-        };
+    ) -> (L, L::Mask) {
+        let of = |[x, y, z]: [usize; 3]| V3::new(side(x), side(y), side(z));
         let [low, high] = self.inverse.map(V3::splat);
-        let near = of(false) - V3::splat(self.near_origin);
-        let far = of(true) - V3::splat(self.far_origin);
+        let near = of(self.near) - V3::splat(self.near_origin);
+        let far = of(self.far) - V3::splat(self.far_origin);
         let (mut first, mut last) = (near.times(low), far.times(low));
         if !ONE {
             let (a, b) = (near.times(high), far.times(high));
@@ -128,8 +115,16 @@ impl<S: Real> Sheaf<S> {
         }
         let first = first.x.max(first.y).max(first.z).max(L::zero());
         let last = last.x.min(last.y).min(last.z) * grown();
-        (first, (first.le(last) & first.le(limit)).bits())
+        (first, first.le(last) & first.le(limit))
     }
+}
+
+/// The smallest and the largest coordinates in the lanes `here`, of which `first` is one.
+#[inline(always)]
+fn ends<L: Lanes>(v: V3<L>, here: L::Mask, first: usize) -> ([L::Scalar; 3], [L::Scalar; 3]) {
+    let v = V3::select(here, v, V3::splat(v.lane(first)));
+    let [x, y, z] = [extremes(v.x), extremes(v.y), extremes(v.z)];
+    ([x.0, y.0, z.0], [x.1, y.1, z.1])
 }
 
 /// The smallest and the largest lane; lanes that are no number do not count.
@@ -176,30 +171,23 @@ pub struct Entry<S> {
     near: S,
 }
 
-/// Entries of the stack for trees of usual depth: seven a level, and one.
-pub const STACK: usize = 128;
-
-/// Entries of the stack for any tree but those that nobody has.
-pub const DEEP_STACK: usize = 1024;
-
-/// Calls `$walk` with `$stack`, room for `$walks` walks through a tree, usually on the processor's own.
-macro_rules! with_stack {
-    ($boxes:expr, $walks:expr, $stack:ident => $walk:expr) => {{
-        use crate::shape::walk::{DEEP_STACK, Entry, STACK};
-        let room = 7 * $boxes.depth() + 1;
-        if room <= STACK {
-            let $stack = &mut [Entry::default(); STACK * $walks][..];
-            $walk
-        } else if room <= DEEP_STACK {
-            let $stack = &mut [Entry::default(); DEEP_STACK * $walks][..];
-            $walk
-        } else {
-            let $stack = &mut vec![Entry::default(); room * $walks][..];
-            $walk
-        }
-    }};
+/// Calls `walk` with so many `things` for each branch on a way through a tree, usually on the processor's
+/// own stack.
+#[inline(always)]
+pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
+    things: usize,
+    boxes: &Boxes,
+    walk: impl FnOnce(&mut [T]) -> R,
+) -> R {
+    let room = things * boxes.depth();
+    if room <= SMALL {
+        walk(&mut [T::default(); SMALL])
+    } else if room <= LARGE {
+        walk(&mut [T::default(); LARGE])
+    } else {
+        walk(&mut vec![T::default(); room])
+    }
 }
-pub(super) use with_stack;
 
 /// Puts an entry on the stack, above those that are entered later, of the ones from `base` on.
 #[inline(always)]
@@ -211,107 +199,6 @@ fn push<S: Real>(stack: &mut [Entry<S>], base: usize, top: &mut usize, entry: En
     }
     stack[at] = entry;
     *top += 1;
-}
-
-/// So many rays of a packet that go apart take turns: while one waits for its next branch or leaf to
-/// come from memory, others go on.
-pub const TURNS: usize = 4;
-
-/// One of them.
-#[derive(Clone, Copy, Default)]
-struct Walker<S> {
-    lane: usize,
-    ray: Sheaf<S>,
-    limit: S,
-    /// Where it goes next, and its place on the stack.
-    child: u32,
-    top: usize,
-}
-
-/// Calls `leaf(lane, leaf, limit)` for the leaves whose boxes the ray of a lane enters no farther than its
-/// limit, nearer ones first; `leaf` returns the distance beyond which nothing matters to that ray any
-/// more. `lanes`: those that go. `soon(leaf)` is called before a leaf is needed.
-#[inline(always)]
-pub fn apart<L: Lanes>(
-    boxes: &Boxes,
-    (beam, limit): (&Beam<L>, L),
-    mut lanes: u32,
-    stack: &mut [Entry<L::Scalar>],
-    soon: impl Fn(usize),
-    mut leaf: impl FnMut(usize, usize, L::Scalar) -> L::Scalar,
-) {
-    let room = stack.len() / TURNS;
-    let mut walkers = [Walker::default(); TURNS];
-    while lanes != 0 {
-        let mut count = 0;
-        for (i, walker) in walkers.iter_mut().enumerate() {
-            if lanes == 0 {
-                break;
-            }
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            let (ray, limit) = (Sheaf::only(beam, lane), limit.lane(lane));
-            *walker = Walker { lane, ray, limit, child: 0, top: i * room };
-            count += 1;
-        }
-        let mut going = (1u32 << count) - 1;
-        while going != 0 {
-            let mut left = going;
-            while left != 0 {
-                let i = left.trailing_zeros() as usize;
-                left &= left - 1;
-                let walker = &mut walkers[i % TURNS];
-                if walker.child & LEAF != 0 {
-                    let number = (walker.child & !LEAF) as usize;
-                    walker.limit = leaf(walker.lane, number, walker.limit);
-                } else {
-                    walker.open::<L>(boxes, stack);
-                }
-                if !walker.next(i * room, stack) {
-                    going &= !(1 << i);
-                } else if walker.child & LEAF != 0 {
-                    soon((walker.child & !LEAF) as usize);
-                } else {
-                    let sides = &boxes.branches()[walker.child as usize].sides;
-                    std::hint::black_box((sides[0][0], sides[2][0], sides[4][0]));
-                }
-            }
-        }
-    }
-}
-
-impl<S: Real> Walker<S> {
-    /// Puts those boxes of the branch at hand on the stack that the ray enters.
-    #[inline(always)]
-    fn open<L: Lanes<Scalar = S>>(&mut self, boxes: &Boxes, stack: &mut [Entry<S>]) {
-        let branch = &boxes.branches()[self.child as usize];
-        let base = self.top;
-        for part in 0..WIDE.div_ceil(L::WIDTH) {
-            let side = |k: usize| lanes_of::<L>(&branch.sides[k], part);
-            let (near, bits) = self.ray.meets::<true, L>(side, L::splat(self.limit));
-            let mut bits = bits & fresh();
-            while bits != 0 {
-                let i = bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                let child = branch.child[(part * L::WIDTH + i) % WIDE];
-                push(stack, base, &mut self.top, Entry { child, near: near.lane(i) });
-            }
-        }
-    }
-
-    /// Takes the next entry off the stack that still matters; false: there is none above `bottom`.
-    #[inline(always)]
-    fn next(&mut self, bottom: usize, stack: &[Entry<S>]) -> bool {
-        while self.top > bottom {
-            self.top -= 1;
-            let entry = stack[self.top];
-            if entry.near <= self.limit {
-                self.child = entry.child;
-                return true;
-            }
-        }
-        false
-    }
 }
 
 /// Calls `leaf(leaf, limit)` for the leaves whose boxes a packet may enter no farther than `limit`, those
@@ -336,12 +223,12 @@ pub fn together<L: Lanes>(
             let base = top;
             for part in 0..WIDE.div_ceil(L::WIDTH) {
                 let side = |k: usize| lanes_of(&branch.sides[k], part);
-                let (near, bits) = match bounds {
+                let (near, met) = match bounds {
                     Some(bounds) => bounds.meets::<false, L>(side, L::splat(farthest)),
                     // Of no use to order them; but empty places are known.
-                    None => (L::zero(), side(0).le(side(3)).bits()),
+                    None => (L::zero(), side(0).le(side(3))),
                 };
-                let mut bits = bits & fresh() & ((1 << L::WIDTH) - 1);
+                let mut bits = met.bits() & fresh() & ((1 << L::WIDTH) - 1);
                 while bits != 0 {
                     let i = bits.trailing_zeros() as usize;
                     bits &= bits - 1;

@@ -17,7 +17,7 @@ pub struct Leaf {
     pub corners: [[[f32; WIDE]; 3]; 3],
 }
 
-/// A mesh with the tree over it: about 65 bytes a triangle for the tree, 12 for its indices, and 12
+/// A mesh with the tree over it: about 58 bytes a triangle for the tree, 12 for its indices, and 12
 /// to 32 for each vertex.
 pub struct Mesh {
     mesh: TriangleMesh,
