@@ -17,7 +17,8 @@
 //! by chance, and an estimate of the picture made of the same numbers is too low: by 2 % of the RMSE after
 //! 32 samples per pixel, by 5 % after 8. So a tile is estimated twice, each time from every other pixel,
 //! like a chessboard: the black ones guide the samples, the white ones tell the error. Their samples are
-//! independent.
+//! independent. But they are half as many, and of a small picture the estimate from all pixels may be the
+//! better one: the larger of the two is told.
 
 use super::TILE;
 use super::curve::Curve;
@@ -33,6 +34,13 @@ pub struct Mse {
     pub linear: f64,
     /// As displayed, in codes of 0..=255.
     pub codes: f64,
+}
+
+impl Mse {
+    fn add(&mut self, weight: f64, other: Self) {
+        self.linear += weight * other.linear;
+        self.codes += weight * other.codes;
+    }
 }
 
 /// Estimated error of one tile.
@@ -145,7 +153,7 @@ fn weighted(sums: &[i64], per_sum: &[f64]) -> [f64; 3] {
 }
 
 impl TileNoise {
-    /// From all pixels: the best guess of this one tile's error, where no choice hangs on it.
+    /// From all pixels.
     pub fn of_all(&self) -> Mse {
         let [black, white] = [self.pixels.div_ceil(2), self.pixels / 2].map(f64::from);
         let mean = |black_mse: f64, white_mse: f64| {
@@ -174,15 +182,15 @@ pub struct Noise {
 impl Noise {
     /// From the estimates of all tiles; `None` if there are none or one is missing.
     pub fn of_tiles(tiles: impl IntoIterator<Item = Option<TileNoise>>) -> Option<Self> {
-        let (mut linear, mut codes, mut pixels) = (0.0, 0.0, 0.0);
+        let (mut told, mut all, mut pixels) = (Mse::default(), Mse::default(), 0.0);
         let mut of_tiles = Vec::new();
         for tile in tiles {
             let tile = tile?;
             let weight = f64::from(tile.pixels);
-            linear += tile.told.linear * weight;
-            codes += tile.told.codes * weight;
+            told.add(weight, tile.told);
+            all.add(weight, tile.of_all());
             pixels += weight;
-            of_tiles.push(tile.told.codes);
+            of_tiles.push(tile.of_all().codes);
         }
         // The smallest value that at least 95 % of the tiles do not exceed.
         let rank = (of_tiles.len() * 19).div_ceil(20).checked_sub(1)?;
@@ -190,8 +198,8 @@ impl Noise {
         let p95_codes = p95.sqrt();
         let worst = of_tiles.iter().copied().fold(0.0, f64::max);
         Some(Self {
-            rmse_linear: (linear / pixels).sqrt(),
-            rmse_codes: (codes / pixels).sqrt(),
+            rmse_linear: (told.linear.max(all.linear) / pixels).sqrt(),
+            rmse_codes: (told.codes.max(all.codes) / pixels).sqrt(),
             p95_codes,
             worst_codes: worst.sqrt(),
         })

@@ -251,13 +251,20 @@ fn a_lagging_replicate_still_has_an_estimate() {
 fn the_picture_sums_up_its_tiles() {
     let tile = |codes: f64, pixels| {
         let told = Mse { linear: 0.01, codes: codes * codes };
-        Some(TileNoise { told, guide: Mse { linear: 7.0, codes: 7.0 }, pixels })
+        Some(TileNoise { told, guide: told, pixels })
     };
     let tiles = (1..=20).map(|i| tile(f64::from(i), 256)).chain([tile(7.0, 0)]);
     let noise = Noise::of_tiles(tiles).unwrap();
     assert!((noise.rmse_linear - 0.1).abs() < 1e-15);
     assert!((noise.rmse_codes - 143.5f64.sqrt()).abs() < 1e-12);
     assert_eq!((noise.p95_codes, noise.worst_codes), (19.0, 20.0));
+    // Of the estimates from half the pixels and from all the larger one counts.
+    let of = |told: f64, guide: f64| {
+        let mse = |x: f64| Mse { linear: x, codes: x };
+        let tile = TileNoise { told: mse(told), guide: mse(guide), pixels: 256 };
+        Noise::of_tiles([Some(tile)]).unwrap().rmse_codes
+    };
+    assert_eq!((of(4.0, 2.0), of(2.0, 6.0)), (2.0, 2.0));
     assert_eq!(Noise::of_tiles([tile(1.0, 256), None]), None);
     assert_eq!(Noise::of_tiles([]), None);
 }

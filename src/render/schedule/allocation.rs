@@ -91,12 +91,10 @@ impl Schedule {
 
         let budget = SHARE * self.rays as f64;
         let mut samples_left = self.samples_left();
-        let mut error: f64 =
-            self.tiles.iter().map(|t| t.mse(criterion) * f64::from(t.pixels)).sum();
-        let enough = self
-            .target()
-            .filter(|(c, _)| *c == criterion)
-            .map_or(-1.0, |(_, target)| target * target * self.pixels() as f64);
+        let over_picture = |rmse: f64| rmse * rmse * self.pixels() as f64;
+        let mut error = over_picture(self.noise.map_or(0.0, |noise| criterion.of_picture(noise)));
+        let target = self.target().filter(|(c, _)| *c == criterion);
+        let enough = target.map_or(-1.0, |(_, target)| over_picture(target));
         let mut heap: BinaryHeap<Bid> =
             count.iter().enumerate().filter_map(|(i, n)| bid(i, *n)).collect();
         let min_blocks = MIN_BLOCKS.min(heap.len());

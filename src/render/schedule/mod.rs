@@ -158,11 +158,7 @@ impl Schedule {
     fn judge(&mut self) {
         self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error.map(|(_, e)| e)));
         if let Some(noise) = self.noise {
-            let rmse = match self.settings.criterion {
-                Criterion::Codes => noise.rmse_codes,
-                Criterion::Linear => noise.rmse_linear,
-            };
-            self.trend.note(self.rays as f64, rmse);
+            self.trend.note(self.rays as f64, self.settings.criterion.of_picture(noise));
         }
     }
 

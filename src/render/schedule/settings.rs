@@ -1,6 +1,6 @@
 //! What the scheduler is asked for, and why it ended.
 
-use crate::film::Mse;
+use crate::film::{Mse, Noise};
 
 /// What "noise" means when tiles compete for samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +16,13 @@ impl Criterion {
         match self {
             Self::Codes => error.codes,
             Self::Linear => error.linear,
+        }
+    }
+
+    pub(super) fn of_picture(self, noise: Noise) -> f64 {
+        match self {
+            Self::Codes => noise.rmse_codes,
+            Self::Linear => noise.rmse_linear,
         }
     }
 }
