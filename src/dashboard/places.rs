@@ -33,6 +33,9 @@ impl Model {
             Area { y, ..centred(columns, rows) }
         };
         Some(match self.overlay.as_ref()? {
+            Overlay::Still(_) => {
+                Place { frame: Area { x: 0, y: 0, width, height }, ..Place::default() }
+            }
             Overlay::Help { .. } => whole(centred(84, height - 2)),
             Overlay::Inventory { .. } => {
                 let columns = 84.min(width - 2);

@@ -204,6 +204,7 @@ impl Link {
         let room = match self.mode {
             Mode::Local => frame,
             Mode::Answers(_) if self.has_room(now, false) => frame,
+            Mode::Answers(_) if self.free_at > now => frame.max(self.free_at),
             // Before that an answer comes, or is lost.
             Mode::Answers(_) => self.lost_at().unwrap_or(frame),
             Mode::Queue => {
@@ -237,6 +238,18 @@ impl Link {
                 self.held_back.bytes += bytes as f64;
             }
             Mode::Fixed => self.free_at = self.free_at.max(now) + seconds(bytes, self.rate),
+        }
+    }
+
+    /// Bytes were sent that end in the midst of a sequence, where nothing can be asked: the line is
+    /// taken to carry what it has carried so far.
+    pub fn sent_unasked(&mut self, now: Duration, bytes: usize) {
+        if let Mode::Answers(_) = self.mode {
+            self.last_frame = Some(now);
+            let took = Duration::from_secs_f64(bytes as f64 / self.rate);
+            self.free_at = self.free_at.max(now) + took;
+        } else {
+            self.sent(now, bytes, true, 0);
         }
     }
 
@@ -343,6 +356,7 @@ impl Link {
     fn has_room(&self, now: Duration, answers: bool) -> bool {
         match self.mode {
             Mode::Local => true,
+            Mode::Answers(_) if self.free_at > now => false,
             Mode::Answers(_) => {
                 if self.is_learning(now) {
                     return self.flights.is_empty();

@@ -26,6 +26,8 @@ pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Positio
         Overlay::Pick(open) => pick(open, &place, theme, buffer),
         Overlay::Form(open) => return form(model, open, &place, theme, buffer),
         Overlay::Prompt(open) => return prompt(open, &place, theme, buffer),
+        // It has the whole screen.
+        Overlay::Still(_) => {}
         Overlay::Question(open) => question(open, &place, theme, buffer),
     }
     None
