@@ -26,6 +26,8 @@ const SIZE: [u16; 2] = [160, 45];
 const RATE: f64 = 125e3;
 const ONE_WAY: Duration = Duration::from_millis(50);
 const KEYS: usize = 40;
+/// What the program says at its end.
+const TOLD: &str = "told.txt";
 
 /// Two steps to the right, two to the left: the camera stays about where it is.
 const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[C", "\x1b[D", "\x1b[D"];
@@ -42,15 +44,19 @@ fn main() {
         Err(why) => return println!("skipped: {why}"),
     };
     println!(
-        "{:42} {:>7} {:>7} {:>7} {:>7}  bytes/s while converging",
+        "{:38} {:>7} {:>7} {:>7} {:>5}  of the line, while visible differences waited",
         "", "median", "p95", "max", "keys"
     );
     let room = folder.path().join("room.toml");
-    let program = format!("COLORTERM=truecolor {PROGRAM} {}", room.display());
-    measure("plain", &server, folder.path(), &program, true);
-    measure("plain, answers lost after the start", &server, folder.path(), &program, false);
-    let fixed = format!("{program} --bandwidth 30");
-    measure("plain, --bandwidth 30", &server, folder.path(), &fixed, true);
+    let [trace, told] = ["trace.csv", TOLD].map(|name| folder.path().join(name));
+    // Without passing through the bench's own terminal, in which tmux would swallow it.
+    let program = |options: &str| {
+        let [room, trace, told] = [&room, &trace, &told].map(|path| path.display());
+        format!("COLORTERM=truecolor {PROGRAM} {room} --trace {trace} {options} 2>{told}")
+    };
+    measure("plain", &server, folder.path(), &program(""), true);
+    measure("plain, answers lost after the start", &server, folder.path(), &program(""), false);
+    measure("plain, --bandwidth 30", &server, folder.path(), &program("--bandwidth 30"), true);
     if Command::new("tmux").arg("-V").output().is_err() {
         return println!("inside tmux: skipped, there is no tmux");
     }
@@ -62,7 +68,8 @@ fn main() {
         );
         fs::write(&settings, text).unwrap();
         let socket = format!("zerkalo-bench-{}", std::process::id());
-        let command = format!("tmux -L {socket} -f {} new-session '{program}'", settings.display());
+        let command =
+            format!("tmux -L {socket} -f {} new-session '{}'", settings.display(), program(""));
         measure(name, &server, folder.path(), &command, true);
         let _ = Command::new("tmux").args(["-L", &socket, "kill-server"]).status();
     }
@@ -82,35 +89,36 @@ fn measure(name: &str, server: &Server, folder: &Path, program: &str, answering:
     terminal.wait_for_text("top at");
     terminal.send("\x15noise 0.01\r");
     std::thread::sleep(Duration::from_secs(if answering { 3 } else { 12 }));
-    let busy = busy(&relay, &mut terminal);
     let mut seconds: Vec<f64> = (0..KEYS).map(|i| pressed(&mut terminal, i)).collect();
     seconds.sort_by(f64::total_cmp);
     let quantile = |share: f64| seconds[((share * KEYS as f64).ceil() as usize).max(1) - 1];
+    let status = status(&terminal);
+    terminal.send("q");
+    std::thread::sleep(Duration::from_secs(3));
+    // The camera was moved: it is asked whether that is to be saved.
+    if terminal.screen(|screen| screen.contents().contains("unsaved edits")) {
+        terminal.send("d");
+        std::thread::sleep(Duration::from_secs(3));
+    }
+    drop(terminal);
+    let line = [busy(folder).unwrap_or("not told".to_string()), status];
     println!(
-        "{name:42} {:5.3} s {:5.3} s {:5.3} s {KEYS:7}  {:.0} % of the line; {}",
+        "{name:38} {:5.3} s {:5.3} s {:5.3} s {KEYS:5}  {}",
         quantile(0.5),
         quantile(0.95),
         quantile(1.0),
-        100.0 * busy,
-        status(&terminal),
+        line.join("; "),
     );
-    // The connection breaks off.
-    drop(terminal);
 }
 
-/// The share of the line that is used in the second after another picture has begun.
-fn busy(relay: &Relay, terminal: &mut Terminal) -> f64 {
-    let mut shares = Vec::new();
-    for i in 0..6 {
-        terminal.send(ARROWS[i % ARROWS.len()]);
-        std::thread::sleep(Duration::from_millis(300));
-        let (before, begun) = (relay.carried(), Instant::now());
-        std::thread::sleep(Duration::from_millis(700));
-        let carried = (relay.carried() - before) as f64;
-        shares.push(carried / begun.elapsed().as_secs_f64() / RATE);
-        std::thread::sleep(Duration::from_millis(1500));
-    }
-    shares.iter().sum::<f64>() / shares.len() as f64
+/// The share of the line that was used while visible differences waited, by what the program says at
+/// its end.
+fn busy(folder: &Path) -> Option<String> {
+    let told = fs::read_to_string(folder.join(TOLD)).ok()?;
+    let line = told.lines().find_map(|line| line.split_once("waited for "))?.1;
+    let numbers = line.split_whitespace().filter_map(|word| word.parse::<f64>().ok());
+    let &[seconds, bytes] = &numbers.collect::<Vec<_>>()[..] else { return None };
+    Some(format!("{:.0} % in {seconds:.1} s", 100.0 * bytes / seconds / RATE))
 }
 
 /// Presses a key; seconds until the picture is clearly another one.

@@ -25,8 +25,10 @@ impl Model {
         let layout = self.layout()?;
         let [width, height] = self.screen;
         let centred = |columns: u16, rows: u16| {
+            // The two lowest lines tell where the work stands and what the keys do.
             let (columns, rows) = (columns.min(width - 2), rows.min(height - 2));
-            Area { x: (width - columns) / 2, y: (height - rows) / 2, width: columns, height: rows }
+            let [x, y] = [(width - columns) / 2, (height - 2 - rows) / 2];
+            Area { x, y, width: columns, height: rows }
         };
         let low = |columns: u16, rows: u16| {
             let y = height.saturating_sub(3 + rows);

@@ -104,6 +104,8 @@ pub struct Link {
     last_frame: Option<Duration>,
     /// When what was sent at a known rate is through.
     free_at: Duration,
+    /// When the line has done with what was sent, by its rate: a frame then finds it empty.
+    clear_at: Duration,
     /// When the next slice of invisible differences may go.
     flush_at: Duration,
     held_back: Held,
@@ -138,6 +140,7 @@ impl Link {
             acting_until: Duration::ZERO,
             last_frame: None,
             free_at: Duration::ZERO,
+            clear_at: Duration::ZERO,
             flush_at: Duration::ZERO,
             held_back: Held::default(),
         }
@@ -205,6 +208,9 @@ impl Link {
             Mode::Local => frame,
             Mode::Answers(_) if self.has_room(now, false) => frame,
             Mode::Answers(_) if self.free_at > now => frame.max(self.free_at),
+            Mode::Answers(_) if now < self.acting_until.min(self.clear_at) => {
+                frame.max(self.clear_at)
+            }
             // Before that an answer comes, or is lost.
             Mode::Answers(_) => self.lost_at().unwrap_or(frame),
             Mode::Queue => {
@@ -232,7 +238,10 @@ impl Link {
         }
         match self.mode {
             Mode::Local => {}
-            Mode::Answers(_) => self.flights.add(Flight { sent: now, bytes, picture }),
+            Mode::Answers(_) => {
+                self.clear_at = self.clear_at.max(now) + seconds(bytes, self.rate);
+                self.flights.add(Flight { sent: now, bytes, picture });
+            }
             Mode::Queue => {
                 self.held_back.sent += bytes as f64;
                 self.held_back.bytes += bytes as f64;
@@ -265,6 +274,9 @@ impl Link {
         }
         let Some((flight, arrived)) = self.flights.answered(at) else { return false };
         self.losses = 0;
+        if self.flights.is_empty() {
+            self.clear_at = self.clear_at.min(at);
+        }
         let took = at.saturating_sub(flight.sent);
         if flight.alone && flight.bytes <= SMALL && self.is_learning(at) {
             self.round_trip = Some(took);
@@ -362,7 +374,11 @@ impl Link {
                     return self.flights.is_empty();
                 }
                 let acting = now < self.acting_until;
-                let most = if acting { 1 + usize::from(answers) } else { self.flights_at_once() };
+                // Who acts waits for no more than the frame that the line is at.
+                let most = match acting && self.clear_at > now {
+                    true => 1 + usize::from(answers),
+                    false => self.flights_at_once(),
+                };
                 // The first answer does not wait for what was sent when nobody did anything.
                 let newest = self.flights.newest();
                 let first = acting && answers && newest.is_some_and(|at| at < self.acting_since);

@@ -29,6 +29,8 @@ pub struct Frames {
     queue: Option<Queue>,
     synchronised: bool,
     writer: Writer,
+    /// Bytes so far.
+    sent: u64,
     wanted: Buffer,
     /// Where the cursor ought to be shown, if it ought to.
     cursor: Option<Position>,
@@ -80,6 +82,7 @@ impl Frames {
             queue,
             synchronised: terminal.synchronised,
             writer: Writer::new(Arc::clone(&tty))?,
+            sent: 0,
             wanted: Buffer::empty(Rect::ZERO),
             cursor: None,
             facts: Facts::default(),
@@ -159,6 +162,11 @@ impl Frames {
     /// Whether the last frame has been written.
     pub fn ready(&self) -> bool {
         self.writer.ready()
+    }
+
+    /// Whether differences of the picture wait that can be seen, and bytes of frames sent so far.
+    pub fn load(&self) -> (bool, u64) {
+        (self.pacing.rest().visible, self.sent)
     }
 
     /// What the user is told about the line.
@@ -287,6 +295,7 @@ impl Frames {
         if let Some(through) = self.link.question() {
             bytes.extend(cursor_question(through).as_bytes());
         }
+        self.sent += bytes.len() as u64;
         self.link.sent(now, bytes.len(), frame.picture, frame.flushed);
         self.writer.send(bytes);
         if frame.picture { Drawn::Picture } else { Drawn::Text }

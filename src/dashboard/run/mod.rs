@@ -374,6 +374,8 @@ impl Dashboard {
             due = self.frames.due(now, self.changed, answers);
             if due.is_some_and(|at| at <= now) {
                 let drawn = self.frames.draw(&self.model, now, self.changed, answers, self.subject);
+                let (waits, sent) = self.frames.load();
+                self.trace.line(now, waits, sent);
                 self.changed &= matches!(drawn, Drawn::Nothing | Drawn::Slice);
                 match drawn {
                     Drawn::Nothing | Drawn::Waiting | Drawn::Slice => {}
