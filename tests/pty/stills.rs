@@ -147,7 +147,8 @@ fn sixel_shows_the_file_in_strips() {
             for strip in strips {
                 let image = SixelImage::decode(format!("\x1bP{strip}\x1b\\").as_bytes()).unwrap();
                 assert_eq!(image.width, file.size[0]);
-                rgb.extend(image.pixels.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]));
+                let drawn = image.pixels.chunks_exact(4).filter(|pixel| pixel[3] > 0);
+                rgb.extend(drawn.flat_map(|p| [p[0], p[1], p[2]]));
                 count += 1;
             }
             // xterm remembers 16.

@@ -22,12 +22,13 @@ impl Transfer {
     /// The next bytes after the first `sent`: at most `room`, or one piece if that is larger and cannot
     /// be cut; and whether a sequence is open after them.
     pub fn slice(&self, sent: usize, room: usize) -> (Range<usize>, bool) {
+        let room = room.max(usize::from(self.divisible));
         let later = &self.stops[self.stops.partition_point(|stop| *stop <= sent)..];
         let fitting = later.partition_point(|stop| *stop <= sent.saturating_add(room));
         match (fitting, later.first()) {
             (_, None) => (sent..sent, false),
             (0, Some(stop)) if !self.divisible => (sent..*stop, false),
-            (0, Some(_)) => (sent..sent + room.max(1), true),
+            (0, Some(_)) => (sent..sent + room, true),
             (fitting, _) => (sent..later[fitting - 1], false),
         }
     }

@@ -114,7 +114,10 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
     };
     let words: Vec<_> =
         inner.split([',', ';', ' ', '\t']).filter(|word| !word.is_empty()).collect();
-    let between = |at: usize| ["x", "×"].contains(&words[at]) && at > 0 && at + 1 < words.len();
+    let is_number = |at: usize| words.get(at).is_some_and(|word| digits(word));
+    let between = |at: usize| {
+        ["x", "×"].contains(&words[at]) && at > 0 && is_number(at - 1) && is_number(at + 1)
+    };
     let parts = (0..words.len()).filter(|at| !between(*at));
     let parts = parts.flat_map(|at| words[at].split(['x', '×']));
     parts.map(|part| digits(part).then(|| part.parse().ok())?).collect()
