@@ -60,9 +60,9 @@ pub fn placeholder(row: u16) -> String {
     [Some(PLACEHOLDER), mark.and_then(char::from_u32)].into_iter().flatten().collect()
 }
 
-/// What shows `png` on the cells of `place`. `through_tmux`: wrapped so that it reaches the terminal
-/// behind, which then shows it where there are placeholders.
-pub fn transfer(png: &[u8], place: Area, through_tmux: bool) -> Transfer {
+/// What shows `png` at `place`, pixel by pixel or stretched to its cells. `through_tmux`: wrapped so that
+/// it reaches the terminal behind, which then shows it where there are placeholders.
+pub fn transfer(png: &[u8], place: Area, stretched: bool, through_tmux: bool) -> Transfer {
     let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
     let letters = STANDARD.encode(png);
     let remove = format!("\x1b_Ga=d,d=I,i={IMAGE},q=2\x1b\\");
@@ -76,12 +76,15 @@ pub fn transfer(png: &[u8], place: Area, through_tmux: bool) -> Transfer {
         true => String::new(),
         false => format!("\x1b[{};{}H", y + 1, x + 1),
     };
-    let how = if through_tmux { "U=1" } else { "C=1" };
+    let mut how = if through_tmux { "U=1" } else { "C=1" }.to_string();
+    if stretched || through_tmux {
+        how += &format!(",c={width},r={height}");
+    }
     let count = letters.len().div_ceil(PIECE);
     for at in 0..count {
         let piece = &letters[at * PIECE..letters.len().min((at + 1) * PIECE)];
         let first = match at {
-            0 => format!("a=T,f=100,i={IMAGE},{how},c={width},r={height},"),
+            0 => format!("a=T,f=100,i={IMAGE},{how},"),
             _ => String::new(),
         };
         let more = u8::from(at + 1 < count);
@@ -109,8 +112,8 @@ mod tests {
     fn pieces_carry_the_whole_file() {
         for length in [1, 767, 768, 769, 5000] {
             let png: Vec<u8> = (0..length).map(|i| (i % 251) as u8).collect();
-            for tmux in [false, true] {
-                let transfer = transfer(&png, PLACE, tmux);
+            for (stretched, tmux) in [(false, false), (true, false), (false, true)] {
+                let transfer = transfer(&png, PLACE, stretched, tmux);
                 let text = String::from_utf8(transfer.bytes.clone()).unwrap();
                 let plain = text.replace("\x1b\x1b", "\x1b").replace("\x1bPtmux;", "");
                 let pieces: Vec<_> = plain.split("\x1b_G").skip(1).collect();
@@ -125,7 +128,8 @@ mod tests {
                 assert_eq!(STANDARD.decode(letters.concat()).unwrap(), png);
                 let open = keys.iter().filter(|keys| keys.contains("m=1")).count();
                 assert_eq!(open, keys.len() - 1);
-                assert!(keys[0].contains("a=T,f=100,i=163") && keys[0].contains("c=40,r=12"));
+                assert!(keys[0].contains("a=T,f=100,i=163"));
+                assert_eq!(keys[0].contains("c=40,r=12"), stretched || tmux);
                 assert_eq!(plain.contains("\x1b[2;4H"), !tmux);
                 assert!(String::from_utf8_lossy(&transfer.remove).contains("a=d,d=I,i=163"));
             }

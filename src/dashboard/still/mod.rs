@@ -65,7 +65,7 @@ pub struct Still {
     pub protocol: Protocol,
     /// The cells that it covers.
     pub place: Area,
-    /// It in half blocks, on the same cells.
+    /// It in half blocks, on those of the cells that the crisp one covers whole.
     pub raster: Raster,
     /// What shows it crisply; empty: nothing does.
     pub transfer: Transfer,
@@ -164,13 +164,16 @@ impl Still {
             Protocol::Kitty | Protocol::KittyThroughTmux => {
                 let size = shown.map(|n| n as u32);
                 let png = png_of_rgb(size, small.as_flattened()).map_err(|e| e.to_string())?;
-                kitty::transfer(&png, place, window.protocol == Protocol::KittyThroughTmux)
+                let through_tmux = window.protocol == Protocol::KittyThroughTmux;
+                kitty::transfer(&png, place, window.cell_px.is_none(), through_tmux)
             }
         };
         let raster = match window.protocol {
             Protocol::Blocks => Raster { width: shown[0], height: shown[1], pixels: small },
             _ => {
-                let halves = [shown[0].min(width.into()), shown[1].min(2 * usize::from(height))];
+                // Not on cells that the crisp one covers in part: it would look out from behind.
+                let covered = [0, 1].map(|i| (shown[i] / cell[i]).max(1));
+                let halves = [covered[0].min(shown[0]), (2 * covered[1]).min(shown[1])];
                 let pixels = shrunk(&small, shown, halves);
                 Raster { width: halves[0], height: halves[1], pixels }
             }
