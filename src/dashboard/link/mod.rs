@@ -10,6 +10,7 @@
 //! Nothing here reads a clock or writes a byte: times and counts are arguments.
 
 mod flight;
+mod held;
 mod queue;
 mod start;
 #[cfg(test)]
@@ -17,6 +18,7 @@ mod tests;
 
 use super::terminal::Multiplexer;
 use flight::{Flight, Flights};
+use held::Held;
 pub use queue::Queue;
 pub use start::Start;
 use std::time::Duration;
@@ -109,18 +111,6 @@ pub struct Link {
     /// When the next slice of invisible differences may go.
     flush_at: Duration,
     held_back: Held,
-}
-
-/// What the kernel holds back.
-#[derive(Debug, Default)]
-struct Held {
-    bytes: f64,
-    asked: Option<Duration>,
-    /// Bytes that it had got rid of then.
-    gone: f64,
-    /// Since when it has always held something back, and what it had got rid of before.
-    busy: Option<(Duration, f64)>,
-    sent: f64,
 }
 
 impl Link {
