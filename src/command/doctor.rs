@@ -263,21 +263,14 @@ fn whole_frames(terminal: &Capabilities) -> String {
 }
 
 fn stills(terminal: &Capabilities) -> String {
-    match Protocol::of(terminal) {
-        Protocol::Sixel(colors) => format!("crisp, by sixel in {colors} colours"),
-        Protocol::Blocks => {
-            let why = match (terminal.kitty_graphics, terminal.sixel) {
-                (true, _) => {
-                    "what is between lets kitty's protocol through, but its placeholders \
-                              need kitty 0.28 or Ghostty"
-                }
-                (false, true) => "sixel is there, but not the size of a cell in pixels",
-                (false, false) => "neither kitty's protocol nor sixel",
-            };
-            format!("in half blocks: {why}")
-        }
-        protocol => format!("crisp, by {}", protocol.name()),
-    }
+    let missing = match Protocol::of(terminal) {
+        Protocol::Sixel(colors) => return format!("crisp, by sixel in {colors} colours"),
+        Protocol::Blocks if terminal.kitty_graphics => "its kitty's protocol has no placeholders",
+        Protocol::Blocks if terminal.sixel => "sixel needs the size of a cell in pixels",
+        Protocol::Blocks => "neither kitty's protocol nor sixel",
+        protocol => return format!("crisp, by {}", protocol.name()),
+    };
+    format!("in half blocks: {missing}")
 }
 
 fn arrival(mode: Mode) -> String {
