@@ -18,3 +18,5 @@ fi
 echo "machine: $(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | xargs), $(nproc) cores; $(date +%F)"
 echo "line: 1 Mbit/s, 50 ms each way; 160x45 cells; from a key to the first change of the picture"
 cargo bench --quiet --bench link "$@"
+echo "on a simulated line, one wave at a time to 1,024 samples per pixel:"
+cargo test --quiet --test link -- --nocapture --test-threads 1 | grep -E "room|noisy|acting"

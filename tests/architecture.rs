@@ -68,6 +68,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("epaint_default_fonts", &["measure"]),
     ("exr", &["film"]),
     ("gltf", &["asset"]),
+    ("icy_sixel", &["dashboard"]),
     ("image", &["asset"]),
     ("indicatif", &["command"]),
     ("nucleo_matcher", &["dashboard"]),

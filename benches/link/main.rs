@@ -1,6 +1,7 @@
 //! From a key to the first change of the picture over a slow line: the program itself behind a real
 //! OpenSSH server on loopback, with a relay between that limits it to 1 Mbit/s and delays everything by
-//! 50 ms, plain and inside tmux. `benches/link.sh` installs what it needs.
+//! 50 ms, plain and inside tmux. `benches/link.sh` installs what it needs. Arguments: the name of one of
+//! the rows, and how many keys are pressed.
 
 #[path = "../../tests/pty/terminal.rs"]
 mod terminal;
@@ -25,16 +26,23 @@ const SIZE: [u16; 2] = [160, 45];
 /// Bytes a second: 1 Mbit/s.
 const RATE: f64 = 125e3;
 const ONE_WAY: Duration = Duration::from_millis(50);
+/// Keys that are pressed, unless an argument says how many.
 const KEYS: usize = 40;
+/// What the program says at its end.
+const TOLD: &str = "told.txt";
 
 /// Two steps to the right, two to the left: the camera stays about where it is.
 const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[C", "\x1b[D", "\x1b[D"];
 
 fn main() {
     // `cargo test --benches` only wants to know whether it runs.
-    if !std::env::args().any(|argument| argument == "--bench") {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
+    let keys = arguments.iter().find_map(|a| a.parse().ok()).unwrap_or(KEYS);
+    let row = arguments.iter().find(|a| !a.starts_with('-') && a.parse::<usize>().is_err());
+    let wanted = |name: &str| row.is_none_or(|row| row == name);
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("room.toml"), BUILT_IN).unwrap();
     let server = match Server::start(folder.path()) {
@@ -42,19 +50,29 @@ fn main() {
         Err(why) => return println!("skipped: {why}"),
     };
     println!(
-        "{:42} {:>7} {:>7} {:>7} {:>7}  bytes/s while converging",
+        "{:38} {:>7} {:>7} {:>7} {:>5}  of the line, while visible differences waited",
         "", "median", "p95", "max", "keys"
     );
     let room = folder.path().join("room.toml");
-    let program = format!("COLORTERM=truecolor {PROGRAM} {}", room.display());
-    measure("plain", &server, folder.path(), &program, true);
-    measure("plain, answers lost after the start", &server, folder.path(), &program, false);
-    let fixed = format!("{program} --bandwidth 30");
-    measure("plain, --bandwidth 30", &server, folder.path(), &fixed, true);
+    let [trace, told] = ["trace.csv", TOLD].map(|name| folder.path().join(name));
+    // Without passing through the bench's own terminal, in which tmux would swallow it.
+    let program = |options: &str| {
+        let [room, trace, told] = [&room, &trace, &told].map(|path| path.display());
+        format!("COLORTERM=truecolor {PROGRAM} {room} --trace {trace} {options} 2>{told}")
+    };
+    let plain = [
+        ("plain", "", true),
+        ("plain, answers lost after the start", "", false),
+        ("plain, --bandwidth 30", "--bandwidth 30", true),
+    ];
+    for (name, options, answering) in plain.into_iter().filter(|(name, ..)| wanted(name)) {
+        measure(name, keys, &server, folder.path(), &program(options), answering);
+    }
     if Command::new("tmux").arg("-V").output().is_err() {
         return println!("inside tmux: skipped, there is no tmux");
     }
-    for (name, passthrough) in [("tmux, passthrough", "on"), ("tmux, no passthrough", "off")] {
+    let inside = [("tmux, passthrough", "on"), ("tmux, no passthrough", "off")];
+    for (name, passthrough) in inside.into_iter().filter(|(name, _)| wanted(name)) {
         let settings = folder.path().join("tmux.conf");
         let text = format!(
             "set -g allow-passthrough {passthrough}\nset -g status off\nset -g escape-time 10\n\
@@ -62,14 +80,23 @@ fn main() {
         );
         fs::write(&settings, text).unwrap();
         let socket = format!("zerkalo-bench-{}", std::process::id());
-        let command = format!("tmux -L {socket} -f {} new-session '{program}'", settings.display());
-        measure(name, &server, folder.path(), &command, true);
+        let command =
+            format!("tmux -L {socket} -f {} new-session '{}'", settings.display(), program(""));
+        measure(name, keys, &server, folder.path(), &command, true);
         let _ = Command::new("tmux").args(["-L", &socket, "kill-server"]).status();
     }
 }
 
 /// Opens the dashboard, lets it converge, presses keys.
-fn measure(name: &str, server: &Server, folder: &Path, program: &str, answering: bool) {
+fn measure(
+    name: &str,
+    keys: usize,
+    server: &Server,
+    folder: &Path,
+    program: &str,
+    answering: bool,
+) {
+    let _ = fs::remove_file(folder.join(TOLD));
     let relay = Relay::start(server.address, RATE, ONE_WAY).unwrap();
     let command = server.ssh(relay.address, program);
     let words: Vec<&str> = command.iter().map(String::as_str).collect();
@@ -82,35 +109,36 @@ fn measure(name: &str, server: &Server, folder: &Path, program: &str, answering:
     terminal.wait_for_text("top at");
     terminal.send("\x15noise 0.01\r");
     std::thread::sleep(Duration::from_secs(if answering { 3 } else { 12 }));
-    let busy = busy(&relay, &mut terminal);
-    let mut seconds: Vec<f64> = (0..KEYS).map(|i| pressed(&mut terminal, i)).collect();
+    let mut seconds: Vec<f64> = (0..keys).map(|i| pressed(&mut terminal, i)).collect();
     seconds.sort_by(f64::total_cmp);
-    let quantile = |share: f64| seconds[((share * KEYS as f64).ceil() as usize).max(1) - 1];
+    let quantile = |share: f64| seconds[((share * keys as f64).ceil() as usize).max(1) - 1];
+    let status = status(&terminal);
+    terminal.send("q");
+    std::thread::sleep(Duration::from_secs(3));
+    // The camera was moved: it is asked whether that is to be saved.
+    if terminal.screen(|screen| screen.contents().contains("unsaved edits")) {
+        terminal.send("d");
+        std::thread::sleep(Duration::from_secs(3));
+    }
+    drop(terminal);
+    let line = [busy(folder).unwrap_or("not told".to_string()), status];
     println!(
-        "{name:42} {:5.3} s {:5.3} s {:5.3} s {KEYS:7}  {:.0} % of the line; {}",
+        "{name:38} {:5.3} s {:5.3} s {:5.3} s {keys:5}  {}",
         quantile(0.5),
         quantile(0.95),
         quantile(1.0),
-        100.0 * busy,
-        status(&terminal),
+        line.join("; "),
     );
-    // The connection breaks off.
-    drop(terminal);
 }
 
-/// The share of the line that is used in the second after another picture has begun.
-fn busy(relay: &Relay, terminal: &mut Terminal) -> f64 {
-    let mut shares = Vec::new();
-    for i in 0..6 {
-        terminal.send(ARROWS[i % ARROWS.len()]);
-        std::thread::sleep(Duration::from_millis(300));
-        let (before, begun) = (relay.carried(), Instant::now());
-        std::thread::sleep(Duration::from_millis(700));
-        let carried = (relay.carried() - before) as f64;
-        shares.push(carried / begun.elapsed().as_secs_f64() / RATE);
-        std::thread::sleep(Duration::from_millis(1500));
-    }
-    shares.iter().sum::<f64>() / shares.len() as f64
+/// The share of the line that was used while visible differences waited, by what the program says at
+/// its end.
+fn busy(folder: &Path) -> Option<String> {
+    let told = fs::read_to_string(folder.join(TOLD)).ok()?;
+    let line = told.lines().find_map(|line| line.split_once("waited for "))?.1;
+    let numbers = line.split_whitespace().filter_map(|word| word.parse::<f64>().ok());
+    let &[seconds, bytes] = &numbers.collect::<Vec<_>>()[..] else { return None };
+    Some(format!("{:.0} % in {seconds:.1} s", 100.0 * bytes / seconds / RATE))
 }
 
 /// Presses a key; seconds until the picture is clearly another one.

@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -14,7 +13,6 @@ const HELD: usize = 64 << 10;
 /// A listening relay. Every connection to it goes on to the server.
 pub struct Relay {
     pub address: SocketAddr,
-    carried: Arc<AtomicU64>,
 }
 
 /// Pieces on their way.
@@ -31,34 +29,21 @@ impl Relay {
     pub fn start(target: SocketAddr, rate: f64, one_way: Duration) -> io::Result<Self> {
         let listener = TcpListener::bind("127.0.0.1:0")?;
         let address = listener.local_addr()?;
-        let carried = Arc::new(AtomicU64::new(0));
-        let count = Arc::clone(&carried);
         thread::spawn(move || {
             for client in listener.incoming().flatten() {
                 let Ok(server) = TcpStream::connect(target) else { continue };
                 let _ = client.set_nodelay(true).and_then(|()| server.set_nodelay(true));
                 let (Ok(up), Ok(down)) = (client.try_clone(), server.try_clone()) else { continue };
-                carry(up, server, f64::INFINITY, one_way, Arc::default());
-                carry(down, client, rate, one_way, Arc::clone(&count));
+                carry(up, server, f64::INFINITY, one_way);
+                carry(down, client, rate, one_way);
             }
         });
-        Ok(Self { address, carried })
-    }
-
-    /// Bytes that have come from the server so far.
-    pub fn carried(&self) -> u64 {
-        self.carried.load(Ordering::Relaxed)
+        Ok(Self { address })
     }
 }
 
 /// One direction.
-fn carry(
-    mut from: TcpStream,
-    mut to: TcpStream,
-    rate: f64,
-    one_way: Duration,
-    count: Arc<AtomicU64>,
-) {
+fn carry(mut from: TcpStream, mut to: TcpStream, rate: f64, one_way: Duration) {
     let pipe = Arc::new((Mutex::new(Pipe::default()), Condvar::new()));
     let other = Arc::clone(&pipe);
     thread::spawn(move || {
@@ -90,7 +75,6 @@ fn carry(
             let Some((at, piece)) = held.pieces.pop_front() else { break };
             drop(held);
             thread::sleep(at.saturating_duration_since(Instant::now()));
-            count.fetch_add(piece.len() as u64, Ordering::Relaxed);
             if to.write_all(&piece).is_err() {
                 break;
             }

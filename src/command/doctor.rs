@@ -6,6 +6,7 @@ use super::{Failure, say};
 use crate::dashboard::link::{DEFAULT_RATE, Mode};
 use crate::dashboard::places::wrapped;
 use crate::dashboard::run::{Colors, Examined, examine};
+use crate::dashboard::still::Protocol;
 use crate::dashboard::terminal::{Capabilities, Multiplexer, Surroundings};
 use crate::scene::{kept_in, state_folder};
 use crate::value::printable;
@@ -262,13 +263,14 @@ fn whole_frames(terminal: &Capabilities) -> String {
 }
 
 fn stills(terminal: &Capabilities) -> String {
-    let ways = match (terminal.kitty_graphics, terminal.sixel) {
-        (true, true) => "kitty's protocol and sixel",
-        (true, false) => "kitty's protocol",
-        (false, true) => "sixel",
-        (false, false) => "neither kitty's protocol nor sixel",
+    let missing = match Protocol::of(terminal) {
+        Protocol::Sixel(colors) => return format!("crisp, by sixel in {colors} colours"),
+        Protocol::Blocks if terminal.kitty_graphics => "its kitty's protocol has no placeholders",
+        Protocol::Blocks if terminal.sixel => "sixel needs the size of a cell in pixels",
+        Protocol::Blocks => "neither kitty's protocol nor sixel",
+        protocol => return format!("crisp, by {}", protocol.name()),
     };
-    ways.to_string()
+    format!("in half blocks: {missing}")
 }
 
 fn arrival(mode: Mode) -> String {
@@ -349,7 +351,7 @@ mod tests {
             "24-bit colour: COLORTERM=truecolor",
             "#1e1e2e, dark",
             "shown at once",
-            "kitty's protocol\n",
+            "crisp, by kitty's protocol\n",
             "UTF-8: LANG=",
             "1.2 ms",
             "2500 KB/s, measured",

@@ -164,6 +164,8 @@ pub enum Action {
     ExportExr,
     /// Copies the path of the last picture that was written.
     CopyPath,
+    /// Shows the last picture that was written.
+    ShowExport,
     /// Renders at another size, asked for, into a file.
     ExportSized,
     /// Ends a running export of another size.

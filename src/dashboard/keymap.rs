@@ -192,6 +192,7 @@ pub const KEYMAP: &[Row] = &[
 
     row(C::Picture, ExportPng, &[(Anywhere, &["p"])], "write a PNG"),
     row(C::Picture, ExportExr, &[(Anywhere, &["P"])], "write an EXR"),
+    row(C::Picture, ShowExport, &[(Anywhere, &["o"])], "look at the last picture"),
     row(C::Picture, CopyPath, &[(Anywhere, &["y"])], "copy the path of the last picture"),
     row(C::Picture, ExportSized, &[(Anywhere, &["Ctrl-e"])], "render at another size"),
     row(C::Picture, CancelExport, &[(Anywhere, &["Ctrl-x"])], "cancel the running export"),

@@ -2,6 +2,7 @@
 
 use super::input::{Key, Mouse};
 use super::link::Reading;
+use super::still::Still;
 use crate::film::{Display, Linear};
 use crate::render::schedule::Stop;
 use crate::render::session::Snapshot;
@@ -39,6 +40,10 @@ pub enum Message {
     Exported(Result<Exported, String>),
     /// How far the render of [`Effect::ExportSized`] is, 0..=1.
     ExportProgress(f64),
+    /// The picture at this path was made ready to be looked at, or not, and why. After [`Effect::Look`].
+    Still(PathBuf, Result<Arc<Still>, String>),
+    /// How much of a picture that is looked at has been sent, 0..=1.
+    StillSent(f64),
     /// What is known of the line to the terminal.
     Line(Option<Reading>),
     /// Time has passed. At least once a second while something on the screen depends on it
@@ -184,6 +189,15 @@ pub enum Effect {
     TakeUp,
     /// The edits that were left behind are not wanted.
     Discard,
+    /// Make this picture ready to be looked at, on a screen of so many columns and rows.
+    Look {
+        /// A PNG or an EXR.
+        path: PathBuf,
+        /// How linear light is shown.
+        display: Display,
+        /// Columns and rows.
+        screen: [u16; 2],
+    },
     /// Put the path of this file into the clipboard of the terminal.
     Copy(PathBuf),
     /// Give the terminal to the shell until it calls back.

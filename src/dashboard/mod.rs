@@ -3,7 +3,8 @@
 //! Parts that only meet in data. `update` decides: it turns a [`Message`](message::Message) into a
 //! changed [`Model`](model::Model) and a list of [`Effect`](message::Effect)s, without clock, file or
 //! terminal. `view` shows: it draws a model into a buffer of cells. `pacing` chooses which of them go
-//! out now, within what `link` says that the line carries. `run` acts: renderer, files, time; and
+//! out now, within what `link` says that the line carries; `still` makes written pictures ready to
+//! be looked at. `run` acts: renderer, files, time; and
 //! `terminal` is what lies at the other end of the line.
 
 pub mod action;
@@ -23,6 +24,7 @@ pub mod places;
 pub mod quality;
 pub mod raster;
 pub mod run;
+pub mod still;
 pub mod terminal;
 #[cfg(test)]
 mod testing;

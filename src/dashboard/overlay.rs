@@ -1,6 +1,7 @@
 //! What can lie over the panels and take the keys: help, lists, forms, prompts, questions.
 
 use super::editor::Editor;
+use super::still::Still;
 use crate::scene::Scene;
 use crate::scene::edit::Subject;
 use std::path::PathBuf;
@@ -34,6 +35,19 @@ pub enum Overlay {
     Prompt(Prompt),
     /// A question with a few answers.
     Question(Question),
+    /// A picture that was written, on the whole screen.
+    Still(Looked),
+}
+
+/// A picture that was written, being looked at.
+#[derive(Clone, Debug)]
+pub struct Looked {
+    /// Its file.
+    pub path: PathBuf,
+    /// The picture; `None`: it is being read.
+    pub still: Option<Arc<Still>>,
+    /// How much of its transfer the terminal has been sent, 0..=1.
+    pub sent: f64,
 }
 
 /// Finds an action by typing.

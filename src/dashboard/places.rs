@@ -4,6 +4,7 @@
 use super::layout::Area;
 use super::model::Model;
 use super::overlay::Overlay;
+use super::quality::ABOUT;
 use crate::render::session::QUALITIES;
 
 /// Where an overlay lies. Parts without rows are not there.
@@ -25,14 +26,19 @@ impl Model {
         let layout = self.layout()?;
         let [width, height] = self.screen;
         let centred = |columns: u16, rows: u16| {
+            // The two lowest lines tell where the work stands and what the keys do.
             let (columns, rows) = (columns.min(width - 2), rows.min(height - 2));
-            Area { x: (width - columns) / 2, y: (height - rows) / 2, width: columns, height: rows }
+            let [x, y] = [(width - columns) / 2, (height - 2 - rows) / 2];
+            Area { x, y, width: columns, height: rows }
         };
         let low = |columns: u16, rows: u16| {
             let y = height.saturating_sub(3 + rows);
             Area { y, ..centred(columns, rows) }
         };
         Some(match self.overlay.as_ref()? {
+            Overlay::Still(_) => {
+                Place { frame: Area { x: 0, y: 0, width, height }, ..Place::default() }
+            }
             Overlay::Help { .. } => whole(centred(84, height - 2)),
             Overlay::Inventory { .. } => {
                 let columns = 84.min(width - 2);
@@ -40,7 +46,8 @@ impl Model {
                 whole(centred(columns, rows.saturating_add(2)))
             }
             Overlay::Quality { .. } => {
-                let frame = low(76, QUALITIES.len() as u16 + 4);
+                let about = wrapped_rows(ABOUT, 76.min(width - 2) - 5);
+                let frame = low(76, QUALITIES.len() as u16 + 2 + about);
                 let inner = frame.inner();
                 let list = Area { height: inner.height.min(QUALITIES.len() as u16), ..inner };
                 let help = Area {
@@ -85,12 +92,14 @@ impl Model {
             Overlay::Question(question) => {
                 let columns = 64.min(width - 2);
                 let answers = question.answers.len() as u16;
-                let rows = wrapped_rows(&question.text, columns - 2);
+                // A column free on both sides.
+                let rows = wrapped_rows(&question.text, columns - 4);
                 let frame = low(columns, rows + answers + 2);
                 let inner = frame.inner();
                 let answers = answers.min(inner.height);
-                let help = Area { height: inner.height - answers, ..inner };
-                let list = Area { y: inner.y + help.height, height: answers, ..inner };
+                let height = inner.height - answers;
+                let help = Area { x: inner.x + 1, width: inner.width - 2, height, ..inner };
+                let list = Area { y: inner.y + height, height: answers, ..inner };
                 Place { frame, input: Area::default(), list, help }
             }
         })

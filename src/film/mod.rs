@@ -18,6 +18,7 @@ mod noise;
 #[cfg(test)]
 mod noise_test;
 mod png;
+mod png_read;
 mod probe;
 mod raster;
 mod resample;
@@ -34,6 +35,7 @@ pub use linear::Linear;
 pub use mix::{Mix, Part};
 pub use noise::{Estimator, Mse, Noise, TileNoise};
 pub use png::png_of_rgb;
+pub use png_read::read_png;
 pub use probe::Probe;
 pub use raster::{Raster, Stale};
 pub use resample::Thumbnail;

@@ -58,6 +58,9 @@ struct Figures {
     mean_error: f64,
     /// Seconds from the last wave until everything is exact.
     exact_after: f64,
+    /// Seconds in which visible differences waited, and the share of them in which the line was busy.
+    waited: f64,
+    busy: f64,
 }
 
 /// One wave at a time: the next one is traced when nothing that can be seen waits any more.
@@ -97,14 +100,25 @@ fn converge(scene: &Scene) -> Figures {
         largest: line.sent.iter().map(|sent| sent.bytes).max().unwrap(),
         mean_error: errors.iter().sum::<f64>() / errors.len() as f64,
         exact_after: (line.now - begun).as_secs_f64(),
+        waited: line.waited[0].as_secs_f64(),
+        busy: line.busy(),
     }
 }
 
 fn report(name: &str, f: &Figures) {
     println!(
         "{name:20} {:4} frames, largest {:6} B, first 64 samples {:8} B, total {:8} B of which {:7} \
-         B at rest, mean OKLab error {:.5}, exact after {:.1} s",
-        f.frames, f.largest, f.first_64, f.total, f.flushed, f.mean_error, f.exact_after
+         B at rest, mean OKLab error {:.5}, exact after {:.1} s; line busy for {:.0} % of the {:.1} \
+         s in which visible differences waited",
+        f.frames,
+        f.largest,
+        f.first_64,
+        f.total,
+        f.flushed,
+        f.mean_error,
+        f.exact_after,
+        100.0 * f.busy,
+        f.waited,
     );
 }
 
@@ -115,6 +129,7 @@ fn the_mirror_room_costs_little_and_stays_near() {
     assert!(figures.total <= 2_500_000, "{} bytes", figures.total);
     assert!(figures.mean_error <= 0.0065, "{}", figures.mean_error);
     assert!(figures.exact_after < 30.0);
+    assert!(figures.busy >= 0.6, "{}", figures.busy);
 }
 
 #[test]
@@ -122,6 +137,7 @@ fn a_scene_that_is_noisy_everywhere() {
     let figures = converge(&support::parsed(NOISY));
     report("noisy everywhere", &figures);
     assert!(figures.total <= 4_000_000, "{} bytes", figures.total);
+    assert!(figures.busy >= 0.6, "{}", figures.busy);
 }
 
 /// What is sent follows what is shown, not the clock: the same bytes each time.
@@ -165,6 +181,30 @@ fn another_picture_shows_in_its_first_frame() {
     let after = work.error(line.parser.screen());
     println!("{} of {} B: error {before:.3} -> {after:.3}", first.bytes, first.budget);
     assert!(first.bytes <= first.budget && after < 0.6 * before, "{before} {after}");
+}
+
+/// Edit after edit, the line is kept at work as long as something is to be seen, and whoever presses
+/// the next key does not wait for more than a frame.
+#[test]
+fn the_line_is_busy_while_differences_wait() {
+    let scenes = ["mirror-room.toml", "viewpoint-left.toml"].map(support::shipped);
+    for acting in [false, true] {
+        let mut work = Work::new(&scenes[0], 8);
+        let mut line = Line::new(SCREEN, RATE, ROUND_TRIP);
+        line.acting = acting;
+        for edit in 1..9 {
+            while !work.done {
+                work.wave();
+                line.pass(&work.wanted(), Duration::from_millis(120));
+            }
+            work.edit(&scenes[edit % 2], 8);
+        }
+        let [waited, busy] = [line.waited[0].as_secs_f64(), line.busy()];
+        println!("acting: {acting}; busy for {:.0} % of {waited:.1} s", 100.0 * busy);
+        assert!(waited > 2.0 && busy >= 0.6, "{acting} {waited} {busy}");
+        let longest = line.sent.iter().map(|sent| sent.bytes).max().unwrap();
+        assert!(longest as f64 <= 0.15 * RATE, "{longest} bytes");
+    }
 }
 
 #[test]

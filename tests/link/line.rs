@@ -22,6 +22,10 @@ pub struct Line {
     /// Answers come back.
     pub answering: bool,
     pub sent: Vec<Sent>,
+    /// The user acts all the time.
+    pub acting: bool,
+    /// How long differences that can be seen have waited, and how long of that the line was busy.
+    pub waited: [Duration; 2],
 }
 
 /// A frame that was sent.
@@ -57,6 +61,8 @@ impl Line {
             answers: VecDeque::new(),
             answering: true,
             sent: Vec::new(),
+            acting: false,
+            waited: [Duration::ZERO; 2],
         }
     }
 
@@ -69,6 +75,9 @@ impl Line {
             self.now += STEP;
             self.arrive();
             self.link.look(self.now);
+            if self.acting {
+                self.link.act(self.now);
+            }
             let allowance = self.link.allowance(self.now, false);
             if let Some(allowance) = allowance.filter(|_| next <= self.now) {
                 next = self.now + FRAME_INTERVAL;
@@ -84,6 +93,10 @@ impl Line {
                     self.coming.push_back((self.free_at + self.one_way, bytes));
                 }
             }
+            if self.pacing.rest().visible {
+                self.waited[0] += STEP;
+                self.waited[1] += if self.free_at >= self.now { STEP } else { Duration::ZERO };
+            }
         }
     }
 
@@ -92,6 +105,12 @@ impl Line {
         for (_, bytes) in self.coming.drain(..) {
             self.parser.process(&bytes);
         }
+    }
+
+    /// The share of the time in which differences waited that could be seen, in which the line was
+    /// busy.
+    pub fn busy(&self) -> f64 {
+        self.waited[1].as_secs_f64() / self.waited[0].as_secs_f64().max(1e-3)
     }
 
     /// Bytes sent in all.

@@ -176,3 +176,29 @@ fn replies_press_no_keys() {
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
 }
+
+/// A terminal that answers nothing is waited for, but not when somebody wants the program to end.
+#[test]
+fn a_signal_is_heeded_while_the_terminal_is_asked() {
+    let desk = Desk::with_room();
+    let env = [("SSH_CONNECTION", "192.0.2.7 5000 192.0.2.1 22")];
+    let command = [PROGRAM, "room.toml"];
+    let start = Start {
+        command: &command,
+        folder: desk.0.path(),
+        size: [80, 24],
+        env: &env,
+        answers: false,
+    };
+    // Where the machine does not let it be in time once, the screen has been drawn.
+    let heeded = (0..3).any(|_| {
+        let terminal = Terminal::start(&start);
+        terminal.wait_for("the screen is taken", |screen| screen.alternate_screen().then_some(()));
+        signal("TERM", terminal.process_id());
+        let (status, bytes) = terminal.end();
+        assert_eq!(status, 143);
+        assert!(bytes.ends_with(LEAVE));
+        !bytes.contains("room.toml")
+    });
+    assert!(heeded, "it goes on asking");
+}

@@ -5,6 +5,7 @@ mod editing;
 mod hostile;
 mod life;
 mod picture;
+mod stills;
 mod stopping;
 mod terminal;
 

@@ -9,13 +9,13 @@ const SIZE: [u16; 2] = [120, 36];
 const FILM: [u32; 2] = [640, 480];
 
 /// A picture of 8-bit codes.
-struct Picture {
-    size: [usize; 2],
-    rgb: Vec<u8>,
+pub struct Picture {
+    pub size: [usize; 2],
+    pub rgb: Vec<u8>,
 }
 
 impl Picture {
-    fn of_png(bytes: &[u8]) -> Self {
+    pub fn of_png(bytes: &[u8]) -> Self {
         let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
         let mut rgb = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut rgb).unwrap();

@@ -27,8 +27,11 @@ static TURN: Mutex<()> = Mutex::new(());
 /// What keys and answers are written to.
 type Keyboard = Arc<Mutex<Box<dyn Write + Send>>>;
 
+/// A question and its answer.
+pub type Answer = (&'static [u8], &'static str);
+
 /// Questions of programs, and the answers of a terminal with synchronised output.
-const ANSWERS: [(&[u8], &str); 3] =
+const ANSWERS: [Answer; 3] =
     [(b"\x1b[c", "\x1b[?62;22c"), (b"\x1b[?2026$p", "\x1b[?2026;2$y"), (b"\x1b[6n", "")];
 
 /// A program in its terminal.
@@ -62,6 +65,13 @@ pub struct Start<'a> {
 impl Terminal {
     /// Starts a program in a terminal of true colour.
     pub fn start(start: &Start) -> Self {
+        Self::start_with(start, &[])
+    }
+
+    /// The same for one that has other or more answers.
+    pub fn start_with(start: &Start, also: &[Answer]) -> Self {
+        let known = ANSWERS.iter().filter(|known| also.iter().all(|other| other.0 != known.0));
+        let table: Vec<Answer> = known.chain(also).copied().collect();
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let pair = native_pty_system().openpty(pty_size(start.size)).expect("a pseudo-terminal");
         let mut command = CommandBuilder::new(start.command[0]);
@@ -92,7 +102,7 @@ impl Terminal {
             let mut begun = Vec::new();
             loop {
                 let read = reader.read(&mut buffer).unwrap_or(0);
-                let asked = questions(&mut begun, &buffer[..read]);
+                let asked = questions(&table, &mut begun, &buffer[..read]);
                 let mut output = shared.0.lock().unwrap();
                 output.ended = read == 0;
                 output.parser.process(&buffer[..read]);
@@ -232,19 +242,19 @@ impl Terminal {
 
 /// The answers that `bytes`, after what has `begun` before, ask for; what may be the beginning of
 /// another question is remembered.
-fn questions(begun: &mut Vec<u8>, bytes: &[u8]) -> Vec<&'static str> {
+fn questions(table: &[Answer], begun: &mut Vec<u8>, bytes: &[u8]) -> Vec<&'static str> {
     begun.extend_from_slice(bytes);
     let mut answers = Vec::new();
     let mut read = 0;
     for at in 0..begun.len() {
-        for (question, answer) in ANSWERS {
+        for (question, answer) in table {
             if begun[at..].starts_with(question) {
-                answers.push(answer);
+                answers.push(*answer);
                 read = at + question.len();
             }
         }
     }
-    let longest = ANSWERS.iter().map(|(question, _)| question.len()).max().unwrap_or(0);
+    let longest = table.iter().map(|(question, _)| question.len()).max().unwrap_or(0);
     begun.drain(..read.max(begun.len().saturating_sub(longest - 1)));
     answers
 }

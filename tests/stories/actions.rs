@@ -333,6 +333,7 @@ fn picture_stories() -> Vec<Story> {
         story(MoveProbe(Way::Right, Pace::Coarse), c(), "i Right", move |_, d| probe(d)[0] > 32),
         story(MoveProbe(Way::Up, Pace::Coarse), c(), "i Up", move |_, d| probe(d)[1] < 24),
         story(CopyPath, c(), "p y", |_, d| d.asked(|e| matches!(e, Effect::Copy(_)))),
+        story(ShowExport, c(), "p o", |_, d| d.asked(|e| matches!(e, Effect::Look { .. }))),
         story(MoveProbe(Way::Down, Pace::Coarse), c(), "i Down", move |_, d| probe(d)[1] > 24),
         fine(Way::Left, "i Shift-Left", [31, 24]),
         fine(Way::Right, "i Shift-Right", [33, 24]),
@@ -402,9 +403,7 @@ fn every_action_does_what_its_story_says() {
         told.insert(action);
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    for row in KEYMAP {
-        assert!(told.contains(&row.action), "{} has no story", row.label);
-    }
+    KEYMAP.iter().for_each(|row| assert!(told.contains(&row.action), "no story: {}", row.label));
 }
 
 /// Whatever has a key can be found by its name too, and then does the same.

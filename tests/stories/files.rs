@@ -229,3 +229,29 @@ fn the_path_of_the_last_picture_is_copied_unless_it_steers() {
     desk.keys("y");
     assert!(desk.effects.is_empty() && desk.notice().contains("not copied"));
 }
+
+/// A picture takes the whole screen, and the next key does nothing but take it away.
+#[test]
+fn the_last_picture_is_looked_at_until_a_key_comes() {
+    let mut desk = Desk::new(ROOM);
+    desk.keys("o");
+    assert!(desk.model.overlay.is_none() && desk.notice().contains("No picture"));
+    desk.keys("p o");
+    let looked = |desk: &Desk| matches!(&desk.model.overlay, Some(Overlay::Still(looked)) if looked.path.ends_with("room-1.png"));
+    assert!(looked(&desk));
+    // Made anew for a screen of another size; what was made for the old one is not shown.
+    desk.effects.clear();
+    let screen = [100, 30];
+    desk.effects.extend(update(&mut desk.model, Message::Resize(screen), Duration::ZERO));
+    assert!(looked(&desk) && desk.asked(|e| matches!(e, Effect::Look { screen: [100, 30], .. })));
+    let before = desk.text();
+    desk.keys("x");
+    assert!(desk.model.overlay.is_none() && desk.text() == before);
+    // One that cannot be read is told and leads back.
+    desk.keys("o");
+    let message = Message::Still("room-1.png".into(), Err("it is gone".to_string()));
+    update(&mut desk.model, message, Duration::ZERO);
+    assert!(desk.model.overlay.is_none() && desk.notice().contains("room-1.png cannot be shown"));
+    desk.keys("o Ctrl-c");
+    assert!(desk.asked(|e| *e == Effect::Quit));
+}

@@ -101,6 +101,7 @@ fn every_action() -> Vec<Action> {
         ExportPng,
         ExportExr,
         CopyPath,
+        ShowExport,
         ExportSized,
         CancelExport,
         Exposure(Change::Up),
@@ -154,7 +155,7 @@ fn every_action() -> Vec<Action> {
             | Drop | OwnMaterial | NextPanel | PreviousPanel | OnlyPicture | First | Last
             | Open | ClearField | Undo | Redo | Save | SaveAs | Reload | Recover | Suspend
             | Quit | Pause | Restart | StopAt | Quality | ExportPng | ExportExr | CopyPath
-            | ExportSized | CancelExport | ResetExposure | NextTone | NextChannel
+            | ShowExport | ExportSized | CancelExport | ResetExposure | NextTone | NextChannel
             | PreviousChannel | Probe | Keep | Flip | Difference | Priority | NextColors | Help
             | Palette | Inventory => {
                 vec![action]

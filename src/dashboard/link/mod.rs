@@ -10,6 +10,7 @@
 //! Nothing here reads a clock or writes a byte: times and counts are arguments.
 
 mod flight;
+mod held;
 mod queue;
 mod start;
 #[cfg(test)]
@@ -17,6 +18,7 @@ mod tests;
 
 use super::terminal::Multiplexer;
 use flight::{Flight, Flights};
+use held::Held;
 pub use queue::Queue;
 pub use start::Start;
 use std::time::Duration;
@@ -104,21 +106,11 @@ pub struct Link {
     last_frame: Option<Duration>,
     /// When what was sent at a known rate is through.
     free_at: Duration,
+    /// When the line has done with what was sent, by its rate: a frame then finds it empty.
+    clear_at: Duration,
     /// When the next slice of invisible differences may go.
     flush_at: Duration,
     held_back: Held,
-}
-
-/// What the kernel holds back.
-#[derive(Debug, Default)]
-struct Held {
-    bytes: f64,
-    asked: Option<Duration>,
-    /// Bytes that it had got rid of then.
-    gone: f64,
-    /// Since when it has always held something back, and what it had got rid of before.
-    busy: Option<(Duration, f64)>,
-    sent: f64,
 }
 
 impl Link {
@@ -138,6 +130,7 @@ impl Link {
             acting_until: Duration::ZERO,
             last_frame: None,
             free_at: Duration::ZERO,
+            clear_at: Duration::ZERO,
             flush_at: Duration::ZERO,
             held_back: Held::default(),
         }
@@ -204,6 +197,10 @@ impl Link {
         let room = match self.mode {
             Mode::Local => frame,
             Mode::Answers(_) if self.has_room(now, false) => frame,
+            Mode::Answers(_) if self.free_at > now => frame.max(self.free_at),
+            Mode::Answers(_) if now < self.acting_until.min(self.clear_at) => {
+                frame.max(self.clear_at)
+            }
             // Before that an answer comes, or is lost.
             Mode::Answers(_) => self.lost_at().unwrap_or(frame),
             Mode::Queue => {
@@ -231,12 +228,27 @@ impl Link {
         }
         match self.mode {
             Mode::Local => {}
-            Mode::Answers(_) => self.flights.add(Flight { sent: now, bytes, picture }),
+            Mode::Answers(_) => {
+                self.clear_at = self.clear_at.max(now) + seconds(bytes, self.rate);
+                self.flights.add(Flight { sent: now, bytes, picture });
+            }
             Mode::Queue => {
                 self.held_back.sent += bytes as f64;
                 self.held_back.bytes += bytes as f64;
             }
             Mode::Fixed => self.free_at = self.free_at.max(now) + seconds(bytes, self.rate),
+        }
+    }
+
+    /// Bytes were sent that end in the midst of a sequence, where nothing can be asked: the line is
+    /// taken to carry what it has carried so far.
+    pub fn sent_unasked(&mut self, now: Duration, bytes: usize) {
+        if let Mode::Answers(_) = self.mode {
+            self.last_frame = Some(now);
+            let took = Duration::from_secs_f64(bytes as f64 / self.rate);
+            self.free_at = self.free_at.max(now) + took;
+        } else {
+            self.sent(now, bytes, true, 0);
         }
     }
 
@@ -252,6 +264,9 @@ impl Link {
         }
         let Some((flight, arrived)) = self.flights.answered(at) else { return false };
         self.losses = 0;
+        if self.flights.is_empty() {
+            self.clear_at = self.clear_at.min(at);
+        }
         let took = at.saturating_sub(flight.sent);
         if flight.alone && flight.bytes <= SMALL && self.is_learning(at) {
             self.round_trip = Some(took);
@@ -343,12 +358,17 @@ impl Link {
     fn has_room(&self, now: Duration, answers: bool) -> bool {
         match self.mode {
             Mode::Local => true,
+            Mode::Answers(_) if self.free_at > now => false,
             Mode::Answers(_) => {
                 if self.is_learning(now) {
                     return self.flights.is_empty();
                 }
                 let acting = now < self.acting_until;
-                let most = if acting { 1 + usize::from(answers) } else { self.flights_at_once() };
+                // Who acts waits for no more than the frame that the line is at.
+                let most = match acting && self.clear_at > now {
+                    true => 1 + usize::from(answers),
+                    false => self.flights_at_once(),
+                };
                 // The first answer does not wait for what was sent when nobody did anything.
                 let newest = self.flights.newest();
                 let first = acting && answers && newest.is_some_and(|at| at < self.acting_since);

@@ -71,8 +71,8 @@ fn the_rate_is_found_and_the_line_is_kept_busy() {
 fn who_acts_waits_for_one_frame_only() {
     let mut link = Link::new(start(Mode::Answers(None)));
     let mut wire = Wire { rate: 125e3, round_trip: ms(100), free_at: Duration::ZERO };
-    let (_, waited) = saturate(&mut link, &mut wire, 20, true);
-    assert!(waited < ms(160), "{waited:?}");
+    let (busy, waited) = saturate(&mut link, &mut wire, 20, true);
+    assert!(waited < ms(160) && busy > 0.8, "{waited:?}, busy {busy:.2}");
     let now = ms(20_000);
     link.act(now);
     link.flights = Flights::default();

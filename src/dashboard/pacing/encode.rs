@@ -64,6 +64,11 @@ impl Encoder {
         self.at = (width == 1 && x + 1 < self.columns).then_some((x + 1, y));
     }
 
+    /// Nobody knows where the cursor is.
+    pub fn moved(&mut self) {
+        self.at = None;
+    }
+
     /// Moves the cursor.
     pub fn go(&mut self, out: &mut Vec<u8>, x: u16, y: u16) {
         let before = self.at.replace((x, y));

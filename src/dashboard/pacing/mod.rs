@@ -107,6 +107,11 @@ impl Pacing {
         self.rest
     }
 
+    /// Something else than a frame has moved the cursor.
+    pub fn moved(&mut self) {
+        self.encoder.moved();
+    }
+
     /// Writes the next frame to `out`, which stays empty if there is nothing to send. Differences of at
     /// most `threshold`, in OKLab, cannot be seen.
     pub fn frame(

@@ -15,6 +15,7 @@ pub use coarse::blocks;
 pub use false_color::{Scale, depth, difference, magnitude, normals, object_color, objects};
 pub use indexed::nearest as nearest_indexed;
 pub use oklab::Oklab;
+pub(super) use oklab::{code, linear};
 
 /// How many colours the terminal has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

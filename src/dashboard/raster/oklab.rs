@@ -25,13 +25,13 @@ static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
 });
 
 /// Linear light, 0..=1, of 8-bit sRGB.
-pub(super) fn linear(rgb: [u8; 3]) -> [f32; 3] {
+pub(in crate::dashboard) fn linear(rgb: [u8; 3]) -> [f32; 3] {
     let table = &*LINEAR;
     rgb.map(|code| table[usize::from(code)])
 }
 
 /// The 8-bit sRGB code whose linear light is nearest; `linear` is clamped to 0..=1.
-pub(super) fn code(linear: f32) -> u8 {
+pub(in crate::dashboard) fn code(linear: f32) -> u8 {
     let table = &*LINEAR;
     let above = table.partition_point(|l| *l < linear).min(255);
     let below = above.saturating_sub(1);

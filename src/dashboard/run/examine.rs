@@ -3,8 +3,8 @@
 use super::signals::watch;
 use crate::dashboard::link::{Mode, Queue, Start};
 use crate::dashboard::terminal::{
-    Capabilities, Event, Keyboard, Multiplexer, Reply, Screen, Surroundings, Tty, cursor_question,
-    probe, size,
+    Capabilities, Event, Keyboard, Multiplexer, Reply, Screen, Surroundings, Tty, cell_px,
+    cursor_question, probe, size,
 };
 use rustix::termios::tcgetwinsize;
 use std::io;
@@ -46,7 +46,7 @@ pub fn examine(surroundings: Surroundings, measure: bool) -> io::Result<Examined
     let tty = screen.tty();
     watch(screen.tty(), Duration::ZERO)?;
     let mut keyboard = Keyboard::new(&surroundings);
-    let mut terminal = probe(&tty, &mut keyboard, surroundings)?;
+    let mut terminal = probe(&tty, &mut keyboard, surroundings, &|| false)?;
     let multiplexer = terminal.surroundings.multiplexer;
     if multiplexer.is_some() && terminal.passthrough.is_none() {
         terminal.passthrough = answer(&tty, &mut keyboard, multiplexer, &[], PATIENCE)?;
@@ -69,6 +69,7 @@ pub fn examine(surroundings: Surroundings, measure: bool) -> io::Result<Examined
         }
         _ => None,
     };
+    terminal.cell_px = cell_px().or(terminal.cell_px);
     let window = tcgetwinsize(io::stdout())?;
     let cells = size()?;
     let known = window.ws_xpixel > 0 && window.ws_ypixel > 0;

@@ -1,8 +1,10 @@
 //! From the model to the terminal's bytes: a frame is drawn, thinned out, encoded, sent.
 
+use super::sending::Sending;
 use super::writer::{Writer, Written};
-use crate::dashboard::link::{Link, Queue, Reading, Start};
+use crate::dashboard::link::{Allowance, Link, Queue, Reading, Start};
 use crate::dashboard::model::Model;
+use crate::dashboard::overlay::Overlay;
 use crate::dashboard::pacing::{Pacing, Wanted};
 use crate::dashboard::terminal::{Capabilities, Tty, copied, cursor_question};
 use crate::dashboard::view::{View, is_settled};
@@ -16,6 +18,9 @@ use std::time::{Duration, Instant};
 /// What is shown at once by terminals that know this mode, and then.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
 
+/// What a question takes.
+const QUESTION_BYTES: usize = 16;
+
 /// Frames on their way to the terminal.
 pub struct Frames {
     view: View,
@@ -24,12 +29,21 @@ pub struct Frames {
     queue: Option<Queue>,
     synchronised: bool,
     writer: Writer,
+    /// Bytes so far.
+    sent: u64,
     wanted: Buffer,
     /// Where the cursor ought to be shown, if it ought to.
     cursor: Option<Position>,
     facts: Facts,
     /// For the clipboard: goes out with the next frame.
     copied: String,
+    tty: Arc<Tty>,
+    /// The still that the model shows.
+    sending: Option<Sending>,
+    /// What takes away one that it shows no more: goes out before the next frame.
+    removal: Vec<u8>,
+    /// It has gone out.
+    removing: bool,
 }
 
 /// What a frame has to know of the model, as it was when it was drawn.
@@ -49,6 +63,8 @@ pub enum Drawn {
     Waiting,
     /// The screen is as it ought to be, in what matters.
     Same,
+    /// A slice of a still was sent; nothing was drawn.
+    Slice,
     /// A frame was sent without the picture.
     Text,
     /// A frame was sent.
@@ -65,11 +81,16 @@ impl Frames {
             link: Link::new(Start::of(terminal, queue.is_some(), bandwidth)),
             queue,
             synchronised: terminal.synchronised,
-            writer: Writer::new(tty)?,
+            writer: Writer::new(Arc::clone(&tty))?,
+            sent: 0,
             wanted: Buffer::empty(Rect::ZERO),
             cursor: None,
             facts: Facts::default(),
             copied: String::new(),
+            tty,
+            sending: None,
+            removal: Vec::new(),
+            removing: false,
         })
     }
 
@@ -81,11 +102,71 @@ impl Frames {
     /// Nothing is known any more of what the terminal shows.
     pub fn forget(&mut self) {
         self.pacing = Pacing::new();
+        self.give_up();
+    }
+
+    /// How much of the still that is shown has been sent, 0..=1.
+    pub fn still_sent(&self) -> Option<f64> {
+        self.sending.as_ref().map(Sending::share)
+    }
+
+    /// The model's still is the one that is sent.
+    pub fn follow(&mut self, model: &Model) {
+        let still = match &model.overlay {
+            Some(Overlay::Still(looked)) => looked.still.as_ref(),
+            _ => None,
+        };
+        let same = |sending: &Sending| still.is_some_and(|still| sending.is_of(still));
+        if !self.sending.as_ref().is_some_and(same) {
+            self.give_up();
+            self.sending = still.map(|still| Sending::new(Arc::clone(still)));
+        }
+    }
+
+    /// Takes away what was sent of a still.
+    fn give_up(&mut self) {
+        if let Some(sending) = self.sending.take() {
+            let (removal, destroys) = sending.removal();
+            self.removal.extend(removal);
+            if destroys {
+                self.pacing = Pacing::new();
+            }
+        }
+    }
+
+    /// Sends the next slice of a still.
+    fn slice(&mut self, now: Duration, allowance: Allowance) -> Drawn {
+        let Some(sending) = self.sending.as_mut().filter(|_| allowance.picture) else {
+            return Drawn::Nothing;
+        };
+        if !sending.has_begun() {
+            // Whatever happens from here on.
+            self.tty.owe(&sending.any_removal());
+            self.removing = false;
+        }
+        let mut bytes = self.writer.buffer();
+        sending.next(allowance.bytes.saturating_sub(QUESTION_BYTES), &mut bytes);
+        self.pacing.moved();
+        if sending.is_open() {
+            self.link.sent_unasked(now, bytes.len());
+        } else {
+            if let Some(through) = self.link.question() {
+                bytes.extend(cursor_question(through).as_bytes());
+            }
+            self.link.sent(now, bytes.len(), true, 0);
+        }
+        self.writer.send(bytes);
+        Drawn::Slice
     }
 
     /// Whether the last frame has been written.
     pub fn ready(&self) -> bool {
         self.writer.ready()
+    }
+
+    /// Whether differences of the picture wait that can be seen, and bytes of frames sent so far.
+    pub fn load(&self) -> (bool, u64) {
+        (self.pacing.rest().visible, self.sent)
     }
 
     /// What the user is told about the line.
@@ -133,11 +214,17 @@ impl Frames {
     /// `answers`: what is drawn shows what the user has just done.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
         let rest = self.pacing.rest();
-        let text = changed || rest.text;
+        let text = changed || rest.text || !self.removal.is_empty();
+        let may = || self.link.allowance(now, false).is_some_and(|allowance| allowance.picture);
+        if let Some(sending) = &self.sending
+            && (sending.is_open() || !text && sending.follows(rest.visible))
+        {
+            let slice = || if may() { now } else { self.link.wakes_at(now, false) };
+            return sending.is_unfinished().then(slice);
+        }
         if !text && !rest.visible {
             let hidden = rest.hidden?.max(self.link.flush_at());
-            let may = self.link.allowance(now, false).is_some_and(|allowance| allowance.picture);
-            return Some(if may { hidden } else { hidden.max(self.link.wakes_at(now, false)) });
+            return Some(if may() { hidden } else { hidden.max(self.link.wakes_at(now, false)) });
         }
         match self.link.allowance(now, answers) {
             Some(allowance) if allowance.picture || text => Some(now),
@@ -155,7 +242,15 @@ impl Frames {
         answers: bool,
         subject: u64,
     ) -> Drawn {
-        let Some(allowance) = self.link.allowance(now, answers) else { return Drawn::Nothing };
+        let Some(whole) = self.link.allowance(now, answers) else { return Drawn::Nothing };
+        let mut allowance = whole;
+        if let Some(sending) = &self.sending {
+            if sending.is_open() {
+                return self.slice(now, whole);
+            }
+            // What is crisp comes over the picture, or lies there already.
+            allowance.picture &= !sending.follows(true);
+        }
         if changed {
             self.redraw(model);
         }
@@ -172,23 +267,35 @@ impl Frames {
             settled,
         };
         let mut bytes = self.writer.buffer();
+        bytes.extend(&self.removal);
         if self.synchronised {
             bytes.extend(SYNCHRONISED[0]);
         }
         let empty = bytes.len();
         let frame = self.pacing.frame(&wanted, now, allowance, self.link.threshold(), &mut bytes);
-        if bytes.len() == empty && self.copied.is_empty() {
+        if let Some(sending) = &mut self.sending {
+            sending.seen |= frame.picture;
+        }
+        if bytes.len() == empty && self.copied.is_empty() && self.removal.is_empty() {
             bytes.clear();
             self.writer.keep(bytes);
+            let rest = self.pacing.rest();
+            let follows =
+                |sending: &Sending| sending.is_unfinished() && sending.follows(rest.visible);
+            if !rest.text && self.sending.as_ref().is_some_and(follows) {
+                return self.slice(now, whole);
+            }
             return if self.pacing.rest().visible { Drawn::Waiting } else { Drawn::Same };
         }
         if self.synchronised {
             bytes.extend(SYNCHRONISED[1]);
         }
+        self.removing |= !std::mem::take(&mut self.removal).is_empty();
         bytes.extend(std::mem::take(&mut self.copied).as_bytes());
         if let Some(through) = self.link.question() {
             bytes.extend(cursor_question(through).as_bytes());
         }
+        self.sent += bytes.len() as u64;
         self.link.sent(now, bytes.len(), frame.picture, frame.flushed);
         self.writer.send(bytes);
         if frame.picture { Drawn::Picture } else { Drawn::Text }
@@ -201,6 +308,9 @@ impl Frames {
 
     /// Takes note that the frame on its way has been written; when that was.
     pub fn written_at(&mut self, frame: Written) -> io::Result<Instant> {
+        if std::mem::take(&mut self.removing) {
+            self.tty.owe(&[]);
+        }
         self.writer.done(frame)
     }
 

@@ -83,6 +83,11 @@ impl Hands {
         &self.session
     }
 
+    /// Where what was done is told.
+    pub fn results(&self) -> Sender<Message> {
+        self.results.clone()
+    }
+
     /// What was done, as messages; pass them through [`Hands::note`].
     pub fn done(&self) -> &Receiver<Message> {
         &self.done
@@ -159,7 +164,7 @@ impl Hands {
             Effect::TakeUp => self.files.take_up(),
             Effect::Discard => self.files.discard(),
             // The loop's own.
-            Effect::Quit | Effect::Suspend | Effect::Copy(_) => {}
+            Effect::Quit | Effect::Suspend | Effect::Copy(_) | Effect::Look { .. } => {}
         }
         None
     }

@@ -10,14 +10,18 @@ mod input;
 mod journal;
 mod life;
 mod names;
+mod sending;
 mod signals;
+mod stills;
 mod trace;
 mod writer;
 
 use super::link::Reading;
 use super::message::{Effect, Exported, Message};
 use super::model::{Model, Start};
-use super::terminal::{Event, Keyboard, Reply, Screen, Surroundings, Timed, probe, size};
+use super::terminal::{
+    Capabilities, Event, Keyboard, Reply, Screen, Surroundings, Timed, probe, size,
+};
 use super::update::update;
 use crate::render::Options;
 use crate::render::schedule::{Settings, Stop};
@@ -96,7 +100,8 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     let screen = Screen::enter()?;
     let signals = signals::watch(screen.tty(), signals::PATIENCE)?;
     let mut keyboard = Keyboard::new(&surroundings);
-    let Ok(terminal) = probe(&screen.tty(), &mut keyboard, surroundings) else {
+    let ending = || signals.is_ending();
+    let Ok(terminal) = probe(&screen.tty(), &mut keyboard, surroundings, &ending) else {
         return Ok(Ended { signalled: Some(HUNG_UP), ..Ended::default() });
     };
     let model = Model::new(Start {
@@ -113,6 +118,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         model,
         hands,
         frames: Frames::new(screen.tty(), &terminal, bandwidth)?,
+        terminal,
         trace: Trace::new(trace.is_some()),
         began: Instant::now(),
         shown: 0,
@@ -126,7 +132,8 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     // So that the renderer learns how large the picture is.
     dashboard.take(Message::Resize(dashboard.model.screen));
     let input = input::read(keyboard)?;
-    let line = Line { tty: screen.tty(), input, signals, left: screen.left().clone() };
+    let line =
+        Line { tty: screen.tty(), input, signals: signals.told, left: screen.left().clone() };
     let result = dashboard.watch(&line);
     // First of all, and whatever else there is to write.
     dashboard.hands.secure(Duration::ZERO);
@@ -153,6 +160,8 @@ struct Dashboard {
     model: Model,
     hands: Hands,
     frames: Frames,
+    /// What the terminal can do, as far as it has said.
+    terminal: Capabilities,
     trace: Trace,
     began: Instant,
     /// The scene whose picture the model has: its number.
@@ -247,6 +256,11 @@ impl Dashboard {
                 self.frames.answered(at.saturating_duration_since(self.began));
                 return;
             }
+            Event::Reply(reply @ (Reply::Graphics(true) | Reply::Version(_))) => {
+                // From behind a multiplexer, or late.
+                self.terminal.learn(&reply);
+                return;
+            }
             Event::Reply(_) => return,
         };
         input::join(waiting, Input { at, message });
@@ -282,6 +296,9 @@ impl Dashboard {
                 Effect::Show(scene) => Some(Arc::clone(scene)),
                 _ => None,
             };
+            if let Effect::Look { path, display, screen } = &effect {
+                self.prepare_still(path, *display, *screen);
+            }
             let number = self.hands.perform(effect);
             // A change of light is seen at once in the picture that is there.
             let snapshot = self.model.snapshot.as_deref();
@@ -349,15 +366,19 @@ impl Dashboard {
             self.told = now;
             self.take(Message::Line(reading));
         }
+        self.tell_of_still(now);
+        self.frames.follow(&self.model);
         let mut due = None;
         if self.frames.ready() && !self.quit {
             let answers = self.trace.answers(self.shown);
             due = self.frames.due(now, self.changed, answers);
             if due.is_some_and(|at| at <= now) {
                 let drawn = self.frames.draw(&self.model, now, self.changed, answers, self.subject);
-                self.changed &= drawn == Drawn::Nothing;
+                let (waits, sent) = self.frames.load();
+                self.trace.line(now, waits, sent);
+                self.changed &= matches!(drawn, Drawn::Nothing | Drawn::Slice);
                 match drawn {
-                    Drawn::Nothing | Drawn::Waiting => {}
+                    Drawn::Nothing | Drawn::Waiting | Drawn::Slice => {}
                     Drawn::Same => {
                         // The screen was the answer already.
                         self.trace.sent(self.shown);

@@ -5,9 +5,10 @@ use crate::dashboard::terminal::Tty;
 use crossbeam_channel::{Receiver, unbounded};
 use rustix::process::{Signal, getpid, kill_current_process_group, kill_process};
 use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGWINCH};
-use signal_hook::iterator::Signals;
+use signal_hook::iterator;
 use std::io;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -33,6 +34,21 @@ pub(super) enum Told {
     Continue,
 }
 
+/// What signals say.
+pub(super) struct Signals {
+    /// One after the other.
+    pub told: Receiver<Told>,
+    /// One of them says to end.
+    ending: Arc<AtomicBool>,
+}
+
+impl Signals {
+    /// Whether one of them says to end.
+    pub fn is_ending(&self) -> bool {
+        self.ending.load(Ordering::Acquire)
+    }
+}
+
 /// Whom a stop concerns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Whom {
@@ -44,9 +60,12 @@ pub(super) enum Whom {
 
 /// Listens to signals. If the program is still there `patience` after it should have ended, the
 /// terminal is restored and the program ended from here.
-pub(super) fn watch(tty: Arc<Tty>, patience: Duration) -> io::Result<Receiver<Told>> {
-    let mut signals = Signals::new([SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])?;
+pub(super) fn watch(tty: Arc<Tty>, patience: Duration) -> io::Result<Signals> {
+    let mut signals =
+        iterator::Signals::new([SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])?;
     let (teller, told) = unbounded();
+    let ending = Arc::new(AtomicBool::new(false));
+    let mark = Arc::clone(&ending);
     thread::Builder::new().name("signals".into()).spawn(move || {
         for signal in signals.forever() {
             let what = match signal {
@@ -57,6 +76,7 @@ pub(super) fn watch(tty: Arc<Tty>, patience: Duration) -> io::Result<Receiver<To
             };
             // Nobody listens any more when the program ends.
             let _ = teller.send(what);
+            mark.fetch_or(matches!(what, Told::End(_)), Ordering::Release);
             if let Told::End(status) = what {
                 thread::sleep(patience);
                 tty.leave();
@@ -64,7 +84,7 @@ pub(super) fn watch(tty: Arc<Tty>, patience: Duration) -> io::Result<Receiver<To
             }
         }
     })?;
-    Ok(told)
+    Ok(Signals { told, ending })
 }
 
 /// Stops until somebody says to go on; a moment may pass before it happens. It does not happen if there

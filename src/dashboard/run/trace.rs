@@ -39,6 +39,16 @@ pub struct Trace {
     awaiting: Vec<Awaiting>,
     in_flight: Vec<Awaiting>,
     answered: Option<Vec<Answered>>,
+    load: Load,
+}
+
+/// What the line has been given while differences waited that can be seen.
+#[derive(Clone, Copy, Debug, Default)]
+struct Load {
+    /// When it was looked last, whether they waited then, and bytes that had been sent.
+    last: (Duration, bool, u64),
+    waited: Duration,
+    bytes: u64,
 }
 
 impl Trace {
@@ -49,6 +59,7 @@ impl Trace {
             awaiting: Vec::new(),
             in_flight: Vec::new(),
             answered: remember.then(Vec::new),
+            load: Load::default(),
         }
     }
 
@@ -88,6 +99,20 @@ impl Trace {
         }
     }
 
+    /// After a frame, if there was one: whether differences that can be seen wait still, and the bytes
+    /// sent so far.
+    pub fn line(&mut self, now: Duration, waits: bool, sent: u64) {
+        let Load { last: (before, waited, known), .. } = self.load;
+        if waited {
+            self.load.waited += now.saturating_sub(before);
+        }
+        // What leaves nothing to wait for is on the line when nothing waits.
+        if waits {
+            self.load.bytes += sent - known;
+        }
+        self.load.last = (now, waits, sent);
+    }
+
     /// Writes one line per event: seconds from the start to its reading, what answered it, and
     /// milliseconds until then. Events without an answer so far are left out.
     pub fn write(&self, path: &Path) -> io::Result<()> {
@@ -101,7 +126,7 @@ impl Trace {
         file.flush()
     }
 
-    /// The distribution, a line per kind of answer that there was.
+    /// The distribution, a line per kind of answer that there was, and what the line has been given.
     pub fn summary(&self) -> Vec<String> {
         let of = |wanted: bool, name: &str| {
             let of_kind = self.answered.iter().flatten().filter(|a| a.picture == wanted);
@@ -118,10 +143,16 @@ impl Trace {
                 ms(last)
             ))
         };
-        [(true, "event to picture"), (false, "event to screen")]
-            .into_iter()
-            .filter_map(|(picture, name)| of(picture, name))
-            .collect()
+        let kinds = [(true, "event to picture"), (false, "event to screen")];
+        let answers = kinds.into_iter().filter_map(|(picture, name)| of(picture, name));
+        let Load { waited, bytes, .. } = self.load;
+        let load = (self.answered.is_some() && !waited.is_zero()).then(|| {
+            let seconds = waited.as_secs_f64();
+            format!(
+                "visible differences waited for {seconds:.3} s, in which {bytes} bytes were sent"
+            )
+        });
+        answers.chain(load).collect()
     }
 }
 
@@ -192,6 +223,20 @@ mod tests {
         assert_eq!(quantile(&sorted, 0.99), ms(99));
         assert_eq!(quantile(&sorted[..3], 0.5), ms(2));
         assert_eq!(quantile(&[], 0.5), ms(0));
+    }
+
+    #[test]
+    fn the_line_counts_while_differences_wait() {
+        let mut trace = Trace::new(true);
+        let ms = Duration::from_millis;
+        for (at, waits, sent) in
+            [(0, false, 100), (1000, true, 1100), (1100, true, 2100), (1200, false, 3000)]
+        {
+            trace.line(ms(at), waits, sent);
+        }
+        trace.line(ms(9000), false, 3500);
+        let told = "visible differences waited for 0.200 s, in which 2000 bytes were sent";
+        assert_eq!(trace.summary(), [told]);
     }
 
     #[test]

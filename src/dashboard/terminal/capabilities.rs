@@ -42,8 +42,14 @@ pub struct Capabilities {
     pub background: Option<[u8; 3]>,
     /// Pictures by kitty's protocol.
     pub kitty_graphics: bool,
+    /// Pictures by kitty's protocol can stand among text, as they must inside tmux.
+    pub placeholders: bool,
     /// Pictures by sixel.
     pub sixel: bool,
+    /// How many colours those have.
+    pub sixel_colors: Option<u16>,
+    /// How many pixels, in a row and in a column.
+    pub sixel_px: Option<[u16; 2]>,
     /// Width and height of a cell in pixels.
     pub cell_px: Option<[u16; 2]>,
     /// How long the answer to the first question took.
@@ -112,7 +118,10 @@ impl Capabilities {
             version: None,
             background: None,
             kitty_graphics: false,
+            placeholders: false,
             sixel: false,
+            sixel_colors: None,
+            sixel_px: None,
             cell_px: None,
             round_trip: None,
             passthrough: None,

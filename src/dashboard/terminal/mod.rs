@@ -18,7 +18,7 @@ pub use decode::Decoder;
 pub use keyboard::{Keyboard, Timed};
 pub(in crate::dashboard) use probe::cursor_question;
 pub use probe::probe;
-pub use screen::{ENTER, LEAVE, Screen, Tty, size};
+pub use screen::{ENTER, LEAVE, Screen, Tty, cell_px, size};
 
 /// What a terminal sends.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,6 +62,10 @@ pub enum Reply {
     Graphics(bool),
     /// Width and height of a cell in pixels.
     CellSize([u16; 2]),
+    /// How many colours a sixel picture has (XTSMGRAPHICS).
+    SixelColors(u16),
+    /// How many pixels in a row and in a column of it.
+    SixelSize([u16; 2]),
     /// Anything else.
     Other,
 }

@@ -5,7 +5,7 @@ use rustix::termios::{OptionalActions, Termios, tcgetattr, tcgetwinsize, tcsetat
 use std::io::{self, Write};
 use std::panic;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -34,6 +34,8 @@ pub struct Tty {
     /// The modes of stdin as they were.
     before: Option<Termios>,
     leaving: Sender<()>,
+    /// What has to be sent before anything else when the terminal is given back.
+    owed: Mutex<Vec<u8>>,
 }
 
 /// Columns and rows of the terminal that stdout leads to.
@@ -44,6 +46,13 @@ pub fn size() -> io::Result<[u16; 2]> {
     let size = tcgetwinsize(io::stdout())?;
     // Some lines do not tell a size: it is zero then.
     Ok(if size.ws_col == 0 || size.ws_row == 0 { [80, 24] } else { [size.ws_col, size.ws_row] })
+}
+
+/// Width and height of a cell in pixels, if the line tells.
+pub fn cell_px() -> Option<[u16; 2]> {
+    let size = tcgetwinsize(io::stdout()).ok()?;
+    let cell = |px: u16, cells: u16| px.checked_div(cells).filter(|px| *px > 0);
+    Some([cell(size.ws_xpixel, size.ws_col)?, cell(size.ws_ypixel, size.ws_row)?])
 }
 
 /// Sets the modes of stdin, also if signals come meanwhile.
@@ -73,7 +82,13 @@ impl Screen {
     fn over(out: Box<dyn Write + Send>, before: Option<Termios>) -> io::Result<Self> {
         let (leaving, left) = bounded(1);
         let out = Mutex::new(out);
-        let tty = Arc::new(Tty { out, entered: AtomicBool::new(true), before, leaving });
+        let tty = Arc::new(Tty {
+            out,
+            entered: AtomicBool::new(true),
+            before,
+            leaving,
+            owed: Mutex::default(),
+        });
         let screen = Self { tty, left };
         let tty = Arc::clone(&screen.tty);
         let report = panic::take_hook();
@@ -106,12 +121,19 @@ impl Drop for Screen {
 impl Tty {
     /// Writes `bytes` in one go; not any more once the terminal was given back.
     pub fn write(&self, bytes: &[u8]) -> io::Result<()> {
-        let mut out = self.out.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
         if self.entered.load(Ordering::Acquire) {
             out.write_all(bytes)?;
             out.flush()?;
         }
         Ok(())
+    }
+
+    /// From now on `bytes` are sent first when the terminal is given back.
+    pub fn owe(&self, bytes: &[u8]) {
+        let mut owed = self.owed.lock().unwrap_or_else(PoisonError::into_inner);
+        owed.clear();
+        owed.extend(bytes);
     }
 
     /// Gives the terminal back. The second time nothing happens.
@@ -128,8 +150,11 @@ impl Tty {
         }
         // A terminal that has stopped reading shall not keep the program from ending.
         if let Some(mut out) = self.lock_within(PATIENCE) {
+            let mut owed = self.owed.lock().unwrap_or_else(PoisonError::into_inner);
+            let last = [&*owed, LEAVE.as_bytes()].concat();
+            owed.clear();
             // If the terminal has gone there is nothing left to restore.
-            let _ = out.write_all(LEAVE.as_bytes()).and_then(|()| out.flush());
+            let _ = out.write_all(&last).and_then(|()| out.flush());
         }
         if let Some(before) = &self.before {
             // What has come and was not read yet, such as late replies, is for nobody else.
@@ -148,7 +173,7 @@ impl Tty {
             raw.make_raw();
             set_modes(&raw, OptionalActions::Now)?;
         }
-        let mut out = self.out.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
         self.entered.store(true, Ordering::Release);
         out.write_all(ENTER.as_bytes())?;
         out.flush()
@@ -201,6 +226,19 @@ mod tests {
         tty.leave();
         tty.write(b"a frame that comes too late").unwrap();
         assert_eq!(paper.text(), format!("{ENTER}frame{LEAVE}"));
+    }
+
+    #[test]
+    fn what_is_owed_comes_before_leaving_and_once() {
+        let paper = Paper::default();
+        let screen = Screen::over(Box::new(paper.clone()), None).unwrap();
+        let tty = screen.tty();
+        tty.owe(b"old");
+        tty.owe(b"the picture goes");
+        tty.suspend();
+        tty.resume().unwrap();
+        drop(screen);
+        assert_eq!(paper.text(), format!("{ENTER}the picture goes{LEAVE}{ENTER}{LEAVE}"));
     }
 
     #[test]

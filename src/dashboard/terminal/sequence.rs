@@ -33,6 +33,13 @@ pub fn control(sequence: &[u8]) -> Option<Event> {
             let [mode, setting] = pair(text[1..].strip_suffix('$')?)?;
             return reply(Reply::Mode { mode, setting });
         }
+        (Some(b'?'), b'S') => {
+            return reply(match numbers(&text[1..])[..] {
+                [Some(1), Some(0), Some(colors)] => Reply::SixelColors(colors),
+                [Some(2), Some(0), Some(width), Some(height)] => Reply::SixelSize([width, height]),
+                _ => Reply::Other,
+            });
+        }
         (Some(b'?' | b'>' | b'=' | b'<'), _) => return reply(Reply::Other),
         _ => {}
     }

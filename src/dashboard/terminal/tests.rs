@@ -142,6 +142,9 @@ fn replies_say_what_they_say() {
         ("\x1b_Gi=31;OK\x1b\\", Reply::Graphics(true)),
         ("\x1b_Gi=31;EINVAL\x1b\\", Reply::Graphics(false)),
         ("\x1b[6;20;10t", Reply::CellSize([10, 20])),
+        ("\x1b[?1;0;1024S", Reply::SixelColors(1024)),
+        ("\x1b[?2;0;1000;800S", Reply::SixelSize([1000, 800])),
+        ("\x1b[?1;3;0S", Reply::Other),
     ] {
         assert_eq!(all_at_once(bytes), [Event::Reply(reply)], "{bytes:?}");
     }
@@ -169,6 +172,21 @@ fn answers_make_capabilities() {
         ..Capabilities::unasked(Surroundings::default())
     };
     assert_eq!(found, expected);
+    // Of what answers through tmux only some show pictures among text.
+    let multiplexer = Some(Multiplexer::Tmux);
+    for (version, expected) in [
+        ("tmux 3.3a", false),
+        ("kitty(0.27.1)", false),
+        ("kitty(0.28.0)", true),
+        ("ghostty 1.2", true),
+    ] {
+        let tmux = Surroundings { multiplexer, ..Surroundings::default() };
+        let mut behind = Capabilities::unasked(tmux);
+        behind.learn(&Reply::Version("tmux 3.3a".into()));
+        behind.learn(&Reply::Version(version.into()));
+        assert_eq!(behind.placeholders, expected, "{version}");
+        assert_eq!(behind.version.as_deref(), Some("tmux 3.3a"));
+    }
     // What the user has forbidden no answer brings back.
     let mut without = Capabilities::unasked(Surroundings { no_color: true, ..Default::default() });
     without.learn(&Reply::Setting("48;2;1;2;3m".into()));

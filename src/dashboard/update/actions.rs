@@ -104,6 +104,7 @@ impl Turn<'_> {
             Action::ExportPng => self.export(Format::Png),
             Action::ExportExr => self.export(Format::Exr),
             Action::CopyPath => self.copy_path(),
+            Action::ShowExport => self.look_at_export(),
             Action::ExportSized => self.ask_export_size(),
             Action::CancelExport => self.cancel_export(),
             Action::Exposure(change) => self.exposure(steps(change, Pace::Coarse)),

@@ -201,7 +201,7 @@ impl Turn<'_> {
                 }
                 let noise = noise_codes.map_or(String::new(), |n| format!("  noise {n:.2}"));
                 let text = format!(
-                    "{}  {width}x{height}  {spp:.0} spp{noise}  ·  y copies the path  ·  scp {scp} .",
+                    "{}  {width}x{height}  {spp:.0} spp{noise}  ·  o shows it, y copies the path  ·  scp {scp} .",
                     path.display()
                 );
                 self.model.last_export = Some(path);

@@ -1,9 +1,10 @@
 //! Keys: first to a line of text that is open, then through the key table.
 
 use super::Turn;
+use crate::dashboard::action::Action;
 use crate::dashboard::editor::Editor;
 use crate::dashboard::input::{Code, Key};
-use crate::dashboard::keymap::lookup;
+use crate::dashboard::keymap::{Context, lookup};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
 
@@ -33,6 +34,13 @@ impl Turn<'_> {
         self.model.first_time = false;
         if self.model.notice.as_ref().is_some_and(|notice| notice.until.is_none()) {
             self.model.notice = None;
+        }
+        if let Some(Overlay::Still(_)) = self.model.overlay {
+            match lookup(Context::Overlay, key) {
+                Some(action @ (Action::Suspend | Action::Quit)) => self.act(action, None),
+                _ => self.look_away(),
+            }
+            return;
         }
         if let Some(editor) = self.model.editor_mut()
             && editor.key(key)

@@ -44,7 +44,7 @@ impl Turn<'_> {
             Some(Overlay::Question(question)) => {
                 question.cursor = moved(question.cursor, steps, question.answers.len());
             }
-            Some(Overlay::Prompt(_)) => {}
+            Some(Overlay::Prompt(_) | Overlay::Still(_)) => {}
             Some(Overlay::Form(_)) => {
                 if self.apply_field() {
                     self.walk_field(steps);
@@ -114,6 +114,7 @@ impl Turn<'_> {
             }
             Some(Overlay::Prompt(_)) => self.answer_prompt(),
             Some(Overlay::Question(question)) => self.answer(question.cursor),
+            Some(Overlay::Still(_)) => {}
             None if self.model.focus == Focus::Inspector => {
                 if self.model.inspector.editor.is_some() {
                     self.apply_field();

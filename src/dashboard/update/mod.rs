@@ -15,6 +15,7 @@ mod objects;
 mod prompt;
 mod recovery;
 mod render;
+mod still;
 
 use super::message::{Effect, Message};
 use super::model::{Inspector, Model, Notice, Tone};
@@ -85,6 +86,7 @@ impl<'a> Turn<'a> {
             Message::Paste(text) => self.paste(&text),
             Message::Resize(screen) => {
                 self.model.screen = screen;
+                self.look_again();
                 self.repaint();
             }
             Message::Snapshot(snapshot) => {
@@ -111,6 +113,13 @@ impl<'a> Turn<'a> {
                 self.follow = false;
                 if let Some(export) = &mut self.model.export {
                     export.progress = progress;
+                }
+            }
+            Message::Still(path, result) => self.still(&path, result),
+            Message::StillSent(sent) => {
+                self.follow = false;
+                if let Some(Overlay::Still(looked)) = &mut self.model.overlay {
+                    looked.sent = sent;
                 }
             }
             Message::Line(line) => {

@@ -119,6 +119,7 @@ impl Turn<'_> {
                 }
                 return;
             }
+            Some(Overlay::Still(_)) => return self.look_away(),
             _ => return,
         };
         if let Some(at) = line_at(place.list, scroll, mouse).filter(|at| *at < len) {

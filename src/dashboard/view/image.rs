@@ -4,6 +4,7 @@ use super::legend::Legend;
 use crate::dashboard::layout::Area;
 use crate::dashboard::message::Channel;
 use crate::dashboard::model::{Compared, Model};
+use crate::dashboard::overlay::Overlay;
 use crate::dashboard::raster::{
     Ink, PictureCell, PictureCells, Raster, Scale, depth, difference, normals, objects,
 };
@@ -31,6 +32,9 @@ struct Kept {
 
 /// Whether the picture will stay as it is until somebody does something.
 pub fn is_settled(model: &Model) -> bool {
+    if let Some(Overlay::Still(_)) = model.overlay {
+        return true;
+    }
     let resting = |s: &Snapshot| matches!(s.report.state, State::Resting(_) | State::Paused);
     model.snapshot.as_ref().is_some_and(|s| resting(s)) || model.comparison.shown == Compared::Kept
 }

@@ -13,6 +13,7 @@ mod plot;
 mod probe;
 mod reading;
 mod status;
+mod still;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -66,6 +67,14 @@ impl View {
     /// Where text is being typed, if it is.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme::new(model.colors);
+        if let Some(Overlay::Still(looked)) = &model.overlay {
+            let shown = still::draw(model, looked, &theme, buffer);
+            (self.place, self.uncovered) = match (shown, &looked.still) {
+                (Some(cells), Some(still)) => image::uncovered(&cells, still.place, buffer),
+                _ => (Rect::ZERO, Vec::new()),
+            };
+            return None;
+        }
         (self.place, self.uncovered) = (Rect::ZERO, Vec::new());
         let Some(layout) = model.layout() else {
             too_small(model.screen, buffer);

@@ -10,7 +10,7 @@ use crate::dashboard::layout::Area;
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::{Form, Overlay, Palette, Pick, Prompt, Question};
 use crate::dashboard::places::{Place, wrapped};
-use crate::dashboard::quality::Cost;
+use crate::dashboard::quality::{ABOUT, Cost};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::Style;
@@ -26,6 +26,8 @@ pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Positio
         Overlay::Pick(open) => pick(open, &place, theme, buffer),
         Overlay::Form(open) => return form(model, open, &place, theme, buffer),
         Overlay::Prompt(open) => return prompt(open, &place, theme, buffer),
+        // It has the whole screen.
+        Overlay::Still(_) => {}
         Overlay::Question(open) => question(open, &place, theme, buffer),
     }
     None
@@ -89,12 +91,11 @@ fn qualities(model: &Model, cursor: usize, place: &Place, theme: &Theme, buffer:
         };
         let unit = if quality.noise_codes == 1.0 { "code" } else { "codes" };
         let target = if quality.is_target { "→ " } else { "  " };
-        to.put_right("  ", 0, rest).put_right(&cost, 8, name);
+        to.put_right("  ", 0, rest).put_right(&cost, 8, name).put_right("  ", 0, rest);
         to.put(target, theme.good()).put_wide(&quality.noise_codes.to_string(), 5, name).skip(1);
         to.put_wide(unit, 5, name).skip(2).put(quality.looks, rest);
     }
-    let about = "Halving the noise takes two to four times as long. Enter: stop there.";
-    say(about, theme.dim(), place.help, buffer);
+    say(ABOUT, theme.dim(), place.help, buffer);
 }
 
 /// A row of a list with a cursor.

@@ -158,7 +158,8 @@ fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<
         None => text.push(dim(" codes")),
     }
     if let (Some((from, to)), State::Tracing) = (report.eta_seconds, &report.state) {
-        text.push((format!(" in {}", durations(from, to)), theme.text()));
+        let left = if to < 1.0 { "under 1 s".to_string() } else { durations(from, to) };
+        text.push((format!(" in {left}"), theme.text()));
     }
     text
 }

@@ -105,14 +105,21 @@ fn unquoted(text: &str) -> &str {
     text.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(text)
 }
 
-/// Numbers between commas, semicolons or spaces (or the `x` of `640x480`), brackets around them or
-/// not.
+/// Numbers between commas, semicolons or spaces (or the `x` of `640x480` and `640 x 480`), brackets
+/// around them or not.
 fn numbers(text: &str) -> Option<Vec<f64>> {
     let inner = match text.strip_prefix('[') {
         Some(rest) => rest.strip_suffix(']')?,
         None => text,
     };
-    let parts = inner.split([',', ';', 'x', '×', ' ', '\t']).filter(|part| !part.is_empty());
+    let words: Vec<_> =
+        inner.split([',', ';', ' ', '\t']).filter(|word| !word.is_empty()).collect();
+    let is_number = |at: usize| words.get(at).is_some_and(|word| digits(word));
+    let between = |at: usize| {
+        ["x", "×"].contains(&words[at]) && at > 0 && is_number(at - 1) && is_number(at + 1)
+    };
+    let parts = (0..words.len()).filter(|at| !between(*at));
+    let parts = parts.flat_map(|at| words[at].split(['x', '×']));
     parts.map(|part| digits(part).then(|| part.parse().ok())?).collect()
 }
 
@@ -178,7 +185,10 @@ mod tests {
         {
             assert_eq!(parse(&one, text), Ok(Value::Float(expected)), "{text}");
         }
-        for text in ["", "x", "inf", "nan", "1 2", "0,5", "--1", "1e", "[1", "e", "0x10"] {
+        for text in [
+            "", "x", "inf", "nan", "1 2", "0,5", "--1", "1e", "[1", "e", "0x10", "1x", "x1", "1 x",
+            "×2",
+        ] {
             assert!(parse(&one, text).is_err(), "{text}");
         }
         let three = field(Takes::Numbers(3, Range::FINITE));
@@ -188,8 +198,12 @@ mod tests {
         let refusal = parse(&three, "1 2").unwrap_err();
         assert_eq!(refusal.found, "it needs 3 numbers, not 2");
         let size = field(Takes::Wholes(2, Range::closed(1.0, 100.0)));
-        assert_eq!(floats(&parse(&size, "64x48").unwrap()), Some(vec![64.0, 48.0]));
-        for text in ["64x", "64 0", "64 4.5", "64 1e9"] {
+        for text in ["64x48", "64 x 48", "64×48", "64 48"] {
+            assert_eq!(floats(&parse(&size, text).unwrap()), Some(vec![64.0, 48.0]), "{text}");
+        }
+        for text in
+            ["64x", "x64", "64 48x", "64xx48", "64 x x 48", "64 x", "64 0", "64 4.5", "64 1e9"]
+        {
             assert!(parse(&size, text).is_err(), "{text}");
         }
         let factor = field(Takes::Factor);

@@ -1,0 +1,63 @@
+//! PNG files as codes to be shown.
+
+use png::{ColorType, Decoder, Transformations};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// The most pixels that are read: as many as a scene may have.
+const MAX_PIXELS: u64 = 1 << 26;
+
+/// Width and height of a PNG and its sRGB codes row by row, without what it may say about transparency.
+///
+/// # Errors
+/// It cannot be read or is too large.
+pub fn read_png(path: &Path) -> Result<([usize; 2], Vec<[u8; 3]>), String> {
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    let mut decoder = Decoder::new(BufReader::new(file));
+    decoder.set_transformations(Transformations::EXPAND | Transformations::STRIP_16);
+    let mut reader = decoder.read_info().map_err(|error| error.to_string())?;
+    let (width, height) = reader.info().size();
+    let count = u64::from(width) * u64::from(height);
+    if count > MAX_PIXELS {
+        return Err(format!("it has {count} pixels; expected at most {MAX_PIXELS}"));
+    }
+    let bytes = reader.output_buffer_size().ok_or("it is too large")?;
+    let mut codes = vec![0; bytes];
+    reader.next_frame(&mut codes).map_err(|error| error.to_string())?;
+    let pixels = match reader.output_color_type().0 {
+        ColorType::Rgb => codes.as_chunks::<3>().0.to_vec(),
+        ColorType::Rgba => {
+            codes.as_chunks::<4>().0.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect()
+        }
+        ColorType::GrayscaleAlpha => {
+            codes.as_chunks::<2>().0.iter().map(|[y, _]| [*y; 3]).collect()
+        }
+        // Palettes are expanded.
+        ColorType::Grayscale | ColorType::Indexed => codes.iter().map(|y| [*y; 3]).collect(),
+    };
+    Ok(([width as usize, height as usize], pixels))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::png_of_rgb;
+
+    #[test]
+    fn what_is_written_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let codes: Vec<u8> = (0..5 * 3 * 3).map(|i| (i * 37 % 256) as u8).collect();
+        std::fs::write(&path, png_of_rgb([5, 3], &codes).unwrap()).unwrap();
+        let (size, pixels) = read_png(&path).unwrap();
+        assert_eq!((size, pixels.as_flattened()), ([5, 3], &codes[..]));
+        // However it is cut off, it is an error or the picture.
+        let whole = std::fs::read(&path).unwrap();
+        for length in 0..whole.len() {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            assert!(read_png(&path).is_err() || length > whole.len() - 16, "{length}");
+        }
+        assert!(read_png(&folder.path().join("none.png")).is_err());
+    }
+}
