@@ -155,6 +155,8 @@ impl Groups {
         let mut splits = vec![[[0; 2]; WIDE]; nodes.len()];
         // The least sum of areas of a node's part of the tree in at most so many boxes.
         let mut costs = vec![[0.0f32; WIDE]; nodes.len()];
+        // Branches of boxes without an area are not for nothing.
+        let least_area = 1e-7 * nodes[0].aabb().half_area() + f32::MIN_POSITIVE;
         let mut order = vec![0];
         for at in 0.. {
             let Some(node) = order.get(at) else { break };
@@ -180,7 +182,7 @@ impl Groups {
                 })
             };
             let (inside, split) = least(WIDE);
-            let mut cost = [inside + node.aabb().half_area(); WIDE];
+            let mut cost = [inside + node.aabb().half_area() + least_area; WIDE];
             splits[number][0] = split;
             for boxes in 2..=WIDE {
                 let (apart, split) = least(boxes);
@@ -257,7 +259,9 @@ mod tests {
         assert!(met.iter().all(|n| *n == 1), "{count} things, {in_leaf} a leaf: {met:?}");
         assert_eq!(deepest, boxes.depth());
         let fill = filled as f64 / boxes.branches().len() as f64;
-        assert!(count < 500 || fill > 5.0, "{fill} boxes in a branch of {count} things");
+        // Three at one place share a branch of no area.
+        let full = if size > 0.0 { 4.5 } else { 3.0 };
+        assert!(count < 500 || fill > full, "{fill} boxes in a branch of {count} things");
     }
 
     #[test]
