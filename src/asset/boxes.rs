@@ -226,18 +226,17 @@ mod tests {
         [middle.map(|x| x - size), middle.map(|x| x + size * (1.0 + (i % 5) as f32))]
     }
 
-    /// Everything lies in one leaf, in all the boxes on the way to it, and branches are well filled.
+    /// Everything lies in one leaf, in all the boxes on the way to it.
     fn holds(count: usize, size: f32, in_leaf: usize) {
         let built =
             Boxes::build(count, |i| corners(i, size), in_leaf, BvhBuildParams::fast_build());
         let (boxes, mut met) = (&built.boxes, vec![0; count]);
         let mut todo = vec![(0u32, 1, Vec::new())];
-        let (mut filled, mut deepest) = (0, 0);
+        let mut deepest = 0;
         while let Some((branch, depth, around)) = todo.pop() {
             deepest = depth.max(deepest);
             let branch = &boxes.branches()[branch as usize];
             for place in branch.places() {
-                filled += 1;
                 let mut around: Vec<[f32; 6]> = around.clone();
                 around.push(branch.sides.map(|side| side[place]));
                 let child = branch.child[place];
@@ -258,10 +257,6 @@ mod tests {
         }
         assert!(met.iter().all(|n| *n == 1), "{count} things, {in_leaf} a leaf: {met:?}");
         assert_eq!(deepest, boxes.depth());
-        let fill = filled as f64 / boxes.branches().len() as f64;
-        // Three at one place share a branch of no area.
-        let full = if size > 0.0 { 4.5 } else { 3.0 };
-        assert!(count < 500 || fill > full, "{fill} boxes in a branch of {count} things");
     }
 
     #[test]
