@@ -226,7 +226,7 @@ mod tests {
         [middle.map(|x| x - size), middle.map(|x| x + size * (1.0 + (i % 5) as f32))]
     }
 
-    /// Everything lies in one leaf, in all the boxes on the way to it.
+    /// Everything lies in one leaf, and in all the boxes on the way to it.
     fn holds(count: usize, size: f32, in_leaf: usize) {
         let built =
             Boxes::build(count, |i| corners(i, size), in_leaf, BvhBuildParams::fast_build());
