@@ -261,3 +261,37 @@ impl Plan {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+
+    fn names(topic: Topic, threads: usize) -> Vec<String> {
+        let plan = Plan {
+            targets: vec![0.5],
+            topics: vec![topic],
+            repetitions: 3,
+            seconds: 1.0,
+            threads,
+            seed: 0,
+            display: Display::default(),
+        };
+        let all = plan.variations(&Arc::new(built_in()));
+        assert_eq!((all[0].topic, all[0].threads), (Topic::Default, threads));
+        all[1..].iter().map(|v| v.name.clone()).collect()
+    }
+
+    /// What would be the default again is left out.
+    #[test]
+    fn variations_differ_from_the_default() {
+        assert_eq!(names(Topic::Precision, 2), ["double"]);
+        assert_eq!(names(Topic::Threads, 1), [""; 0]);
+        assert_eq!(names(Topic::Threads, 2), ["1 thread"]);
+        assert_eq!(names(Topic::Threads, 6), ["1 thread", "2 threads", "4 threads"]);
+        assert_eq!(names(Topic::Adaptivity, 2), ["uniform"]);
+        assert_eq!(Topic::Threads.of_default(true, 6), "6 threads, default");
+        assert_eq!(Topic::Precision.of_default(true, 6), "single, default");
+        assert_eq!(Topic::Depth.of_default(true, 6), "default");
+    }
+}

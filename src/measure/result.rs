@@ -65,6 +65,8 @@ pub struct Measurement {
     pub targets: Vec<f64>,
     /// Those of them that the default did not reach in its time.
     pub expected: Vec<Expected>,
+    /// Settings that were asked for and have nothing to compare in this scene.
+    pub idle: Vec<Topic>,
     /// The default first.
     pub measured: Vec<Measured>,
 }
@@ -350,6 +352,7 @@ mod tests {
             compared_at: 0.5,
             targets: vec![1.0, 0.25],
             expected: Vec::new(),
+            idle: Vec::new(),
             measured: vec![way],
         };
         let steady = measurement.steadiness();

@@ -2,7 +2,7 @@
 
 use super::curve::{End, repeat, walk};
 use super::picture::Reference;
-use super::plan::{Plan, Variation};
+use super::plan::{Plan, Topic, Variation};
 use super::result::{Expected, Measured, Measurement, spread};
 use crate::render::Course;
 use crate::scene::Scene;
@@ -54,6 +54,7 @@ pub fn measure(
     let begun = Instant::now();
     let variations = plan.variations(scene);
     let default = &variations[0];
+    let idle = |topic: &Topic| !variations.iter().any(|v| v.topic == *topic);
     let of = 1 + variations.len() * plan.repetitions.max(1);
     let mut go_on = tell(Progress { what: "reference", done: 0, of });
 
@@ -126,6 +127,7 @@ pub fn measure(
         compared_at,
         targets: plan.targets.clone(),
         expected,
+        idle: plan.topics.iter().copied().filter(idle).collect(),
         measured,
     })
 }
@@ -184,4 +186,55 @@ fn make_reference(default: &Variation, codes: f64, seconds: f64) -> io::Result<M
         spp: course.spp().mean,
         seconds: course.seconds(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::curve::Point;
+    use super::super::picture::Errors;
+    use super::*;
+
+    /// A way with these seconds and codes.
+    fn way(points: &[(f64, f64)]) -> Measured {
+        let point = |(seconds, codes): &(f64, f64)| Point {
+            step: 1,
+            samples: 1,
+            spp: *seconds,
+            seconds: vec![*seconds; 3],
+            told_codes: Some(*codes),
+            errors: Errors { rmse_linear: 0.0, rmse_codes: *codes, rel_mse: 0.0, spread: 0.0 },
+        };
+        Measured {
+            topic: Topic::Default,
+            name: String::new(),
+            threads: 1,
+            points: points.iter().map(point).collect(),
+            taken: vec![None; 3],
+            bias: None,
+        }
+    }
+
+    #[test]
+    fn settings_are_compared_where_there_is_time_for_it() {
+        let default = way(&[(0.1, 5.0), (1.0, 1.6), (2.0, 0.8), (5.0, 0.3)]);
+        let targets = [2.0, 1.0, 0.5, 0.25];
+        assert_eq!(level(&default, &targets, 9.0), 0.5, "no finer than is needed");
+        assert_eq!(level(&default, &targets, 2.0), 1.0);
+        assert_eq!(level(&default, &targets, 0.3), 4.0, "coarser than asked for");
+        assert_eq!(level(&default, &targets, 0.01), 4.0, "what was reached first, not at once");
+        assert_eq!(
+            level(&way(&[(1.0, 0.2)]), &targets, 9.0),
+            0.5,
+            "at once is better than nothing"
+        );
+        assert_eq!(level(&way(&[(1.0, 30.0), (2.0, 20.0)]), &targets, 9.0), 20.0, "where it ended");
+    }
+
+    #[test]
+    fn ways_are_steady_when_their_repetitions_agree() {
+        let mut way = way(&[(1.0, 1.0), (2.0, 0.5)]);
+        assert!(is_steady(&way, 0.5) && is_steady(&way, 0.1));
+        way.points[1].seconds = vec![2.0, 2.4, 2.0];
+        assert!(!is_steady(&way, 0.5) && !is_steady(&way, 0.1) && is_steady(&way, 1.0));
+    }
 }

@@ -175,6 +175,9 @@ impl fmt::Display for About<'_> {
             }
             self.row(f, &measured.name, measured)?;
         }
+        for topic in &m.idle {
+            writeln!(f, "\n{}: there is nothing to compare here", topic.question())?;
+        }
         if m.measured.iter().any(|m| m.bias.is_some()) {
             writeln!(
                 f,
