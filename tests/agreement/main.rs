@@ -115,7 +115,7 @@ fn deliberate_errors_are_found() {
     for lobe in [Lobe::Cone, Lobe::Beckmann] {
         let mut scene = scene("roughness-0.3.toml");
         scene.materials.values_mut().for_each(|material| material.lobe = lobe);
-        is_found(Mutation::WiderLobe, &format!("{lobe:?}"), &scene, 24 * PLAIN);
+        is_found(Mutation::WiderLobe, &format!("{lobe:?}"), &scene, 32 * PLAIN);
         is_found(Mutation::LobeDensity, &format!("{lobe:?}"), &scene, PLAIN);
     }
 }

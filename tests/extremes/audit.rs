@@ -165,7 +165,7 @@ const EXTREMES: [(&str, &str, &str, &str); 30] = [
     ),
     (
         "the shift by a slab at 0 .. 89.9 degrees",
-        "within 1e-10 t (single: 1e-3 t)",
+        "within 1e-10 t (single: 1.5e-3 t)",
         "slab_displacement",
         "tests/lobes/through.rs",
     ),

@@ -17,13 +17,16 @@ const GLASS: &str = "ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmissio
 
 /// A slab of thickness t shifts a ray by t sin i (1 - cos i / sqrt(n^2 - sin^2 i)) and lets it go on in
 /// the old direction. How far off the shift is at most, as a share of t, while it is no more than
-/// rounding makes it: a direction's last digit over the way from the ray's origin through the slab, which
-/// at 89.9 degrees is 600 to 1000 long, and a coordinate's there.
+/// rounding makes it: a direction's last digit over the way through the slab, which at 89.9 degrees is up
+/// to 430 long, and the two starts behind surfaces, 8 roundings of the slab's half width off them.
 fn check_slab<L: Lanes>() -> f64 {
+    /// The least that holds a ray at 89.9 degrees in a slab that does not bend it.
+    const HALF_WIDTH: f64 = 450.0;
     let t = 0.75;
     let slab = scene(&format!(
-        "[[object]]\nshape.box = {{ center = [0.0, 0.0, {}], size = [2e3, 2e3, {t}] }}",
-        -0.5 * t
+        "[[object]]\nshape.box = {{ center = [0.0, 0.0, {}], size = [{}, 2.0, {t}] }}",
+        -0.5 * t,
+        2.0 * HALF_WIDTH
     ));
     let form = slab.objects[0].shape.form();
     let geometry = Geometry::<L>::with_tree(&[form], false);
@@ -52,12 +55,12 @@ fn check_slab<L: Lanes>() -> f64 {
             let expected = t * sin * (1.0 - cos / (n * n - sin * sin).sqrt());
             let off = (shift - expected).abs() / t;
             let through = t / (1.0 - (sin / n).powi(2)).sqrt();
-            let rounding = L::EPSILON * (1.0 + 1.0 / cos + through) / t;
-            assert!(off <= 4.0 * rounding, "{}, {n} {i}: {shift} {expected}", L::NAME);
+            let roundings = 4.0 * (1.0 + 1.0 / cos + through) + 2.0 * 8.0 * HALF_WIDTH * sin;
+            assert!(off <= L::EPSILON * roundings / t, "{}, {n} {i}: {shift} {expected}", L::NAME);
             worst = worst.max(off);
             let turned = number((ray.direction - direction).max_abs());
             // Near grazing incidence a rounding of the sine is a larger one of the cosine.
-            let allowed = 4.0 * L::EPSILON / cos * n.max(1.0);
+            let allowed = L::EPSILON * (4.0 * n / cos).min(4.5e5);
             assert!(turned <= allowed, "{}, {n} {i}: turned by {turned}", L::NAME);
         }
     }
@@ -70,7 +73,7 @@ fn extreme_27_slab_displacement() {
     assert!(double <= 1e-10, "{double}");
     told(27, "double", &format!("{double:.0e} t off at most"));
     let single = check_slab::<f32>();
-    assert!(single <= 1e-3, "{single}");
+    assert!(single <= 1.5e-3, "{single}");
     told(27, "single", &format!("{single:.0e} t off at most"));
 }
 
