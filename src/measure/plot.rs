@@ -11,11 +11,11 @@ use std::error::Error;
 use std::ops::Range;
 
 /// Width and height of a panel, and of the head above all panels, in pixels.
-const PANEL: (i32, i32) = (440, 360);
+const PANEL: (i32, i32) = (440, 374);
 const HEAD: i32 = 64;
 
 /// From a panel's sides to its field: left, right, top, bottom.
-const FRAME: [i32; 4] = [58, 22, 74, 50];
+const FRAME: [i32; 4] = [58, 22, 96, 50];
 
 /// Axes' ends are this much beyond the data.
 const MARGIN: f64 = 1.15;
@@ -207,20 +207,22 @@ where
         root.draw(&path((x0, y), (x1, y), &GRID))?;
         root.draw_text(&label, &text(13, INK, HPos::Right, VPos::Center), (x0 - 8, y))?;
     }
-    let small = |h| text(12, TARGET, h, VPos::Bottom);
+    // Lines come from the upper left: below them there is room.
+    let small = text(12, TARGET, HPos::Left, VPos::Bottom);
     for target in measurement.targets.iter().filter(|t| codes.numbers.contains(t)) {
         let y = codes.at(*target);
         for x in (x0..x1).step_by(8) {
             root.draw(&path((x, y), ((x + 4).min(x1), y), &TARGET))?;
         }
-        root.draw_text(&format!("{target} codes"), &small(HPos::Right), (x1, y - 2))?;
+        let unit = if *target == 1.0 { "code" } else { "codes" };
+        root.draw_text(&format!("{target} {unit}"), &small, (x0 + 4, y - 2))?;
     }
     root.draw(&path((x0, y0), (x1, y0), &INK))?;
     root.draw(&path((x0, y0), (x0, y1), &INK))?;
     let axis = text(13, DEFAULT, HPos::Right, VPos::Top);
     root.draw_text("seconds of tracing", &axis, (x1, y0 + 26))?;
     let axis = text(13, DEFAULT, HPos::Left, VPos::Top);
-    root.draw_text("RMSE as displayed, 8-bit codes, against", &axis, (x0 - 34, y0 + 26))?;
+    root.draw_text("RMSE as displayed, 8-bit codes", &axis, (x0 - 34, y1 - 26))?;
     for Line { color, points, .. } in &lines {
         let at: Vec<(i32, i32)> =
             points.iter().map(|(s, e)| (seconds.at(*s), codes.at(*e))).collect();
