@@ -52,7 +52,8 @@ fn check_slab<L: Lanes>() -> f64 {
             // Beside the way that the ray would have gone.
             let way = ray.origin - from;
             let shift = (number(way.x) * -cos - number(way.z) * sin).abs();
-            let expected = t * sin * (1.0 - cos / (n * n - sin * sin).sqrt());
+            // n^2 - sin^2, without cancellation at n = 1.
+            let expected = t * sin * (1.0 - cos / (n * n - 1.0 + cos * cos).sqrt());
             let off = (shift - expected).abs() / t;
             let through = t / (1.0 - (sin / n).powi(2)).sqrt();
             let roundings = 4.0 * (1.0 + 1.0 / cos + through) + 2.0 * 8.0 * HALF_WIDTH * sin;
