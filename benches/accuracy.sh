@@ -6,7 +6,8 @@
 #
 # In docs/accuracy.md a block between `<!-- measured: KEY SCENE OPTIONS -->` and `<!-- end -->` is replaced by what
 # `zerkalo measure scenes/SCENE.toml OPTIONS` prints; the drawing goes to docs/images/accuracy-KEY.svg, the numbers to
-# benches/runs/DATE-accuracy-KEY.csv.
+# benches/runs/DATE-accuracy-KEY.csv. The block `<!-- extremes -->` (its key is `extremes`) is replaced by what the
+# tests of extremes tell; that takes no quiet machine.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -16,25 +17,12 @@ zerkalo="${ZERKALO:-target/release/zerkalo}"
 scratch="$(mktemp -d)"
 trap 'rm -rf "$scratch"' EXIT
 
-sed -n 's/^<!-- measured: \(.*\) -->$/\1/p' "$page" > "$scratch/blocks"
-while read -r key scene options; do
-    if [ $# -gt 0 ] && [[ " $* " != *" $key "* ]]; then
-        continue
-    fi
-    echo "$key: $scene $options" >&2
-    # shellcheck disable=SC2086 # Options are words.
-    "$zerkalo" measure "scenes/$scene.toml" $options \
-        --plot "docs/images/accuracy-$key.svg" --csv "benches/runs/$day-accuracy-$key.csv" \
-        > "$scratch/$key.txt" < /dev/null
-    awk -v key="$key" -v text="$scratch/$key.txt" '
-        /^<!-- measured: / && $3 == key {
+# Puts the text of the second file after the line of the page that the first one holds, up to the block's end.
+replace() {
+    awk -v begin="$(cat "$1")" -v text="$2" '
+        $0 == begin {
             print
-            command = $0
-            sub(/^<!-- measured: [^ ]+ [^ ]+/, "", command)
-            sub(/ -->$/, "", command)
-            print "\n    $ zerkalo measure scenes/" $4 ".toml" command "\n"
-            while ((getline line < text) > 0) print (line == "" ? "" : "    " line)
-            print "\n![Error against time](images/accuracy-" key ".svg)\n"
+            while ((getline line < text) > 0) print line
             inside = 1
             next
         }
@@ -42,4 +30,53 @@ while read -r key scene options; do
         !inside { print }
     ' "$page" > "$scratch/page"
     cp "$scratch/page" "$page"
+}
+
+wanted() {
+    local key="$1"
+    shift
+    [ $# -eq 0 ] || [[ " $* " == *" $key "* ]]
+}
+
+sed -n 's/^<!-- measured: \(.*\) -->$/\1/p' "$page" > "$scratch/blocks"
+while read -r key scene options; do
+    wanted "$key" "$@" || continue
+    echo "$key: $scene $options" >&2
+    # shellcheck disable=SC2086 # Options are words.
+    "$zerkalo" measure "scenes/$scene.toml" $options \
+        --plot "docs/images/accuracy-$key.svg" --csv "benches/runs/$day-accuracy-$key.csv" \
+        > "$scratch/$key.txt" < /dev/null
+    {
+        printf '\n    $ zerkalo measure scenes/%s.toml%s\n\n' "$scene" "${options:+ $options}"
+        sed 's/^\(.\)/    \1/' "$scratch/$key.txt"
+        printf '\n![Error against time](images/accuracy-%s.svg)\n\n' "$key"
+    } > "$scratch/$key.md"
+    echo "<!-- measured: $key $scene${options:+ $options} -->" > "$scratch/begin"
+    replace "$scratch/begin" "$scratch/$key.md"
 done < "$scratch/blocks"
+
+if wanted extremes "$@"; then
+    echo "extremes: the tests" >&2
+    cargo test --lib --test extremes --test lobes --test film --test determinism --test honesty \
+        -- --nocapture extreme all_thirty < /dev/null > "$scratch/tests.txt"
+    grep -o 'extreme [0-9][0-9] | .*' "$scratch/tests.txt" | LC_ALL=C sort -u > "$scratch/told.txt"
+    awk -F ' [|] ' '
+        function add(column, words) {
+            cell[n, column] = cell[n, column] (cell[n, column] == "" ? "" : "; ") words
+        }
+        {
+            n = substr($1, 9) + 0
+            if ($2 == "both") { add("single", $3); add("double", $3) } else add($2, $3)
+        }
+        END {
+            print "\n| # | what | asked | single | double | `auto` takes |"
+            print "|---|---|---|---|---|---|"
+            for (n = 1; n <= 30; n++)
+                printf "| %d | %s | %s | %s | %s | %s |\n", n, cell[n, "about"], cell[n, "criterion"], \
+                    cell[n, "single"], cell[n, "double"], cell[n, "auto"]
+            print ""
+        }
+    ' "$scratch/told.txt" > "$scratch/extremes.md"
+    echo "<!-- extremes -->" > "$scratch/begin"
+    replace "$scratch/begin" "$scratch/extremes.md"
+fi

@@ -2,12 +2,15 @@
 //! whichever thread traced it, in whatever order, in packets of whatever form, in whatever parts.
 
 mod support;
+#[path = "common/told.rs"]
+mod told;
 
 use std::fs;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use support::{Rng, all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
+use told::told;
 use zerkalo::film::Film;
 use zerkalo::render::Rendering;
 use zerkalo::render::session::Traced;
@@ -70,6 +73,7 @@ fn extreme_29_determinism() {
             }
         }
     }
+    told(29, "both", "threads 1, 2, 7: the same bytes");
 }
 
 #[test]
@@ -90,9 +94,12 @@ fn extreme_29_parts_added_in_any_order_are_the_whole() {
             }
         }
     }
+    told(29, "both", "parts in 6 orders: the same bytes");
 }
 
-/// A render that is stopped somewhere in a wave, and another one, begun anew, that traces what is left.
+/// A render that is stopped somewhere in a wave, and another one, begun anew, that traces what is left:
+/// what a process that is killed leaves behind, and what the next one adds. A film has no file yet that
+/// the two could be apart by, so both live here; its bytes are those that such a file would hold.
 #[test]
 fn extreme_29_stopped_and_resumed() {
     let pool = pool(2);
@@ -124,6 +131,7 @@ fn extreme_29_stopped_and_resumed() {
             }
         }
     }
+    told(29, "both", "stopped and resumed: the same bytes");
 }
 
 #[test]

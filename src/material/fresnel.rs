@@ -113,6 +113,7 @@ mod tests {
     /// Extreme test 24: in [0, 1], F(1) = F0, no NaN, for every F0 and cosine.
     #[test]
     fn extreme_24_fresnel() {
+        let mut worst = 0f64;
         for f0 in [0.0, 1e-9, 0.04, 0.349, 0.989, 1.0 - 2f64.powi(-24), 1.0] {
             for law in [Fresnel::Constant, Fresnel::Schlick, Fresnel::Exact] {
                 let material = Material {
@@ -130,8 +131,11 @@ mod tests {
                     assert!((0.0..=1.0 + 1e-6).contains(&f), "{law:?} F0 {f0} c {c}: {f}");
                 }
                 assert!((double.at(1.0).x - f0).abs() <= 1e-7, "{law:?} {f0}");
+                worst = worst.max((double.at(1.0).x - f0).abs());
             }
         }
+        println!("extreme 24 | double | F(1) {worst:.0e} off at most, all in [0, 1]");
+        println!("extreme 24 | single | all in [0, 1 + 1e-6]");
     }
 
     /// Grazing light is reflected whole; a dielectric of n = 1.5 gives the textbook's 4 %.

@@ -1,5 +1,6 @@
 //! One setting's way from the first samples to a quiet picture.
 
+use super::calm::Waits;
 use super::picture::{Errors, Reference};
 use super::plan::Variation;
 use crate::render::Course;
@@ -36,13 +37,25 @@ pub struct End {
 /// The error is looked at each time it has, by the program's own estimate, come down by this factor.
 const EVERY: f64 = 0.84;
 
-/// The way of `variation`, with errors, and the picture at its end.
+/// The share of the processors' time that others took while so many threads wanted them for so many
+/// seconds since `before`; `None`: nobody knows, or these threads wait for each other.
+fn taken(before: Option<&Waits>, threads: usize, seconds: f64) -> Option<f64> {
+    if seconds <= 0.0 || threads > std::thread::available_parallelism().map_or(1, usize::from) {
+        return None;
+    }
+    let waited = Waits::now()?.seconds_since(before?);
+    Some((waited / (threads as f64 * seconds)).min(1.0))
+}
+
+/// The way of `variation`, with errors, the share of the processors that others took meanwhile, and the
+/// picture at its end.
 pub fn walk(
     variation: &Variation,
     reference: &Reference,
     end: End,
-) -> io::Result<(Vec<Point>, Course)> {
+) -> io::Result<(Vec<Point>, Option<f64>, Course)> {
     let mut course = variation.course()?;
+    let before = Waits::now();
     let mut points: Vec<Point> = Vec::new();
     let mut looked_at = f64::INFINITY;
     for step in 1.. {
@@ -72,12 +85,14 @@ pub fn walk(
             }
         }
     }
-    Ok((points, course))
+    let taken = taken(before.as_ref(), variation.threads, course.seconds());
+    Ok((points, taken, course))
 }
 
-/// Goes the same way again and notes the seconds.
-pub fn repeat(variation: &Variation, points: &mut [Point]) -> io::Result<()> {
+/// Goes the same way again and notes the seconds; the share of the processors that others took meanwhile.
+pub fn repeat(variation: &Variation, points: &mut [Point]) -> io::Result<Option<f64>> {
     let mut course = variation.course()?;
+    let before = Waits::now();
     let mut step = 0;
     for point in points {
         while step < point.step {
@@ -86,5 +101,5 @@ pub fn repeat(variation: &Variation, points: &mut [Point]) -> io::Result<()> {
         }
         point.seconds.push(course.seconds());
     }
-    Ok(())
+    Ok(taken(before.as_ref(), variation.threads, course.seconds()))
 }

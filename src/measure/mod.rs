@@ -2,8 +2,10 @@
 //! given noise, what each setting costs and what it gets wrong.
 //!
 //! Errors are those of a seeded picture and come out the same each time; seconds are medians of
-//! repetitions, taken in turns so that a slow moment of the machine hits all settings alike.
+//! repetitions, taken in turns so that a slow moment of the machine hits all settings alike, and those
+//! in which other programs took the processors are left out.
 
+mod calm;
 mod curve;
 mod picture;
 mod plan;
@@ -13,8 +15,8 @@ mod run;
 mod slope;
 
 pub use curve::Point;
-pub use picture::{Errors, Reference};
+pub use picture::{Bias, Errors, Reference};
 pub use plan::{Plan, Topic, Variation};
-pub use result::{Bias, Crossing, Measured, Measurement, median, spread};
+pub use result::{Crossing, Expected, Measured, Measurement, Steadiness, median, spread};
 pub use run::{Progress, measure};
 pub use slope::Slope;

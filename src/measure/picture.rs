@@ -10,6 +10,9 @@ pub struct Reference {
     size: [usize; 2],
     pixels: Vec<[f64; 3]>,
     codes: Vec<[f64; 3]>,
+    /// Half the difference of the replicates in codes: as large as its error, and independent of it.
+    /// Empty: it is taken for the truth.
+    halves: Vec<[f64; 3]>,
     own: Squares,
     /// Variance of the mean of all pixels and channels.
     mean_variance: f64,
@@ -33,6 +36,27 @@ pub struct Errors {
     pub rmse_codes: f64,
     /// Mean of (x - r)^2 / (r^2 + 0.01).
     pub rel_mse: f64,
+    /// Relative standard error of `rmse_codes` beside another reference as noisy as this one, at most
+    /// 1: what the own error of the reference, once subtracted, leaves open.
+    pub spread: f64,
+}
+
+/// How a picture's expectation differs from the truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bias {
+    /// Difference of the pictures' means in standard errors.
+    pub z: f64,
+    /// Root mean square of the pixels' differences that noise does not explain, in codes.
+    pub codes: f64,
+    /// The least of that which can be told from noise, at two standard errors.
+    pub least_codes: f64,
+}
+
+impl Bias {
+    /// Whether there is more than noise explains.
+    pub fn is_seen(&self) -> bool {
+        self.codes > self.least_codes || self.z.abs() > 4.0
+    }
 }
 
 /// Mean squares of half the difference of two replicates, and the variance of their mean's mean: what
@@ -93,7 +117,9 @@ impl Reference {
     ) -> Self {
         let (own, mean_variance) = own_error(a, b, display);
         let mean = |(a, b): (&[f64; 3], &[f64; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
-        Self::new(size, a.iter().zip(b).map(mean).collect(), own, mean_variance, *display)
+        let pixels = a.iter().zip(b).map(mean).collect();
+        let halves = a.iter().zip(b).map(|(a, b)| half(a, b, display)).collect();
+        Self { halves, ..Self::new(size, pixels, own, mean_variance, *display) }
     }
 
     /// A picture from elsewhere, which is taken for the truth.
@@ -109,7 +135,7 @@ impl Reference {
         display: Display,
     ) -> Self {
         let codes = pixels.iter().map(|x| display.codes(*x)).collect();
-        Self { size, pixels, codes, own, mean_variance, display }
+        Self { size, pixels, codes, halves: Vec::new(), own, mean_variance, display }
     }
 
     /// Width and height in pixels.
@@ -129,73 +155,157 @@ impl Reference {
 
     /// The film's errors: its distance from the reference, less what the reference is wrong by itself.
     pub fn errors(&self, film: &Film, mix: &Mix) -> Errors {
+        self.errors_of(&mut |y, row| film.row(y, Part::Both, mix, row))
+    }
+
+    /// The same of a picture that `fill` gives row by row.
+    fn errors_of(&self, fill: &mut dyn FnMut(usize, &mut Vec<[f64; 3]>)) -> Errors {
         let mut sum = Squares::default();
+        let mut crossed = 0.0;
         let mut row = Vec::new();
         for y in 0..self.size[1] {
-            film.row(y, Part::Both, mix, &mut row);
-            let at = y * self.size[0]..(y + 1) * self.size[0];
-            for ((x, r), code_r) in row.iter().zip(&self.pixels[at.clone()]).zip(&self.codes[at]) {
-                let code_x = self.display.codes(*x);
+            fill(y, &mut row);
+            for (x, i) in row.iter().zip(y * self.size[0]..) {
+                let (r, code_r, code_x) = (self.pixels[i], self.codes[i], self.display.codes(*x));
+                let apart: [f64; 3] = std::array::from_fn(|c| code_x[c] - code_r[c]);
                 for c in 0..3 {
                     let d = x[c] - r[c];
                     sum.linear += d * d;
-                    sum.codes += (code_x[c] - code_r[c]).powi(2);
+                    sum.codes += apart[c] * apart[c];
                     sum.relative += d * d / (r[c] * r[c] + RELATIVE_FLOOR);
                 }
+                crossed += self.halves.get(i).map_or(0.0, |half| dot(&apart, half).powi(2));
             }
         }
         let values = (3 * self.pixels.len()) as f64;
         let left = |sum: f64, own: f64| (sum / values - own).max(0.0);
+        let codes = left(sum.codes, self.own.codes);
+        // Of the sum of squares, whose error is twice this; of its root, which halves it.
+        let spread = crossed.sqrt() / values;
         Errors {
             rmse_linear: left(sum.linear, self.own.linear).sqrt(),
-            rmse_codes: left(sum.codes, self.own.codes).sqrt(),
+            rmse_codes: codes.sqrt(),
             rel_mse: left(sum.relative, self.own.relative),
+            spread: if spread < codes { spread / codes } else { f64::from(spread > 0.0) },
         }
     }
 
-    /// How far the film's expectation is from the reference's: the difference of the pictures' means
-    /// in standard errors, and the root mean square of the pixels' differences that noise does not
-    /// explain in codes.
-    pub fn bias(&self, film: &Film, mix: &Mix) -> (f64, f64) {
+    /// How far the film's expectation is from the reference's.
+    pub fn bias(&self, film: &Film, mix: &Mix) -> Bias {
         let [a, b] = replicates(film, mix);
         let (own, mean_variance) = own_error(&a, &b, &self.display);
-        let of = |(r, (a, b)): (&[f64; 3], (&[f64; 3], &[f64; 3]))| {
-            (0..3).map(|c| 0.5 * (a[c] + b[c]) - r[c]).sum::<f64>()
-        };
-        let sum: f64 = self.pixels.iter().zip(a.iter().zip(&b)).map(of).sum();
-        let mean = sum / (3 * self.pixels.len()) as f64;
+        let (mut sum, mut squares, mut crossed) = (0.0, 0.0, 0.0);
+        for (i, (a, b)) in a.iter().zip(&b).enumerate() {
+            let mean = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
+            sum += (0..3).map(|c| mean[c] - self.pixels[i][c]).sum::<f64>();
+            let code = self.display.codes(mean);
+            let apart = std::array::from_fn(|c| code[c] - self.codes[i][c]);
+            squares += dot(&apart, &apart);
+            crossed += dot(&apart, &half(a, b, &self.display)).powi(2);
+            crossed += self.halves.get(i).map_or(0.0, |half| dot(&apart, half).powi(2));
+        }
+        let values = (3 * self.pixels.len()) as f64;
+        let mean = sum / values;
         let deviation = (mean_variance + self.mean_variance).sqrt();
-        let codes = (self.errors(film, mix).rmse_codes.powi(2) - own.codes).max(0.0).sqrt();
-        // Two pictures without noise differ, or they do not.
-        let z = if mean == 0.0 { 0.0 } else { mean / deviation };
-        (z, codes)
+        Bias {
+            // Two pictures without noise differ, or they do not.
+            z: if mean == 0.0 { 0.0 } else { mean / deviation },
+            codes: (squares / values - own.codes - self.own.codes).max(0.0).sqrt(),
+            least_codes: (2.0 * 2.0 * crossed.sqrt() / values).sqrt(),
+        }
     }
+}
+
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Half the difference of two replicates of a pixel as displayed, in codes.
+fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
+    let [a, b] = [*a, *b].map(|x| display.codes(x));
+    std::array::from_fn(|c| 0.5 * (a[c] - b[c]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// Normal numbers, nearly: twelve uniform ones.
+    struct Noise(u64);
+
+    impl Noise {
+        fn next(&mut self) -> f64 {
+            (0..12).fold(-6.0, |sum, _| {
+                self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                sum + (self.0 >> 11) as f64 / (1u64 << 53) as f64
+            })
+        }
+
+        /// Grey of standard deviation `s` about 0.5, in all channels alike, a third of it anew in each.
+        fn pixels(&mut self, count: usize, s: f64) -> Vec<[f64; 3]> {
+            let pixel = |_| {
+                let common = self.next();
+                [0; 3].map(|_| 0.5 + s * (common + self.next() / 3.0))
+            };
+            (0..count).map(pixel).collect()
+        }
+    }
+
     /// Noise of standard deviation s in both replicates: their mean is wrong by s / sqrt 2.
     #[test]
     fn the_own_error_is_that_of_the_mean() {
-        let mut state = 1u64;
-        let mut noise = || {
-            // Twelve uniform numbers make a normal one, nearly.
-            let mut sum = -6.0;
-            for _ in 0..12 {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                sum += (state >> 11) as f64 / (1u64 << 53) as f64;
-            }
-            sum
-        };
-        let mut pixels = || (0..10_000).map(|_| [0; 3].map(|_| 0.5 + 0.01 * noise())).collect();
-        let [a, b]: [Vec<[f64; 3]>; 2] = [pixels(), pixels()];
+        let mut noise = Noise(1);
+        let [a, b] = [0; 2].map(|_| noise.pixels(10_000, 0.01));
         let reference = Reference::of_replicates([100, 100], &a, &b, &Display::default());
-        let expected = 0.01 / 2f64.sqrt();
+        let expected = 0.01 * (1.0f64 + 1.0 / 9.0).sqrt() / 2f64.sqrt();
         assert!((reference.noise_linear() / expected - 1.0).abs() < 0.02);
         // The sRGB curve's slope at 0.5 is 1.055 / 2.4 x 0.5^(1/2.4 - 1).
         let slope = 255.0 * 1.055 / 2.4 * 0.5f64.powf(1.0 / 2.4 - 1.0);
         assert!((reference.noise_codes() / (slope * expected) - 1.0).abs() < 0.02);
+    }
+
+    /// One picture beside many references of the same noise: its errors differ as much as each of them
+    /// says that they may.
+    #[test]
+    fn the_spread_is_that_between_references() {
+        let mut noise = Noise(2);
+        let size = [40, 30];
+        for (own, theirs) in [(0.01, 0.003), (0.01, 0.01), (0.004, 0.01)] {
+            let picture = noise.pixels(1200, own);
+            let errors: Vec<Errors> = (0..200)
+                .map(|_| {
+                    let [a, b] = [0; 2].map(|_| noise.pixels(1200, theirs * 2f64.sqrt()));
+                    let reference = Reference::of_replicates(size, &a, &b, &Display::default());
+                    reference.errors_of(&mut |y, row| {
+                        row.clear();
+                        row.extend_from_slice(&picture[y * size[0]..(y + 1) * size[0]]);
+                    })
+                })
+                .collect();
+            let n = errors.len() as f64;
+            let mean = errors.iter().map(|e| e.rmse_codes).sum::<f64>() / n;
+            let variance = errors.iter().map(|e| (e.rmse_codes - mean).powi(2)).sum::<f64>() / n;
+            let (seen, told) =
+                (variance.sqrt() / mean, errors.iter().map(|e| e.spread).sum::<f64>() / n);
+            assert!((told / seen - 1.0).abs() < 0.2, "{own} {theirs}: {told} told, {seen} seen");
+        }
+    }
+
+    #[test]
+    fn a_picture_beside_itself_has_no_error_and_beside_the_truth_no_doubt() {
+        let mut noise = Noise(3);
+        let pixels = noise.pixels(1200, 0.01);
+        let same = |row: &mut Vec<[f64; 3]>, y: usize| {
+            row.clear();
+            row.extend_from_slice(&pixels[y * 40..(y + 1) * 40]);
+        };
+        let truth = Reference::of_pixels([40, 30], pixels.clone(), &Display::default());
+        let errors = truth.errors_of(&mut |y, row| same(row, y));
+        assert_eq!((errors.rmse_codes, errors.spread), (0.0, 0.0));
+        let off = truth.errors_of(&mut |y, row| {
+            same(row, y);
+            row.iter_mut().for_each(|p| p[1] += 0.02);
+        });
+        assert!(off.rmse_codes > 1.0 && off.spread == 0.0, "{off:?}");
     }
 }

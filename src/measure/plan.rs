@@ -6,7 +6,7 @@ use crate::render::schedule::{Criterion, Settings, Stop};
 use crate::render::{Course, Options};
 use crate::sampling::{SampleSettings, SamplerKind};
 use crate::scene::{Acceleration, Level, Scene};
-use crate::world::{self, Precision};
+use crate::world::{self, AnyWorld, Precision};
 use std::io;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -62,6 +62,19 @@ impl Topic {
     /// The question that it answers.
     pub fn question(self) -> &'static str {
         Self::ALL.iter().find(|(topic, ..)| *topic == self).map_or("", |(.., question)| question)
+    }
+
+    /// What the default is beside the variations: `adaptive, default`.
+    pub fn of_default(self, single: bool, threads: usize) -> String {
+        let own = match self {
+            Self::Adaptivity => "adaptive".to_string(),
+            Self::Precision => if single { "single" } else { "double" }.to_string(),
+            Self::Threads if threads == 1 => "1 thread".to_string(),
+            Self::Threads => format!("{threads} threads"),
+            Self::Sampler => "Sobol".to_string(),
+            _ => return "default".to_string(),
+        };
+        format!("{own}, default")
     }
 
     /// Whether all its variations have the same expectation: only their noise differs.
@@ -181,22 +194,24 @@ impl Plan {
         match topic {
             Topic::Default => Vec::new(),
             Topic::Adaptivity => vec![Variation { adaptive: false, ..named("uniform") }],
-            Topic::Precision => [("single", Precision::Single), ("double", Precision::Double)]
-                .map(|(name, precision)| {
-                    let mut variation = named(name);
-                    variation.options.world.precision = precision;
-                    variation
-                })
-                .into(),
+            Topic::Precision => {
+                // The other one than the scene asks for.
+                let (name, precision) = match AnyWorld::compile(scene, &base.options.world) {
+                    AnyWorld::Single(_) => ("double", Precision::Double),
+                    AnyWorld::Double(_) => ("single", Precision::Single),
+                };
+                let mut variation = named(name);
+                variation.options.world.precision = precision;
+                vec![variation]
+            }
             Topic::Threads => {
-                let mut counts: Vec<usize> =
-                    (0..).map(|k| 1 << k).take_while(|n| *n < self.threads).collect();
-                counts.push(self.threads);
+                // As many as there are is the default.
+                let counts = (0..).map(|k| 1 << k).take_while(|n| *n < self.threads);
                 let of = |n: usize| {
                     let name = if n == 1 { "1 thread".to_string() } else { format!("{n} threads") };
                     Variation { threads: n, ..named(&name) }
                 };
-                counts.into_iter().map(of).collect()
+                counts.map(of).collect()
             }
             Topic::Sampler => {
                 let mut random = named("random");
@@ -244,5 +259,39 @@ impl Plan {
                 .map(|by| edited(by.name().to_string(), &|s| s.trace.acceleration = by))
                 .collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+
+    fn names(topic: Topic, threads: usize) -> Vec<String> {
+        let plan = Plan {
+            targets: vec![0.5],
+            topics: vec![topic],
+            repetitions: 3,
+            seconds: 1.0,
+            threads,
+            seed: 0,
+            display: Display::default(),
+        };
+        let all = plan.variations(&Arc::new(built_in()));
+        assert_eq!((all[0].topic, all[0].threads), (Topic::Default, threads));
+        all[1..].iter().map(|v| v.name.clone()).collect()
+    }
+
+    /// What would be the default again is left out.
+    #[test]
+    fn variations_differ_from_the_default() {
+        assert_eq!(names(Topic::Precision, 2), ["double"]);
+        assert_eq!(names(Topic::Threads, 1), [""; 0]);
+        assert_eq!(names(Topic::Threads, 2), ["1 thread"]);
+        assert_eq!(names(Topic::Threads, 6), ["1 thread", "2 threads", "4 threads"]);
+        assert_eq!(names(Topic::Adaptivity, 2), ["uniform"]);
+        assert_eq!(Topic::Threads.of_default(true, 6), "6 threads, default");
+        assert_eq!(Topic::Precision.of_default(true, 6), "single, default");
+        assert_eq!(Topic::Depth.of_default(true, 6), "default");
     }
 }

@@ -1,16 +1,55 @@
-//! Error against time, drawn: log-log, one line a variation.
+//! Error against time, drawn: a panel for each setting, log-log, the default beside its variations.
 
+use super::plan::Topic;
 use super::result::{Measured, Measurement, median};
 use epaint_default_fonts::UBUNTU_LIGHT;
+use plotters::coord::Shift;
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontStyle, register_font};
 use std::error::Error;
+use std::ops::Range;
 
-/// Width and height of a drawing, in pixels.
-pub const SIZE: (u32, u32) = (1000, 640);
+/// Width and height of a panel, and of the head above all panels, in pixels.
+const PANEL: (i32, i32) = (440, 374);
+const HEAD: i32 = 64;
+
+/// From a panel's sides to its field: left, right, top, bottom.
+const FRAME: [i32; 4] = [58, 22, 96, 50];
 
 /// Axes' ends are this much beyond the data.
-const MARGIN: f64 = 1.25;
+const MARGIN: f64 = 1.15;
+
+/// Colours that can be told apart with any kind of sight (Okabe and Ito 2008).
+const COLORS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+];
+const DEFAULT: RGBColor = RGBColor(90, 90, 90);
+const INK: RGBColor = RGBColor(40, 40, 40);
+const GRID: RGBColor = RGBColor(226, 226, 226);
+const TARGET: RGBColor = RGBColor(150, 150, 150);
+
+/// One variation.
+struct Line<'a> {
+    name: &'a str,
+    color: RGBColor,
+    /// (seconds, codes)
+    points: Vec<(f64, f64)>,
+}
+
+type Drawn = Result<(), Box<dyn Error>>;
+type Canvas<B> = DrawingArea<B, Shift>;
+
+/// Width and height of a measurement's drawing, in pixels.
+pub fn size(measurement: &Measurement) -> (u32, u32) {
+    let (cols, rows) = grid(panels(measurement).len());
+    ((cols * PANEL.0) as u32, (HEAD + rows * PANEL.1) as u32)
+}
 
 /// The drawing as SVG.
 ///
@@ -18,90 +57,235 @@ const MARGIN: f64 = 1.25;
 /// What the drawing library says.
 pub fn svg(measurement: &Measurement, title: &str) -> Result<String, Box<dyn Error>> {
     let mut text = String::new();
-    draw(SVGBackend::with_string(&mut text, SIZE), measurement, title)?;
+    draw(SVGBackend::with_string(&mut text, size(measurement)), measurement, title)?;
     Ok(text)
 }
 
-/// The drawing as rows of red, green, blue, 8 bits each, [`SIZE`] pixels.
+/// The drawing as rows of red, green, blue, 8 bits each, [`size`] pixels.
 ///
 /// # Errors
 /// What the drawing library says.
 pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn Error>> {
-    let mut bytes = vec![0; SIZE.0 as usize * SIZE.1 as usize * 3];
-    draw(BitMapBackend::with_buffer(&mut bytes, SIZE), measurement, title)?;
+    let (width, height) = size(measurement);
+    let mut bytes = vec![0; width as usize * height as usize * 3];
+    draw(BitMapBackend::with_buffer(&mut bytes, (width, height)), measurement, title)?;
     Ok(bytes)
+}
+
+/// A setting's variations. The default has a panel only if there is nothing else.
+fn panels(measurement: &Measurement) -> Vec<(Topic, Vec<&Measured>)> {
+    let mut panels: Vec<(Topic, Vec<&Measured>)> = Vec::new();
+    for measured in measurement.measured.iter().skip(1) {
+        match panels.last_mut() {
+            Some((topic, of)) if *topic == measured.topic => of.push(measured),
+            _ => panels.push((measured.topic, vec![measured])),
+        }
+    }
+    if panels.is_empty() {
+        panels.push((Topic::Default, Vec::new()));
+    }
+    panels
+}
+
+/// Columns and rows for so many panels.
+fn grid(panels: usize) -> (i32, i32) {
+    let cols = match panels {
+        1 => 1,
+        2 | 4 => 2,
+        _ => 3,
+    };
+    (cols as i32, panels.div_ceil(cols) as i32)
 }
 
 /// (seconds, codes) of the points that have both.
 fn points(measured: &Measured) -> Vec<(f64, f64)> {
-    let of = |p: &super::Point| (median(&p.seconds), p.errors.rmse_codes);
+    let of = |p: &super::Point| (median(&measured.seconds(p)), p.errors.rmse_codes);
     measured.points.iter().map(of).filter(|(s, e)| *s > 0.0 && *e > 0.0).collect()
 }
 
-fn draw<B: DrawingBackend>(
-    backend: B,
-    measurement: &Measurement,
-    title: &str,
-) -> Result<(), Box<dyn Error>>
+/// From numbers to pixels along one axis, by their logarithms.
+struct Axis {
+    numbers: Range<f64>,
+    pixels: (i32, i32),
+}
+
+impl Axis {
+    fn new(values: impl Iterator<Item = f64>, pixels: (i32, i32)) -> Self {
+        let (low, high) = values.fold((f64::INFINITY, 0f64), |(l, h), v| (l.min(v), h.max(v)));
+        let numbers = if low.is_finite() { low / MARGIN..high * MARGIN } else { 0.1..10.0 };
+        Self { numbers, pixels }
+    }
+
+    fn at(&self, value: f64) -> i32 {
+        let share =
+            (value / self.numbers.start).ln() / (self.numbers.end / self.numbers.start).ln();
+        self.pixels.0 + (share * f64::from(self.pixels.1 - self.pixels.0)).round() as i32
+    }
+
+    /// Round numbers in its range: 1, 2 and 5 of each power of ten, or these powers alone.
+    fn ticks(&self) -> Vec<(f64, String)> {
+        let Range { start, end } = self.numbers;
+        let powers = start.log10().floor() as i32..=end.log10().ceil() as i32;
+        let of = |steps: &'static [u32]| {
+            powers.clone().flat_map(move |k| steps.iter().map(move |m| (*m, k)))
+        };
+        let number = |(m, k): (u32, i32)| f64::from(m) * 10f64.powi(k);
+        let inside = |tick: &(u32, i32)| (start..=end).contains(&number(*tick));
+        let label = |tick: (u32, i32)| {
+            (number(tick), format!("{:.*}", (-tick.1).max(0) as usize, number(tick)))
+        };
+        let mut ticks: Vec<_> = of(&[1, 2, 5]).filter(inside).collect();
+        if ticks.len() > 9 {
+            ticks = of(&[1]).filter(inside).collect();
+        }
+        ticks.into_iter().map(label).collect()
+    }
+}
+
+fn text<'a>(size: u32, color: RGBColor, h: HPos, v: VPos) -> TextStyle<'a> {
+    ("sans-serif", size).into_font().color(&color).pos(Pos::new(h, v))
+}
+
+fn draw<B: DrawingBackend>(backend: B, measurement: &Measurement, title: &str) -> Drawn
 where
     B::ErrorType: 'static,
 {
     // Drawings look alike on every machine; a font that is registered already stays.
     let _ = register_font("sans-serif", FontStyle::Normal, UBUNTU_LIGHT);
-    let lines: Vec<(&Measured, Vec<(f64, f64)>)> = measurement
-        .measured
-        .iter()
-        .map(|m| (m, points(m)))
-        .filter(|(_, p)| !p.is_empty())
-        .collect();
-    let all = || lines.iter().flat_map(|(_, points)| points.iter().copied());
-    let range = |values: &mut dyn Iterator<Item = f64>| {
-        let (low, high) = values.fold((f64::INFINITY, 0f64), |(l, h), v| (l.min(v), h.max(v)));
-        if low.is_finite() { low / MARGIN..high * MARGIN } else { 0.1..10.0 }
-    };
-    let seconds = range(&mut all().map(|p| p.0));
-    let codes = range(&mut all().map(|p| p.1));
-
     let root = backend.into_drawing_area();
     root.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&root)
-        .caption(title, ("sans-serif", 22))
-        .margin(16)
-        .x_label_area_size(48)
-        .y_label_area_size(64)
-        .build_cartesian_2d(seconds.clone().log_scale(), codes.log_scale())?;
-    chart
-        .configure_mesh()
-        .x_desc("seconds of tracing")
-        .y_desc("RMSE as displayed, 8-bit codes")
-        .label_style(("sans-serif", 15))
-        .light_line_style(BLACK.mix(0.04))
-        .bold_line_style(BLACK.mix(0.12))
-        .draw()?;
-    for target in &measurement.targets {
-        let line = [(seconds.start, *target), (seconds.end, *target)];
-        chart.draw_series(LineSeries::new(line, BLACK.mix(0.25)))?;
+    root.draw_text(title, &text(20, INK, HPos::Left, VPos::Top), (24, 14))?;
+    let words = "How the error falls with the time: the lower and the further left, the better";
+    root.draw_text(words, &text(14, DEFAULT, HPos::Left, VPos::Top), (24, 40))?;
+    let panels = panels(measurement);
+    let (cols, _) = grid(panels.len());
+    for (i, (topic, variations)) in (0..).zip(&panels) {
+        let corner = (i % cols * PANEL.0, HEAD + i / cols * PANEL.1);
+        panel(&root, corner, measurement, *topic, variations)?;
     }
-    for (i, (measured, points)) in lines.iter().enumerate() {
-        let color = Palette99::pick(i).to_rgba();
-        let label = match measured.topic {
-            super::Topic::Default => measured.name.clone(),
-            topic => format!("{}: {}", topic.name(), measured.name),
-        };
-        chart
-            .draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))?
-            .label(label)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(2)));
-        let dots = points.iter().map(|p| Circle::new(*p, 3, color.filled()));
-        chart.draw_series(dots)?;
-    }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::LowerLeft)
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK.mix(0.2))
-        .label_font(("sans-serif", 15))
-        .draw()?;
     root.present()?;
     Ok(())
+}
+
+/// One setting, in the panel that has its upper left corner at `corner`.
+fn panel<'a, B: DrawingBackend>(
+    root: &Canvas<B>,
+    corner: (i32, i32),
+    measurement: &'a Measurement,
+    topic: Topic,
+    variations: &[&'a Measured],
+) -> Drawn
+where
+    B::ErrorType: 'static,
+{
+    let [left, right, top, bottom] = FRAME;
+    let (x0, x1) = (corner.0 + left, corner.0 + PANEL.0 - right);
+    let (y0, y1) = (corner.1 + PANEL.1 - bottom, corner.1 + top);
+    let colors = std::iter::once(&DEFAULT).chain(COLORS.iter().cycle());
+    let all = measurement.measured.first().into_iter().chain(variations.iter().copied());
+    let line = |(measured, color): (&'a Measured, &RGBColor)| Line {
+        name: &measured.name,
+        color: *color,
+        points: points(measured),
+    };
+    let lines: Vec<Line> = all.zip(colors).map(line).collect();
+    let numbers = || lines.iter().flat_map(|line| line.points.iter().copied());
+    let seconds = Axis::new(numbers().map(|p| p.0), (x0, x1));
+    let codes = Axis::new(numbers().map(|p| p.1), (y0, y1));
+
+    let heading = text(15, INK, HPos::Left, VPos::Top);
+    root.draw_text(topic.question(), &heading, (x0 - 34, corner.1 + 8))?;
+    legend(root, (x0 - 34, corner.1 + 38), x1, &lines)?;
+    let path = |from, to, color: &RGBColor| PathElement::new([from, to], color.stroke_width(1));
+    for (tick, label) in seconds.ticks() {
+        let x = seconds.at(tick);
+        root.draw(&path((x, y0), (x, y1), &GRID))?;
+        root.draw_text(&label, &text(13, INK, HPos::Center, VPos::Top), (x, y0 + 6))?;
+    }
+    for (tick, label) in codes.ticks() {
+        let y = codes.at(tick);
+        root.draw(&path((x0, y), (x1, y), &GRID))?;
+        root.draw_text(&label, &text(13, INK, HPos::Right, VPos::Center), (x0 - 8, y))?;
+    }
+    // Lines come from the upper left: below them there is room.
+    let small = text(12, TARGET, HPos::Left, VPos::Bottom);
+    for target in measurement.targets.iter().filter(|t| codes.numbers.contains(t)) {
+        let y = codes.at(*target);
+        for x in (x0..x1).step_by(8) {
+            root.draw(&path((x, y), ((x + 4).min(x1), y), &TARGET))?;
+        }
+        let unit = if *target == 1.0 { "code" } else { "codes" };
+        root.draw_text(&format!("{target} {unit}"), &small, (x0 + 4, y - 2))?;
+    }
+    root.draw(&path((x0, y0), (x1, y0), &INK))?;
+    root.draw(&path((x0, y0), (x0, y1), &INK))?;
+    let axis = text(13, DEFAULT, HPos::Right, VPos::Top);
+    root.draw_text("seconds of tracing", &axis, (x1, y0 + 26))?;
+    let axis = text(13, DEFAULT, HPos::Left, VPos::Top);
+    root.draw_text("RMSE as displayed, 8-bit codes", &axis, (x0 - 34, y1 - 26))?;
+    for Line { color, points, .. } in &lines {
+        let at: Vec<(i32, i32)> =
+            points.iter().map(|(s, e)| (seconds.at(*s), codes.at(*e))).collect();
+        let width = if *color == DEFAULT { 4 } else { 2 };
+        root.draw(&PathElement::new(at.clone(), color.stroke_width(width)))?;
+        for point in at {
+            root.draw(&Circle::new(point, 3, color.filled()))?;
+        }
+    }
+    Ok(())
+}
+
+/// The names of the lines in their colours, side by side from `corner` on, in a second row if the first
+/// is full at `end`.
+fn legend<B: DrawingBackend>(
+    root: &Canvas<B>,
+    corner: (i32, i32),
+    end: i32,
+    lines: &[Line],
+) -> Drawn
+where
+    B::ErrorType: 'static,
+{
+    const SWATCH: i32 = 18;
+    let style = text(13, INK, HPos::Left, VPos::Center);
+    let (mut x, mut y) = corner;
+    for Line { name, color, .. } in lines {
+        let width = SWATCH + 5 + root.estimate_text_size(name, &style)?.0 as i32;
+        if x + width > end && x > corner.0 {
+            (x, y) = (corner.0, y + 17);
+        }
+        let stroke = color.stroke_width(if *color == DEFAULT { 4 } else { 2 });
+        root.draw(&PathElement::new([(x, y), (x + SWATCH, y)], stroke))?;
+        root.draw_text(name, &style, (x + SWATCH + 5, y))?;
+        x += width + 14;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_not_too_many() {
+        let labels = |numbers| {
+            let axis = Axis { numbers, pixels: (0, 100) };
+            axis.ticks().into_iter().map(|(_, label)| label).collect::<Vec<_>>()
+        };
+        assert_eq!(labels(0.13..2.4), ["0.2", "0.5", "1", "2"]);
+        assert_eq!(labels(0.001..2e4).first().unwrap(), "0.001");
+        assert_eq!(labels(0.001..2e4).last().unwrap(), "10000");
+        assert!(labels(0.001..2e4).len() <= 9);
+    }
+
+    #[test]
+    fn logarithms_are_spread_evenly() {
+        let axis = Axis { numbers: 0.01..100.0, pixels: (100, 500) };
+        assert_eq!([0.01, 1.0, 10.0, 100.0].map(|v| axis.at(v)), [100, 300, 400, 500]);
+    }
+
+    #[test]
+    fn panels_fill_a_grid() {
+        assert_eq!([1, 2, 3, 4, 5, 10].map(grid), [(1, 1), (2, 1), (3, 1), (2, 2), (3, 2), (3, 4)]);
+    }
 }

@@ -1,6 +1,7 @@
 //! What came out.
 
 use super::curve::Point;
+use super::picture::Bias;
 use super::plan::{Topic, Variation};
 use super::slope::Slope;
 
@@ -11,7 +12,7 @@ pub struct Crossing {
     pub codes: f64,
     /// Seconds of tracing, median of the repetitions.
     pub seconds: f64,
-    /// Half the distance of the quartiles, as a share of the median.
+    /// How far the repetitions are apart, see [`spread`].
     pub spread: f64,
     /// Samples per pixel, mean.
     pub spp: f64,
@@ -19,13 +20,13 @@ pub struct Crossing {
     pub at_most: bool,
 }
 
-/// What a setting gets wrong, beside noise.
+/// When the default would reach a noise that it was not followed to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bias {
-    /// Difference of the pictures' means in standard errors.
-    pub z: f64,
-    /// Root mean square of the pixels' differences that noise does not explain, in codes.
+pub struct Expected {
+    /// The noise, in codes.
     pub codes: f64,
+    /// A lower and an upper guess of the seconds, by how the noise fell last.
+    pub seconds: (f64, f64),
 }
 
 /// One variation, measured.
@@ -39,6 +40,9 @@ pub struct Measured {
     pub threads: usize,
     /// The way, first to last.
     pub points: Vec<Point>,
+    /// Of each repetition, the share of the processors' time that other programs took meanwhile; `None`:
+    /// nobody knows.
+    pub taken: Vec<Option<f64>>,
     /// Compared with the reference at the end, if its expectation may be another one.
     pub bias: Option<Bias>,
 }
@@ -59,22 +63,55 @@ pub struct Measurement {
     pub compared_at: f64,
     /// The noise levels asked for, falling.
     pub targets: Vec<f64>,
+    /// Those of them that the default did not reach in its time.
+    pub expected: Vec<Expected>,
+    /// Settings that were asked for and have nothing to compare in this scene.
+    pub idle: Vec<Topic>,
     /// The default first.
     pub measured: Vec<Measured>,
 }
+
+/// How far a measurement's times are to be trusted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Steadiness {
+    /// The fewest repetitions that any of them is the median of.
+    pub repetitions: usize,
+    /// The greatest spread of those that are told.
+    pub spread: f64,
+    /// The greatest share of the processors that others took while those were taken; `None`: nobody
+    /// knows.
+    pub taken: Option<f64>,
+}
+
+/// A repetition counts as undisturbed if others took no more than this share of the processors.
+const CALM: f64 = 0.05;
+/// So many repetitions count in any case, the calmest ones.
+const LEAST: usize = 5;
+/// An error that another reference could change by more than this share is not told.
+const DOUBTFUL: f64 = 0.05;
 
 /// The middle one; the mean of the two in the middle.
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// Half the distance of the quartiles as a share of the median; 0 for fewer than two values.
+/// How far repetitions are apart, as a share of their median: with fewer than five the distance of the
+/// least and the greatest, else half of it, from nine on that of the second of each. On a machine that
+/// stays as it is, the median of another measurement is that near in four of five cases at least. 0 for
+/// fewer than two values.
 pub fn spread(values: &[f64]) -> f64 {
     let middle = median(values);
     if values.len() < 2 || middle == 0.0 {
         return 0.0;
     }
-    0.5 * (quantile(values, 0.75) - quantile(values, 0.25)) / middle
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let (share, left_out) = match values.len() {
+        ..5 => (1.0, 0),
+        5..9 => (0.5, 0),
+        _ => (0.5, 1),
+    };
+    share * (sorted[values.len() - 1 - left_out] - sorted[left_out]) / middle
 }
 
 fn quantile(values: &[f64], q: f64) -> f64 {
@@ -88,24 +125,59 @@ fn quantile(values: &[f64], q: f64) -> f64 {
 
 impl Measured {
     /// An empty record of a variation whose way is `points`.
-    pub fn new(variation: &Variation, points: Vec<Point>, bias: Option<Bias>) -> Self {
+    pub fn new(
+        variation: &Variation,
+        points: Vec<Point>,
+        taken: Option<f64>,
+        bias: Option<Bias>,
+    ) -> Self {
         Self {
             topic: variation.topic,
             name: variation.name.clone(),
             threads: variation.threads,
             points,
+            taken: vec![taken],
             bias,
         }
     }
 
+    /// The repetitions that count: those in which nobody else took the processors; if they are too few,
+    /// the calmest.
+    fn counted(&self) -> Vec<usize> {
+        let of = |i: &usize| self.taken[*i].unwrap_or(0.0);
+        let mut all: Vec<usize> = (0..self.taken.len()).collect();
+        all.sort_by(|a, b| of(a).total_cmp(&of(b)));
+        let calm = all.iter().filter(|i| of(i) <= CALM).count();
+        all.truncate(calm.max(LEAST));
+        all
+    }
+
+    /// Seconds at a point of the way, of each repetition that counts.
+    pub fn seconds(&self, point: &Point) -> Vec<f64> {
+        self.counted().into_iter().filter_map(|i| point.seconds.get(i).copied()).collect()
+    }
+
+    /// The greatest share of the processors that others took in the repetitions that count.
+    fn most_taken(&self) -> Option<f64> {
+        self.counted().into_iter().filter_map(|i| self.taken[i]).reduce(f64::max)
+    }
+
     /// Where the true error came down to `codes`, between points on straight lines of the logarithms.
     pub fn crossing(&self, codes: f64) -> Option<Crossing> {
-        self.crossing_of(codes, |p| p.errors.rmse_codes)
+        self.crossing_of(codes, |p| {
+            let certain = p.errors.spread <= DOUBTFUL;
+            if certain { p.errors.rmse_codes } else { f64::INFINITY }
+        })
     }
 
     /// The same of the error that the program told, for what is never right.
     pub fn told_crossing(&self, codes: f64) -> Option<Crossing> {
         self.crossing_of(codes, |p| p.told_codes.unwrap_or(f64::INFINITY))
+    }
+
+    /// The one of them that says when it is as quiet as it gets: of what is never right, what it told.
+    pub fn own_crossing(&self, codes: f64) -> Option<Crossing> {
+        if self.bias.is_some() { self.told_crossing(codes) } else { self.crossing(codes) }
     }
 
     fn crossing_of(&self, codes: f64, of: impl Fn(&Point) -> f64) -> Option<Crossing> {
@@ -120,8 +192,9 @@ impl Measured {
             _ => (1.0, to),
         };
         let between = |a: f64, b: f64| a * (b / a).powf(weight);
+        let (before, after_it) = (self.seconds(from), self.seconds(to));
         let seconds: Vec<f64> =
-            from.seconds.iter().zip(&to.seconds).map(|(a, b)| between(*a, *b)).collect();
+            before.iter().zip(&after_it).map(|(a, b)| between(*a, *b)).collect();
         Some(Crossing {
             codes,
             seconds: median(&seconds),
@@ -134,7 +207,7 @@ impl Measured {
     /// Samples per second over the whole way: median and spread of the repetitions.
     pub fn samples_per_second(&self) -> Option<(f64, f64)> {
         let last = self.points.last()?;
-        let speeds: Vec<f64> = last.seconds.iter().map(|s| last.samples as f64 / s).collect();
+        let speeds: Vec<f64> = self.seconds(last).iter().map(|s| last.samples as f64 / s).collect();
         Some((median(&speeds), spread(&speeds)))
     }
 
@@ -150,8 +223,35 @@ impl Measured {
     /// 1 / (MSE x seconds) at the end, linear: what a second is worth.
     pub fn efficiency(&self) -> Option<f64> {
         let last = self.points.last()?;
-        let cost = last.errors.rmse_linear.powi(2) * median(&last.seconds);
+        let cost = last.errors.rmse_linear.powi(2) * median(&self.seconds(last));
         (cost > 0.0).then(|| 1.0 / cost)
+    }
+}
+
+impl Measurement {
+    /// Of the times that are told: those to the targets, and those that settings are compared by.
+    pub fn steadiness(&self) -> Steadiness {
+        let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0, taken: None };
+        for (i, measured) in self.measured.iter().enumerate() {
+            let targets = self.targets.iter().filter(|_| i == 0).copied();
+            for codes in targets.chain([self.compared_at]) {
+                let Some(crossing) = measured.own_crossing(codes) else { continue };
+                all.spread = all.spread.max(crossing.spread);
+                all.repetitions = all.repetitions.min(measured.counted().len());
+            }
+            all.taken = [all.taken, measured.most_taken()].into_iter().flatten().reduce(f64::max);
+        }
+        if all.repetitions == usize::MAX {
+            all.repetitions = 0;
+        }
+        all
+    }
+
+    /// The largest share by which another reference could change the errors that are told.
+    pub fn doubt(&self) -> f64 {
+        let points = self.measured.iter().flat_map(|m| &m.points);
+        let told = points.map(|p| p.errors.spread).filter(|spread| *spread <= DOUBTFUL);
+        told.fold(0.0, f64::max)
     }
 }
 
@@ -167,13 +267,19 @@ mod tests {
             spp: *spp,
             seconds: vec![*spp * 1e-3, *spp * 3e-3, *spp * 2e-3],
             told_codes: Some(2.0 * codes),
-            errors: Errors { rmse_linear: codes / 255.0, rmse_codes: *codes, rel_mse: 0.0 },
+            errors: Errors {
+                rmse_linear: codes / 255.0,
+                rmse_codes: *codes,
+                rel_mse: 0.0,
+                spread: 0.0,
+            },
         };
         Measured {
             topic: Topic::Default,
             name: String::new(),
             threads: 1,
             points: points.iter().enumerate().map(point).collect(),
+            taken: vec![None; 3],
             bias: None,
         }
     }
@@ -184,7 +290,7 @@ mod tests {
         let way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
         let at = way.crossing(2f64.sqrt()).unwrap();
         assert!((at.spp - 32.0).abs() < 1e-9 && (at.seconds - 0.064).abs() < 1e-12, "{at:?}");
-        assert!(!at.at_most && (at.spread - 0.25).abs() < 1e-12);
+        assert!(!at.at_most && (at.spread - 1.0).abs() < 1e-12);
         assert!(way.crossing(3.0).unwrap().at_most);
         assert_eq!(way.crossing(0.4), None);
         assert!((way.told_crossing(2.0).unwrap().spp - 64.0).abs() < 1e-9);
@@ -193,11 +299,77 @@ mod tests {
     }
 
     #[test]
-    fn quartiles() {
+    fn medians_and_spreads() {
         assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
         assert_eq!(median(&[1.0, 2.0]), 1.5);
-        assert_eq!(spread(&[1.0, 2.0, 3.0]), 0.25);
+        assert_eq!(spread(&[1.0, 2.0, 3.0]), 1.0);
+        assert_eq!(spread(&[1.0, 2.0, 2.0, 2.0, 3.0]), 0.5);
+        assert_eq!(spread(&[1.0, 9.0, 10.0, 10.0, 10.0, 10.0, 10.0, 11.0, 90.0]), 0.1);
         assert_eq!(spread(&[5.0]), 0.0);
         assert!(median(&[]).is_nan());
+    }
+
+    /// Measurements of normally scattered times, again and again: how often the second is as near to the
+    /// first as the first says.
+    #[test]
+    fn a_spread_tells_where_another_measurement_will_be() {
+        let mut state = 5u64;
+        let mut time = || {
+            1.0 + 0.03
+                * (0..12).fold(-6.0, |sum, _| {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    sum + (state >> 11) as f64 / (1u64 << 53) as f64
+                })
+        };
+        for n in [3, 4, 5, 6, 8, 9, 15, 31] {
+            let mut times = || (0..n).map(|_| time()).collect::<Vec<f64>>();
+            let near = |(a, b): &(Vec<f64>, Vec<f64>)| {
+                (median(a) - median(b)).abs() <= spread(a) * median(a)
+            };
+            let near = (0..2000).map(|_| (times(), times())).filter(near).count();
+            assert!(near > 1560, "{n} repetitions: {near} of 2000");
+        }
+    }
+
+    /// Two repetitions of nine were disturbed: they do not count. Of nine disturbed ones the five
+    /// calmest do, and it is said how disturbed they were.
+    #[test]
+    fn disturbed_repetitions_do_not_count() {
+        let mut way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
+        for point in &mut way.points {
+            let first = point.spp * 1e-3;
+            point.seconds = (0..9).map(|i| first * [1.0, 3.0, 1.0, 1.1][i % 4]).collect();
+        }
+        way.taken = [0.0, 0.4, 0.01, 0.0].into_iter().cycle().take(9).map(Some).collect();
+        let at = way.crossing(1.0).unwrap();
+        assert!((at.seconds - 0.064).abs() < 1e-12 && (at.spread - 0.05).abs() < 1e-9, "{at:?}");
+        let mut measurement = Measurement {
+            size: [1, 1],
+            reference_spp: 0.0,
+            reference_codes: 0.0,
+            reference_linear: 0.0,
+            reference_seconds: 0.0,
+            compared_at: 0.5,
+            targets: vec![1.0, 0.25],
+            expected: Vec::new(),
+            idle: Vec::new(),
+            measured: vec![way],
+        };
+        let steady = measurement.steadiness();
+        assert_eq!((steady.repetitions, steady.taken), (7, Some(0.01)));
+        measurement.measured[0].taken = (0..9).map(|i| Some(0.1 + 0.1 * f64::from(i))).collect();
+        let steady = measurement.steadiness();
+        assert_eq!(steady.repetitions, 5);
+        assert!((steady.taken.unwrap() - 0.5).abs() < 1e-12);
+        assert!((steady.spread - 1.0).abs() < 1e-9, "1, 3, 1, 1.1, 1: {steady:?}");
+    }
+
+    /// An error that the reference's own drowns is no answer.
+    #[test]
+    fn a_doubtful_error_reaches_no_target() {
+        let mut way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
+        way.points[2].errors.spread = 0.3;
+        assert!(way.crossing(1.0).is_some());
+        assert_eq!(way.crossing(0.5), None);
     }
 }

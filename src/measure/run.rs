@@ -3,7 +3,8 @@
 use super::curve::{End, repeat, walk};
 use super::picture::Reference;
 use super::plan::{Plan, Topic, Variation};
-use super::result::{Bias, Measured, Measurement};
+use super::result::{Expected, Measured, Measurement, spread};
+use crate::render::Course;
 use crate::scene::Scene;
 use std::io;
 use std::sync::Arc;
@@ -21,14 +22,22 @@ pub struct Progress<'a> {
 
 /// Seconds of tracing before anything is measured: clocks and caches settle.
 const WARM_UP_SECONDS: f64 = 0.3;
-/// The reference's noise is this part of the smallest target.
+/// The reference's noise is this part of the smallest target, if there is time for that.
 const REFERENCE_SHARE: f64 = 0.3;
 /// The most of the time that the reference may take.
-const REFERENCE_TIME: f64 = 0.4;
-/// The most of the time that one way may take the first time.
-const WAY_TIME: f64 = 0.12;
-/// Settings are compared at this noise, in codes, if the default gets there in time.
+const REFERENCE_TIME: f64 = 0.3;
+/// The most of the time that the default's way may take the first time.
+const DEFAULT_TIME: f64 = 0.12;
+/// Settings are compared at this noise, in codes, or where there is time for that.
 const COMPARED_AT: f64 = 0.5;
+/// A setting that takes so many times as long as the default is not followed to the end.
+const SLOWEST: f64 = 5.0;
+/// Times that are apart by no more than this share are steady.
+const STEADY: f64 = 0.05;
+/// With steady times, more repetitions than this tell nothing new.
+const ENOUGH: usize = 7;
+/// More repetitions than this do not make times steady.
+const MOST: usize = 31;
 
 /// Measures `scene`, which has no faults. `reference`: a picture to compare with; else one is made
 /// with another seed. `tell` hears how far it is; `false` from it ends the measurement early, with
@@ -45,6 +54,7 @@ pub fn measure(
     let begun = Instant::now();
     let variations = plan.variations(scene);
     let default = &variations[0];
+    let idle = |topic: &Topic| !variations.iter().any(|v| v.topic == *topic);
     let of = 1 + variations.len() * plan.repetitions.max(1);
     let mut go_on = tell(Progress { what: "reference", done: 0, of });
 
@@ -57,47 +67,55 @@ pub fn measure(
     let reference = &made.reference;
 
     let mut measured: Vec<Measured> = Vec::new();
+    let mut expected = Vec::new();
     let mut compared_at = COMPARED_AT;
+    let mut longest = DEFAULT_TIME * plan.seconds;
     for (i, variation) in variations.iter().enumerate() {
         if i > 0 && !go_on {
             break;
         }
         go_on &= tell(Progress { what: &variation.name, done: 1 + i, of });
-        let codes = if variation.topic == Topic::Default { least } else { compared_at };
-        let end =
-            End { codes, seconds: WAY_TIME * plan.seconds, told: !variation.topic.unbiased() };
-        let (points, course) = walk(variation, reference, end)?;
+        let codes = if i == 0 { least } else { compared_at };
+        let end = End { codes, seconds: longest, told: !variation.topic.unbiased() };
+        let (points, taken, course) = walk(variation, reference, end)?;
         let rendering = course.rendering();
-        let bias = (!variation.topic.unbiased()).then(|| {
-            let (z, codes) = reference.bias(&rendering.film, &rendering.mix);
-            Bias { z, codes }
-        });
-        let result = Measured::new(variation, points, bias);
-        if variation.topic == Topic::Default {
-            // The finest of the targets that the default met, but no finer than is needed.
-            let met = |codes: &f64| result.crossing(*codes).is_some();
-            let mut levels: Vec<f64> = plan.targets.iter().copied().chain([COMPARED_AT]).collect();
-            levels.sort_by(f64::total_cmp);
-            let enough = levels.iter().copied().filter(|c| *c >= COMPARED_AT);
-            compared_at = enough.into_iter().find(met).unwrap_or(f64::INFINITY);
-            if compared_at.is_infinite() {
-                compared_at = result.points.last().map_or(COMPARED_AT, |p| p.errors.rmse_codes);
-            }
+        let bias =
+            (!variation.topic.unbiased()).then(|| reference.bias(&rendering.film, &rendering.mix));
+        let result = Measured::new(variation, points, taken, bias);
+        if i == 0 {
+            let missed = plan.targets.iter().filter(|codes| result.crossing(**codes).is_none());
+            expected = missed.filter_map(|codes| expect(&course, *codes)).collect();
+            let left = plan.seconds - begun.elapsed().as_secs_f64();
+            let ways = plan.repetitions.max(1) * (variations.len() - 1);
+            let own = (plan.repetitions.max(1) - 1) as f64 * course.seconds();
+            compared_at = level(&result, &plan.targets, (left - own) / (2 * ways.max(1)) as f64);
+            longest = SLOWEST * result.crossing(compared_at).map_or(longest, |c| c.seconds);
         }
         measured.push(result);
     }
 
-    // In turns; every way at least as often as asked for, then as long as there is time.
+    // In turns; every way at least as often as asked for, then until times are steady, while there is
+    // time.
     let mut round = 1;
-    while go_on && (round < plan.repetitions || time_for_another(begun, plan.seconds, round)) {
+    let mut round_seconds = 0.0;
+    while go_on {
+        let passed = begun.elapsed().as_secs_f64();
+        let steady = measured.iter().all(|m| is_steady(m, compared_at));
+        let wanted = round < MOST && (round < ENOUGH || !steady);
+        let fits = round == 1 || passed + round_seconds <= plan.seconds;
+        if round >= plan.repetitions && !(wanted && fits) {
+            break;
+        }
         for (i, (variation, result)) in variations.iter().zip(&mut measured).enumerate() {
             let done = (1 + variations.len() * round + i).min(of);
             go_on &= tell(Progress { what: &variation.name, done, of });
             if !go_on {
                 break;
             }
-            repeat(variation, &mut result.points)?;
+            let taken = repeat(variation, &mut result.points)?;
+            result.taken.push(taken);
         }
+        round_seconds = begun.elapsed().as_secs_f64() - passed;
         round += 1;
     }
     Ok(Measurement {
@@ -108,16 +126,35 @@ pub fn measure(
         reference_seconds: made.seconds,
         compared_at,
         targets: plan.targets.clone(),
+        expected,
+        idle: plan.topics.iter().copied().filter(idle).collect(),
         measured,
     })
 }
 
-/// Whether a round like those before would end in time.
-fn time_for_another(begun: Instant, seconds: f64, rounds: usize) -> bool {
-    /// More repetitions than this tell nothing new.
-    const ENOUGH: usize = 9;
-    let passed = begun.elapsed().as_secs_f64();
-    rounds < ENOUGH && passed + passed * (1.0 - REFERENCE_TIME) / rounds as f64 <= seconds
+/// When the noise will have fallen to `codes`.
+fn expect(course: &Course, codes: f64) -> Option<Expected> {
+    course.seconds_to_noise(codes).map(|seconds| Expected { codes, seconds })
+}
+
+/// The noise in codes at which settings are compared: the finest of the targets and their doubles that
+/// the default reached within `seconds`, but no finer than is needed; else the coarsest that it reached;
+/// else where it ended.
+fn level(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
+    let mut levels: Vec<f64> = targets.iter().copied().chain([0.5, 1.0, 2.0, 4.0, 8.0]).collect();
+    levels.retain(|codes| *codes >= COMPARED_AT);
+    levels.sort_by(f64::total_cmp);
+    let reached: Vec<_> = levels.iter().filter_map(|codes| default.crossing(*codes)).collect();
+    let in_time = reached.iter().find(|c| c.seconds <= seconds && !c.at_most);
+    let any = || reached.iter().rev().find(|c| !c.at_most).or(reached.first());
+    let end = || default.points.last().map_or(COMPARED_AT, |p| p.errors.rmse_codes);
+    in_time.or_else(any).map_or_else(end, |c| c.codes)
+}
+
+/// Whether a way's time to `codes`, or to its end, needs no more repetitions.
+fn is_steady(measured: &Measured, codes: f64) -> bool {
+    let end = || measured.points.last().map_or(0.0, |p| spread(&measured.seconds(p)));
+    measured.own_crossing(codes).map_or_else(end, |c| c.spread) <= STEADY
 }
 
 fn warm_up(variation: &Variation) -> io::Result<()> {
@@ -149,4 +186,55 @@ fn make_reference(default: &Variation, codes: f64, seconds: f64) -> io::Result<M
         spp: course.spp().mean,
         seconds: course.seconds(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::curve::Point;
+    use super::super::picture::Errors;
+    use super::*;
+
+    /// A way with these seconds and codes.
+    fn way(points: &[(f64, f64)]) -> Measured {
+        let point = |(seconds, codes): &(f64, f64)| Point {
+            step: 1,
+            samples: 1,
+            spp: *seconds,
+            seconds: vec![*seconds; 3],
+            told_codes: Some(*codes),
+            errors: Errors { rmse_linear: 0.0, rmse_codes: *codes, rel_mse: 0.0, spread: 0.0 },
+        };
+        Measured {
+            topic: Topic::Default,
+            name: String::new(),
+            threads: 1,
+            points: points.iter().map(point).collect(),
+            taken: vec![None; 3],
+            bias: None,
+        }
+    }
+
+    #[test]
+    fn settings_are_compared_where_there_is_time_for_it() {
+        let default = way(&[(0.1, 5.0), (1.0, 1.6), (2.0, 0.8), (5.0, 0.3)]);
+        let targets = [2.0, 1.0, 0.5, 0.25];
+        assert_eq!(level(&default, &targets, 9.0), 0.5, "no finer than is needed");
+        assert_eq!(level(&default, &targets, 2.0), 1.0);
+        assert_eq!(level(&default, &targets, 0.3), 4.0, "coarser than asked for");
+        assert_eq!(level(&default, &targets, 0.01), 4.0, "what was reached first, not at once");
+        assert_eq!(
+            level(&way(&[(1.0, 0.2)]), &targets, 9.0),
+            0.5,
+            "at once is better than nothing"
+        );
+        assert_eq!(level(&way(&[(1.0, 30.0), (2.0, 20.0)]), &targets, 9.0), 20.0, "where it ended");
+    }
+
+    #[test]
+    fn ways_are_steady_when_their_repetitions_agree() {
+        let mut way = way(&[(1.0, 1.0), (2.0, 0.5)]);
+        assert!(is_steady(&way, 0.5) && is_steady(&way, 0.1));
+        way.points[1].seconds = vec![2.0, 2.4, 2.0];
+        assert!(!is_steady(&way, 0.5) && !is_steady(&way, 0.1) && is_steady(&way, 1.0));
+    }
 }

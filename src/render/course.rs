@@ -74,6 +74,13 @@ impl Course {
         self.schedule.noise().map(|noise| noise.rmse_codes)
     }
 
+    /// A lower and an upper guess of the seconds of tracing, in all, at which that error will have fallen
+    /// to `codes`; `None` before an error is known.
+    pub fn seconds_to_noise(&self, codes: f64) -> Option<(f64, f64)> {
+        let (low, high) = self.schedule.seconds_to_noise(codes, self.seconds)?;
+        Some((self.seconds + low, self.seconds + high))
+    }
+
     /// The world and the film.
     pub fn rendering(&self) -> &Rendering {
         &self.rendering

@@ -295,5 +295,6 @@ mod tests {
             assert_eq!(film.pixel(3, 0, &mix), [0.0; 3], "{bad}");
             assert_eq!(film.pixel(4, 0, &mix), [0.5, 0.0, 0.0], "{bad}");
         }
+        println!("extreme 30 | both | bad samples counted, pixels finite");
     }
 }

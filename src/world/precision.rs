@@ -98,10 +98,17 @@ fn thickness(form: &Form) -> f64 {
             let across = rows.x_axis.length().max(rows.y_axis.length());
             (2.0 / across).min(rows.z_axis.length().recip())
         }
-        Form::Mesh { .. } => form.bounds().map_or(f64::INFINITY, |(l, h)| {
+        Form::Mesh { mesh, scene_from_mesh, .. } => {
+            let [low, high] = mesh.mesh().bounds.map(|corner| DVec3::from(corner.map(f64::from)));
+            let m = scene_from_mesh.matrix3;
+            let stretched = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
+            let size = ((high - low) * DVec3::from(stretched)).to_array();
+            let longest = size.into_iter().fold(0.0, f64::max);
+            // Needles and thin sheets; what is flat altogether has no inside.
+            let thinnest = size.into_iter().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
             // Details are taken to be as large as this part of the whole.
-            (h - l).max_element() / MESH_DETAILS
-        }),
+            thinnest.min(longest / MESH_DETAILS)
+        }
         Form::Compound(compound) => {
             compound.parts.iter().map(thickness).fold(f64::INFINITY, f64::min)
         }

@@ -16,8 +16,9 @@ use zerkalo::world::Precision;
 pub const SIZE: [u32; 2] = [32, 24];
 /// Side of the blocks of pixels whose means are compared.
 const BLOCK: usize = 4;
-/// The chance that all comparisons of one scene together raise a false alarm.
-const LEVEL: f64 = 1e-3;
+/// The chance that all comparisons of one scene together raise a false alarm: one in a thousand for a
+/// hundred scenes.
+const LEVEL: f64 = 1e-3 / 100.0;
 
 /// How far two pictures are apart, beside what chance allows.
 #[derive(Debug)]

@@ -2,6 +2,7 @@
 //! just behind tell whether the whole begins or ends there.
 
 use crate::meshes::Triangles;
+use crate::paint::{Canvas, Spot};
 use crate::surfaces::{Piece, map, pieces};
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo::scene::Object;
@@ -9,8 +10,9 @@ use zerkalo::shape::{Part, Shape};
 
 /// A simple shape: its pieces or its triangles, and the maps between their space and the scene's.
 pub struct Leaf {
-    pieces: Vec<Piece>,
-    mesh: Option<Triangles>,
+    pub pieces: Vec<Piece>,
+    pub mesh: Option<Triangles>,
+    pub canvas: Canvas,
     own_from_scene: DAffine3,
     /// Normals are mapped by the inverse transpose.
     scene_from_own_normals: DMat3,
@@ -46,9 +48,7 @@ impl Leaf {
         let hits = self.pieces.iter().flat_map(|piece| piece.meet(origin, direction)).flatten();
         let hits = hits.map(|(t, n)| (t, n, 0));
         let of_mesh = self.mesh.iter().flat_map(|mesh| mesh.meet(origin, direction));
-        hits.chain(of_mesh)
-            .map(|(t, n, i)| (t, (self.scene_from_own_normals * n).normalize(), i))
-            .collect()
+        hits.chain(of_mesh).map(|(t, n, i)| (t, self.scene_normal(n), i)).collect()
     }
 
     /// The interpolated normal of triangle `i` at `point`; `None`: it has none but its own.
@@ -60,6 +60,22 @@ impl Leaf {
     /// The colour of its own at triangle `i`.
     pub fn color(&self, i: usize) -> DVec3 {
         self.mesh.as_ref().map_or(DVec3::ONE, |mesh| mesh.color(i))
+    }
+
+    /// A point of the scene and the outer normal there, in the space of the leaf's description.
+    pub fn spot(&self, facet: usize, point: DVec3, outer: DVec3) -> Spot<'_> {
+        let point = self.own_from_scene.transform_point3(point);
+        Spot { leaf: self, facet, point, normal: self.own_normal(outer) }
+    }
+
+    /// A normal of the scene in the space of the leaf's description.
+    pub fn own_normal(&self, normal: DVec3) -> DVec3 {
+        (self.scene_from_own_normals.inverse() * normal).normalize()
+    }
+
+    /// The other way.
+    pub fn scene_normal(&self, own: DVec3) -> DVec3 {
+        (self.scene_from_own_normals * own).normalize()
     }
 
     fn contains(&self, point: DVec3) -> bool {
@@ -156,6 +172,7 @@ fn grow(
             };
             let pieces = if mesh.is_some() { Vec::new() } else { pieces(simple)? };
             leaves.push(Leaf {
+                canvas: Canvas::new(simple, mesh.as_ref()),
                 pieces,
                 mesh,
                 own_from_scene: scene_from_own.inverse(),

@@ -1,6 +1,6 @@
 //! Meshes in the plainest way: every triangle is asked, one after the other.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::collections::HashMap;
 use zerkalo::shape::{Form, Kind, MeshFile};
 
@@ -14,6 +14,8 @@ pub struct Triangles {
     normals: Vec<[DVec3; 3]>,
     /// Empty: the file names none.
     colors: Vec<DVec3>,
+    /// Texture coordinates of the corners; empty: the file names none.
+    uvs: Vec<[DVec2; 3]>,
     low: DVec3,
     high: DVec3,
 }
@@ -50,11 +52,17 @@ impl Triangles {
             }
             None => around(&corners),
         };
+        let pair = |i: u32, given: &[[f32; 2]]| DVec2::from(given[i as usize].map(f64::from));
+        let uvs = mesh
+            .uvs
+            .iter()
+            .flat_map(|given| mesh.triangles.iter().map(|t| t.map(|i| pair(i, given))));
         let all = || corners.iter().flatten().copied();
         Self {
             low: all().fold(DVec3::INFINITY, DVec3::min),
             high: all().fold(DVec3::NEG_INFINITY, DVec3::max),
             colors: (0..corners.len()).filter_map(|i| mesh.color(i)).map(vector).collect(),
+            uvs: uvs.collect(),
             normals,
             corners,
         }
@@ -83,10 +91,33 @@ impl Triangles {
     /// The mean of the corners' normals at a point of triangle `i`; `None`: light sees the triangle's own.
     pub fn smooth(&self, i: usize, point: DVec3) -> Option<DVec3> {
         let normals = self.normals.get(i)?;
-        let corners = self.corners[i];
-        let area = |a: DVec3, b: DVec3| (a - point).cross(b - point).length();
-        let weights = [0, 1, 2].map(|k| area(corners[(k + 1) % 3], corners[(k + 2) % 3]));
-        Some((0..3).map(|k| normals[k] * weights[k]).sum())
+        let shares = self.shares(i, point);
+        Some((0..3).map(|k| normals[k] * shares[k]).sum())
+    }
+
+    /// What each corner of triangle `i` counts at a point of its plane; together 1.
+    fn shares(&self, i: usize, point: DVec3) -> [f64; 3] {
+        let [a, b, c] = self.corners[i];
+        let normal = (b - a).cross(c - a);
+        let area = |a: DVec3, b: DVec3| (a - point).cross(b - point).dot(normal);
+        [(b, c), (c, a), (a, b)].map(|(a, b)| area(a, b) / normal.length_squared())
+    }
+
+    /// Whether the file has texture coordinates.
+    pub fn has_uv(&self) -> bool {
+        !self.uvs.is_empty()
+    }
+
+    /// Those at a point of the plane of triangle `i`; `None`: the file has none.
+    pub fn uv(&self, i: usize, point: DVec3) -> Option<DVec2> {
+        let uvs = self.uvs.get(i)?;
+        let shares = self.shares(i, point);
+        Some((0..3).map(|k| uvs[k] * shares[k]).sum())
+    }
+
+    /// All corners of all triangles.
+    pub fn points(&self) -> impl Iterator<Item = DVec3> {
+        self.corners.iter().flatten().copied()
     }
 
     /// The file's colour of triangle `i`.

@@ -46,11 +46,10 @@ impl Tracer<'_> {
 
     /// From `hit`, whose material lets light through, one way by chance.
     pub fn through(&self, hit: &Hit, direction: DVec3, numbers: &mut Numbers) -> Way {
-        // Meshes that let light through are refused: everything here is as light sees it.
-        let (material, n) = (hit.material, hit.normal);
+        let (material, n) = (hit.material, hit.seen);
         let open = self.bodies[hit.body].is_open();
-        let (before, n_i) = self.medium(hit.point + n * ASIDE);
-        let (behind, mut n_t) = self.medium(hit.point - n * ASIDE);
+        let (before, n_i) = self.medium(hit.point + hit.normal * ASIDE);
+        let (behind, mut n_t) = self.medium(hit.point - hit.normal * ASIDE);
         if open {
             n_t = material.index;
         } else if before == behind {
@@ -99,7 +98,10 @@ impl Tracer<'_> {
             return Way::On(None);
         }
         let p = r / (r + t);
-        let (way, chance) = if numbers.unit() < p { (mirrored, p) } else { (passed, 1.0 - p) };
-        Way::On(way.map(|(d, k)| (d, k / chance)))
+        let (way, chance, side) =
+            if numbers.unit() < p { (mirrored, p, 1.0) } else { (passed, 1.0 - p, -1.0) };
+        // Where bumps would send a ray to the wrong side it leaves as steeply on the right one.
+        let to = side * hit.normal;
+        Way::On(way.map(|(d, k)| (d - 2.0 * d.dot(to).min(0.0) * to, k / chance)))
     }
 }

@@ -4,8 +4,10 @@ use crate::answers::{highlight, reflect};
 use crate::common::Numbers;
 use crate::compounds::Body;
 use crate::meshes;
+use crate::paint::Pixels;
 use crate::through::Way;
 use glam::DVec3;
+use std::collections::HashMap;
 use std::f64::consts::PI;
 use zerkalo::camera::ViewAngle;
 use zerkalo::light::{Falloff, Light};
@@ -29,12 +31,18 @@ pub enum Mutation {
     NoCosine,
     /// Light that enters a solid goes straight on.
     NoBending,
+    /// Textures take u for v.
+    SidewaysTexture,
+    /// Bumps go down where they should go up.
+    SunkenBumps,
 }
 
 /// A scene to trace.
 pub struct Tracer<'a> {
     pub scene: &'a Scene,
     pub bodies: Vec<Body>,
+    /// By the names of their files.
+    pub images: HashMap<String, Pixels>,
     plain: Material,
     pub mutation: Mutation,
 }
@@ -50,7 +58,7 @@ pub struct Hit<'a> {
     pub point: DVec3,
     /// On the viewer's side.
     pub normal: DVec3,
-    /// The one that light sees: another on smooth meshes.
+    /// The one that light sees: another on smooth meshes and under bumps.
     pub seen: DVec3,
     /// Colour of its own.
     pub tint: DVec3,
@@ -67,14 +75,15 @@ impl<'a> Tracer<'a> {
     /// `Err`: there is something in the scene that this tracer does not know.
     pub fn new(scene: &'a Scene, mutation: Mutation) -> Result<Self, String> {
         let bodies = scene.objects.iter().map(Body::new).collect::<Result<Vec<_>, _>>()?;
-        let tracer = Self { scene, bodies, plain: Material::default(), mutation };
-        for body in &tracer.bodies {
-            for leaf in &body.leaves {
-                let material = tracer.material(&leaf.material);
-                unknown_keys(material)?;
-                if body.is_mesh() && material.transmission > 0.0 {
-                    return Err("a mesh that lets light through".to_string());
-                }
+        let images = HashMap::new();
+        let mut tracer = Self { scene, bodies, images, plain: Material::default(), mutation };
+        for material in scene.materials.values() {
+            unknown_keys(material)?;
+            tracer.open_images(material)?;
+        }
+        for body in tracer.bodies.iter().filter(|body| body.is_mesh()) {
+            if tracer.material(&body.leaves[0].material).transmission > 0.0 {
+                return Err("a mesh that lets light through".to_string());
             }
         }
         Ok(tracer)
@@ -140,7 +149,7 @@ impl<'a> Tracer<'a> {
             let turned =
                 reflect(hit.material, hit.seen, -direction, trace.horizon, self.mutation, numbers);
             let Some((mut next, factor)) = turned else { return radiance };
-            // What would go into the triangle goes as steeply out of it.
+            // What would go into the surface goes as steeply out of it.
             next -= 2.0 * next.dot(hit.normal).min(0.0) * hit.normal;
             weight *= factor;
             if weight.max_element() <= 0.0 || weight.max_element() < trace.min_weight {
@@ -189,11 +198,18 @@ impl<'a> Tracer<'a> {
         let front = normal.dot(direction) < 0.0;
         let (point, normal) = (origin + direction * t, if front { normal } else { -normal });
         let smooth = leaf.smooth(facet, point);
+        let mut seen = smooth.map_or(normal, |smooth| meshes::seen(smooth, normal, direction));
+        let outward = if front { 1.0 } else { -1.0 };
+        let spot = leaf.spot(facet, point, normal * outward);
+        if material.bump.is_some() {
+            let raised = self.raised(material, &spot, leaf.own_normal(seen * outward));
+            seen = meshes::seen(leaf.scene_normal(raised) * outward, normal, direction);
+        }
         Some(Hit {
             point,
             normal,
-            seen: smooth.map_or(normal, |smooth| meshes::seen(smooth, normal, direction)),
-            tint: leaf.color(facet),
+            seen,
+            tint: leaf.color(facet) * self.painted(material, &spot),
             material,
             body: i,
             front,
@@ -255,7 +271,7 @@ fn arrival(light: &Light, point: DVec3) -> (DVec3, f64, DVec3) {
 }
 
 /// What this tracer reads of a material.
-const KNOWN: [&str; 17] = [
+const KNOWN: [&str; 19] = [
     "color",
     "ambient",
     "diffuse",
@@ -273,6 +289,8 @@ const KNOWN: [&str; 17] = [
     "reflectance",
     "metal",
     "two_sided",
+    "texture",
+    "bump",
 ];
 
 /// `Err`: the material says something that this tracer does not read.

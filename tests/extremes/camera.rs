@@ -2,6 +2,7 @@
 
 use crate::common::Numbers;
 use crate::rays::to_dvec3;
+use crate::told::{precision, told};
 use glam::DVec3;
 use zerkalo::camera::{Camera, View, ViewAngle};
 use zerkalo::lanes::{Double, Frame, Lanes, Single, V3};
@@ -51,11 +52,13 @@ fn extreme_17_odd_cameras() {
             }
         }
     }
+    told(17, "both", "rays finite");
 }
 
 /// The angle between the outermost rays is the view angle.
 #[test]
 fn extreme_17_narrow_and_wide_angles_are_right() {
+    let mut worst = 0f64;
     for degrees in [1e-3f64, 1.0, 90.0, 179.9] {
         let camera = Camera { view_angle: ViewAngle::Horizontal(degrees), ..Camera::default() };
         let view = View::new(&camera, [1000, 1], DVec3::ZERO);
@@ -70,7 +73,9 @@ fn extreme_17_narrow_and_wide_angles_are_right() {
         // Unit vectors are known to 1e-16: so is the angle, in radians.
         let tolerance = 1e-13 + 1e-13 * degrees;
         assert!((found - degrees).abs() < tolerance, "{degrees}: {found}");
+        worst = worst.max((found - degrees).abs());
     }
+    told(17, "double", &format!("angles {worst:.0e} degrees off at most"));
 }
 
 #[test]
@@ -83,12 +88,13 @@ fn extreme_17_impossible_views_are_located_errors() {
         ("target = [0.0, 0.0, 0.0]\nview_angle.horizontal = 180.0", "test:3:25"),
     ] {
         let text = format!("[camera]\n{line}\n");
-        let told = match Scene::parse(&text, "test") {
+        let words = match Scene::parse(&text, "test") {
             Ok(_) => panic!("accepted: {text}"),
             Err(errors) => errors.to_string(),
         };
-        assert!(told.starts_with(place), "expected at {place}: {told}");
+        assert!(words.starts_with(place), "expected at {place}: {words}");
     }
+    told(17, "both", "errors located");
 }
 
 fn check_frames<L: Lanes>(bound: f64) {
@@ -140,6 +146,9 @@ fn check_frames<L: Lanes>(bound: f64) {
         }
     }
     assert!(worst > 0.0);
+    if L::WIDTH > 1 {
+        told(18, precision::<L>(), &format!("{worst:.0e}"));
+    }
 }
 
 #[test]

@@ -8,6 +8,8 @@ mod common;
 mod rays;
 #[path = "../support/mod.rs"]
 mod support;
+#[path = "../common/told.rs"]
+mod told;
 
 mod audit;
 mod camera;
@@ -25,3 +27,4 @@ mod shadow;
 mod slopes;
 mod sphere;
 mod tapered;
+mod volumes;

@@ -3,6 +3,7 @@
 
 use crate::common::Numbers;
 use crate::rays::{Line, closest, packets};
+use crate::told::{LEFT, told};
 use glam::{DAffine3, DQuat, DVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -10,11 +11,13 @@ use std::fmt::Write;
 use std::sync::Arc;
 use zerkalo::asset::{Assets, Mesh};
 use zerkalo::lanes::{Double, Lanes, Mask, Single};
+use zerkalo::scene::Scene;
 use zerkalo::shape::{Form, Geometry};
+use zerkalo::world::{AnyWorld, Options};
 
 /// An icosahedron around the origin, each of its triangles cut in four `times` times, its corners on
-/// the ellipsoid with these half-axes.
-fn icosphere(times: u32, axes: DVec3) -> Arc<Mesh> {
+/// the ellipsoid with these half-axes; and whether `auto` traces a scene of it in double precision.
+fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
     let golden = 0.5 * (1.0 + 5f64.sqrt());
     let mut corners = Vec::new();
     for axis in 0..3 {
@@ -64,7 +67,13 @@ fn icosphere(times: u32, axes: DVec3) -> Arc<Mesh> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("ball.obj");
     std::fs::write(&path, text).unwrap();
-    Assets::default().mesh(&path).unwrap()
+    let scene = folder.path().join("scene.toml");
+    let eye = "[camera]\neye = [3.0, 1.0, 0.0]\ntarget = [0.0, 0.0, 0.0]\n";
+    std::fs::write(&scene, format!("{eye}[[object]]\nshape.mesh = {{ file = \"ball.obj\" }}\n"))
+        .unwrap();
+    let scene = Scene::read(&scene).unwrap();
+    let double = matches!(AnyWorld::compile(&scene, &Options::default()), AnyWorld::Double(_));
+    (Assets::default().mesh(&path).unwrap(), double)
 }
 
 /// How many of `rays` rays from inside the mesh to its corners, its edges and into its triangles do not
@@ -104,7 +113,8 @@ fn missed<L: Lanes>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: usize)
 }
 
 /// The meshes: fine and coarse, turned and far from the origin for their size, and drawn out to a needle
-/// of 1e-6 and squeezed to a sheet of 1e-6, whose triangles are slivers.
+/// of 1e-6 and squeezed to a sheet of 1e-6, whose triangles are slivers. Of such a thing single precision
+/// knows the inside to a tenth of its thickness; it loses one ray in a million, and `auto` takes double.
 fn check(rays: usize) {
     let turned = DAffine3::from_scale_rotation_translation(
         DVec3::splat(3.7),
@@ -113,6 +123,7 @@ fn check(rays: usize) {
     );
     let (round, needle, sheet) =
         (DVec3::ONE, DVec3::new(1e-6, 1.0, 1e-6), DVec3::new(1.0, 1e-6, 1.0));
+    let mut lost = 0;
     for (name, times, axes, place) in [
         ("icosahedron", 0, round, DAffine3::IDENTITY),
         ("icosphere", 4, round, DAffine3::IDENTITY),
@@ -120,13 +131,18 @@ fn check(rays: usize) {
         ("needle", 2, needle, DAffine3::IDENTITY),
         ("sheet", 2, sheet, DAffine3::IDENTITY),
     ] {
-        let mesh = icosphere(times, axes);
+        let (mesh, left_to_double) = icosphere(times, axes);
+        assert_eq!(left_to_double, axes != round, "{name}");
         assert_eq!(mesh.mesh().triangles.len(), 20 << (2 * times), "{name}");
         let double = missed::<Double>(&mesh, place, axes, rays);
         assert_eq!(double, 0, "{name}: of {rays} rays in double precision");
         let single = missed::<Single>(&mesh, place, axes, rays);
-        assert_eq!(single, 0, "{name}: of {rays} rays in single precision");
+        let allowed = if left_to_double { rays / 100_000 } else { 0 };
+        assert!(single <= allowed, "{name}: {single} of {rays} rays in single precision");
+        lost += if left_to_double { single } else { 0 };
     }
+    told(14, "double", &format!("0 missed of 5 x {rays} rays"));
+    told(14, "single", &format!("0 missed of 3 x {rays} rays; slivers ({lost} missed) {LEFT}"));
 }
 
 /// Two million rays, each asked twice; ten times as many below.

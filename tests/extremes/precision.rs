@@ -2,7 +2,9 @@
 //! proportion shrinks; what single precision gets wrong is measured as the RMSE beside double precision
 //! with the same samples, in codes.
 
-use crate::support::{all_shipped, parsed, picture, rendered, sized};
+use crate::support::{all_shipped, parsed, picture, rendered, shipped, sized};
+use crate::told::told;
+use std::collections::BTreeMap;
 use zerkalo::film::{Display, Part};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
@@ -256,7 +258,8 @@ fn auto_takes_single_where_proportions_are_harmless() {
     }
 }
 
-/// The numbered extremes that single precision cannot meet: `auto` switches to double.
+/// Scenes with the numbered extremes. Those that single precision cannot meet go to double by `auto`;
+/// the others, of which a shipped scene stands for many, stay in single.
 #[test]
 fn auto_takes_double_for_the_extremes_beyond_single() {
     let seen = |eye: [f64; 3], degrees: f64, shape: &str| {
@@ -266,17 +269,60 @@ fn auto_takes_double_for_the_extremes_beyond_single() {
     let cylinder = |height: f64| {
         format!("cylinder = {{ base = [0, 0, 0], top = [0, {height:e}, 0], radius = 1.0 }}")
     };
-    for (number, text) in [
-        (1, seen([1e6, 0.0, 0.0], 1e-4, ball)),
-        (2, bare_round_ground(1e-9)),
-        (3, seen([1.0, 0.0, 0.0], 1e-3, "sphere = { center = [0, 0, 0], radius = 1e-6 }")),
-        (11, seen([3.0, 2.0, 3.0], 40.0, &cylinder(1e-9))),
-        (11, seen([3.0, 2.0, 3.0], 40.0, &cylinder(1e9))),
-        (13, seen([3.0, 2.0, 3.0], 40.0, "box = { center = [0, 0, 0], size = [1, 1e-6, 1] }")),
-        (16, narrow_gap(1e-6)),
-        (17, seen([3.0, 2.0, 3.0], 1e-3, ball)),
-    ] {
-        assert!(!takes_single(&parsed(&text)), "extreme {number}:\n{text}");
+    let own = [
+        (1, true, seen([1e6, 0.0, 0.0], 1e-4, ball)),
+        (2, true, bare_round_ground(1e-9)),
+        (3, true, seen([1.0, 0.0, 0.0], 1e-3, "sphere = { center = [0, 0, 0], radius = 1e-6 }")),
+        (4, false, seen([0.1, 0.2, 0.3], 90.0, ball)),
+        (5, false, seen([3.0, 1.0, 0.0], 40.0, ball)),
+        (6, false, seen([3.0, 0.5, 0.0], 40.0, "box = { center = [0, 0, 0], size = [1, 1, 1] }")),
+        (11, true, seen([3.0, 2.0, 3.0], 40.0, &cylinder(1e-9))),
+        (11, true, seen([3.0, 2.0, 3.0], 40.0, &cylinder(1e9))),
+        (
+            13,
+            true,
+            seen([3.0, 2.0, 3.0], 40.0, "box = { center = [0, 0, 0], size = [1, 1e-6, 1] }"),
+        ),
+        (15, false, small_ball(0.5)),
+        (16, true, narrow_gap(1e-6)),
+        (17, true, seen([3.0, 2.0, 3.0], 1e-3, ball)),
+        // At the border of so wide a view neighbouring rays are next to parallel.
+        (17, true, seen([3.0, 2.0, 3.0], 179.9, ball)),
+    ];
+    let of_shipped = [
+        (7, "extents"),
+        (8, "compound-nested"),
+        (9, "compound-intersection"),
+        (10, "compound-difference"),
+        (12, "shape-tapered-cylinder"),
+        (14, "shape-mesh"),
+        (18, "lobe-cone"),
+        (19, "slope-lobe"),
+        (20, "lobe-square"),
+        (21, "horizon-fold"),
+        (22, "lobe-ggx"),
+        (23, "furnace"),
+        (24, "metals"),
+        (25, "glass"),
+        (26, "facing-mirrors"),
+        (27, "transmission"),
+        (28, "mirror-room"),
+        (29, "light-groups"),
+        (30, "slope-aa"),
+    ];
+    let own = own.into_iter().map(|(number, double, text)| (number, double, parsed(&text)));
+    let of_shipped = of_shipped
+        .into_iter()
+        .map(|(number, name)| (number, false, shipped(&format!("{name}.toml"))));
+    let mut chosen: BTreeMap<usize, Vec<&str>> = BTreeMap::new();
+    for (number, double, scene) in own.chain(of_shipped) {
+        assert_eq!(takes_single(&scene), !double, "extreme {number}");
+        chosen.entry(number).or_default().push(if double { "double" } else { "single" });
+    }
+    assert!(chosen.keys().copied().eq(1..=30), "{chosen:?}");
+    for (number, mut words) in chosen {
+        words.dedup();
+        told(number, "auto", &words.join(", "));
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::common::Numbers;
 use crate::rays::{Line, Traced, scene};
+use crate::told::told;
 use glam::{DMat3, DVec3};
 use zerkalo::world::Precision;
 
@@ -196,6 +197,8 @@ fn check_self_shadow(precision: Precision, place: DVec3, scales: &[f64], points:
 fn extreme_15_self_shadow() {
     check_self_shadow(Precision::Double, DVec3::ZERO, &SCALES, 8000);
     check_self_shadow(Precision::Single, DVec3::ZERO, &SCALES, 8000);
+    let asked = THINGS.len() * SCALES.len() * 4 * 8000;
+    told(15, "both", &format!("0 falsely dark of {asked} points"));
 }
 
 /// A million units from the origin the file's own numbers end at 1e-10: things are as small as 1e-4.
@@ -205,6 +208,8 @@ fn extreme_15_self_shadow_far_from_the_origin() {
     let place = DVec3::new(1e6, -1e6, 1e6);
     check_self_shadow(Precision::Double, place, &SCALES[1..], 4000);
     check_self_shadow(Precision::Single, place, &SCALES[1..], 4000);
+    let asked = THINGS.len() * (SCALES.len() - 1) * 4 * 4000;
+    told(15, "both", &format!("a million units off 0 of {asked}"));
 }
 
 /// A box that hovers a millionth of its size above the ground: under it the ground is dark but for
@@ -261,4 +266,6 @@ fn extreme_16_thin_gap() {
         check_gap(scale, Precision::Double);
         check_gap(scale, Precision::Single);
     }
+    told(16, "double", "no leak, the strip under the edge is lit");
+    told(16, "single", "no leak, the strip is not to be seen");
 }

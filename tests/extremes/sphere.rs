@@ -2,6 +2,7 @@
 
 use crate::common::Numbers;
 use crate::rays::{Line, Traced, closest, scene};
+use crate::told::{LEFT, precision, told};
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::camera::{Camera, View, ViewAngle};
@@ -59,8 +60,10 @@ fn exact((origin, d): Line, center: DVec3, radius: f64) -> (f64, DVec3) {
     (across2.0.sqrt() - radius, DVec3::from_array(point))
 }
 
-/// Rays at a unit sphere from the distance `far`: within 0.7 of the radius, and near the limb.
-fn check_far<L: Lanes>(far: f64, seed: u64) {
+/// Rays at a unit sphere from the distance `far`: within 0.7 of the radius, and near the limb. How far
+/// their meeting points are off the surface at most.
+fn check_far<L: Lanes>(far: f64, seed: u64) -> f64 {
+    let mut worst = 0f64;
     let mut numbers = Numbers::new(seed);
     let rounded = |v: DVec3| if L::EPSILON > 1e-10 { v.as_vec3().as_dvec3() } else { v };
     // What rounds is the ray: its direction is one of this precision, and so is f . d.
@@ -94,6 +97,7 @@ fn check_far<L: Lanes>(far: f64, seed: u64) {
             let from_center = met.point - center;
             let off = (from_center.length() - 1.0).abs();
             assert!(off <= 8.0 * L::EPSILON, "{told}: {off} off the surface");
+            worst = worst.max(off);
             if i % 2 == 0 {
                 // Up to 0.7 of the radius the surface is inclined by at most 45 degrees.
                 let wrong = (from_center - at).length();
@@ -101,18 +105,23 @@ fn check_far<L: Lanes>(far: f64, seed: u64) {
             }
         }
     }
+    worst
 }
 
 #[test]
 fn extreme_01_sphere_far_away() {
+    let mut worst = 0f64;
     for (i, far) in [1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9].into_iter().enumerate() {
-        check_far::<Double>(far, 10 + i as u64);
+        worst = worst.max(check_far::<Double>(far, 10 + i as u64));
     }
+    told(1, "double", &format!("hits right, {worst:.0e} r off at most"));
     // Single precision ends where a rounding of the distance is a thousandth of the radius; the
     // choice of precision leaves it before.
+    let mut worst = 0f64;
     for (i, far) in [1e2, 1e3, 8192.0].into_iter().enumerate() {
-        check_far::<Single>(far, 30 + i as u64);
+        worst = worst.max(check_far::<Single>(far, 30 + i as u64));
     }
+    told(1, "single", &format!("up to 8192: hits right, {worst:.0e} r off at most; beyond {LEFT}"));
 }
 
 #[test]
@@ -166,6 +175,8 @@ fn extreme_02_sphere_as_ground() {
         let dark = traced.radiance(&lines).iter().filter(|l| l[0] <= 0.0).count();
         assert_eq!(dark, 0, "light {light}: dark points on bare ground");
     }
+    told(2, "double", &format!("horizon {:.0e} px off, no dark point", (below - row).abs()));
+    told(2, "single", LEFT);
 }
 
 /// Share of the rays through points of the square around the image of `center` on z = -1 that meet
@@ -209,6 +220,8 @@ fn extreme_03_tiny_sphere() {
     let center = DVec3::new(0.3, -0.2, -1.0).normalize();
     let ratio = check_silhouette(center, 1e-6, 1_000_000, 3);
     assert!((ratio - 1.0).abs() < 0.01, "silhouette {ratio} of the true one");
+    told(3, "double", &format!("{:+.2} %", 100.0 * (ratio - 1.0)));
+    told(3, "single", LEFT);
 }
 
 #[test]
@@ -271,7 +284,7 @@ fn longest_touch<L: Lanes>() -> f64 {
 /// Lines that touch: either a miss or a chord no longer than rounding makes it.
 fn check_tangents<L: Lanes>() {
     let mut numbers = Numbers::new(5);
-    let limit = longest_touch::<L>();
+    let (limit, mut longest) = (longest_touch::<L>(), 0f64);
     let geometry = Geometry::<L>::new(&[Form::Sphere { center: DVec3::ZERO, radius: 1.0 }]);
     let signs = |bits: u64| {
         DVec3::new(
@@ -303,8 +316,10 @@ fn check_tangents<L: Lanes>() {
         if let [Some(near), Some(back)] = ends[..] {
             let chord = ahead + 8.0 - near.t - back.t;
             assert!(chord.abs() <= limit, "{line:?}: chord {chord}");
+            longest = longest.max(chord);
         }
     }
+    told(5, precision::<L>(), &format!("sphere: chords up to {longest:.0e}"));
 }
 
 #[test]

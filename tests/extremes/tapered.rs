@@ -2,6 +2,7 @@
 
 use crate::common::Numbers;
 use crate::rays::{Line, Met, closest};
+use crate::told::{LEFT, precision, told};
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, Lanes, Single};
 use zerkalo::shape::{Cone, Cylinder, Form, Geometry, Kind, TaperedCylinder, UnitCylinder};
@@ -80,6 +81,7 @@ fn spans_are_those_of_the_plain_formula() {
 /// From cylinder to cone without a step, where the quadratic changes its degree.
 #[test]
 fn extreme_11_tapered_cylinders() {
+    let mut worst = 0f64;
     let lines = lines(12, 50_000);
     let straight = meet::<Double>(&canonical(1.0), &lines);
     for hair in [1e-15, 1e-12, -1e-15, -1e-12] {
@@ -89,6 +91,7 @@ fn extreme_11_tapered_cylinders() {
                 (Some(a), Some(b)) => {
                     let flat = a.normal.dot(line.1).abs().min(b.normal.dot(line.1).abs());
                     assert!((a.t - b.t).abs() < 1e-9 / flat.max(1e-6), "{hair}: {line:?}");
+                    worst = worst.max((a.t - b.t).abs() * flat.max(1e-6));
                     assert!((b.normal.length() - 1.0).abs() < 1e-14, "{hair}: {line:?}");
                 }
                 (None, None) => {}
@@ -99,6 +102,8 @@ fn extreme_11_tapered_cylinders() {
             }
         }
     }
+    told(11, "double", &format!("a step of {worst:.0e} at most"));
+    told(11, "single", LEFT);
 }
 
 /// A tapered cylinder of equal radii is the cylinder, bit for bit, and one of radius 0 the cone.
@@ -124,6 +129,7 @@ fn extreme_11_without_taper_it_is_the_cylinder() {
             assert_eq!(a.map(bits), b.map(bits), "{name}: {line:?}");
         }
     }
+    told(11, "double", "without taper bit-equal");
 }
 
 #[test]
@@ -153,6 +159,7 @@ fn extreme_11_flat_and_tall_solids() {
 
 #[test]
 fn extreme_12_along_a_generator() {
+    let mut worst = 0f64;
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, 1.0, -2.0);
     let mut numbers = Numbers::new(14);
     for place in [DAffine3::IDENTITY, DAffine3::from_quat(turn)] {
@@ -182,6 +189,7 @@ fn extreme_12_along_a_generator() {
                 let half = low.distance(high) / 2.0;
                 let error = (enter + half).abs().max((leave - half).abs());
                 assert!(error < 1e-6, "s = {s}: {enter} {leave} {half}");
+                worst = worst.max(error);
                 let outer = middle - (center - middle) * 1e-9;
                 let found = ends(&form, (outer, d), 4.0).map_or(0.0, |(a, b)| b - a);
                 assert!(found < 1e-6, "s = {s}: {found}");
@@ -194,6 +202,8 @@ fn extreme_12_along_a_generator() {
             }
         }
     }
+    told(12, "double", &format!("finite, lengths {worst:.0e} off at most"));
+    told(12, "single", "finite");
 }
 
 /// Lines that touch: no NaN, and no more than `limit` of their length inside.
@@ -231,7 +241,7 @@ fn check_tangents<L: Lanes>(limit: f64) {
             }
         }
     }
-    println!("{}: {longest:.1e} of a touching line inside at most", L::NAME);
+    told(5, precision::<L>(), &format!("others: chords up to {longest:.0e}"));
 }
 
 #[test]

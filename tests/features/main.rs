@@ -18,6 +18,9 @@ mod compounds;
 #[allow(dead_code, reason = "of tests/agreement; not all of it is needed here")]
 #[path = "../agreement/meshes.rs"]
 mod meshes;
+#[allow(dead_code, reason = "of tests/agreement; not all of it is needed here")]
+#[path = "../agreement/paint.rs"]
+mod paint;
 #[path = "../support/mod.rs"]
 mod support;
 #[allow(dead_code, reason = "of tests/agreement; not all of it is needed here")]

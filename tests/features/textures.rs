@@ -1,57 +1,20 @@
 //! Textures and bumps: images looked up by the formulas of two mappings.
 
 use crate::beside::without_chance;
+use crate::paint::Pixels;
 use crate::row::{Verdict, ensure, number, row};
 use crate::sight::{RASTER, centers, sighting, sights};
 use crate::support::{shipped, sized};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
+use zerkalo::material::{TextureFilter, Wrap};
 use zerkalo::scene::edit::{self, Subject};
 use zerkalo::scene::{Level, Scene};
 use zerkalo::shape::Shape;
 
-/// An image of `scenes/textures`, its pixels from the lowest row up.
-struct Pixels {
-    size: [usize; 2],
-    /// Codes divided by 255.
-    codes: Vec<DVec3>,
-}
-
-impl Pixels {
-    fn open(name: &str) -> Self {
-        let path = format!("{}/scenes/textures/{name}", env!("CARGO_MANIFEST_DIR"));
-        let image = image::open(&path).unwrap_or_else(|e| panic!("{path}: {e}")).to_rgb8();
-        let (width, height) = image.dimensions();
-        let rows = (0..height).rev().flat_map(|y| (0..width).map(move |x| (x, y)));
-        let code = |(x, y)| DVec3::from(image.get_pixel(x, y).0.map(|c| f64::from(c) / 255.0));
-        Self { size: [width as usize, height as usize], codes: rows.map(code).collect() }
-    }
-
-    /// The mean of the four pixels around a point, `of` each; the image repeats.
-    fn at(&self, uv: DVec2, of: impl Fn(DVec3) -> DVec3) -> DVec3 {
-        let [width, height] = self.size;
-        let (x, y) = (uv.x * width as f64 - 0.5, uv.y * height as f64 - 0.5);
-        let pixel = |dx: f64, dy: f64| {
-            let i = (x.floor() + dx).rem_euclid(width as f64) as usize;
-            let j = (y.floor() + dy).rem_euclid(height as f64) as usize;
-            of(self.codes[j * width + i])
-        };
-        let (a, b) = (x - x.floor(), y - y.floor());
-        let low = pixel(0.0, 0.0).lerp(pixel(1.0, 0.0), a);
-        low.lerp(pixel(0.0, 1.0).lerp(pixel(1.0, 1.0), a), b)
-    }
-
-    /// The linear colour.
-    fn color(&self, uv: DVec2) -> DVec3 {
-        let linear =
-            |c: f64| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
-        self.at(uv, |code| code.map(linear))
-    }
-
-    /// Grey, 0 to 1.
-    fn height(&self, uv: DVec2) -> f64 {
-        self.at(uv, |code| code).element_sum() / 3.0
-    }
+/// An image of `scenes/textures`.
+fn image(name: &str) -> Pixels {
+    Pixels::open(&format!("textures/{name}")).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Only camera rays, and no highlights.
@@ -98,17 +61,18 @@ fn wears_images(meant: &Scene, shown: &Scene) -> Verdict {
     let mut bare = plain(meant);
     bare.materials.values_mut().for_each(|m| m.texture = None);
     let (bare, shown) = (without_chance(&bare), without_chance(&plain(shown)));
-    let (sheet, wood) = (Pixels::open("sheet.png"), Pixels::open("wood.png"));
+    let (sheet, wood) = (image("sheet.png"), image("wood.png"));
+    let color = |of: &Pixels, uv| of.color(uv, Wrap::Repeat, TextureFilter::Bilinear);
     let (center, radius) = ball(meant, "ball");
     let mut pixels: Vec<(usize, DVec3)> = Vec::new();
     for (i, p) in points(meant, "picture") {
         // 1.1 wide and 0.8 high around (-0.75, 1.55).
         let uv = DVec2::new((p.x + 0.75) / 1.1 + 0.5, (p.y - 1.55) / 0.8 + 0.5);
-        pixels.push((i, sheet.color(uv)));
+        pixels.push((i, color(&sheet, uv)));
     }
     ensure(pixels.len() > 40, || format!("{} pixels of the picture", pixels.len()))?;
     for (i, p) in points(meant, "ball") {
-        pixels.push((i, wood.color(spherical((p - center) / radius, [3.0, 2.0]))));
+        pixels.push((i, color(&wood, spherical((p - center) / radius, [3.0, 2.0]))));
     }
     ensure(pixels.len() > 120, || format!("{} pixels in all", pixels.len()))?;
     for (i, color) in pixels {
@@ -151,7 +115,7 @@ fn b13_image_texture() {
 /// The ball's normals are those of a surface raised by the image's heights; its outline stays.
 fn is_raised(meant: &Scene, shown: &Scene) -> Verdict {
     let picture = without_chance(&plain(shown));
-    let heights = Pixels::open("brick-heights.png");
+    let heights = image("brick-heights.png");
     let (center, radius) = ball(meant, "plaster ball");
     let (scale, height) = ([3.0, 1.5], 0.02);
     let own = &meant.materials["plaster"];
@@ -161,14 +125,15 @@ fn is_raised(meant: &Scene, shown: &Scene) -> Verdict {
     let eye = DVec3::from(meant.camera.eye);
     let seen = points(shown, "plaster ball");
     ensure(seen == points(meant, "plaster ball"), || "another outline".into())?;
-    let step = heights.size.map(|n| 1.0 / n as f64);
+    let step = 1.0 / heights.size;
     let mut bent = 0;
     for (i, p) in seen {
         let n = (p - center) / radius;
         let uv = spherical(n, scale);
         // Heights a pixel to both sides.
-        let [along_u, along_v] = [DVec2::X * step[0], DVec2::Y * step[1]].map(|d| {
-            height * (heights.height(uv + d) - heights.height(uv - d)) / (2.0 * d.element_sum())
+        let [along_u, along_v] = [DVec2::X * step.x, DVec2::Y * step.y].map(|d| {
+            let rise = heights.height(uv + d, Wrap::Repeat) - heights.height(uv - d, Wrap::Repeat);
+            height * rise / (2.0 * d.element_sum())
         });
         let [longitude, latitude] = angles(n);
         let east = DVec3::new(longitude.cos(), 0.0, -longitude.sin());

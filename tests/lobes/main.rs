@@ -10,4 +10,6 @@ mod sampler;
 mod setup;
 mod stats;
 mod through;
+#[path = "../common/told.rs"]
+mod told;
 mod worlds;

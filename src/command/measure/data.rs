@@ -17,6 +17,14 @@ struct Document<'a> {
     reference_linear: f64,
     reference_seconds: f64,
     compared_at_codes: f64,
+    /// The largest share by which another reference could change the errors.
+    errors_spread: f64,
+    /// The greatest spread of the times that the table tells.
+    times_spread: f64,
+    /// The greatest share of the processors that other programs took.
+    taken_by_others: Option<f64>,
+    /// Noise levels that were not waited for.
+    expected: Vec<Expected>,
     variations: Vec<Variation<'a>>,
 }
 
@@ -33,6 +41,8 @@ struct Variation<'a> {
     efficiency: Option<f64>,
     bias_z: Option<f64>,
     bias_codes: Option<f64>,
+    /// The least that could be told from noise.
+    bias_least_codes: Option<f64>,
     crossings: Vec<Crossing>,
     points: Vec<Point>,
 }
@@ -46,6 +56,13 @@ struct Crossing {
     at_most: bool,
 }
 
+#[derive(Serialize)]
+struct Expected {
+    codes: f64,
+    seconds_low: f64,
+    seconds_high: f64,
+}
+
 /// One place on the way; a line of the CSV.
 #[derive(Serialize)]
 struct Point {
@@ -55,6 +72,7 @@ struct Point {
     seconds_spread: f64,
     told_codes: Option<f64>,
     rmse_codes: f64,
+    rmse_codes_spread: f64,
     rmse_linear: f64,
     rel_mse: f64,
 }
@@ -70,6 +88,7 @@ struct Line<'a> {
     seconds_spread: f64,
     told_codes: Option<f64>,
     rmse_codes: f64,
+    rmse_codes_spread: f64,
     rmse_linear: f64,
     rel_mse: f64,
 }
@@ -78,10 +97,11 @@ fn points(measured: &Measured) -> impl Iterator<Item = Point> {
     measured.points.iter().map(|p| Point {
         samples: p.samples,
         spp: p.spp,
-        seconds: median(&p.seconds),
-        seconds_spread: spread(&p.seconds),
+        seconds: median(&measured.seconds(p)),
+        seconds_spread: spread(&measured.seconds(p)),
         told_codes: p.told_codes,
         rmse_codes: p.errors.rmse_codes,
+        rmse_codes_spread: p.errors.spread,
         rmse_linear: p.errors.rmse_linear,
         rel_mse: p.errors.rel_mse,
     })
@@ -112,6 +132,7 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
         // A difference without noise has no finite number of standard errors.
         bias_z: measured.bias.map(|b| b.z).filter(|z| z.is_finite()),
         bias_codes: measured.bias.map(|b| b.codes),
+        bias_least_codes: measured.bias.map(|b| b.least_codes),
         crossings: targets.iter().filter_map(crossing).collect(),
         points: points(measured).collect(),
     }
@@ -120,6 +141,11 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
 /// Everything.
 pub fn json(about: &About) -> Vec<u8> {
     let m = about.measurement;
+    let steadiness = m.steadiness();
+    let expected = |e: &crate::measure::Expected| {
+        let (seconds_low, seconds_high) = e.seconds;
+        Expected { codes: e.codes, seconds_low, seconds_high }
+    };
     let document = Document {
         scene: about.scene.display().to_string(),
         version: env!("CARGO_PKG_VERSION"),
@@ -132,6 +158,10 @@ pub fn json(about: &About) -> Vec<u8> {
         reference_linear: m.reference_linear,
         reference_seconds: m.reference_seconds,
         compared_at_codes: m.compared_at,
+        errors_spread: m.doubt(),
+        times_spread: steadiness.spread,
+        taken_by_others: steadiness.taken,
+        expected: m.expected.iter().map(expected).collect(),
         variations: m.measured.iter().map(|v| variation(v, &m.targets)).collect(),
     };
     let mut bytes = serde_json::to_vec_pretty(&document).expect("numbers and strings only");
@@ -154,6 +184,7 @@ pub fn csv(measurement: &Measurement) -> Vec<u8> {
                 seconds_spread: p.seconds_spread,
                 told_codes: p.told_codes,
                 rmse_codes: p.rmse_codes,
+                rmse_codes_spread: p.rmse_codes_spread,
                 rmse_linear: p.rmse_linear,
                 rel_mse: p.rel_mse,
             };

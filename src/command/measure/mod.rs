@@ -60,7 +60,9 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
         seed: args.seed,
         display,
     };
-    let lanes = AnyWorld::compile(&scene, &world::Options::default()).lanes();
+    let world = AnyWorld::compile(&scene, &world::Options::default());
+    let (lanes, single) = (world.lanes(), matches!(world, AnyWorld::Single(_)));
+    drop(world);
     let signals = Signals::watch().map_err(|e| failed(format!("no signals: {e}")))?;
     let bar = progress_bar();
     let measurement = measure::measure(&Arc::new(scene), &plan, reference, &mut |progress| {
@@ -72,7 +74,8 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     .map_err(|e| failed(format!("cannot start {threads} threads: {e}; try fewer by --threads")))?;
     bar.finish_and_clear();
 
-    let about = table::About { scene: &args.scene, threads, lanes, measurement: &measurement };
+    let about =
+        table::About { scene: &args.scene, threads, lanes, single, measurement: &measurement };
     say(&about.to_string());
     if let Some(path) = &args.json {
         write(path, &data::json(&about))?;
@@ -108,7 +111,7 @@ fn plot(path: &Path, about: &table::About) -> Result<(), Failure> {
     let drawn = match drawing(path).map_err(Failure::Usage)? {
         Drawing::Svg => measure::plot::svg(about.measurement, &title).map(String::into_bytes),
         Drawing::Png => measure::plot::pixels(about.measurement, &title).and_then(|pixels| {
-            let (width, height) = measure::plot::SIZE;
+            let (width, height) = measure::plot::size(about.measurement);
             Ok(film::png_of_rgb([width, height], &pixels)?)
         }),
     };

@@ -1,6 +1,6 @@
 //! A measurement for people.
 
-use crate::measure::{Crossing, Measured, Measurement, Topic};
+use crate::measure::{Crossing, Measured, Measurement, Steadiness, Topic, median};
 use std::fmt;
 use std::path::Path;
 
@@ -9,6 +9,8 @@ pub struct About<'a> {
     pub scene: &'a Path,
     pub threads: usize,
     pub lanes: &'static str,
+    /// Whether the scene is traced in single precision.
+    pub single: bool,
     pub measurement: &'a Measurement,
 }
 
@@ -59,6 +61,47 @@ fn reached(crossing: &Crossing) -> String {
     format!("{least}{} {}", time(crossing.seconds), percent(crossing.spread))
 }
 
+/// Two times in the unit of the second: `12 to 30 s`.
+fn between((low, high): (f64, f64)) -> String {
+    let (low, high) = (time(low), time(high));
+    match (low.split_once(' '), high.split_once(' ')) {
+        (Some((value, unit)), Some((_, same))) if unit == same => format!("{value} to {high}"),
+        _ => format!("{low} to {high}"),
+    }
+}
+
+/// Times that are apart by more than this are not steady.
+const UNSTEADY: f64 = 0.1;
+/// Others that took less than this share of the processors are not worth a word.
+const TAKEN: f64 = 0.03;
+
+/// What is to be said about times that are apart so far; `None`: nothing.
+fn caution(steadiness: &Steadiness) -> Option<String> {
+    let Steadiness { spread, taken, .. } = steadiness;
+    let others = taken.filter(|share| *share > TAKEN).map(|share| {
+        format!("other programs used up to {:.0} % of the processors meanwhile", 100.0 * share)
+    });
+    match (*spread > UNSTEADY, others) {
+        (false, None) => None,
+        (false, Some(others)) => {
+            Some(format!("These times are steady, but {others}: without them it is faster."))
+        }
+        (true, others) => {
+            let why = others.unwrap_or_else(|| {
+                "too few runs fitted in, or the machine itself is now faster, now slower \
+                 (a virtual machine, heat, a battery)"
+                    .to_string()
+            });
+            Some(format!(
+                "Do not trust these times beyond their spread, up to {}: {why}.\n\
+                 Measure again when the machine has nothing else to do, or longer (--seconds). Errors and\n\
+                 samples per pixel do not depend on that.",
+                percent(*spread)
+            ))
+        }
+    }
+}
+
 impl fmt::Display for About<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let m = self.measurement;
@@ -75,19 +118,37 @@ impl fmt::Display for About<'_> {
         if m.reference_spp > 0.0 {
             writeln!(
                 f,
-                "Errors are against a reference of {:.0} samples per pixel, itself {:.3} codes off ({}).",
+                "Errors are against a reference of {:.0} samples per pixel, itself {:.3} codes off ({}); \
+                 against another\none they would be the same within {:.1} %.",
                 m.reference_spp,
                 m.reference_codes,
-                time(m.reference_seconds)
+                time(m.reference_seconds),
+                (100.0 * m.doubt()).max(0.1)
             )?;
+        }
+        let steadiness = m.steadiness();
+        writeln!(
+            f,
+            "Times are medians of {} runs or more, ± how far these are apart.",
+            steadiness.repetitions
+        )?;
+        if let Some(words) = caution(&steadiness) {
+            writeln!(f, "{words}")?;
         }
         let Some(default) = m.measured.first() else { return Ok(()) };
         writeln!(f, "\nHow long to a given noise (RMSE as displayed, 8-bit codes)")?;
         writeln!(f, "  {:>7}  {:>18}  {:>18}", "codes", "time", "samples per pixel")?;
         for target in &m.targets {
-            match default.crossing(*target) {
-                Some(c) => writeln!(f, "  {target:>7}  {:>18}  {:>18.0}", reached(&c), c.spp)?,
-                None => writeln!(f, "  {target:>7}  {:>18}", "not in this time")?,
+            let expected = m.expected.iter().find(|e| e.codes == *target);
+            match (default.crossing(*target), expected) {
+                (Some(c), _) => writeln!(f, "  {target:>7}  {:>18}  {:>18.0}", reached(&c), c.spp)?,
+                (None, Some(e)) => writeln!(
+                    f,
+                    "  {target:>7}  {:>18}  {:>18}",
+                    format!("~ {}", between(e.seconds)),
+                    "expected"
+                )?,
+                (None, None) => writeln!(f, "  {target:>7}  {:>18}", "not in this time")?,
             }
         }
         if let (Some(slope), Some((speed, spread))) =
@@ -102,14 +163,27 @@ impl fmt::Display for About<'_> {
                 percent(spread)
             )?;
         }
+        if !m.expected.is_empty() {
+            writeln!(f, "  ~ was not waited for: expected from how the noise fell last")?;
+        }
         let mut last = Topic::Default;
         for measured in &m.measured[1..] {
             if measured.topic != last {
                 last = measured.topic;
                 self.heading(f, last)?;
-                self.row(f, default)?;
+                self.row(f, &last.of_default(self.single, self.threads), default)?;
             }
-            self.row(f, measured)?;
+            self.row(f, &measured.name, measured)?;
+        }
+        for topic in &m.idle {
+            writeln!(f, "\n{}: there is nothing to compare here", topic.question())?;
+        }
+        if m.measured.iter().any(|m| m.bias.is_some()) {
+            writeln!(
+                f,
+                "\noff by: what stays wrong however long it runs, as RMSE; z: by how many standard errors the \
+                 picture's\nmean brightness differs from the reference's (beyond 4 it is no chance)"
+            )?;
         }
         Ok(())
     }
@@ -118,30 +192,36 @@ impl fmt::Display for About<'_> {
 impl About<'_> {
     fn heading(&self, f: &mut fmt::Formatter, topic: Topic) -> fmt::Result {
         writeln!(f, "\n{} (to {:.2} codes)", topic.question(), self.measurement.compared_at)?;
-        let last = if topic.unbiased() { "" } else { "        off by" };
+        let last = if topic.unbiased() { "" } else { "   off by" };
         writeln!(
             f,
-            "  {:<16}  {:>16}  {:>9}  {:>9}  {:>9}{last}",
-            "", "time", "default/", "spp", "Msamp./s"
+            "  {:<18}  {:>14}  {:>9}  {:>9}  {:>9}{last}",
+            "", "time", "speed", "spp", "Msamp./s"
         )
     }
 
-    fn row(&self, f: &mut fmt::Formatter, measured: &Measured) -> fmt::Result {
+    fn row(&self, f: &mut fmt::Formatter, name: &str, measured: &Measured) -> fmt::Result {
         let codes = self.measurement.compared_at;
-        let at = |m: &Measured| {
-            if m.bias.is_some() { m.told_crossing(codes) } else { m.crossing(codes) }
-        };
-        let (own, default) = (at(measured), self.measurement.measured[0].crossing(codes));
-        let time = own.as_ref().map_or("not in this time".to_string(), reached);
-        let ratio = match (&own, &default) {
-            (Some(own), Some(default)) => format!("{:.2}x", default.seconds / own.seconds),
-            _ => String::new(),
+        let default = self.measurement.measured[0].crossing(codes);
+        let own = measured.own_crossing(codes);
+        let followed = || measured.points.last().map_or(0.0, |p| median(&measured.seconds(p)));
+        let (time, speed) = match (&own, &default) {
+            (Some(own), Some(default)) => {
+                (reached(own), format!("{:.2}x", default.seconds / own.seconds))
+            }
+            (Some(own), None) => (reached(own), String::new()),
+            (None, Some(default)) => (
+                format!("> {}", time(followed())),
+                format!("< {:.2}x", default.seconds / followed()),
+            ),
+            (None, None) => (format!("> {}", time(followed())), String::new()),
         };
         let spp = own.as_ref().map_or(String::new(), |c| format!("{:.0}", c.spp));
-        let speed = measured.samples_per_second().map_or(0.0, |(speed, _)| speed * 1e-6);
-        write!(f, "  {:<16}  {time:>16}  {ratio:>9}  {spp:>9}  {speed:>9.1}", measured.name)?;
+        let rate = measured.samples_per_second().map_or(0.0, |(speed, _)| speed * 1e-6);
+        write!(f, "  {name:<18}  {time:>14}  {speed:>9}  {spp:>9}  {rate:>9.1}")?;
         match measured.bias {
-            Some(bias) => writeln!(f, "  {:>7.3} codes (mean: z = {:.1})", bias.codes, bias.z),
+            Some(b) if b.is_seen() => writeln!(f, "   {:.2} codes (z = {:.0})", b.codes, b.z),
+            Some(b) => writeln!(f, "   nothing to be seen (less than {:.2} codes)", b.least_codes),
             None => writeln!(f),
         }
     }
@@ -158,5 +238,24 @@ mod tests {
             shown,
             ["1.23 ms", "35.1 ms", "1.00 s", "1.23 s", "12.3 s", "119 s", "10.0 min"]
         );
+    }
+
+    #[test]
+    fn expected_times_have_one_unit_if_they_can() {
+        assert_eq!(between((12.0, 30.0)), "12.0 to 30.0 s");
+        assert_eq!(between((40.0, 300.0)), "40.0 s to 5.0 min");
+    }
+
+    #[test]
+    fn unsteady_times_are_told_with_the_reason() {
+        let told = |spread, taken| caution(&Steadiness { repetitions: 3, spread, taken });
+        assert_eq!(told(0.04, Some(0.01)), None);
+        assert_eq!(told(0.1, None), None);
+        let words = told(0.04, Some(0.5)).unwrap();
+        assert!(words.contains("50 %") && words.contains("steady"), "{words}");
+        let words = told(0.18, Some(0.23)).unwrap();
+        assert!(words.contains("±18 %") && words.contains("other programs used up to 23 %"));
+        let words = told(0.18, Some(0.0)).unwrap();
+        assert!(words.contains("±18 %") && !words.contains("other programs"), "{words}");
     }
 }

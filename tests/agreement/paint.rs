@@ -1,0 +1,277 @@
+//! Textures and bumps in the plainest way: where a point lies in the picture is asked of formulas, how
+//! that changes from place to place of points beside it.
+
+use crate::compounds::Leaf;
+use crate::meshes::Triangles;
+use crate::surfaces::Piece;
+use crate::tracer::{Mutation, Tracer};
+use glam::{DMat3, DVec2, DVec3};
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+use zerkalo::material::{
+    Axis, Bump, Mapping, Material, Placement, Texture, TextureFilter as Filter, Wrap,
+};
+use zerkalo::shape::Shape;
+
+/// How far beside a point its neighbours are asked, in scene units.
+const ASIDE: f64 = 1e-6;
+
+/// The ends of a cylinder show what lies this far inside its rims, in heights.
+const RIM: f64 = 1e-6;
+
+/// An image of `scenes`, its pixels from the lowest row up.
+pub struct Pixels {
+    /// Columns and rows.
+    pub size: DVec2,
+    /// The file's numbers, from 0 to 1.
+    codes: Vec<DVec3>,
+}
+
+impl Pixels {
+    /// A file, as a shipped scene names it.
+    pub fn open(file: &str) -> Result<Self, String> {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
+        let image = image::open(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let image = image.to_rgb32f();
+        let (width, height) = image.dimensions();
+        let rows = (0..height).rev().flat_map(|y| (0..width).map(move |x| (x, y)));
+        let code = |(x, y)| DVec3::from(image.get_pixel(x, y).0.map(f64::from));
+        let size = DVec2::new(f64::from(width), f64::from(height));
+        Ok(Self { size, codes: rows.map(code).collect() })
+    }
+
+    /// The pixel in a column and a row that may lie beyond the edges.
+    fn pixel(&self, at: DVec2, wrap: Wrap) -> DVec3 {
+        let inside = match wrap {
+            Wrap::Repeat => at.rem_euclid(self.size),
+            Wrap::Clamp => at.clamp(DVec2::ZERO, self.size - 1.0),
+        };
+        self.codes[(inside.y * self.size.x + inside.x) as usize]
+    }
+
+    /// The mean of what `of` says of the four pixels around a point, the nearer the more.
+    fn between(&self, uv: DVec2, wrap: Wrap, of: impl Fn(DVec3) -> DVec3) -> DVec3 {
+        let at = uv * self.size - 0.5;
+        let (first, part) = (at.floor(), at - at.floor());
+        let pixel = |x: f64, y: f64| of(self.pixel(first + DVec2::new(x, y), wrap));
+        let low = pixel(0.0, 0.0).lerp(pixel(1.0, 0.0), part.x);
+        low.lerp(pixel(0.0, 1.0).lerp(pixel(1.0, 1.0), part.x), part.y)
+    }
+
+    /// The linear colour at a point, in repeats from the lower left corner.
+    pub fn color(&self, uv: DVec2, wrap: Wrap, filter: Filter) -> DVec3 {
+        let linear =
+            |c: f64| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
+        let light = |code: DVec3| DVec3::from(code.to_array().map(linear));
+        match filter {
+            Filter::Bilinear => self.between(uv, wrap, light),
+            Filter::Nearest => light(self.pixel((uv * self.size).floor(), wrap)),
+        }
+    }
+
+    /// Grey, 0 to 1.
+    pub fn height(&self, uv: DVec2, wrap: Wrap) -> f64 {
+        self.between(uv, wrap, |code| code).element_sum() / 3.0
+    }
+
+    /// How heights grow with u and v: by the pixels to both sides.
+    fn slope(&self, uv: DVec2, wrap: Wrap) -> DVec2 {
+        let along = |way: DVec2| {
+            let step = way / self.size;
+            let rise = self.height(uv + step, wrap) - self.height(uv - step, wrap);
+            rise / (2.0 * step.element_sum())
+        };
+        DVec2::new(along(DVec2::X), along(DVec2::Y))
+    }
+}
+
+/// Where textures lie on a simple shape, in the space of its description.
+pub struct Canvas {
+    /// To the right, up (or along the axis), to the front (or along the normal).
+    frame: DMat3,
+    /// What a texture does if nobody says.
+    usual: Mapping,
+}
+
+/// As far right as can be, around an axis.
+fn around(axis: DVec3) -> DMat3 {
+    let up = axis.normalize();
+    let right = up.cross(DVec3::Z).try_normalize().unwrap_or(DVec3::X);
+    DMat3::from_cols(right, up, right.cross(up))
+}
+
+/// On what is flat: as far up as can be, on what lies flat away from the viewer.
+fn flat(normal: DVec3) -> DMat3 {
+    let front = normal.normalize();
+    let up = if front.y.abs() > 0.999 { DVec3::NEG_Z * front.y.signum() } else { DVec3::Y };
+    let right = up.cross(front).normalize();
+    DMat3::from_cols(right, front.cross(right), front)
+}
+
+impl Canvas {
+    pub fn new(shape: &Shape, mesh: Option<&Triangles>) -> Self {
+        let v = |a: [f64; 3]| DVec3::from(a);
+        let turned = |degrees: f64| DMat3::from_rotation_y(degrees.to_radians());
+        let (frame, usual) = match shape {
+            Shape::Sphere(_) => (DMat3::IDENTITY, Mapping::Spherical),
+            Shape::Plane(p) => (flat(v(p.normal)), Mapping::Planar),
+            Shape::Platform(_) => (flat(DVec3::Y), Mapping::Planar),
+            Shape::Rectangle(r) => {
+                let front = v(r.normal).normalize();
+                let right = v(r.up).cross(front).normalize();
+                (DMat3::from_cols(right, front.cross(right), front), Mapping::Planar)
+            }
+            Shape::Cylinder(c) => (around(v(c.top) - v(c.base)), Mapping::Cylindrical),
+            Shape::TaperedCylinder(c) => (around(v(c.top) - v(c.base)), Mapping::Cylindrical),
+            Shape::Cone(c) => (around(v(c.apex) - v(c.base)), Mapping::Cylindrical),
+            Shape::UnitCylinder(_) => (around(DVec3::Z), Mapping::Cylindrical),
+            Shape::Cube(c) => (turned(c.rotation), Mapping::Box),
+            Shape::Prism(p) => (turned(p.rotation), Mapping::Box),
+            Shape::Pyramid(p) => (turned(p.rotation), Mapping::Box),
+            _ if mesh.is_some_and(Triangles::has_uv) => (DMat3::IDENTITY, Mapping::Uv),
+            _ => (DMat3::IDENTITY, Mapping::Box),
+        };
+        Self { frame, usual }
+    }
+
+    /// The mapping, and directions to the right, up and to the front as it sees them.
+    fn view(&self, placement: &Placement) -> (Mapping, DMat3) {
+        let mapping = match placement.mapping {
+            Mapping::Auto => self.usual,
+            said => said,
+        };
+        let [x, y, z] = [self.frame.x_axis, self.frame.y_axis, self.frame.z_axis];
+        let looks = matches!(mapping, Mapping::Planar | Mapping::Uv);
+        let turns = matches!(mapping, Mapping::Spherical | Mapping::Cylindrical);
+        let view = match placement.axis {
+            Some(Axis::X) if looks => DMat3::from_cols(-z, y, x),
+            Some(Axis::Y) if looks => DMat3::from_cols(x, -z, y),
+            Some(Axis::X) if turns => DMat3::from_cols(z, x, y),
+            Some(Axis::Z) if turns => DMat3::from_cols(y, z, x),
+            _ => self.frame,
+        };
+        (mapping, view)
+    }
+}
+
+/// The ends of all pieces and triangles along a direction: least and greatest.
+fn ends(leaf: &Leaf, along: DVec3) -> (f64, f64) {
+    let corners = leaf.mesh.iter().flat_map(Triangles::points).map(|p| (p.dot(along), 0.0));
+    let pieces = leaf.pieces.iter().flat_map(|piece| match piece {
+        Piece::Sphere(center, radius) => vec![(center.dot(along), *radius)],
+        Piece::Polygon(corners, _) => corners.iter().map(|c| (c.dot(along), 0.0)).collect(),
+        Piece::Plane(point, _) => vec![(point.dot(along), 0.0)],
+        Piece::Disc(center, normal, radius) => {
+            vec![(center.dot(along), radius * normal.cross(along).length())]
+        }
+        // Its ends are discs.
+        Piece::Side(..) => Vec::new(),
+    });
+    corners
+        .chain(pieces)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (x, r)| (l.min(x - r), h.max(x + r)))
+}
+
+/// A point on a leaf, in the space of its description.
+pub struct Spot<'a> {
+    pub leaf: &'a Leaf,
+    pub facet: usize,
+    pub point: DVec3,
+    /// Outwards.
+    pub normal: DVec3,
+}
+
+impl Spot<'_> {
+    /// Where `point`, which lies on the same side of the same thing, is in the picture, in repeats.
+    fn uv(&self, placement: &Placement, point: DVec3) -> DVec2 {
+        let (scale, offset) = (DVec2::from(placement.scale), DVec2::from(placement.offset));
+        let (mapping, view) = self.leaf.canvas.view(placement);
+        let own = self.leaf.mesh.as_ref().and_then(|mesh| mesh.uv(self.facet, point));
+        if let (Mapping::Uv, Some(own)) = (mapping, own) {
+            return own * scale + offset;
+        }
+        let all = [view.x_axis, view.y_axis, view.z_axis].map(|axis| ends(self.leaf, axis));
+        let low = DVec3::from(all.map(|(low, _)| low));
+        let high = DVec3::from(all.map(|(_, high)| high));
+        let (size, seen) = (high - low, view.transpose() * point);
+        let (from_low, from_middle) = (seen - low, seen - 0.5 * (low + high));
+        let turns = 0.5 + from_middle.x.atan2(from_middle.z) / TAU;
+        let uv = match mapping {
+            Mapping::Spherical => {
+                let across = from_middle.x.hypot(from_middle.z);
+                DVec2::new(turns, 0.5 + from_middle.y.atan2(across) / PI)
+            }
+            Mapping::Cylindrical => DVec2::new(turns, (from_low.y / size.y).clamp(RIM, 1.0 - RIM)),
+            Mapping::Box => {
+                let n = view.transpose() * self.normal;
+                // From a side's lower left corner, seen from outside; of equal ones the later axis.
+                let (back, p) = (high - seen, from_low);
+                match n.abs() {
+                    a if a.z >= a.x.max(a.y) => {
+                        DVec2::new(if n.z > 0.0 { p.x } else { back.x }, p.y)
+                    }
+                    a if a.y >= a.x => DVec2::new(p.x, if n.y > 0.0 { back.z } else { p.z }),
+                    _ => DVec2::new(if n.x > 0.0 { back.z } else { p.z }, p.y),
+                }
+            }
+            // From edge to edge of what is flat.
+            Mapping::Uv => from_low.truncate() / size.truncate(),
+            Mapping::Planar | Mapping::Auto => from_low.truncate(),
+        };
+        uv * scale + offset
+    }
+}
+
+impl Tracer<'_> {
+    /// Opens the images that a material names.
+    pub fn open_images(&mut self, material: &Material) -> Result<(), String> {
+        for file in material.files() {
+            if !self.images.contains_key(file) {
+                self.images.insert(file.to_string(), Pixels::open(file)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// What the material's texture multiplies colours with.
+    pub fn painted(&self, material: &Material, spot: &Spot) -> DVec3 {
+        let Some(texture) = &material.texture else { return DVec3::ONE };
+        let mut uv = spot.uv(&texture.placement(), spot.point);
+        if self.mutation == Mutation::SidewaysTexture {
+            uv = DVec2::new(uv.y, uv.x);
+        }
+        match texture {
+            Texture::Checker(checker) => {
+                let squares = (uv * 2.0).floor().element_sum();
+                let color = if squares.rem_euclid(2.0) == 0.0 { checker.even } else { checker.odd };
+                DVec3::from(color.0)
+            }
+            Texture::Image(texture) => self
+                .images
+                .get(&texture.file)
+                .map_or(DVec3::ONE, |pixels| pixels.color(uv, texture.wrap, texture.filter)),
+        }
+    }
+
+    /// The outer normal `normal`, turned as that of a surface with the material's bumps.
+    pub fn raised(&self, material: &Material, spot: &Spot, normal: DVec3) -> DVec3 {
+        let Some(Bump::Image(image)) = &material.bump else { return normal };
+        let Some(pixels) = self.images.get(&image.file) else { return normal };
+        let placement = image.placement();
+        let slope = pixels.slope(spot.uv(&placement, spot.point), image.wrap);
+        let height =
+            if self.mutation == Mutation::SunkenBumps { -image.height } else { image.height };
+        let rise = |along: DVec3| {
+            let there = spot.uv(&placement, spot.point + along * ASIDE);
+            let mut step = there - spot.uv(&placement, spot.point - along * ASIDE);
+            // Where a turn ends the next begins.
+            let turn = placement.scale[0];
+            if step.x.abs() > 0.5 * turn {
+                step.x -= turn * step.x.signum();
+            }
+            along * (height * slope.dot(step) / (2.0 * ASIDE))
+        };
+        let (a, b) = normal.any_orthonormal_pair();
+        (normal - rise(a) - rise(b)).normalize()
+    }
+}

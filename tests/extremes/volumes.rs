@@ -1,0 +1,154 @@
+//! Volumes of compounds by the chords of lines.
+
+use crate::common::Numbers;
+use crate::compound::{ball, block, chords, difference, intersection, lines, union};
+use crate::rays::Line;
+use crate::told::told;
+use glam::{DAffine3, DQuat, DVec3};
+use std::f64::consts::PI;
+use zerkalo::lanes::Double;
+use zerkalo::shape::{Cylinder, Form, Kind};
+
+/// The volume of what stands in the cube from -half to half, by the chords of parallel lines, one in
+/// each cell of a lattice, and its standard error.
+fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
+    let mut numbers = Numbers::new(seed);
+    let side = 400;
+    let cell = 2.0 * half / f64::from(side);
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.5, 0.7);
+    // The cube's shadow along any direction fits into sqrt 3 times its side.
+    let reach = 3f64.sqrt();
+    let mut sum = 0.0;
+    let mut squares = 0.0;
+    for row in 0..side {
+        let lines: Vec<Line> = (0..side)
+            .map(|column| {
+                let at =
+                    |i: i32, n: &mut Numbers| reach * (cell * (f64::from(i) + n.unit()) - half);
+                let (u, v) = (at(row, &mut numbers), at(column, &mut numbers));
+                (turn * DVec3::new(u, v, -4.0 * half), turn * DVec3::Z)
+            })
+            .collect();
+        let found = chords::<Double>(name, form, &lines);
+        sum += found.iter().sum::<f64>();
+        squares += found.windows(2).map(|w| 0.5 * (w[0] - w[1]).powi(2)).sum::<f64>();
+    }
+    let area = (reach * cell).powi(2);
+    (sum * area, squares.sqrt() * area)
+}
+
+/// Closed form 9.
+#[test]
+fn extreme_09_volumes() {
+    let mut worst = 0f64;
+    let lens = |r: f64, s: f64, d: f64| {
+        PI * (r + s - d).powi(2) * (d * d + 2.0 * d * (r + s) - 3.0 * (r - s).powi(2)) / (12.0 * d)
+    };
+    let rod =
+        |end: [f64; 3], radius: f64| Cylinder { base: end.map(|x| -x), top: end, radius }.form();
+    let above = |height: f64| Form::Plane { normal: DVec3::Y, offset: height };
+    let below = |height: f64| Form::Plane { normal: DVec3::NEG_Y, offset: -height };
+    // A ball pierced by a rod so that a ring of height 1.2 is left.
+    let ring: f64 = 1.2;
+    let hole = (1.0 - ring * ring / 4.0).sqrt();
+    let cone = Form::tapered(DAffine3::from_translation(DVec3::new(0.0, 0.0, -0.5)), 0.0);
+    let half_space = |normal: DVec3, offset| Form::Plane { normal, offset };
+    for (n, (name, form, expected)) in [
+        (
+            "lens",
+            intersection(vec![ball(-0.3, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)]),
+            lens(1.0, 0.8, 0.8),
+        ),
+        (
+            "two balls",
+            union(vec![ball(-0.3, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)]),
+            4.0 / 3.0 * PI * (1.0 + 0.512) - lens(1.0, 0.8, 0.8),
+        ),
+        (
+            "cap",
+            intersection(vec![ball(0.0, 0.0, 0.0, 1.0), below(0.4)]),
+            PI * 0.36 * (3.0 - 0.6) / 3.0,
+        ),
+        (
+            "cap cut away",
+            difference(vec![ball(0.0, 0.0, 0.0, 1.0), below(0.4)]),
+            4.0 / 3.0 * PI - PI * 0.36 * (3.0 - 0.6) / 3.0,
+        ),
+        (
+            "slice",
+            intersection(vec![ball(0.0, 0.0, 0.0, 1.0), above(0.25), below(-0.25)]),
+            PI * (0.5 - 2.0 * 0.25f64.powi(3) / 3.0),
+        ),
+        (
+            "napkin ring",
+            difference(vec![ball(0.0, 0.0, 0.0, 1.0), rod([0.0, 2.0, 0.0], hole)]),
+            PI * ring.powi(3) / 6.0,
+        ),
+        (
+            "Steinmetz",
+            intersection(vec![rod([2.0, 0.0, 0.0], 0.7), rod([0.0, 2.0, 0.0], 0.7)]),
+            16.0 * 0.7f64.powi(3) / 3.0,
+        ),
+        (
+            "frustum",
+            intersection(vec![cone.clone(), half_space(DVec3::Z, 0.1)]),
+            PI * 0.6 * (1.0 + 0.4 + 0.16) / 3.0,
+        ),
+        (
+            "truncated pyramid",
+            difference(vec![
+                zerkalo::shape::Pyramid {
+                    corner: [-0.6, -0.5, 0.6],
+                    side: 1.2,
+                    apex_height: 1.5,
+                    height: 1.5,
+                    rotation: 20.0,
+                }
+                .form(),
+                below(0.1),
+            ]),
+            // The top at height 0.6 of 1.5 has side 0.72.
+            0.6 * (1.44 + 0.5184 + (1.44f64 * 0.5184).sqrt()) / 3.0,
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (found, error) = volume(name, &form, 1.4, 90 + n as u64);
+        let z = (found - expected) / error;
+        assert!(error < 2e-3 * expected, "{name}: {found} +- {error}");
+        assert!(z.abs() < 4.0, "{name}: {found} +- {error}, not {expected}: {z} sigma");
+        worst = worst.max(z.abs());
+    }
+    told(9, "double", &format!("volumes {worst:.1} sigma off at most"));
+}
+
+/// V(A or B) + V(A and B) = V(A) + V(B), on every line.
+#[test]
+fn extreme_09_inclusion_and_exclusion() {
+    let solids = [
+        ball(0.2, -0.1, 0.0, 0.9),
+        block([-0.3, 0.2, 0.1], [1.1, 0.9, 1.5]),
+        Cylinder { base: [-0.8, -0.9, 0.3], top: [0.7, 0.8, -0.2], radius: 0.5 }.form(),
+        Form::tapered(DAffine3::from_scale(DVec3::new(0.7, 0.9, 1.1)), 0.2),
+        ball(0.0, 0.0, 0.0, 0.8).transformed(&DAffine3::from_scale(DVec3::new(1.0, 0.5, 1.6))),
+    ];
+    let lines = lines(91, 40_000);
+    let alone: Vec<Vec<f64>> = solids.iter().map(|s| chords::<Double>("one", s, &lines)).collect();
+    for i in 0..solids.len() {
+        for j in 0..i {
+            let pair = || vec![solids[i].clone(), solids[j].clone()];
+            let either = chords::<Double>("or", &union(pair()), &lines);
+            let both = chords::<Double>("and", &intersection(pair()), &lines);
+            let first = chords::<Double>("minus", &difference(pair()), &lines);
+            for n in 0..lines.len() {
+                let sum = alone[i][n] + alone[j][n];
+                let told = || format!("{i} {j} {:?}", lines[n]);
+                // What is thinner than a tie is nothing; along a flat line that is some length.
+                let close = |a: f64, b: f64| (a - b).abs() < 1e-5;
+                assert!(close(either[n] + both[n], sum), "{}: {}", told(), either[n] + both[n]);
+                assert!(close(first[n] + both[n], alone[i][n]), "{}", told());
+            }
+        }
+    }
+}
