@@ -10,6 +10,7 @@ use crate::camera::View;
 use crate::scene::Scene;
 use crate::shape::Form;
 use glam::DVec3;
+use std::ops::Range;
 
 /// The largest extent over the thinnest thing: rays start 1/128 of it above a surface.
 const THINNEST: f64 = 8192.0;
@@ -66,7 +67,9 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
         return false;
     }
     let rounded = 16.0 * f64::EPSILON * origin.abs().max_element();
-    !has_gap(forms, (CLOSED * extent).max(rounded)..extent / NARROWEST)
+    let narrow = (CLOSED * extent).max(rounded)..extent / NARROWEST;
+    let pixel = |point: DVec3| angle * point.distance(view.eye());
+    !has_gap(forms, narrow, pixel)
 }
 
 /// No more than the distance of `point` from the surfaces of `forms`; those in whose box it is, and of
@@ -205,38 +208,68 @@ impl Piece {
     }
 }
 
-/// How far two sides are apart where they run side by side; infinite if they do not.
-fn apart(a: &Side, b: &Side) -> f64 {
+/// Where two sides are closest to each other.
+struct Gap {
+    width: f64,
+    /// For sides that bend away from each other: the place, and the radius of a ball that would bend away
+    /// from a plane as they do.
+    round: Option<(DVec3, f64)>,
+}
+
+impl Gap {
+    /// Whether it is narrow, and wherever it is narrow so is more than half a pixel around: a ball beside
+    /// another, or on a floor, is close to it in a spot too small to see.
+    fn is_seen(&self, narrow: &Range<f64>, pixel: &impl Fn(DVec3) -> f64) -> bool {
+        let wide =
+            |(place, radius): (DVec3, f64)| (2.0 * radius * narrow.end).sqrt() > 0.5 * pixel(place);
+        narrow.contains(&self.width) && self.round.is_none_or(wide)
+    }
+}
+
+/// The gaps between two sides that run side by side.
+fn gaps(a: &Side, b: &Side) -> [Option<Gap>; 2] {
     match (a, b) {
         (Side::Flat { normal: n, offset: o }, Side::Flat { normal: m, offset: p }) => {
             let along = n.dot(*m);
-            if along.abs() < 1.0 - 1e-9 { f64::INFINITY } else { (o - along.signum() * p).abs() }
+            let width = (o - along.signum() * p).abs();
+            [(along.abs() >= 1.0 - 1e-9).then_some(Gap { width, round: None }), None]
         }
         (Side::Round { center, radius }, Side::Flat { normal, offset })
         | (Side::Flat { normal, offset }, Side::Round { center, radius }) => {
-            ((normal.dot(*center) - offset).abs() - radius).abs()
+            let height = normal.dot(*center) - offset;
+            let place = center - normal * radius.copysign(height);
+            [
+                Some(Gap { width: (height.abs() - radius).abs(), round: Some((place, *radius)) }),
+                None,
+            ]
         }
         (Side::Round { center: c, radius: r }, Side::Round { center: d, radius: s }) => {
             let between = c.distance(*d);
-            (between - (r + s)).abs().min((between - (r - s).abs()).abs())
+            let place = c + (d - c).normalize_or(DVec3::X) * r;
+            let gap = |distance: f64, radius: f64| {
+                Some(Gap { width: (between - distance).abs(), round: Some((place, radius)) })
+            };
+            // Beside each other, and one in the other.
+            [gap(r + s, r * s / (r + s)), gap((r - s).abs(), r * s / (r - s).abs())]
         }
     }
 }
 
-/// Whether sides of two things run at a distance within `range` of each other.
-fn has_gap(forms: &[Form], range: std::ops::Range<f64>) -> bool {
+/// Whether sides of two things run at a distance within `narrow` of each other where that can be seen;
+/// `pixel`: what a pixel shows at a place.
+fn has_gap(forms: &[Form], narrow: Range<f64>, pixel: impl Fn(DVec3) -> f64) -> bool {
+    let seen =
+        |a: &Side, b: &Side| gaps(a, b).iter().flatten().any(|gap| gap.is_seen(&narrow, &pixel));
     let mut pieces = Piece::all(forms);
     pieces.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
     let mut pairs = 0;
     for (i, a) in pieces.iter().enumerate() {
-        for b in pieces[i + 1..].iter().take_while(|b| b.low.x <= a.high.x + range.end) {
+        for b in pieces[i + 1..].iter().take_while(|b| b.low.x <= a.high.x + narrow.end) {
             pairs += 1;
             if pairs > MOST_PAIRS {
                 return false;
             }
-            if a.near(b, range.end)
-                && a.sides.iter().any(|s| b.sides.iter().any(|t| range.contains(&apart(s, t))))
-            {
+            if a.near(b, narrow.end) && a.sides.iter().any(|s| b.sides.iter().any(|t| seen(s, t))) {
                 return true;
             }
         }

@@ -256,6 +256,15 @@ fn auto_takes_single_where_proportions_are_harmless() {
     for (place, size) in [(0.0, 1e-6), (0.0, 1e6), (1e6, 1.0), (-1e7, 10.0), (1e3, 1e-3)] {
         assert!(takes_single(&parsed(&at(place, size))), "at {place:e}, of size {size:e}");
     }
+    // Two balls that all but touch do so in a spot smaller than a pixel, unless one looks closely.
+    let beside = |degrees: f64| {
+        let ball = |x: f64| {
+            format!("[[object]]\nshape.sphere = {{ center = [{x:?}, 0.0, 0.0], radius = 0.25 }}\n")
+        };
+        let camera = camera([0.0, 0.5, 2.0], [0.0, 0.0, 0.0], degrees);
+        parsed(&(camera + SUN + &ball(-0.25) + &ball(0.250_001)))
+    };
+    assert!(takes_single(&beside(40.0)) && !takes_single(&beside(0.4)));
 }
 
 /// Scenes with the numbered extremes. Those that single precision cannot meet go to double by `auto`;
