@@ -324,17 +324,18 @@ fn extreme_30_a_noise_target_is_reached() {
 }
 
 /// The promise of the command line, on the scene that it is made for: noise 0.5 is an RMSE of at most
-/// 0.55 codes, not rounded, against a reference of another seed.
+/// 0.55 codes, not rounded, against a reference of another seed. A picture of a few dozen tiles knows its
+/// error by some 6 % only (96 x 72, 24 seeds: 0.40 to 0.56 codes); this one has 300.
 #[test]
 fn noise_half_a_code_is_half_a_code_in_the_mirror_room() {
-    let scene = sized(shipped("mirror-room.toml"), [96, 72]);
+    let scene = sized(shipped("mirror-room.toml"), [320, 240]);
     let display = Display::default();
     let pool = pool(2);
     let codes = |rendering: &Rendering| -> Vec<f64> {
         picture(rendering, Part::Both).iter().flat_map(|rgb| display.codes(*rgb)).collect()
     };
     let mut reference = begin(&scene, 1000, Precision::Auto);
-    let reference_spp = 6000;
+    let reference_spp = 1280;
     let stop = Stop { spp: Some(reference_spp), ..Stop::default() };
     assert_eq!(follow(&mut reference, settings(true, 0, stop), &pool), StoppedBy::Spp);
     let own = reference.film.noise(&reference.mix, &display).unwrap().rmse_codes;
@@ -345,11 +346,12 @@ fn noise_half_a_code_is_half_a_code_in_the_mirror_room() {
         let mut rendering = begin(&scene, seed, Precision::Auto);
         let stop = Stop { noise_codes: Some(0.5), ..Stop::default() };
         assert_eq!(follow(&mut rendering, settings(true, 0, stop), &pool), StoppedBy::Noise);
-        let spp = rendering.film.samples() / (96 * 72);
+        let spp = rendering.film.samples() / (320 * 240);
         assert!(64 * spp <= u64::from(reference_spp), "{spp} spp need a better reference");
         let got = codes(&rendering);
         let sum: f64 = got.iter().zip(&reference).map(|(g, r)| (g - r).powi(2)).sum();
         let achieved = (sum / got.len() as f64 - own * own).max(0.0).sqrt();
+        println!("seed {seed}: {achieved:.3} codes at {spp} samples per pixel");
         assert!(achieved <= 0.55, "seed {seed}: achieved {achieved} codes");
     }
 }

@@ -48,7 +48,7 @@ fn c1_reflecting_tracks() {
         ensure(shown.film.size == [640, 480], || format!("{:?} pixels", shown.film.size))?;
         sees(&meant, shown)?;
         exactly(&without_rays_by_chance(&meant), &without_rays_by_chance(shown))?;
-        agrees(&meant, shown, 16)
+        agrees(&meant, shown, 64)
     };
     row(
         "reflecting-tracks.toml",
