@@ -1,6 +1,6 @@
 //! The terminal and the line to it, looked at without showing anything.
 
-use super::signals::watch;
+use super::signals::{expect, watch};
 use crate::dashboard::link::{Mode, Queue, Start};
 use crate::dashboard::terminal::{
     Capabilities, Event, Keyboard, Multiplexer, Reply, Screen, Surroundings, Tty, cell_px,
@@ -42,9 +42,10 @@ pub struct Examined {
 pub fn examine(surroundings: Surroundings, measure: bool) -> io::Result<Examined> {
     // On a screen of its own, which goes with whatever a terminal shows of questions that it does not
     // understand.
+    let signals = expect()?;
     let screen = Screen::enter()?;
     let tty = screen.tty();
-    watch(screen.tty(), Duration::ZERO)?;
+    watch(signals, screen.tty(), Duration::ZERO)?;
     let mut keyboard = Keyboard::new(&surroundings);
     let mut terminal = probe(&tty, &mut keyboard, surroundings, &|| false)?;
     let multiplexer = terminal.surroundings.multiplexer;

@@ -97,8 +97,9 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         // While the terminal is asked what it can do.
         hands.show(Arc::clone(scene));
     }
+    let signals = signals::expect()?;
     let screen = Screen::enter()?;
-    let signals = signals::watch(screen.tty(), signals::PATIENCE)?;
+    let signals = signals::watch(signals, screen.tty(), signals::PATIENCE)?;
     let mut keyboard = Keyboard::new(&surroundings);
     let ending = || signals.is_ending();
     let Ok(terminal) = probe(&screen.tty(), &mut keyboard, surroundings, &ending) else {

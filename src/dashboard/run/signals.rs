@@ -58,11 +58,19 @@ pub(super) enum Whom {
     Group,
 }
 
-/// Listens to signals. If the program is still there `patience` after it should have ended, the
-/// terminal is restored and the program ended from here.
-pub(super) fn watch(tty: Arc<Tty>, patience: Duration) -> io::Result<Signals> {
-    let mut signals =
-        iterator::Signals::new([SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])?;
+/// Signals that come from here on wait to be heeded: to be called before the terminal is taken, which a
+/// signal that nobody waits for would not give back.
+pub(super) fn expect() -> io::Result<iterator::Signals> {
+    iterator::Signals::new([SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])
+}
+
+/// Heeds signals. If the program is still there `patience` after it should have ended, the terminal is
+/// restored and the program ended from here.
+pub(super) fn watch(
+    mut signals: iterator::Signals,
+    tty: Arc<Tty>,
+    patience: Duration,
+) -> io::Result<Signals> {
     let (teller, told) = unbounded();
     let ending = Arc::new(AtomicBool::new(false));
     let mark = Arc::clone(&ending);
