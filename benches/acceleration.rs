@@ -16,7 +16,7 @@ use zerkalo::render::pass;
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Acceleration, Document, Scene};
-use zerkalo::world::{AnyWorld, Options, Precision};
+use zerkalo::world::{AnyWorld, Options};
 
 const SIZE: [u32; 2] = [320, 240];
 
@@ -36,8 +36,7 @@ impl Bench {
         let mut scene = scene.clone();
         scene.film.size = SIZE;
         scene.trace.acceleration = acceleration;
-        // One precision for all: of many spheres side by side some nearly touch, which asks for the other.
-        let world = AnyWorld::compile(&scene, &Options { precision: Precision::Single });
+        let world = AnyWorld::compile(&scene, &Options::default());
         let (scales, mix) = (world.group_scales(), Mix { weights: world.mix(&scene) });
         let estimator = Estimator::new(&scales, &mix, &Display::default());
         let [width, height] = SIZE.map(|n| n as usize);
