@@ -25,13 +25,8 @@ fn along_tan2<L: Lanes>(h: V3<L>, n: V3<L>) -> (L, L) {
     (along, (across.length2() / (along * along)).min(L::of(1e15)))
 }
 
-/// Beckmann's D is below 1e-30 / alpha^2 where tan^2 / alpha^2 exceeds this: exp(-80) is 2e-35.
-const DARK: f64 = 80.0;
-
 /// Microfacet terms in a lane type.
 pub trait FacetsOf<L: Lanes> {
-    /// Whether facets with normals at `tan2` are too rare to be seen, in all lanes.
-    fn is_dark(&self, tan2: L) -> bool;
     /// D [1/sr] for a facet normal at `tan2` from the surface normal.
     fn density(&self, tan2: L) -> L;
     /// G, the share of facets with normal h that both directions see, as numerator and denominator.
@@ -72,11 +67,6 @@ fn beckmann_lambda<L: Lanes>(a: L) -> L {
 }
 
 impl<L: Lanes> FacetsOf<L> for Facets<L::Scalar> {
-    #[inline(always)]
-    fn is_dark(&self, tan2: L) -> bool {
-        !self.ggx && (tan2 * L::splat(self.inverse_alpha2)).gt(L::of(DARK)).all()
-    }
-
     #[inline(always)]
     fn density(&self, tan2: L) -> L {
         let inverse_alpha2 = L::splat(self.inverse_alpha2);
@@ -149,9 +139,6 @@ impl<S: Real> Finish<S> {
                 // The half vector, not of unit length: its square is twice its product with either.
                 let h = view + light;
                 let (nh, tan2) = along_tan2(h, n);
-                if facets.is_dark(tan2) {
-                    return V3::zero();
-                }
                 let h2 = h.length2();
                 let (seen, all) = facets.masking(nh, nv, nl, h2 * L::of(0.5));
                 // f N.L = D G F / (4 N.V): the light's cosine cancels.

@@ -90,15 +90,21 @@ const LEAST: usize = 5;
 /// An error that another reference could change by more than this share is not told.
 const DOUBTFUL: f64 = 0.05;
 
+/// Standard deviations within which a number of signs lies in four of five cases, times the root of two
+/// for the difference of two such numbers.
+const CERTAINTY: f64 = 1.282 * std::f64::consts::SQRT_2;
+
 /// The middle one; the mean of the two in the middle.
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// How far repetitions are apart, as a share of their median: with fewer than five the distance of the
-/// least and the greatest, else half of it, from nine on that of the second of each. On a machine that
-/// stays as it is, the median of another measurement is that near in four of five cases at least. 0 for
-/// fewer than two values.
+/// How far the median of another measurement may be from this one's, as a share of it, on a machine that
+/// stays as it is: it is that near in four of five cases at least. With fewer than five values the
+/// distance of the least and the greatest; else half the distance of the two values between which the
+/// median of all that could be measured lies, so certainly that two such medians agree (by the signs test:
+/// Conover, *Practical Nonparametric Statistics*, confidence interval for a quantile). 0 for fewer than
+/// two values.
 pub fn spread(values: &[f64]) -> f64 {
     let middle = median(values);
     if values.len() < 2 || middle == 0.0 {
@@ -106,11 +112,9 @@ pub fn spread(values: &[f64]) -> f64 {
     }
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let (share, left_out) = match values.len() {
-        ..5 => (1.0, 0),
-        5..9 => (0.5, 0),
-        _ => (0.5, 1),
-    };
+    let n = values.len() as f64;
+    let share = if values.len() < 5 { 1.0 } else { 0.5 };
+    let left_out = (0.5 * (n - CERTAINTY * n.sqrt())).max(0.0) as usize;
     share * (sorted[values.len() - 1 - left_out] - sorted[left_out]) / middle
 }
 

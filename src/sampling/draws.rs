@@ -106,15 +106,14 @@ impl<L: Lanes> Points<'_, L> {
     #[inline(always)]
     pub fn of_pixel(&self, pixel: (u32, u32), replicate: usize) -> Draws<'_, L> {
         let key = self.sampler.key(pixel, replicate);
-        let seeds = self.sampler.apart.map(|apart| mix1(key ^ apart));
-        Draws { points: self, key: L::Bits::splat(key), seeds: Some(seeds) }
+        Draws { points: self, key: L::Bits::splat(key), of_one: Some(key) }
     }
 
     /// Samples of the pixels `at(lane)`.
     #[inline(always)]
     pub fn of_pixels(&self, at: impl Fn(usize) -> (u32, u32), replicate: usize) -> Draws<'_, L> {
         let key = L::Bits::from_fn(|lane| self.sampler.key(at(lane), replicate));
-        Draws { points: self, key, seeds: None }
+        Draws { points: self, key, of_one: None }
     }
 }
 
@@ -123,8 +122,8 @@ pub struct Draws<'a, L: Lanes> {
     points: &'a Points<'a, L>,
     /// Key of the pixel in each lane.
     key: L::Bits,
-    /// Seed of each dimension's scrambling, if all lanes have the same pixel.
-    seeds: Option<[u32; DIMENSIONS]>,
+    /// The key, if all lanes have the same pixel.
+    of_one: Option<u32>,
 }
 
 impl<L: Lanes> Draws<'_, L> {
@@ -155,9 +154,10 @@ impl<L: Lanes> Draws<'_, L> {
     #[inline(always)]
     fn joint(&self, d: usize) -> L {
         let points = self.points;
-        let seed = match &self.seeds {
-            Some(seeds) => L::Bits::splat(seeds[d]),
-            None => mix(self.key ^ L::Bits::splat(points.sampler.apart[d])),
+        let apart = points.sampler.apart[d];
+        let seed = match self.of_one {
+            Some(key) => L::Bits::splat(mix1(key ^ apart)),
+            None => mix(self.key ^ L::Bits::splat(apart)),
         };
         match points.sampler.settings.kind {
             SamplerKind::Random => L::unit(mix(mix(points.index ^ seed) + self.key)),

@@ -12,7 +12,7 @@ pub fn mix<B: Bits>(x: B) -> B {
 }
 
 /// [`mix`] of one word.
-pub fn mix1(mut x: u32) -> u32 {
+pub const fn mix1(mut x: u32) -> u32 {
     x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
     x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
     x ^ (x >> 16)

@@ -1,56 +1,70 @@
-//! The first eight dimensions of the Sobol sequence, 32-bit index.
+//! A sequence of points in eight dimensions, 32-bit index: four pairs, each of which is the first two
+//! dimensions of the Sobol sequence, a (0, 2)-sequence in base 2.
 //!
-//! Direction numbers: Joe and Kuo 2008, *Constructing Sobol sequences with better two-dimensional
-//! projections*, table new-joe-kuo-6. Values are stored with the first binary digit in bit 0, as the
-//! scrambling hash wants them.
+//! Pair k runs through that sequence in an order of its own: at the index `M_k i`, where `M_k` is an
+//! upper triangular matrix of bits with ones on its diagonal. Such a matrix maps the first 2^m indices to
+//! themselves, for every m, so each pair stays a (0, 2)-sequence (Faure and Tezuka 2002, *Another Random
+//! Scrambling of Digital (t,s)-Sequences*), which no pair but the first is among the usual direction
+//! numbers (Joe and Kuo 2008). What a pixel sees in a mirror depends on a pair: where in the pixel a ray
+//! starts, where in the lobe it leaves; see docs/accuracy.md for what that is worth.
+//!
+//! The first columns of the matrices were searched for, one after the other: the one with which the 2^m
+//! points, scrambled at random, tell best how much of the cube lies on one side of a random plane that
+//! leans towards the axes of several pairs; further columns are as good as random.
+//!
+//! Values are stored with the first binary digit in bit 0, as the scrambling hash wants them.
+
+use super::hash::mix1;
 
 /// Dimensions of one joint set.
 pub const DIMENSIONS: usize = 8;
 
-/// Degree s, coefficients a, and initial numbers m of the primitive polynomial of a dimension.
-struct Polynomial {
-    s: usize,
-    a: u32,
-    m: [u32; 5],
-}
-
-const POLYNOMIALS: [Polynomial; DIMENSIONS - 1] = [
-    Polynomial { s: 1, a: 0, m: [1, 0, 0, 0, 0] },
-    Polynomial { s: 2, a: 1, m: [1, 3, 0, 0, 0] },
-    Polynomial { s: 3, a: 1, m: [1, 3, 1, 0, 0] },
-    Polynomial { s: 3, a: 2, m: [1, 1, 1, 0, 0] },
-    Polynomial { s: 4, a: 1, m: [1, 1, 3, 3, 0] },
-    Polynomial { s: 4, a: 4, m: [1, 3, 5, 13, 0] },
-    Polynomial { s: 5, a: 2, m: [1, 1, 5, 5, 17] },
+/// The columns of `M_1`, `M_2`, `M_3` that were searched for: bit r is row r.
+const COLUMNS: [&[u32]; 3] = [
+    &[1, 2, 5, 11, 23, 58, 68, 223, 441, 802, 1712, 2402, 4270],
+    &[1, 3, 5, 8, 23, 61, 95, 212, 304, 738],
+    &[1, 3, 4, 10, 17, 52, 121, 201, 256],
 ];
 
-/// Direction numbers of a dimension, first digit in bit 31.
-const fn directions(dimension: usize) -> [u32; 32] {
-    let mut v = [0u32; 32];
-    let mut i = 0;
-    if dimension == 0 {
-        while i < 32 {
-            v[i] = 1 << (31 - i);
+/// What bit `bit` of the index of pair `pair` becomes in the index of the first pair.
+const fn column(pair: usize, bit: usize) -> u32 {
+    let own = 1 << bit;
+    if pair == 0 {
+        return own;
+    }
+    let found = COLUMNS[pair - 1];
+    if bit < found.len() {
+        return found[bit];
+    }
+    own | (mix1((32 * (pair - 1) + bit) as u32) & (own - 1))
+}
+
+/// The Sobol sequence's directions in dimension 0 or 1, first digit in bit 0.
+const fn direction(dimension: usize, bit: usize) -> u32 {
+    let mut row = 1 << bit;
+    if dimension == 1 {
+        // Pascal's triangle modulo 2.
+        row = 1;
+        let mut i = 0;
+        while i < bit {
+            row ^= row << 1;
             i += 1;
         }
-        return v;
     }
-    let p = &POLYNOMIALS[dimension - 1];
-    while i < 32 {
-        if i < p.s {
-            v[i] = p.m[i] << (31 - i);
-        } else {
-            let mut x = v[i - p.s] ^ (v[i - p.s] >> p.s);
-            let mut k = 1;
-            while k < p.s {
-                if p.a >> (p.s - 1 - k) & 1 == 1 {
-                    x ^= v[i - k];
-                }
-                k += 1;
-            }
-            v[i] = x;
+    row
+}
+
+/// Directions of a dimension, first digit in bit 0.
+const fn directions(dimension: usize) -> [u32; 32] {
+    let mut v = [0; 32];
+    let mut bit = 0;
+    while bit < 32 {
+        let mut rows = column(dimension / 2, bit);
+        while rows != 0 {
+            v[bit] ^= direction(dimension % 2, rows.trailing_zeros() as usize);
+            rows &= rows - 1;
         }
-        i += 1;
+        bit += 1;
     }
     v
 }
@@ -68,8 +82,7 @@ static TABLES: Tables = {
             let mut byte = 1;
             while byte < 256usize {
                 let low = byte.trailing_zeros() as usize;
-                tables[d][k][byte] =
-                    tables[d][k][byte & (byte - 1)] ^ v[8 * k + low].reverse_bits();
+                tables[d][k][byte] = tables[d][k][byte & (byte - 1)] ^ v[8 * k + low];
                 byte += 1;
             }
             k += 1;
@@ -96,39 +109,87 @@ pub fn point(dimension: usize, index: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// Every dimension alone is a (0, m, 1)-net, and the first two together a (0, m, 2)-net: each
-    /// elementary interval of volume 2^-m holds exactly one of the first 2^m points.
+    fn digits(dimension: usize, index: u32) -> u32 {
+        point(dimension, index).reverse_bits()
+    }
+
+    /// Every pair is a (0, m, 2)-net for every m: each elementary interval of volume 2^-m holds exactly
+    /// one of the first 2^m points, and of every later 2^m that are aligned.
     #[test]
     fn elementary_intervals_hold_one_point_each() {
-        let m = 10;
-        for d in 0..DIMENSIONS {
-            let mut seen = vec![0; 1 << m];
-            for i in 0..1u32 << m {
-                seen[(point(d, i).reverse_bits() >> (32 - m)) as usize] += 1;
+        for (pair, m) in (0..DIMENSIONS / 2).flat_map(|pair| (0..=12u32).map(move |m| (pair, m))) {
+            for (first, split) in
+                [0, 5, 0xabcde].iter().flat_map(|n| (0..=m).map(move |s| (n << m, s)))
+            {
+                let mut seen = vec![0; 1 << m];
+                for i in first..first + (1 << m) {
+                    let x = u64::from(digits(2 * pair, i)) << split >> 32;
+                    let y = u64::from(digits(2 * pair + 1, i)) << (m - split) >> 32;
+                    seen[((x << (m - split)) | y) as usize] += 1;
+                }
+                assert!(
+                    seen.iter().all(|n| *n == 1),
+                    "pair {pair}, 2^{m} points from {first}, split {split}"
+                );
             }
-            assert!(seen.iter().all(|n| *n == 1), "dimension {d}");
-        }
-        for split in 0..=m {
-            let mut seen = vec![0; 1 << m];
-            for i in 0..1u32 << m {
-                let x = u64::from(point(0, i).reverse_bits()) << split >> 32;
-                let y = u64::from(point(1, i).reverse_bits()) << (m - split) >> 32;
-                seen[((x << (m - split)) | y) as usize] += 1;
-            }
-            assert!(seen.iter().all(|n| *n == 1), "split {split}");
         }
     }
 
     /// The first points of the Sobol sequence as published with the direction numbers.
     #[test]
     fn first_points_are_the_published_ones() {
-        let row = |i| [0, 1, 2].map(|d| f64::from(point(d, i).reverse_bits()) / 4_294_967_296.0);
+        let row = |i| [0, 1].map(|d| f64::from(digits(d, i)) / 4_294_967_296.0);
         // Index order without Gray code: 0, 1, 2, 3 in radical-inverse order.
-        assert_eq!(row(0), [0.0, 0.0, 0.0]);
-        assert_eq!(row(1), [0.5, 0.5, 0.5]);
-        assert_eq!(row(2), [0.25, 0.75, 0.75]);
-        assert_eq!(row(3), [0.75, 0.25, 0.25]);
-        assert_eq!(row(4), [0.125, 0.625, 0.375]);
+        let rows = [[0.0, 0.0], [0.5, 0.5], [0.25, 0.75], [0.75, 0.25], [0.125, 0.625]];
+        (0..).zip(rows).for_each(|(i, published)| assert_eq!(row(i), published));
+    }
+
+    /// The share of random half-spaces that the points tell has less error than with as many independent
+    /// points: by so much in the planes of the pairs, and where all four first dimensions take part.
+    #[test]
+    fn scrambled_points_tell_half_spaces_better_than_random_ones() {
+        use crate::lanes::{Bits, Lanes};
+        use crate::sampling::hash::owen;
+        type One = f32;
+        let unit = |bits: u32| f64::from(bits) / 4_294_967_296.0;
+        let mut state = 1;
+        let mut random = || {
+            state += 1;
+            mix1(state)
+        };
+        for (name, weights, points, most) in [
+            ("the lobe", [0.0, 1.0], 64, 0.42),
+            ("mostly the lobe", [0.1, 1.0], 64, 0.45),
+            ("both", [1.0, 1.0], 64, 0.60),
+            ("the lobe", [0.0, 1.0], 256, 0.30),
+            ("mostly the lobe", [0.1, 1.0], 256, 0.36),
+            ("both", [1.0, 1.0], 256, 0.52),
+        ] {
+            let (mut error, mut independent) = (0.0, 0.0);
+            for _ in 0..4000 {
+                let turn = [0, 1].map(|_| std::f64::consts::TAU * unit(random()));
+                let normal = [0, 1, 2, 3].map(|d| {
+                    weights[d / 2] * if d % 2 == 0 { turn[d / 2].cos() } else { turn[d / 2].sin() }
+                });
+                let height =
+                    |at: [u32; 4]| at.iter().zip(normal).map(|(x, n)| unit(*x) * n).sum::<f64>();
+                let border = height([0; 4].map(|_: u32| random()));
+                let mut share = || {
+                    let keys = [0; 4].map(|_: u32| random());
+                    let at = |i| [0, 1, 2, 3].map(|d| owen_1(point(d, i), keys[d]).reverse_bits());
+                    (0..points).filter(|i| height(at(*i)) > border).count() as f64
+                        / f64::from(points)
+                };
+                let (a, b) = (share(), share());
+                error += (a - b).powi(2) / 2.0;
+                independent += 0.25 * (a + b) * (2.0 - a - b) / f64::from(points);
+            }
+            let ratio = f64::sqrt(error / independent);
+            assert!(ratio < most, "{name}, {points} points: {ratio} of the error of random ones");
+        }
+        fn owen_1(x: u32, seed: u32) -> u32 {
+            owen(<One as Lanes>::Bits::splat(x), <One as Lanes>::Bits::splat(seed)).lane(0)
+        }
     }
 
     /// Eight aligned points are one point XOR eight constants: what the packets rely on.

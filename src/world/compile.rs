@@ -42,8 +42,6 @@ pub(super) struct Source<S> {
     pub group: usize,
     /// `None`: 1 in every channel.
     pub weight: Option<[S; 3]>,
-    /// Light up to this, a 64th of the film's step, is as good as none.
-    pub negligible: S,
 }
 
 /// A scene, compiled for the lane type `L`.
@@ -158,8 +156,7 @@ impl<L: Lanes> World<L> {
             .filter_map(|(light, group, weight)| {
                 let lamp = Lamp::new(&scene.lights[light], placed.origin)?;
                 let weight = (weight != [1.0; 3]).then(|| weight.map(L::Scalar::of));
-                let negligible = L::Scalar::of(1.0 / (64.0 * scales[group]));
-                Some(Source { lamp, group, weight, negligible })
+                Some(Source { lamp, group, weight })
             })
             .collect();
         let going_on = finishes.iter().any(|f| f.reflection.is_some() || f.transmission.is_some());

@@ -246,6 +246,14 @@ impl<L: Lanes> World<L> {
             if lit.none() {
                 continue;
             }
+            if self.shadows {
+                counts.rays += u64::from(lit.bits().count_ones());
+                let ray = Ray { origin: met.start, direction: arrival.towards };
+                lit = lit.and_not(self.geometry.blocked(&ray, arrival.distance, lit, shading));
+                if lit.none() {
+                    continue;
+                }
+            }
             let mut value = met.diffuse * (nl * L::of(FRAC_1_PI));
             for (finish, lanes) in met.finishes(met.shining & lit) {
                 let (finish, view) = (&self.finishes[finish], -path.ray.direction);
@@ -256,16 +264,6 @@ impl<L: Lanes> World<L> {
             let mut value = path.weight.times(value) * arrival.irradiance;
             if let Some(strength) = source.weight {
                 value = value.times(V3::splat(strength));
-            }
-            // Away from its highlight a mirror returns nothing that a shadow could take.
-            lit = lit.and_not(value.max_element().le(L::splat(source.negligible)));
-            if lit.none() {
-                continue;
-            }
-            if self.shadows {
-                counts.rays += u64::from(lit.bits().count_ones());
-                let ray = Ray { origin: met.start, direction: arrival.towards };
-                lit = lit.and_not(self.geometry.blocked(&ray, arrival.distance, lit, shading));
             }
             out.groups[source.group] += value.only(lit);
         }
