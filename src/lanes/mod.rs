@@ -193,6 +193,9 @@ pub trait Lanes:
     fn min(self, other: Self) -> Self;
     /// The larger. If `self` is NaN, `other`; unspecified (but no panic) if `other` is NaN.
     fn max(self, other: Self) -> Self;
+    /// The smallest and the largest lane; lanes that are NaN do not count (the largest number and its
+    /// negative, if all are).
+    fn extremes(self) -> (Self::Scalar, Self::Scalar);
     /// Absolute value.
     fn abs(self) -> Self;
     /// Square root; NaN below zero.

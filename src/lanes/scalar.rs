@@ -118,6 +118,10 @@ macro_rules! scalar_lanes {
                 if self > other { self } else { other }
             }
             #[inline(always)]
+            fn extremes(self) -> (Self, Self) {
+                (Lanes::min(self, <$float>::MAX), Lanes::max(self, -<$float>::MAX))
+            }
+            #[inline(always)]
             fn abs(self) -> Self {
                 <$float>::abs(self)
             }

@@ -2,7 +2,7 @@
 
 use super::{Bits, Lanes, MAX_WIDTH, Mask, ROUNDER, round_i64};
 use wide::bytemuck::cast;
-use wide::{f32x8, f64x4, i32x4, i32x8, i64x4, u32x4, u32x8};
+use wide::{f32x4, f32x8, f64x2, f64x4, i32x4, i32x8, i64x4, u32x4, u32x8};
 #[cfg(target_feature = "avx512f")]
 use wide::{f32x16, f64x8, i32x16, u32x16};
 
@@ -95,7 +95,7 @@ vector_bits!(u32x4, 4, reverse4);
 vector_bits!(u32x16, 16, reverse_by_shifts);
 
 macro_rules! vector_lanes {
-    ($vector:ident, $scalar:ident, $bits:ident, $raw:ident, $n:literal, $unit:expr) => {
+    ($vector:ident, $half:ident, $scalar:ident, $bits:ident, $raw:ident, $n:literal, $unit:expr) => {
         impl Mask for $vector {
             #[inline(always)]
             fn any(self) -> bool {
@@ -142,6 +142,20 @@ macro_rules! vector_lanes {
             #[inline(always)]
             fn max(self, other: Self) -> Self {
                 $vector::fast_max(self, other)
+            }
+            #[inline(always)]
+            fn extremes(self) -> ($scalar, $scalar) {
+                // Both halves at once, then one by one.
+                let most = $vector::splat($scalar::MAX);
+                let [a, b]: [$half; 2] = cast(Lanes::min(self, most));
+                let [c, d]: [$half; 2] = cast(Lanes::max(self, -most));
+                let (low, high) = (a.fast_min(b).to_array(), c.fast_max(d).to_array());
+                let smaller = |a, b| if a < b { a } else { b };
+                let larger = |a, b| if a > b { a } else { b };
+                (
+                    low.into_iter().fold($scalar::MAX, smaller),
+                    high.into_iter().fold(-$scalar::MAX, larger),
+                )
             }
             #[inline(always)]
             fn abs(self) -> Self {
@@ -233,20 +247,20 @@ macro_rules! vector_lanes {
     };
 }
 
-vector_lanes!(f32x8, f32, u32x8, u32, 8, |bits| {
+vector_lanes!(f32x8, f32x4, f32, u32x8, u32, 8, |bits| {
     f32x8::from_i32x8(cast::<u32x8, i32x8>(bits >> 8u32)) * f32x8::splat(1.0 / 16_777_216.0)
 });
-vector_lanes!(f64x4, f64, u32x4, u64, 4, |bits| {
+vector_lanes!(f64x4, f64x2, f64, u32x4, u64, 4, |bits| {
     let signed: i32x4 = cast(bits ^ u32x4::splat(0x8000_0000));
     (f64x4::from_i32x4(signed) + f64x4::splat(2_147_483_648.5))
         * f64x4::splat(1.0 / 4_294_967_296.0)
 });
 #[cfg(target_feature = "avx512f")]
-vector_lanes!(f32x16, f32, u32x16, u32, 16, |bits| {
+vector_lanes!(f32x16, f32x8, f32, u32x16, u32, 16, |bits| {
     f32x16::from_i32x16(cast::<u32x16, i32x16>(bits >> 8u32)) * f32x16::splat(1.0 / 16_777_216.0)
 });
 #[cfg(target_feature = "avx512f")]
-vector_lanes!(f64x8, f64, u32x8, u64, 8, |bits| {
+vector_lanes!(f64x8, f64x4, f64, u32x8, u64, 8, |bits| {
     let signed: i32x8 = cast(bits ^ u32x8::splat(0x8000_0000));
     (f64x8::from_i32x8(signed) + f64x8::splat(2_147_483_648.5))
         * f64x8::splat(1.0 / 4_294_967_296.0)

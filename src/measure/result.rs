@@ -90,9 +90,9 @@ const LEAST: usize = 5;
 /// An error that another reference could change by more than this share is not told.
 const DOUBTFUL: f64 = 0.05;
 
-/// Standard deviations within which a number of signs lies in four of five cases, times the root of two
-/// for the difference of two such numbers.
-const CERTAINTY: f64 = 1.282 * std::f64::consts::SQRT_2;
+/// Standard deviations within which a number of signs lies in more than four of five cases, times the
+/// root of two for the difference of two such numbers.
+const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
 /// The middle one; the mean of the two in the middle.
 pub fn median(values: &[f64]) -> f64 {

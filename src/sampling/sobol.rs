@@ -10,7 +10,8 @@
 //!
 //! The first columns of the matrices were searched for, one after the other: the one with which the 2^m
 //! points, scrambled at random, tell best how much of the cube lies on one side of a random plane that
-//! leans towards the axes of several pairs; further columns are as good as random.
+//! leans towards the axes of several pairs, and the mean of a smooth product of numbers of several pairs;
+//! further columns are as good as random.
 //!
 //! Values are stored with the first binary digit in bit 0, as the scrambling hash wants them.
 
@@ -21,9 +22,9 @@ pub const DIMENSIONS: usize = 8;
 
 /// The columns of `M_1`, `M_2`, `M_3` that were searched for: bit r is row r.
 const COLUMNS: [&[u32]; 3] = [
-    &[1, 2, 5, 11, 23, 58, 68, 223, 441, 802, 1712, 2402, 4270],
-    &[1, 3, 5, 8, 23, 61, 95, 212, 304, 738],
-    &[1, 3, 4, 10, 17, 52, 121, 201, 256],
+    &[1, 3, 4, 13, 22, 46, 65, 179, 390, 573, 1694, 2956, 5907],
+    &[1, 2, 6, 15, 22, 33, 100, 158, 457, 810],
+    &[1, 2, 7, 12, 22, 39, 88, 191, 277],
 ];
 
 /// What bit `bit` of the index of pair `pair` becomes in the index of the first pair.

@@ -217,10 +217,14 @@ mod tests {
         undone::<Single>(&numbers, 2e-6);
         numbers.extend((24..=32).map(|bits| f64::from(-bits).exp2()));
         undone::<Double>(&numbers, 2e-7);
-        for u in [0.0, 0.5] {
-            let x: f64 = erf_inverse(Single::of(u)).lane(0).to_f64();
-            assert!(x.is_finite() && (u < 0.5 || x == 0.0), "u = {u}: {x}");
-        }
+        ends::<Single>();
+        ends::<Double>();
+    }
+
+    fn ends<L: Lanes>() {
+        let at = |u: f64| erf_inverse(L::of(u)).lane(0).to_f64();
+        assert_eq!(at(0.5), 0.0);
+        assert!((-5.0..-4.5).contains(&at(0.0)), "{}", at(0.0));
     }
 
     /// Squares about the centre become circles, and areas stay areas.
@@ -250,6 +254,6 @@ mod tests {
     #[test]
     fn the_disk_is_round_and_its_areas_are_those_of_the_square() {
         round::<Single>(1e-6);
-        round::<Double>(1e-13);
+        round::<Double>(1e-12);
     }
 }

@@ -123,20 +123,8 @@ impl<S: Real> Sheaf<S> {
 #[inline(always)]
 fn ends<L: Lanes>(v: V3<L>, here: L::Mask, first: usize) -> ([L::Scalar; 3], [L::Scalar; 3]) {
     let v = V3::select(here, v, V3::splat(v.lane(first)));
-    let [x, y, z] = [extremes(v.x), extremes(v.y), extremes(v.z)];
+    let [x, y, z] = [v.x.extremes(), v.y.extremes(), v.z.extremes()];
     ([x.0, y.0, z.0], [x.1, y.1, z.1])
-}
-
-/// The smallest and the largest lane; lanes that are no number do not count.
-#[inline(always)]
-fn extremes<L: Lanes>(x: L) -> (L::Scalar, L::Scalar) {
-    let mut out = (L::Scalar::of(L::MAX), L::Scalar::of(-L::MAX));
-    for i in 0..L::WIDTH {
-        let x = x.lane(i);
-        out.0 = if x < out.0 { x } else { out.0 };
-        out.1 = if x > out.1 { x } else { out.1 };
-    }
-    out
 }
 
 /// The far side of a box moves out by some roundings, so that no hit is lost (Ize 2013, *Robust BVH
@@ -212,12 +200,12 @@ pub fn together<L: Lanes>(
     stack: &mut [Entry<L::Scalar>],
     mut leaf: impl FnMut(usize, L) -> L,
 ) {
-    let mut farthest = extremes(limit).1;
+    let mut farthest = limit.extremes().1;
     let (mut top, mut child) = (0, 0);
     loop {
         if child & LEAF != 0 {
             limit = leaf((child & !LEAF) as usize, limit);
-            farthest = extremes(limit).1;
+            farthest = limit.extremes().1;
         } else {
             let branch = &boxes.branches()[child as usize];
             let base = top;

@@ -242,6 +242,27 @@ fn nan_follows_the_stated_rule() {
     for_every_instance!(not_a_number);
 }
 
+/// The smallest and the largest lane, wherever they are and whichever lanes are NaN.
+fn ends_of_lanes<L: Lanes>() {
+    for i in 0..2000u32 {
+        let numbers: Vec<f64> = (0..L::WIDTH as u32)
+            .map(|lane| match i.wrapping_mul(0x9e37_79b9) >> lane & 3 {
+                0 => f64::NAN,
+                _ => f64::from(L::of(uniform(16 * i + lane) - 0.5).lane(0).to_f64() as f32),
+            })
+            .collect();
+        let known = || numbers.iter().copied().filter(|x| !x.is_nan());
+        let (low, high) = L::from_fn(|lane| Real::of(numbers[lane])).extremes();
+        assert_eq!(low.to_f64(), known().fold(L::MAX, f64::min), "{}: {numbers:?}", L::NAME);
+        assert_eq!(high.to_f64(), known().fold(-L::MAX, f64::max), "{}: {numbers:?}", L::NAME);
+    }
+}
+
+#[test]
+fn the_ends_of_lanes_are_found() {
+    for_every_instance!(ends_of_lanes);
+}
+
 /// Arithmetic up to the square root and the fused product are the same bits at every width.
 fn same_bits<One: Lanes, Many: Lanes<Scalar = One::Scalar>>() {
     let value = |i: u32| One::Scalar::of((uniform(i) - 0.5) * (60.0 * uniform(!i) - 30.0).exp2());
