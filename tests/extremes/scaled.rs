@@ -47,17 +47,22 @@ fn changed(mut scene: Scene, s: f64, by: DVec3) -> Scene {
     scene
 }
 
-/// Root mean square difference of two pictures of the same samples, in codes.
-fn apart(a: &Scene, b: &Scene, precision: Precision) -> f64 {
+/// Root mean square difference of two pictures of the same samples, in codes, without the `left_out` pixels
+/// that differ most.
+fn apart(a: &Scene, b: &Scene, precision: Precision, left_out: usize) -> f64 {
     let display = Display::default();
-    let codes = |scene: &Scene| -> Vec<f64> {
+    let codes = |scene: &Scene| -> Vec<[f64; 3]> {
         let rendering = rendered(scene, 5, precision, SAMPLES);
         assert_eq!(rendering.film.bad_samples().count, 0);
-        picture(&rendering, Part::Both).iter().flat_map(|p| display.codes(*p)).collect()
+        picture(&rendering, Part::Both).iter().map(|p| display.codes(*p)).collect()
     };
     let (a, b) = (codes(a), codes(b));
-    let sum: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
-    (sum / a.len() as f64).sqrt()
+    let of_pixel =
+        |(a, b): (&[f64; 3], &[f64; 3])| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    let mut squares: Vec<f64> = a.iter().zip(&b).map(of_pixel).collect();
+    squares.sort_by(f64::total_cmp);
+    let sum: f64 = squares[..squares.len() - left_out].iter().sum();
+    (sum / (3 * a.len()) as f64).sqrt()
 }
 
 /// Checks all scenes under one change; `limits`: codes in double precision and by `auto`.
@@ -66,7 +71,8 @@ fn check(name: &str, s: f64, by: DVec3, limits: [f64; 2]) {
         let scene = sized(shipped(file), SIZE);
         let other = changed(scene.clone(), s, by);
         for (precision, limit) in [Precision::Double, Precision::Auto].into_iter().zip(limits) {
-            let codes = apart(&scene, &other, precision);
+            let left_out = if precision == Precision::Double { 0 } else { FLIPPED };
+            let codes = apart(&scene, &other, precision, left_out);
             println!("{name}, {file}, {precision:?}: {codes:.2e} codes");
             assert!(codes <= limit, "{name}, {file}, {precision:?}: {codes} codes");
         }
@@ -82,9 +88,12 @@ fn scaled_scenes_give_the_same_picture() {
     check("scaled by 2^20", 1_048_576.0, DVec3::ZERO, [0.0; 2]);
 }
 
+/// In so many of the 3,072 pixels a path of single precision may pass the other side of an edge.
+const FLIPPED: usize = 2;
+
 /// What RMSE of the same samples roundings may make, in double precision and by `auto`: found are 3e-7
-/// codes, and in single precision 3e-5, or 2e-3 where one path in a million passes the other side of an edge.
-const DOUBLE_AUTO: [f64; 2] = [1e-6, 1e-2];
+/// codes, and 5e-5 in single precision.
+const DOUBLE_AUTO: [f64; 2] = [1e-6, 2e-4];
 
 /// Ten million units away the file's own numbers end at 2e-9.
 #[test]
