@@ -83,7 +83,7 @@ fn main() {
         let command =
             format!("tmux -L {socket} -f {} new-session '{}'", settings.display(), program(""));
         measure(name, keys, &server, folder.path(), &command, true);
-        let _ = Command::new("tmux").args(["-L", &socket, "kill-server"]).status();
+        let _ = Command::new("tmux").args(["-L", &socket, "kill-server"]).output();
     }
 }
 
