@@ -184,7 +184,7 @@ shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
     // unless a number lies so close to the middle between two that it is rounded to the other one (a
     // coefficient of a thin ellipsoid in extents.toml: 2.7e-8). A sample at an edge may fall to the other
     // side: near the horizon of a checked floor (gallery-glass.toml) one in ten thousand does, so a
-    // five-hundredth of the pixels may be off, by no more than one sample each.
+    // five-hundredth of its pixels may be off, by no more than one sample each; in no other scene does one.
     for (name, scene) in all_shipped() {
         let scene = sized(scene, SIZE);
         for precision in PRECISIONS {
@@ -195,7 +195,8 @@ shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
                 .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum())
                 .collect();
             apart.sort_by(f64::total_cmp);
-            let (most, flipped) = apart.split_at(apart.len() - apart.len() / 500);
+            let edges = if name == "gallery-glass.toml" { apart.len() / 500 } else { 0 };
+            let (most, flipped) = apart.split_at(apart.len() - edges);
             let sum = here.iter().sum::<f64>();
             let limit =
                 if precision == Precision::Single { 0.5 * f64::from(f32::EPSILON) } else { 1e-8 };

@@ -168,7 +168,9 @@ pub struct Frame<L> {
 }
 
 impl<L: Lanes> Frame<L> {
-    /// Branch-free basis around the unit vector `n`, continuous but for n.z = 0.
+    /// Branch-free basis around the unit vector `n`, continuous but for n.z = 0. Around a level vector
+    /// (n.y = 0) the first tangent is level and the second upright, and so are the axes of the lobes of
+    /// an upright mirror.
     ///
     /// Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1).
     #[inline(always)]

@@ -90,7 +90,7 @@ const LEAST: usize = 5;
 /// An error that another reference could change by more than this share is not told.
 const DOUBTFUL: f64 = 0.05;
 
-/// Standard deviations within which a number of signs lies in more than four of five cases, times the
+/// Standard deviations within which a number of signs lies in more than four of five cases (as they are whole numbers, in about four), times the
 /// root of two for the difference of two such numbers.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
@@ -100,7 +100,7 @@ pub fn median(values: &[f64]) -> f64 {
 }
 
 /// How far the median of another measurement may be from this one's, as a share of it, on a machine that
-/// stays as it is: it is that near in four of five cases at least. With fewer than five values the
+/// stays as it is: it is that near in about four of five cases. With fewer than five values the
 /// distance of the least and the greatest; else half the distance of the two values between which the
 /// median of all that could be measured lies, so certainly that two such medians agree (by the signs test:
 /// Conover, *Practical Nonparametric Statistics*, confidence interval for a quantile). 0 for fewer than

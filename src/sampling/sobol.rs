@@ -146,7 +146,8 @@ mod tests {
     }
 
     /// The share of random half-spaces that the points tell has less error than with as many independent
-    /// points: by so much in the planes of the pairs, and where all four first dimensions take part.
+    /// points: by so much in the plane of a pair (where the usual second pair has 0.30 and 0.23 of it), and
+    /// where all four first dimensions take part.
     #[test]
     fn scrambled_points_tell_half_spaces_better_than_random_ones() {
         use crate::lanes::{Bits, Lanes};
@@ -159,12 +160,12 @@ mod tests {
             mix1(state)
         };
         for (name, weights, points, most) in [
-            ("the lobe", [0.0, 1.0], 64, 0.42),
-            ("mostly the lobe", [0.1, 1.0], 64, 0.45),
-            ("both", [1.0, 1.0], 64, 0.60),
-            ("the lobe", [0.0, 1.0], 256, 0.30),
-            ("mostly the lobe", [0.1, 1.0], 256, 0.36),
-            ("both", [1.0, 1.0], 256, 0.52),
+            ("the lobe", [0.0, 1.0], 64, 0.30),
+            ("mostly the lobe", [0.1, 1.0], 64, 0.35),
+            ("both", [1.0, 1.0], 64, 0.50),
+            ("the lobe", [0.0, 1.0], 256, 0.22),
+            ("mostly the lobe", [0.1, 1.0], 256, 0.33),
+            ("both", [1.0, 1.0], 256, 0.46),
         ] {
             let (mut error, mut independent) = (0.0, 0.0);
             for _ in 0..4000 {

@@ -1,6 +1,6 @@
 //! The lane types: what they promise beyond the operations that IEEE defines.
 
-use zerkalo::lanes::{Bits, Double, Lanes, MAX_WIDTH, Mask, Real, Single};
+use zerkalo::lanes::{Bits, Double, Frame, Lanes, MAX_WIDTH, Mask, Real, Single, V3};
 
 /// A sequence of 32-bit numbers with nothing in common.
 fn noise(i: u32) -> u32 {
@@ -286,4 +286,15 @@ fn same_bits<One: Lanes, Many: Lanes<Scalar = One::Scalar>>() {
 fn ieee_operations_are_the_same_bits_at_every_width() {
     same_bits::<f32, Single>();
     same_bits::<f64, Double>();
+}
+
+/// The axes of an upright mirror's lobes are level and upright, whichever way it faces.
+#[test]
+fn frames_around_level_vectors_stand_upright() {
+    for i in 0..360 {
+        let angle = f64::from(i).to_radians();
+        let frame = Frame::around(V3::<f64>::of([angle.sin(), 0.0, angle.cos()]));
+        assert!(frame.b.x.abs() < 1e-15 && frame.b.z.abs() < 1e-15, "{i} degrees: {frame:?}");
+        assert!((frame.b.y.abs() - 1.0).abs() < 1e-15 && frame.t.y.abs() < 1e-15, "{i}: {frame:?}");
+    }
 }
