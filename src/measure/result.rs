@@ -90,8 +90,8 @@ const LEAST: usize = 5;
 /// An error that another reference could change by more than this share is not told.
 const DOUBTFUL: f64 = 0.05;
 
-/// Standard deviations within which a number of signs lies in more than four of five cases (as they are whole numbers, in about four), times the
-/// root of two for the difference of two such numbers.
+/// Standard deviations within which a number of signs lies in about four of five cases, times the root
+/// of two for the difference of two such numbers.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
 /// The middle one; the mean of the two in the middle.
