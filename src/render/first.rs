@@ -2,10 +2,10 @@
 
 use super::pass::{Tracer, Work};
 use super::wave::{JobReport, Wave, WaveReport};
-use crate::film::{Film, Slot, TILE, lattice_pixels};
+use crate::film::{Film, Slot, TILE, Tile, lattice_pixels};
 use crate::lanes::Lanes;
 use crate::sampling::SampleSettings;
-use crate::world::{AnyWorld, Counts, World};
+use crate::world::{AnyWorld, Counts, Outlook, World};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -29,6 +29,9 @@ pub fn run(
 
 /// Tiles side by side that share packets while the lattice is coarse.
 const STRIP_TILES: usize = 8;
+
+/// A lattice is that while its step is larger than this \[pixels\]; then the tiles' own pixels fill packets.
+const SHARED_FROM: usize = 2;
 
 fn first_in<L: Lanes>(
     world: &World<L>,
@@ -75,28 +78,47 @@ fn first_in<L: Lanes>(
 
 impl<L: Lanes> Tracer<'_, L> {
     /// The first sample of the pixels that a lattice of `step` pixels adds to one of `before` (0:
-    /// none) in tiles side by side, whose pixels share packets.
+    /// none) in tiles side by side, whose pixels share packets while they are few.
     fn lattice(&self, slots: Vec<Slot>, before: usize, step: usize, counts: &mut [Counts]) {
-        let mut tiles = Vec::new();
+        let mut tiles: Vec<_> = slots.into_iter().map(|slot| (slot.origin, slot.open())).collect();
+        if step > SHARED_FROM {
+            self.add_pixels(&mut tiles, None, (before, step), counts);
+        } else {
+            for (tile, counts) in tiles.chunks_mut(1).zip(counts.chunks_mut(1)) {
+                let outlook = self.world.outlook(tile[0].0, tile[0].1.extent());
+                if !outlook.as_ref().is_some_and(|outlook| self.world.is_black(outlook)) {
+                    self.add_pixels(tile, outlook, (before, step), counts);
+                }
+            }
+        }
+        tiles.into_iter().for_each(|(_, tile)| tile.set_lattice(step));
+    }
+
+    /// Samples of those pixels in tiles, given with their origins, that share packets. `outlook`: of all
+    /// of them.
+    fn add_pixels(
+        &self,
+        tiles: &mut [([usize; 2], &mut Tile)],
+        outlook: Option<Outlook>,
+        (before, step): (usize, usize),
+        counts: &mut [Counts],
+    ) {
         let mut pixels = Vec::new();
-        for (t, slot) in slots.into_iter().enumerate() {
-            let origin = slot.origin;
-            let tile = slot.open();
+        for (t, (origin, tile)) in tiles.iter().enumerate() {
             let extent = tile.extent();
             let inside = |p: &usize| p % TILE < extent[0] && p / TILE < extent[1];
-            pixels.extend(lattice_pixels(before, step).filter(inside).map(|p| (t, origin, p)));
-            tiles.push(tile);
+            pixels.extend(lattice_pixels(before, step).filter(inside).map(|p| (t, *origin, p)));
         }
         let points = self.sampler.at(0);
+        let mut work = Work::new(0, outlook);
         for packet in pixels.chunks(L::WIDTH) {
             let at = |lane: usize| {
                 let (_, origin, p) = packet[lane.min(packet.len() - 1)];
                 ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
             };
-            let mut work = Work::new(0, None);
             self.pixels(&mut work, &points, packet.len(), at, 0);
             // A packet's rays are shared out among its pixels' tiles, the remainder to the first.
-            let Counts { rays, glossy } = work.counts;
+            let Counts { rays, glossy } = std::mem::take(&mut work.counts);
             let share = rays / packet.len() as u64;
             counts[packet[0].0].rays += rays - share * packet.len() as u64;
             for (t, _, _) in packet {
@@ -105,17 +127,14 @@ impl<L: Lanes> Tracer<'_, L> {
             }
             self.scatter(&work.radiance, packet.len(), |lane, group, values| {
                 let (t, _, p) = packet[lane];
-                tiles[t].add_group(0, p, group, values);
+                tiles[t].1.add_group(0, p, group, values);
             });
-            for bad in work.bad {
+            for bad in work.bad.drain(..) {
                 let tile_of = |lane: &usize| at(*lane) == (bad.x, bad.y);
                 if let Some(lane) = (0..packet.len()).find(tile_of) {
-                    tiles[packet[lane].0].record_bad(bad);
+                    tiles[packet[lane].0].1.record_bad(bad);
                 }
             }
-        }
-        for tile in tiles {
-            tile.set_lattice(step);
         }
     }
 }

@@ -268,19 +268,41 @@ impl<L: Lanes> Geometry<L> {
         if !self.extents.is_empty() {
             return self.blocked_in_boxes(ray, limit, wanted, by);
         }
+        let blocked = self.blocked_by_listed(ray, limit, wanted, by);
+        match &self.tree {
+            Some(tree) if by.tree && wanted.and_not(blocked).any() => {
+                self.blocked_in(tree, ray, limit, wanted, blocked)
+            }
+            _ => blocked,
+        }
+    }
+
+    /// As [`Geometry::blocked`], by those items that are in no tree, and have no boxes.
+    #[inline(always)]
+    pub fn blocked_by_listed(
+        &self,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+        by: &Selection,
+    ) -> L::Mask {
         let mut blocked = L::mask(false);
         for (part, range) in &by.runs {
             let open = wanted.and_not(blocked);
             let batch = &self.parts[*part as usize].batch;
             blocked = blocked | batch.blocked(indices(range), ray, limit, open);
             if wanted.and_not(blocked).none() {
-                return blocked;
+                break;
             }
         }
-        match &self.tree {
-            Some(tree) if by.tree => self.blocked_in(tree, ray, limit, wanted, blocked),
-            _ => blocked,
-        }
+        blocked
+    }
+
+    /// As [`Geometry::blocked`], by one item of the tree: `number` in [`Geometry::in_tree`].
+    #[inline(always)]
+    pub fn blocked_by_one(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+        let (part, i) = self.tree_items[number as usize];
+        self.parts[part as usize].batch.blocked(indices(&(i..i + 1)), ray, limit, wanted)
     }
 
     #[inline(never)]
@@ -294,10 +316,8 @@ impl<L: Lanes> Geometry<L> {
     ) -> L::Mask {
         let limit_of = |blocked| L::select(wanted.and_not(blocked), limit, L::of(-1.0));
         tree.walk(ray, limit_of(blocked), |item, left| {
-            let (part, i) = self.tree_items[item];
             let open = left.gt(L::zero());
-            let batch = &self.parts[part as usize].batch;
-            let new = batch.blocked(indices(&(i..i + 1)), ray, left, open);
+            let new = self.blocked_by_one(item as u32, ray, left, open);
             blocked = blocked | (new & open);
             limit_of(blocked)
         });

@@ -3,6 +3,7 @@
 use super::groups::{Groups, Member};
 use super::guide::Sight;
 use super::inventory::Inventory;
+use super::light_buffer::LightBuffer;
 use super::limits;
 use super::media::Media;
 use super::outlook::{Culling, Outlook, Surroundings};
@@ -68,6 +69,8 @@ pub struct World<L: Lanes> {
     pub(super) fold: bool,
     pub(super) view: View,
     pub(super) panorama: Outlook,
+    /// For each light, if the geometry has a tree.
+    pub(super) light_buffers: Vec<Option<LightBuffer<L::Scalar>>>,
     culling: Culling,
     groups: Groups,
     names: Vec<String>,
@@ -184,11 +187,13 @@ impl<L: Lanes> World<L> {
         let media = Media::new(&placed.forms, geometry.sources(), &finish_of, &finishes, begin);
         let entered = media.as_ref().map_or(vec![false; finish_of.len()], Media::entered);
         let mut panorama = Outlook::everything(&geometry, lamps.len());
+        let mut light_buffers = Vec::new();
         let culling = match acceleration {
             Acceleration::Auto => {
                 let of = Surroundings::new(forms().collect(), eye, &entered, &lamps);
                 panorama = of.outlook(&geometry, None);
                 if geometry.has_tree() {
+                    light_buffers = of.light_buffers(&geometry);
                     let things = geometry.in_tree().into_iter();
                     let seen = |item: u32| {
                         let source = geometry.sources()[item as usize];
@@ -206,6 +211,7 @@ impl<L: Lanes> World<L> {
         };
         Self {
             panorama,
+            light_buffers,
             culling,
             ambient: groups.find(&Member::Ambient),
             background: (scene.background.color.0 != [0.0; 3])

@@ -5,10 +5,10 @@
 //! of the glass that is listed after it. Light that leaves the last solid is outside, where the index of
 //! refraction is 1.
 
-use super::path::first_tag;
-use crate::lanes::{Lanes, Mask, Real, V3};
+use super::path::{Met, first_tag};
+use crate::lanes::{Lanes, Mask, Real};
 use crate::material::Finish;
-use crate::shape::{Form, Geometry, Hit, Ray, Source};
+use crate::shape::{Form, Geometry, Ray, Source};
 use glam::DVec3;
 
 /// So many solids around one point are told apart; of more, those that are listed last.
@@ -92,8 +92,6 @@ pub(super) struct Crossing<L: Lanes> {
     pub pane: L::Mask,
     /// Those that meet a surface which is not there, because another solid fills the space.
     pub hidden: L::Mask,
-    /// Origin of rays that leave on the far side.
-    pub beyond: V3<L>,
     /// Index of refraction before the surface.
     pub n_i: L,
     /// Index of refraction behind it; for a pane, of what it is made of.
@@ -168,28 +166,29 @@ impl<L: Lanes> Media<L> {
         inside
     }
 
+    /// Index of refraction inside of what the ranks say.
     fn index(&self, rank: L) -> L {
-        L::from_fn(|lane| self.indices[rank.lane(lane).to_f64() as usize])
+        let of = |rank: L::Scalar| self.indices[rank.to_f64() as usize];
+        let first = rank.lane(0);
+        if equal(rank, L::splat(first)).all() {
+            return L::splat(of(first));
+        }
+        L::from_fn(|lane| of(rank.lane(lane)))
     }
 
     /// Where the rays of `lanes`, which are `inside` what they are, meet surfaces that let light through.
-    /// `normal`: on the viewer's side. `index_of_pane`: what those are made of that are open.
+    /// `index_of_pane`: what those are made of that are open.
     pub fn cross(
         &self,
-        geometry: &Geometry<L>,
-        (ray, hit, normal): (&Ray<L>, &Hit<L>, V3<L>),
+        met: &Met<L>,
         lanes: L::Mask,
         inside: &Inside<L>,
         index_of_pane: L,
     ) -> Crossing<L> {
-        let mut outer = L::mask(false);
-        let mut beyond = ray.origin;
+        let outer = lanes & met.front;
         let mut rank = L::zero();
         let mut left = lanes;
-        while let Some((item, here)) = first_tag(hit.item, left) {
-            let surface = geometry.surface(item, hit.facet, ray.at(hit.t));
-            outer = outer | (here & surface.normal.dot(ray.direction).lt(L::zero()));
-            beyond = V3::select(here, normal.mul_add(-surface.lift(), surface.point), beyond);
+        while let Some((item, here)) = first_tag(met.item, left) {
             rank = L::select(here, L::of(f64::from(self.rank_of[item as usize])), rank);
             left = left.and_not(here);
         }
@@ -203,7 +202,6 @@ impl<L: Lanes> Media<L> {
             outer,
             pane: lanes.and_not(solid),
             hidden: lanes & solid & equal(before.top(), behind.top()),
-            beyond,
             n_i,
             n_t: L::select(solid, self.index(behind.top()), index_of_pane),
             before,

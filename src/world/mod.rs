@@ -5,6 +5,7 @@ mod compile;
 mod groups;
 mod guide;
 mod inventory;
+mod light_buffer;
 mod limits;
 mod media;
 mod outlook;

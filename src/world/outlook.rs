@@ -2,6 +2,7 @@
 //! that may stand between what they see and a light. Most parts see one or two things, and nothing
 //! shades them: the others are never asked.
 
+use super::light_buffer::{LightBuffer, Shader};
 use super::screen::{Cells, Rectangle};
 use crate::camera::View;
 use crate::lanes::{Lanes, Real};
@@ -102,6 +103,19 @@ impl Surroundings {
         };
         let hollow = bounds.iter().zip(entered).map(hollow).collect();
         Self { towards: towards.collect(), hollow, bounds }
+    }
+
+    /// For each light what shadow rays to it meet of the things in the geometry's tree.
+    pub fn light_buffers<L: Lanes>(
+        &self,
+        geometry: &Geometry<L>,
+    ) -> Vec<Option<LightBuffer<L::Scalar>>> {
+        let shader = |item: u32| Shader {
+            ball: self.bounds[item as usize].ball(),
+            own: (!self.hollow[item as usize]).then_some(item),
+        };
+        let shaders: Vec<Shader> = geometry.in_tree().into_iter().map(shader).collect();
+        self.towards.iter().map(|towards| LightBuffer::new(towards, &shaders)).collect()
     }
 
     /// The outlook of camera rays inside `pencil`; `None`: of any rays.

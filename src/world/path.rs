@@ -39,8 +39,14 @@ pub(super) struct Met<L: Lanes> {
     pub normal: V3<L>,
     /// The surface's own, on the viewer's side: the same but on smooth meshes and bumps. Light comes from that side.
     pub geometric: V3<L>,
-    /// Origin of rays that leave on the viewer's side.
-    pub start: V3<L>,
+    /// Where the rays end, on the surface.
+    point: V3<L>,
+    /// How far from there rays start that leave the surface.
+    lift: L,
+    /// Lanes that met the side that the surface's own normal points to.
+    pub front: L::Mask,
+    /// Tag of the item.
+    pub item: L,
     /// Tag of the finish.
     finish: L,
     /// Colour of the thing itself, which multiplies its finish's.
@@ -80,6 +86,18 @@ impl<L: Lanes> Met<L> {
         })
     }
 
+    /// Origin of rays that leave on the viewer's side.
+    #[inline(always)]
+    pub fn start(&self) -> V3<L> {
+        self.geometric.mul_add(self.lift, self.point)
+    }
+
+    /// Origin of rays that leave on the other side.
+    #[inline(always)]
+    pub fn beyond(&self) -> V3<L> {
+        self.geometric.mul_add(-self.lift, self.point)
+    }
+
     /// In `lanes` there is no surface.
     #[inline(always)]
     pub fn leave_out(&mut self, lanes: L::Mask) {
@@ -102,7 +120,9 @@ impl<L: Lanes> Met<L> {
         self.normal = V3::select(lanes, other.normal, self.normal);
         self.geometric = V3::select(lanes, other.geometric, self.geometric);
         self.tint = V3::select(lanes, other.tint, self.tint);
-        self.start = V3::select(lanes, other.start, self.start);
+        self.point = V3::select(lanes, other.point, self.point);
+        self.lift = L::select(lanes, other.lift, self.lift);
+        self.front = self.front | other.front;
         self.finish = L::select(lanes, other.finish, self.finish);
         self.diffuse = V3::select(lanes, other.diffuse, self.diffuse);
         self.finished = self.finished | other.finished;
@@ -204,7 +224,10 @@ impl<L: Lanes> World<L> {
             normal,
             geometric,
             tint,
-            start: geometric.mul_add(surface.lift(), surface.point),
+            point: surface.point,
+            lift: surface.lift(),
+            front: front & lanes,
+            item: hit.item,
             finish: L::tag(number),
             diffuse,
             finished,
@@ -236,8 +259,9 @@ impl<L: Lanes> World<L> {
         if met.lit.none() {
             return;
         }
-        for (source, shading) in self.sources.iter().zip(&outlook.shading) {
-            let arrival = source.lamp.at(met.start);
+        let start = met.start();
+        for (number, (source, shading)) in self.sources.iter().zip(&outlook.shading).enumerate() {
+            let arrival = source.lamp.at(start);
             let nl = met.normal.dot(arrival.towards);
             let mut lit = met.lit & nl.gt(L::zero());
             if self.smooth {
@@ -248,8 +272,18 @@ impl<L: Lanes> World<L> {
             }
             if self.shadows {
                 counts.rays += u64::from(lit.bits().count_ones());
-                let ray = Ray { origin: met.start, direction: arrival.towards };
-                lit = lit.and_not(self.geometry.blocked(&ray, arrival.distance, lit, shading));
+                let ray = Ray { origin: start, direction: arrival.towards };
+                let blocked = match self.light_buffers.get(number) {
+                    Some(Some(buffer)) => buffer.blocked(
+                        &self.geometry,
+                        (&ray, met.item),
+                        arrival.distance,
+                        lit,
+                        shading,
+                    ),
+                    _ => self.geometry.blocked(&ray, arrival.distance, lit, shading),
+                };
+                lit = lit.and_not(blocked);
                 if lit.none() {
                     continue;
                 }
@@ -298,7 +332,7 @@ impl<L: Lanes> World<L> {
             path.ray.direction = V3::select(lanes, out, path.ray.direction);
             path.weight = V3::select(lanes, weight.times(r.weight), path.weight);
         }
-        path.ray.origin = met.start;
+        path.ray.origin = met.start();
         let strongest = path.weight.max_element();
         met.reflecting & strongest.gt(L::zero()) & strongest.ge(L::of(self.min_weight))
     }

@@ -7,7 +7,7 @@ use super::path::{Counts, Met, Path, Radiance};
 use crate::lanes::{Lanes, Mask, V3};
 use crate::material::{Interface, Spread};
 use crate::sampling::Draws;
-use crate::shape::{Hit, Ray};
+use crate::shape::Ray;
 
 /// At so many surfaces, counted from the eye, a path follows both the reflected and the transmitted ray;
 /// from then on one of them, by chance.
@@ -104,7 +104,7 @@ impl<L: Lanes> World<L> {
         }
         let lanes = arm.lanes & ended;
         let Some(mut met) = self.meet(&path.ray, &hit, lanes) else { return false };
-        let crossing = self.crossing(media, &path.ray, &hit, &met, lanes, &inside);
+        let crossing = self.crossing(media, &met, lanes, &inside);
         if let Some(crossing) = &crossing {
             met.leave_out(crossing.hidden);
         }
@@ -128,7 +128,7 @@ impl<L: Lanes> World<L> {
         let both = mirrors & passes;
         let mirrored = Arm {
             path: Path {
-                ray: Ray { origin: met.start, direction: ways.mirrored },
+                ray: Ray { origin: met.start(), direction: ways.mirrored },
                 weight: ways.mirrored_weight,
             },
             lanes: both,
@@ -154,7 +154,7 @@ impl<L: Lanes> World<L> {
         let lanes = mirrors | passes;
         let path = Path {
             ray: Ray {
-                origin: V3::select(through, crossing.beyond, met.start),
+                origin: V3::select(through, met.beyond(), met.start()),
                 direction: V3::select(through, ways.passed, ways.mirrored),
             },
             weight: V3::select(through, passed_weight, mirrored_weight),
@@ -168,8 +168,6 @@ impl<L: Lanes> World<L> {
     fn crossing(
         &self,
         media: &Media<L>,
-        ray: &Ray<L>,
-        hit: &Hit<L>,
         met: &Met<L>,
         lanes: L::Mask,
         inside: &Inside<L>,
@@ -182,8 +180,7 @@ impl<L: Lanes> World<L> {
                 index = L::select(here, L::splat(transmission.index), index);
             }
         }
-        let at = (ray, hit, met.geometric);
-        through.any().then(|| media.cross(&self.geometry, at, through, inside, index))
+        through.any().then(|| media.cross(met, through, inside, index))
     }
 
     /// How paths go on from the surfaces that they meet, of which some let light through.

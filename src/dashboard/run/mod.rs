@@ -187,6 +187,12 @@ impl Dashboard {
         let written = self.frames.written().clone();
         let silence = never();
         let mut waiting = Vec::new();
+        // Who was told to end while the terminal was asked draws nothing any more.
+        while let Ok(told) = line.signals.try_recv() {
+            if let Some(status) = self.heed(told, line) {
+                return Ok(Some(status));
+            }
+        }
         while !self.quit {
             let wait = self.draw();
             // A picture is made when the last one has been taken: not before it can be shown.
