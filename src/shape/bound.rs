@@ -118,7 +118,10 @@ impl Bound {
         let Pencil { apex, forward, corners } = pencil;
         let ball = self.ball;
         if ball.radius.is_finite() {
-            if !ViewCone::around(*apex, corners).meets(&ball) {
+            let axis = corners.iter().sum::<DVec3>().normalize();
+            let cos = corners.iter().map(|c| c.normalize().dot(axis)).fold(1.0, f64::min);
+            let cone = Cone { apex: *apex, axis, cos, sin: (1.0 - cos * cos).sqrt() };
+            if !cone.meets(&ball) {
                 return None;
             }
         }
@@ -181,7 +184,7 @@ impl Bound {
                 }
                 let sin = radius / distance;
                 let (axis, cos) = (to / distance, (1.0 - sin * sin).sqrt());
-                let cone = ViewCone { apex: *light, axis, sin, cos };
+                let cone = Cone { apex: *light, axis, sin, cos };
                 let nearest = (self.ball.center - *light).length() - self.ball.radius;
                 nearest <= distance + radius && cone.meets(&self.ball)
             }
@@ -189,26 +192,18 @@ impl Bound {
     }
 }
 
-/// All directions within an angle of at most 90 degrees of an axis.
-#[derive(Clone, Copy, Debug)]
-pub struct ViewCone {
+/// All directions within an angle below 90 degrees of an axis.
+struct Cone {
     apex: DVec3,
     axis: DVec3,
     sin: f64,
     cos: f64,
 }
 
-impl ViewCone {
-    /// Around four directions from `apex`, and so around all directions between them.
-    pub fn around(apex: DVec3, directions: &[DVec3; 4]) -> Self {
-        let axis = directions.iter().sum::<DVec3>().normalize();
-        let cos = directions.iter().map(|d| d.normalize().dot(axis)).fold(1.0, f64::min);
-        Self { apex, axis, cos, sin: (1.0 - cos * cos).sqrt() }
-    }
-
+impl Cone {
     /// Whether a ball may reach into the cone: it is not all behind the apex, and its centre is no
     /// farther from the cone's side than its radius.
-    pub fn meets(&self, ball: &Ball) -> bool {
+    fn meets(&self, ball: &Ball) -> bool {
         let to = ball.center - self.apex;
         let along = to.dot(self.axis);
         let across = (to - self.axis * along).length();

@@ -1,16 +1,10 @@
 //! For each direction from a light, the few things of a tree that stand there: shadow rays ask these
 //! instead of the tree (Haines and Greenberg 1986, *The Light Buffer: A Shadow-Testing Accelerator*).
 
+use super::light_chart::{Chart, Charted};
 use super::path::first_tag;
-use crate::lanes::{Lanes, Mask, Real, V3};
-use crate::shape::{Ball, Geometry, Ray, Selection, Towards, ViewCone};
-use glam::{DVec2, DVec3};
-use std::ops::Range;
-use std::sync::LazyLock;
-
-/// The chart of directions has `2^LEVELS` cells to a side.
-const LEVELS: u32 = 6;
-const SIDE: usize = 1 << LEVELS;
+use crate::lanes::{Lanes, Mask, Real};
+use crate::shape::{Ball, Geometry, Ray, Selection, Towards};
 
 /// So many things are kept for a cell, the nearest to the light.
 const FEW: usize = 16;
@@ -24,20 +18,14 @@ const NONE: u32 = u32::MAX;
 /// What stands in the way of one light.
 pub(super) struct LightBuffer<S> {
     chart: Chart<S>,
+    /// Cells in a row of the chart, and rows.
+    side: usize,
     /// The largest coordinate of the things and the light: from farther off, rays stray too far.
     scale: S,
-    /// Row by row.
+    /// Row by row, face by face.
     cells: Vec<Cell<S>>,
     /// Of one cell after the other, those nearer to the light first.
     things: Vec<Thing<S>>,
-}
-
-/// Where a point is seen from a light.
-enum Chart<S> {
-    /// From a point: directions on an octahedron, unfolded to a square.
-    Around,
-    /// From far away: coordinates along two axes, from 0 to 1 where there are things.
-    Along { axes: [[S; 3]; 2], low: [S; 2], scale: [S; 2] },
 }
 
 #[derive(Clone, Copy)]
@@ -64,7 +52,8 @@ struct Thing<S> {
     number: u32,
     /// As in [`Shader`]; [`NONE`] stands for `None`.
     own: u32,
-    /// The depth that it begins at.
+    /// The depth that it begins at: the distance from a point, the way along a direction from the plane
+    /// through the origin.
     near: S,
 }
 
@@ -77,25 +66,30 @@ impl<S: Real> LightBuffer<S> {
             Towards::Direction(_) => 0.0,
         };
         let scale = shaders.iter().map(|s| reach(&s.ball)).fold(light, f64::max);
-        let grown = |b: &Ball| Ball { radius: b.radius + STRAY * scale, ..*b };
-        let balls: Vec<Ball> = shaders.iter().map(|s| grown(&s.ball)).collect();
-        let mut order: Vec<(f64, u32)> =
-            (0..).zip(&balls).map(|(number, ball)| (near(towards, ball), number)).collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (chart, spans) = match towards {
-            Towards::Point(_) => (Chart::Around, None),
-            Towards::Direction(direction) => {
-                let (chart, spans) = flat(*direction, &balls);
-                (chart, Some(spans))
-            }
+        // As the light sees them.
+        let seen = |s: &Shader| {
+            let center = match towards {
+                Towards::Point(light) => s.ball.center - light,
+                Towards::Direction(_) => s.ball.center,
+            };
+            Ball { center, radius: s.ball.radius + STRAY * scale }
         };
+        let balls: Vec<Ball> = shaders.iter().map(seen).collect();
+        let near = |ball: &Ball| match towards {
+            Towards::Point(_) => ball.center.length() - ball.radius,
+            Towards::Direction(direction) => -ball.center.dot(*direction) - ball.radius,
+        };
+        let mut order: Vec<(f64, u32)> = balls.iter().map(near).zip(0..).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+
+        let Charted { chart, places, side } = Charted::new(towards, &balls);
+        let count = chart.faces() * side * side;
+        let (mut counts, mut until) = (vec![0; count], vec![S::of(f64::INFINITY); count]);
         let mut entries: Vec<(usize, Thing<S>)> = Vec::new();
-        let mut counts = [0; SIDE * SIDE];
-        let mut until = [S::of(f64::INFINITY); SIDE * SIDE];
         let mut left_out = 0;
         for (near, number) in order {
             let (near, own) = (S::of(near), shaders[number as usize].own.unwrap_or(NONE));
-            let mut add = |cell: usize| {
+            for cell in places[number as usize].iter().flat_map(|place| place.cells(side)) {
                 if counts[cell] < FEW {
                     counts[cell] += 1;
                     entries.push((cell, Thing { number, own, near }));
@@ -103,34 +97,26 @@ impl<S: Real> LightBuffer<S> {
                     until[cell] = if until[cell] < near { until[cell] } else { near };
                     left_out += 1;
                 }
-            };
-            match (towards, &spans) {
-                (Towards::Point(light), _) => {
-                    let Ball { center, radius } = balls[number as usize];
-                    around(1, [0, 0], &Ball { center: center - light, radius }, &mut add);
-                }
-                (_, Some(spans)) => {
-                    let [columns, rows] = spans[number as usize].clone();
-                    rows.for_each(|row| columns.clone().for_each(|x| add(row * SIDE + x)));
-                }
-                _ => unreachable!("a direction has spans"),
             }
-            if left_out > entries.len() + SIDE * SIDE {
+            if left_out > entries.len() + count {
                 return None;
             }
         }
-        // A stable sort keeps the order of depths.
-        entries.sort_by_key(|(cell, _)| *cell);
-        let mut first = 0;
+        let mut end = 0;
         let cell = |(count, until): (&usize, &S)| {
-            let end = first + *count as u32;
-            let cell = Cell { first, end, until: *until };
-            first = end;
+            // Grows to its end when it is filled.
+            let cell = Cell { first: end, end, until: *until };
+            end += *count as u32;
             cell
         };
-        let cells = counts.iter().zip(&until).map(cell).collect();
-        let things = entries.into_iter().map(|(_, thing)| thing).collect();
-        Some(Self { chart, scale: S::of(scale), cells, things })
+        let mut cells: Vec<Cell<S>> = counts.iter().zip(&until).map(cell).collect();
+        let nothing = Thing { number: 0, own: NONE, near: S::default() };
+        let mut things = vec![nothing; entries.len()];
+        for (cell, thing) in entries {
+            things[cells[cell].end as usize] = thing;
+            cells[cell].end += 1;
+        }
+        Some(Self { chart, side, scale: S::of(scale), cells, things })
     }
 
     /// [`Geometry::blocked`] for rays to this light, which end after `limit`. `on`: tags of the items whose
@@ -147,7 +133,7 @@ impl<S: Real> LightBuffer<S> {
         let mut blocked = geometry.blocked_by_listed(ray, limit, wanted, by);
         let mut beyond = wanted.and_not(blocked) & ray.origin.max_abs().gt(L::splat(self.scale));
         let mut left = wanted.and_not(blocked | beyond);
-        let (cell, depth) = self.chart.place(ray, limit);
+        let (cell, depth) = self.chart.place(ray, limit, self.side);
         // The item that all begin on.
         let own = match first_tag(on, wanted) {
             Some((own, all)) if wanted.and_not(all).none() => Some(own),
@@ -185,124 +171,12 @@ impl<S: Real> LightBuffer<S> {
     }
 }
 
-impl<S: Real> Chart<S> {
-    /// In which cell rays to the light begin, and at which depth.
-    #[inline(always)]
-    fn place<L: Lanes<Scalar = S>>(&self, ray: &Ray<L>, limit: L) -> (L, L) {
-        let half = L::of(0.5);
-        let (u, v, depth) = match self {
-            Self::Around => {
-                let d = -ray.direction;
-                let scale = L::one() / (d.x.abs() + d.y.abs() + d.z.abs());
-                let (u, v) = (d.x * scale, d.y * scale);
-                let folded = |a: L, b: L| (L::one() - b.abs()).copysign(a);
-                let below = d.z.lt(L::zero());
-                let choose = |a: L, b: L| L::select(below, folded(a, b), a).mul_add(half, half);
-                (choose(u, v), choose(v, u), limit)
-            }
-            Self::Along { axes, low, scale } => {
-                let along = |i: usize| {
-                    let a = ray.origin.dot(V3::splat(axes[i]));
-                    (a - L::splat(low[i])) * L::splat(scale[i])
-                };
-                (along(0), along(1), -ray.origin.dot(ray.direction))
-            }
-        };
-        // A number below 2^22 plus this has no fraction bits left in single precision; in double one
-        // below 2^51.
-        let rounder = L::of(1.5 / L::EPSILON);
-        let side = L::of(SIDE as f64);
-        let cell = |x: L| {
-            let x = x.mul_add(side, -half).max(L::zero()).min(L::of((SIDE - 1) as f64));
-            (x + rounder) - rounder
-        };
-        (cell(v).mul_add(side, cell(u)), depth)
-    }
-}
-
-/// The depth that a ball begins at, seen from the light: of a point the distance, of a direction the way
-/// from the plane through the origin.
-fn near(towards: &Towards, ball: &Ball) -> f64 {
-    let middle = match towards {
-        Towards::Point(light) => ball.center.distance(*light),
-        Towards::Direction(direction) => -ball.center.dot(*direction),
-    };
-    middle - ball.radius
-}
-
-/// A point of the unfolded octahedron, both coordinates from -1 to 1, as a direction.
-fn unfolded(u: f64, v: f64) -> DVec3 {
-    let z = 1.0 - u.abs() - v.abs();
-    let folded = |a: f64, b: f64| (1.0 - b.abs()).copysign(a);
-    let (x, y) = if z < 0.0 { (folded(u, v), folded(v, u)) } else { (u, v) };
-    DVec3::new(x, y, z).normalize()
-}
-
-/// What is seen through each square of the quadtree over the octahedron: level by level from the four
-/// quarters on, row by row. Squares consist of triangles of the octahedron's faces, so that a cone around
-/// their corners holds them.
-static SQUARES: LazyLock<Vec<Vec<ViewCone>>> = LazyLock::new(|| {
-    let square = |side: usize, i: usize| {
-        let at = |k: usize| 2.0 * k as f64 / side as f64 - 1.0;
-        let corner = |x: usize, y: usize| unfolded(at(i % side + x), at(i / side + y));
-        ViewCone::around(DVec3::ZERO, &[corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)])
-    };
-    let level = |level: u32| {
-        let side = 1 << level;
-        (0..side * side).map(|i| square(side, i)).collect()
-    };
-    (1..=LEVELS).map(level).collect()
-});
-
-/// Calls `add` for the cells through which a ball may be seen from the origin: of four squares of a level,
-/// the first at `column` and `row`.
-fn around(level: u32, [column, row]: [usize; 2], ball: &Ball, add: &mut impl FnMut(usize)) {
-    let side = 1 << level;
-    for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| (column + x, row + y)) {
-        let square = y * side + x;
-        if !SQUARES[level as usize - 1][square].meets(ball) {
-            continue;
-        }
-        if level == LEVELS {
-            add(square);
-        } else {
-            around(level + 1, [2 * x, 2 * y], ball, add);
-        }
-    }
-}
-
-/// The cells of a ball: columns and rows.
-type Spans = [Range<usize>; 2];
-
-/// A chart across `direction`, and which of its cells each ball covers.
-fn flat<S: Real>(direction: DVec3, balls: &[Ball]) -> (Chart<S>, Vec<Spans>) {
-    let (a, b) = direction.any_orthonormal_pair();
-    let at = |p: DVec3| DVec2::new(p.dot(a), p.dot(b));
-    let reach = |ball: &Ball| DVec2::splat(ball.radius);
-    let ends = |ball: &Ball| (at(ball.center) - reach(ball), at(ball.center) + reach(ball));
-    let low = balls.iter().map(|b| ends(b).0).fold(DVec2::INFINITY, DVec2::min);
-    let high = balls.iter().map(|b| ends(b).1).fold(DVec2::NEG_INFINITY, DVec2::max);
-    let scale = (high - low).recip();
-    let cell = |x: f64| ((x * SIDE as f64).max(0.0) as usize).min(SIDE - 1);
-    let span = |ball: &Ball| {
-        let (first, last) = ends(ball);
-        let (first, last) = ((first - low) * scale, (last - low) * scale);
-        [cell(first.x)..cell(last.x) + 1, cell(first.y)..cell(last.y) + 1]
-    };
-    let reals = |v: DVec2| v.to_array().map(S::of);
-    let chart = Chart::Along {
-        axes: [a, b].map(|axis| axis.to_array().map(S::of)),
-        low: reals(low),
-        scale: reals(scale),
-    };
-    (chart, balls.iter().map(span).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::{Double, Single};
+    use crate::lanes::{Double, Single, V3};
     use crate::shape::Form;
+    use glam::DVec3;
 
     struct Random(u64);
 
@@ -381,27 +255,12 @@ mod tests {
         }
     }
 
-    /// A direction lies in the cone of the square that the chart puts it in.
-    #[test]
-    fn the_chart_and_its_squares_agree() {
-        let mut random = Random(2);
-        let chart = Chart::<f64>::Around;
-        for _ in 0..10_000 {
-            let to = random.point(1.0).normalize();
-            let ray = Ray { origin: V3::<f64>::zero(), direction: V3::of((-to).to_array()) };
-            let (cell, depth) = chart.place(&ray, 3.0);
-            assert!(depth == 3.0 && cell == cell.round() && cell < (SIDE * SIDE) as f64);
-            let square = &SQUARES[LEVELS as usize - 1][cell as usize];
-            assert!(square.meets(&Ball { center: to, radius: 1e-9 }), "{to}: {cell}");
-        }
-    }
-
     #[test]
     fn few_things_are_asked() {
         let mut random = Random(3);
         let light = Towards::Point(DVec3::ZERO);
         let few = LightBuffer::<f32>::new(&light, &shaders(&balls(&mut random, 400, 0.3))).unwrap();
-        let mean = few.things.len() as f64 / (SIDE * SIDE) as f64;
+        let mean = few.things.len() as f64 / few.cells.len() as f64;
         assert!(mean < 4.0, "{mean} in a cell");
         let many = balls(&mut random, 4000, 3.0);
         assert!(LightBuffer::<f32>::new(&light, &shaders(&many)).is_none());

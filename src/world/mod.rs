@@ -6,6 +6,7 @@ mod groups;
 mod guide;
 mod inventory;
 mod light_buffer;
+mod light_chart;
 mod limits;
 mod media;
 mod outlook;
