@@ -184,7 +184,9 @@ fn packets_of_one_pixel_and_of_many_agree_in_every_scene() {
 #[test]
 fn the_interleaved_first_pass_is_a_plain_wave() {
     let pool = pool(2);
-    for (name, scene) in scenes() {
+    // So wide that not all tiles of a row share packets; black in parts, and with a tree.
+    let wide = ("wide".to_string(), sized(shipped("reflecting-tracks.toml"), [300, 40]));
+    for (name, scene) in scenes().into_iter().chain([wide]) {
         for precision in PRECISIONS {
             let mut rendering = begin(&scene, SEED, precision);
             let first = wave(&rendering.film, 0, 0, 1);

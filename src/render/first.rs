@@ -30,8 +30,8 @@ pub fn run(
 /// Tiles side by side that share packets while the lattice is coarse.
 const STRIP_TILES: usize = 8;
 
-/// A lattice is that while its step is larger than this \[pixels\]; then the tiles' own pixels fill packets.
-const SHARED_FROM: usize = 2;
+/// They do while the lattice's step is larger than this \[pixels\]; then the tiles' own pixels fill packets.
+const SHARED_ABOVE: usize = 2;
 
 fn first_in<L: Lanes>(
     world: &World<L>,
@@ -81,7 +81,7 @@ impl<L: Lanes> Tracer<'_, L> {
     /// none) in tiles side by side, whose pixels share packets while they are few.
     fn lattice(&self, slots: Vec<Slot>, before: usize, step: usize, counts: &mut [Counts]) {
         let mut tiles: Vec<_> = slots.into_iter().map(|slot| (slot.origin, slot.open())).collect();
-        if step > SHARED_FROM {
+        if step > SHARED_ABOVE {
             self.add_pixels(&mut tiles, None, (before, step), counts);
         } else {
             for (tile, counts) in tiles.chunks_mut(1).zip(counts.chunks_mut(1)) {

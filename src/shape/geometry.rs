@@ -277,7 +277,7 @@ impl<L: Lanes> Geometry<L> {
         }
     }
 
-    /// As [`Geometry::blocked`], by those items that are in no tree, and have no boxes.
+    /// As [`Geometry::blocked`], by those items that are in no tree; boxes are not asked.
     #[inline(always)]
     pub fn blocked_by_listed(
         &self,

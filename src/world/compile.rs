@@ -69,7 +69,7 @@ pub struct World<L: Lanes> {
     pub(super) fold: bool,
     pub(super) view: View,
     pub(super) panorama: Outlook,
-    /// For each light, if the geometry has a tree.
+    /// For each light, if the geometry has a tree that may be gone round.
     pub(super) light_buffers: Vec<Option<LightBuffer<L::Scalar>>>,
     culling: Culling,
     groups: Groups,
@@ -193,7 +193,9 @@ impl<L: Lanes> World<L> {
                 let of = Surroundings::new(forms().collect(), eye, &entered, &lamps);
                 panorama = of.outlook(&geometry, None);
                 if geometry.has_tree() {
-                    light_buffers = of.light_buffers(&geometry);
+                    if level >= Level::Shadows {
+                        light_buffers = of.light_buffers(&geometry);
+                    }
                     let things = geometry.in_tree().into_iter();
                     let seen = |item: u32| {
                         let source = geometry.sources()[item as usize];

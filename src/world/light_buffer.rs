@@ -38,7 +38,7 @@ struct Cell<S> {
 
 /// A thing of the geometry's tree.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shader {
+pub(super) struct Occluder {
     /// Around it.
     pub ball: Ball,
     /// The number of the item whose surface it does not shade, because that is its own; `None`: it may
@@ -50,7 +50,7 @@ pub(super) struct Shader {
 struct Thing<S> {
     /// Number in the geometry's tree.
     number: u32,
-    /// As in [`Shader`]; [`NONE`] stands for `None`.
+    /// As in [`Occluder`]; [`NONE`] stands for `None`.
     own: u32,
     /// The depth that it begins at: the distance from a point, the way along a direction from the plane
     /// through the origin.
@@ -58,47 +58,50 @@ struct Thing<S> {
 }
 
 impl<S: Real> LightBuffer<S> {
-    /// Of the things of a tree; `None`: most cells would hold too many.
-    pub fn new(towards: &Towards, shaders: &[Shader]) -> Option<Self> {
+    /// Of the things of a tree; `None`: of half of them or more, most of the cells would have no room.
+    pub fn new(towards: &Towards, occluders: &[Occluder]) -> Option<Self> {
         let reach = |ball: &Ball| ball.center.abs().max_element() + ball.radius;
         let light = match towards {
             Towards::Point(light) => light.abs().max_element(),
             Towards::Direction(_) => 0.0,
         };
-        let scale = shaders.iter().map(|s| reach(&s.ball)).fold(light, f64::max);
+        let scale = occluders.iter().map(|s| reach(&s.ball)).fold(light, f64::max);
         // As the light sees them.
-        let seen = |s: &Shader| {
+        let seen = |s: &Occluder| {
             let center = match towards {
                 Towards::Point(light) => s.ball.center - light,
                 Towards::Direction(_) => s.ball.center,
             };
             Ball { center, radius: s.ball.radius + STRAY * scale }
         };
-        let balls: Vec<Ball> = shaders.iter().map(seen).collect();
-        let near = |ball: &Ball| match towards {
+        let balls: Vec<Ball> = occluders.iter().map(seen).collect();
+        let begin = |ball: &Ball| match towards {
             Towards::Point(_) => ball.center.length() - ball.radius,
             Towards::Direction(direction) => -ball.center.dot(*direction) - ball.radius,
         };
-        let mut order: Vec<(f64, u32)> = balls.iter().map(near).zip(0..).collect();
+        let mut order: Vec<(f64, u32)> = balls.iter().map(begin).zip(0..).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
 
         let Charted { chart, places, side } = Charted::new(towards, &balls);
         let count = chart.faces() * side * side;
         let (mut counts, mut until) = (vec![0; count], vec![S::of(f64::INFINITY); count]);
         let mut entries: Vec<(usize, Thing<S>)> = Vec::new();
-        let mut left_out = 0;
+        let mut crowded_out = 0;
         for (near, number) in order {
-            let (near, own) = (S::of(near), shaders[number as usize].own.unwrap_or(NONE));
+            let (near, own) = (S::of(near), occluders[number as usize].own.unwrap_or(NONE));
+            let mut balance = 0;
             for cell in places[number as usize].iter().flat_map(|place| place.cells(side)) {
                 if counts[cell] < FEW {
                     counts[cell] += 1;
                     entries.push((cell, Thing { number, own, near }));
+                    balance += 1;
                 } else {
                     until[cell] = if until[cell] < near { until[cell] } else { near };
-                    left_out += 1;
+                    balance -= 1;
                 }
             }
-            if left_out > entries.len() + count {
+            crowded_out += usize::from(balance < 0);
+            if 2 * crowded_out >= occluders.len() {
                 return None;
             }
         }
@@ -119,13 +122,14 @@ impl<S: Real> LightBuffer<S> {
         Some(Self { chart, side, scale: S::of(scale), cells, things })
     }
 
-    /// [`Geometry::blocked`] for rays to this light, which end after `limit`. `on`: tags of the items whose
-    /// outsides the rays begin on.
+    /// [`Geometry::blocked`] for rays to this light, which end after `limit`. `on`: tags of the items that the
+    /// rays begin on, and where that is on their outsides.
     #[inline(never)]
     pub fn blocked<L: Lanes<Scalar = S>>(
         &self,
         geometry: &Geometry<L>,
-        (ray, on): (&Ray<L>, L),
+        ray: &Ray<L>,
+        on: (L, L::Mask),
         limit: L,
         wanted: L::Mask,
         by: &Selection,
@@ -134,15 +138,20 @@ impl<S: Real> LightBuffer<S> {
         let mut beyond = wanted.and_not(blocked) & ray.origin.max_abs().gt(L::splat(self.scale));
         let mut left = wanted.and_not(blocked | beyond);
         let (cell, depth) = self.chart.place(ray, limit, self.side);
-        // The item that all begin on.
-        let own = match first_tag(on, wanted) {
-            Some((own, all)) if wanted.and_not(all).none() => Some(own),
+        // The item on whose outside all begin.
+        let own = match first_tag(on.0, wanted) {
+            Some((own, all)) if wanted.and_not(all & on.1).none() => Some(own),
             _ => None,
         };
         while left.any() {
             let number = cell.lane(left.bits().trailing_zeros() as usize);
             let here = L::splat(number);
             let here = left & cell.le(here) & cell.ge(here);
+            if here.none() {
+                // No number: the chart could not tell.
+                beyond = beyond | left;
+                break;
+            }
             left = left.and_not(here);
             let Cell { first, end, until } = self.cells[number.to_f64() as usize];
             let farthest = L::select(here, depth, L::of(-L::MAX)).extremes().1;
@@ -176,44 +185,42 @@ mod tests {
     use super::*;
     use crate::lanes::{Double, Single, V3};
     use crate::shape::Form;
+    use crate::world::light_chart::tests::Random;
     use glam::DVec3;
-
-    struct Random(u64);
-
-    impl Random {
-        fn unit(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (self.0 >> 40) as f64 / 16_777_216.0
-        }
-
-        fn point(&mut self, half: f64) -> DVec3 {
-            DVec3::from([0; 3].map(|_| half * (2.0 * self.unit() - 1.0)))
-        }
-    }
 
     fn balls(random: &mut Random, count: usize, radius: f64) -> Vec<Ball> {
         let ball = |_| Ball { center: random.point(5.0), radius: radius * random.unit() };
         (0..count).map(ball).collect()
     }
 
-    fn shaders(balls: &[Ball]) -> Vec<Shader> {
-        balls.iter().map(|ball| Shader { ball: *ball, own: None }).collect()
+    fn occluders(balls: &[Ball]) -> Vec<Occluder> {
+        (0..).zip(balls).map(|(i, ball)| Occluder { ball: *ball, own: Some(i) }).collect()
     }
 
-    /// Asks for shadows at random points and compares with the tree; how many were blocked.
+    /// Asks for shadows of rays from many places and compares with the tree; how many were blocked.
     fn compare<L: Lanes>(towards: &Towards, balls: &[Ball], random: &mut Random) -> usize {
         let form = |b: &Ball| Form::Sphere { center: b.center, radius: b.radius };
         let forms: Vec<Form> = balls.iter().map(form).collect();
         let geometry = Geometry::<L>::with_tree(&forms, true);
-        let Some(buffer) = LightBuffer::<L::Scalar>::new(towards, &shaders(balls)) else {
+        let Some(buffer) = LightBuffer::<L::Scalar>::new(towards, &occluders(balls)) else {
             panic!("no buffer for {} balls", balls.len());
         };
         let mut count = 0;
-        for round in 0..2000 {
-            // Close together, apart, and far off.
-            let (middle, apart) = (random.point(7.0), [0.01, 1.0, 10.0, 1e4][round % 4]);
-            let points: Vec<DVec3> = (0..L::WIDTH).map(|_| middle + random.point(apart)).collect();
-            let axis = |a: usize| L::from_fn(|i| L::Scalar::of(points[i][a]));
+        for round in 0..3000 {
+            // In the air, close together, apart, and far off; on the outside of one ball, or of two.
+            let (middle, apart) = (random.point(7.0), [0.01, 1.0, 10.0, 1e4, 0.0, 0.0][round % 6]);
+            let pair = [0; 2].map(|_| (random.unit() * balls.len() as f64) as usize);
+            let ball_of = |lane: usize| if round % 6 == 4 { pair[0] } else { pair[lane % 2] };
+            let normals: Vec<DVec3> =
+                (0..L::WIDTH).map(|_| random.point(1.0).normalize()).collect();
+            let point = |lane: usize| {
+                let Ball { center, radius } = balls[ball_of(lane)];
+                match round % 6 {
+                    4 | 5 => center + normals[lane] * (radius + 1e-4),
+                    _ => middle + normals[lane] * apart,
+                }
+            };
+            let axis = |a: usize| L::from_fn(|i| L::Scalar::of(point(i)[a]));
             let origin = V3::new(axis(0), axis(1), axis(2));
             let (direction, limit) = match towards {
                 Towards::Direction(d) => (V3::of(d.to_array()), L::of(L::MAX)),
@@ -224,11 +231,16 @@ mod tests {
                 }
             };
             let ray = Ray { origin, direction };
-            let wanted = axis(0).gt(L::of(middle.x - 0.3 * apart));
-            let expected = geometry.blocked(&ray, limit, wanted, geometry.all()) & wanted;
-            let found = buffer.blocked(&geometry, (&ray, L::tag(0)), limit, wanted, geometry.all())
-                & wanted;
-            assert_eq!(found.bits(), expected.bits(), "{towards:?}, round {round}: {points:?}");
+            let normal = |a: usize| L::from_fn(|i| L::Scalar::of(normals[i][a]));
+            let facing = V3::new(normal(0), normal(1), normal(2)).dot(direction);
+            let wanted = facing.gt(L::zero());
+            let (first, second) = (L::tag(ball_of(0) as u32), L::tag(ball_of(1) as u32));
+            let odd = L::from_fn(|i| L::Scalar::of((i % 2) as f64)).gt(L::zero());
+            let on = (L::select(odd, second, first), L::mask(round % 6 >= 4));
+            let all = geometry.all();
+            let expected = geometry.blocked(&ray, limit, wanted, all) & wanted;
+            let found = buffer.blocked(&geometry, &ray, on, limit, wanted, all) & wanted;
+            assert_eq!(found.bits(), expected.bits(), "{towards:?}, round {round}");
             count += found.bits().count_ones() as usize;
         }
         count
@@ -239,12 +251,11 @@ mod tests {
         let mut random = Random(1);
         let lights = [
             Towards::Point(DVec3::new(1.0, 2.0, -0.5)),
-            Towards::Point(DVec3::new(0.0, 9.0, 0.0)),
+            Towards::Point(DVec3::new(0.0, 19.0, 0.0)),
             Towards::Direction(DVec3::new(0.2, -0.9, 0.4).normalize()),
             Towards::Direction(DVec3::Z),
         ];
         for towards in &lights {
-            // The last kind fills cells so that the tree has to be asked, too.
             for (count, radius) in [(3, 8.0), (100, 0.5), (400, 0.3), (60, 1.5)] {
                 let balls = balls(&mut random, count, radius);
                 let blocked = compare::<Single>(towards, &balls, &mut random);
@@ -255,14 +266,53 @@ mod tests {
         }
     }
 
+    /// Behind a crowd the tree has to be asked.
+    #[test]
+    fn what_has_no_room_is_found_in_the_tree() {
+        let mut random = Random(4);
+        let mut balls = balls(&mut random, 100, 0.5);
+        let crowd = |_| Ball { center: random.point(0.3), radius: 0.05 + 0.2 * random.unit() };
+        balls.extend((0..70).map(crowd));
+        for towards in [Towards::Point(DVec3::new(0.0, 4.0, 4.0)), Towards::Direction(DVec3::X)] {
+            let buffer = LightBuffer::<f32>::new(&towards, &occluders(&balls)).expect("a buffer");
+            assert!(buffer.cells.iter().any(|cell| cell.until < f32::INFINITY), "{towards:?}");
+            let mut random = Random(5);
+            assert!(compare::<Single>(&towards, &balls, &mut random) > 100);
+            compare::<Double>(&towards, &balls, &mut random);
+        }
+    }
+
+    /// On the inside of a thing its other side is in the way.
+    #[test]
+    fn what_begins_inside_is_blocked_by_the_thing_itself() {
+        let balls = [
+            Ball { center: DVec3::ZERO, radius: 1.0 },
+            Ball { center: DVec3::X * 5.0, radius: 1.0 },
+        ];
+        let forms = balls.map(|b| Form::Sphere { center: b.center, radius: b.radius });
+        let geometry = Geometry::<Single>::with_tree(&forms, true);
+        let towards = Towards::Point(DVec3::Y * 9.0);
+        let buffer = LightBuffer::<f32>::new(&towards, &occluders(&balls)).expect("a buffer");
+        let ray = Ray { origin: V3::<Single>::zero(), direction: V3::of([0.0, 1.0, 0.0]) };
+        let ask = |outside| {
+            let on = (Single::tag(0), Single::mask(outside));
+            let wanted = Single::mask(true);
+            buffer.blocked(&geometry, &ray, on, Single::of(9.0), wanted, geometry.all())
+        };
+        assert!(ask(false).all());
+        // Who says that this is outside is believed.
+        assert!(ask(true).none());
+    }
+
     #[test]
     fn few_things_are_asked() {
         let mut random = Random(3);
         let light = Towards::Point(DVec3::ZERO);
-        let few = LightBuffer::<f32>::new(&light, &shaders(&balls(&mut random, 400, 0.3))).unwrap();
+        let few =
+            LightBuffer::<f32>::new(&light, &occluders(&balls(&mut random, 400, 0.3))).unwrap();
         let mean = few.things.len() as f64 / few.cells.len() as f64;
         assert!(mean < 4.0, "{mean} in a cell");
         let many = balls(&mut random, 4000, 3.0);
-        assert!(LightBuffer::<f32>::new(&light, &shaders(&many)).is_none());
+        assert!(LightBuffer::<f32>::new(&light, &occluders(&many)).is_none());
     }
 }

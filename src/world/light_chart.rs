@@ -119,11 +119,10 @@ impl<S: Real> Charted<S> {
 /// largest x / z: `x` and `z` are its centre's. `None`: it is all behind.
 fn slopes(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     let distance = x.hypot(z);
-    let spread = if distance > radius { (radius / distance).asin() } else { FRAC_PI_2 };
     if distance <= radius {
         return Some((f64::NEG_INFINITY, f64::INFINITY));
     }
-    let middle = x.atan2(z);
+    let (middle, spread) = (x.atan2(z), (radius / distance).asin());
     let (low, high) = (middle - spread, middle + spread);
     let slope = |angle: f64| {
         if angle.abs() < FRAC_PI_2 { angle.tan() } else { f64::INFINITY.copysign(angle) }
@@ -190,43 +189,71 @@ fn fitted<S: Real>(seen: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<Place>>)
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+    use crate::lanes::{Double, Single};
 
-    struct Random(u64);
+    pub struct Random(pub u64);
 
     impl Random {
-        fn unit(&mut self) -> f64 {
+        pub fn unit(&mut self) -> f64 {
             self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             (self.0 >> 40) as f64 / 16_777_216.0
         }
 
-        fn point(&mut self, half: f64) -> DVec3 {
+        pub fn point(&mut self, half: f64) -> DVec3 {
             DVec3::from([0; 3].map(|_| half * (2.0 * self.unit() - 1.0)))
         }
     }
 
-    /// The chart puts the points of a ball where the ball is seen.
-    #[test]
-    fn points_of_a_ball_are_seen_where_the_ball_is() {
+    fn points_are_in_the_cells_of_their_ball<L: Lanes>(slack: f64) {
         let mut random = Random(2);
         let side = 64;
-        for round in 0..300 {
-            let away = [DVec3::ZERO, DVec3::new(30.0, -9.0, 4.0)][round % 2];
-            let ball = Ball { center: random.point(5.0) + away, radius: 0.2 + 2.0 * random.unit() };
-            let all = [ball];
-            let (chart, places) = match round % 4 {
-                0 => cube::<f64>(&all),
-                1 => window(&all).expect("it is on one side"),
-                _ => far(random.point(1.0).normalize(), &all),
+        for round in 0..600 {
+            let away = [DVec3::ZERO, DVec3::new(30.0, -9.0, 4.0), DVec3::Y * 20.0][round % 3];
+            let center = random.point(5.0) + away;
+            let ball = Ball { center, radius: 0.2 + 2.0 * random.unit() };
+            // With another one, so that the ball is not all of the chart.
+            let balls = [ball, Ball { center: center + DVec3::new(0.5, 1.0, 0.7), radius: 0.1 }];
+            let (chart, places) = match round / 3 % 3 {
+                0 => cube::<L::Scalar>(&balls),
+                1 => match window(&balls) {
+                    Some(window) => window,
+                    None => continue,
+                },
+                _ => far(random.point(1.0).normalize(), &balls),
             };
+            let cells: Vec<usize> = places[0].iter().flat_map(|place| place.cells(side)).collect();
             for _ in 0..100 {
-                let point = ball.center + random.point(1.0).normalize() * ball.radius * 0.999;
+                // On an axis and on a diagonal, too.
+                let to =
+                    [random.point(1.0), DVec3::X, DVec3::ONE, DVec3::NEG_Z][round % 4].normalize();
+                let point = center + to * ball.radius * (1.0 - slack);
                 let origin = V3::of(point.to_array());
                 let direction = V3::of((-point.normalize()).to_array());
-                let (cell, _) = chart.place(&Ray { origin, direction }, 1.0, side);
-                let mut cells = places[0].iter().flat_map(|place| place.cells(side));
-                assert!(cells.any(|c| c == cell as usize), "{ball:?}, {point}: {cell}");
+                let (cell, _) = chart.place(&Ray { origin, direction }, L::one(), side);
+                let cell = cell.lane(0).to_f64();
+                assert!(cells.contains(&(cell as usize)), "{round}: {ball:?}, {point}: {cell}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_light_sees_points_of_a_ball_where_it_sees_the_ball() {
+        points_are_in_the_cells_of_their_ball::<Double>(1e-9);
+        points_are_in_the_cells_of_their_ball::<Single>(1e-4);
+    }
+
+    /// Directions along which charts divide by zero get some cell.
+    #[test]
+    fn every_direction_has_a_cell() {
+        let balls = [Ball { center: DVec3::NEG_Y * 5.0, radius: 1.0 }];
+        let (window, _) = window::<f32>(&balls).expect("it is on one side");
+        for chart in [cube(&balls).0, window, far(DVec3::Y, &balls).0] {
+            for to in [[1.0, 0.0, 0.0], [0.0, 1.0, -0.0], [-0.0, 0.0, -1.0], [f64::NAN; 3]] {
+                let ray = Ray { origin: V3::of(to), direction: V3::<Single>::of(to) };
+                let cell = chart.place(&ray, Single::one(), 8).0.as_array()[0];
+                assert!(cell >= 0.0 && cell < (chart.faces() * 64) as f32, "{to:?}: {cell}");
             }
         }
     }

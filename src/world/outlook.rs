@@ -2,7 +2,7 @@
 //! that may stand between what they see and a light. Most parts see one or two things, and nothing
 //! shades them: the others are never asked.
 
-use super::light_buffer::{LightBuffer, Shader};
+use super::light_buffer::{LightBuffer, Occluder};
 use super::screen::{Cells, Rectangle};
 use crate::camera::View;
 use crate::lanes::{Lanes, Real};
@@ -110,12 +110,12 @@ impl Surroundings {
         &self,
         geometry: &Geometry<L>,
     ) -> Vec<Option<LightBuffer<L::Scalar>>> {
-        let shader = |item: u32| Shader {
+        let occluder = |item: u32| Occluder {
             ball: self.bounds[item as usize].ball(),
             own: (!self.hollow[item as usize]).then_some(item),
         };
-        let shaders: Vec<Shader> = geometry.in_tree().into_iter().map(shader).collect();
-        self.towards.iter().map(|towards| LightBuffer::new(towards, &shaders)).collect()
+        let occluders: Vec<Occluder> = geometry.in_tree().into_iter().map(occluder).collect();
+        self.towards.iter().map(|towards| LightBuffer::new(towards, &occluders)).collect()
     }
 
     /// The outlook of camera rays inside `pencil`; `None`: of any rays.

@@ -274,13 +274,10 @@ impl<L: Lanes> World<L> {
                 counts.rays += u64::from(lit.bits().count_ones());
                 let ray = Ray { origin: start, direction: arrival.towards };
                 let blocked = match self.light_buffers.get(number) {
-                    Some(Some(buffer)) => buffer.blocked(
-                        &self.geometry,
-                        (&ray, met.item),
-                        arrival.distance,
-                        lit,
-                        shading,
-                    ),
+                    Some(Some(buffer)) => {
+                        let on = (met.item, met.front);
+                        buffer.blocked(&self.geometry, &ray, on, arrival.distance, lit, shading)
+                    }
                     _ => self.geometry.blocked(&ray, arrival.distance, lit, shading),
                 };
                 lit = lit.and_not(blocked);
