@@ -5,7 +5,7 @@ use super::form::Form;
 use glam::DVec3;
 
 /// Rays in single precision stray by a few times 2^-24 of the largest coordinate; this is more.
-const STRAY: f64 = 1e-5;
+pub const STRAY: f64 = 1e-5;
 
 /// A ball.
 #[derive(Clone, Copy, Debug)]

@@ -33,7 +33,7 @@ mod upright;
 mod walk;
 
 pub use batch::{Hit, OwnUv, Ray, Source, Surface};
-pub use bound::{Ball, Bound, Pencil, Towards};
+pub use bound::{Ball, Bound, Pencil, STRAY, Towards};
 pub use compound::{Difference, Intersection, MAX_DEPTH, Part, Union};
 pub use cone::Cone;
 pub use csg::{Compound, Tree as CompoundTree};

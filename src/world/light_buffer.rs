@@ -4,13 +4,10 @@
 use super::light_chart::{Chart, Charted};
 use super::path::first_tag;
 use crate::lanes::{Lanes, Mask, Real};
-use crate::shape::{Ball, Geometry, Ray, Selection, Towards};
+use crate::shape::{Ball, Geometry, Ray, STRAY, Selection, Towards};
 
 /// So many things are kept for a cell, the nearest to the light.
 const FEW: usize = 16;
-
-/// Rays in single precision stray by a few times 2^-24 of the largest coordinate; this is more.
-const STRAY: f64 = 1e-5;
 
 /// No item's number.
 const NONE: u32 = u32::MAX;

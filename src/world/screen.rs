@@ -1,7 +1,7 @@
 //! Where on the raster things are seen.
 
 use crate::camera::View;
-use crate::shape::Form;
+use crate::shape::{Form, STRAY};
 use glam::DVec3;
 
 /// The part of the raster that a thing may be seen on \[pixels\]: smallest and largest coordinates.
@@ -11,9 +11,8 @@ pub(super) struct Rectangle {
     high: [f64; 2],
 }
 
-/// Room for the rounding of rays in single precision \[pixels, and of the coordinates that take part\].
+/// Room for the rounding of rays in single precision \[pixels\].
 const MARGIN_PX: f64 = 0.25;
-const STRAY: f64 = 1e-5;
 
 impl Rectangle {
     /// Of a form: around the corners of its box, if all are in front of the eye.
