@@ -1,5 +1,6 @@
 //! What each way of keeping rays from things costs, on three scenes: the reflecting tracks, 300 things of
-//! several kinds, a mesh; and how the time per sample grows with the number of things.
+//! several kinds, a mesh; and how the time per sample grows with the number of things, on the tracks with
+//! fewer and more balls in each row, and in a crowd.
 //!
 //! `cargo bench --bench acceleration`. One core; all ways of a scene take turns, and the least of five
 //! times counts.
@@ -15,10 +16,13 @@ use zerkalo::film::{Display, Estimator, Film, Header, Mix};
 use zerkalo::render::pass;
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::{Acceleration, Document, Scene};
+use zerkalo::scene::{Acceleration, Document, Object, Scene};
+use zerkalo::shape::{Shape, Sphere};
 use zerkalo::world::{AnyWorld, Options};
 
-const SIZE: [u32; 2] = [320, 240];
+/// Of the pictures of a small crowd; the others have the size of the tracks.
+const SMALL: [u32; 2] = [320, 240];
+const SIZE: [u32; 2] = [640, 480];
 
 /// Samples in every pixel.
 const SAMPLES: u32 = 8;
@@ -32,14 +36,14 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(scene: &Scene, acceleration: Acceleration) -> Self {
+    fn new(scene: &Scene, acceleration: Acceleration, size: [u32; 2]) -> Self {
         let mut scene = scene.clone();
-        scene.film.size = SIZE;
+        scene.film.size = size;
         scene.trace.acceleration = acceleration;
         let world = AnyWorld::compile(&scene, &Options::default());
         let (scales, mix) = (world.group_scales(), Mix { weights: world.mix(&scene) });
         let estimator = Estimator::new(&scales, &mix, &Display::default());
-        let [width, height] = SIZE.map(|n| n as usize);
+        let [width, height] = size.map(|n| n as usize);
         let precision = world.lanes().to_string();
         let film = Film::new(Header { width, height, scales, seed: 1, precision });
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
@@ -62,11 +66,11 @@ impl Bench {
 
 /// Nanoseconds per sample of each.
 fn times(mut benches: Vec<Bench>) -> Vec<f64> {
+    let samples = benches[0].film.width() * benches[0].film.height() * SAMPLES as usize;
     let mut traces: Vec<_> = benches.iter_mut().map(|b| move || b.trace()).collect();
     let mut ways: Vec<&mut dyn FnMut()> =
         traces.iter_mut().map(|t| t as &mut dyn FnMut()).collect();
-    let samples = f64::from(SIZE[0] * SIZE[1] * SAMPLES);
-    in_turns(5, &mut ways).into_iter().map(|seconds| seconds / samples * 1e9).collect()
+    in_turns(5, &mut ways).into_iter().map(|seconds| seconds / samples as f64 * 1e9).collect()
 }
 
 const ROOM: &str = r#"
@@ -107,6 +111,35 @@ fn crowd(count: usize, shapes: &[&str]) -> Scene {
 
 const BALL: &str = "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }";
 
+/// The reflecting tracks with `4 n n` small balls instead of 400: `4 n` rows of `n`, spread over the same
+/// curves, as large as leaves them the same share of the picture.
+fn tracks(scene: &Scene, n: usize) -> Scene {
+    let mut scene = scene.clone();
+    let [mirror, ball, ..] = &scene.objects[..] else { panic!("no tracks") };
+    let (mut objects, ball) = (vec![mirror.clone()], ball.clone());
+    for (a, b) in (0..4 * n).flat_map(|a| (0..n).map(move |b| (a, b))) {
+        let i = 39.0 * a as f64 / (4 * n - 1) as f64;
+        let j = 9.0 * b as f64 / (n - 1) as f64;
+        let center = [i - 9.0, 7.0 - 5.0 * i.sqrt(), 6.0 - j * j];
+        let shape = Shape::Sphere(Sphere { center, radius: 8.0 / n as f64 });
+        let material = format!("product-{}", i.round() * j.round());
+        objects.push(Object { name: format!("track {a}, {b}"), material, shape, ..ball.clone() });
+    }
+    scene.objects = objects;
+    assert_eq!(scene.faults(), [], "{n}");
+    scene
+}
+
+/// Prints nanoseconds per sample of scenes with some numbers of spheres, by `auto` and in a tree.
+fn growth(scenes: &[(usize, Scene)], size: [u32; 2]) {
+    let of = |by| times(scenes.iter().map(|(_, s)| Bench::new(s, by, size)).collect());
+    let [auto, tree] = [Acceleration::Auto, Acceleration::Hierarchy].map(of);
+    let hundred = scenes.iter().position(|(n, _)| *n == 100).expect("a hundred");
+    for (((count, _), time), tree) in scenes.iter().zip(&auto).zip(&tree) {
+        println!("  {count:6}: {time:8.0} ({:5.2}) {tree:8.0}", time / auto[hundred]);
+    }
+}
+
 fn main() {
     let kinds = [
         BALL,
@@ -123,21 +156,21 @@ fn main() {
         ("300 things of four kinds", crowd(300, &kinds)),
         ("a mesh on a floor", file("shape-mesh.toml")),
     ];
-    println!("nanoseconds per sample (times that of auto), {} x {}:", SIZE[0], SIZE[1]);
+    println!("nanoseconds per sample (times that of auto), {} x {}:", SMALL[0], SMALL[1]);
     print!("{:32}", "");
     Acceleration::ALL.iter().for_each(|a| print!(" {:>16}", a.name()));
     println!();
     for (name, scene) in &scenes {
-        let all = times(Acceleration::ALL.map(|a| Bench::new(scene, a)).into());
+        let all = times(Acceleration::ALL.map(|a| Bench::new(scene, a, SMALL)).into());
         print!("{name:32}");
         all.iter().for_each(|t| print!(" {:>8.0} ({:5.2})", t, t / all[0]));
         println!();
     }
-    let counts = [10, 30, 60, 95, 100, 300, 1000, 10_000];
-    let of = |by| times(counts.map(|n| Bench::new(&crowd(n, &[BALL]), by)).into());
-    let [auto, tree] = [Acceleration::Auto, Acceleration::Hierarchy].map(of);
     println!("nanoseconds per sample by number of spheres (times that of 100), in a tree:");
-    for ((count, time), tree) in counts.iter().zip(&auto).zip(&tree) {
-        println!("  {count:6}: {time:8.0} ({:5.2}) {tree:8.0}", time / auto[4]);
-    }
+    println!("the reflecting tracks, {} x {}", SIZE[0], SIZE[1]);
+    let all = [3, 5, 7, 10, 16, 28, 50].map(|n| (4 * n * n, tracks(&scenes[0].1, n)));
+    growth(&all, SIZE);
+    println!("a crowd, {} x {}", SMALL[0], SMALL[1]);
+    let all = [10, 30, 60, 95, 100, 300, 1000, 10_000].map(|n| (n, crowd(n, &[BALL])));
+    growth(&all, SMALL);
 }

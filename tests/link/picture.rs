@@ -127,7 +127,6 @@ fn halves(glyph: &str, [fg, bg]: [[u8; 3]; 2]) -> [[u8; 3]; 2] {
     match glyph {
         "▀" => [fg, bg],
         "▄" => [bg, fg],
-        "█" => [fg; 2],
         " " | "" => [bg; 2],
         other => panic!("{other:?} is no picture"),
     }

@@ -71,7 +71,7 @@ fn picture_cells(screen: &vt100::Screen) -> usize {
         let cell = screen.cell(row, column);
         cell.is_some_and(|cell| {
             matches!(cell.bgcolor(), vt100::Color::Rgb(..))
-                && ["▀", "▄", "█", " "].contains(&cell.contents())
+                && ["▀", "▄", " "].contains(&cell.contents())
         })
     };
     cells.filter(|at| is_picture(*at)).count()

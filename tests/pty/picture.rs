@@ -66,7 +66,6 @@ fn halves(cell: &vt100::Cell) -> Option<[[u8; 3]; 2]> {
     match cell.contents() {
         "▀" => Some([rgb(cell.fgcolor())?, rgb(cell.bgcolor())?]),
         "▄" => Some([rgb(cell.bgcolor())?, rgb(cell.fgcolor())?]),
-        "█" => Some([rgb(cell.fgcolor())?; 2]),
         " " | "" => Some([rgb(cell.bgcolor())?; 2]),
         _ => None,
     }

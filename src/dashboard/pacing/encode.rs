@@ -112,7 +112,8 @@ impl Encoder {
         // The terminal's own colours are other ones in front than behind.
         let movable = upper != Color::Reset && lower != Color::Reset;
         let ways: &[(&str, Pen)] = match (movable, same) {
-            (true, true) => &[(" ", pen(self.pen.fg, upper)), ("█", pen(upper, self.pen.bg))],
+            // No full block: those of some fonts leave an edge of the ground uncovered.
+            (true, true) => &[(" ", pen(self.pen.fg, upper))],
             (true, false) => &[("▀", pen(upper, lower)), ("▄", pen(lower, upper))],
             (false, _) if symbol == " " => &[(" ", pen(self.pen.fg, bg))],
             (false, _) => &[plain],
@@ -217,8 +218,17 @@ mod tests {
         let bytes = encoded(&cells);
         let expected = "\x1b[H\x1b[38;2;1;0;0;48;2;2;0;0m▀\x1b[48;2;3;0;0m▀▄";
         assert_eq!(bytes, expected);
+    }
+
+    #[test]
+    fn a_cell_of_one_color_is_all_ground() {
         let cells = [(5, 1, half("▀", 1, 2)), (6, 1, half(" ", 7, 2)), (7, 1, half("▀", 1, 1))];
-        assert_eq!(encoded(&cells), "\x1b[2;6H\x1b[38;2;1;0;0;48;2;2;0;0m▀ █");
+        let expected = "\x1b[2;6H\x1b[38;2;1;0;0;48;2;2;0;0m▀ \x1b[48;2;1;0;0m ";
+        assert_eq!(encoded(&cells), expected);
+        // Whatever the pen has in front already.
+        let cells = [(0, 0, half("▀", 1, 2)), (1, 0, half("█", 1, 9))];
+        let expected = "\x1b[H\x1b[38;2;1;0;0;48;2;2;0;0m▀\x1b[48;2;1;0;0m ";
+        assert_eq!(encoded(&cells), expected);
     }
 
     #[test]

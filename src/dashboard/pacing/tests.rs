@@ -104,7 +104,6 @@ impl Desk {
             "▀" => same(fg, wanted.fg) && same(bg, wanted.bg),
             "▄" => same(bg, wanted.fg) && same(fg, wanted.bg),
             " " | "" => same(bg, wanted.fg) && same(bg, wanted.bg),
-            "█" => same(fg, wanted.fg) && same(fg, wanted.bg),
             _ => false,
         }
     }
