@@ -4,6 +4,7 @@
 # notice a mutation runs with it, and has to fail.
 #
 #     tests/features/mutate.sh [NAME ...]
+#     tests/features/mutate.sh --check      only whether the copy compiles
 #
 # MUTATE_IN: folder for the copy, kept afterwards. Status 1: a mutation was not noticed.
 set -eu
@@ -47,6 +48,9 @@ pub fn mutant(name: &str) -> bool {
     AWAKE.get_or_init(|| std::env::var("ZERKALO_MUTANT").unwrap_or_default()) == name
 }
 RUST
+if [ "${1:-}" = --check ]; then
+    exec cargo check --quiet
+fi
 cargo test --quiet --test features --no-run
 
 if [ $# -eq 0 ]; then
