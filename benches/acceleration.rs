@@ -20,9 +20,10 @@ use zerkalo::scene::{Acceleration, Document, Object, Scene};
 use zerkalo::shape::{Shape, Sphere};
 use zerkalo::world::{AnyWorld, Options};
 
-/// Of the pictures of a small crowd; the others have the size of the tracks.
-const SMALL: [u32; 2] = [320, 240];
+/// The size of the tracks' picture, where their balls are counted.
 const SIZE: [u32; 2] = [640, 480];
+/// The size of all other pictures.
+const SMALL: [u32; 2] = [320, 240];
 
 /// Samples in every pixel.
 const SAMPLES: u32 = 8;
