@@ -49,7 +49,8 @@ pub fn mutant(name: &str) -> bool {
 }
 RUST
 if [ "${1:-}" = --check ]; then
-    exec cargo check --quiet
+    cargo check --quiet
+    exit
 fi
 cargo test --quiet --test features --no-run
 

@@ -58,7 +58,7 @@ pub(super) fn write(scene: &Scene, subject: &Subject, values: Table) -> Result<S
     fn fill<T: DeserializeOwned>(part: Option<&mut T>, values: Table) -> Result<(), Refusal> {
         let wrong = |e: toml::de::Error| Refusal::new(e.message(), "The scene stays as it was.");
         if let Some(part) = part {
-            // As text, for which the readers are there already.
+            // As text: the readers of files serve, and no second set of them is compiled.
             *part = toml::from_str(&values.to_string()).map_err(wrong)?;
         }
         Ok(())
