@@ -9,7 +9,7 @@ use zerkalo::film::{
 /// A noisy gradient of `groups` lights, 64 + 64 samples in every pixel.
 fn film(width: usize, height: usize, groups: usize) -> Film {
     let scales = vec![2f64.powi(28); groups];
-    let mut film = Film::new(Header { width, height, scales, seed: 1, precision: "f32x8".into() });
+    let mut film = Film::new(Header { width, height, scales, seed: 1, precision: "single".into() });
     let all: Vec<_> = (0..film.tile_count()).collect();
     let mut state = 1u64;
     for slot in film.slots(&all) {

@@ -123,7 +123,7 @@ fn paths<L: Lanes>(c: &mut Criterion) {
     let scales = world.scales().to_vec();
     let mix = Mix { weights: vec![[1.0; 3]; scales.len()] };
     let estimator = Estimator::new(&scales, &mix, &Display::default());
-    let precision = name::<L>().to_string();
+    let precision = "none".to_string();
     let header = Header { width: 160, height: 120, scales, seed: 1, precision };
     let mut film = Film::new(header);
     let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first: 0, count: 16 });
@@ -141,14 +141,14 @@ fn paths<L: Lanes>(c: &mut Criterion) {
 }
 
 fn sampler(c: &mut Criterion) {
-    let mut group = c.benchmark_group("sampler, 4 dimensions of 8 samples");
-    group.throughput(Throughput::Elements(8));
+    let mut group = c.benchmark_group("sampler, 4 dimensions of a packet");
+    group.throughput(Throughput::Elements(Single::WIDTH as u64));
     for kind in [SamplerKind::Sobol, SamplerKind::Random] {
         let sampler = Sampler::<Single>::new(SampleSettings { seed: 1, kind }, true);
         group.bench_function(kind.name(), |b| {
             b.iter(|| {
-                let points = sampler.aligned(64);
-                let draws = points.of_pixel((black_box(17), 23), 0);
+                let points = sampler.block(64, Single::WIDTH);
+                let draws = points.of_pixel(sampler.key((black_box(17), 23), 0));
                 (draws.pixel(), draws.lobe(0))
             })
         });

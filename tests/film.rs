@@ -20,7 +20,7 @@ const SCALES: [f64; 2] = [268_435_456.0, 1_048_576.0];
 
 fn film_of(width: usize, height: usize, scales: &[f64]) -> Film {
     let scales = scales.to_vec();
-    Film::new(Header { width, height, scales, seed: 7, precision: "f32x8".to_string() })
+    Film::new(Header { width, height, scales, seed: 7, precision: "single".to_string() })
 }
 
 fn new_film() -> Film {

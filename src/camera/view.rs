@@ -108,33 +108,17 @@ impl View {
         [self.right, self.down].map(|pixel| on_plane.dot(pixel) / pixel.length_squared())
     }
 
-    /// Origins and unit directions of rays through the points `(x, y) + (dx, dy)` of the raster, in
-    /// pixels; `(x, y) = at(lane)`. They begin on the near plane.
-    #[inline(always)]
-    pub fn rays<L: Lanes>(
-        &self,
-        at: impl Fn(usize) -> (u32, u32),
-        (dx, dy): (L, L),
-    ) -> (V3<L>, V3<L>) {
-        let base = V3::from_fn(|lane| self.toward(at(lane)));
-        self.finish(base, dx, dy)
-    }
-
-    /// The same for one pixel in all lanes.
-    #[inline(always)]
-    pub fn rays_of<L: Lanes>(&self, at: (u32, u32), (dx, dy): (L, L)) -> (V3<L>, V3<L>) {
-        self.finish(V3::splat(self.toward(at)), dx, dy)
-    }
-
     /// From the eye to the corner of a pixel, on the plane at unit distance.
     #[inline(always)]
-    fn toward<S: Real>(&self, (x, y): (u32, u32)) -> [S; 3] {
+    pub fn toward<S: Real>(&self, (x, y): (u32, u32)) -> [S; 3] {
         let corner = self.corner + self.right * f64::from(x) + self.down * f64::from(y);
         corner.to_array().map(S::of)
     }
 
+    /// Origins and unit directions of rays through points of pixels: `base` as [`View::toward`] gives it, `(dx,
+    /// dy)` from there to the right and downward \[pixels\]. They begin on the near plane.
     #[inline(always)]
-    fn finish<L: Lanes>(&self, base: V3<L>, dx: L, dy: L) -> (V3<L>, V3<L>) {
+    pub fn rays<L: Lanes>(&self, base: V3<L>, (dx, dy): (L, L)) -> (V3<L>, V3<L>) {
         let right = V3::of(self.right.to_array());
         let down = V3::of(self.down.to_array());
         let toward = right.mul_add(dx, down.mul_add(dy, base));

@@ -54,7 +54,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
 
     let writing = Instant::now();
     let hash = scene_hash(document.text());
-    let (report, lanes, written) = write(&session, args, &target, hash.clone())
+    let (report, precision, written) = write(&session, args, &target, hash.clone())
         .ok_or_else(|| Failure::Failed("the renderer has no picture".to_string()))?;
     written.map_err(failed_write)?;
     let write_seconds = writing.elapsed().as_secs_f64();
@@ -69,8 +69,8 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
             size,
             seed: args.seed,
             sampler: args.sampler.kind().name(),
-            precision: if lanes.starts_with("f64") { "double" } else { "single" },
-            lanes,
+            precision,
+            lanes: report.lanes,
             threads,
             adaptive: !args.uniform,
             samples: report.samples,
@@ -147,7 +147,7 @@ fn write(
     let (display, target) = (display(args), target.clone());
     session.with(move |rendering, report| {
         let written = rendering.write(report, &origin, display, depth, &target);
-        (report.clone(), rendering.world.lanes(), written)
+        (report.clone(), rendering.world.precision(), written)
     })
 }
 

@@ -17,7 +17,7 @@ pub struct Header {
     pub scales: Vec<f64>,
     /// The seed of all samples.
     pub seed: u64,
-    /// Name of the lane type that traced them, such as `f32x8`.
+    /// What they were traced in, `single` or `double`: how many lanes side by side changes no bit.
     pub precision: String,
 }
 
@@ -348,7 +348,7 @@ mod tests {
             (alter(|h| h.scales = vec![2.0]), "scales [1.0] here, [2.0] there"),
             (alter(|h| h.scales = vec![1.0, 1.0]), "[1.0] here, [1.0, 1.0] there"),
             (alter(|h| h.seed = 2), "seed 1 here, 2 there"),
-            (alter(|h| h.precision = "f64x4".into()), "precision f32x8 here, f64x4 there"),
+            (alter(|h| h.precision = "double".into()), "precision single here, double there"),
         ];
         for (other, words) in others {
             let message = ours.add(&other).unwrap_err().to_string();

@@ -29,7 +29,7 @@ impl Rng {
 
 pub fn film(width: usize, height: usize, scales: &[f64]) -> Film {
     let scales = scales.to_vec();
-    Film::new(Header { width, height, scales, seed: 1, precision: "f32x8".to_string() })
+    Film::new(Header { width, height, scales, seed: 1, precision: "single".to_string() })
 }
 
 /// Unit weights.

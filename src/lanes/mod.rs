@@ -251,8 +251,8 @@ pub trait Lanes:
     /// The sum over lanes of `round(lane * scale)`. Each lane is rounded by itself, so that the sum
     /// is exact in any grouping; `|lane * scale|` must not exceed 2^49.
     fn fixed_sum(self, scale: f64) -> i64;
-    /// `round(lane * scale)` of every lane, in `out[..WIDTH]`; the same bounds.
-    fn fixed(self, scale: f64, out: &mut [i64; MAX_WIDTH]);
+    /// `round(lane * scale)` of every lane, zeros behind the last; the same bounds.
+    fn fixed(self, scale: f64) -> [i64; MAX_WIDTH];
 }
 
 /// 1.5 x 2^52: a double below 2^51 in magnitude plus this has no fraction bits left: it is rounded to

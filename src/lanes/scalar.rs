@@ -187,8 +187,10 @@ macro_rules! scalar_lanes {
                 round_i64(f64::from(self) * scale)
             }
             #[inline(always)]
-            fn fixed(self, scale: f64, out: &mut [i64; MAX_WIDTH]) {
-                out[0] = round_i64(f64::from(self) * scale);
+            fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {
+                let mut each = [0; MAX_WIDTH];
+                each[0] = self.fixed_sum(scale);
+                each
             }
         }
     };

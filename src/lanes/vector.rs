@@ -238,10 +238,12 @@ macro_rules! vector_lanes {
                 all.wrapping_sub((ROUNDER.to_bits() as i64).wrapping_mul($n))
             }
             #[inline(always)]
-            fn fixed(self, scale: f64, out: &mut [i64; MAX_WIDTH]) {
-                for (out, x) in out.iter_mut().zip(self.as_array()) {
-                    *out = round_i64(f64::from(*x) * scale);
+            fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {
+                let mut each = [0; MAX_WIDTH];
+                for (each, x) in each.iter_mut().zip(self.as_array()) {
+                    *each = round_i64(f64::from(*x) * scale);
                 }
+                each
             }
         }
     };

@@ -77,7 +77,7 @@ fn metadata(
         (
             "Settings",
             format!(
-                "sampler {}, lanes {}, {}, exposure {} EV, tone {}",
+                "sampler {}, {} precision, {}, exposure {} EV, tone {}",
                 origin.sampler.name(),
                 header.precision,
                 if origin.adaptive { "adaptive" } else { "uniform" },

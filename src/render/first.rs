@@ -109,32 +109,33 @@ impl<L: Lanes> Tracer<'_, L> {
             let inside = |p: &usize| p % TILE < extent[0] && p / TILE < extent[1];
             pixels.extend(lattice_pixels(before, step).filter(inside).map(|p| (t, *origin, p)));
         }
-        let points = self.sampler.at(0);
+        let place = |(_, origin, p): &(usize, [usize; 2], usize)| {
+            ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
+        };
+        let sites = self.sites(0, pixels.iter().map(place));
+        let points = self.sampler.block(0, 1);
         let mut work = Work::new(0, outlook);
-        for packet in pixels.chunks(L::WIDTH) {
-            let at = |lane: usize| {
-                let (_, origin, p) = packet[lane.min(packet.len() - 1)];
-                ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
-            };
-            self.pixels(&mut work, &points, packet.len(), at, 0);
-            // A packet's rays are shared out among its pixels' tiles, the remainder to the first.
-            let Counts { rays, glossy } = std::mem::take(&mut work.counts);
-            let share = rays / packet.len() as u64;
-            counts[packet[0].0].rays += rays - share * packet.len() as u64;
-            for (t, _, _) in packet {
-                counts[*t].rays += share;
-                counts[*t].glossy |= glossy;
-            }
-            self.scatter(&work.radiance, packet.len(), |lane, group, values| {
-                let (t, _, p) = packet[lane];
-                tiles[t].1.add_group(0, p, group, values);
+        for range in sites.packets(L::WIDTH) {
+            let packet = &pixels[range.clone()];
+            self.pixels::<1>(&mut work, &points, &sites, range, 0);
+            self.sum_of_each::<1, _>(&work.radiance, packet, |(t, _, p), group, sums| {
+                tiles[*t].1.add_group(0, *p, group, sums);
             });
             for bad in work.bad.drain(..) {
-                let tile_of = |lane: &usize| at(*lane) == (bad.x, bad.y);
-                if let Some(lane) = (0..packet.len()).find(tile_of) {
-                    tiles[packet[lane].0].1.record_bad(bad);
+                if let Some((t, ..)) = packet.iter().find(|pixel| place(pixel) == (bad.x, bad.y)) {
+                    tiles[*t].1.record_bad(bad);
                 }
             }
+        }
+        // Which tile of several the rays were for, packets do not say; and what each is told must not depend on
+        // how many pixels share one.
+        if let [counts] = counts {
+            counts.rays += work.counts.rays;
+            counts.glossy |= work.counts.glossy;
+        } else {
+            let (rays, sharing) = (work.counts.rays, pixels.len().max(1) as u64);
+            counts[0].rays += rays % sharing;
+            pixels.iter().for_each(|(t, ..)| counts[*t].rays += rays / sharing);
         }
     }
 }

@@ -9,6 +9,7 @@ pub mod pass;
 mod rendering;
 pub mod schedule;
 pub mod session;
+mod sites;
 pub mod wave;
 
 pub use course::Course;

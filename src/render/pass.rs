@@ -1,11 +1,13 @@
 //! The synchronous core: traces the jobs of one wave into the film.
 
+use super::sites::Sites;
 use super::wave::{Job, JobReport, Wave, WaveReport};
-use crate::film::{BadSample, Estimator, Film, Slot, TILE, Tile};
-use crate::lanes::{Lanes, MAX_WIDTH, Mask, Real, V3};
+use crate::film::{BadSample, Estimator, Film, Slot, TILE, TILE_PIXELS, Tile};
+use crate::lanes::{Lanes, Mask, Real, V3};
 use crate::sampling::{Draws, Points, SampleSettings, Sampler};
 use crate::world::{AnyWorld, Counts, MAX_GROUPS, Outlook, Radiance, World};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Traces the jobs of `wave` into `film`, on `pool`. A job that has not begun when `cancel` is raised
@@ -64,7 +66,7 @@ pub(super) struct Tracer<'a, L: Lanes> {
     /// Radiance beyond this cannot be told from a fault, per group: 2^49 steps of the film.
     limits: [L; MAX_GROUPS],
     /// The pixels of a tile that lies inside the picture, see [`blocks`].
-    whole: Vec<(usize, usize)>,
+    whole: Vec<u8>,
 }
 
 impl<'a, L: Lanes> Tracer<'a, L> {
@@ -82,7 +84,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     }
 
     /// Samples of all pixels of a tile: packets of one pixel where enough aligned samples are asked
-    /// for, of several pixels at one index elsewhere.
+    /// for, of several pixels elsewhere.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let outlook = self.world.outlook(origin, tile.extent());
         if outlook.as_ref().is_some_and(|outlook| self.world.is_black(outlook)) {
@@ -90,69 +92,108 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             return Counts::default();
         }
         let mut work = Work::new(replicate, outlook);
-        let width = L::WIDTH as u32;
-        let end = job.first + job.count;
-        let part: Vec<(usize, usize)>;
+        let part: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
             &self.whole
         } else {
             part = blocks(tile.extent());
             &part
         };
-        let place = |(x, y): (usize, usize)| ((origin[0] + x) as u32, (origin[1] + y) as u32);
-        let mut index = job.first;
+        let place = |pixel: &u8| {
+            let pixel = usize::from(*pixel);
+            ((origin[0] + pixel % TILE) as u32, (origin[1] + pixel / TILE) as u32)
+        };
+        let sites = self.sites(replicate, pixels.iter().map(place));
+        let (mut index, end) = (job.first, job.first + job.count);
         while index < end {
-            if index.is_multiple_of(width) && end - index >= width {
-                let points = self.sampler.aligned(index);
-                for (x, y) in pixels {
-                    self.pixel(&mut work, &points, place((*x, *y)), index);
-                    self.sum(&work.radiance, |group, sums| {
-                        tile.add_group(replicate, y * TILE + x, group, sums);
-                    });
+            let count = block(index, end, L::WIDTH);
+            match count {
+                _ if count == L::WIDTH => {
+                    let points = self.sampler.block(index, count);
+                    for (i, pixel) in pixels.iter().enumerate() {
+                        self.pixel(&mut work, &points, &sites, i, index);
+                        self.sum(&work.radiance, |group, sums| {
+                            tile.add_group(replicate, usize::from(*pixel), group, sums);
+                        });
+                    }
                 }
-                index += width;
-            } else {
-                let points = self.sampler.at(index);
-                for packet in pixels.chunks(L::WIDTH) {
-                    let at = |lane: usize| place(packet[lane.min(packet.len() - 1)]);
-                    self.pixels(&mut work, &points, packet.len(), at, index);
-                    self.scatter(&work.radiance, packet.len(), |lane, group, values| {
-                        let (x, y) = packet[lane];
-                        tile.add_group(replicate, y * TILE + x, group, values);
-                    });
-                }
-                index += 1;
+                1 => self.share::<1>(tile, &mut work, &sites, pixels, index),
+                2 => self.share::<2>(tile, &mut work, &sites, pixels, index),
+                4 => self.share::<4>(tile, &mut work, &sites, pixels, index),
+                _ => self.share::<8>(tile, &mut work, &sites, pixels, index),
             }
+            index += count as u32;
         }
         work.bad.into_iter().for_each(|bad| tile.record_bad(bad));
         tile.advance(replicate, job.count);
         work.counts
     }
 
-    /// The samples `first ..` of one pixel, into `work.radiance`.
-    #[inline(always)]
-    fn pixel(&self, work: &mut Work<L>, points: &Points<'_, L>, at: (u32, u32), first: u32) {
-        let draws = points.of_pixel(at, work.replicate);
-        let rays = self.world.view().rays_of(at, self.jitter(&draws));
-        work.trace(self.world, rays, &draws, L::mask(true));
-        self.take_out_bad(work, |lane| (at, first + lane as u32));
+    /// The samples `first..first + COUNT` of all pixels of a tile, in packets that hold as many of several.
+    #[inline(never)]
+    fn share<const COUNT: usize>(
+        &self,
+        tile: &mut Tile,
+        work: &mut Work<L>,
+        sites: &Sites<L::Scalar>,
+        pixels: &[u8],
+        first: u32,
+    ) {
+        let points = self.sampler.block(first, COUNT);
+        for packet in sites.packets(L::WIDTH / COUNT) {
+            let pixels = &pixels[packet.clone()];
+            self.pixels::<COUNT>(work, &points, sites, packet, first);
+            let replicate = work.replicate;
+            self.sum_of_each::<COUNT, _>(&work.radiance, pixels, |pixel, group, sums| {
+                tile.add_group(replicate, usize::from(*pixel), group, sums);
+            });
+        }
     }
 
-    /// Sample `index` of the first `count` pixels that `at` names, into `work.radiance`.
+    /// What the samples of some pixels start from.
+    pub(super) fn sites(
+        &self,
+        replicate: usize,
+        pixels: impl Iterator<Item = (u32, u32)>,
+    ) -> Sites<L::Scalar> {
+        Sites::new(self.world.view(), &self.sampler, replicate, pixels)
+    }
+
+    /// The samples `first ..` of the pixel `i` of `sites`, into `work.radiance`.
     #[inline(always)]
-    pub(super) fn pixels(
+    fn pixel(
         &self,
         work: &mut Work<L>,
         points: &Points<'_, L>,
-        count: usize,
-        at: impl Fn(usize) -> (u32, u32),
-        index: u32,
+        sites: &Sites<L::Scalar>,
+        i: usize,
+        first: u32,
     ) {
-        let draws = points.of_pixels(&at, work.replicate);
-        let rays = self.world.view().rays(&at, self.jitter(&draws));
-        let lanes = L::from_fn(|lane| L::Scalar::of(if lane < count { 1.0 } else { 0.0 }));
-        work.trace(self.world, rays, &draws, lanes.gt(L::zero()));
-        self.take_out_bad(work, |lane| (at(lane), index));
+        let (key, toward) = sites.one(i);
+        let draws = points.of_pixel(key);
+        let rays = self.world.view().rays(toward, self.jitter(&draws));
+        work.trace(self.world, rays, &draws, L::mask(true));
+        self.take_out_bad(work, |lane| (sites.at(i), first + lane as u32));
+    }
+
+    /// The samples `first..first + COUNT` of each of those pixels of `sites` that share the packet `packet`,
+    /// into `work.radiance`.
+    #[inline(always)]
+    pub(super) fn pixels<const COUNT: usize>(
+        &self,
+        work: &mut Work<L>,
+        points: &Points<'_, L>,
+        sites: &Sites<L::Scalar>,
+        packet: Range<usize>,
+        first: u32,
+    ) {
+        let (keys, toward) = sites.several::<L, COUNT>(packet.start);
+        let draws = points.of_pixels(keys);
+        let rays = self.world.view().rays(toward, self.jitter(&draws));
+        work.trace(self.world, rays, &draws, first_lanes::<L>(packet.len() * COUNT));
+        self.take_out_bad(work, |lane| {
+            (sites.at(packet.start + lane / COUNT), first + (lane % COUNT) as u32)
+        });
     }
 
     /// Where in their pixels the samples lie.
@@ -170,21 +211,21 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         }
     }
 
-    /// Gives the samples of the first `count` lanes to `put`, by lane and group.
+    /// Gives the sums over the COUNT lanes of each of `pixels` to `put`, by pixel and group.
     #[inline(always)]
-    pub(super) fn scatter(
+    pub(super) fn sum_of_each<const COUNT: usize, P>(
         &self,
         radiance: &Radiance<L>,
-        count: usize,
-        mut put: impl FnMut(usize, usize, [i64; 3]),
+        pixels: &[P],
+        mut put: impl FnMut(&P, usize, [i64; 3]),
     ) {
         for (group, scale) in self.world.scales().iter().enumerate() {
             let value = radiance.groups[group];
-            let mut channels = [[0; MAX_WIDTH]; 3];
-            value.x.fixed(*scale, &mut channels[0]);
-            value.y.fixed(*scale, &mut channels[1]);
-            value.z.fixed(*scale, &mut channels[2]);
-            (0..count).for_each(|lane| put(lane, group, channels.map(|channel| channel[lane])));
+            let [x, y, z] = [value.x, value.y, value.z].map(|channel| channel.fixed(*scale));
+            let sums = x.chunks_exact(COUNT).zip(y.chunks_exact(COUNT)).zip(z.chunks_exact(COUNT));
+            for (pixel, ((x, y), z)) in pixels.iter().zip(sums) {
+                put(pixel, group, [x, y, z].map(|lanes| lanes.iter().sum()));
+            }
         }
     }
 
@@ -226,8 +267,13 @@ pub(super) struct Work<L: Lanes> {
 
 impl<L: Lanes> Work<L> {
     pub(super) fn new(replicate: usize, outlook: Option<Outlook>) -> Self {
-        let radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
-        Self { replicate, outlook, radiance, counts: Counts::default(), bad: Vec::new() }
+        Self {
+            replicate,
+            outlook,
+            radiance: Radiance { groups: [V3::zero(); MAX_GROUPS] },
+            counts: Counts::default(),
+            bad: Vec::new(),
+        }
     }
 
     #[inline(always)]
@@ -244,24 +290,44 @@ impl<L: Lanes> Work<L> {
     }
 }
 
-/// The pixels of a tile in an order in which neighbours in the list are neighbours in the picture:
-/// blocks of 4 x 2.
-const ORDER: [(u8, u8); TILE * TILE] = {
-    let mut order = [(0, 0); TILE * TILE];
+/// How many of the samples `first..end` of a pixel come next in one packet: a power of two that divides `first`, at
+/// most `width`.
+fn block(first: u32, end: u32, width: usize) -> usize {
+    let aligned = first | width as u32;
+    1 << aligned.trailing_zeros().min((end - first).ilog2())
+}
+
+/// The first `count` lanes.
+fn first_lanes<L: Lanes>(count: usize) -> L::Mask {
+    if count == L::WIDTH {
+        return L::mask(true);
+    }
+    let lanes = L::from_fn(|lane| L::Scalar::of(if lane < count { 1.0 } else { 0.0 }));
+    lanes.gt(L::zero())
+}
+
+/// The pixels of a tile, row by row in numbers, in Morton order: those that share a packet are neighbours in
+/// the picture, 2 x 1, 2 x 2, 4 x 2 or 4 x 4 of them.
+const ORDER: [u8; TILE_PIXELS] = {
+    let mut order = [0; TILE_PIXELS];
     let mut i = 0;
     while i < order.len() {
-        let (block, within) = (i / 8, i % 8);
-        let (x, y) = (4 * (block % 4) + within % 4, 2 * (block / 4) + within / 4);
-        order[i] = (x as u8, y as u8);
+        let (mut x, mut y, mut bit) = (0, 0, 0);
+        while 1 << bit < TILE {
+            x |= (i >> (2 * bit) & 1) << bit;
+            y |= (i >> (2 * bit + 1) & 1) << bit;
+            bit += 1;
+        }
+        order[i] = (y * TILE + x) as u8;
         i += 1;
     }
     order
 };
 
 /// The pixels of a tile of the given extent, in [`ORDER`].
-fn blocks([width, height]: [usize; 2]) -> Vec<(usize, usize)> {
-    let pixels = ORDER.iter().map(|(x, y)| (usize::from(*x), usize::from(*y)));
-    pixels.filter(|(x, y)| *x < width && *y < height).collect()
+fn blocks([width, height]: [usize; 2]) -> Vec<u8> {
+    let inside = |p: &u8| usize::from(*p) % TILE < width && usize::from(*p) / TILE < height;
+    ORDER.into_iter().filter(inside).collect()
 }
 
 #[cfg(test)]
@@ -278,15 +344,17 @@ mod tests {
         let world = World::<Single>::new(&built_in());
         let tracer = Tracer::new(&world, &SampleSettings { seed: 0, kind: SamplerKind::Sobol });
         for bad in [f64::NAN, f64::INFINITY, -1.0, 1e30] {
-            let (scales, precision) = (world.scales().to_vec(), Single::NAME.to_string());
+            let (scales, precision) = (world.scales().to_vec(), "single".to_string());
             let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
             let tile = film.slots(&[0]).remove(0).open();
             let mut work = Work::<Single>::new(0, None);
             work.radiance.groups[0].x =
                 Single::from_fn(|i| Real::of(if i == 3 { bad } else { 0.5 }));
             tracer.take_out_bad(&mut work, |lane| ((lane as u32, 0), 0));
-            let put = |lane, group, values| tile.add_group(0, lane, group, values);
-            tracer.scatter(&work.radiance, 8, put);
+            let pixels = [0, 1, 2, 3, 4, 5, 6, 7];
+            tracer.sum_of_each::<1, _>(&work.radiance, &pixels, |pixel, group, sums| {
+                tile.add_group(0, *pixel, group, sums);
+            });
             assert_eq!(work.bad, [BadSample { index: 0, replicate: 0, y: 0, x: 3 }], "{bad}");
             work.bad.into_iter().for_each(|bad| tile.record_bad(bad));
             tile.advance(0, 1);

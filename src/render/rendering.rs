@@ -52,7 +52,7 @@ impl Rendering {
             height,
             scales: world.group_scales(),
             seed: options.sampling.seed,
-            precision: world.lanes().to_string(),
+            precision: world.precision().to_string(),
         };
         let mix = Mix { weights: world.mix(&scene) };
         let estimator = Estimator::new(&header.scales, &mix, &options.display);

@@ -35,6 +35,9 @@ pub struct SampleSettings {
 /// The last dimensions of the joint set are for a path's first choices.
 const CHOICES: u32 = 2;
 
+/// Powers of two up to the widest packet.
+const SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
+
 /// The numbers that samples of a lane type start from.
 pub struct Sampler<L: Lanes> {
     settings: SampleSettings,
@@ -42,8 +45,8 @@ pub struct Sampler<L: Lanes> {
     seeds: [[u32; 2]; 2],
     /// Dimensions of the first lobe: after the two of the pixel, if these are used.
     first_lobe: usize,
-    /// `low[d]`: Sobol points 0..WIDTH in dimension d.
-    low: [L::Bits; DIMENSIONS],
+    /// `low[k][d]`: Sobol points 0..2^k in dimension d, again and again.
+    low: [[L::Bits; DIMENSIONS]; SHAPES],
     /// 0, 1, 2, ... in the lanes.
     ramp: L::Bits,
     /// A constant per dimension that sets its scrambling apart.
@@ -66,54 +69,52 @@ impl<L: Lanes> Sampler<L> {
         let word = |replicate: u32, use_: u32| {
             fold(&[settings.seed as u32, (settings.seed >> 32) as u32, replicate, use_])
         };
-        let low = |d| L::Bits::from_fn(|lane| sobol::point(d, lane as u32));
+        let low =
+            |k: usize, d| L::Bits::from_fn(|lane| sobol::point(d, lane as u32 & ((1u32 << k) - 1)));
         Self {
             settings,
             seeds: [0, 1].map(|replicate| [word(replicate, 0), word(replicate, 1)]),
             first_lobe: if jitter { 2 } else { 0 },
-            low: std::array::from_fn(low),
+            low: std::array::from_fn(|k| std::array::from_fn(|d| low(k, d))),
             ramp: L::Bits::from_fn(|lane| lane as u32),
             apart: std::array::from_fn(|d| mix1(d as u32 + 1)),
         }
     }
 
-    /// Lane i has index `first + i`; `first` is a multiple of WIDTH.
-    pub fn aligned(&self, first: u32) -> Points<'_, L> {
-        debug_assert!((first as usize).is_multiple_of(L::WIDTH));
+    /// The indices `first..first + count`, in packets that hold as many of each of WIDTH / `count` pixels:
+    /// lane i has index `first + i % count`. `count` is a power of two, at most WIDTH, and `first` a multiple
+    /// of it.
+    pub fn block(&self, first: u32, count: usize) -> Points<'_, L> {
+        debug_assert!(count.is_power_of_two() && count <= L::WIDTH);
+        debug_assert!((first as usize).is_multiple_of(count));
         // Aligned points are one point XOR constants.
-        let point = |d| L::Bits::splat(sobol::point(d, first)) ^ self.low[d];
+        let low = &self.low[count.ilog2() as usize];
+        let point = |d| L::Bits::splat(sobol::point(d, first)) ^ low[d];
         let begun = std::array::from_fn(|d| owen_begin(point(d)));
-        Points { sampler: self, index: L::Bits::splat(first) + self.ramp, begun }
-    }
-
-    /// The same index in all lanes.
-    pub fn at(&self, index: u32) -> Points<'_, L> {
-        let begun = |d| owen_begin(L::Bits::splat(sobol::point(d, index)));
-        Points { sampler: self, index: L::Bits::splat(index), begun: std::array::from_fn(begun) }
+        let within = self.ramp & L::Bits::splat(count as u32 - 1);
+        Points { sampler: self, index: L::Bits::splat(first) + within, begun }
     }
 
     /// The key of a pixel's samples in one replicate (0: A, 1: B). Distinct for all pixels of a
     /// picture up to 65536 x 65536, since every step is a bijection of the packed coordinates.
     #[inline(always)]
-    fn key(&self, (x, y): (u32, u32), replicate: usize) -> u32 {
+    pub fn key(&self, (x, y): (u32, u32), replicate: usize) -> u32 {
         let [before, after] = self.seeds[replicate];
         mix1(mix1((x | y << 16) ^ before) ^ after)
     }
 }
 
 impl<L: Lanes> Points<'_, L> {
-    /// Samples of one pixel.
+    /// Samples of the pixel that [`Sampler::key`] gave a key.
     #[inline(always)]
-    pub fn of_pixel(&self, pixel: (u32, u32), replicate: usize) -> Draws<'_, L> {
-        let key = self.sampler.key(pixel, replicate);
+    pub fn of_pixel(&self, key: u32) -> Draws<'_, L> {
         Draws { points: self, key: L::Bits::splat(key), of_one: Some(key) }
     }
 
-    /// Samples of the pixels `at(lane)`.
+    /// Samples of several pixels, by the keys of the pixels in the lanes.
     #[inline(always)]
-    pub fn of_pixels(&self, at: impl Fn(usize) -> (u32, u32), replicate: usize) -> Draws<'_, L> {
-        let key = L::Bits::from_fn(|lane| self.sampler.key(at(lane), replicate));
-        Draws { points: self, key, of_one: None }
+    pub fn of_pixels(&self, keys: L::Bits) -> Draws<'_, L> {
+        Draws { points: self, key: keys, of_one: None }
     }
 }
 

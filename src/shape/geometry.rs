@@ -162,6 +162,11 @@ impl<L: Lanes> Geometry<L> {
         self.tree.is_some()
     }
 
+    /// Whether there is neither a tree nor a box: nothing but lists.
+    pub fn is_listed(&self) -> bool {
+        self.tree.is_none() && self.extents.is_empty()
+    }
+
     /// All items.
     pub fn all(&self) -> &Selection {
         &self.all
@@ -192,19 +197,25 @@ impl<L: Lanes> Geometry<L> {
     /// As [`Geometry::closest`], in those lanes for which `wanted` is true; the others are meaningless.
     #[inline(always)]
     pub fn closest_of(&self, ray: &Ray<L>, of: &Selection, wanted: L::Mask) -> Hit<L> {
-        // What nobody wants goes no way.
-        let mut hit = Hit::nearer_than(L::select(wanted, L::of(L::MAX), L::of(-1.0)));
         if !self.extents.is_empty() {
-            return self.closest_in_boxes(ray, of, hit);
+            return self.closest_in_boxes(ray, of, nearest_wanted(wanted));
         }
-        for (part, range) in &of.runs {
-            let part = &self.parts[*part as usize];
-            part.batch.closest(indices(range), part.base, ray, &mut hit);
-        }
+        let hit = self.closest_of_listed(ray, of, wanted);
         match &self.tree {
             Some(tree) if of.tree => self.closest_in(tree, ray, hit),
             _ => hit,
         }
+    }
+
+    /// As [`Geometry::closest_of`], of those items that are in no tree; boxes are not asked.
+    #[inline(always)]
+    pub fn closest_of_listed(&self, ray: &Ray<L>, of: &Selection, wanted: L::Mask) -> Hit<L> {
+        let mut hit = nearest_wanted(wanted);
+        for (part, range) in &of.runs {
+            let part = &self.parts[*part as usize];
+            part.batch.closest(indices(range), part.base, ray, &mut hit);
+        }
+        hit
     }
 
     #[inline(never)]
@@ -380,6 +391,12 @@ impl<L: Lanes> Geometry<L> {
         let (meshes, base) = self.meshes()?;
         (item >= base).then(|| meshes.uv((item - base) as usize, facet, point))?
     }
+}
+
+/// Nothing met yet; what nobody wants goes no way.
+#[inline(always)]
+fn nearest_wanted<L: Lanes>(wanted: L::Mask) -> Hit<L> {
+    Hit::nearer_than(L::select(wanted, L::of(L::MAX), L::of(-1.0)))
 }
 
 fn indices(range: &Range<u32>) -> Range<usize> {

@@ -59,6 +59,8 @@ pub struct World<L: Lanes> {
     pub(super) smooth: bool,
     /// Things have colours of their own.
     pub(super) colored: bool,
+    /// Neither smooth nor colored, and all things in lists: no trees, no boxes.
+    pub(super) plain: bool,
     /// Textures and bumps; `None`: there are none.
     pub(super) skins: Option<Skins<L>>,
     /// What lets light through; `None`: nothing does.
@@ -211,6 +213,8 @@ impl<L: Lanes> World<L> {
             }
             _ => Culling::Nothing,
         };
+        let smooth = geometry.is_smooth() || skins.as_ref().is_some_and(Skins::is_bumped);
+        let colored = geometry.is_colored() || skins.as_ref().is_some_and(Skins::is_colored);
         Self {
             panorama,
             light_buffers,
@@ -219,8 +223,9 @@ impl<L: Lanes> World<L> {
             background: (scene.background.color.0 != [0.0; 3])
                 .then(|| groups.find(&Member::Background))
                 .flatten(),
-            smooth: geometry.is_smooth() || skins.as_ref().is_some_and(Skins::is_bumped),
-            colored: geometry.is_colored() || skins.as_ref().is_some_and(Skins::is_colored),
+            smooth,
+            colored,
+            plain: !smooth && !colored && geometry.is_listed(),
             skins,
             shadows: level >= Level::Shadows && !geometry.is_empty(),
             depth: if going_on { scene.trace.depth } else { 0 },
@@ -318,6 +323,14 @@ impl AnyWorld {
             Self::Single(World::compile(scene, placed))
         } else {
             Self::Double(World::compile(scene, placed))
+        }
+    }
+
+    /// `single` or `double`.
+    pub fn precision(&self) -> &'static str {
+        match self {
+            Self::Single(_) => "single",
+            Self::Double(_) => "double",
         }
     }
 

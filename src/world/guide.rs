@@ -35,11 +35,11 @@ impl<L: Lanes> World<L> {
     /// At most one packet of it.
     fn look_at(&self, points: &[[f64; 2]], seen: &mut [Sight]) {
         let point = |lane: usize| points[lane.min(points.len() - 1)];
-        let pixel = |lane: usize| point(lane).map(|c| c as u32).into();
+        let base = V3::from_fn(|lane| self.view.toward(point(lane).map(|c| c as u32).into()));
         let within = |axis: usize| {
             L::from_fn(|lane| L::Scalar::of(point(lane)[axis] - point(lane)[axis].floor()))
         };
-        let (origin, direction) = self.view.rays(pixel, (within(0), within(1)));
+        let (origin, direction) = self.view.rays(base, (within(0), within(1)));
         let ray = Ray { origin, direction };
         let hit = self.geometry.closest(&ray, self.geometry.all());
         let at = ray.at(hit.t);

@@ -136,40 +136,61 @@ impl<L: Lanes> World<L> {
     /// Traces one packet of camera samples: `origin` and `direction` as [`crate::camera::View`] makes
     /// them. Lanes outside `active` stay black. `outlook`: what these rays and the shadow rays from
     /// where they end may meet, if that is known.
-    #[inline]
+    #[inline(always)]
     pub fn trace(
         &self,
         (origin, direction): (V3<L>, V3<L>),
         outlook: Option<&Outlook>,
         draws: &Draws<'_, L>,
-        mut active: L::Mask,
+        active: L::Mask,
         out: &mut Radiance<L>,
     ) -> Counts {
         for group in &mut out.groups[..self.groups()] {
             *group = V3::zero();
         }
-        let mut counts = Counts::default();
         let ray = Ray { origin, direction };
-        let mut outlook = outlook.unwrap_or(&self.panorama);
+        let outlook = outlook.unwrap_or(&self.panorama);
         if let Some(media) = &self.media {
-            return self.trace_through(media, ray, outlook, draws, active, out);
+            self.trace_through(media, ray, outlook, draws, active, out)
+        } else if self.plain {
+            self.trace_opaque::<true>(ray, outlook, draws, active, out)
+        } else {
+            self.trace_opaque::<false>(ray, outlook, draws, active, out)
         }
+    }
+
+    /// [`World::trace`] for a world without media. Here and below `PLAIN` says that the world is
+    /// [plain](World::plain).
+    #[inline(never)]
+    fn trace_opaque<'a, const PLAIN: bool>(
+        &'a self,
+        ray: Ray<L>,
+        mut outlook: &'a Outlook,
+        draws: &Draws<'_, L>,
+        mut active: L::Mask,
+        out: &mut Radiance<L>,
+    ) -> Counts {
+        let mut counts = Counts::default();
         let mut path = Path { ray, weight: V3::of([1.0; 3]) };
         let mut bounce = 0;
         loop {
             counts.rays += u64::from(active.bits().count_ones());
-            let hit = self.geometry.closest_of(&path.ray, &outlook.seen, active);
+            let hit = if PLAIN {
+                self.geometry.closest_of_listed(&path.ray, &outlook.seen, active)
+            } else {
+                self.geometry.closest_of(&path.ray, &outlook.seen, active)
+            };
             let ended = hit.t.lt(L::of(L::MAX));
             if let Some(group) = self.background {
                 out.groups[group] += path.weight.only(active.and_not(ended));
             }
             active = active & ended;
-            let Some(met) = self.meet(&path.ray, &hit, active) else { return counts };
-            self.light(&path, &met, outlook, out, &mut counts);
+            let Some(met) = self.meet::<PLAIN>(&path.ray, &hit, active) else { return counts };
+            self.light::<PLAIN>(&path, &met, outlook, out, &mut counts);
             if bounce == self.depth || met.reflecting.none() {
                 return counts;
             }
-            active = self.bounce(&mut path, &met, draws, bounce, &mut counts);
+            active = self.bounce::<PLAIN>(&mut path, &met, draws, bounce, &mut counts);
             if active.none() {
                 return counts;
             }
@@ -180,27 +201,43 @@ impl<L: Lanes> World<L> {
 
     /// The surfaces where the active rays end; `None`: there are no such rays.
     #[inline(always)]
-    pub(super) fn meet(&self, ray: &Ray<L>, hit: &Hit<L>, active: L::Mask) -> Option<Met<L>> {
+    pub(super) fn meet<const PLAIN: bool>(
+        &self,
+        ray: &Ray<L>,
+        hit: &Hit<L>,
+        active: L::Mask,
+    ) -> Option<Met<L>> {
         let (item, here) = first_tag(hit.item, active)?;
-        let mut met = self.face(ray, hit, item, here);
-        if active.and_not(here).any() {
-            self.meet_others(ray, hit, active.and_not(here), &mut met);
-        }
-        Some(met)
+        let met = self.face::<PLAIN>(ray, hit, item, here);
+        let others = active.and_not(here);
+        Some(if others.none() { met } else { self.meet_others::<PLAIN>(ray, hit, others, met) })
     }
 
-    /// The surfaces of lanes that met another item than the first.
+    /// Adds to `met` the surfaces of lanes that met another item than the first.
     #[inline(never)]
-    fn meet_others(&self, ray: &Ray<L>, hit: &Hit<L>, mut left: L::Mask, met: &mut Met<L>) {
+    fn meet_others<const PLAIN: bool>(
+        &self,
+        ray: &Ray<L>,
+        hit: &Hit<L>,
+        mut left: L::Mask,
+        mut met: Met<L>,
+    ) -> Met<L> {
         while let Some((item, here)) = first_tag(hit.item, left) {
-            met.take(here, &self.face(ray, hit, item, here));
+            met.take(here, &self.face::<PLAIN>(ray, hit, item, here));
             left = left.and_not(here);
         }
+        met
     }
 
     /// The surface of one item, which the rays of `lanes` meet at `hit`.
     #[inline(always)]
-    fn face(&self, ray: &Ray<L>, hit: &Hit<L>, item: u32, lanes: L::Mask) -> Met<L> {
+    fn face<const PLAIN: bool>(
+        &self,
+        ray: &Ray<L>,
+        hit: &Hit<L>,
+        item: u32,
+        lanes: L::Mask,
+    ) -> Met<L> {
         let surface = self.geometry.surface(item, hit.facet, ray.at(hit.t));
         let front = surface.normal.dot(ray.direction).lt(L::zero());
         let geometric = V3::select(front, surface.normal, -surface.normal);
@@ -208,12 +245,13 @@ impl<L: Lanes> World<L> {
         let finish = &self.finishes[number as usize];
         let mut normal = geometric;
         let patch = || Patch { item, facet: hit.facet, surface, lanes };
-        if self.smooth {
+        if !PLAIN && self.smooth {
             normal = self.shading_normal(&patch(), (front, geometric), ray.direction);
         }
         let mut tint = V3::of([1.0; 3]);
         let mut diffuse = V3::splat(finish.diffuse);
-        if self.colored
+        if !PLAIN
+            && self.colored
             && let Some(color) = self.own_color(&patch())
         {
             (tint, diffuse) = (color, diffuse.times(color));
@@ -239,7 +277,7 @@ impl<L: Lanes> World<L> {
 
     /// Adds what the surfaces return of ambient light and of every lamp.
     #[inline(always)]
-    pub(super) fn light(
+    pub(super) fn light<const PLAIN: bool>(
         &self,
         path: &Path<L>,
         met: &Met<L>,
@@ -250,7 +288,7 @@ impl<L: Lanes> World<L> {
         if let Some(group) = self.ambient {
             for (finish, lanes) in met.finishes(met.finished) {
                 let mut ambient = V3::splat(self.finishes[finish].ambient);
-                if self.colored {
+                if !PLAIN && self.colored {
                     ambient = ambient.times(met.tint);
                 }
                 out.groups[group] += path.weight.times(ambient).only(lanes);
@@ -264,7 +302,7 @@ impl<L: Lanes> World<L> {
             let arrival = source.lamp.at(start);
             let nl = met.normal.dot(arrival.towards);
             let mut lit = met.lit & nl.gt(L::zero());
-            if self.smooth {
+            if !PLAIN && self.smooth {
                 lit = lit & met.geometric.dot(arrival.towards).gt(L::zero());
             }
             if lit.none() {
@@ -274,9 +312,12 @@ impl<L: Lanes> World<L> {
                 counts.rays += u64::from(lit.bits().count_ones());
                 let ray = Ray { origin: start, direction: arrival.towards };
                 let blocked = match self.light_buffers.get(number) {
-                    Some(Some(buffer)) => {
+                    Some(Some(buffer)) if !PLAIN => {
                         let on = (met.item, met.front);
                         buffer.blocked(&self.geometry, &ray, on, arrival.distance, lit, shading)
+                    }
+                    _ if PLAIN => {
+                        self.geometry.blocked_by_listed(&ray, arrival.distance, lit, shading)
                     }
                     _ => self.geometry.blocked(&ray, arrival.distance, lit, shading),
                 };
@@ -302,7 +343,7 @@ impl<L: Lanes> World<L> {
 
     /// Turns the paths into the directions of reflections; returns the lanes that go on.
     #[inline(always)]
-    pub(super) fn bounce(
+    pub(super) fn bounce<const PLAIN: bool>(
         &self,
         path: &mut Path<L>,
         met: &Met<L>,
@@ -323,7 +364,7 @@ impl<L: Lanes> World<L> {
             };
             let r = finish.reflect(*strength, spread, incident, met.normal, uv, self.fold);
             let mut out = r.direction;
-            if self.smooth {
+            if !PLAIN && self.smooth {
                 out = met.outward(out);
             }
             path.ray.direction = V3::select(lanes, out, path.ray.direction);

@@ -103,18 +103,18 @@ impl<L: Lanes> World<L> {
             out.groups[group] += path.weight.only(arm.lanes.and_not(ended));
         }
         let lanes = arm.lanes & ended;
-        let Some(mut met) = self.meet(&path.ray, &hit, lanes) else { return false };
+        let Some(mut met) = self.meet::<false>(&path.ray, &hit, lanes) else { return false };
         let crossing = self.crossing(media, &met, lanes, &inside);
         if let Some(crossing) = &crossing {
             met.leave_out(crossing.hidden);
         }
-        self.light(&path, &met, outlook, out, counts);
+        self.light::<false>(&path, &met, outlook, out, counts);
         if bounce == self.depth {
             return false;
         }
         let bounce = bounce + 1;
         let Some(crossing) = crossing else {
-            arm.lanes = self.bounce(&mut arm.path, &met, draws, bounce - 1, counts);
+            arm.lanes = self.bounce::<false>(&mut arm.path, &met, draws, bounce - 1, counts);
             arm.bounce = bounce;
             return arm.lanes.any();
         };

@@ -141,10 +141,10 @@ impl Traced {
         let settings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
         let sampler = Sampler::new(settings, world.jitter());
         let mut out = Vec::with_capacity(lines.len());
-        let points = sampler.aligned(0);
+        let points = sampler.block(0, L::WIDTH);
         let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
         for (ray, count) in packets::<L>(lines) {
-            let draws = points.of_pixel((0, 0), 0);
+            let draws = points.of_pixel(sampler.key((0, 0), 0));
             world.trace((ray.origin, ray.direction), None, &draws, L::mask(true), &mut radiance);
             for i in 0..count {
                 let mut sum = DVec3::ZERO;

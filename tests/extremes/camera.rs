@@ -20,7 +20,7 @@ fn check_finite<L: Lanes>(camera: &Camera, size: [u32; 2], name: &str) {
     let ys = [0, size[1] / 2, size[1] - 1];
     for at in xs.into_iter().flat_map(|x| ys.map(|y| (x, y))) {
         for offset in [0.0, 0.5, 1.0] {
-            let (o, d) = view.rays_of::<L>(at, (L::of(offset), L::of(offset)));
+            let (o, d) = view.rays(V3::<L>::splat(view.toward(at)), (L::of(offset), L::of(offset)));
             for lane in 0..L::WIDTH {
                 let (o, d) = (to_dvec3(o, lane), to_dvec3(d, lane));
                 assert!(o.is_finite() && d.is_finite(), "{name}: pixel {at:?}: {o} {d}");
@@ -63,8 +63,8 @@ fn extreme_17_narrow_and_wide_angles_are_right() {
         let camera = Camera { view_angle: ViewAngle::Horizontal(degrees), ..Camera::default() };
         let view = View::new(&camera, [1000, 1], DVec3::ZERO);
         let angle = |y: f64| {
-            let (_, left) = view.rays_of::<f64>((0, 0), (0.0, y));
-            let (_, right) = view.rays_of::<f64>((999, 0), (1.0, y));
+            let (_, left) = view.rays(V3::<f64>::splat(view.toward((0, 0))), (0.0, y));
+            let (_, right) = view.rays(V3::<f64>::splat(view.toward((999, 0))), (1.0, y));
             let (a, b) =
                 (DVec3::new(left.x, left.y, left.z), DVec3::new(right.x, right.y, right.z));
             a.cross(b).length().atan2(a.dot(b)).to_degrees()

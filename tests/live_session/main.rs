@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 use zerkalo::film::{Display, Tone};
+use zerkalo::lanes::{Lanes, Single};
 use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo::render::session::{Session, Snapshot, State, View};
 use zerkalo::render::{Options, Rendering};
@@ -231,7 +232,7 @@ fn aims_display_and_threads_change_without_losing_samples() {
 
     let mut session = session(spp(40), false);
     let first = finish(&mut session, &scene()).report;
-    assert_eq!((first.spp.min, first.threads, first.lanes), (40, 2, "f32x8"));
+    assert_eq!((first.spp.min, first.threads, first.lanes), (40, 2, Single::NAME));
     assert!(first.inventory.contains("1 sphere"), "{}", first.inventory);
     assert!(first.recent_samples_per_second > 0.0);
     session.set_threads(1, 5).unwrap();

@@ -116,11 +116,9 @@ fn fixed_point<L: Lanes>() {
         };
         let x = L::from_fn(|lane| L::Scalar::of(value(lane)));
         let exact = |lane| (x.lane(lane).to_f64() * scale).round_ties_even() as i64;
-        let mut each = [i64::MIN; MAX_WIDTH];
-        x.fixed(scale, &mut each);
-        for (lane, each) in each.iter().enumerate() {
-            let expected = if lane < L::WIDTH { exact(lane) } else { i64::MIN };
-            assert_eq!(*each, expected, "{} {i} {lane}", L::NAME);
+        for (lane, fixed) in x.fixed(scale).into_iter().enumerate() {
+            let expected = if lane < L::WIDTH { exact(lane) } else { 0 };
+            assert_eq!(fixed, expected, "{} {i} {lane}", L::NAME);
         }
         assert_eq!(x.fixed_sum(scale), (0..L::WIDTH).map(exact).sum::<i64>(), "{} {i}", L::NAME);
     }

@@ -2,7 +2,7 @@
 
 use crate::stats::slope;
 use std::f64::consts::PI;
-use zerkalo::lanes::{Double, Lanes, Real, Single};
+use zerkalo::lanes::{Bits, Double, Lanes, Real, Single};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 
 fn sampler<L: Lanes>(kind: SamplerKind, seed: u64, jitter: bool) -> Sampler<L> {
@@ -19,11 +19,12 @@ fn pairs<L: Lanes>(
 ) -> Vec<[f64; 2]> {
     let mut out = Vec::new();
     for first in (0..count).step_by(L::WIDTH) {
-        let points = sampler.aligned(first);
-        let draws = points.of_pixel((x, y), replicate);
+        let points = sampler.block(first, L::WIDTH);
+        let draws = points.of_pixel(sampler.key((x, y), replicate));
         let (u, v) = bounce.map_or_else(|| draws.pixel(), |b| draws.lobe(b));
         out.extend((0..L::WIDTH).map(|i| [u.lane(i).to_f64(), v.lane(i).to_f64()]));
     }
+    out.truncate(count as usize);
     out
 }
 
@@ -73,8 +74,7 @@ fn scrambled_sets_remain_nets() {
     nets::<Single>();
 }
 
-/// Bit by bit the same numbers, whatever the width: one pixel at many indices, and many pixels at one
-/// index.
+/// Bit by bit the same numbers, whatever the width, and however many pixels share a packet.
 fn packets_equal_singles<One: Lanes, Many: Lanes>() {
     let bits = |x: f64| x.to_bits();
     for kind in [SamplerKind::Sobol, SamplerKind::Random] {
@@ -91,20 +91,28 @@ fn packets_equal_singles<One: Lanes, Many: Lanes>() {
                             let (u, v) = bounce.map_or_else(|| d.pixel(), |b| d.lobe(b));
                             (bits(u.lane(0).to_f64()), bits(v.lane(0).to_f64()))
                         };
-                        let at = |lane: usize| (lane as u32 * 77, 1000 - lane as u32);
-                        let row = pair(&many.aligned(first).of_pixel((11, 13), replicate));
-                        let field = pair(&many.at(first).of_pixels(at, replicate));
-                        for lane in 0..Many::WIDTH {
-                            let index = first + lane as u32;
-                            let expected =
-                                single(&one.aligned(index).of_pixel((11, 13), replicate));
-                            let lane_of = |p: (Many, Many)| {
-                                (bits(p.0.lane(lane).to_f64()), bits(p.1.lane(lane).to_f64()))
-                            };
-                            assert_eq!(lane_of(row), expected, "{kind:?} {index} {bounce:?}");
-                            let (x, y) = at(lane);
-                            let expected = single(&one.at(first).of_pixel((x, y), replicate));
-                            assert_eq!(lane_of(field), expected, "{kind:?} {first} {bounce:?}");
+                        let lane_of = |p: (Many, Many), lane| {
+                            (bits(p.0.lane(lane).to_f64()), bits(p.1.lane(lane).to_f64()))
+                        };
+                        let mut count = Many::WIDTH;
+                        while count > 0 {
+                            let points = many.block(first, count);
+                            let at =
+                                |lane| ((lane / count) as u32 * 77, 1000 - (lane / count) as u32);
+                            let key = |lane| many.key(at(lane), replicate);
+                            let field = pair(&points.of_pixels(Many::Bits::from_fn(key)));
+                            let row = pair(&points.of_pixel(key(0)));
+                            for lane in 0..Many::WIDTH {
+                                let index = first + (lane % count) as u32;
+                                let points = one.block(index, 1);
+                                let name = format!("{kind:?} {index} {count} {bounce:?}");
+                                let expected =
+                                    single(&points.of_pixel(one.key(at(lane), replicate)));
+                                assert_eq!(lane_of(field, lane), expected, "{name}");
+                                let expected = single(&points.of_pixel(one.key(at(0), replicate)));
+                                assert_eq!(lane_of(row, lane), expected, "{name}");
+                            }
+                            count /= 2;
                         }
                     }
                 }
@@ -121,8 +129,8 @@ fn packets_draw_what_single_samples_draw() {
 
 /// All numbers that sample `index` of a pixel uses in ten bounces.
 fn numbers(sampler: &Sampler<f64>, pixel: (u32, u32), replicate: usize, index: u32) -> Vec<f64> {
-    let points = sampler.at(index);
-    let draws = points.of_pixel(pixel, replicate);
+    let points = sampler.block(index, 1);
+    let draws = points.of_pixel(sampler.key(pixel, replicate));
     let place = draws.pixel();
     let lobes = (0..10).flat_map(|b| <[f64; 2]>::from(draws.lobe(b)));
     [place.0, place.1].into_iter().chain(lobes).collect()

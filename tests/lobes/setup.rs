@@ -105,7 +105,8 @@ pub fn each_reflection<L: Lanes>(
     let settings = SampleSettings { seed: numbers.seed, kind: numbers.kind };
     let sampler = Sampler::<L>::new(settings, false);
     for first in (0..count).step_by(L::WIDTH) {
-        let uv = sampler.aligned(first).of_pixel(numbers.pixel, 0).lobe(0);
+        let key = sampler.key(numbers.pixel, 0);
+        let uv = sampler.block(first, L::WIDTH).of_pixel(key).lobe(0);
         let r = finish.reflect(strength, &spread, incident, n, uv, fold);
         for lane in 0..L::WIDTH {
             take(r.direction.lane(lane).map(Real::to_f64), r.weight.lane(lane).map(Real::to_f64));
@@ -121,11 +122,11 @@ pub fn trace<L: Lanes>(
     replicate: usize,
     first: u32,
 ) -> Vec<Vec<Vector>> {
-    let points = sampler.aligned(first);
-    let draws = points.of_pixel(pixel, replicate);
+    let points = sampler.block(first, L::WIDTH);
+    let draws = points.of_pixel(sampler.key(pixel, replicate));
     let half = L::of(0.5);
     let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
-    let rays = world.view().rays_of(pixel, jitter);
+    let rays = world.view().rays(V3::splat(world.view().toward(pixel)), jitter);
     let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
     let all = L::mask(true);
     assert!(all.all());

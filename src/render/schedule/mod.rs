@@ -16,7 +16,6 @@ mod tile;
 mod trend;
 
 use crate::film::Noise;
-use crate::lanes::{Lanes, Single};
 use crate::render::wave::{Job, Wave, WaveReport};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
@@ -26,9 +25,9 @@ use trend::Trend;
 /// below, they say little and cost as much as the samples. Sixteen would spend a third of the mirror
 /// room's samples, and two thirds of the reflecting tracks', on tiles without any noise.
 const FLOOR: u32 = 4;
-/// From the first packet on, samples are given in multiples of the widest packet that renders; only a
-/// tile's last block may be shorter.
-pub const PACKET: u32 = if Single::WIDTH > 8 { Single::WIDTH as u32 } else { 8 };
+/// From so many on, samples are given in multiples of this, the width of the widest packets; only a tile's last block
+/// may be shorter. The same where packets are narrower: which samples a picture has must not depend on the processor.
+pub const PACKET: u32 = 16;
 /// Samples per replicate at which a tile is full: half of what a 32-bit index can count.
 const FULL: u32 = 1 << 31;
 

@@ -272,8 +272,12 @@ fn tasks_interrupt_waves_and_change_no_result() {
         tasks += 1;
     }
     assert!(tasks > 20, "{tasks} tasks");
-    // Waves 1, 1, 2, 4, 8, 8 of A and of B over 128 tiles, each job once.
-    assert_eq!(log.jobs.load(Ordering::SeqCst), 12 * 128);
+    let counts = session.with(|d, _| d.film.touched().map(|(_, t)| t.counts()).collect::<Vec<_>>());
+    assert_eq!(counts, Some(vec![[24, 24]; 128]));
+    // Waves 1, 1, 2, 4, 8, 8 of A and of B over 128 tiles, each job once; but the first wave may be begun twice,
+    // if the mark of the scene's arrival is raised late.
+    let again = log.jobs.load(Ordering::SeqCst) - 12 * 128;
+    assert!(again < 128, "{again} jobs too many");
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn pieces_decide_nothing() {
     for adaptive in [false, true] {
         let settings = until(noise(0.6), adaptive);
         let (whole, reason) = Model::exact(mixed(), 6).finish(settings);
-        for (tiles, longest) in [(1, 8), (5, 16), (100, 24)] {
+        for (tiles, longest) in [(1, PACKET), (5, 2 * PACKET), (100, 3 * PACKET)] {
             let mut model = Model::exact(mixed(), 6);
             let mut schedule = model.schedule(settings);
             assert_eq!(in_pieces(&mut model, &mut schedule, tiles, longest), reason);

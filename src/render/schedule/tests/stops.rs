@@ -13,8 +13,7 @@ fn waves_count_as_the_sequence_likes_it() {
         let report = model.run(&wave);
         schedule.complete(&wave, &report);
     }
-    let blocks =
-        [(0, 1), (1, 1), (2, 2), (4, 4), (8, 8), (16, 8), (24, 8), (32, 8), (40, 8), (48, 2)];
+    let blocks = [(0, 1), (1, 1), (2, 2), (4, 4), (8, 8), (16, 16), (32, 16), (48, 2)];
     let expected: Vec<_> = blocks.iter().flat_map(|(f, c)| [(0, *f, *c), (1, *f, *c)]).collect();
     assert_eq!(seen, expected);
     assert_eq!(schedule.next(0.0), Step::Rest(StoppedBy::Spp));

@@ -1,0 +1,89 @@
+//! Pixels, and what all their samples start from.
+
+use crate::camera::View;
+use crate::film::TILE_PIXELS;
+use crate::lanes::{Bits, Lanes, Real, V3};
+use crate::sampling::Sampler;
+use std::ops::Range;
+
+/// At most as many pixels as a tile has, in the order in which they share packets.
+pub(super) struct Sites<S> {
+    count: usize,
+    /// Columns and rows, in pixels of the picture. Here and below a last packet is filled up with copies of the
+    /// last pixel.
+    x: [u32; TILE_PIXELS],
+    y: [u32; TILE_PIXELS],
+    /// Keys of their random numbers.
+    keys: [u32; TILE_PIXELS],
+    /// From the eye to their corners, on the plane at unit distance, axis by axis.
+    toward: [[S; TILE_PIXELS]; 3],
+}
+
+impl<S: Real> Sites<S> {
+    /// Of the first [`TILE_PIXELS`] of `pixels`, in one replicate.
+    pub fn new<L: Lanes<Scalar = S>>(
+        view: &View,
+        sampler: &Sampler<L>,
+        replicate: usize,
+        pixels: impl Iterator<Item = (u32, u32)>,
+    ) -> Self {
+        let mut out = Self {
+            count: 0,
+            x: [0; TILE_PIXELS],
+            y: [0; TILE_PIXELS],
+            keys: [0; TILE_PIXELS],
+            toward: [[S::default(); TILE_PIXELS]; 3],
+        };
+        for ((x, y), at) in out.x.iter_mut().zip(&mut out.y).zip(pixels) {
+            (*x, *y) = at;
+            out.count += 1;
+        }
+        let Some(last) = out.count.checked_sub(1) else { return out };
+        let full = out.count.next_multiple_of(L::WIDTH);
+        let (x, y) = (out.x[last], out.y[last]);
+        out.x[last..full].fill(x);
+        out.y[last..full].fill(y);
+        let at = || out.x[..full].iter().copied().zip(out.y[..full].iter().copied());
+        for (key, at) in out.keys.iter_mut().zip(at()) {
+            *key = sampler.key(at, replicate);
+        }
+        let [x, y, z] = &mut out.toward;
+        for (((x, y), z), at) in x.iter_mut().zip(y).zip(z).zip(at()) {
+            [*x, *y, *z] = view.toward(at);
+        }
+        out
+    }
+
+    /// Column and row of pixel `i`.
+    pub fn at(&self, i: usize) -> (u32, u32) {
+        (self.x[i], self.y[i])
+    }
+
+    /// The key of pixel `i`, and from the eye to its corner, in all lanes.
+    #[inline(always)]
+    pub fn one<L: Lanes<Scalar = S>>(&self, i: usize) -> (u32, V3<L>) {
+        (self.keys[i], V3::splat(self.toward.each_ref().map(|axis| axis[i])))
+    }
+
+    /// The same for the pixels `first ..`, each in COUNT lanes side by side; COUNT is a power of two, and
+    /// `first` a multiple of WIDTH / COUNT.
+    #[inline(always)]
+    pub fn several<L: Lanes<Scalar = S>, const COUNT: usize>(
+        &self,
+        first: usize,
+    ) -> (L::Bits, V3<L>) {
+        let those = first..first + L::WIDTH / COUNT;
+        let keys = &self.keys[those.clone()];
+        let [x, y, z] = self.toward.each_ref().map(|axis| {
+            let axis = &axis[those.clone()];
+            L::from_fn(|lane| axis[lane / COUNT])
+        });
+        (L::Bits::from_fn(|lane| keys[lane / COUNT]), V3::new(x, y, z))
+    }
+
+    /// The pixels in packets that hold `each` of them.
+    pub fn packets(&self, each: usize) -> impl Iterator<Item = Range<usize>> {
+        let count = self.count;
+        (0..count).step_by(each).map(move |first| first..count.min(first + each))
+    }
+}
