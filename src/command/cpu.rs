@@ -1,41 +1,50 @@
 //! Whether this processor has what the program was compiled for.
 //!
-//! The build names a baseline (see `.cargo/config.toml`) and the compiler uses all of it everywhere,
-//! so that an older processor would stop with an illegal instruction in the middle of something.
+//! The build names a processor (see `.cargo/config.toml`) and the compiler uses all that it has everywhere,
+//! so that a lesser one would stop with an illegal instruction in the middle of something.
 //! `is_x86_feature_detected!` does not help here: for a feature that the build assumes it answers
 //! true without looking. So the processor is asked directly, in code so plain (integers and calls
 //! into the standard library, which is compiled for the oldest processors) that nothing newer has a
-//! place in it. Under an emulator of an older processor this was seen to work; should a compiler ever
+//! place in it. Under an emulator of older processors this was seen to work; should a compiler ever
 //! find such a place, the outcome is the illegal instruction that there would be without this.
+
+/// For each feature that the build assumes: looks at the bit by which the processor says that it has it.
+#[cfg(target_arch = "x86_64")]
+macro_rules! need {
+    ($($name:literal $register:ident $bit:literal)*) => {
+        $(if cfg!(target_feature = $name) && $register >> $bit & 1 == 0 {
+            refuse($name);
+        })*
+    };
+}
 
 /// Ends the program with exit status 1 and a line on stderr if this processor lacks a feature that the
 /// program was compiled for. To be called before anything else.
 #[cfg(target_arch = "x86_64")]
 #[inline(never)]
 pub fn require() {
-    use std::arch::x86_64::{__cpuid, __cpuid_count};
-    // Bits: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 2A, CPUID.
+    use std::arch::x86_64::{__cpuid, __cpuid_count, CpuidResult};
+    // Bits: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 2A, CPUID; AMD64
+    // Architecture Programmer's Manual, volume 3, appendix E (those of leaf 8000_0001).
+    let none = CpuidResult { eax: 0, ebx: 0, ecx: 0, edx: 0 };
+    // By bit 27 the operating system says that it keeps the wide registers: without, there is no AVX.
     let basic = __cpuid(1).ecx;
-    let more = if __cpuid(0).eax >= 7 { __cpuid_count(7, 0).ebx } else { 0 };
-    let extended =
-        if __cpuid(0x8000_0000).eax >= 0x8000_0001 { __cpuid(0x8000_0001).ecx } else { 0 };
-    let lacks = |assumed: bool, register: u32, bit: u32| assumed && register >> bit & 1 == 0;
-    // With the bit by which the operating system says that it keeps the wide registers.
-    let os = lacks(cfg!(target_feature = "avx"), basic, 27);
-    let avx = os || lacks(cfg!(target_feature = "avx"), basic, 28);
-    let avx2 = lacks(cfg!(target_feature = "avx2"), more, 5);
-    let fma = lacks(cfg!(target_feature = "fma"), basic, 12);
-    let bits = lacks(cfg!(target_feature = "bmi1"), more, 3)
-        || lacks(cfg!(target_feature = "bmi2"), more, 8)
-        || lacks(cfg!(target_feature = "lzcnt"), extended, 5)
-        || lacks(cfg!(target_feature = "movbe"), basic, 22)
-        || lacks(cfg!(target_feature = "f16c"), basic, 29);
-    let avx512 = lacks(cfg!(target_feature = "avx512f"), more, 16)
-        || lacks(cfg!(target_feature = "avx512dq"), more, 17)
-        || lacks(cfg!(target_feature = "avx512bw"), more, 30)
-        || lacks(cfg!(target_feature = "avx512vl"), more, 31);
-    if avx || avx2 || fma || bits || avx512 {
-        refuse();
+    let basic = if basic >> 27 & 1 == 1 { basic } else { basic & !(1 << 28) };
+    let seven = if __cpuid(0).eax >= 7 { __cpuid_count(7, 0) } else { none };
+    let (more, newer, newest) = (seven.ebx, seven.ecx, seven.edx);
+    let last = if seven.eax >= 1 { __cpuid_count(7, 1).eax } else { 0 };
+    let has_extended = __cpuid(0x8000_0000).eax >= 0x8000_0001;
+    let extended = if has_extended { __cpuid(0x8000_0001).ecx } else { 0 };
+    need! {
+        "avx" basic 28 "avx2" more 5 "fma" basic 12
+        "avx512f" more 16 "avx512dq" more 17 "avx512cd" more 28 "avx512bw" more 30 "avx512vl" more 31
+        "avx512ifma" more 21 "avx512vbmi" newer 1 "avx512vbmi2" newer 6 "avx512vnni" newer 11
+        "avx512bitalg" newer 12 "avx512vpopcntdq" newer 14 "avx512fp16" newest 23 "avx512bf16" last 5
+        "avxvnni" last 4 "gfni" newer 8 "vaes" newer 9 "vpclmulqdq" newer 10
+        "bmi1" more 3 "bmi2" more 8 "lzcnt" extended 5 "movbe" basic 22 "f16c" basic 29
+        "sse3" basic 0 "pclmulqdq" basic 1 "ssse3" basic 9 "sse4.1" basic 19 "sse4.2" basic 20
+        "popcnt" basic 23 "aes" basic 25 "rdrand" basic 30 "rdseed" more 18 "adx" more 19 "sha" more 29
+        "sse4a" extended 6 "tbm" extended 21
     }
 }
 
@@ -46,15 +55,17 @@ pub fn require() {}
 #[cfg(target_arch = "x86_64")]
 #[cold]
 #[inline(never)]
-fn refuse() -> ! {
+fn refuse(lacking: &str) -> ! {
     use std::io::Write;
-    const MESSAGE: &[u8] = if cfg!(target_feature = "avx512f") {
-        b"zerkalo was built for a processor with AVX-512, which this one lacks; build it on this machine\n"
-    } else {
-        b"zerkalo was built for a processor with AVX2 and FMA (x86-64-v3), which this one lacks; \
-          RUSTFLAGS=\"-C target-cpu=native\" cargo build --release builds it for this one\n"
-    };
-    // If nobody can read it, the exit status is all there is to say.
-    let _ = std::io::stderr().write_all(MESSAGE);
+    let mut err = std::io::stderr();
+    let parts = [
+        "zerkalo was built for a processor with ",
+        lacking,
+        ", which this one lacks; cargo build --release on this machine builds it for this one\n",
+    ];
+    for part in parts {
+        // If nobody can read it, the exit status is all there is to say.
+        let _ = err.write_all(part.as_bytes());
+    }
     std::process::exit(1)
 }
