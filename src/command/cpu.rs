@@ -4,9 +4,10 @@
 //! so that a lesser one would stop with an illegal instruction in the middle of something.
 //! `is_x86_feature_detected!` does not help here: for a feature that the build assumes it answers
 //! true without looking. So the processor is asked directly, in code so plain (integers and calls
-//! into the standard library, which is compiled for the oldest processors) that nothing newer has a
-//! place in it. Under an emulator of older processors this was seen to work; should a compiler ever
-//! find such a place, the outcome is the illegal instruction that there would be without this.
+//! into the standard library) that nothing newer has a place in it. Under an emulator of older processors this was
+//! seen to work for builds for a named processor, such as x86-64-v3. In an optimised build for `native` the standard
+//! library is compiled anew for that processor, with what comes before `main`: there the outcome may be the illegal
+//! instruction that there would be without this.
 
 /// For each feature that the build assumes: looks at the bit by which the processor says that it has it.
 #[cfg(target_arch = "x86_64")]
