@@ -123,7 +123,7 @@ fn paths<L: Lanes>(c: &mut Criterion) {
     let scales = world.scales().to_vec();
     let mix = Mix { weights: vec![[1.0; 3]; scales.len()] };
     let estimator = Estimator::new(&scales, &mix, &Display::default());
-    let precision = "none".to_string();
+    let precision = "single".to_string();
     let header = Header { width: 160, height: 120, scales, seed: 1, precision };
     let mut film = Film::new(header);
     let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first: 0, count: 16 });
@@ -176,7 +176,7 @@ fn wave(c: &mut Criterion) {
             height: 480,
             scales,
             seed: 1,
-            precision: world.lanes().to_string(),
+            precision: world.precision().to_string(),
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
         let film = Film::new(header.clone());

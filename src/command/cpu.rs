@@ -3,13 +3,13 @@
 //! The build names a processor (see `.cargo/config.toml`) and the compiler uses all that it has everywhere,
 //! so that a lesser one would stop with an illegal instruction in the middle of something.
 //! `is_x86_feature_detected!` does not help here: for a feature that the build assumes it answers
-//! true without looking. So the processor is asked directly, in code so plain (integers and calls
-//! into the standard library) that nothing newer has a place in it. Under an emulator of older processors this was
-//! seen to work for builds for a named processor, such as x86-64-v3. In an optimised build for `native` the standard
-//! library is compiled anew for that processor, with what comes before `main`: there the outcome may be the illegal
-//! instruction that there would be without this.
+//! true without looking. So the processor is asked directly, in plain code.
+//!
+//! This is promised for builds for a named processor, such as x86-64-v3, and was seen to work under an emulator of older
+//! ones. In an optimised build for `native` the standard library is compiled anew with what comes before `main`, and
+//! the illegal instruction may be there already.
 
-/// For each feature that the build assumes: looks at the bit by which the processor says that it has it.
+/// For each of these features that the build assumes: looks at the bit by which the processor says that it has it.
 #[cfg(target_arch = "x86_64")]
 macro_rules! need {
     ($($name:literal $register:ident $bit:literal)*) => {
@@ -28,7 +28,7 @@ pub fn require() {
     // Bits: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 2A, CPUID; AMD64
     // Architecture Programmer's Manual, volume 3, appendix E (those of leaf 8000_0001).
     let none = CpuidResult { eax: 0, ebx: 0, ecx: 0, edx: 0 };
-    // By bit 27 the operating system says that it keeps the wide registers: without, there is no AVX.
+    // Bit 27: the operating system lets programs ask which registers it keeps. Without, there is no AVX.
     let basic = __cpuid(1).ecx;
     let basic = if basic >> 27 & 1 == 1 { basic } else { basic & !(1 << 28) };
     let seven = if __cpuid(0).eax >= 7 { __cpuid_count(7, 0) } else { none };
@@ -59,14 +59,11 @@ pub fn require() {}
 fn refuse(lacking: &str) -> ! {
     use std::io::Write;
     let mut err = std::io::stderr();
-    let parts = [
-        "zerkalo was built for a processor with ",
-        lacking,
-        ", which this one lacks; cargo build --release on this machine builds it for this one\n",
-    ];
-    for part in parts {
-        // If nobody can read it, the exit status is all there is to say.
-        let _ = err.write_all(part.as_bytes());
-    }
+    // If nobody can read it, the exit status is all there is to say.
+    let _ = err.write_all(b"zerkalo was built for a processor with ");
+    let _ = err.write_all(lacking.as_bytes());
+    let _ = err.write_all(
+        b", which this one lacks; \"cargo clean\" and \"cargo build --release\" build it for this one\n",
+    );
     std::process::exit(1)
 }

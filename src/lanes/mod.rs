@@ -152,7 +152,7 @@ pub trait Lanes:
 {
     /// Number of lanes.
     const WIDTH: usize;
-    /// Name for statistics and file headers, such as `f32x8`.
+    /// Name for statistics, such as `f32x8`.
     const NAME: &'static str;
     /// Distance from 1 to the next larger number of this precision.
     const EPSILON: f64 = Self::Scalar::EPSILON;

@@ -128,7 +128,7 @@ impl<L: Lanes> Tracer<'_, L> {
             }
         }
         // Which tile of several the rays were for, packets do not say; and what each is told must not depend on
-        // how many pixels share one.
+        // how many pixels share one. Of glossy lobes tiles learn from their own packets, later.
         if let [counts] = counts {
             counts.rays += work.counts.rays;
             counts.glossy |= work.counts.glossy;

@@ -65,7 +65,7 @@ pub(super) struct Tracer<'a, L: Lanes> {
     pub(super) sampler: Sampler<L>,
     /// Radiance beyond this cannot be told from a fault, per group: 2^49 steps of the film.
     limits: [L; MAX_GROUPS],
-    /// The pixels of a tile that lies inside the picture, see [`blocks`].
+    /// The pixels of a tile that lies inside the picture, see [`pixels_of`].
     whole: Vec<u8>,
 }
 
@@ -79,7 +79,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             world,
             sampler: Sampler::new(*sampling, world.jitter()),
             limits,
-            whole: blocks([TILE; 2]),
+            whole: pixels_of([TILE; 2]),
         }
     }
 
@@ -96,7 +96,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         let pixels = if tile.extent() == [TILE; 2] {
             &self.whole
         } else {
-            part = blocks(tile.extent());
+            part = pixels_of(tile.extent());
             &part
         };
         let place = |pixel: &u8| {
@@ -106,7 +106,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         let sites = self.sites(replicate, pixels.iter().map(place));
         let (mut index, end) = (job.first, job.first + job.count);
         while index < end {
-            let count = block(index, end, L::WIDTH);
+            let count = together(index, end, L::WIDTH);
             match count {
                 _ if count == L::WIDTH => {
                     let points = self.sampler.block(index, count);
@@ -120,7 +120,8 @@ impl<'a, L: Lanes> Tracer<'a, L> {
                 1 => self.share::<1>(tile, &mut work, &sites, pixels, index),
                 2 => self.share::<2>(tile, &mut work, &sites, pixels, index),
                 4 => self.share::<4>(tile, &mut work, &sites, pixels, index),
-                _ => self.share::<8>(tile, &mut work, &sites, pixels, index),
+                8 => self.share::<8>(tile, &mut work, &sites, pixels, index),
+                _ => unreachable!("packets are narrower than 32"),
             }
             index += count as u32;
         }
@@ -292,7 +293,7 @@ impl<L: Lanes> Work<L> {
 
 /// How many of the samples `first..end` of a pixel come next in one packet: a power of two that divides `first`, at
 /// most `width`.
-fn block(first: u32, end: u32, width: usize) -> usize {
+fn together(first: u32, end: u32, width: usize) -> usize {
     let aligned = first | width as u32;
     1 << aligned.trailing_zeros().min((end - first).ilog2())
 }
@@ -306,7 +307,7 @@ fn first_lanes<L: Lanes>(count: usize) -> L::Mask {
     lanes.gt(L::zero())
 }
 
-/// The pixels of a tile, row by row in numbers, in Morton order: those that share a packet are neighbours in
+/// The pixels of a tile (numbers count row by row) in Morton order: those that share a packet are neighbours in
 /// the picture, 2 x 1, 2 x 2, 4 x 2 or 4 x 4 of them.
 const ORDER: [u8; TILE_PIXELS] = {
     let mut order = [0; TILE_PIXELS];
@@ -325,7 +326,7 @@ const ORDER: [u8; TILE_PIXELS] = {
 };
 
 /// The pixels of a tile of the given extent, in [`ORDER`].
-fn blocks([width, height]: [usize; 2]) -> Vec<u8> {
+fn pixels_of([width, height]: [usize; 2]) -> Vec<u8> {
     let inside = |p: &u8| usize::from(*p) % TILE < width && usize::from(*p) / TILE < height;
     ORDER.into_iter().filter(inside).collect()
 }

@@ -20,12 +20,12 @@ pub(super) struct Sites<S> {
 }
 
 impl<S: Real> Sites<S> {
-    /// Of the first [`TILE_PIXELS`] of `pixels`, in one replicate.
+    /// Of `pixels`, in one replicate.
     pub fn new<L: Lanes<Scalar = S>>(
         view: &View,
         sampler: &Sampler<L>,
         replicate: usize,
-        pixels: impl Iterator<Item = (u32, u32)>,
+        mut pixels: impl Iterator<Item = (u32, u32)>,
     ) -> Self {
         let mut out = Self {
             count: 0,
@@ -34,10 +34,11 @@ impl<S: Real> Sites<S> {
             keys: [0; TILE_PIXELS],
             toward: [[S::default(); TILE_PIXELS]; 3],
         };
-        for ((x, y), at) in out.x.iter_mut().zip(&mut out.y).zip(pixels) {
+        for ((x, y), at) in out.x.iter_mut().zip(&mut out.y).zip(pixels.by_ref()) {
             (*x, *y) = at;
             out.count += 1;
         }
+        debug_assert!(pixels.next().is_none(), "more than {TILE_PIXELS} pixels");
         let Some(last) = out.count.checked_sub(1) else { return out };
         let full = out.count.next_multiple_of(L::WIDTH);
         let (x, y) = (out.x[last], out.y[last]);

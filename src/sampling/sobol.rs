@@ -194,12 +194,12 @@ mod tests {
         }
     }
 
-    /// Eight aligned points are one point XOR eight constants: what the packets rely on.
+    /// Sixteen aligned points are one point XOR sixteen constants: what the packets rely on.
     #[test]
     fn aligned_points_are_one_point_and_constants() {
         for d in 0..DIMENSIONS {
-            for i in [0u32, 8, 4096, 0xffff_fff8, 0x1234_5678] {
-                for low in 0..8 {
+            for i in [0u32, 16, 4096, 0xffff_fff0, 0x1234_5670] {
+                for low in 0..16 {
                     assert_eq!(point(d, i | low), point(d, i) ^ point(d, low));
                 }
             }

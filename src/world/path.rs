@@ -311,15 +311,14 @@ impl<L: Lanes> World<L> {
             if self.shadows {
                 counts.rays += u64::from(lit.bits().count_ones());
                 let ray = Ray { origin: start, direction: arrival.towards };
-                let blocked = match self.light_buffers.get(number) {
-                    Some(Some(buffer)) if !PLAIN => {
-                        let on = (met.item, met.front);
-                        buffer.blocked(&self.geometry, &ray, on, arrival.distance, lit, shading)
-                    }
-                    _ if PLAIN => {
-                        self.geometry.blocked_by_listed(&ray, arrival.distance, lit, shading)
-                    }
-                    _ => self.geometry.blocked(&ray, arrival.distance, lit, shading),
+                let within = arrival.distance;
+                let blocked = if PLAIN {
+                    self.geometry.blocked_by_listed(&ray, within, lit, shading)
+                } else if let Some(Some(buffer)) = self.light_buffers.get(number) {
+                    let on = (met.item, met.front);
+                    buffer.blocked(&self.geometry, &ray, on, within, lit, shading)
+                } else {
+                    self.geometry.blocked(&ray, within, lit, shading)
                 };
                 lit = lit.and_not(blocked);
                 if lit.none() {

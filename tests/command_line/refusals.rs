@@ -82,7 +82,7 @@ fn every_bad_scene_has_status_1_and_names_its_file() {
 /// What happens on a processor that lacks what the program was built for, under an emulator.
 #[cfg(target_arch = "x86_64")]
 #[test]
-#[ignore = "needs qemu-x86_64 (Debian: qemu-user)"]
+#[ignore = "needs qemu-x86_64 (Debian: qemu-user); promised only with RUSTFLAGS=\"-C target-cpu=x86-64-v3\""]
 fn an_old_processor_gets_a_message() {
     for (model, lacking) in [("Westmere", "avx"), ("SandyBridge", "avx2")] {
         let mut command = Command::new("qemu-x86_64");
