@@ -52,11 +52,12 @@ impl Curve {
     /// The exact code, rounded to 8 bits, of linear light 0..=1.
     #[inline]
     pub fn code_8(&self, linear: f64) -> u8 {
-        let code = self.code(linear);
-        if (code.fract() - 0.5).abs() <= MAX_ERROR_CODES {
+        let above = self.code(linear) + 0.5;
+        let nearest = above.floor();
+        if (above - nearest - 0.5).abs() >= 0.5 - MAX_ERROR_CODES {
             return quantised_8(255.0 * srgb_from_linear(linear));
         }
-        quantised_8(code)
+        nearest as u8
     }
 }
 

@@ -57,7 +57,13 @@ impl Display {
     /// Radiance to sRGB codes, rounded to 8 bits: the same as rounding [`Display::codes`], but several
     /// times as fast.
     pub fn codes_8(&self, radiance: [f64; 3]) -> [u8; 3] {
-        self.shown(radiance).map(|c| Curve::shared().code_8(c))
+        self.to_8()(radiance)
+    }
+
+    /// [`Display::codes_8`] for many pixels.
+    pub fn to_8(&self) -> impl Fn([f64; 3]) -> [u8; 3] + use<> {
+        let (tone, factor, curve) = (self.tone, self.exposure_factor(), Curve::shared());
+        move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.code_8(c))
     }
 
     /// Radiance to linear light of the display, 0..=1.

@@ -65,14 +65,17 @@ impl Sums<'_> {
     }
 
     /// Radiance, or black without samples; `per_unit` from [`Mix::per_unit`].
+    #[inline(always)]
     pub fn mean(&self, part: Part, per_unit: &[f64]) -> [f64; 3] {
         let count = self.count(part);
         if count == 0 {
             return [0.0; 3];
         }
         let mut sum = [0.0; 3];
-        for (i, factor) in per_unit.iter().enumerate() {
-            sum[i % 3] += self.value(part, i) * factor;
+        for (group, factors) in per_unit.chunks_exact(3).enumerate() {
+            for c in 0..3 {
+                sum[c] += self.value(part, 3 * group + c) * factors[c];
+            }
         }
         sum.map(|s| s / f64::from(count))
     }

@@ -75,10 +75,11 @@ fn pixels(picture: &Picture) -> Vec<u8> {
         Depth::Sixteen => 2,
     };
     let mut bytes = Vec::with_capacity(film.width() * film.height() * 3 * bytes_per_channel);
+    let to_8 = picture.display.to_8();
     for y in 0..film.height() {
         film.row(y, Part::Both, picture.mix, &mut row);
         match picture.depth {
-            Depth::Eight => bytes.extend(row.iter().flat_map(|rgb| picture.display.codes_8(*rgb))),
+            Depth::Eight => row.iter().for_each(|rgb| bytes.extend(to_8(*rgb))),
             Depth::Sixteen => bytes.extend(
                 row.iter()
                     .flat_map(|rgb| picture.display.codes(*rgb))

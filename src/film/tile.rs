@@ -250,8 +250,10 @@ fn on_lattice(pixel: usize, step_px: usize) -> bool {
 /// The pixels of a tile that a lattice of `step_px` has and one of `before_px` has not (0: no lattice
 /// before), in row order. `step_px` divides 16.
 pub fn lattice_pixels(before_px: usize, step_px: usize) -> impl Iterator<Item = usize> {
-    (0..TILE_PIXELS)
-        .filter(move |p| on_lattice(*p, step_px) && (before_px == 0 || !on_lattice(*p, before_px)))
+    let lines = move || (0..TILE).step_by(step_px);
+    lines()
+        .flat_map(move |y| lines().map(move |x| y * TILE + x))
+        .filter(move |p| before_px == 0 || !on_lattice(*p, before_px))
 }
 
 #[cfg(test)]

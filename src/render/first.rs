@@ -2,7 +2,7 @@
 
 use super::pass::{Tracer, Work};
 use super::wave::{JobReport, Wave, WaveReport};
-use crate::film::{Film, Slot, TILE, Tile, lattice_pixels};
+use crate::film::{Film, Slot, TILE, TILE_PIXELS, Tile, lattice_pixels};
 use crate::lanes::Lanes;
 use crate::sampling::SampleSettings;
 use crate::world::{AnyWorld, Counts, Outlook, World};
@@ -103,7 +103,7 @@ impl<L: Lanes> Tracer<'_, L> {
         (before, step): (usize, usize),
         counts: &mut [Counts],
     ) {
-        let mut pixels = Vec::new();
+        let mut pixels = Vec::with_capacity(TILE_PIXELS);
         for (t, (origin, tile)) in tiles.iter().enumerate() {
             let extent = tile.extent();
             let inside = |p: &usize| p % TILE < extent[0] && p / TILE < extent[1];

@@ -66,9 +66,9 @@ impl Work {
         self.samples = f64::from(counts[0] + counts[1]);
         self.version += 1;
         let radiance = support::picture(&self.rendering, Part::Both);
-        let display = Display::default();
+        let to_8 = Display::default().to_8();
         let [width, height] = [PICTURE.width, 2 * PICTURE.height].map(usize::from);
-        let raster = Raster::from_fn(width, height, |i| display.codes_8(radiance[i]));
+        let raster = Raster::from_fn(width, height, |i| to_8(radiance[i]));
         self.cells.reset();
         let picture = PictureCells::new(&raster, Colors::True, self.done);
         for (cell, at) in picture.cells.iter().zip(PICTURE.positions()) {

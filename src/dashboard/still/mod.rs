@@ -139,7 +139,7 @@ impl Still {
     pub fn read(path: &Path, display: &Display, window: &Window) -> Result<Self, String> {
         let (size, pixels) = if path.extension().is_some_and(|e| e == "exr") {
             let picture = read_exr(path)?;
-            (picture.size, picture.pixels.iter().map(|p| display.codes_8(*p)).collect())
+            (picture.size, picture.pixels.iter().copied().map(display.to_8()).collect())
         } else {
             read_png(path)?
         };

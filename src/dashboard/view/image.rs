@@ -181,10 +181,8 @@ fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [
 
 /// Radiance as displayed.
 fn shown(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 2]) -> Raster {
-    // The exposure is the same for all: its power is taken once.
-    let factor = display.exposure_factor();
-    let display = Display { exposure_ev: 0.0, ..*display };
-    Raster::from_fn(width, height, |i| display.codes_8(radiance[i].map(|c| f64::from(c) * factor)))
+    let to_8 = display.to_8();
+    Raster::from_fn(width, height, |i| to_8(radiance[i].map(f64::from)))
 }
 
 /// For the moment after the terminal's size has changed: the raster stretched.
