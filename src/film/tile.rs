@@ -154,7 +154,10 @@ impl Tile {
         let (word, bit) = (&mut self.written[replicate][pixel / 64], 1 << (pixel % 64));
         if *word & bit == 0 {
             *word |= bit;
-            sums.fill(0);
+            match &mut *sums {
+                [r, g, b] => (*r, *g, *b) = (0, 0, 0),
+                several => several.fill(0),
+            }
         }
         sums
     }
@@ -189,11 +192,11 @@ impl Tile {
     #[inline(always)]
     pub fn add_group(&mut self, replicate: usize, pixel: usize, group: usize, values: [i64; 3]) {
         let sums = &mut self.pixel_mut(replicate, pixel)[3 * group..][..3];
-        let mut overflowed = false;
-        for (sum, value) in sums.iter_mut().zip(values) {
-            overflowed |= add_saturating(sum, value);
-        }
-        self.saturated |= overflowed;
+        // Of numbers that are not negative, a sum that does not fit is.
+        let new = [0, 1, 2].map(|c| sums[c].wrapping_add(values[c]));
+        let fit = new[0] | new[1] | new[2] >= 0;
+        sums.copy_from_slice(&if fit { new } else { new.map(at_most_the_largest) });
+        self.saturated |= !fit;
     }
 
     /// Number of channel sums that have reached the largest value a sum can have.
@@ -233,12 +236,10 @@ impl Tile {
     }
 }
 
-/// Adds; at the limit the sum stays there, and the answer is true.
-#[inline(always)]
-fn add_saturating(sum: &mut i64, value: i64) -> bool {
-    let (wrapped, overflowed) = sum.overflowing_add(value);
-    *sum = if overflowed { i64::MAX } else { wrapped };
-    overflowed
+/// A sum that has wrapped around stays at the limit.
+#[cold]
+fn at_most_the_largest(sum: i64) -> i64 {
+    if sum < 0 { i64::MAX } else { sum }
 }
 
 #[inline(always)]

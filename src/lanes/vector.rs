@@ -1,6 +1,6 @@
 //! The vector instances, over the types of the `wide` crate.
 
-use super::{Bits, Lanes, MAX_WIDTH, Mask, ROUNDER, round_i64};
+use super::{Bits, Lanes, MAX_WIDTH, Mask, ROUNDER};
 use wide::bytemuck::cast;
 use wide::{f32x4, f32x8, f64x2, f64x4, i32x4, i32x8, i64x4, u32x4, u32x8};
 #[cfg(target_feature = "avx512f")]
@@ -239,9 +239,15 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {
+                // By fours, as above: of single numbers the compiler makes scattered stores.
+                let (scale, rounder) = (f64x4::splat(scale), f64x4::splat(ROUNDER));
                 let mut each = [0; MAX_WIDTH];
-                for (each, x) in each.iter_mut().zip(self.as_array()) {
-                    *each = round_i64(f64::from(*x) * scale);
+                let fours = self.as_array().chunks_exact(4);
+                for (each, four) in each.chunks_exact_mut(4).zip(fours) {
+                    let x = f64x4::new(std::array::from_fn(|i| f64::from(four[i])));
+                    let bits = cast::<f64x4, i64x4>(x * scale + rounder);
+                    let rounded = bits - i64x4::splat(ROUNDER.to_bits() as i64);
+                    each.copy_from_slice(&rounded.to_array());
                 }
                 each
             }

@@ -222,10 +222,10 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     ) {
         for (group, scale) in self.world.scales().iter().enumerate() {
             let value = radiance.groups[group];
-            let [x, y, z] = [value.x, value.y, value.z].map(|channel| channel.fixed(*scale));
+            let (x, y, z) = (value.x.fixed(*scale), value.y.fixed(*scale), value.z.fixed(*scale));
             let sums = x.chunks_exact(COUNT).zip(y.chunks_exact(COUNT)).zip(z.chunks_exact(COUNT));
             for (pixel, ((x, y), z)) in pixels.iter().zip(sums) {
-                put(pixel, group, [x, y, z].map(|lanes| lanes.iter().sum()));
+                put(pixel, group, [x.iter().sum(), y.iter().sum(), z.iter().sum()]);
             }
         }
     }

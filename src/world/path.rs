@@ -208,20 +208,24 @@ impl<L: Lanes> World<L> {
         active: L::Mask,
     ) -> Option<Met<L>> {
         let (item, here) = first_tag(hit.item, active)?;
-        let met = self.face::<PLAIN>(ray, hit, item, here);
         let others = active.and_not(here);
-        Some(if others.none() { met } else { self.meet_others::<PLAIN>(ray, hit, others, met) })
+        Some(if others.none() {
+            self.face::<PLAIN>(ray, hit, item, here)
+        } else {
+            self.meet_several::<PLAIN>(ray, hit, (item, here), others)
+        })
     }
 
-    /// Adds to `met` the surfaces of lanes that met another item than the first.
+    /// The surfaces of lanes that met several items.
     #[inline(never)]
-    fn meet_others<const PLAIN: bool>(
+    fn meet_several<const PLAIN: bool>(
         &self,
         ray: &Ray<L>,
         hit: &Hit<L>,
+        (first, here): (u32, L::Mask),
         mut left: L::Mask,
-        mut met: Met<L>,
     ) -> Met<L> {
+        let mut met = self.face::<PLAIN>(ray, hit, first, here);
         while let Some((item, here)) = first_tag(hit.item, left) {
             met.take(here, &self.face::<PLAIN>(ray, hit, item, here));
             left = left.and_not(here);
