@@ -2,12 +2,16 @@
 
 use super::bad::BadSamples;
 use super::{BadSample, TILE};
+use crate::lanes::prefetch;
 
 /// Number of pixels in a tile.
 pub const TILE_PIXELS: usize = TILE * TILE;
 
 /// The most light groups of a film.
 pub const MAX_FILM_GROUPS: usize = 16;
+
+/// Sums in a cache line.
+const CACHE_LINE: usize = 8;
 
 /// The sums of a pixel that has none.
 static NOTHING: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
@@ -170,6 +174,13 @@ impl Tile {
         }
         let start = (replicate * TILE_PIXELS + pixel) * self.stride;
         &self.sums[start..start + self.stride]
+    }
+
+    /// Begins to bring the sums of a replicate from memory; nothing waits for it.
+    pub fn prefetch(&self, replicate: usize) {
+        let start = replicate * TILE_PIXELS * self.stride;
+        let sums = &self.sums[start..start + TILE_PIXELS * self.stride];
+        sums.chunks(CACHE_LINE).for_each(|line| prefetch(&line[0]));
     }
 
     /// Every replicate and pixel whose sums can be other than zero.

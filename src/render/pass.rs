@@ -91,6 +91,8 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             tile.advance(replicate, job.count);
             return Counts::default();
         }
+        // Asked for now, they are there once the first samples are traced.
+        tile.prefetch(replicate);
         let mut work = Work::new(replicate, outlook);
         let part: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
