@@ -158,6 +158,7 @@ impl Tile {
         let (word, bit) = (&mut self.written[replicate][pixel / 64], 1 << (pixel % 64));
         if *word & bit == 0 {
             *word |= bit;
+            // Three stores for one group; a call for that few takes longer.
             match &mut *sums {
                 [r, g, b] => (*r, *g, *b) = (0, 0, 0),
                 several => several.fill(0),
