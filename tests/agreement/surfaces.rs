@@ -19,7 +19,7 @@ pub enum Piece {
     Side(DVec3, DVec3, f64, [f64; 2]),
 }
 
-/// Distance in lengths of the direction, and normal.
+/// Distance in lengths of the direction, and normal. What lies behind the origin need not be told.
 type Meeting = Option<(f64, DVec3)>;
 
 impl Piece {
@@ -63,18 +63,17 @@ impl Piece {
             }
             Self::Plane(point, normal) => [flat(*point, *normal, origin, direction), None],
             Self::Polygon(corners, normal) => {
+                // On the same side of all edges, whichever way they go around.
                 let inside = |p: DVec3| {
-                    let (mut left, mut right) = (true, true);
-                    for (i, a) in corners.iter().enumerate() {
-                        let b = corners[(i + 1) % corners.len()];
-                        let side = (b - a).cross(p - a).dot(*normal);
-                        left &= side >= 0.0;
-                        right &= side <= 0.0;
-                    }
-                    left || right
+                    let side = |i: usize| {
+                        let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);
+                        (b - a).cross(p - a).dot(*normal)
+                    };
+                    let edges = || 0..corners.len();
+                    edges().all(|i| side(i) >= 0.0) || edges().all(|i| side(i) <= 0.0)
                 };
                 let hit = flat(corners[0], *normal, origin, direction);
-                [hit.filter(|(t, _)| inside(origin + direction * *t)), None]
+                [hit.filter(|(t, _)| *t > 0.0 && inside(origin + direction * *t)), None]
             }
         }
     }
