@@ -1,6 +1,6 @@
 //! What tests of the dashboard share.
 
-use crate::film::Noise;
+use crate::film::{Mse, Noise};
 use crate::render::schedule::Spp;
 use crate::render::session::{QUALITIES, Report, State};
 
@@ -20,6 +20,7 @@ pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
             rmse_codes: codes,
             p95_codes: 2.0 * codes,
             worst_codes: 3.0 * codes,
+            effective_pixels: Mse { linear: 1e4, codes: 1e4 },
         }),
         eta_seconds: None,
         quality_seconds: [None; QUALITIES.len()],

@@ -13,12 +13,15 @@
 //! One pixel has a single degree of freedom and no meaningful estimate; a tile's is good to some 7 %
 //! if its pixels are alike, and a whole picture's to well under that.
 //!
-//! Who gives samples to the tiles with the largest estimates leaves behind those whose estimates are low
+//! A sampler that prefers the tiles with the largest estimates leaves behind those whose estimates are low
 //! by chance, and an estimate of the picture made of the same numbers is too low: by 2 % of the RMSE after
 //! 32 samples per pixel, by 5 % after 8. So a tile is estimated twice, each time from every other pixel,
-//! like a chessboard: the black ones guide the samples, the white ones tell the error. Their samples are
+//! like a chessboard: the black ones guide the samples, the white ones give the reported error. Their samples are
 //! independent. But they are half as many, and of a small picture the estimate from all pixels may be the
-//! better one: the larger of the two is told.
+//! better one: the larger of the two is reported.
+//!
+//! The error of a sparse picture (stars, hairlines) sits in few pixels. Its estimate is as uncertain as those are few,
+//! by 1 / sqrt(2 k) of the RMSE for k effective pixels, and so is the true error itself.
 
 use super::TILE;
 use super::curve::Curve;
@@ -37,6 +40,10 @@ pub struct Mse {
 }
 
 impl Mse {
+    /// Squares ([`TileNoise::squares`]) of an error that sits in more pixels than there are.
+    #[cfg(test)]
+    pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
+
     fn add(&mut self, weight: f64, other: Self) {
         self.linear += weight * other.linear;
         self.codes += weight * other.codes;
@@ -50,6 +57,9 @@ pub struct TileNoise {
     pub told: Mse,
     /// To decide by, from other pixels.
     pub guide: Mse,
+    /// Sum over the pixels of the square of each one's squared error, which is summed over its channels. Shows in how
+    /// many pixels the error sits.
+    pub squares: Mse,
     /// Pixels of the tile inside the picture.
     pub pixels: u32,
 }
@@ -98,7 +108,7 @@ impl Estimator {
         let (per_sum_a, per_sum_b) = (per_sum(n), per_sum(m));
         let (share_a, spread) = (n / (n + m), (n * m).sqrt() / (n + m));
         let [width, height] = tile.extent();
-        let mut halves = [Mse::default(); 2];
+        let (mut halves, mut squares) = ([Mse::default(); 2], Mse::default());
         for y in 0..height {
             for x in 0..width {
                 let pixel = y * TILE + x;
@@ -109,7 +119,7 @@ impl Estimator {
                 }
                 let d = [0, 1, 2].map(|c| spread * (a[c] - b[c]));
                 let half = &mut halves[(x + y) % 2];
-                half.linear += d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                let linear = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
                 let mean = [0, 1, 2].map(|c| b[c] + share_a * (a[c] - b[c]));
                 let (a, b) = if n == m {
                     (a, b)
@@ -118,10 +128,13 @@ impl Estimator {
                     (beside(1.0), beside(-1.0))
                 };
                 let (mean, a, b) = (self.codes(mean), self.codes(a), self.codes(b));
+                let mut codes = 0.0;
                 for c in 0..3 {
                     let (to_a, to_b) = (a[c] - mean[c], b[c] - mean[c]);
-                    half.codes += 0.5 * (to_a * to_a + to_b * to_b);
+                    codes += 0.5 * (to_a * to_a + to_b * to_b);
                 }
+                half.add(1.0, Mse { linear, codes });
+                squares.add(1.0, Mse { linear: linear * linear, codes: codes * codes });
             }
         }
         let pixels = width * height;
@@ -132,7 +145,7 @@ impl Estimator {
         // A single pixel does both.
         let black = over(halves[0], pixels.div_ceil(2));
         let white = if pixels > 1 { over(halves[1], pixels / 2) } else { black };
-        Some(TileNoise { told: white, guide: black, pixels: pixels as u32 })
+        Some(TileNoise { told: white, guide: black, squares, pixels: pixels as u32 })
     }
 
     #[inline(always)]
@@ -177,18 +190,23 @@ pub struct Noise {
     pub p95_codes: f64,
     /// The largest of a tile, in codes.
     pub worst_codes: f64,
+    /// Pixels that an evenly spread error of the same size and spread would sit in: the square of the sum over the
+    /// sum of squares of the pixels' squared errors (Kish's effective sample size). 0 without any error.
+    pub effective_pixels: Mse,
 }
 
 impl Noise {
     /// From the estimates of all tiles; `None` if there are none or one is missing.
     pub fn of_tiles(tiles: impl IntoIterator<Item = Option<TileNoise>>) -> Option<Self> {
         let (mut told, mut all, mut pixels) = (Mse::default(), Mse::default(), 0.0);
+        let mut squares = Mse::default();
         let mut of_tiles = Vec::new();
         for tile in tiles {
             let tile = tile?;
             let weight = f64::from(tile.pixels);
             told.add(weight, tile.told);
             all.add(weight, tile.of_all());
+            squares.add(1.0, tile.squares);
             pixels += weight;
             of_tiles.push(tile.of_all().codes);
         }
@@ -197,11 +215,21 @@ impl Noise {
         let (_, p95, _) = of_tiles.select_nth_unstable_by(rank, f64::total_cmp);
         let p95_codes = p95.sqrt();
         let worst = of_tiles.iter().copied().fold(0.0, f64::max);
+        // The sums over the picture are means over the three channels, the squares are of sums over them.
+        let effective = |sum: f64, squares: f64| {
+            let sum = 3.0 * sum;
+            if squares > 0.0 { sum * sum / squares } else { 0.0 }
+        };
+        let effective_pixels = Mse {
+            linear: effective(all.linear, squares.linear),
+            codes: effective(all.codes, squares.codes),
+        };
         Some(Self {
             rmse_linear: (told.linear.max(all.linear) / pixels).sqrt(),
             rmse_codes: (told.codes.max(all.codes) / pixels).sqrt(),
             p95_codes,
             worst_codes: worst.sqrt(),
+            effective_pixels,
         })
     }
 }

@@ -201,7 +201,13 @@ fn unequal_counts_have_no_noise() {
     let noise = |film: &Film| film.noise(&white(1), &Display::default());
     assert_eq!(noise(&film), None);
     fill(&mut film, 3, |_, _, _| vec![1.0; 3]);
-    let zero = Noise { rmse_linear: 0.0, rmse_codes: 0.0, p95_codes: 0.0, worst_codes: 0.0 };
+    let zero = Noise {
+        rmse_linear: 0.0,
+        rmse_codes: 0.0,
+        p95_codes: 0.0,
+        worst_codes: 0.0,
+        effective_pixels: Mse::default(),
+    };
     assert_eq!(noise(&film), Some(zero));
     film.slots(&[1]).remove(0).open().advance(0, 1);
     assert_eq!(noise(&film), None);
@@ -251,7 +257,7 @@ fn a_lagging_replicate_still_has_an_estimate() {
 fn the_picture_sums_up_its_tiles() {
     let tile = |codes: f64, pixels| {
         let told = Mse { linear: 0.01, codes: codes * codes };
-        Some(TileNoise { told, guide: told, pixels })
+        Some(TileNoise { told, guide: told, squares: Mse::SPREAD, pixels })
     };
     let tiles = (1..=20).map(|i| tile(f64::from(i), 256)).chain([tile(7.0, 0)]);
     let noise = Noise::of_tiles(tiles).unwrap();
@@ -261,7 +267,8 @@ fn the_picture_sums_up_its_tiles() {
     // Of the estimates from half the pixels and from all the larger one counts.
     let of = |told: f64, guide: f64| {
         let mse = |x: f64| Mse { linear: x, codes: x };
-        let tile = TileNoise { told: mse(told), guide: mse(guide), pixels: 256 };
+        let tile =
+            TileNoise { told: mse(told), guide: mse(guide), squares: Mse::SPREAD, pixels: 256 };
         Noise::of_tiles([Some(tile)]).unwrap().rmse_codes
     };
     assert_eq!((of(4.0, 2.0), of(2.0, 6.0)), (2.0, 2.0));

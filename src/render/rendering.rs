@@ -176,6 +176,6 @@ impl Traced for Rendering {
             ((film.width() - x).min(TILE) * (film.height() - y).min(TILE)) as u32
         };
         let pixels: Vec<u32> = (0..film.tile_count()).map(pixels_of).collect();
-        Schedule::new(&pixels, film.tile_columns(), settings)
+        Schedule::new(&pixels, settings)
     }
 }

@@ -1,60 +1,90 @@
-//! Adaptive sampling: the next samples go where they lower the picture's error most per ray.
+//! Adaptive sampling: allocates the next samples where they lower the picture's error most per ray.
+//!
+//! A tile's expected error is calibrated by tiles like it. Tiles whose allocation estimates and sample counts are
+//! alike form a class; the class has the mean of its validation estimates, which come from other pixels and have taken
+//! part in no decision (cross-fitting, Chernozhukov et al. 2018). So an estimate that is low by chance starves no tile:
+//! a feature that only validation pixels show raises the error of all tiles that look as empty as its own. An
+//! estimate that is high by chance draws few samples that others should have.
 
 use super::tile::Tile;
 use super::{Criterion, FULL, PACKET, Schedule, to_packet};
 use crate::render::wave::Job;
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 
-/// A decision gives out about this share of the rays spent so far: small enough to correct itself,
-/// large enough for few barriers.
+/// Rays of one decision, as a share of the rays spent so far: small enough to correct itself, large enough for few
+/// barriers.
 const SHARE: f64 = 0.1;
-/// And at least so many blocks, or one for each tile of a picture that has fewer, so that all threads
-/// have work between two barriers.
+/// Share of a decision's rays that goes to the tiles with the fewest samples, whatever their estimates are. A feature
+/// that no sample has met leaves no trace in any estimate; this share finds it. Measured on 32 random sparse pictures
+/// (balls of a pixel, stars, hairlines, distant crowds; `tests/honesty`): the true error is 13 % above the reported one
+/// in the mean without it, 6 % with an eighth, 5 % with a quarter, which costs the mirror room 5 % more rays.
+pub(super) const EXPLORATION: f64 = 0.125;
+/// The fewest blocks of a decision; all tiles in a picture that has fewer. Every thread has work between two barriers.
 const MIN_BLOCKS: usize = 64;
-/// Once the best tiles have doubled their count (further an estimate does not reach), the others go
-/// on only as long as their gain is at least this share of what those would still give.
+/// Once the best tiles have doubled their count (an estimate reaches no further), the others go on only as long as
+/// their gain is at least this share of what those would still give.
 const WORTHWHILE: f64 = 0.25;
+/// Weight of a tile's own estimate against one validation estimate of its class.
+const OWN_WEIGHT: f64 = 0.25;
 
-/// A tile while samples are handed out.
-struct Bid {
+/// A block of samples that a tile could get next.
+struct Candidate {
     /// Expected fall of the summed squared error per ray.
     gain: f64,
+    /// Samples per replicate that the tile would have before the block.
+    count: u32,
     tile: usize,
 }
 
-impl PartialEq for Bid {
+impl PartialEq for Candidate {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
-impl Eq for Bid {}
-impl PartialOrd for Bid {
+impl Eq for Candidate {}
+impl PartialOrd for Candidate {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
-impl Ord for Bid {
-    /// By gain; the lower tile number first among equals, so that the order is always the same.
+impl Ord for Candidate {
+    /// By gain; among equals the tile with fewer samples, then the lower tile number, comes first.
     fn cmp(&self, other: &Self) -> Ordering {
-        self.gain.total_cmp(&other.gain).then(other.tile.cmp(&self.tile))
+        let fewer = other.count.cmp(&self.count).then(other.tile.cmp(&self.tile));
+        self.gain.total_cmp(&other.gain).then(fewer)
     }
 }
 
-/// The law by which one tile's error is expected to fall: `scale * n^(-2 slope)`.
+/// Model of how a tile's error falls with the samples per replicate: `scale * n^(-2 slope)`.
 #[derive(Clone, Copy)]
-struct Law {
+struct ErrorModel {
     scale: f64,
     slope: f64,
 }
 
-impl Law {
+impl ErrorModel {
     fn mse(&self, count: u32) -> f64 {
         self.scale * f64::from(count).powf(-2.0 * self.slope)
     }
+
+    /// The same slope through `mse` at `count`.
+    fn through(&self, count: u32, mse: f64) -> Self {
+        Self { scale: mse * f64::from(count).powf(2.0 * self.slope), ..*self }
+    }
 }
 
-/// The block that a tile with `count` samples per replicate gets next: about a quarter more, a power
+/// Error models of one tile from its two sets of pixels.
+struct TileModels {
+    allocation: ErrorModel,
+    validation: ErrorModel,
+}
+
+/// Tiles that are expected to be alike: octave of the sample count, half octave of the allocation estimate per sample
+/// (`None`: the estimate is 0).
+type Class = (u32, Option<i32>);
+
+/// Size of the block that a tile with `count` samples per replicate gets next: about a quarter of them, a power
 /// of two and at least a packet, so that blocks stay aligned to what makes the sequence even; or what is missing
 /// to such a block; before the first packet is full, as many again.
 fn block(count: u32) -> u32 {
@@ -67,98 +97,155 @@ fn block(count: u32) -> u32 {
     }
 }
 
+/// The sample counts of a decision while it is made.
+struct Allocation<'a> {
+    schedule: &'a Schedule,
+    counts: Vec<u32>,
+    /// Expected rays of the blocks given out.
+    spent: f64,
+    blocks: usize,
+    samples_left: u64,
+}
+
+impl Allocation<'_> {
+    /// Samples of the block that `tile` could get next; 0 where a cap or the mean count leaves none.
+    fn next_block(&self, tile: usize) -> u32 {
+        let (t, count) = (&self.schedule.tiles[tile], self.counts[tile]);
+        let affordable = u32::try_from(self.samples_left / u64::from(t.pixels)).unwrap_or(FULL);
+        block(count).min(self.schedule.cap(t).saturating_sub(count)).min(affordable)
+    }
+
+    fn rays(&self, tile: usize, samples: u32) -> f64 {
+        let t = &self.schedule.tiles[tile];
+        2.0 * f64::from(samples) * f64::from(t.pixels) * t.rays_per_sample()
+    }
+
+    fn give(&mut self, tile: usize, samples: u32) {
+        self.spent += self.rays(tile, samples);
+        self.samples_left -= u64::from(samples) * u64::from(self.schedule.tiles[tile].pixels);
+        self.blocks += 1;
+        self.counts[tile] += samples;
+    }
+
+    /// Gives one block each to the tiles with the fewest samples, for about `rays` rays.
+    fn explore(&mut self, rays: f64) {
+        let mut order: Vec<usize> = (0..self.counts.len()).collect();
+        order.sort_by_key(|tile| self.counts[*tile]);
+        for tile in order {
+            if self.spent >= rays {
+                break;
+            }
+            let samples = self.next_block(tile);
+            if samples > 0 {
+                self.give(tile, samples);
+            }
+        }
+    }
+
+    fn candidate(&self, tile: usize, model: &ErrorModel) -> Option<Candidate> {
+        let (count, samples) = (self.counts[tile], self.next_block(tile));
+        let fall = model.mse(count) - model.mse(count + samples);
+        let pixels = f64::from(self.schedule.tiles[tile].pixels);
+        let gain = fall * pixels / self.rays(tile, samples.max(1));
+        (samples > 0).then_some(Candidate { gain, count, tile })
+    }
+
+    fn into_jobs(self) -> Vec<Job> {
+        let jobs = self.counts.iter().zip(&self.schedule.tiles).zip(0..);
+        jobs.map(|((n, t), tile)| Job { tile, first: t.done, count: n - t.done })
+            .filter(|job| job.count > 0)
+            .collect()
+    }
+}
+
 impl Schedule {
     /// The jobs for the next decision once the floors are reached.
     pub(super) fn by_gain(&self) -> Vec<Job> {
         let criterion = self.settings.criterion;
         let pooled = [self.pooled_slope(false), self.pooled_slope(true)];
-        let own: Vec<Law> = self.tiles.iter().map(|t| law(t, criterion, pooled)).collect();
-        let guarded: Vec<Law> = (0..own.len()).map(|i| self.guarded(&own, i)).collect();
+        let models: Vec<TileModels> =
+            self.tiles.iter().map(|t| tile_models(t, criterion, pooled)).collect();
+        let expected = self.calibrated(&models);
 
-        let rays = |i: usize, samples: u32| {
-            2.0 * f64::from(samples)
-                * f64::from(self.tiles[i].pixels)
-                * self.tiles[i].rays_per_sample()
+        let mut allocation = Allocation {
+            schedule: self,
+            counts: self.tiles.iter().map(|t| t.done).collect(),
+            spent: 0.0,
+            blocks: 0,
+            samples_left: self.samples_left(),
         };
-        let mut count: Vec<u32> = self.tiles.iter().map(|t| t.done).collect();
-        let next = |i: usize, n: u32| block(n).min(self.cap(&self.tiles[i]).saturating_sub(n));
-        let bid = |tile: usize, n: u32| {
-            let samples = next(tile, n);
-            let fall = guarded[tile].mse(n) - guarded[tile].mse(n + samples);
-            let gain = fall * f64::from(self.tiles[tile].pixels) / rays(tile, samples);
-            (samples > 0).then_some(Bid { gain, tile })
-        };
-
         let budget = SHARE * self.rays as f64;
-        let mut samples_left = self.samples_left();
+        allocation.explore(EXPLORATION * budget);
+
         let over_picture = |rmse: f64| rmse * rmse * self.pixels() as f64;
         let mut error = over_picture(self.noise.map_or(0.0, |noise| criterion.of_picture(noise)));
         let target = self.target().filter(|(c, _)| *c == criterion);
         let enough = target.map_or(-1.0, |(_, target)| over_picture(target));
-        let mut heap: BinaryHeap<Bid> =
-            count.iter().enumerate().filter_map(|(i, n)| bid(i, *n)).collect();
+        let mut heap: BinaryHeap<Candidate> =
+            expected.iter().enumerate().filter_map(|(i, m)| allocation.candidate(i, m)).collect();
         let min_blocks = MIN_BLOCKS.min(heap.len());
-        let (mut spent, mut blocks, mut set_aside) = (0.0, 0, 0.0f64);
-        while let Some(Bid { gain, tile }) = heap.pop() {
-            let done = (spent >= budget || gain < WORTHWHILE * set_aside) && blocks >= min_blocks;
-            if done || (error <= enough && blocks > 0) {
+        let mut set_aside = 0.0f64;
+        while let Some(Candidate { gain, count, tile }) = heap.pop() {
+            let done = (allocation.spent >= budget || gain < WORTHWHILE * set_aside)
+                && allocation.blocks >= min_blocks;
+            if done || (error <= enough && allocation.blocks > 0) {
                 break;
             }
-            let n = count[tile];
-            let pixels = u64::from(self.tiles[tile].pixels);
-            let affordable = u32::try_from(samples_left / pixels).unwrap_or(FULL);
-            let samples = next(tile, n).min(affordable);
+            let samples = allocation.next_block(tile);
             if samples == 0 {
                 continue;
             }
-            if n + samples > 2 * self.tiles[tile].done {
+            if count + samples > 2 * self.tiles[tile].done {
                 set_aside = set_aside.max(gain);
                 continue;
             }
-            error -= (own[tile].mse(n) - own[tile].mse(n + samples)) * pixels as f64;
-            spent += rays(tile, samples);
-            samples_left -= u64::from(samples) * pixels;
-            blocks += 1;
-            count[tile] = n + samples;
-            heap.extend(bid(tile, n + samples));
+            let own = &models[tile].allocation;
+            error -=
+                (own.mse(count) - own.mse(count + samples)) * f64::from(self.tiles[tile].pixels);
+            allocation.give(tile, samples);
+            heap.extend(allocation.candidate(tile, &expected[tile]));
         }
-        let jobs = count.iter().zip(&self.tiles).zip(0..);
-        jobs.map(|((n, t), tile)| Job { tile, first: t.done, count: n - t.done })
-            .filter(|job| job.count > 0)
-            .collect()
+        allocation.into_jobs()
     }
 
-    /// The law of tile `i`, guarded against an estimate that is low by chance: a feature that no
-    /// sample has met yet leaves no error behind. A share of 1 / 8n of the mean of the eight
-    /// neighbours' errors is added, as if one in 8n samples had met what they meet.
-    fn guarded(&self, own: &[Law], i: usize) -> Law {
-        let (columns, rows) = (self.tiles_per_row, own.len() / self.tiles_per_row);
-        let (x, y) = (i % columns, i / columns);
-        let n = self.tiles[i].done.max(1);
-        let (mut sum, mut neighbours) = (0.0, 0.0);
-        for y in y.saturating_sub(1)..(y + 2).min(rows) {
-            for x in x.saturating_sub(1)..(x + 2).min(columns) {
-                let j = y * columns + x;
-                if j != i {
-                    sum += own[j].mse(n);
-                    neighbours += 1.0;
-                }
-            }
+    /// The expected error of each tile: the mean of its class's validation estimates, and of its own allocation
+    /// estimate with a small weight, which alone counts where a class has one tile and that looks empty otherwise.
+    fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
+        let variance =
+            |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);
+        let mut classes: BTreeMap<Class, (f64, f64)> = BTreeMap::new();
+        let class_of = |tile: &Tile, models: &TileModels| -> Class {
+            let own = variance(&models.allocation, tile);
+            (tile.done.ilog2(), (own > 0.0).then(|| (2.0 * own.log2()).floor() as i32))
+        };
+        for (tile, models) in self.tiles.iter().zip(models) {
+            let (sum, weight) = classes.entry(class_of(tile, models)).or_default();
+            *sum += f64::from(tile.pixels) * variance(&models.validation, tile);
+            *weight += f64::from(tile.pixels);
         }
-        let law = own[i];
-        let guard = sum / f64::max(neighbours, 1.0) / (8.0 * f64::from(n));
-        let scale = law.scale + guard * f64::from(n).powf(2.0 * law.slope);
-        Law { scale, ..law }
+        let calibrate = |(tile, models): (&Tile, &TileModels)| {
+            let (sum, weight) = classes[&class_of(tile, models)];
+            let own_weight = OWN_WEIGHT * f64::from(tile.pixels);
+            let own = own_weight * variance(&models.allocation, tile);
+            let mse = (own + sum) / (own_weight + weight) / f64::from(tile.done);
+            models.allocation.through(tile.done, mse)
+        };
+        self.tiles.iter().zip(models).map(calibrate).collect()
     }
 }
 
-/// The law through a tile's estimates, weighted by their counts. The earlier ones take part so that
-/// chance in the latest weighs less: a tile that is passed over because its estimate is low by chance
-/// leaves the estimate of the whole picture too low.
-fn law(tile: &Tile, criterion: Criterion, pooled: [f64; 2]) -> Law {
+/// Models through a tile's estimates, weighted by their counts. Estimates at lower counts take part so that chance in
+/// the latest one weighs less.
+fn tile_models(tile: &Tile, criterion: Criterion, pooled: [f64; 2]) -> TileModels {
     let slope = tile.slope(criterion, pooled[usize::from(tile.glossy)]);
-    let (sum, weights) = tile.estimates(criterion).fold((0.0, 0.0), |(sum, weights), (n, mse)| {
-        (sum + n * mse * n.powf(2.0 * slope), weights + n)
-    });
-    Law { scale: sum / f64::max(weights, 1.0), slope }
+    let (mut sums, mut weights) = ([0.0; 2], 0.0);
+    for (n, mse) in tile.estimates(criterion) {
+        for (sum, mse) in sums.iter_mut().zip(mse) {
+            *sum += n * mse * n.powf(2.0 * slope);
+        }
+        weights += n;
+    }
+    let [allocation, validation] =
+        sums.map(|sum| ErrorModel { scale: sum / f64::max(weights, 1.0), slope });
+    TileModels { allocation, validation }
 }

@@ -25,11 +25,16 @@ use trend::Trend;
 /// below, they say little and cost as much as the samples. Sixteen would spend a third of the mirror
 /// room's samples, and two thirds of the reflecting tracks', on tiles without any noise.
 const FLOOR: u32 = 4;
+/// The same while the estimate of the picture's error rests on fewer than [`FEW_PIXELS`] effective pixels: such a picture
+/// is sparse or clean, and its features are found by samples, not by estimates.
+const SPARSE_FLOOR: u32 = PACKET;
+/// Effective pixels below which an estimate says little: with 16 its RMSE is uncertain by 18 % (1 / sqrt(2 k)).
+const FEW_PIXELS: f64 = 16.0;
 /// From so many on, samples are given in multiples of this, the width of the widest packets; only a tile's last block
 /// may be shorter. The same where packets are narrower: which samples a picture has must not depend on the processor.
 pub const PACKET: u32 = 16;
-/// Samples per replicate at which a tile is full: half of what a 32-bit index can count.
-const FULL: u32 = 1 << 31;
+/// Samples per replicate at which a tile is full: the most whose double, the count of both replicates, fits 32 bits.
+const FULL: u32 = (1 << 31) - PACKET;
 
 /// Samples that make `count` a multiple of a packet, if it is more than one: a picture that was to
 /// have fewer samples may have stopped inside one.
@@ -62,7 +67,6 @@ pub struct Spp {
 pub struct Schedule {
     settings: Settings,
     tiles: Vec<Tile>,
-    tiles_per_row: usize,
     /// The jobs decided last; both replicates get them.
     decided: Vec<Job>,
     estimate: bool,
@@ -80,11 +84,10 @@ pub struct Schedule {
 
 impl Schedule {
     /// For a picture whose tiles, row by row, have these numbers of pixels.
-    pub fn new(pixels: &[u32], tiles_per_row: usize, settings: Settings) -> Self {
+    pub fn new(pixels: &[u32], settings: Settings) -> Self {
         Self {
             settings,
             tiles: pixels.iter().map(|p| Tile::new(*p)).collect(),
-            tiles_per_row,
             decided: Vec::new(),
             estimate: false,
             replicate: 1,
@@ -228,11 +231,17 @@ impl Schedule {
     fn decide(&mut self) -> Vec<Job> {
         self.estimate = true;
         let common = self.common_count();
-        if common < FLOOR || !self.settings.adaptive {
+        if common < self.floor() || !self.settings.adaptive {
             self.uniform(common)
         } else {
             self.by_gain()
         }
+    }
+
+    /// Samples per replicate that every tile gets before an estimate is believed.
+    fn floor(&self) -> u32 {
+        let sparse = |noise: Noise| self.settings.criterion.effective_pixels(noise) < FEW_PIXELS;
+        if self.noise.is_some_and(sparse) { SPARSE_FLOOR } else { FLOOR }
     }
 
     /// Samples per replicate of the tiles that no cap holds back (of all if every one is capped).

@@ -25,6 +25,13 @@ impl Criterion {
             Self::Linear => noise.rmse_linear,
         }
     }
+
+    pub(super) fn effective_pixels(self, noise: Noise) -> f64 {
+        match self {
+            Self::Codes => noise.effective_pixels.codes,
+            Self::Linear => noise.effective_pixels.linear,
+        }
+    }
 }
 
 /// When to stop; whichever comes first. Nothing set: never.

@@ -1,7 +1,7 @@
 //! When the work is done, and how long it will take.
 
 use super::tile::Tile;
-use super::{Criterion, FLOOR, FULL, Schedule, StoppedBy};
+use super::{Criterion, FULL, Schedule, StoppedBy};
 
 impl Schedule {
     /// A lower and an upper guess of the seconds left until the first of the targets, `seconds` after
@@ -101,6 +101,7 @@ impl Schedule {
 
     /// Whether every tile has had its floor, so that the pooled error is to be believed.
     fn floors_reached(&self) -> bool {
-        self.tiles.iter().all(|t| t.done >= FLOOR.min(self.cap(t)))
+        let floor = self.floor();
+        self.tiles.iter().all(|t| t.done >= floor.min(self.cap(t)))
     }
 }

@@ -73,11 +73,12 @@ impl Tile {
         self.error.map_or(0.0, |(_, e)| criterion.of(e.told))
     }
 
-    /// The estimates to decide by, those on record and the latest: counts and mean squared errors.
-    pub fn estimates(&self, criterion: Criterion) -> impl Iterator<Item = (f64, f64)> {
+    /// The estimates on record and the latest: counts, and mean squared errors of the pixels for allocation and of those
+    /// for validation.
+    pub fn estimates(&self, criterion: Criterion) -> impl Iterator<Item = (f64, [f64; 2])> {
         let latest = self.error.filter(|e| self.history.last() != Some(e));
         let all = self.history.iter().copied().chain(latest);
-        all.map(move |(n, e)| (f64::from(n), criterion.of(e.guide)))
+        all.map(move |(n, e)| (f64::from(n), [e.guide, e.told].map(|mse| criterion.of(mse))))
     }
 
     /// The last doubling on record: counts and errors before and after.

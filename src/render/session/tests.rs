@@ -45,7 +45,7 @@ impl Double {
         assert_eq!(tile.counts()[wave.replicate], job.first, "each index once, in order");
         tile.advance(wave.replicate, job.count);
         let mse = Mse { codes: 1.0 / f64::from(job.first + 1), linear: 0.0 };
-        let error = TileNoise { told: mse, guide: mse, pixels: 256 };
+        let error = TileNoise { told: mse, guide: mse, squares: Mse::SPREAD, pixels: 256 };
         JobReport { rays: 1, glossy: false, error: wave.estimate.then_some(error) }
     }
 }
@@ -154,7 +154,7 @@ impl Traced for Double {
 
     fn schedule(&self, settings: Settings) -> Schedule {
         let pixels = vec![(TILE * TILE) as u32; self.film.tile_count()];
-        Schedule::new(&pixels, self.film.tile_columns(), settings)
+        Schedule::new(&pixels, settings)
     }
 }
 

@@ -25,9 +25,9 @@ fn mixed() -> Vec<Truth> {
 fn pieces_decide_nothing() {
     for adaptive in [false, true] {
         let settings = until(noise(0.6), adaptive);
-        let (whole, reason) = Model::exact(mixed(), 6).finish(settings);
+        let (whole, reason) = Model::exact(mixed()).finish(settings);
         for (tiles, longest) in [(1, PACKET), (5, 2 * PACKET), (100, 3 * PACKET)] {
-            let mut model = Model::exact(mixed(), 6);
+            let mut model = Model::exact(mixed());
             let mut schedule = model.schedule(settings);
             assert_eq!(in_pieces(&mut model, &mut schedule, tiles, longest), reason);
             let done = |s: &Schedule| s.tiles.iter().map(|t| t.done).collect::<Vec<_>>();
@@ -42,7 +42,7 @@ fn pieces_decide_nothing() {
 fn a_higher_aim_goes_on_where_the_lower_one_ended() {
     for adaptive in [false, true] {
         for low in [2, 6, 22, 50, 150] {
-            let mut model = Model::exact(mixed(), 6);
+            let mut model = Model::exact(mixed());
             let mut schedule = model.schedule(until(spp(low), adaptive));
             assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);
             assert_eq!(schedule.spp().mean, f64::from(low));
@@ -73,7 +73,7 @@ fn a_higher_aim_goes_on_where_the_lower_one_ended() {
 
 #[test]
 fn estimates_made_anew_replace_the_old_ones() {
-    let mut model = Model::exact(mixed(), 6);
+    let mut model = Model::exact(mixed());
     let mut schedule = model.schedule(until(noise(0.6), true));
     in_pieces(&mut model, &mut schedule, 100, FULL);
     let (before, samples) = (schedule.noise().unwrap(), schedule.samples());
@@ -99,7 +99,7 @@ fn estimates_made_anew_replace_the_old_ones() {
 
 #[test]
 fn a_cap_may_rise_and_fall() {
-    let mut model = Model::exact(mixed(), 6);
+    let mut model = Model::exact(mixed());
     let mut schedule = model.schedule(until(spp(100), false));
     schedule.set_rays_per_pixel(40);
     assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);

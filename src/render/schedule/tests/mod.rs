@@ -42,7 +42,6 @@ const NOISY: Truth = Truth { sigma: 40.0, slope: 0.5, glossy: true, rays_per_sam
 struct Model {
     truth: Vec<Truth>,
     pixels: Vec<u32>,
-    columns: usize,
     /// Samples per replicate of each tile.
     counts: [Vec<u32>; 2],
     /// Sums of the errors of `[replicate][tile][effective pixel]`, as random walks; empty: exact.
@@ -51,28 +50,30 @@ struct Model {
     waves: usize,
     /// Blocks of samples are to begin where packets do.
     aligned: bool,
+    /// Tiles whose error shows in validation pixels only.
+    hidden: Vec<usize>,
 }
 
 impl Model {
-    fn exact(truth: Vec<Truth>, columns: usize) -> Self {
+    fn exact(truth: Vec<Truth>) -> Self {
         let tiles = truth.len();
         Self {
             truth,
             pixels: vec![PIXELS; tiles],
-            columns,
             counts: [vec![0; tiles], vec![0; tiles]],
             walks: [vec![vec![]; tiles], vec![vec![]; tiles]],
             chance: Chance(1),
             waves: 0,
             aligned: true,
+            hidden: Vec::new(),
         }
     }
 
     /// Errors by chance, for slope 0.5: each tile's error sits in `effective` independent values.
-    fn random(truth: Vec<Truth>, columns: usize, effective: usize, seed: u64) -> Self {
+    fn random(truth: Vec<Truth>, effective: usize, seed: u64) -> Self {
         let tiles = truth.len();
         let walks = vec![vec![0.0; effective]; tiles];
-        Self { walks: [walks.clone(), walks], chance: Chance(seed), ..Self::exact(truth, columns) }
+        Self { walks: [walks.clone(), walks], chance: Chance(seed), ..Self::exact(truth) }
     }
 
     /// The estimate from A - B, if the film holds equally many of both.
@@ -80,7 +81,7 @@ impl Model {
         let n = f64::from(self.counts[0][tile]);
         let [a, b] = [&self.walks[0][tile], &self.walks[1][tile]];
         let mse = |codes: f64| Mse { codes, linear: codes * 1e-6 };
-        let [guide, told] = [0, 1].map(|half| {
+        let [mut guide, mut told] = [0, 1].map(|half| {
             if a.is_empty() {
                 return mse(self.true_mse(tile));
             }
@@ -88,7 +89,10 @@ impl Model {
             let squares: f64 = values.map(|(a, b)| ((a - b) / n).powi(2)).sum();
             mse(squares / 2.0 / a.len() as f64)
         });
-        TileNoise { told, guide, pixels: PIXELS }
+        if self.hidden.contains(&tile) {
+            (guide, told) = (mse(0.0), mse(2.0 * told.codes));
+        }
+        TileNoise { told, guide, squares: Mse::SPREAD, pixels: PIXELS }
     }
 
     /// The squared error that the picture (A + B) / 2 really has.
@@ -135,7 +139,7 @@ impl Model {
     }
 
     fn schedule(&self, settings: Settings) -> Schedule {
-        Schedule::new(&self.pixels, self.columns, settings)
+        Schedule::new(&self.pixels, settings)
     }
 
     /// Runs to the end (a nanosecond per ray); panics if it does not end.
@@ -173,5 +177,5 @@ fn clustered(tiles: usize, share: f64) -> Vec<Truth> {
 }
 
 fn model_of(truth: Truth) -> Model {
-    Model::exact(vec![truth; 25], 5)
+    Model::exact(vec![truth; 25])
 }

@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn waves_count_as_the_sequence_likes_it() {
-    let mut model = Model::exact(vec![NOISY; 4], 2);
+    let mut model = Model::exact(vec![NOISY; 4]);
     let mut schedule = model.schedule(until(spp(100), false));
     let mut seen = Vec::new();
     while let Step::Trace(wave) = schedule.next(0.0) {
@@ -26,7 +26,7 @@ fn waves_count_as_the_sequence_likes_it() {
 fn spp_rounds_up_to_even_and_even_two_samples_have_a_noise() {
     for (asked, given) in [(1, 2), (2, 2), (7, 8), (33, 34)] {
         for adaptive in [false, true] {
-            let mut model = Model::exact(vec![CALM; 9], 3);
+            let mut model = Model::exact(vec![CALM; 9]);
             let (schedule, reason) = model.finish(until(spp(asked), adaptive));
             assert_eq!(reason, StoppedBy::Spp);
             assert_eq!(schedule.spp().mean, f64::from(given), "{asked} adaptive {adaptive}");
@@ -43,7 +43,7 @@ fn spp_rounds_up_to_even_and_even_two_samples_have_a_noise() {
 #[test]
 fn caps_hold_for_glossy_tiles_only() {
     for adaptive in [false, true] {
-        let mut model = Model::exact(clustered(100, 0.5), 10);
+        let mut model = Model::exact(clustered(100, 0.5));
         model.truth.iter_mut().for_each(|t| t.sigma = 30.0);
         let settings = Settings { rays_per_pixel: 41, ..until(noise(1.0), adaptive) };
         let (schedule, reason) = model.finish(settings);
@@ -56,7 +56,7 @@ fn caps_hold_for_glossy_tiles_only() {
         );
 
         // All are glossy: nothing is left to do.
-        let mut model = Model::exact(vec![NOISY; 25], 5);
+        let mut model = Model::exact(vec![NOISY; 25]);
         let (schedule, reason) = model.finish(settings);
         assert_eq!((reason, schedule.spp().max), (StoppedBy::RaysPerPixel, 40));
         // A cap does not keep a count from being reached.
@@ -81,10 +81,10 @@ fn time_ends_the_work_with_both_replicates_alike() {
 
 #[test]
 fn time_is_overshot_by_little() {
-    for (tiles, columns) in [(1, 1), (12, 4), (400, 20)] {
+    for tiles in [1, 12, 400] {
         for adaptive in [false, true] {
             let stop = Stop { seconds: Some(0.5), ..Stop::default() };
-            let mut model = Model::exact(vec![NOISY; tiles], columns);
+            let mut model = Model::exact(vec![NOISY; tiles]);
             let (schedule, _) = model.finish(until(stop, adaptive));
             // At a nanosecond per ray.
             let seconds = schedule.rays() as f64 * 1e-9;
@@ -102,15 +102,16 @@ fn whichever_comes_first() {
 }
 
 #[test]
-fn a_picture_without_error_ends_at_the_floor() {
+fn clean_picture_ends_at_the_floor_of_sparse_ones() {
     let (schedule, reason) = model_of(CALM).finish(until(noise(0.5), true));
-    assert_eq!((reason, schedule.spp().max), (StoppedBy::Noise, 2 * FLOOR));
+    let spp = schedule.spp();
+    assert_eq!((reason, spp.min, spp.max), (StoppedBy::Noise, 2 * SPARSE_FLOOR, 2 * SPARSE_FLOOR));
 }
 
 #[test]
 fn cancelled_jobs_come_again() {
-    let mut model = Model::random(clustered(100, 0.5), 10, 16, 3);
-    let mut whole = Model::random(clustered(100, 0.5), 10, 16, 3);
+    let mut model = Model::random(clustered(100, 0.5), 16, 3);
+    let mut whole = Model::random(clustered(100, 0.5), 16, 3);
     let settings = until(spp(100), false);
     let (expected, _) = whole.finish(settings);
     let mut schedule = model.schedule(settings);
@@ -176,7 +177,7 @@ fn the_time_left_is_told_as_a_range_that_holds() {
 #[test]
 fn the_95th_percentile_is_that_of_tiles() {
     let truth = (0..100).map(|i| Truth { sigma: f64::from(i), ..NOISY }).collect();
-    let mut model = Model::exact(truth, 10);
+    let mut model = Model::exact(truth);
     let (schedule, _) = model.finish(until(spp(32), false));
     // Tile 94 is the 95th of 100: sigma 94 after 16 samples of each replicate.
     assert!((schedule.noise().unwrap().p95_codes - 94.0 / 32f64.sqrt()).abs() < 1e-9);

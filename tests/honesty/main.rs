@@ -1,8 +1,11 @@
 //! The error that the program tells is the error that is left, and the picture is not biased: shown
 //! on a scene whose every pixel is known in closed form, and on the mirror room.
 
+mod scenes;
+#[path = "../support/mod.rs"]
 mod support;
-#[path = "common/told.rs"]
+mod survey;
+#[path = "../common/told.rs"]
 mod told;
 
 use std::f64::consts::PI;

@@ -1,0 +1,216 @@
+//! The error that is reported against the error that is left, over random sparse and dense scenes, and the rays that
+//! an adaptive picture takes against those of a uniform one with the same true error.
+//!
+//! The short form runs with all tests. The long form prints a table of 200 scenes:
+//! `cargo test --test honesty survey -- --ignored --nocapture`.
+
+use crate::scenes::{Sample, scene};
+use crate::support::{begin, picture, pool, rendered, settings, trace};
+use zerkalo::film::{Display, Part};
+use zerkalo::render::Rendering;
+use zerkalo::render::schedule::{Schedule, Step, Stop, StoppedBy};
+use zerkalo::render::session::Traced;
+use zerkalo::world::Precision;
+
+/// Samples per pixel at which the survey ends a picture that has not reached its target.
+const LIMIT_SPP: u32 = 1024;
+
+fn codes(rendering: &Rendering) -> Vec<f64> {
+    let display = Display::default();
+    let radiance = picture(rendering, Part::Both);
+    radiance.iter().flat_map(|rgb| display.codes(*rgb)).collect()
+}
+
+/// A uniform picture of another seed with its own estimated error.
+struct Reference {
+    codes: Vec<f64>,
+    own: f64,
+}
+
+impl Reference {
+    fn new(sample: &Sample, count: u32) -> Self {
+        let rendering = rendered(&sample.scene, 987_654, Precision::Auto, count);
+        let own = rendering.film.noise(&rendering.mix, &Display::default()).unwrap().rmse_codes;
+        Self { codes: codes(&rendering), own }
+    }
+
+    /// True RMSE of a picture in 8-bit levels, without the error of the reference.
+    fn error(&self, rendering: &Rendering) -> f64 {
+        let got = codes(rendering);
+        let sum: f64 = got.iter().zip(&self.codes).map(|(g, r)| (g - r).powi(2)).sum();
+        (sum / got.len() as f64 - self.own * self.own).max(0.0).sqrt()
+    }
+}
+
+/// Follows a schedule; `each` sees every state between two decisions and returns whether to end.
+fn run(
+    sample: &Sample,
+    seed: u64,
+    adaptive: bool,
+    stop: Stop,
+    mut each: impl FnMut(&Rendering, &Schedule) -> bool,
+) -> (Rendering, Schedule, Option<StoppedBy>) {
+    let pool = pool(2);
+    let mut rendering = begin(&sample.scene, seed, Precision::Auto);
+    let mut schedule = rendering.schedule(settings(adaptive, 0, stop));
+    loop {
+        match schedule.next(0.0) {
+            Step::Rest(reason) => return (rendering, schedule, Some(reason)),
+            Step::Trace(wave) => {
+                let report = trace(&mut rendering, &wave, &pool);
+                schedule.complete(&wave, &report);
+                if wave.replicate == 1 && each(&rendering, &schedule) {
+                    return (rendering, schedule, None);
+                }
+            }
+        }
+    }
+}
+
+/// One scene of the survey.
+struct Outcome {
+    name: String,
+    /// True over reported RMSE of the adaptive picture.
+    ratio: f64,
+    /// Effective pixels of its error.
+    pixels: f64,
+    /// Rays over those of the uniform picture with the same true error.
+    rays: f64,
+}
+
+/// Rays at which a uniform picture has the error `wanted`, interpolated between its waves; those of the last wave
+/// where it does not come so far.
+fn uniform_rays(sample: &Sample, seed: u64, reference: &Reference, wanted: f64) -> f64 {
+    let stop = Stop { spp: Some(2 * LIMIT_SPP), noise_codes: Some(1e-9), ..Stop::default() };
+    let mut curve: Vec<(f64, f64)> = Vec::new();
+    run(sample, seed, false, stop, |rendering, schedule| {
+        curve.push((schedule.rays() as f64, reference.error(rendering)));
+        curve.last().is_some_and(|(_, error)| *error <= wanted)
+    });
+    match curve.as_slice() {
+        [.., (r0, e0), (r1, e1)] if e1 <= &wanted && e0 > e1 => {
+            let share = (e0 / wanted).ln() / (e0 / e1.max(1e-9)).ln();
+            r0 * (r1 / r0).powf(share)
+        }
+        [.., (rays, _)] => *rays,
+        [] => f64::NAN,
+    }
+}
+
+fn examine(number: u64, reference_count: u32) -> Outcome {
+    let sample = scene(number);
+    let reference = Reference::new(&sample, reference_count);
+    let target = [1.0, 0.5, 0.25][(number / 10 % 3) as usize];
+    let stop = Stop { noise_codes: Some(target), spp: Some(LIMIT_SPP), ..Stop::default() };
+    let (rendering, schedule, _) = run(&sample, number + 1, true, stop, |_, _| false);
+    let noise = schedule.noise().expect("an estimate");
+    let error = reference.error(&rendering);
+    let rays = schedule.rays() as f64 / uniform_rays(&sample, number + 1, &reference, error);
+    let (ratio, spp) = (error / noise.rmse_codes, schedule.spp());
+    println!(
+        "{:26} target {target:.2}: {:6.1} spp ({}..{}), reported {:.3}, true {error:.3}, true/reported {ratio:.3}, \
+         {:.0} effective pixels, rays {rays:.2} of uniform, reference {:.3}",
+        sample.name,
+        spp.mean,
+        spp.min,
+        spp.max,
+        noise.rmse_codes,
+        noise.effective_pixels.codes,
+        reference.own
+    );
+    Outcome { name: sample.name, ratio, pixels: noise.effective_pixels.codes, rays }
+}
+
+/// The true error agrees with the reported one within what few pixels leave uncertain (both are means of as many squares,
+/// each uncertain by 1 / sqrt(2 k)), and adaptivity costs at most half as many rays again as uniform sampling.
+fn assert_honest(outcomes: &[Outcome]) {
+    let mut scores = Vec::new();
+    for Outcome { name, ratio, pixels, rays } in outcomes.iter().filter(|o| o.pixels >= 16.0) {
+        let sigma = (1.0 / pixels + 0.03f64.powi(2)).sqrt();
+        let score = ratio.ln() / sigma;
+        assert!(score.abs() < 4.0, "{name}: true/reported {ratio}, {score:.1} standard deviations");
+        assert!(*rays <= 1.5, "{name}: {rays} times the rays of a uniform picture");
+        scores.push(score);
+    }
+    let count = scores.len() as f64;
+    let mean = scores.iter().sum::<f64>() / count;
+    let sigmas = mean * count.sqrt();
+    println!("{count} scenes: mean score {mean:.2}, {sigmas:.1} sigma");
+    assert!(mean.abs() < 1.0, "the mean of {count} scores is {mean}");
+}
+
+/// One scene of every kind.
+#[test]
+fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
+    let cheap = (0..40).filter(|number| number % 10 <= 5 || *number == 8 || *number == 9);
+    let outcomes: Vec<Outcome> = cheap.step_by(2).map(|number| examine(number, 1024)).collect();
+    assert_honest(&outcomes);
+}
+
+/// 200 scenes.
+#[test]
+#[ignore = "an hour: cargo test --test honesty survey -- --ignored --nocapture"]
+fn survey_of_200_scenes() {
+    let outcomes: Vec<Outcome> = (0..200).map(|number| examine(number, 4096)).collect();
+    let many = || outcomes.iter().filter(|o| o.ratio.is_finite());
+    let inside = many().filter(|o| (0.9..=1.15).contains(&o.ratio)).count();
+    let extreme = many().map(|o| o.ratio).fold(0.0, f64::max);
+    let dearest = many().map(|o| o.rays).fold(0.0, f64::max);
+    println!(
+        "{inside} of {} within 0.9 to 1.15, at most {extreme:.2}; at most {dearest:.2} times the uniform rays",
+        many().count()
+    );
+    assert_honest(&outcomes);
+}
+
+/// One white ball of about a pixel on a dark ground: its tile is noisy in validation pixels only.
+#[test]
+fn single_ball_ends_with_few_samples() {
+    let text = "
+        [film]\nsize = [160, 128]
+        [camera]\neye = [0.0, 0.0, 10.0]\ntarget = [0.0, 0.0, 0.0]\nview_angle.vertical = 40.0
+        [background]\ncolor = [0.01, 0.01, 0.01]
+        [ambient]\ncolor = [1.0, 1.0, 1.0]
+        [materials.white]\ncolor = [1.0, 1.0, 1.0]
+        [[object]]\nmaterial = \"white\"
+        shape.sphere = { center = [1.222713, -2.075768, 0.0], radius = 0.019905 }";
+    let sample = Sample { name: "single ball".into(), scene: crate::support::parsed(text) };
+    for seed in 0..6 {
+        let stop = Stop { noise_codes: Some(0.2), spp: Some(4 * LIMIT_SPP), ..Stop::default() };
+        let (_, uniform, reason) = run(&sample, seed, false, stop, |_, _| false);
+        assert_eq!(reason, Some(StoppedBy::Noise));
+        let (_, adaptive, reason) = run(&sample, seed, true, stop, |_, _| false);
+        assert_eq!(reason, Some(StoppedBy::Noise), "seed {seed}");
+        let [adaptive, uniform] = [&adaptive, &uniform].map(Schedule::rays);
+        assert!(
+            adaptive as f64 <= 1.5 * uniform as f64,
+            "seed {seed}: {adaptive} rays, uniform {uniform}"
+        );
+    }
+}
+
+/// The mean of a closed glossy room is the same with and without adaptivity: skewed noise in the estimates that decide
+/// biases no tile by more than its own chance.
+#[test]
+fn adaptive_mean_of_a_closed_room_is_unbiased() {
+    let mut sample = scene(7);
+    sample.scene.film.size = [64, 48];
+    let seeds = 60;
+    let mean_and_error = |adaptive: bool, spp: u32, first: u64| {
+        let mean_of = |seed: u64| {
+            let stop = Stop { spp: Some(spp), ..Stop::default() };
+            let (rendering, ..) = run(&sample, first + seed, adaptive, stop, |_, _| false);
+            let all = picture(&rendering, Part::Both);
+            all.iter().flatten().sum::<f64>() / (3 * all.len()) as f64
+        };
+        let means: Vec<f64> = (0..seeds).map(mean_of).collect();
+        let mean = means.iter().sum::<f64>() / seeds as f64;
+        let squares: f64 = means.iter().map(|m| (m - mean).powi(2)).sum();
+        (mean, (squares / (seeds * (seeds - 1)) as f64).sqrt())
+    };
+    let (adaptive, sigma) = mean_and_error(true, 16, 0);
+    let (uniform, sigma_uniform) = mean_and_error(false, 64, 1000);
+    let z = (adaptive - uniform) / sigma.hypot(sigma_uniform);
+    println!("adaptive {adaptive:.5}, uniform {uniform:.5}, z {z:.2}");
+    assert!(z.abs() < 3.0, "adaptive {adaptive}, uniform {uniform}: z {z}");
+}
