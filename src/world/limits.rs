@@ -211,7 +211,7 @@ mod tests {
         // Four reflections: 0.09^2 (1 + 0.9) / (1 - 0.09)
         assert_eq!(
             biases(&two),
-            ["depth 3 cuts longer paths (at most 1.69e-2 of the brightest surface)"]
+            ["depth 3 cuts longer paths (at most 1.70e-2 of the brightest surface)"]
         );
         let full = biases(&scene("[0.0, 0.0, 5.0]", &[(1.0, BALL), (1.0, FLOOR)])).concat();
         assert!(full.contains("no bound"), "{full}");
