@@ -5,7 +5,7 @@ mod view;
 
 pub use view::View;
 
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Checks, Fault, Field, Range, Takes, unit};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -185,7 +185,7 @@ impl Camera {
                 "a target away from the eye",
             ));
         };
-        let up = unit(DVec3::from_array(self.up))?;
+        let up = unit(self.up)?;
         // Within 1e-6 of parallel the picture's sides are noise.
         (view.cross(up).length() <= 1e-6).then(|| {
             Fault::new(
@@ -195,11 +195,6 @@ impl Camera {
             )
         })
     }
-}
-
-/// `v` with length 1, whatever its length; `None` if that is 0.
-fn unit(v: DVec3) -> Option<DVec3> {
-    (v / v.abs().max_element()).try_normalize()
 }
 
 #[cfg(test)]

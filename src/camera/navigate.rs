@@ -5,8 +5,8 @@
 //! coordinates, no distance left) leaves the old one. Turns are relative to `up`; the view never
 //! comes nearer to it than 0.1 degrees.
 
-use super::{Camera, ViewAngle, unit};
-use crate::value::{decade, rounded_to, significant};
+use super::{Camera, ViewAngle};
+use crate::value::{decade, rounded_to, significant, unit};
 use glam::DVec3;
 
 /// The steepest view up or down, in degrees above or below the plane across `up`.
@@ -19,7 +19,7 @@ impl Camera {
     /// has faults.
     pub fn frame(&self) -> [DVec3; 3] {
         let forward = self.view().unwrap_or(DVec3::NEG_Z);
-        let up = unit(DVec3::from_array(self.up)).unwrap_or(DVec3::Y);
+        let up = unit(self.up).unwrap_or(DVec3::Y);
         let right = forward.cross(up).try_normalize();
         let right = right.unwrap_or_else(|| forward.any_orthonormal_vector());
         [right, right.cross(forward), forward]
@@ -96,7 +96,7 @@ impl Camera {
             return self.clone();
         }
         let forward = self.frame()[2];
-        let up = unit(DVec3::from_array(self.up)).unwrap_or(DVec3::Y);
+        let up = unit(self.up).unwrap_or(DVec3::Y);
         let (sin, cos) = degrees.to_radians().sin_cos();
         // Rodrigues' rotation about the view direction.
         let rolled = up * cos + forward.cross(up) * sin + forward * (forward.dot(up) * (1.0 - cos));
@@ -152,7 +152,7 @@ impl Camera {
         if !(right.is_finite() && up.is_finite()) {
             return None;
         }
-        let axis = unit(DVec3::from_array(self.up)).unwrap_or(DVec3::Y);
+        let axis = unit(self.up).unwrap_or(DVec3::Y);
         let [side, _, forward] = self.frame();
         // Forward, but level.
         let ahead = axis.cross(side);

@@ -2,6 +2,7 @@
 
 use super::{Camera, ViewAngle};
 use crate::lanes::{Lanes, Real, V3};
+use crate::value::unit;
 use glam::DVec3;
 
 /// A pinhole camera with its raster. Directions of pixels are computed in double precision and
@@ -34,8 +35,8 @@ impl View {
             (None, Some(target)) => DVec3::from(target) - eye,
             (None, None) => DVec3::NEG_Z,
         };
-        let w = look.normalize();
-        let up = DVec3::from(camera.up).normalize();
+        let w = unit(look).unwrap_or(DVec3::NEG_Z);
+        let up = unit(camera.up).unwrap_or(DVec3::Y);
         let mut u = w.cross(up);
         if u.length() <= 1e-6 {
             let a = w.abs();

@@ -108,7 +108,7 @@ pub fn inspector(scene: &Scene, subject: &Subject) -> Vec<Line> {
     let mut lines = fields(scene, subject);
     let material = subject.material(scene).filter(|material| material != subject);
     if let Some(Subject::Material(name)) = &material {
-        let users = scene.objects.iter().filter(|o| o.material == *name).count();
+        let users = scene.objects.iter().filter(|o| o.names_material(name)).count();
         let shared = if users > 1 { format!(" · shared by {users}") } else { String::new() };
         lines.push(Line::Heading(format!("material {}{shared}", excerpt(name))));
         lines.extend(fields(scene, &Subject::Material(name.clone())));

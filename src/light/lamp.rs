@@ -3,6 +3,7 @@
 
 use super::{Falloff, Light};
 use crate::lanes::{Lanes, Real, V3};
+use crate::value::unit;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -38,7 +39,8 @@ pub struct Arrival<L> {
 }
 
 impl<S: Real> Lamp<S> {
-    /// Compiles `light` for a scene shifted so that `origin` becomes zero. `None`: it has no kind.
+    /// Compiles `light` for a scene shifted so that `origin` becomes zero. `None`: it has no kind
+    /// or no direction.
     pub fn new(light: &Light, origin: DVec3) -> Option<Self> {
         if let Some(point) = &light.point {
             let position = (DVec3::from(point.position) - origin).to_array().map(S::of);
@@ -47,7 +49,7 @@ impl<S: Real> Lamp<S> {
                 Falloff::None => Self::Even { position },
             });
         }
-        let towards = -DVec3::from(light.directional?.direction).normalize();
+        let towards = -unit(light.directional?.direction)?;
         Some(Self::Directional { towards: towards.to_array().map(S::of) })
     }
 

@@ -104,7 +104,9 @@ pub const FIELDS: &[Field] = &[
         Takes::Switch,
         "",
         "true",
-        "Whether the back of a surface is finished like its front; otherwise the back is black.",
+        "Whether the back of a surface is finished like its front; otherwise the back is black: of its \
+         finish only `transmission` is left there, and total reflection past the critical angle \
+         unless `fresnel` is `dielectric`.",
     ),
     Field::without(
         "texture",

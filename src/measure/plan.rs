@@ -188,9 +188,11 @@ impl Plan {
         };
         let reflects = scene.trace.level == Level::Full
             && scene.trace.depth > 0
-            && scene.objects.iter().any(|object| {
-                scene.materials.get(&object.material).is_some_and(|m| m.reflection > 0.0)
-            });
+            && scene
+                .objects
+                .iter()
+                .flat_map(|object| object.materials())
+                .any(|name| scene.materials.get(name).is_some_and(|m| m.reflection > 0.0));
         match topic {
             Topic::Default => Vec::new(),
             Topic::Adaptivity => vec![Variation { adaptive: false, ..named("uniform") }],

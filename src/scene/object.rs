@@ -43,6 +43,25 @@ pub const OBJECT_FIELDS: &[Field] = &[
 ];
 
 impl Object {
+    /// The material of each part of its form; a simple object has one part.
+    pub fn materials(&self) -> Vec<&str> {
+        self.shape.part_materials(&self.material)
+    }
+
+    /// Whether it or a part of it carries the name of this material.
+    pub fn names_material(&self, name: &str) -> bool {
+        self.material == name || self.shape.named_materials().iter().any(|(_, own)| *own == name)
+    }
+
+    /// Gives it and its parts the material `new` where they name `old`. An empty name stands for the default finish,
+    /// in a part for the material of the whole.
+    pub fn rename_material(&mut self, old: &str, new: &str) {
+        let names = self.shape.part_names_mut().into_iter().chain([&mut self.material]);
+        for name in names.filter(|name| *name == old) {
+            *name = new.to_string();
+        }
+    }
+
     /// The transform's steps in order, as one map.
     pub fn scene_from_object(&self) -> DAffine3 {
         chained(&self.transform)

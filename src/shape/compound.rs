@@ -153,6 +153,16 @@ pub(super) fn parts_of(shape: &Shape) -> Option<&[Part]> {
     }
 }
 
+/// [`parts_of`], to be changed.
+fn parts_of_mut(shape: &mut Shape) -> &mut [Part] {
+    match shape {
+        Shape::Union(Union { of })
+        | Shape::Intersection(Intersection { of })
+        | Shape::Difference(Difference { of }) => of,
+        _ => &mut [],
+    }
+}
+
 fn combined(of: &[Part], join: fn(Vec<Tree>) -> Tree) -> Compound {
     let mut parts = Vec::new();
     let mut trees = Vec::new();
@@ -233,6 +243,16 @@ impl Shape {
                 })
                 .collect(),
         }
+    }
+
+    /// The names of materials that its parts carry, those that are empty too.
+    pub fn part_names_mut(&mut self) -> Vec<&mut String> {
+        let mut names = Vec::new();
+        for part in parts_of_mut(self) {
+            names.push(&mut part.material);
+            names.extend(part.shape.part_names_mut());
+        }
+        names
     }
 
     /// The materials that its parts name.

@@ -2,7 +2,7 @@
 
 use super::texture::on_plane;
 use super::{Form, Kind};
-use crate::value::{Checks, Fault, Field, Range, Takes, turned};
+use crate::value::{Checks, Fault, Field, Range, Takes, turned, unit};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -31,9 +31,7 @@ impl Kind for Plane {
     ];
 
     fn form(&self) -> Form {
-        let normal = DVec3::from_array(self.normal);
-        // First to length about 1, so that the square of no length over- or underflows.
-        let normal = (normal / normal.abs().max_element()).normalize();
+        let normal = unit(self.normal).unwrap_or(DVec3::Y);
         Form::Plane { normal, offset: normal.dot(DVec3::from_array(self.point)) }
     }
 

@@ -2,7 +2,7 @@
 
 use super::{Form, Kind};
 
-use crate::value::{Checks, Fault, Field, Range, Takes, turned};
+use crate::value::{Checks, Fault, Field, Range, Takes, turned, unit};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -29,7 +29,6 @@ impl Rectangle {
     /// Unit vectors to the right (seen from the front), up and to the front; `None` if `up` lies
     /// along the normal.
     fn frame(&self) -> Option<[DVec3; 3]> {
-        // First to length 1, so that no length that a file can hold over- or underflows below.
         let front = unit(self.normal)?;
         let right = unit(self.up)?.cross(front);
         // Within 1e-6 of parallel the direction is noise.
@@ -38,11 +37,6 @@ impl Rectangle {
             [right, front.cross(right), front]
         })
     }
-}
-
-fn unit(direction: [f64; 3]) -> Option<DVec3> {
-    let v = DVec3::from_array(direction);
-    (v / v.abs().max_element()).try_normalize()
 }
 
 impl Kind for Rectangle {

@@ -3,7 +3,7 @@
 
 use super::Form;
 use super::texture::around_axis;
-use crate::value::Fault;
+use crate::value::{Fault, unit};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// The solid around the axis from `base` to `top`, two different points, with these radii there, both
@@ -17,7 +17,7 @@ pub(super) fn between(base: [f64; 3], top: [f64; 3], base_radius: f64, top_radiu
         (top, base, top_radius, base_radius)
     };
     let axis = to - from;
-    let (u, v) = (axis / axis.abs().max_element()).normalize().any_orthonormal_pair();
+    let (u, v) = unit(axis).unwrap_or(DVec3::Y).any_orthonormal_pair();
     let linear = DMat3::from_cols(u * wide, v * wide, axis);
     Form::tapered(DAffine3::from_mat3_translation(linear, from), narrow / wide)
 }
@@ -25,7 +25,7 @@ pub(super) fn between(base: [f64; 3], top: [f64; 3], base_radius: f64, top_radiu
 /// The axes in which textures lie on it: y from `base` to `top`.
 pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
     let axis = DVec3::from_array(top) - DVec3::from_array(base);
-    around_axis((axis / axis.abs().max_element()).normalize())
+    around_axis(unit(axis).unwrap_or(DVec3::Y))
 }
 
 /// The fault of an axis of length 0, which ends at the key `name`.

@@ -1,7 +1,7 @@
 //! Transforms: steps that move, turn and scale an object or a part of one, one after the other.
 
 use super::{Form, Shape};
-use crate::value::{Checks, Fault, Field, Range, Takes, sin_cos_degrees};
+use crate::value::{Checks, Fault, Field, Range, Takes, sin_cos_degrees, unit};
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
@@ -112,10 +112,7 @@ impl Step {
             Self::RotateX(degrees) => turn(DVec3::X, degrees),
             Self::RotateY(degrees) => turn(DVec3::Y, degrees),
             Self::RotateZ(degrees) => turn(DVec3::Z, degrees),
-            Self::Rotate(Rotate { axis, degrees }) => {
-                let axis = DVec3::from_array(axis);
-                turn((axis / axis.abs().max_element()).normalize(), degrees)
-            }
+            Self::Rotate(Rotate { axis, degrees }) => turn(unit(axis).unwrap_or(DVec3::Y), degrees),
             Self::Scale(Scale(by)) => DAffine3::from_scale(DVec3::from_array(by)),
         }
     }

@@ -4,6 +4,7 @@
 
 mod angle;
 mod color;
+mod direction;
 mod fault;
 mod field;
 mod hash;
@@ -13,6 +14,7 @@ mod text;
 
 pub use angle::sin_cos_degrees;
 pub use color::{Color, linear_from_srgb};
+pub use direction::unit;
 pub use fault::{Checks, Fault};
 pub use field::{Choice, Field, Preset, Takes};
 pub use hash::fnv1a64;

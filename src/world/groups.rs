@@ -3,8 +3,7 @@
 
 use crate::lanes::Real;
 use crate::light::{Falloff, Lamp, Light};
-use crate::material::Material;
-use crate::scene::{Object, Scene};
+use crate::scene::Scene;
 use crate::value::Color;
 use glam::DVec3;
 
@@ -39,9 +38,9 @@ pub struct Groups {
     /// In the order of the film.
     pub members: Vec<Member>,
     /// Some surface answers lights.
-    lit: bool,
+    pub(super) lit: bool,
     /// Some surface answers ambient light.
-    ambient: bool,
+    pub(super) ambient: bool,
 }
 
 impl Groups {
@@ -102,71 +101,6 @@ impl Groups {
             Member::Shared(_) => [1.0; 3],
         };
         self.members.iter().map(weight).collect()
-    }
-
-    /// Whether the samples of the world compiled from `compiled` (whose groups these are) are samples
-    /// of `scene` too, mixed otherwise: they differ in nothing but the strength of lights, ambient and
-    /// background that have groups, in names, in materials that nothing is made of, and in the cap on
-    /// rays per pixel, which only says how many samples there are to be.
-    pub fn serve(&self, compiled: &Scene, scene: &Scene) -> bool {
-        let Scene {
-            film,
-            trace,
-            camera,
-            views: _,
-            background,
-            ambient,
-            lights: _,
-            materials: _,
-            objects,
-            library: _,
-        } = scene;
-        let default = Material::default();
-        let same_object = |(a, b): (&Object, &Object)| {
-            a.shape == b.shape
-                && a.transform == b.transform
-                && compiled.materials.get(&a.material).unwrap_or(&default)
-                    == scene.materials.get(&b.material).unwrap_or(&default)
-        };
-        film.size == compiled.film.size
-            && film.filter == compiled.film.filter
-            && *trace == compiled.trace
-            && *camera == compiled.camera
-            && (background.color == Color::BLACK || compiled.background.color != Color::BLACK)
-            && (ambient.color == Color::BLACK
-                || !self.ambient
-                || self.members.contains(&Member::Ambient))
-            && objects.len() == compiled.objects.len()
-            && compiled.objects.iter().zip(objects).all(same_object)
-            && self.serve_lights(compiled, scene)
-    }
-
-    /// The part of [`Groups::serve`] that is about lights. One that does not shine may stand anywhere.
-    fn serve_lights(&self, compiled: &Scene, scene: &Scene) -> bool {
-        let is_compiled = |i: usize| {
-            let of = |m: &Member| match m {
-                Member::Light(own) => *own == i,
-                Member::Shared(list) => list.contains(&i),
-                Member::Ambient | Member::Background => false,
-            };
-            self.members.iter().any(of)
-        };
-        let same_place = |i: usize, light: &Light| {
-            let before = &compiled.lights[i];
-            before.point == light.point
-                && before.directional == light.directional
-                && before.falloff == light.falloff
-        };
-        let mut shining = scene.lights.iter().enumerate().filter(|(_, light)| shines(light));
-        let shared = |member: &Member| match member {
-            Member::Shared(list) => list.iter().all(|i| {
-                scene.lights.get(*i).is_some_and(|l| strength(l) == strength(&compiled.lights[*i]))
-            }),
-            Member::Ambient | Member::Background | Member::Light(_) => true,
-        };
-        !self.lit
-            || shining.all(|(i, light)| is_compiled(i) && same_place(i, light))
-                && self.members.iter().all(shared)
     }
 
     /// A name for each group, for layers of files.
@@ -230,11 +164,11 @@ impl Groups {
 }
 
 /// Colour times intensity; black if it is off.
-fn strength(light: &Light) -> [f64; 3] {
+pub(super) fn strength(light: &Light) -> [f64; 3] {
     if light.on { light.color.scaled(light.intensity).0 } else { [0.0; 3] }
 }
 
-fn shines(light: &Light) -> bool {
+pub(super) fn shines(light: &Light) -> bool {
     strength(light) != [0.0; 3]
 }
 

@@ -13,6 +13,7 @@ mod outlook;
 mod path;
 mod precision;
 mod screen;
+mod serving;
 mod skin;
 mod through;
 

@@ -222,7 +222,8 @@ impl<L: Lanes> World<L> {
                 ways.mirrored_weight = V3::select(lanes, total, ways.mirrored_weight);
             }
             let Some((strength, spread)) = &finish.reflection else { continue };
-            let lanes = lanes & own.gt(L::zero());
+            // Not on backs without a finish.
+            let lanes = lanes & met.reflecting & own.gt(L::zero());
             if lanes.none() {
                 continue;
             }

@@ -16,7 +16,7 @@ mod through;
 mod tracer;
 
 use compare::{Picture, keep, reference, rendered, small, variances_differ_by};
-use support::{all_shipped, shipped};
+use support::{all_shipped, parsed, shipped};
 use tracer::{Mutation, Tracer};
 use zerkalo::material::Lobe;
 use zerkalo::sampling::SamplerKind;
@@ -131,5 +131,81 @@ fn variances_agree_under_independent_random_numbers() {
         let z = variances_differ_by(&reference, PLAIN, &half, OWN, scene.film.size);
         println!("{name}: {z:.2} standard errors");
         assert!(z < 4.0, "{name}: variances differ by {z:.2} standard errors");
+    }
+}
+
+/// Panes and solids of every law of reflection, one-sided, from both sides: behind, only what shows through.
+#[test]
+fn one_sided_transparent_things_reflect_on_their_front_only() {
+    for law in ["constant", "schlick\"\nreflectance = \"#806040", "dielectric"] {
+        for side in [1.0, -1.0] {
+            let text = format!(
+                "[camera]
+                eye = [0.5, 0.75, {}]
+                target = [0.0, 0.0, 0.0]
+                [background]
+                color = [0.25, 0.5, 1.0]
+                [ambient]
+                color = [0.5, 0.5, 0.5]
+                [[light]]
+                point = {{ position = [2.0, 4.0, {}] }}
+                [materials.glass]
+                diffuse = 0.25
+                reflection = 0.75
+                transmission = 0.5
+                fresnel = \"{law}\"
+                two_sided = false
+                [[object]]
+                material = \"glass\"
+                shape.rectangle = {{ center = [0.0, 0.0, 0.0], size = [2.0, 1.5], normal = [0.0, 0.0, 1.0] }}
+                [[object]]
+                material = \"glass\"
+                shape.sphere = {{ center = [1.25, 0.0, 0.5], radius = 0.5 }}
+                [[object]]
+                shape.plane = {{ point = [0.0, -1.0, 0.0], normal = [0.0, 1.0, 0.0] }}",
+                4.0 * side,
+                3.0 * side,
+            );
+            let scene = small(parsed(&text));
+            let samples = 2 * PLAIN;
+            let reference = reference(&scene, samples, Mutation::None).unwrap();
+            let verdict = Picture::new(&scene, OWN).beside(&reference, samples);
+            println!("{law:?} from {side}: {verdict}");
+            assert!(verdict.agree(), "{law} from {side}: {verdict}");
+        }
+    }
+}
+
+/// A pane before a bright wall and behind a dark one: whoever looks at its back sees k_t of the dark one, no mirror.
+#[test]
+fn the_back_of_a_one_sided_pane_mirrors_nothing() {
+    for (two_sided, expected) in [(true, 0.75), (false, 0.0)] {
+        for law in ["constant", "schlick"] {
+            let text = format!(
+                "[camera]
+                eye = [0.0, 0.0, -2.0]
+                target = [0.0, 0.0, 0.0]
+                [ambient]
+                color = [1.0, 1.0, 1.0]
+                [materials.pane]
+                color = [0.0, 0.0, 0.0]
+                reflection = 0.75
+                transmission = 0.5
+                fresnel = \"{law}\"
+                two_sided = {two_sided}
+                [materials.wall]
+                color = [1.0, 1.0, 1.0]
+                [[object]]
+                material = \"pane\"
+                shape.plane = {{ point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] }}
+                [[object]]
+                material = \"wall\"
+                shape.plane = {{ point = [0.0, 0.0, -3.0], normal = [0.0, 0.0, 1.0] }}"
+            );
+            let (mean, _) = rendered(&small(parsed(&text)), 4, SamplerKind::Sobol);
+            for pixel in mean {
+                assert!((pixel.x - expected).abs() < 1e-6, "{law}, {two_sided}: {pixel}");
+            }
+        }
     }
 }

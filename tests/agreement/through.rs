@@ -77,6 +77,7 @@ impl Tracer<'_> {
             (false, _) => 1.0,
         };
         let mirrors = match (dielectric, open) {
+            _ if hit.bare => false,
             (false, false) => hit.front && t.is_some(),
             _ => true,
         };

@@ -68,7 +68,7 @@ pub struct Hit<'a> {
     /// Its outside or front.
     pub front: bool,
     /// The back of something that has no finish there.
-    bare: bool,
+    pub bare: bool,
 }
 
 impl<'a> Tracer<'a> {

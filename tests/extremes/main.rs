@@ -8,6 +8,8 @@ mod common;
 mod rays;
 #[path = "../support/mod.rs"]
 mod support;
+#[path = "../common/tables.rs"]
+mod tables;
 #[path = "../common/told.rs"]
 mod told;
 
@@ -19,6 +21,7 @@ mod coincident;
 mod compound;
 mod degenerate;
 mod fuzz;
+mod lengths;
 mod mesh;
 mod precision;
 mod random;

@@ -9,7 +9,7 @@ use crate::render::schedule::{Settings, Stop};
 use crate::render::session::{Report, Session, State, Traced};
 use crate::render::{Options, Rendering};
 use crate::sampling::SamplerKind;
-use crate::scene::Scene;
+use crate::scene::{Document, Scene};
 use crossbeam_channel::Sender;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -76,7 +76,7 @@ impl Studio {
                 document.apply(scene);
                 (document.name().to_string(), document.text().to_string())
             }
-            None => (self.stem.clone(), String::new()),
+            None => (self.stem.clone(), Document::new(scene, &self.stem).text().to_string()),
         }
     }
 }

@@ -60,7 +60,7 @@ impl Turn<'_> {
             .materials
             .keys()
             .filter(|name| !base.materials.contains_key(*name))
-            .filter(|name| scene.objects.iter().all(|object| object.material != **name))
+            .filter(|name| !scene.objects.iter().any(|object| object.names_material(name)))
             .cloned()
             .collect();
         for name in unused {

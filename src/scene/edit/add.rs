@@ -9,7 +9,7 @@ use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::Material;
 use crate::scene::{Object, Scale, Scene, Step};
 use crate::shape::{Form, KINDS, Shape, chained};
-use crate::value::{Color, clean, number, rounded_to, significant};
+use crate::value::{Color, clean, number, rounded_to, significant, unit};
 use glam::DVec3;
 
 /// The kinds of object that can be added, with what they are.
@@ -146,7 +146,7 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, Refusal> {
     let (right, forward) = (level(right), level(forward));
     let side = |light: &Light| match (light.point, light.directional) {
         (Some(point), _) => (DVec3::from_array(point.position) - center).dot(right),
-        (_, Some(directional)) => -DVec3::from_array(directional.direction).dot(right),
+        (_, Some(sun)) => unit(sun.direction).map_or(0.0, |along| -along.dot(right)),
         _ => 0.0,
     };
     let lit: f64 = scene.lights.iter().map(|l| side(l).signum()).sum();

@@ -74,7 +74,7 @@ pub fn duplicate(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
 }
 
 /// Takes an object, a light, a view or a material away. Objects whose material goes get the default
-/// finish, and the note names them.
+/// finish, parts whose own one goes that of the whole; the note names them.
 ///
 /// # Errors
 /// For what a scene always has.
@@ -122,25 +122,41 @@ fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) ->
     names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
 }
 
-/// Gives every object of the material `name` the default finish and says which.
+/// Gives every object of the material `name` the default finish, and every part of it the material of the whole;
+/// says which.
 fn strip(scene: &mut Scene, name: &str) -> Option<String> {
-    let mut stripped = Vec::new();
+    let (mut whole, mut parts) = (Vec::new(), Vec::new());
     for i in 0..scene.objects.len() {
-        if scene.objects[i].material == name {
-            scene.objects[i].material.clear();
-            stripped.push(Subject::Object(i).label(scene));
+        if !scene.objects[i].names_material(name) {
+            continue;
         }
+        let label = Subject::Object(i).label(scene);
+        let object = &mut scene.objects[i];
+        if object.material == name { &mut whole } else { &mut parts }.push(label);
+        object.rename_material(name, "");
     }
-    let shown = stripped.iter().take(3).cloned().collect::<Vec<_>>().join(", ");
-    match stripped.len() {
-        0 => None,
-        1 => Some(format!("{shown} has the default finish now.")),
-        2 | 3 => Some(format!("{shown} have the default finish now.")),
-        n => Some(format!("{shown} and {} more have the default finish now.", n - 3)),
-    }
+    let told = |labels: &[String], [one, many]: [&str; 2]| {
+        let shown = labels.iter().take(3).cloned().collect::<Vec<_>>().join(", ");
+        match labels.len() {
+            0 => None,
+            1 => Some(format!("{shown} {one} now.")),
+            2 | 3 => Some(format!("{shown} {many} now.")),
+            n => Some(format!("{shown} and {} more {many} now.", n - 3)),
+        }
+    };
+    let whole = told(&whole, ["has the default finish", "have the default finish"]);
+    let parts = told(
+        &parts,
+        [
+            "has the material of the whole in its parts",
+            "have the material of the whole in their parts",
+        ],
+    );
+    let notes: Vec<_> = whole.into_iter().chain(parts).collect();
+    (!notes.is_empty()).then(|| notes.join(" "))
 }
 
-/// Gives a new name. Objects follow their material's name; an object or a light may have none.
+/// Gives a new name. Objects and parts follow their material's name; an object or a light may have none.
 ///
 /// # Errors
 /// For what has no name, and for a name that is taken or cannot be shown.
@@ -168,9 +184,7 @@ pub fn rename(scene: &Scene, subject: &Subject, new: &str) -> Result<Edit, Refus
             }
             let moved = next.materials.remove(old);
             next.materials.extend(moved.map(|material| (new.clone(), material)));
-            for object in next.objects.iter_mut().filter(|o| o.material == *old) {
-                object.material = new.clone();
-            }
+            next.objects.iter_mut().for_each(|object| object.rename_material(old, &new));
             Subject::Material(new.clone())
         }
         Subject::View(old) => {
@@ -279,5 +293,45 @@ mod tests {
         assert_eq!(edit.scene.objects[2].material, "ball");
         assert_eq!(edit.scene.materials["ball"], scene.materials["red"]);
         assert!(own_material(&scene, &Subject::Light(0)).is_err());
+    }
+
+    const COMPOUND: &str = "
+        [materials.red]
+        color = [1.0, 0.0, 0.0]
+        [materials.blue]
+        color = [0.0, 0.0, 1.0]
+        [[object]]
+        name = \"dice\"
+        material = \"blue\"
+        [[object.shape.union.of]]
+        shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
+        [[object.shape.union.of]]
+        material = \"red\"
+        [[object.shape.union.of.shape.difference.of]]
+        shape.sphere = { center = [1.0, 0.0, 0.0], radius = 1.0 }
+        [[object.shape.union.of.shape.difference.of]]
+        material = \"red\"
+        shape.sphere = { center = [1.0, 1.0, 0.0], radius = 0.5 }
+    ";
+
+    #[test]
+    fn parts_follow_the_name_of_their_material() {
+        let scene = Scene::parse(COMPOUND, "test").unwrap();
+        let edit = rename(&scene, &Subject::Material("red".into()), "crimson").unwrap();
+        assert_eq!(edit.scene.objects[0].materials(), ["blue", "crimson", "crimson"]);
+        let edit = rename(&scene, &Subject::Material("blue".into()), "navy").unwrap();
+        assert_eq!(edit.scene.objects[0].materials(), ["navy", "red", "red"]);
+    }
+
+    #[test]
+    fn parts_lose_the_material_that_is_deleted() {
+        let scene = Scene::parse(COMPOUND, "test").unwrap();
+        let edit = delete(&scene, &Subject::Material("red".into())).unwrap();
+        assert_eq!(edit.scene.objects[0].materials(), ["blue"; 3]);
+        let note = "dice has the material of the whole in its parts now.";
+        assert_eq!(edit.note.as_deref(), Some(note));
+        let edit = delete(&scene, &Subject::Material("blue".into())).unwrap();
+        assert_eq!(edit.scene.objects[0].materials(), ["", "red", "red"]);
+        assert_eq!(edit.note.as_deref(), Some("dice has the default finish now."));
     }
 }

@@ -38,7 +38,7 @@ pub fn bounds(scene: &Scene, subject: &Subject) -> Option<Ball> {
             Some(Ball { center: position, radius: scene_bounds(scene).radius / 10.0 })
         }
         Subject::Material(name) => {
-            let used = scene.objects.iter().filter(|o| o.material == *name);
+            let used = scene.objects.iter().filter(|o| o.names_material(name));
             used.filter_map(|o| o.form().bounds()).reduce(union).map(ball)
         }
         _ => None,

@@ -9,7 +9,7 @@ use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::{Bump, Material, Texture};
 use crate::scene::Scene;
 use crate::shape::Shape;
-use crate::value::{Field, Range, Takes, clean, number, rounded_to, significant};
+use crate::value::{Field, Range, Takes, clean, number, rounded_to, significant, unit};
 use glam::DVec3;
 use toml::{Table, Value};
 
@@ -125,7 +125,7 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     match (name, light.point, light.directional) {
         ("directional", Some(point), _) => {
             let from = DVec3::from_array(point.position);
-            let direction = (center - from).try_normalize().unwrap_or(DVec3::NEG_Y);
+            let direction = unit(center - from).unwrap_or(DVec3::NEG_Y);
             let direction = direction.map(|x| rounded_to(x, -3)).to_array();
             light.point = None;
             light.directional = Some(Directional { direction });
@@ -136,8 +136,7 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
             })
         }
         ("point", _, Some(Directional { direction })) => {
-            let along = DVec3::from_array(direction);
-            let along = (along / along.abs().max_element()).normalize();
+            let along = unit(direction).unwrap_or(DVec3::NEG_Y);
             let at = center - along * (3.0 * ball.radius);
             let position = at.map(|x| clean(x, ball.radius)).to_array();
             light.point = Some(Point { position });
@@ -214,10 +213,9 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     }
     let eye = DVec3::from_array(camera.eye);
     match (name, camera.target, camera.direction) {
-        ("direction", Some(target), _) => {
-            let view = DVec3::from_array(target) - eye;
-            let scale = view.length();
-            camera.direction = Some((view / scale).map(|x| rounded_to(x, -6)).to_array());
+        ("direction", Some(_), _) => {
+            let view = camera.view().unwrap_or(DVec3::NEG_Z);
+            camera.direction = Some(view.map(|x| rounded_to(x, -6)).to_array());
             camera.target = None;
         }
         ("target", _, Some(_)) => {

@@ -1,16 +1,16 @@
 //! The keys that act on the scene's mirror.
 
-use super::subject::reflects;
+use super::subject::mirror_of;
 use super::{Edit, Refusal, Subject, step, toggle};
 use crate::scene::Scene;
 use crate::shape::Form;
 
 /// The material that the mirror keys act on: that of the selected object (or the selected material) if
 /// it reflects; else that of the first rectangle that reflects; else the one that reflects most among
-/// the objects'. If nothing reflects: the selected one, else that of the first rectangle, so that a
-/// mirror that was turned down to nothing can be turned up again. `None`: there is none of all these.
+/// those of objects and their parts. If nothing reflects: the selected one, else that of the first rectangle,
+/// so that a mirror that was turned down to nothing can be turned up again. `None`: there is none of all these.
 pub fn mirror(scene: &Scene, selected: Option<&Subject>) -> Option<String> {
-    let name = |i: usize| Some(scene.objects.get(i)?.material.clone());
+    let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
     let chosen = selected.and_then(|subject| match subject.material(scene) {
         Some(Subject::Material(name)) => Some(name),
         _ => None,
@@ -20,23 +20,25 @@ pub fn mirror(scene: &Scene, selected: Option<&Subject>) -> Option<String> {
     if let Some(chosen) = chosen.clone().filter(mirrors) {
         return Some(chosen);
     }
+    if let Some(Subject::Object(i)) = selected
+        && let Some(part) = reflecting(*i)
+    {
+        return Some(part);
+    }
     // A rectangle of any orientation, not the ground.
     let rectangle = |i: &usize| {
         let object = &scene.objects[*i];
         object.shape.key() == "rectangle" && matches!(object.form(), Form::Parallelogram { .. })
     };
     let mut all = 0..scene.objects.len();
-    if let Some(i) = all.clone().filter(rectangle).find(|i| reflects(scene, *i)) {
-        return name(i);
+    if let Some(name) = all.clone().filter(rectangle).find_map(reflecting) {
+        return Some(name);
     }
-    let reflection = |i: &usize| scene.materials[&scene.objects[*i].material].reflection;
-    let most = all
-        .clone()
-        .filter(|i| reflects(scene, *i))
-        .reduce(|a, b| if reflection(&b) > reflection(&a) { b } else { a });
-    if let Some(i) = most {
-        return name(i);
+    let strengths = all.clone().filter_map(|i| mirror_of(scene, i));
+    if let Some((name, _)) = strengths.reduce(|a, b| if b.1 > a.1 { b } else { a }) {
+        return Some(name.to_string());
     }
+    let name = |i: usize| Some(scene.objects[i].material.clone());
     let named = |i: &usize| scene.materials.contains_key(&scene.objects[*i].material);
     chosen.or_else(|| all.find(|i| rectangle(i) && named(i)).and_then(name))
 }
@@ -101,6 +103,26 @@ mod tests {
         scene.objects.clear();
         assert_eq!(mirror(&scene, None), None);
         assert!(roughen(&scene, None, 1.0).unwrap_err().found.contains("nothing"));
+    }
+
+    #[test]
+    fn parts_are_mirrors_too() {
+        let text = "
+            [materials.glossy]
+            reflection = 0.5
+            [[object]]
+            [[object.shape.union.of]]
+            shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
+            material = \"glossy\"
+            [[object.shape.union.of]]
+            shape.sphere = { center = [1.0, 0.0, 0.0], radius = 1.0 }
+        ";
+        let scene = Scene::parse(text, "test").unwrap();
+        assert_eq!(mirror(&scene, None).as_deref(), Some("glossy"));
+        assert_eq!(mirror(&scene, Some(&Subject::Object(0))).as_deref(), Some("glossy"));
+        let outline = crate::scene::edit::outline(&scene);
+        let (section, _) = outline.iter().find(|(_, s)| *s == Subject::Object(0)).unwrap();
+        assert_eq!(*section, crate::scene::edit::Section::Mirrors);
     }
 
     #[test]

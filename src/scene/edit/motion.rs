@@ -4,7 +4,7 @@ use super::extent::scene_bounds;
 use super::{Edit, Refusal, Subject};
 use crate::light::{Directional, Light};
 use crate::scene::{Object, Scene, Step};
-use crate::value::{decade, rounded_to};
+use crate::value::{decade, rounded_to, unit};
 use glam::DVec3;
 
 /// Moves an object, a light, the camera or a view by the vector `by`, in scene units. An object
@@ -77,11 +77,10 @@ fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
     }
     if let Some(Directional { direction }) = &mut light.directional {
         let reach = 3.0 * scene_bounds(scene).radius;
-        let along = DVec3::from_array(*direction);
-        let lamp = -(along / along.abs().max_element()).normalize() * reach;
+        let lamp = -unit(*direction).unwrap_or(DVec3::NEG_Y) * reach;
         let lamp = lamp + DVec3::from_array(by);
         // Through the middle there is no direction left: it stays.
-        if let Some(aimed) = (-lamp).try_normalize() {
+        if let Some(aimed) = unit(-lamp) {
             *direction = aimed.map(|x| rounded_to(x, -4)).to_array();
         }
     }

@@ -1,6 +1,6 @@
 //! What can be selected and edited.
 
-use crate::scene::{Finding, Message, Scene};
+use crate::scene::{Finding, Message, Object, Scene};
 use crate::value::excerpt;
 
 /// One thing of a scene that can be selected and edited.
@@ -35,7 +35,7 @@ pub enum Section {
     Surroundings,
     /// Lights.
     Lights,
-    /// Objects whose material reflects.
+    /// Objects that reflect, or a part of which does.
     Mirrors,
     /// All other objects.
     Objects,
@@ -78,10 +78,18 @@ pub fn outline(scene: &Scene) -> Vec<(Section, Subject)> {
     list
 }
 
-/// Whether the object at `index` has a material that reflects.
+/// Whether the object at `index`, or a part of it, has a material that reflects.
 pub(super) fn reflects(scene: &Scene, index: usize) -> bool {
-    let object = scene.objects.get(index);
-    object.and_then(|o| scene.materials.get(&o.material)).is_some_and(|m| m.reflection > 0.0)
+    mirror_of(scene, index).is_some()
+}
+
+/// Of the materials of the object at `index` and its parts the one that reflects most, with its
+/// coefficient; `None`: none reflects.
+pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
+    let names = scene.objects.get(index).map(Object::materials).unwrap_or_default();
+    let known =
+        names.into_iter().filter_map(|name| Some((name, scene.materials.get(name)?.reflection)));
+    known.filter(|(_, k)| *k > 0.0).reduce(|a, b| if b.1 > a.1 { b } else { a })
 }
 
 impl Subject {

@@ -1,0 +1,97 @@
+//! Directions of every length that a file can hold: only where they point matters.
+
+use crate::support::{parsed, rendered};
+use crate::tables::{at, keys, scene, table};
+use std::collections::BTreeSet;
+use toml::Value;
+use zerkalo::scene::{FIELDS, Scene};
+use zerkalo::value::{Field, Takes};
+use zerkalo::world::Precision;
+
+/// Every key that takes a direction, with a value.
+const TEXT: &str = "
+    film.size = [24, 18]
+    [camera]
+    eye = [0.5, 1.5, 5.0]
+    direction = [-0.125, -0.25, -1.0]
+    up = [0.125, 1.0, 0.0]
+    [ambient]
+    color = [0.25, 0.25, 0.25]
+    [[light]]
+    directional = { direction = [-0.5, -1.0, -0.75] }
+    [materials.mirror]
+    reflection = 0.75
+    roughness = 0.125
+    [materials.checked]
+    texture.checker = { scale = [2.0, 2.0] }
+    [[object]]
+    material = \"checked\"
+    shape.plane = { point = [0.0, -0.5, 0.0], normal = [0.125, 1.0, 0.25] }
+    [[object]]
+    material = \"mirror\"
+    shape.rectangle = { center = [0.0, 1.0, -2.0], size = [3.0, 2.0], normal = [0.25, 0.125, 1.0], up = [0.25, 1.0, 0.0] }
+    [[object]]
+    shape.box = { center = [0.0, 0.5, 0.0], size = [1.0, 1.0, 1.0] }
+    transform = [{ rotate = { axis = [0.5, 1.0, 0.25], degrees = 30.0 } }]
+";
+
+/// The names of all keys that take a direction. Compounds hold shapes again: twice is enough.
+fn directions(fields: &[Field], depth: usize, out: &mut BTreeSet<&'static str>) {
+    for field in fields.iter().filter(|_| depth < 8) {
+        match field.takes {
+            Takes::Direction => {
+                out.insert(field.name);
+            }
+            Takes::Table(inner)
+            | Takes::OneOf(inner)
+            | Takes::ListOf(inner)
+            | Takes::Tables(inner)
+            | Takes::Named(inner) => directions(inner, depth + 1, out),
+            _ => {}
+        }
+    }
+}
+
+/// The scene with each of its directions `factor` times as long.
+fn stretched(base: &Scene, factor: f64) -> Scene {
+    let mut changed = table(base);
+    let mut met = BTreeSet::new();
+    for key in keys(&changed).iter().filter(|key| matches!(key.takes, Takes::Direction)) {
+        let Some(Value::Array(numbers)) = at(&mut changed, &key.path) else { continue };
+        for number in numbers {
+            *number = Value::Float(number.as_float().unwrap() * factor);
+        }
+        met.insert(key.path.last().unwrap().clone());
+    }
+    let mut all = BTreeSet::new();
+    directions(FIELDS, 0, &mut all);
+    assert!(met.iter().map(String::as_str).eq(all), "the scene has only {met:?}");
+    scene(&changed, &base.library).unwrap_or_else(|| panic!("{factor:e}: the scene is refused"))
+}
+
+#[test]
+fn only_where_a_direction_points_matters() {
+    let base = parsed(TEXT);
+    for precision in [Precision::Single, Precision::Double] {
+        let expected = rendered(&base, 1, precision, 4).film.bytes();
+        // Powers of two change no digit.
+        for exponent in [-1000, -664, -512, 512, 664, 1000] {
+            let other = stretched(&base, f64::from(exponent).exp2());
+            let found = rendered(&other, 1, precision, 4).film.bytes();
+            assert!(found == expected, "2^{exponent} in {precision:?}");
+        }
+    }
+    // Others change the last digits, which a picture in codes does not show.
+    let codes = |scene: &Scene| {
+        let rendering = rendered(scene, 1, Precision::Single, 4);
+        let picture = crate::support::picture(&rendering, zerkalo::film::Part::Both);
+        picture.into_iter().map(|p| p[1]).collect::<Vec<f64>>()
+    };
+    let expected = codes(&base);
+    assert!(expected.iter().sum::<f64>() > 50.0);
+    for length in [1e-300, 1e-200, 1e200, 1e300] {
+        let found = codes(&stretched(&base, length));
+        let apart = found.iter().zip(&expected).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
+        assert!(apart <= 2, "{length:e}: {apart} pixels differ");
+    }
+}
