@@ -5,30 +5,17 @@ mod support;
 
 use common::Numbers;
 use std::fmt::Write;
-use support::{all_shipped, begin, parsed, pool, sized, trace, wave};
+use support::{accelerated, all_shipped, parsed, sized};
 use zerkalo::scene::{Acceleration, Scene};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 /// Not a multiple of a tile.
 const SIZE: [u32; 2] = [53, 37];
 
-/// The film of `count` samples in every pixel of both replicates.
-fn bytes(scene: &Scene, by: Acceleration, precision: Precision, count: u32) -> Vec<u8> {
-    let mut scene = scene.clone();
-    scene.trace.acceleration = by;
-    let mut rendering = begin(&scene, 5, precision);
-    let pool = pool(1);
-    for replicate in 0..2 {
-        let wave = wave(&rendering.film, replicate, 0, count);
-        trace(&mut rendering, &wave, &pool);
-    }
-    rendering.film.bytes()
-}
-
 fn same(name: &str, scene: &Scene, precision: Precision, count: u32) {
-    let expected = bytes(scene, Acceleration::Auto, precision, count);
+    let expected = accelerated(scene, Acceleration::Auto, precision, count).film.bytes();
     for by in Acceleration::ALL {
-        let found = bytes(scene, by, precision, count);
+        let found = accelerated(scene, by, precision, count).film.bytes();
         assert!(found == expected, "{name} in {precision:?}: {} differs", by.name());
     }
 }

@@ -1,16 +1,21 @@
 //! Every scene of the folder `scenes`: what it is compiled to, and that its picture stays what it is.
 //! `ZERKALO_BLESS=1 cargo test --test scenes` writes the expected values anew.
 
+#[path = "common/normal.rs"]
+mod normal;
 mod support;
 
+use normal::{tail, two_sided_z};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
 use std::path::PathBuf;
-use support::{all_shipped, begin, parsed, picture, pool, rendered, shipped, sized, uniform};
+use support::{
+    all_shipped, begin, parsed, picture, pool, rendered, shipped, sized, uniform, without_chance,
+};
 use zerkalo::film::Part;
 use zerkalo::render::Rendering;
-use zerkalo::scene::{Filter, Scene};
+use zerkalo::scene::Scene;
 use zerkalo::world::{self, AnyWorld, Precision};
 
 /// Raster and samples per replicate of the pictures that are compared.
@@ -113,22 +118,10 @@ fn parse_references(text: &str) -> References {
     references
 }
 
-/// The two-sided chance that a standard normal number exceeds `z`, by its continued fraction.
-fn tail(z: f64) -> f64 {
-    let fraction = (1..60).rev().fold(z, |f, k| z + f64::from(k) / f);
-    2.0 * (-0.5 * z * z).exp() / (std::f64::consts::TAU.sqrt() * fraction)
-}
-
 /// The number of standard errors that the largest of `n` deviations exceeds as rarely as one deviation
 /// exceeds four (Sidak).
 fn threshold(n: usize) -> f64 {
-    let each = 1.0 - (1.0 - tail(4.0)).powf(1.0 / n as f64);
-    let (mut low, mut high) = (4.0, 20.0);
-    for _ in 0..60 {
-        let z = 0.5 * (low + high);
-        if tail(z) > each { low = z } else { high = z }
-    }
-    high
+    two_sided_z(1.0 - (1.0 - tail(4.0)).powf(1.0 / n as f64))
 }
 
 #[test]
@@ -200,14 +193,7 @@ fn the_furnace_is_exactly_1() {
 fn without_chance_both_replicates_are_equal() {
     for (name, mut scene) in all_shipped() {
         scene = sized(scene, SIZE);
-        scene.film.filter = Filter::Center;
-        for material in scene.materials.values_mut() {
-            (material.roughness, material.alpha) = (0.0, None);
-            if material.transmission > 0.0 {
-                // Beyond, one of two rays is chosen by chance.
-                scene.trace.depth = scene.trace.depth.min(2);
-            }
-        }
+        without_chance(&mut scene);
         for precision in [Precision::Single, Precision::Double] {
             let rendering = rendered(&scene, 5, precision, 9);
             let [a, b] = [Part::A, Part::B].map(|part| picture(&rendering, part));

@@ -1,6 +1,7 @@
 //! Two pictures of the same scene by two programs: do they agree as well as their noise allows?
 
 use crate::common::Numbers;
+use crate::normal::two_sided_z;
 use crate::support::{begin_with, picture, pool, sized, uniform};
 use crate::tracer::{Estimate, Mutation, Tracer};
 use glam::DVec3;
@@ -168,21 +169,6 @@ pub fn variances_differ_by(
     let mean = differences.iter().sum::<f64>() / n;
     let spread = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
     mean.abs() / (spread / n).sqrt()
-}
-
-/// The z beyond which a normal variable lies with probability `p`, on both sides together.
-fn two_sided_z(p: f64) -> f64 {
-    // Newton on log Q, with Q by the continued fraction of the normal tail (z > 2 here).
-    let tail = |z: f64| {
-        let fraction = (1..200).rev().fold(z, |below, k| z + f64::from(k) / below);
-        (-0.5 * z * z).exp() / ((2.0 * std::f64::consts::PI).sqrt() * fraction)
-    };
-    let (mut low, mut high) = (1.5, 20.0);
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if 2.0 * tail(middle) > p { low = middle } else { high = middle }
-    }
-    high
 }
 
 /// Writes picture, reference and difference where they can be looked at; returns the folder.

@@ -8,6 +8,8 @@ mod common;
 mod compare;
 mod compounds;
 mod meshes;
+#[path = "../common/normal.rs"]
+mod normal;
 mod paint;
 #[path = "../support/mod.rs"]
 mod support;

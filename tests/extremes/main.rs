@@ -1,5 +1,5 @@
 //! The extremes: sizes, places and proportions at which programs of this kind fail. The thirty numbered
-//! tests (`audit.rs` knows where each stands), random scenes, the choice of precision, scenes scaled and
+//! tests (`audit.rs` knows where each stands), the choice of precision, scenes scaled and
 //! shifted, and how fast the error falls.
 
 #[path = "../common/mod.rs"]
@@ -20,11 +20,9 @@ mod cavity;
 mod coincident;
 mod compound;
 mod degenerate;
-mod fuzz;
 mod lengths;
 mod mesh;
 mod precision;
-mod random;
 mod scaled;
 mod shadow;
 mod slopes;

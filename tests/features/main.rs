@@ -18,6 +18,8 @@ mod compounds;
 #[allow(dead_code, reason = "of tests/agreement; not all of it is needed here")]
 #[path = "../agreement/meshes.rs"]
 mod meshes;
+#[path = "../common/normal.rs"]
+mod normal;
 #[allow(dead_code, reason = "of tests/agreement; not all of it is needed here")]
 #[path = "../agreement/paint.rs"]
 mod paint;

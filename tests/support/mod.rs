@@ -10,7 +10,7 @@ use zerkalo::render::session::Traced;
 use zerkalo::render::wave::{Job, Wave, WaveReport};
 use zerkalo::render::{Options, Rendering};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::Scene;
+use zerkalo::scene::{Acceleration, Filter, Scene};
 use zerkalo::world::{self, Precision};
 
 /// A scene of the folder `scenes`.
@@ -82,6 +82,27 @@ pub fn rendered(scene: &Scene, seed: u64, precision: Precision, count: u32) -> R
     let mut rendering = begin(scene, seed, precision);
     uniform(&mut rendering, 0, count, &pool(2));
     rendering
+}
+
+/// Both replicates of `scene` by one thread, accelerated in one of the ways.
+pub fn accelerated(scene: &Scene, by: Acceleration, precision: Precision, count: u32) -> Rendering {
+    let mut scene = scene.clone();
+    scene.trace.acceleration = by;
+    let mut rendering = begin(&scene, 5, precision);
+    uniform(&mut rendering, 0, count, &pool(1));
+    rendering
+}
+
+/// Takes from a scene all that is left to chance: anti-aliasing, lobes, and beyond two surfaces that let
+/// light through the choice of one of two rays.
+pub fn without_chance(scene: &mut Scene) {
+    scene.film.filter = Filter::Center;
+    for material in scene.materials.values_mut() {
+        (material.roughness, material.alpha) = (0.0, None);
+        if material.transmission > 0.0 {
+            scene.trace.depth = scene.trace.depth.min(2);
+        }
+    }
 }
 
 /// Follows a schedule that stops for anything but time.

@@ -1,0 +1,128 @@
+//! Compares scene after scene, and keeps those that fail.
+
+use crate::scene::{Random, scene};
+use crate::shrink::shrunk;
+use crate::support::parsed;
+use std::collections::BTreeMap;
+use std::fs;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use zerkalo::scene::Scene;
+
+/// What a comparison found.
+pub enum Verdict {
+    /// The pictures agree.
+    Same,
+    /// There is nothing to compare, for this reason.
+    Skipped(&'static str),
+    /// What differs.
+    Different(String),
+}
+
+/// A comparison of a scene's pictures.
+pub type Check = fn(&Scene) -> Verdict;
+
+fn number(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |text| {
+        text.parse().unwrap_or_else(|_| panic!("{name} is {text}, not a whole number"))
+    })
+}
+
+/// The seeds that the environment asks for.
+pub fn many() -> Range<u64> {
+    let first = number("ZERKALO_FIRST", 0);
+    first..first + number("ZERKALO_SCENES", 200)
+}
+
+/// What is wrong by this check, a panic included.
+fn failure(text: &str, check: Check) -> Option<String> {
+    match catch_unwind(AssertUnwindSafe(|| check(&parsed(text)))) {
+        Ok(Verdict::Different(what)) => Some(what),
+        Ok(_) => None,
+        Err(panic) => Some(format!("panic: {}", words(panic.as_ref()))),
+    }
+}
+
+fn words(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().cloned();
+    text.or_else(|| panic.downcast_ref::<&str>().map(|t| t.to_string())).unwrap_or_default()
+}
+
+/// Compares the scenes of `seeds`; `name` is that of the comparison.
+pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
+    let (mut wrong, mut skipped) = (Vec::new(), BTreeMap::<&str, u32>::new());
+    let mut count = 0;
+    let only = std::env::var_os("ZERKALO_SEED").map(|_| number("ZERKALO_SEED", 0));
+    let seeds: Vec<u64> = only.map_or_else(|| seeds.into_iter().collect(), |seed| vec![seed]);
+    for seed in seeds {
+        count += 1;
+        let Random { layout, text } = scene(seed);
+        let outcome = catch_unwind(AssertUnwindSafe(|| check(&parsed(&text))));
+        let what = match outcome {
+            Ok(Verdict::Same) => continue,
+            Ok(Verdict::Skipped(why)) => {
+                *skipped.entry(why).or_default() += 1;
+                continue;
+            }
+            Ok(Verdict::Different(what)) => what,
+            Err(panic) => format!("panic: {}", words(panic.as_ref())),
+        };
+        let seconds = number("ZERKALO_SHRINK", 10);
+        let small = shrunk(&text, seconds, &|text| failure(text, check).is_some());
+        let last = failure(&small, check).unwrap_or_default();
+        let path = keep(name, seed, &what, &text, &last, &small);
+        let line = format!(
+            "seed {seed}, {layout:?}: {what}\n    {}\n    ZERKALO_SEED={seed} cargo test --test \
+             random_scenes -- {name}",
+            path.display()
+        );
+        println!("{line}");
+        wrong.push(line);
+    }
+    println!("{name}: {count} scenes, {} differ, skipped: {skipped:?}", wrong.len());
+    assert!(wrong.is_empty(), "{} of {count} scenes differ:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+/// As [`compare`], with the seeds that the environment asks for.
+pub fn compare_many(name: &str, check: Check) {
+    compare(name, many(), check);
+}
+
+/// Writes the scenes as files, to be looked at.
+#[test]
+#[ignore = "writes the scenes that the environment asks for to target/tmp/random_scenes"]
+fn write_scenes() {
+    let folder = folder();
+    for seed in many() {
+        let Random { layout, text } = scene(seed);
+        fs::write(folder.join(format!("{seed}.toml")), format!("# {layout:?}\n{text}")).unwrap();
+    }
+    println!("{}", folder.display());
+}
+
+/// The folder for scenes, with the files that they name from the folder of the package.
+fn folder() -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("random_scenes");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for files in ["scenes/meshes", "scenes/textures", "tests/random_scenes"] {
+        fs::create_dir_all(folder.join(files)).unwrap();
+        for file in fs::read_dir(root.join(files)).unwrap().map(|entry| entry.unwrap()) {
+            if file.path().extension().is_some_and(|e| e != "rs") {
+                fs::copy(file.path(), folder.join(files).join(file.file_name())).unwrap();
+            }
+        }
+    }
+    folder
+}
+
+/// Writes the scene and what is left of it when it is made smaller; returns the path of the latter.
+fn keep(name: &str, seed: u64, what: &str, text: &str, last: &str, small: &str) -> PathBuf {
+    let folder = folder();
+    let comment = |what: &str| what.lines().map(|line| format!("# {line}\n")).collect::<String>();
+    let path = folder.join(format!("{name}-{seed}-whole.toml"));
+    fs::write(path, format!("{}{text}", comment(what))).unwrap();
+    let path = folder.join(format!("{name}-{seed}.toml"));
+    fs::write(&path, format!("{}{small}", comment(last))).unwrap();
+    path
+}

@@ -1,0 +1,81 @@
+//! Where `auto` takes single precision it shows what double precision shows.
+
+use crate::driver::{Verdict, compare, compare_many};
+use crate::statistics::{Worst, blocks, mean_and_error, mean_of};
+use crate::support::{picture, rendered};
+use zerkalo::film::{Display, Part};
+use zerkalo::scene::{Filter, Scene};
+use zerkalo::world::{AnyWorld, Options, Precision};
+
+const SEEDS: u64 = 8;
+/// Samples of a pixel and replicate.
+const SAMPLES: u32 = 4;
+/// What single precision may get wrong in the mean of a block, in codes: docs/accuracy.md measures 0.12 over a picture
+/// at the worst proportions that `auto` leaves to it.
+const FLOOR: f64 = 0.5;
+
+/// The codes of every pixel, for each seed.
+pub fn codes(scene: &Scene, precision: Precision, samples: u32) -> Vec<Vec<[f64; 3]>> {
+    let display = Display::default();
+    (0..SEEDS)
+        .map(|seed| {
+            let rendering = rendered(scene, seed, precision, samples);
+            picture(&rendering, Part::Both).into_iter().map(|rgb| display.codes(rgb)).collect()
+        })
+        .collect()
+}
+
+/// The blocks of two sets of pictures, of which those of one seed have the same samples.
+pub fn paired(
+    size: [u32; 2],
+    names: [&str; 2],
+    [a, b]: [&[Vec<[f64; 3]>]; 2],
+    floor: f64,
+) -> Verdict {
+    let blocks = blocks(size);
+    let mut worst = Worst::new(3 * blocks.len(), a.len() - 1);
+    for (i, pixels) in blocks.iter().enumerate() {
+        let means = |pictures: &[Vec<[f64; 3]>]| -> Vec<[f64; 3]> {
+            pictures.iter().map(|p| mean_of(p, pixels)).collect()
+        };
+        let (a, b) = (means(a), means(b));
+        for c in 0..3 {
+            let differences: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a[c] - b[c]).collect();
+            let (mean, error) = mean_and_error(&differences);
+            worst.note(mean, floor, error, || {
+                let of = |v: &[[f64; 3]]| v.iter().map(|m| m[c]).sum::<f64>() / v.len() as f64;
+                let [first, second] = names;
+                format!(
+                    "block {i} of {}, channel {c}: {first} {:.2}, {second} {:.2} codes",
+                    blocks.len(),
+                    of(&a),
+                    of(&b)
+                )
+            });
+        }
+    }
+    worst.beyond_chance().map_or(Verdict::Same, Verdict::Different)
+}
+
+fn single_is_double(scene: &Scene) -> Verdict {
+    let mut scene = scene.clone();
+    // A sample at a pixel's centre may lie exactly on an edge.
+    scene.film.filter = Filter::Box;
+    if let AnyWorld::Double(_) = AnyWorld::compile(&scene, &Options::default()) {
+        return Verdict::Skipped("auto takes double precision");
+    }
+    let [single, double] =
+        [Precision::Single, Precision::Double].map(|p| codes(&scene, p, SAMPLES));
+    paired(scene.film.size, ["single", "double"], [&single, &double], FLOOR)
+}
+
+#[test]
+fn precisions() {
+    compare("precisions", 0..48, single_is_double);
+}
+
+#[test]
+#[ignore = "as many scenes as the environment asks for"]
+fn many_precisions() {
+    compare_many("precisions", single_is_double);
+}

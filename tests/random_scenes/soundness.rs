@@ -1,0 +1,103 @@
+//! No panic, no sample that is no light, a noise that is a number; and where nothing is left to chance both
+//! replicates are the same.
+
+use crate::driver::{Verdict, compare, compare_many};
+use crate::layouts::Layout;
+use crate::scene::of;
+use crate::support::{parsed, picture, pool, rendered, uniform, without_chance};
+use zerkalo::film::{Display, Part};
+use zerkalo::scene::Scene;
+use zerkalo::world::Precision;
+
+const SAMPLES: u32 = 4;
+
+fn sound(scene: &Scene) -> Verdict {
+    for precision in [Precision::Auto, Precision::Double] {
+        let mut rendering = rendered(scene, 1, precision, SAMPLES);
+        // Packets of many pixels and, from here on, of one.
+        uniform(&mut rendering, 8, 8, &pool(2));
+        let bad = rendering.film.bad_samples();
+        if bad.count > 0 {
+            return Verdict::Different(format!(
+                "{precision:?}: {} bad samples, such as {:?}",
+                bad.count, bad.first[0]
+            ));
+        }
+        let parts = [Part::A, Part::B, Part::Both].map(|part| picture(&rendering, part));
+        let light = |p: &[f64; 3]| p.iter().all(|c| c.is_finite() && *c >= 0.0);
+        if let Some(i) = parts.iter().flatten().position(|p| !light(p)) {
+            return Verdict::Different(format!("{precision:?}: pixel {i} is no light"));
+        }
+        let noise = rendering.film.noise(&rendering.mix, &Display::default());
+        let told = noise.map(|n| [n.rmse_linear, n.rmse_codes, n.p95_codes, n.worst_codes]);
+        if !told.is_some_and(|told| told.iter().all(|x| x.is_finite() && *x >= 0.0)) {
+            return Verdict::Different(format!("{precision:?}: a noise of {noise:?}"));
+        }
+    }
+    Verdict::Same
+}
+
+fn alike(scene: &Scene) -> Verdict {
+    let mut scene = scene.clone();
+    without_chance(&mut scene);
+    for precision in [Precision::Auto, Precision::Double] {
+        let rendering = rendered(&scene, 1, precision, SAMPLES);
+        let [a, b] = [Part::A, Part::B].map(|part| picture(&rendering, part));
+        if let Some(i) = (0..a.len()).find(|i| a[*i] != b[*i]) {
+            return Verdict::Different(format!(
+                "{precision:?}: without chance pixel {i} is {:?} and {:?}",
+                a[i], b[i]
+            ));
+        }
+    }
+    Verdict::Same
+}
+
+#[test]
+fn soundness() {
+    compare("soundness", 0..160, sound);
+}
+
+/// Of all proportions.
+#[test]
+fn wild_soundness() {
+    compare("soundness", of(Layout::Wild, 20..320), sound);
+}
+
+#[test]
+#[ignore = "as many scenes as the environment asks for"]
+fn many_soundness() {
+    compare_many("soundness", sound);
+}
+
+#[test]
+fn replicates() {
+    compare("replicates", 0..96, alike);
+}
+
+#[test]
+fn wild_replicates() {
+    compare("replicates", of(Layout::Wild, 12..312), alike);
+}
+
+#[test]
+#[ignore = "as many scenes as the environment asks for"]
+fn many_replicates() {
+    compare_many("replicates", alike);
+}
+
+/// A lamp a few millionths of the scene above the floor is bright there, not wrong.
+#[test]
+fn a_lamp_close_to_the_floor_has_no_bad_sample() {
+    let scene = parsed(
+        "[film]\nsize = [16, 16]\n[camera]\neye = [0.0, 1e-4, 1e-4]\ntarget = [0.0, 0.0, 0.0]\n\
+         [[light]]\npoint = { position = [0.0, 1e-5, 0.0] }\nfalloff = \"inverse-square\"\n\
+         [[object]]\nshape.platform = { center = [0.0, 0.0, 0.0], size = [10.0, 10.0] }\n",
+    );
+    for precision in [Precision::Auto, Precision::Double] {
+        let rendering = rendered(&scene, 2, precision, 16);
+        assert_eq!(rendering.film.bad_samples().count, 0);
+        let brightest = picture(&rendering, Part::Both).iter().map(|p| p[0]).fold(0.0, f64::max);
+        assert!(brightest > 1e8, "{brightest}");
+    }
+}

@@ -1,0 +1,70 @@
+//! Pictures of several seeds compared by the means of blocks of pixels. Seeds are independent, so that how much
+//! their means differ tells the error of the mean of all, whatever the sampler does within a seed.
+
+use crate::normal::{two_sided_z, z_of_t};
+
+/// The probability that any number of a scene's comparison raises a false alarm.
+const LEVEL: f64 = 1e-6;
+
+/// Side of a block in pixels; tiles are cut into whole ones.
+pub const BLOCK: usize = 8;
+
+/// The pixels of each block, as positions in the picture, and last those of the whole picture.
+pub fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
+    let [width, height] = [width as usize, height as usize];
+    let block = |x0: usize, y0: usize| {
+        let ys = y0..(y0 + BLOCK).min(height);
+        ys.flat_map(|y| (x0..(x0 + BLOCK).min(width)).map(move |x| y * width + x)).collect()
+    };
+    let corners = (0..height).step_by(BLOCK);
+    let mut all: Vec<Vec<usize>> =
+        corners.flat_map(|y| (0..width).step_by(BLOCK).map(move |x| block(x, y))).collect();
+    all.push((0..width * height).collect());
+    all
+}
+
+/// Mean colour over some pixels.
+pub fn mean_of(picture: &[[f64; 3]], pixels: &[usize]) -> [f64; 3] {
+    let n = pixels.len() as f64;
+    [0, 1, 2].map(|c| pixels.iter().map(|p| picture[*p][c]).sum::<f64>() / n)
+}
+
+/// Mean, and the standard error of the mean.
+pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    (mean, (squares / (n - 1.0) / n).sqrt())
+}
+
+/// The largest of many deviations.
+pub struct Worst {
+    count: f64,
+    freedom: f64,
+    z: f64,
+    what: String,
+}
+
+impl Worst {
+    /// Of `count` numbers, whose standard errors have so many degrees of freedom.
+    pub fn new(count: usize, freedom: usize) -> Self {
+        Self { count: count as f64, freedom: freedom as f64, z: 0.0, what: String::new() }
+    }
+
+    /// Takes a deviation of `difference` beyond `floor`, what rounding may do, with a standard error.
+    pub fn note(&mut self, difference: f64, floor: f64, error: f64, what: impl FnOnce() -> String) {
+        let beyond = (difference.abs() - floor).max(0.0);
+        let t = if beyond == 0.0 { 0.0 } else { beyond / error };
+        let z = z_of_t(t.min(1e12), self.freedom);
+        if z > self.z || z.is_nan() {
+            (self.z, self.what) = (z, format!("{} (t {t:.1})", what()));
+        }
+    }
+
+    /// What differs by more than chance allows (Bonferroni).
+    pub fn beyond_chance(self) -> Option<String> {
+        let allowed = two_sided_z(LEVEL / self.count);
+        let wrong = self.z.is_nan() || self.z > allowed;
+        wrong.then(|| format!("{}; z {:.1} of {allowed:.1}", self.what, self.z))
+    }
+}

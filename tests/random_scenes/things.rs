@@ -1,0 +1,324 @@
+//! Random materials, shapes of every registered kind, and objects.
+
+use crate::common::Numbers;
+use crate::words::{chance, direction, list, log, pick, table};
+use glam::DVec3;
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+use toml::{Table, Value};
+use zerkalo::asset::Assets;
+use zerkalo::material::{self, Material};
+use zerkalo::scene::{Library, Object, Rotate, Scale, Scene, Step};
+use zerkalo::shape::{KINDS, Part, Shape};
+use zerkalo::value::{Field, Takes};
+
+/// Files with triangles; the empty name stands for an icosahedron.
+const MESHES: &[&str] = &[
+    "",
+    "scenes/meshes/knot.ply",
+    "scenes/meshes/stone.obj",
+    "scenes/meshes/vase.ply",
+    "tests/random_scenes/block.obj",
+    "tests/random_scenes/block.obj",
+    "tests/random_scenes/sheet.obj",
+];
+
+const IMAGES: &[&str] = &[
+    "scenes/textures/brick-heights.png",
+    "scenes/textures/bricks.png",
+    "scenes/textures/sheet.png",
+    "scenes/textures/wood.png",
+];
+
+/// The files that were read, shared by all scenes.
+pub fn library() -> Library {
+    static ASSETS: OnceLock<Arc<Assets>> = OnceLock::new();
+    Library::of(Path::new("test"), ASSETS.get_or_init(Arc::default).clone())
+}
+
+/// A coefficient: zero, one, between, and rarely above.
+fn coefficient(numbers: &mut Numbers) -> f64 {
+    match numbers.below(12) {
+        0 => 0.0,
+        1 | 2 => 1.0,
+        3 => numbers.between(1.0, 1.5),
+        _ => numbers.unit(),
+    }
+}
+
+fn index(numbers: &mut Numbers) -> f64 {
+    match numbers.below(6) {
+        0 => 1.0,
+        1 | 2 => 1.5,
+        3 => log(numbers, 0.1, 100.0),
+        _ => numbers.between(1.0, 2.5),
+    }
+}
+
+fn material_key(numbers: &mut Numbers, field: &Field) -> Option<Value> {
+    Some(match field.name {
+        "ambient" | "diffuse" | "specular" => Value::Float(coefficient(numbers)),
+        "reflection" | "transmission" => Value::Float(coefficient(numbers).min(1.0)),
+        "exponent" => Value::Float(match numbers.below(3) {
+            0 => log(numbers, 1.0, 1e9),
+            _ => numbers.between(0.0, 200.0),
+        }),
+        "index" => Value::Float(index(numbers)),
+        "roughness" | "alpha" => Value::Float(match numbers.below(4) {
+            0 => 0.0,
+            _ => log(numbers, 1e-4, 3.0),
+        }),
+        "height" => Value::Float(numbers.between(-0.05, 0.05)),
+        "scale" => list([log(numbers, 0.1, 50.0), log(numbers, 0.1, 50.0)]),
+        "offset" => list([numbers.between(-2.0, 2.0), numbers.between(-2.0, 2.0)]),
+        "file" => Value::String(pick(numbers, IMAGES).to_string()),
+        _ => return None,
+    })
+}
+
+/// What a material is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Finish {
+    Any,
+    Glass,
+    Mirror,
+    /// Bright by itself, in ambient light.
+    Glowing,
+}
+
+/// A material without faults.
+pub fn material(numbers: &mut Numbers, finish: Finish) -> Material {
+    loop {
+        let mut keys = table(numbers, material::FIELDS, 0.3, &material_key);
+        let mut set = |key: &str, value| keys.insert(key.to_string(), value);
+        match finish {
+            Finish::Any => {}
+            Finish::Glass => {
+                set("transmission", Value::Float(pick(numbers, &[0.5, 0.9, 1.0])));
+                set("index", Value::Float(index(numbers)));
+                if chance(numbers, 1, 2) {
+                    set("fresnel", Value::String("dielectric".to_string()));
+                    set("reflection", Value::Float(1.0));
+                }
+                set("diffuse", Value::Float(pick(numbers, &[0.0, 0.1])));
+            }
+            Finish::Mirror => {
+                set("reflection", Value::Float(pick(numbers, &[0.3, 0.9, 1.0])));
+            }
+            Finish::Glowing => {
+                set("ambient", Value::Float(pick(numbers, &[1.0, 30.0])));
+            }
+        }
+        if let Ok(material) = keys.try_into::<Material>()
+            && material.faults().is_empty()
+        {
+            return material;
+        }
+    }
+}
+
+fn keys_of(kind: &Field) -> &'static [Field] {
+    match kind.takes {
+        Takes::Table(fields) => fields,
+        _ => &[],
+    }
+}
+
+/// Whether a kind is made of parts.
+fn has_parts(kind: &Field) -> bool {
+    keys_of(kind).iter().any(|f| matches!(f.takes, Takes::Tables(_)))
+}
+
+/// The kinds that can be parts of a compound, and the compounds.
+fn solids() -> &'static (Vec<&'static Field>, Vec<&'static Field>) {
+    static SOLIDS: OnceLock<(Vec<&Field>, Vec<&Field>)> = OnceLock::new();
+    SOLIDS.get_or_init(|| {
+        let (compounds, simple) = KINDS.iter().partition::<Vec<&Field>, _>(|kind| has_parts(kind));
+        let fits = |kind: &&Field| {
+            let [first, second] = ["sphere", kind.name]
+                .map(|key| Part::new(Shape::standing(key, DVec3::ZERO, DVec3::ONE).unwrap()));
+            compound(compounds[0].name, vec![first, second]).is_some()
+        };
+        (simple.into_iter().filter(fits).collect(), compounds)
+    })
+}
+
+/// A compound without faults.
+fn compound(key: &str, of: Vec<Part>) -> Option<Shape> {
+    let parts = Table::from_iter([("of".to_string(), Value::try_from(of).ok()?)]);
+    let whole = Table::from_iter([(key.to_string(), Value::Table(parts))]);
+    whole.try_into::<Shape>().ok().filter(|shape| shape.faults().is_empty())
+}
+
+/// A shape of this kind that stands about in a box of the lengths `size` on `base`, by random keys.
+fn by_keys(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Option<Shape> {
+    let own = |numbers: &mut Numbers, field: &Field| {
+        let least = size.min_element();
+        Some(match field.takes {
+            Takes::Numbers(3, range) if range.low < 0.0 => {
+                let up = DVec3::new(0.0, 0.5 * size.y, 0.0);
+                let spread = DVec3::from_array([(); 3].map(|()| numbers.between(-0.5, 0.5)));
+                list((base + up + spread * size).to_array())
+            }
+            Takes::Number(range) if range.low.is_finite() => {
+                let zero = range.holds(0.0) && chance(numbers, 1, 6);
+                Value::Float(if zero { 0.0 } else { least * log(numbers, 0.03, 0.6) })
+            }
+            Takes::Number(_) => Value::Float(match numbers.below(3) {
+                0 => pick(numbers, &[0.0, 45.0, 90.0]),
+                _ => numbers.between(-180.0, 180.0),
+            }),
+            Takes::Numbers(n, _) => list((0..n).map(|_| least * log(numbers, 0.1, 1.0))),
+            Takes::Text => Value::String(pick(numbers, MESHES).to_string()),
+            _ => return None,
+        })
+    };
+    let keys = table(numbers, keys_of(kind), 0.5, &own);
+    let whole = Table::from_iter([(kind.name.to_string(), Value::Table(keys))]);
+    whole.try_into::<Shape>().ok().filter(|shape| shape.faults().is_empty())
+}
+
+/// A compound in a box of the lengths `size` on `base`: of parts whose faces coincide as often as not.
+pub fn combined(
+    numbers: &mut Numbers,
+    base: DVec3,
+    size: DVec3,
+    materials: &[String],
+    levels: usize,
+) -> Shape {
+    let (simple, compounds) = solids();
+    let kind = compounds[numbers.below(compounds.len())];
+    for _ in 0..8 {
+        let mut parts = Vec::new();
+        for _ in 0..2 + numbers.below(3) {
+            let mut quarters = || f64::from(numbers.below(3) as u32 + 2) / 4.0;
+            let part = size * DVec3::new(quarters(), quarters(), quarters());
+            let mut step = || f64::from(numbers.below(5) as u32) / 4.0 - 0.5;
+            let at = base + DVec3::new(step(), 0.5 + step(), step()) * (size - part);
+            let shape = if levels > 1 && chance(numbers, 1, 4) {
+                combined(numbers, at, part, materials, levels - 1)
+            } else {
+                let kind = simple[numbers.below(simple.len())];
+                of_kind(numbers, kind, at, part)
+            };
+            let mut part = Part::new(shape);
+            if chance(numbers, 1, 2) {
+                part.material = materials[numbers.below(materials.len())].clone();
+            }
+            if chance(numbers, 1, 4) {
+                part.transform = steps(numbers, at);
+            }
+            parts.push(part);
+        }
+        if let Some(shape) = compound(kind.name, parts) {
+            return shape;
+        }
+    }
+    Shape::standing(kind.name, base, size).expect("a registered kind")
+}
+
+fn of_kind(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Shape {
+    let drawn = match numbers.below(2) {
+        0 => None,
+        _ => by_keys(numbers, kind, base, size),
+    };
+    drawn.unwrap_or_else(|| Shape::standing(kind.name, base, size).expect("a registered kind"))
+}
+
+/// Steps that turn, stretch, shear or mirror what stands on `base`, which stays where it is; mostly none.
+fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<Step> {
+    let turn = |numbers: &mut Numbers| {
+        let any = 180.0 * numbers.unit();
+        let degrees = pick(numbers, &[90.0, 45.0, any]);
+        Step::Rotate(Rotate { axis: direction(numbers).to_array(), degrees })
+    };
+    let stretch = |numbers: &mut Numbers| {
+        let factors = [(); 3].map(|()| {
+            let any = log(numbers, 0.05, 3.0);
+            pick(numbers, &[1.0, 0.5, 2.0, any])
+        });
+        Step::Scale(Scale(factors))
+    };
+    let inner = match numbers.below(12) {
+        0 => vec![Step::RotateY(numbers.between(-180.0, 180.0))],
+        1 => vec![turn(numbers)],
+        2 => vec![stretch(numbers)],
+        // Shear.
+        3 => vec![turn(numbers), stretch(numbers), turn(numbers)],
+        // A mirror image.
+        4 => vec![Step::Scale(Scale([-1.0, 1.0, 1.0])), turn(numbers)],
+        5 => vec![turn(numbers), Step::Scale(Scale([0.7, 1.3, -0.6])), turn(numbers)],
+        _ => return Vec::new(),
+    };
+    let there = Step::Translate((-base).to_array());
+    let back = Step::Translate(base.to_array());
+    std::iter::once(there).chain(inner).chain([back]).collect()
+}
+
+/// What objects are made of: names of materials, and the levels of compounds in compounds.
+pub struct Stock<'a> {
+    pub materials: &'a [String],
+    pub levels: usize,
+}
+
+/// An object of any kind on `base`, about as large as `size`, without faults.
+pub fn object(numbers: &mut Numbers, stock: &Stock, base: DVec3, size: DVec3) -> Object {
+    // What has no end hides all the rest: not too often.
+    let kind = loop {
+        let kind = &KINDS[numbers.below(KINDS.len())];
+        let drawn = Shape::standing(kind.name, DVec3::ZERO, DVec3::ONE).expect("a registered kind");
+        if drawn.form().bounds().is_some() || chance(numbers, 1, 6) {
+            break kind;
+        }
+    };
+    object_of(numbers, stock, kind, base, size)
+}
+
+/// The same of the kind with this key.
+pub fn named(numbers: &mut Numbers, stock: &Stock, key: &str, base: DVec3, size: DVec3) -> Object {
+    let kind = KINDS.iter().find(|kind| kind.name == key).expect("a registered kind");
+    object_of(numbers, stock, kind, base, size)
+}
+
+fn object_of(
+    numbers: &mut Numbers,
+    stock: &Stock,
+    kind: &Field,
+    base: DVec3,
+    size: DVec3,
+) -> Object {
+    let material = stock.materials[numbers.below(stock.materials.len())].clone();
+    let shape = match has_parts(kind) {
+        true => combined(numbers, base, size, stock.materials, stock.levels),
+        false => of_kind(numbers, kind, base, size),
+    };
+    let mut object = Object { name: String::new(), material, shape, transform: Vec::new() };
+    if object.shape.anchors().is_empty() && !has_parts(kind) {
+        fit(&mut object, base, size);
+    }
+    let placed = object.transform.len();
+    object.transform.extend(steps(numbers, base));
+    if !object.faults().is_empty() {
+        object.transform.truncate(placed);
+    }
+    object
+}
+
+/// The object with its files.
+pub fn resolved(object: &Object) -> Object {
+    let mut scene = Scene { objects: vec![object.clone()], library: library(), ..Scene::default() };
+    scene.resolve();
+    scene.objects.remove(0)
+}
+
+/// Scaled and moved into a box of the lengths `size` on `base`.
+fn fit(object: &mut Object, base: DVec3, size: DVec3) {
+    let Some((low, high)) = resolved(object).form().bounds() else { return };
+    let factor = (size / (high - low).max(DVec3::splat(1e-9))).min_element();
+    let foot = DVec3::new(0.5 * (low.x + high.x), low.y, 0.5 * (low.z + high.z));
+    object.transform = vec![
+        Step::Translate((-foot).to_array()),
+        Step::Scale(Scale([factor; 3])),
+        Step::Translate(base.to_array()),
+    ];
+}

@@ -1,0 +1,98 @@
+//! Random values for the keys of the format, by the format's own tables: a new key is among them.
+
+use crate::common::Numbers;
+use glam::DVec3;
+use toml::{Table, Value};
+use zerkalo::value::{Field, Preset, Range, Takes};
+
+/// A value for a key; `None`: any that the table allows.
+pub type Own<'a> = &'a dyn Fn(&mut Numbers, &Field) -> Option<Value>;
+
+/// Any of `from`.
+pub fn pick<T: Copy>(numbers: &mut Numbers, from: &[T]) -> T {
+    from[numbers.below(from.len())]
+}
+
+/// True `times` in `of`.
+pub fn chance(numbers: &mut Numbers, times: usize, of: usize) -> bool {
+    numbers.below(of) < times
+}
+
+/// Between two positive numbers, every power of ten as often.
+pub fn log(numbers: &mut Numbers, low: f64, high: f64) -> f64 {
+    10f64.powf(numbers.between(low.log10(), high.log10()))
+}
+
+/// Along an axis, or anywhere.
+pub fn direction(numbers: &mut Numbers) -> DVec3 {
+    match numbers.below(3) {
+        0 => pick(numbers, &[DVec3::X, DVec3::Y, DVec3::Z]) * pick(numbers, &[1.0, -1.0]),
+        _ => numbers.direction(),
+    }
+}
+
+/// A list of numbers.
+pub fn list(numbers: impl IntoIterator<Item = f64>) -> Value {
+    Value::Array(numbers.into_iter().map(Value::Float).collect())
+}
+
+/// A number in `range`, of the middle of which most are.
+fn number(numbers: &mut Numbers, range: Range) -> f64 {
+    let ends: Vec<f64> =
+        [range.low, range.high].into_iter().filter(|x| x.abs() <= 1.0 && range.holds(*x)).collect();
+    let x = match numbers.below(4) {
+        0 if !ends.is_empty() => return pick(numbers, &ends),
+        1 => numbers.unit(),
+        _ => log(numbers, 1e-3, 1e3),
+    };
+    let x = if chance(numbers, 1, 2) && range.holds(-x) { -x } else { x };
+    if range.holds(x) { x } else { x.clamp(range.low.max(-1e3), range.high.min(1e3)) }
+}
+
+/// A value of this type.
+fn value(numbers: &mut Numbers, takes: Takes, odds: f64, own: Own) -> Value {
+    match takes {
+        Takes::Text => Value::String(String::new()),
+        Takes::Switch => Value::Boolean(chance(numbers, 1, 2)),
+        Takes::Choice(words) => Value::String(words[numbers.below(words.len())].name.to_string()),
+        Takes::Whole(range) => Value::Integer(number(numbers, range).round() as i64),
+        Takes::Wholes(n, range) => {
+            Value::Array((0..n).map(|_| Value::Integer(number(numbers, range) as i64)).collect())
+        }
+        Takes::Number(range) => Value::Float(number(numbers, range)),
+        Takes::Numbers(n, range) => list((0..n).map(|_| number(numbers, range))),
+        Takes::Direction => list(direction(numbers).to_array()),
+        Takes::Factor => list((0..3).map(|_| log(numbers, 0.3, 3.0) * pick(numbers, &[1.0, -1.0]))),
+        Takes::Color(_) => list((0..3).map(|_| numbers.unit())),
+        Takes::Table(fields) => Value::Table(table(numbers, fields, odds, own)),
+        Takes::OneOf(fields) => Value::Table(one_of(numbers, fields, odds, own)),
+        Takes::ListOf(fields) => {
+            let steps = (0..numbers.below(3)).map(|_| one_of(numbers, fields, odds, own));
+            Value::Array(steps.map(Value::Table).collect())
+        }
+        Takes::Tables(fields) => {
+            let tables = (0..2 + numbers.below(2)).map(|_| table(numbers, fields, odds, own));
+            Value::Array(tables.map(Value::Table).collect())
+        }
+        Takes::Named(_) => Value::Table(Table::new()),
+    }
+}
+
+fn one_of(numbers: &mut Numbers, fields: &[Field], odds: f64, own: Own) -> Table {
+    let field = &fields[numbers.below(fields.len())];
+    let value = own(numbers, field).unwrap_or_else(|| value(numbers, field.takes, odds, own));
+    [(field.name.to_string(), value)].into_iter().collect()
+}
+
+/// A table with some of these keys: all that are required, each of the others with the probability `odds`.
+pub fn table(numbers: &mut Numbers, fields: &[Field], odds: f64, own: Own) -> Table {
+    let mut out = Table::new();
+    for field in fields {
+        if field.preset == Preset::Required || numbers.unit() < odds {
+            let value =
+                own(numbers, field).unwrap_or_else(|| value(numbers, field.takes, odds, own));
+            out.insert(field.name.to_string(), value);
+        }
+    }
+    out
+}
