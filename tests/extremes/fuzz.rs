@@ -3,13 +3,10 @@
 
 use crate::random::{self, Contents};
 use crate::support::{begin, parsed, picture, pool, rendered, uniform};
-use glam::DVec3;
 use proptest::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 use zerkalo::film::Part;
-use zerkalo::light::Falloff;
 use zerkalo::scene::Scene;
-use zerkalo::shape::Form;
 use zerkalo::world::Precision;
 
 const SAMPLES: u32 = 4;
@@ -23,29 +20,6 @@ struct Count {
     shown: AtomicU32,
 }
 
-/// Light that weakens with the square of the distance is beyond the film's range on things nearer than a
-/// hundred-thousandth of the scene; such lamps shine evenly.
-fn weaken_close_lamps(scene: &mut Scene) {
-    let forms: Vec<Form> = scene.objects.iter().map(|o| o.form()).collect();
-    let boxes: Vec<_> = forms.iter().filter_map(Form::bounds).collect();
-    let low = boxes.iter().map(|b| b.0).fold(DVec3::INFINITY, DVec3::min);
-    let high = boxes.iter().map(|b| b.1).fold(DVec3::NEG_INFINITY, DVec3::max);
-    let eye = DVec3::from(scene.camera.eye);
-    let extent = (high - low).max(eye - low).max(high - eye).max_element();
-    for light in &mut scene.lights {
-        let Some(point) = light.point else { continue };
-        let at = DVec3::from(point.position);
-        let near = |form: &Form| match (form, form.bounds()) {
-            (Form::Plane { normal, offset }, _) => (normal.dot(at) - offset).abs(),
-            (_, Some((low, high))) => (low - at).max(at - high).max(DVec3::ZERO).length(),
-            _ => 0.0,
-        };
-        if forms.iter().map(near).fold(f64::INFINITY, f64::min) < 1e-5 * extent {
-            light.falloff = Falloff::None;
-        }
-    }
-}
-
 /// The pictures of both replicates.
 type Replicates = [Vec<[f64; 3]>; 2];
 
@@ -54,12 +28,11 @@ fn rendered_twice(
     text: &str,
     count: &Count,
 ) -> Result<Vec<(Precision, Replicates)>, TestCaseError> {
-    let Ok(mut scene) = Scene::parse(text, "test") else {
+    let Ok(scene) = Scene::parse(text, "test") else {
         count.refused.fetch_add(1, Ordering::Relaxed);
         return Ok(Vec::new());
     };
     count.taken.fetch_add(1, Ordering::Relaxed);
-    weaken_close_lamps(&mut scene);
     let pool = pool(1);
     let mut out = Vec::new();
     for precision in [Precision::Single, Precision::Double] {

@@ -12,6 +12,7 @@ mod support;
 mod told;
 
 mod audit;
+mod brightness;
 mod camera;
 mod cauchy;
 mod cavity;
