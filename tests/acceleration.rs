@@ -6,6 +6,7 @@ mod support;
 use common::Numbers;
 use std::fmt::Write;
 use support::{accelerated, all_shipped, parsed, sized};
+use zerkalo::camera::ViewAngle;
 use zerkalo::scene::{Acceleration, Scene};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
@@ -88,6 +89,36 @@ fn random_scenes_are_the_same_picture() {
         let scene = sized(crowd(&mut numbers, count), [41, 29]);
         let precision = if seed % 3 == 2 { Precision::Double } else { Precision::Single };
         same(&format!("seed {seed}, {count} things"), &scene, precision, 3);
+    }
+}
+
+/// Small pictures and long ones, from narrow to almost all that is before the eye, so that one tile may span
+/// more than a half space around its middle; with planes and rectangles of every slope.
+#[test]
+fn every_view_angle_shows_the_same_picture() {
+    let flat = "[[object]]\nshape.plane = { point = [0.0, -6.0, 0.0], normal = [0.0, 1.0, 0.0] }\n\
+                [[object]]\nshape.plane = { point = [0.0, 9.0, 0.0], normal = [0.3, -1.0, 0.2] }\n\
+                [[object]]\nshape.rectangle = { center = [4.0, 0.0, 1.0], size = [3.0, 5.0], \
+                normal = [-1.0, 0.5, 0.2] }\n";
+    let sizes =
+        [[1, 1], [3, 2], [20, 20], [40, 30], [200, 1], [1, 200], [1000, 1], [1, 1000], [57, 3]];
+    let mut seed = 100;
+    for angle in [5.0, 60.0, 100.0, 140.0, 160.0, 175.0, 179.0] {
+        for size in sizes {
+            seed += 1;
+            let mut numbers = Numbers::new(seed);
+            let count = [6, 24, 130][numbers.below(3)];
+            let mut scene = crowd(&mut numbers, count);
+            let planes = parsed(flat);
+            scene.objects.extend(planes.objects);
+            scene.camera.view_angle = match numbers.below(2) {
+                0 => ViewAngle::Vertical(angle),
+                _ => ViewAngle::Horizontal(angle),
+            };
+            let precision = if seed % 2 == 0 { Precision::Single } else { Precision::Double };
+            let name = format!("{angle} degrees, {size:?}, {count} things, {precision:?}");
+            same(&name, &sized(scene, size), precision, 3);
+        }
     }
 }
 

@@ -90,8 +90,12 @@ impl View {
     pub fn pixel_angle(&self) -> f64 {
         // At the distance d along the ray a step across it by p turns the ray by about p / d, and one
         // aslant by no less than p / d^2.
-        let step = self.right.length().min(self.down.length());
-        step / self.corner.length_squared()
+        self.pixel() / self.corner.length_squared()
+    }
+
+    /// Side of a pixel on the picture plane at unit distance; of an oblong one the smaller.
+    pub fn pixel(&self) -> f64 {
+        self.right.length().min(self.down.length())
     }
 
     /// From the eye to the corners of a rectangle of the raster, on the picture plane at unit distance.

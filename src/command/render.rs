@@ -88,6 +88,8 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
             noise_codes_p95: report.noise.map(|n| n.p95_codes),
             rmse_linear: report.noise.map(|n| n.rmse_linear),
             bad_samples: report.bad_samples,
+            saturated_samples: report.saturated_samples,
+            saturated_pixels: report.saturated_pixels,
             peak_rss_bytes: peak_rss_bytes(),
             stopped_by: match end {
                 End::Done(reason) => reason.name(),
@@ -232,9 +234,7 @@ fn summary(path: &Path, size: [u32; 2], report: &Report, end: End) -> String {
         size[1],
         report.seconds
     );
-    if report.bad_samples > 0 {
-        text += &format!("  {} bad samples left out", report.bad_samples);
-    }
+    report.warnings().iter().for_each(|warning| text += &format!("  {warning}"));
     match end {
         End::Signal(_) => text += "  (stopped by a signal: the picture so far)",
         End::Done(StoppedBy::RaysPerPixel) => text += "  (the cap on rays per pixel is reached)",

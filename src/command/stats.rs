@@ -47,7 +47,12 @@ pub struct Stats {
     /// 95th percentile of the tiles' RMSE in codes.
     pub noise_codes_p95: Option<f64>,
     pub rmse_linear: Option<f64>,
+    /// NaN or negative; left out.
     pub bad_samples: u64,
+    /// Brighter than the film holds; made as bright as it does.
+    pub saturated_samples: u64,
+    /// Pixels with a sum that is full.
+    pub saturated_pixels: u64,
     /// Highest resident memory; null where the system does not tell.
     pub peak_rss_bytes: Option<u64>,
     /// `spp`, `noise`, `rmse`, `time`, `rays_per_pixel`, `full` or `signal`.

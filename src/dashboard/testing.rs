@@ -26,6 +26,8 @@ pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
         quality_seconds: [None; QUALITIES.len()],
         progress: None,
         bad_samples: 0,
+        saturated_samples: 0,
+        saturated_pixels: 0,
         recent_samples_per_second: 1e7,
         threads: 2,
         lanes: "f32x8",

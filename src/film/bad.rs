@@ -1,9 +1,9 @@
-//! Samples that are no light: NaN, infinite or negative.
+//! Samples that are no light: NaN or negative.
 
 /// How many bad samples are remembered one by one; the rest are only counted.
 pub const BAD_REMEMBERED: usize = 16;
 
-/// Where a bad sample arose; enough to trace it again.
+/// Where a sample arose; enough to trace it again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct BadSample {
     /// Index in the replicate's sequence.

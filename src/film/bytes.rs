@@ -4,7 +4,8 @@
 //! (u64), the length of the precision's name (u32) and the name. Bad samples: their count (u64), the
 //! number of those remembered (u32), and of each index, x, y (u32) and replicate (u8). Then the tiles
 //! in order: counts of A and B (u32), lattice (u8), and if there is any sample the sums of the pixels
-//! inside the picture, `[replicate][row][column][group][channel]` (i64).
+//! inside the picture, `[replicate][row][column][group][channel]` (i64). At the end, if there are saturated
+//! samples, their count (u64).
 
 use super::TILE;
 use super::storage::Film;
@@ -39,7 +40,11 @@ impl Film {
             }
             out.write_all(&[sample.replicate])?;
         }
-        (0..self.tile_count()).try_for_each(|index| write_tile(self.tile(index), out))
+        (0..self.tile_count()).try_for_each(|index| write_tile(self.tile(index), out))?;
+        match self.saturated_samples() {
+            0 => Ok(()),
+            count => out.write_all(&count.to_le_bytes()),
+        }
     }
 }
 

@@ -229,9 +229,19 @@ impl Film {
         all
     }
 
+    /// Samples since the last restart that were brighter than the film holds.
+    pub fn saturated_samples(&self) -> u64 {
+        self.touched().map(|(_, tile)| tile.saturated_samples()).sum()
+    }
+
     /// Number of channel sums that have reached the largest value a sum can have.
     pub fn saturated(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated()).sum()
+    }
+
+    /// Number of pixels with such a sum: more samples make them darker than they are.
+    pub fn saturated_pixels(&self) -> u64 {
+        self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
     }
 
     /// Adds the samples of another film. Films of disjoint sample ranges, added in any order, equal

@@ -32,7 +32,9 @@ pub struct Tile {
     extent: [usize; 2],
     counts: [u32; 2],
     lattice_px: u8,
-    saturated: bool,
+    /// Some sum has reached the largest value.
+    full: bool,
+    saturated_samples: u64,
     bad: BadSamples,
     /// `[replicate][pixel][group][channel]`; empty until the first touch.
     sums: Vec<i64>,
@@ -50,7 +52,8 @@ impl Tile {
             extent,
             counts: [0; 2],
             lattice_px: 0,
-            saturated: false,
+            full: false,
+            saturated_samples: 0,
             bad: BadSamples::default(),
             sums: Vec::new(),
             written: Default::default(),
@@ -83,7 +86,8 @@ impl Tile {
         self.epoch = epoch;
         self.counts = [0; 2];
         self.lattice_px = 0;
-        self.saturated = false;
+        self.full = false;
+        self.saturated_samples = 0;
         self.bad = BadSamples::default();
     }
 
@@ -208,19 +212,39 @@ impl Tile {
         let new = [0, 1, 2].map(|c| sums[c].wrapping_add(values[c]));
         let fit = new[0] | new[1] | new[2] >= 0;
         sums.copy_from_slice(&if fit { new } else { new.map(at_most_the_largest) });
-        self.saturated |= !fit;
+        self.full |= !fit;
     }
 
     /// Number of channel sums that have reached the largest value a sum can have.
     pub fn saturated(&self) -> u64 {
-        if !self.saturated {
+        if !self.full {
             return 0;
         }
         let full = |(r, p)| self.pixel(r, p).iter().filter(|sum| **sum == i64::MAX).count() as u64;
         self.written().map(full).sum()
     }
 
-    /// Records a sample that was NaN, infinite or negative. It counts as a sample of value 0.
+    /// Number of pixels with such a sum.
+    pub fn saturated_pixels(&self) -> u64 {
+        if !self.full {
+            return 0;
+        }
+        let full = |pixel: &usize| (0..2).any(|r| self.pixel(r, *pixel).contains(&i64::MAX));
+        (0..TILE_PIXELS).filter(full).count() as u64
+    }
+
+    /// Records samples that were brighter than the film holds: they have the largest value that it does.
+    #[cold]
+    pub fn record_saturated(&mut self, samples: u64) {
+        self.saturated_samples += samples;
+    }
+
+    /// Number of such samples.
+    pub fn saturated_samples(&self) -> u64 {
+        self.saturated_samples
+    }
+
+    /// Records a sample that was NaN or negative. It counts as a sample of value 0.
     #[cold]
     pub fn record_bad(&mut self, sample: BadSample) {
         self.bad.record(sample);
@@ -238,7 +262,8 @@ impl Tile {
         for (replicate, pixel) in other.written() {
             self.add(replicate, pixel, other.pixel(replicate, pixel));
         }
-        self.saturated |= other.saturated;
+        self.full |= other.full;
+        self.saturated_samples += other.saturated_samples;
         self.lattice_px = self.lattice_px.max(other.lattice_px);
         for replicate in 0..2 {
             self.advance(replicate, other.counts[replicate]);
@@ -320,6 +345,10 @@ mod tests {
         assert_eq!(tile.saturated(), 1);
         assert_eq!(tile.pixel(1, 3), [i64::MAX, 2, 4, 6, 8, 10]);
         assert_eq!(tile.pixel(0, 3), [0; 6]);
+        assert_eq!(tile.saturated_pixels(), 1);
+        tile.add(0, 3, &[i64::MAX, i64::MAX, 0, 0, 0, 0]);
+        tile.add(0, 3, &[1, 1, 0, 0, 0, 0]);
+        assert_eq!((tile.saturated(), tile.saturated_pixels()), (3, 1));
     }
 
     #[test]
@@ -327,10 +356,13 @@ mod tests {
         let mut tile = tile();
         tile.add(0, 0, &[1; 6]);
         tile.advance(0, 1);
+        tile.record_saturated(3);
         tile.touch(1);
         assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (1, [1, 0]));
+        assert_eq!(tile.saturated_samples(), 3);
         tile.touch(2);
         assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (0, [0, 0]));
+        assert_eq!(tile.saturated_samples(), 0);
         // Also where the first thing that happens is a write, and in memory of another stride.
         tile.add(0, 0, &[2; 6]);
         assert_eq!((tile.pixel(0, 0), tile.pixel(1, 0)), (&[2; 6][..], &[0; 6][..]));

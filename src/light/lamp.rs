@@ -67,7 +67,8 @@ impl<S: Real> Lamp<S> {
                 let distance = to.length2().sqrt();
                 let inverse = L::one() / distance;
                 let irradiance = match self {
-                    Self::Falling { .. } => inverse * inverse,
+                    // Infinity times black would be no number.
+                    Self::Falling { .. } => (inverse * inverse).min(L::of(L::MAX)),
                     _ => L::of(PI),
                 };
                 Arrival { towards: to * inverse, distance, irradiance }

@@ -7,6 +7,10 @@ use crate::lanes::Real;
 /// Microfacet slopes below this are mirrors (for reflected rays) or this (for highlights of lights).
 pub const SMOOTH_ALPHA: f64 = 1e-3;
 
+/// Phong exponents above this have highlights so small that their cosine, rounded in single precision, tells
+/// too little: the power's relative error is the exponent times some 1.5e-7.
+pub const SHARP_EXPONENT: f64 = 1024.0;
+
 /// A distribution of microfacets.
 #[derive(Clone, Copy, Debug)]
 pub struct Facets<S> {
@@ -42,6 +46,8 @@ pub enum Shine<S> {
         strength: S,
         /// alpha.
         exponent: S,
+        /// alpha exceeds [`SHARP_EXPONENT`].
+        sharp: bool,
     },
     /// k_s D G F / (4 N.L N.V).
     Facets {
@@ -120,7 +126,11 @@ impl<S: Real> Finish<S> {
         let strength = S::of(material.specular);
         let shine = match material.highlight {
             _ if material.specular == 0.0 => Shine::None,
-            Highlight::Phong => Shine::Phong { strength, exponent: S::of(material.exponent) },
+            Highlight::Phong => Shine::Phong {
+                strength,
+                exponent: S::of(material.exponent),
+                sharp: material.exponent > SHARP_EXPONENT,
+            },
             Highlight::CookTorrance => {
                 Shine::Facets { strength, facets: facets(material.lobe == Lobe::Ggx) }
             }

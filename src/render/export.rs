@@ -73,6 +73,8 @@ fn metadata(
         ("Samples per pixel", format!("{:.2} ({}-{})", spp.mean, spp.min, spp.max)),
         ("Noise", noise),
         ("Bad samples", report.bad_samples.to_string()),
+        ("Saturated samples", report.saturated_samples.to_string()),
+        ("Saturated pixels", report.saturated_pixels.to_string()),
         ("Biased", if biases.is_empty() { "no".to_string() } else { biases.join("; ") }),
         (
             "Settings",

@@ -121,9 +121,15 @@ impl<L: Lanes> Tracer<'_, L> {
             self.sum_of_each::<1, _>(&work.radiance, packet, |(t, _, p), group, sums| {
                 tiles[*t].1.add_group(0, *p, group, sums);
             });
+            let tile_of = |x, y| packet.iter().find(|p| place(p) == (x, y)).map(|(t, ..)| *t);
             for bad in work.bad.drain(..) {
-                if let Some((t, ..)) = packet.iter().find(|pixel| place(pixel) == (bad.x, bad.y)) {
-                    tiles[*t].1.record_bad(bad);
+                if let Some(t) = tile_of(bad.x, bad.y) {
+                    tiles[t].1.record_bad(bad);
+                }
+            }
+            for bright in work.saturated.drain(..) {
+                if let Some(t) = tile_of(bright.x, bright.y) {
+                    tiles[t].1.record_saturated(1);
                 }
             }
         }

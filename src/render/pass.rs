@@ -63,7 +63,7 @@ pub fn run_in<L: Lanes>(
 pub(super) struct Tracer<'a, L: Lanes> {
     pub(super) world: &'a World<L>,
     pub(super) sampler: Sampler<L>,
-    /// Radiance beyond this cannot be told from a fault, per group: 2^49 steps of the film.
+    /// The largest radiance that the film holds, per group: 2^49 steps.
     limits: [L; MAX_GROUPS],
     /// The pixels of a tile that lies inside the picture, see [`pixels_of`].
     whole: Vec<u8>,
@@ -128,6 +128,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             index += count as u32;
         }
         work.bad.into_iter().for_each(|bad| tile.record_bad(bad));
+        tile.record_saturated(work.saturated.len() as u64);
         tile.advance(replicate, job.count);
         work.counts
     }
@@ -176,7 +177,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         let draws = points.of_pixel(key);
         let rays = self.world.view().rays(toward, self.jitter(&draws));
         work.trace(self.world, rays, &draws, L::mask(true));
-        self.take_out_bad(work, |lane| (sites.at(i), first + lane as u32));
+        self.check(work, |lane| (sites.at(i), first + lane as u32));
     }
 
     /// The samples `first..first + COUNT` of each of those pixels of `sites` that share the packet `packet`,
@@ -194,7 +195,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         let draws = points.of_pixels(keys);
         let rays = self.world.view().rays(toward, self.jitter(&draws));
         work.trace(self.world, rays, &draws, first_lanes::<L>(packet.len() * COUNT));
-        self.take_out_bad(work, |lane| {
+        self.check(work, |lane| {
             (sites.at(packet.start + lane / COUNT), first + (lane % COUNT) as u32)
         });
     }
@@ -232,29 +233,43 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         }
     }
 
-    /// Blackens samples that are NaN, infinite, negative or beyond what the film holds, and records
-    /// them; `which` gives pixel and index of a lane.
+    /// Makes samples what the film can hold, and records those that it cannot; `which` gives pixel and index
+    /// of a lane.
     #[inline(always)]
-    fn take_out_bad(&self, work: &mut Work<L>, which: impl Fn(usize) -> ((u32, u32), u32)) {
-        let radiance = &mut work.radiance;
+    fn check(&self, work: &mut Work<L>, which: impl Fn(usize) -> ((u32, u32), u32)) {
         let mut good = L::mask(true);
         for (g, limit) in self.limits.iter().enumerate().take(self.world.groups()) {
-            let v = radiance.groups[g];
+            let v = work.radiance.groups[g];
             let (zero, limit) = (L::zero(), *limit);
             good = good
                 & (v.x.ge(zero) & v.x.le(limit))
                 & (v.y.ge(zero) & v.y.le(limit))
                 & (v.z.ge(zero) & v.z.le(limit));
         }
-        if good.all() {
-            return;
+        if !good.all() {
+            self.repair(work, which);
         }
-        for group in &mut radiance.groups[..self.world.groups()] {
-            *group = group.only(good);
+    }
+
+    /// In each group, blackens what is NaN or negative in some channel, and takes the largest value that the
+    /// film holds for what is brighter or infinite.
+    #[cold]
+    fn repair(&self, work: &mut Work<L>, which: impl Fn(usize) -> ((u32, u32), u32)) {
+        let (mut bad, mut saturated) = (L::mask(false), L::mask(false));
+        for (group, limit) in
+            work.radiance.groups.iter_mut().zip(self.limits).take(self.world.groups())
+        {
+            let (v, zero) = (*group, L::zero());
+            let light = v.x.ge(zero) & v.y.ge(zero) & v.z.ge(zero);
+            bad = bad | !light;
+            saturated = saturated | (light & v.max_element().gt(limit));
+            *group = V3::new(v.x.min(limit), v.y.min(limit), v.z.min(limit)).only(light);
         }
-        for lane in (0..L::WIDTH).filter(|lane| !good.lane(*lane)) {
+        for lane in (0..L::WIDTH).filter(|lane| (bad | saturated).lane(*lane)) {
             let ((x, y), index) = which(lane);
-            work.bad.push(BadSample { index, replicate: work.replicate as u8, y, x });
+            let sample = BadSample { index, replicate: work.replicate as u8, y, x };
+            work.bad.extend(bad.lane(lane).then_some(sample));
+            work.saturated.extend(saturated.lane(lane).then_some(sample));
         }
     }
 }
@@ -265,7 +280,10 @@ pub(super) struct Work<L: Lanes> {
     outlook: Option<Outlook>,
     pub(super) radiance: Radiance<L>,
     pub(super) counts: Counts,
+    /// Samples that were NaN or negative in some group.
     pub(super) bad: Vec<BadSample>,
+    /// Samples that were brighter than the film holds in some group.
+    pub(super) saturated: Vec<BadSample>,
 }
 
 impl<L: Lanes> Work<L> {
@@ -276,6 +294,7 @@ impl<L: Lanes> Work<L> {
             radiance: Radiance { groups: [V3::zero(); MAX_GROUPS] },
             counts: Counts::default(),
             bad: Vec::new(),
+            saturated: Vec::new(),
         }
     }
 
@@ -339,32 +358,52 @@ mod tests {
     use crate::film::{Header, Mix};
     use crate::lanes::{Real, Single};
     use crate::sampling::SamplerKind;
-    use crate::scene::built_in;
 
-    /// Samples that are no light count, add nothing, and leave the pixel finite.
+    /// Samples that are no light count, add nothing, and leave the pixel finite; those that are too much of it
+    /// have the most that the film holds. Other groups keep what they have.
     #[test]
     fn extreme_30_a_bad_sample_is_counted_and_leaves_the_pixel_finite() {
-        let world = World::<Single>::new(&built_in());
+        let scene = crate::scene::Scene::parse(
+            "light = [{ directional = { direction = [0.0, -1.0, 0.0] } }]\n\
+             [background]\ncolor = [1.0, 1.0, 1.0]\n\
+             [[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }\n",
+            "test",
+        )
+        .unwrap_or_else(|e| panic!("{e}"));
+        let world = World::<Single>::new(&scene);
+        assert_eq!(world.groups(), 2);
         let tracer = Tracer::new(&world, &SampleSettings { seed: 0, kind: SamplerKind::Sobol });
-        for bad in [f64::NAN, f64::INFINITY, -1.0, 1e30] {
+        let most = 49f64.exp2() / world.scales()[0];
+        for (odd, left) in [
+            (f64::NAN, 0.0),
+            (-1.0, 0.0),
+            (f64::NEG_INFINITY, 0.0),
+            (f64::INFINITY, most),
+            (1e30, most),
+        ] {
             let (scales, precision) = (world.scales().to_vec(), "single".to_string());
             let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
             let tile = film.slots(&[0]).remove(0).open();
             let mut work = Work::<Single>::new(0, None);
             work.radiance.groups[0].x =
-                Single::from_fn(|i| Real::of(if i == 3 { bad } else { 0.5 }));
-            tracer.take_out_bad(&mut work, |lane| ((lane as u32, 0), 0));
+                Single::from_fn(|i| Real::of(if i == 3 { odd } else { 0.5 }));
+            work.radiance.groups[1].y = Single::of(0.25);
+            tracer.check(&mut work, |lane| ((lane as u32, 0), 0));
             let pixels = [0, 1, 2, 3, 4, 5, 6, 7];
             tracer.sum_of_each::<1, _>(&work.radiance, &pixels, |pixel, group, sums| {
                 tile.add_group(0, *pixel, group, sums);
             });
-            assert_eq!(work.bad, [BadSample { index: 0, replicate: 0, y: 0, x: 3 }], "{bad}");
+            let here = [BadSample { index: 0, replicate: 0, y: 0, x: 3 }];
+            let recorded = if left == 0.0 { (&here[..], &[][..]) } else { (&[][..], &here[..]) };
+            assert_eq!((&work.bad[..], &work.saturated[..]), recorded, "{odd}");
             work.bad.into_iter().for_each(|bad| tile.record_bad(bad));
+            tile.record_saturated(work.saturated.len() as u64);
             tile.advance(0, 1);
-            let mix = Mix::only(0, film.groups());
-            assert_eq!(film.bad_samples().count, 1);
-            assert_eq!(film.pixel(3, 0, &mix), [0.0; 3], "{bad}");
-            assert_eq!(film.pixel(4, 0, &mix), [0.5, 0.0, 0.0], "{bad}");
+            let of = |group| Mix::only(group, 2);
+            assert_eq!(film.bad_samples().count + film.saturated_samples(), 1);
+            assert_eq!(film.pixel(3, 0, &of(0)), [left, 0.0, 0.0], "{odd}");
+            assert_eq!(film.pixel(4, 0, &of(0)), [0.5, 0.0, 0.0], "{odd}");
+            assert_eq!(film.pixel(3, 0, &of(1)), [0.0, 0.25, 0.0], "{odd}");
         }
         println!("extreme 30 | both | bad samples counted, pixels finite");
     }

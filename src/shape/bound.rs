@@ -36,6 +36,29 @@ pub struct Pencil {
     pub corners: [DVec3; 4],
 }
 
+impl Pencil {
+    /// Whether a ball may reach between the lines: into the cone around them, if that is narrower than a half
+    /// space; otherwise, as no circular cone is convex then, to the inner side of the four planes through the
+    /// apex and neighbouring corners.
+    fn meets(&self, ball: &Ball) -> bool {
+        let Self { apex, forward, corners } = self;
+        let axis = corners.iter().sum::<DVec3>().normalize();
+        let cos = corners.iter().map(|c| c.normalize().dot(axis)).fold(1.0, f64::min);
+        if cos > 0.0 {
+            let cone = Cone { apex: *apex, axis, cos, sin: (1.0 - cos * cos).sqrt() };
+            return cone.meets(ball);
+        }
+        let to = ball.center - *apex;
+        let reach = ball.reach(*apex);
+        let is_outside = |i: usize| {
+            let normal = corners[i].cross(corners[(i + 1) % 4]);
+            let inward = normal * normal.dot(axis).signum();
+            inward.dot(to) < -reach * normal.length()
+        };
+        to.dot(*forward) >= -reach && !(0..4).any(is_outside)
+    }
+}
+
 /// The surroundings of one thing.
 #[derive(Clone, Copy, Debug)]
 pub struct Bound {
@@ -56,6 +79,11 @@ impl Ball {
     /// Whether `point` lies inside or near the surface.
     pub fn holds(&self, point: DVec3) -> bool {
         self.center.distance(point) <= self.radius + stray(self.center) + stray(point)
+    }
+
+    /// Its radius, with room for the roundings of rays from `apex`.
+    fn reach(&self, apex: DVec3) -> f64 {
+        self.radius * (1.0 + STRAY) + stray(self.center) + stray(apex)
     }
 }
 
@@ -117,36 +145,41 @@ impl Bound {
     pub fn part_in(&self, pencil: &Pencil) -> Option<Ball> {
         let Pencil { apex, forward, corners } = pencil;
         let ball = self.ball;
-        if ball.radius.is_finite() {
-            let axis = corners.iter().sum::<DVec3>().normalize();
-            let cos = corners.iter().map(|c| c.normalize().dot(axis)).fold(1.0, f64::min);
-            let cone = Cone { apex: *apex, axis, cos, sin: (1.0 - cos * cos).sqrt() };
-            if !cone.meets(&ball) {
-                return None;
-            }
+        if ball.radius.is_finite() && !pencil.meets(&ball) {
+            return None;
         }
+        let room = stray(*apex) + stray(ball.center);
         // Depths along `forward` between which the thing lies.
         let middle = (ball.center - *apex).dot(*forward);
-        let (mut near, mut far) = ((middle - ball.radius).max(0.0), middle + ball.radius);
+        let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
         if let Some((normal, offset)) = self.plane {
             // Along lines that have the same length in depth, 1 / depth of a plane is linear: its
-            // extremes are at the corners, if the plane crosses all four in front.
+            // extremes are at the corners, if the plane crosses all four in front. What rounding may do to
+            // the plane's height above the apex and to the slopes of the lines is allowed for.
             let height = offset - normal.dot(*apex);
-            let depths = corners.map(|c| height / normal.dot(c));
-            if depths.iter().all(|d| d.is_finite() && *d > 0.0) {
-                near = near.max(depths.iter().copied().fold(f64::INFINITY, f64::min));
-                far = far.min(depths.iter().copied().fold(0.0, f64::max));
-            } else if depths.iter().all(|d| *d < 0.0) {
+            let (height, toward) = (height.abs(), normal * height.signum());
+            let slack = stray(*apex) + STRAY * offset.abs();
+            let slopes = corners.map(|c| (toward.dot(c), STRAY * c.length()));
+            if height <= slack {
+                // The apex may be on either side.
+            } else if slopes.iter().all(|(slope, stray)| slope > stray) {
+                let nearest = slopes.map(|(slope, stray)| (height - slack) / (slope + stray));
+                let farthest = slopes.map(|(slope, stray)| (height + slack) / (slope - stray));
+                near = near.max(nearest.into_iter().fold(f64::INFINITY, f64::min));
+                far = far.min(farthest.into_iter().fold(0.0, f64::max));
+            } else if slopes.iter().all(|(slope, stray)| *slope < -stray) {
                 return None;
             }
         }
         if !far.is_finite() {
             return Some(ball);
         }
+        let near = near.max(0.0);
         let far = far.max(near);
         let ends: [DVec3; 8] =
             std::array::from_fn(|i| *apex + corners[i % 4] * if i < 4 { near } else { far });
         let part = Ball::around(&ends);
+        let part = Ball { radius: part.radius + room, ..part };
         Some(if part.radius < ball.radius { part } else { ball })
     }
 
@@ -207,7 +240,7 @@ impl Cone {
         let to = ball.center - self.apex;
         let along = to.dot(self.axis);
         let across = (to - self.axis * along).length();
-        let radius = ball.radius * (1.0 + STRAY) + stray(ball.center) + stray(self.apex);
+        let radius = ball.reach(self.apex);
         along >= -radius && across * self.cos - along * self.sin <= radius
     }
 }
@@ -246,7 +279,7 @@ mod tests {
         let wall = Form::Plane { normal: DVec3::Z, offset: 0.0 };
         let seen = part(&wall).unwrap();
         // A square with half-sides 0.5.
-        assert!(seen.center.length() < 1e-12 && (seen.radius - 0.5f64.sqrt()).abs() < 1e-12);
+        assert!(seen.center.length() < 1e-3 && (seen.radius - 0.5f64.sqrt()).abs() < 1e-3);
         assert!(part(&Form::Plane { normal: DVec3::Z, offset: 6.0 }).is_none());
         // Seen edge-on, without an end.
         let floor = part(&Form::Plane { normal: DVec3::Y, offset: -0.1 }).unwrap();
@@ -272,6 +305,47 @@ mod tests {
             let bound = Bound::new(&form);
             assert_eq!(bound.shades(&lit, &lamp), by_lamp, "lamp {form:?}");
             assert_eq!(bound.shades(&lit, &sun), by_sun, "sun {form:?}");
+        }
+    }
+
+    /// Lines in all directions that a picture of 175 degrees shows in its only tile; the eye is not in the
+    /// middle of the tile's corners, which lie more than 90 degrees from their mean.
+    #[test]
+    fn a_wide_pencil_meets_what_its_lines_meet() {
+        let apex = DVec3::new(1.0, -2.0, 5.0);
+        let edge = 87.5f64.to_radians().tan();
+        let ends =
+            [(-edge, edge), (0.6 * edge, edge), (0.6 * edge, -0.6 * edge), (-edge, -0.6 * edge)];
+        let corners = ends.map(|(x, y)| DVec3::new(x, y, -1.0));
+        let pencil = Pencil { apex, forward: DVec3::NEG_Z, corners };
+        let meets = |center: DVec3, radius: f64| {
+            Bound::new(&Form::Sphere { center, radius }).part_in(&pencil).is_some()
+        };
+        let (mut outside, mut inside) = (0, 0);
+        for i in 0..=40 {
+            for j in 0..=40 {
+                // Points on the picture plane, in the tile and around it.
+                let [x, y] = [i, j].map(|k| edge * (f64::from(k) / 16.0 - 1.25));
+                let seen = x > -edge && x < 0.6 * edge && y > -0.6 * edge && y < edge;
+                for distance in [0.01, 1.0, 300.0] {
+                    let direction = DVec3::new(x, y, -1.0).normalize();
+                    let met = meets(apex + direction * distance, 1e-4 * distance);
+                    assert!(met || !seen, "{direction} at {distance}");
+                    inside += u32::from(met && seen);
+                    outside += u32::from(!met && !seen);
+                }
+            }
+        }
+        assert!(inside > 1000 && outside > 1000, "{inside} {outside}");
+        assert!(!meets(apex + DVec3::Z, 0.5) && meets(apex + DVec3::Z, 2.0));
+    }
+
+    /// A plane whose height above the eye is lost in rounding is seen from either side.
+    #[test]
+    fn a_plane_through_the_eye_is_not_ruled_out() {
+        for offset in [5.0 - 1e-7, 5.0, 5.0 + 1e-7] {
+            let plane = Bound::new(&Form::Plane { normal: DVec3::Z, offset });
+            assert!(plane.part_in(&pencil()).is_some(), "{offset}");
         }
     }
 

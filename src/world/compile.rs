@@ -1,5 +1,6 @@
 //! From a scene to a world.
 
+use super::brightness;
 use super::groups::{Groups, Member};
 use super::guide::Sight;
 use super::inventory::Inventory;
@@ -153,8 +154,18 @@ impl<L: Lanes> World<L> {
         let ambient = used.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3]);
         let groups = Groups::new(scene, lit, ambient);
         let extent = placed.extent(scene);
-        let clearance = |point| precision::clearance(&placed.forms, point);
-        let scales = groups.scales::<L::Scalar>(scene, placed.origin, 0.1 * extent, clearance);
+        let view = View::new(&scene.camera, scene.film.size, placed.origin);
+        let materials_of = |form: usize| {
+            finish_of_object[form].iter().map(|finish| used[*finish as usize]).collect()
+        };
+        let surroundings = brightness::Surroundings::new(
+            scene,
+            &placed.forms,
+            materials_of,
+            &view,
+            (extent, L::EPSILON),
+        );
+        let scales = groups.scales::<L::Scalar>(scene, placed.origin, &surroundings);
         let sources: Vec<_> = groups
             .lights(scene)
             .into_iter()
@@ -177,7 +188,6 @@ impl<L: Lanes> World<L> {
             sources.len(),
             precision,
         );
-        let view = View::new(&scene.camera, scene.film.size, placed.origin);
         // Rays that begin on the near plane may begin inside a thing.
         let eye = (scene.camera.near == 0.0).then(|| view.eye());
         let forms = || geometry.sources().iter().map(|s| &placed.forms[s.form]);

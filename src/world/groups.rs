@@ -1,8 +1,9 @@
 //! Light groups: parts of the picture that are linear in one light's colour and strength, kept apart
 //! so that these can change without new samples.
 
+use super::brightness::{Brightness, Surroundings};
 use crate::lanes::Real;
-use crate::light::{Falloff, Lamp, Light};
+use crate::light::{Lamp, Light};
 use crate::scene::Scene;
 use crate::value::Color;
 use glam::DVec3;
@@ -117,47 +118,33 @@ impl Groups {
         self.members.iter().map(name).collect()
     }
 
-    /// Steps per unit of radiance in the film's integers, a power of two for each group: 2^28 at the
-    /// irradiance that the group's light typically gives in this scene. Samples may exceed that
-    /// 2^22 times, the sum of a billion such samples still fits 64 bits. Where light that weakens with the
-    /// square of the distance stands so close to things that these are brighter, up to twelve bits are given
-    /// up. `clearance`: no more than a point's distance from all things.
-    pub fn scales<S: Real>(
+    /// Steps per unit of radiance in the film's integers, a power of two for each group, as
+    /// [`Brightness`] has it.
+    pub(super) fn scales<S: Real>(
         &self,
         scene: &Scene,
         origin: DVec3,
-        radius: f64,
-        clearance: impl Fn(DVec3) -> f64,
+        surroundings: &Surroundings,
     ) -> Vec<f64> {
-        let typical = |i: usize| {
-            Lamp::<S>::new(&scene.lights[i], origin)
-                .map_or(1.0, |lamp| lamp.typical_irradiance(radius) / std::f64::consts::PI)
+        let of_light = |i: usize| {
+            let lamp = Lamp::<S>::new(&scene.lights[i], origin)?;
+            Some(surroundings.lamp(&lamp))
+        };
+        let of_shared = |i: &usize| {
+            let channels = strength(&scene.lights[*i]).into_iter().filter(|s| *s > 0.0);
+            let (least, most) = (channels.clone().reduce(f64::min)?, channels.reduce(f64::max)?);
+            Some(of_light(*i)?.times(least, most))
         };
         let brightness = |member: &Member| match member {
-            Member::Ambient | Member::Background => 1.0,
-            Member::Light(i) => typical(*i),
-            Member::Shared(list) => list
-                .iter()
-                .map(|i| typical(*i) * strength(&scene.lights[*i]).into_iter().fold(0.0, f64::max))
-                .fold(0.0, f64::max),
+            Member::Ambient => Some(surroundings.ambient()),
+            Member::Background => Some(surroundings.background()),
+            Member::Light(i) => of_light(*i),
+            Member::Shared(list) => list.iter().filter_map(of_shared).reduce(Brightness::or),
         };
-        // How much brighter things close to the light are than that, as far as 2^16 does not hold it.
-        let excess = |i: usize| match &scene.lights[i] {
-            Light { point: Some(point), falloff: Falloff::InverseSquare, .. } => {
-                let nearest = clearance(DVec3::from(point.position) - origin);
-                let brightest = (nearest * nearest * std::f64::consts::PI).recip();
-                ((brightest / typical(i)).log2() - 16.0).ceil().clamp(0.0, 12.0)
-            }
-            _ => 0.0,
-        };
-        let lost = |member: &Member| match member {
-            Member::Ambient | Member::Background => 0.0,
-            Member::Light(i) => excess(*i),
-            Member::Shared(list) => list.iter().map(|i| excess(*i)).fold(0.0, f64::max),
-        };
+        // The limits of samples and their squares are numbers in the precision of the samples.
+        let (least, most) = if S::EPSILON > 1e-10 { (-78.0, 170.0) } else { (-400.0, 900.0) };
         let scale = |member| {
-            let exponent = 28.0 - brightness(member).log2().ceil() - lost(member);
-            exponent.clamp(-900.0, 900.0).exp2()
+            brightness(member).map_or(0.0, |b| b.scale_exponent()).clamp(least, most).exp2()
         };
         self.members.iter().map(scale).collect()
     }

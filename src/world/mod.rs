@@ -1,6 +1,8 @@
 //! The world: a scene compiled for one lane type, holding only what this scene requires, and the
 //! paths traced in it.
 
+mod brightness;
+mod clearance;
 mod compile;
 mod groups;
 mod guide;

@@ -33,6 +33,18 @@ pub(super) struct Path<L> {
     pub weight: V3<L>,
 }
 
+impl<L: Lanes> Path<L> {
+    /// Weights above this saturate the film; infinity times black would be no number.
+    const HEAVIEST: f64 = (1u64 << 60) as f64;
+
+    /// `weight`, finite where mirrors amplify without end.
+    #[inline(always)]
+    pub fn bounded(weight: V3<L>) -> V3<L> {
+        let most = L::of(Self::HEAVIEST);
+        V3::new(most.min(weight.x), most.min(weight.y), most.min(weight.z))
+    }
+}
+
 /// The surfaces that a packet met.
 pub(super) struct Met<L: Lanes> {
     /// Normal on the viewer's side that light is computed with.
@@ -371,7 +383,8 @@ impl<L: Lanes> World<L> {
                 out = met.outward(out);
             }
             path.ray.direction = V3::select(lanes, out, path.ray.direction);
-            path.weight = V3::select(lanes, weight.times(r.weight), path.weight);
+            let weight = Path::bounded(weight.times(r.weight));
+            path.weight = V3::select(lanes, weight, path.weight);
         }
         path.ray.origin = met.start();
         let strongest = path.weight.max_element();

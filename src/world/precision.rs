@@ -6,6 +6,7 @@
 //! to the eye. Each of them has its ratio here; `tests/extremes/precision.rs` measures what single
 //! precision gets wrong at each.
 
+use super::clearance::{clearance, outer_clearance_of};
 use crate::camera::View;
 use crate::scene::Scene;
 use crate::shape::Form;
@@ -54,7 +55,7 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     let angle = view.pixel_angle();
     let distance = |form: &Form| {
         let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
-        Some(clearance_of(form, view.eye())? * if flat { FLAT } else { 1.0 })
+        Some(outer_clearance_of(form, view.eye())? * if flat { FLAT } else { 1.0 })
     };
     let seen_from =
         forms.iter().filter_map(distance).fold(f64::INFINITY, f64::min).max(scene.camera.near);
@@ -70,12 +71,6 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     let narrow = (CLOSED * extent).max(rounded)..extent / NARROWEST;
     let pixel = |point: DVec3| angle * point.distance(view.eye());
     !has_gap(forms, narrow, pixel)
-}
-
-/// No more than the distance of `point` from the surfaces of `forms`; those in whose box it is, and of
-/// which nothing more is known, do not count.
-pub(super) fn clearance(forms: &[Form], point: DVec3) -> f64 {
-    forms.iter().filter_map(|form| clearance_of(form, point)).fold(f64::INFINITY, f64::min)
 }
 
 /// The smallest thickness of a solid, or the smaller edge of a flat thing. Of a compound that of its
@@ -116,37 +111,6 @@ fn thickness(form: &Form) -> f64 {
             compound.parts.iter().map(thickness).fold(f64::INFINITY, f64::min)
         }
     }
-}
-
-/// No more than the distance of `point` from the surface; `None`: it is inside the thing's box, and
-/// nothing more is known.
-fn clearance_of(form: &Form, point: DVec3) -> Option<f64> {
-    match form {
-        Form::Sphere { center, radius } => Some((point.distance(*center) - radius).abs()),
-        Form::Plane { normal, offset } => Some((normal.dot(point) - offset).abs()),
-        Form::Convex { faces, .. } => {
-            let beyond = faces.iter().map(|f| f.normal.dot(point) - f.offset);
-            Some(beyond.fold(f64::NEG_INFINITY, f64::max).abs())
-        }
-        Form::Parallelogram { corner, u, v } => {
-            let normal = u.cross(*v).normalize();
-            let (above, box_away) = (normal.dot(point - corner).abs(), box_distance(form, point));
-            Some(above.max(box_away.unwrap_or(0.0)))
-        }
-        Form::Compound(compound) => {
-            let parts = compound.parts.iter().filter_map(|part| clearance_of(part, point));
-            parts.reduce(f64::min)
-        }
-        Form::Ellipsoid { .. } | Form::Tapered { .. } | Form::Mesh { .. } => {
-            box_distance(form, point).filter(|d| *d > 0.0)
-        }
-    }
-}
-
-/// How far `point` is from the form's box: 0 inside it.
-fn box_distance(form: &Form, point: DVec3) -> Option<f64> {
-    let (low, high) = form.bounds()?;
-    Some((low - point).max(point - high).max(DVec3::ZERO).length())
 }
 
 /// A surface that another may come close to, within a box.

@@ -11,29 +11,35 @@ pub(super) struct Rectangle {
     high: [f64; 2],
 }
 
-/// Room for the rounding of rays in single precision \[pixels\].
+/// Room for the rounding of places in single precision \[pixels\].
 const MARGIN_PX: f64 = 0.25;
+
+/// Rays on the picture plane at unit distance stray by this part of their length: eight roundings in single
+/// precision.
+const ASLANT: f64 = 5e-7;
 
 impl Rectangle {
     /// Of a form: around the corners of its box, if all are in front of the eye.
     pub fn of(form: &Form, view: &View) -> Self {
         let everywhere = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
         let Some((low, high)) = form.bounds() else { return everywhere };
-        let [right, _, forward] = view.frame();
+        let [_, _, forward] = view.frame();
         let reach = low.abs().max(high.abs()).max(view.eye().abs()).max_element();
         let mut out = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
         for corner in 0..8 {
             let pick = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
             let point = DVec3::new(pick(0), pick(1), pick(2));
-            let depth = (point - view.eye()).dot(forward);
+            let to = point - view.eye();
+            let depth = to.dot(forward);
             let stray = STRAY * reach;
             if depth <= 2.0 * stray {
                 return everywhere;
             }
-            // A step to the side by what may be lost shows how large it is on the raster.
-            let at = view.project(point);
-            let aside = view.project(point + right * stray - forward * stray);
-            let margin = MARGIN_PX + (aside[0] - at[0]).abs().max((aside[1] - at[1]).abs());
+            // A step by `stray`, in whatever direction, moves a point at the length l on the picture plane
+            // by at most (1 + l) stray / (depth - stray).
+            let length = to.length() / depth;
+            let strays = (1.0 + length) * stray / (depth - stray) + ASLANT * length;
+            let (at, margin) = (view.project(point), MARGIN_PX + strays / view.pixel());
             out.low = std::array::from_fn(|axis| out.low[axis].min(at[axis] - margin));
             out.high = std::array::from_fn(|axis| out.high[axis].max(at[axis] + margin));
         }

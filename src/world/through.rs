@@ -243,6 +243,8 @@ impl<L: Lanes> World<L> {
             // What would stay before the surface goes as steeply behind it.
             ways.passed = -met.outward(-ways.passed);
         }
+        ways.mirrored_weight = Path::bounded(ways.mirrored_weight);
+        ways.passed_weight = Path::bounded(ways.passed_weight);
         ways
     }
 }

@@ -147,6 +147,8 @@ fn files_tell_how_they_were_made() {
         ("Samples per pixel", "8.00 (8-8)"),
         ("Noise", ""),
         ("Bad samples", "0"),
+        ("Saturated samples", "0"),
+        ("Saturated pixels", "0"),
         ("Biased", ""),
         ("Settings", "sampler sobol"),
     ] {
@@ -176,6 +178,8 @@ fn statistics_have_every_key() {
         "noise_codes",
         "rmse_linear",
         "bad_samples",
+        "saturated_samples",
+        "saturated_pixels",
         "peak_rss_bytes",
         "stopped_by",
     ] {

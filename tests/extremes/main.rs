@@ -14,6 +14,7 @@ mod tables;
 mod told;
 
 mod audit;
+mod brightness;
 mod camera;
 mod cauchy;
 mod cavity;

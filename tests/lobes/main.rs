@@ -5,6 +5,7 @@ mod albedo;
 mod chi_square;
 mod claims;
 mod closed_forms;
+mod highlights;
 mod lanes;
 mod sampler;
 mod setup;

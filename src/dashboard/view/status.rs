@@ -75,9 +75,8 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     } else {
         parts.push(part(6, vec![dim(&duration(report.seconds))]));
     }
-    if report.bad_samples > 0 {
-        let text = format!("{} bad samples", report.bad_samples);
-        parts.push(part(3, vec![(text, theme.warn())]));
+    for warning in report.warnings() {
+        parts.push(part(3, vec![(warning, theme.warn())]));
     }
     if let Some(line) = &model.line {
         parts.push(part(6, vec![plain(rate(line.rate)), dim(" "), dim(mode(line.mode))]));

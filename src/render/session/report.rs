@@ -49,8 +49,12 @@ pub struct Report {
     pub quality_seconds: [Option<(f64, f64)>; QUALITIES.len()],
     /// Share of the work that is done, 0..=1.
     pub progress: Option<f64>,
-    /// Samples that were lost because they were not finite or negative.
+    /// Samples that were lost because they were no numbers or negative.
     pub bad_samples: u64,
+    /// Samples that were brighter than the film holds, and so have the largest value that it does.
+    pub saturated_samples: u64,
+    /// Pixels whose sum of samples is full, and so lower than it should be.
+    pub saturated_pixels: u64,
     /// Speed of the last second of tracing, samples per second; 0 before it is known.
     pub recent_samples_per_second: f64,
     /// Threads that trace.
@@ -78,11 +82,29 @@ impl Report {
             quality_seconds: [None; QUALITIES.len()],
             progress: None,
             bad_samples: 0,
+            saturated_samples: 0,
+            saturated_pixels: 0,
             recent_samples_per_second: 0.0,
             threads,
             lanes: "",
             inventory: Arc::from(""),
         }
+    }
+
+    /// What was changed of the samples, in words; nothing, if nothing was.
+    pub fn warnings(&self) -> Vec<String> {
+        let plural = |n: u64, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
+        let mut out = Vec::new();
+        if self.bad_samples > 0 {
+            out.push(format!("{} left out", plural(self.bad_samples, "bad sample")));
+        }
+        if self.saturated_samples > 0 {
+            out.push(plural(self.saturated_samples, "saturated sample"));
+        }
+        if self.saturated_pixels > 0 {
+            out.push(plural(self.saturated_pixels, "saturated pixel"));
+        }
+        out
     }
 
     /// Mean speed of tracing, samples per second.

@@ -258,6 +258,8 @@ impl<T: Traced> Work<T> {
             quality_seconds: QUALITIES.map(|codes| self.schedule.seconds_to_noise(codes, seconds)),
             progress: self.schedule.progress(seconds),
             bad_samples: self.traced.film().bad_samples().count,
+            saturated_samples: self.traced.film().saturated_samples(),
+            saturated_pixels: self.traced.film().saturated_pixels(),
             recent_samples_per_second: self
                 .pace
                 .samples_per_second()

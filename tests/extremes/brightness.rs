@@ -1,0 +1,234 @@
+//! Brightness at its extremes: samples that the film can hold, and those that it cannot.
+
+use crate::support::{begin, parsed, picture, pool, rendered, uniform};
+use crate::told::told;
+use std::fs;
+use zerkalo::film::{Display, Part};
+use zerkalo::render::Rendering;
+use zerkalo::scene::Scene;
+use zerkalo::world::Precision;
+
+const PRECISIONS: [Precision; 2] = [Precision::Auto, Precision::Double];
+
+/// Nothing was left out or made darker.
+fn is_whole(rendering: &Rendering, name: &str) {
+    let film = &rendering.film;
+    let bad = film.bad_samples();
+    assert_eq!(
+        (bad.count, film.saturated_samples(), film.saturated()),
+        (0, 0, 0),
+        "{name}: {bad:?}"
+    );
+}
+
+/// The mean of all pixels in green.
+fn mean(rendering: &Rendering) -> f64 {
+    let pixels = picture(rendering, Part::Both);
+    pixels.iter().map(|p| p[1]).sum::<f64>() / pixels.len() as f64
+}
+
+/// A picture that looks straight down on a surface from `height`, with a lamp beside the eye; the view angle is
+/// small, so that all pixels have the radiance intensity / (pi height^2).
+fn below_a_lamp(height: f64, place: [f64; 3], object: &str) -> Scene {
+    parsed(&to_toml(height, place, object))
+}
+
+fn to_toml(height: f64, [x, y, z]: [f64; 3], object: &str) -> String {
+    format!(
+        "film = {{ size = [8, 8] }}\n\
+         camera = {{ eye = [{x}, {}, {z}], direction = [0.0, -1.0, 0.0], up = [0.0, 0.0, 1.0], \
+         view_angle.vertical = 2.0 }}\n\
+         light = [{{ point = {{ position = [{x}, {}, {z}] }}, intensity = {}, falloff = \"inverse-square\" }}]\n\
+         [[object]]\n{object}\n",
+        y + 0.99 * height,
+        y + height,
+        std::f64::consts::PI * height * height,
+    )
+}
+
+/// The earth, a lamp 6 above the ground; and lamps close to walls inside the box of things.
+#[test]
+fn what_a_close_lamp_lights_is_bright_however_large_the_scene() {
+    let cases = [
+        (
+            "earth",
+            6.0,
+            [0.0, 0.0, 0.0],
+            "shape.sphere = { center = [0.0, -6.371e6, 0.0], radius = 6.371e6 }",
+        ),
+        (
+            "cylinder from inside",
+            1e-4,
+            [0.0, -50.0, 0.0],
+            "shape.cylinder = { base = [0.0, 0.0, -900.0], top = [0.0, 0.0, 900.0], radius = 50.0 }",
+        ),
+        (
+            "ellipsoid from inside",
+            1e-3,
+            [0.0, -3000.0, 0.0],
+            "shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1000.0 }\n\
+             transform = [{ scale = [1.0, 3.0, 7.0] }]",
+        ),
+        (
+            "compound",
+            1e-3,
+            [0.0, 500.0, 0.0],
+            "shape.difference.of = [\
+             { shape.box = { center = [0.0, 0.0, 0.0], size = [1000.0, 1000.0, 1000.0] } }, \
+             { shape.sphere = { center = [900.0, 0.0, 0.0], radius = 500.0 } }]",
+        ),
+        (
+            "plane",
+            2e4,
+            [0.0, 0.0, 0.0],
+            "shape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }",
+        ),
+    ];
+    let mut worst = 0f64;
+    for (name, height, place, object) in cases {
+        let scene = below_a_lamp(height, place, object);
+        for precision in PRECISIONS {
+            let rendering = rendered(&scene, 1, precision, 8);
+            is_whole(&rendering, name);
+            let found = mean(&rendering);
+            assert!((found - 1.0).abs() < 2e-3, "{name} in {precision:?}: {found}");
+            worst = worst.max((found - 1.0).abs());
+        }
+    }
+    told(30, "both", &format!("close lamps in large scenes: {worst:.0e} off"));
+}
+
+/// A room whose walls are triangles.
+#[test]
+fn a_lamp_close_to_the_wall_of_a_mesh_lights_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut room = String::new();
+    for corner in 0..8 {
+        let at = |axis: u32| if corner >> axis & 1 == 0 { -500 } else { 500 };
+        room += &format!("v {} {} {}\n", at(0), at(1), at(2));
+    }
+    for face in ["1 2 4 3", "5 6 8 7", "1 2 6 5", "3 4 8 7", "1 3 7 5", "2 4 8 6"] {
+        room += &format!("f {face}\n");
+    }
+    fs::write(folder.path().join("room.obj"), room).unwrap();
+    let text = to_toml(
+        1e-3,
+        [30.0, -500.0, 70.0],
+        "shape.mesh = { file = \"room.obj\", normals = \"flat\" }",
+    );
+    let path = folder.path().join("room.toml");
+    fs::write(&path, text).unwrap();
+    let scene = Scene::read(&path).unwrap_or_else(|e| panic!("{e}"));
+    let rendering = rendered(&scene, 1, Precision::Auto, 8);
+    is_whole(&rendering, "mesh");
+    assert!((mean(&rendering) - 1.0).abs() < 2e-3, "{}", mean(&rendering));
+}
+
+/// A white floor in light of `intensity`, of a colour.
+fn floor(material: &str, intensity: f64) -> Scene {
+    parsed(&format!(
+        "film = {{ size = [8, 8] }}\n\
+         camera = {{ eye = [0.0, 2.0, 0.0], direction = [0.0, -1.0, 0.0], up = [0.0, 0.0, 1.0] }}\n\
+         light = [{{ directional = {{ direction = [0.0, -1.0, 0.0] }}, intensity = {intensity} }}]\n\
+         [materials.own]\n{material}\n\
+         [[object]]\nmaterial = \"own\"\n\
+         shape.platform = {{ center = [0.0, 0.0, 0.0], size = [90.0, 90.0] }}\n"
+    ))
+}
+
+/// A colour and a light that undo each other give white.
+#[test]
+fn dim_colours_in_bright_light_are_seen() {
+    for colour in [1e-15, 1e-9, 1e-6, 0.002, 1.0, 50.0, 1e6] {
+        let scene = floor(&format!("color = [{colour}, {colour}, {colour}]"), 1.0 / colour);
+        for precision in PRECISIONS {
+            let rendering = rendered(&scene, 1, precision, 8);
+            is_whole(&rendering, "colour");
+            let found = mean(&rendering);
+            assert!((found - 1.0).abs() < 1e-4, "{colour:e} in {precision:?}: {found}");
+        }
+    }
+}
+
+/// A colour of 1e6 after a million samples per pixel, in two pixels.
+#[test]
+fn bright_colours_do_not_fill_the_sums() {
+    let mut scene = floor("color = [1e6, 1e6, 1e6]", 1e-6);
+    scene.film.size = [2, 1];
+    let mut rendering = begin(&scene, 1, Precision::Single);
+    uniform(&mut rendering, 0, 1 << 18, &pool(2));
+    is_whole(&rendering, "colour 1e6");
+    assert!((mean(&rendering) - 1.0).abs() < 1e-6, "{}", mean(&rendering));
+}
+
+/// Two facing mirrors that amplify, before a white background: white to the eye, and finite.
+#[test]
+fn mirrors_that_amplify_are_white() {
+    let text = |k: f64, depth: u32| {
+        format!(
+            "film = {{ size = [12, 9] }}\ntrace = {{ depth = {depth} }}\n\
+             camera = {{ eye = [0.0, 0.0, 0.0], direction = [0.05, 0.02, -1.0] }}\n\
+             background = {{ color = [1.0, 0.5, 0.25] }}\n\
+             light = [{{ point = {{ position = [0.0, 0.3, 0.0] }} }}]\n\
+             [materials.mirror]\ncolor = [0.5, 0.0, 0.0]\nreflection = {k}\n\
+             [[object]]\nmaterial = \"mirror\"\n\
+             shape.rectangle = {{ center = [0.0, 0.0, -1.0], size = [8.0, 8.0], normal = [0.0, 0.0, 1.0] }}\n\
+             [[object]]\nmaterial = \"mirror\"\n\
+             shape.rectangle = {{ center = [0.0, 0.0, 1.0], size = [8.0, 8.0], normal = [0.0, 0.0, -1.0] }}\n"
+        )
+    };
+    for (k, depth, saturates) in
+        [(3.0, 12, false), (3.0, 40, true), (3.0, 400, true), (1e6, 2000, true)]
+    {
+        for precision in [Precision::Single, Precision::Double] {
+            let name = format!("k_r {k}, depth {depth}, {precision:?}");
+            let rendering = rendered(&parsed(&text(k, depth)), 1, precision, 8);
+            assert_eq!(rendering.film.bad_samples().count, 0, "{name}");
+            assert_eq!(rendering.film.saturated_samples() > 0, saturates, "{name}");
+            let pixels = picture(&rendering, Part::Both);
+            assert!(pixels.iter().all(|p| p[0] > 1.0 && p[0].is_finite()), "{name}: {pixels:?}");
+            // What is too bright poisons no estimate.
+            let noise = rendering.film.noise(&rendering.mix, &Display::default()).unwrap();
+            assert!(
+                noise.rmse_codes.is_finite() && noise.rmse_linear.is_finite(),
+                "{name}: {noise:?}"
+            );
+        }
+    }
+}
+
+/// What is added to a scene far from its lamp leaves what is near it as it is.
+#[test]
+fn a_far_thing_changes_nothing_near_the_lamp() {
+    let ball = "shape.sphere = { center = [0.0, -1.0, 0.0], radius = 1.0 }";
+    let far = "\n[[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 9e8 }";
+    let alone = below_a_lamp(0.5, [0.0; 3], ball);
+    let both = below_a_lamp(0.5, [0.0; 3], &format!("{ball}{far}"));
+    let [alone, both] = [alone, both].map(|scene| mean(&rendered(&scene, 1, Precision::Double, 8)));
+    assert!((alone - both).abs() < 1e-4 && (alone - 1.0).abs() < 0.01, "{alone} {both}");
+}
+
+/// Lights that are 2^40 times as strong, or as weak, give the same picture: of a film whose scale is not the
+/// usual one, too.
+#[test]
+fn strength_in_powers_of_two_does_not_matter() {
+    let scenes = [
+        floor("color = [1e-9, 0.5, 1e3]", 1.0),
+        below_a_lamp(
+            1e-3,
+            [0.0; 3],
+            "shape.sphere = { center = [0.0, -500.0, 0.0], radius = 500.0 }",
+        ),
+    ];
+    for scene in scenes {
+        let of = |scene: &Scene| picture(&rendered(scene, 1, Precision::Auto, 8), Part::Both);
+        let expected = of(&scene);
+        for ev in [-40, 40] {
+            let factor = f64::from(ev).exp2();
+            let mut other = scene.clone();
+            other.lights[0].intensity *= factor;
+            let scaled: Vec<_> = of(&other).iter().map(|p| p.map(|c| c / factor)).collect();
+            assert_eq!(scaled, expected, "{ev}");
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Phong's highlights, from wide ones to those of a single pixel.
+
+use crate::setup::{across, combine, dot, tilted_normal, unit};
+use zerkalo::lanes::{Double, Lanes, Real, Single, V3};
+use zerkalo::material::{Finish, Material};
+
+/// A material that shines and does nothing else.
+fn shiny(exponent: f64) -> Material {
+    Material { diffuse: 0.0, specular: 0.7, exponent, ..Material::default() }
+}
+
+/// A unit vector as a kernel has it, and the same numbers in double precision.
+fn rounded<L: Lanes>(v: [f64; 3]) -> (V3<L>, [f64; 3]) {
+    let v = V3::<L>::of(v).normalize();
+    (v, v.lane(0).map(Real::to_f64))
+}
+
+/// (R.V)^alpha from the tangent of the angle between R and V, which keeps its digits.
+fn power(n: [f64; 3], view: [f64; 3], light: [f64; 3], alpha: f64) -> f64 {
+    let n = unit(n);
+    let r = combine(&[(2.0 * dot(light, n), n), (-1.0, light)]);
+    let along = dot(r, view);
+    let cross = [
+        r[1] * view[2] - r[2] * view[1],
+        r[2] * view[0] - r[0] * view[2],
+        r[0] * view[1] - r[1] * view[0],
+    ];
+    let tan2 = dot(cross, cross) / (along * along);
+    if along > 0.0 { (-0.5 * alpha * tan2.ln_1p()).exp() } else { 0.0 }
+}
+
+/// Highlights around their middle, for every exponent that a scene may have: at most k_s, and as bright as they
+/// should be.
+fn check<L: Lanes>(rounding: f64) {
+    let most = L::of(0.7) * L::of(std::f64::consts::FRAC_1_PI);
+    let most = most.lane(0).to_f64();
+    for tenth in 0..=90 {
+        let alpha = 10f64.powf(f64::from(tenth) / 10.0);
+        let finish = Finish::<L::Scalar>::new(&shiny(alpha), false);
+        let mut worst = 0f64;
+        for step in 0..600 {
+            let (theta, turn) = (f64::from(step % 30) * 0.05, f64::from(step) * 0.7);
+            let n = tilted_normal();
+            let [t, b] = across(n);
+            // Off the mirror direction by up to four times the highlight's width.
+            let off = f64::from(step % 20) * 0.2 * alpha.recip().sqrt();
+            let plane = combine(&[(turn.cos(), t), (turn.sin(), b)]);
+            let light = combine(&[(theta.cos(), n), (theta.sin(), plane)]);
+            let mirrored = combine(&[(2.0 * dot(light, n), n), (-1.0, light)]);
+            let [side, _] = across(mirrored);
+            let view = unit(combine(&[(1.0, mirrored), (off, side)]));
+            let ((n, n64), (view, view64)) = (rounded::<L>(n), rounded::<L>(view));
+            let (light, light64) = rounded::<L>(light);
+            let value =
+                finish.highlight(n, view, light, n.dot(light), n.dot(view)).x.lane(0).to_f64();
+            assert!(value <= most, "{}: {value} for {alpha:e}", L::NAME);
+            let expected = most * power(n64, view64, light64, alpha);
+            worst = worst.max((value - expected).abs() / most);
+        }
+        // Of ordinary exponents the cosine's rounding times the exponent; then the angle's, in widths.
+        let allowed = rounding * (4.0 * alpha.min(1024.0) + 8.0 * alpha.sqrt());
+        assert!(worst <= allowed, "{}: {worst:e} off for {alpha:e}, {allowed:e} allowed", L::NAME);
+    }
+}
+
+#[test]
+fn no_highlight_exceeds_its_strength() {
+    check::<Single>(f64::from(f32::EPSILON));
+    check::<Double>(f64::EPSILON.max(1e-13));
+}
