@@ -194,6 +194,48 @@ mod tests {
         }
     }
 
+    /// Largest gain coefficient of two dimensions: how many times the variance of independent points the first 2^m
+    /// scrambled points can have, for the worst integrand of both (Owen 1997, *Monte Carlo Variance of Scrambled Net
+    /// Quadrature*). It is largest over the Haar components (j, k) of
+    /// mean over the points p, q of the product over both dimensions of 2 [same cell of 2^-(j+1)] - [same cell of 2^-j].
+    fn gain(a: usize, b: usize, m: u32) -> f64 {
+        let count = 1u32 << m;
+        let alike = |d: usize| {
+            let first = digits(d, 0);
+            // The first 2^m points are a group under XOR: every point sees the same distances.
+            (0..count).map(move |i| (digits(d, i) ^ first).leading_zeros()).collect::<Vec<u32>>()
+        };
+        let (a, b) = (alike(a), alike(b));
+        let psi = |same: u32, level: u32| {
+            2.0 * f64::from(u8::from(same > level)) - f64::from(u8::from(same >= level))
+        };
+        let component =
+            |j: u32, k: u32| a.iter().zip(&b).map(|(a, b)| psi(*a, j) * psi(*b, k)).sum::<f64>();
+        let levels = (0..=m).flat_map(|j| (0..=m).map(move |k| (j, k)));
+        levels.map(|(j, k)| component(j, k)).fold(0.0, f64::max)
+    }
+
+    /// The table in docs/accuracy.md. The worst pairs join the second lobe and the branch choices: 4 to 7.
+    #[test]
+    fn worst_pairs_of_dimensions_are_the_documented_ones() {
+        for (m, worst, first_lobes) in [
+            (4, 8.0, 8.0),
+            (5, 16.0, 8.0),
+            (6, 32.0, 8.0),
+            (7, 64.0, 8.0),
+            (8, 16.0, 8.0),
+            (9, 32.0, 16.0),
+        ] {
+            let pairs = |below: usize| (0..below).flat_map(move |b| (0..b).map(move |a| (a, b)));
+            let largest = |below| pairs(below).map(|(a, b)| gain(a, b, m)).fold(0.0, f64::max);
+            let found = (largest(DIMENSIONS), largest(6));
+            assert_eq!(found, (worst, first_lobes), "2^{m} points");
+        }
+        assert_eq!((gain(5, 6, 6), gain(4, 7, 6)), (32.0, 16.0));
+        // The dimensions of one pair are a (0, 2)-sequence.
+        assert!((0..4).all(|pair| gain(2 * pair, 2 * pair + 1, 6) <= 1.0));
+    }
+
     /// Sixteen aligned points are one point XOR sixteen constants: what the packets rely on.
     #[test]
     fn aligned_points_are_one_point_and_constants() {
