@@ -33,6 +33,11 @@ and every key with a default may be left out. Unknown keys are errors.
   \"dielectric\"` both sides share the light between `reflection` (x F) and `transmission` (x 1 - F)
   as physics has it, so that glass has both at 1. What is transmitted is neither blurred nor
   coloured. Transparent things cast shadows like all others.
+- A lamp that lies on a surface, within rounding, lights what a lamp would light that is moved off it
+  towards what it lights, by a distance that vanishes. So a lamp on the ceiling lights all of the room.
+  The surface that it lies on stays dark. A solid is in the way of what is behind it; an open surface
+  (plane, platform, rectangle) has no inside, so that a lamp on it lights both sides: to light one,
+  move the lamp off it.
 - A texture multiplies the `color` of its material in the ambient and the diffuse part, so that white
   shows it as it is: `color = [1.0, 1.0, 1.0]` with `texture.image = { file = \"wood.png\", scale =
   [2.0, 2.0] }` or `texture.checker = { even = \"#ffffff\", odd = \"#202020\" }`. A bump,

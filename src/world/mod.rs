@@ -9,6 +9,7 @@ mod light_buffer;
 mod light_chart;
 mod limits;
 mod media;
+mod on_surface;
 mod outlook;
 mod path;
 mod precision;

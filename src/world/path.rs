@@ -314,8 +314,11 @@ impl<L: Lanes> World<L> {
             }
             if self.shadows {
                 counts.rays += u64::from(lit.bits().count_ones());
-                let ray = Ray { origin: start, direction: arrival.towards };
-                let within = arrival.distance;
+                let (direction, within) = match &source.on_surface {
+                    None => (arrival.towards, arrival.distance),
+                    Some(on) => on.end(start),
+                };
+                let ray = Ray { origin: start, direction };
                 let blocked = if PLAIN {
                     self.geometry.blocked_by_listed(&ray, within, lit, shading)
                 } else if let Some(Some(buffer)) = self.light_buffers.get(number) {

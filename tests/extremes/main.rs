@@ -20,6 +20,7 @@ mod compound;
 mod degenerate;
 mod fuzz;
 mod mesh;
+mod on_surface;
 mod precision;
 mod random;
 mod scaled;
