@@ -196,7 +196,9 @@ impl<L: Lanes> World<L> {
         let farthest =
             view.corners([0, 0], size).map(DVec3::length).into_iter().fold(0.0, f64::max);
         let begin = (view.eye(), scene.camera.near * farthest);
-        let media = Media::new(&placed.forms, geometry.sources(), &finish_of, &finishes, begin);
+        let given = f64::EPSILON * placed.origin.abs().max_element();
+        let media =
+            Media::new(&placed.forms, geometry.sources(), &finish_of, &finishes, begin, given);
         let entered = media.as_ref().map_or(vec![false; finish_of.len()], Media::entered);
         let mut panorama = Outlook::everything(&geometry, lamps.len());
         let mut light_buffers = Vec::new();

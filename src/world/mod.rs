@@ -2,6 +2,7 @@
 //! paths traced in it.
 
 mod compile;
+mod contact;
 mod groups;
 mod guide;
 mod inventory;

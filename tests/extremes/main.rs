@@ -17,6 +17,7 @@ mod cauchy;
 mod cavity;
 mod coincident;
 mod compound;
+mod contact;
 mod degenerate;
 mod fuzz;
 mod mesh;
