@@ -4,7 +4,10 @@ mod common;
 mod support;
 
 use common::Numbers;
+use glam::{DAffine3, DQuat, DVec3};
 use std::fmt::Write;
+use std::fs;
+use std::path::Path;
 use support::{accelerated, all_shipped, parsed, sized};
 use zerkalo::camera::ViewAngle;
 use zerkalo::scene::{Acceleration, Scene};
@@ -120,6 +123,101 @@ fn every_view_angle_shows_the_same_picture() {
             same(&name, &sized(scene, size), precision, 3);
         }
     }
+}
+
+/// A cube from -0.5 to 0.5 as a mesh of twelve triangles.
+const CUBE: &str = "v -0.5 -0.5 -0.5\nv 0.5 -0.5 -0.5\nv 0.5 0.5 -0.5\nv -0.5 0.5 -0.5\n\
+    v -0.5 -0.5 0.5\nv 0.5 -0.5 0.5\nv 0.5 0.5 0.5\nv -0.5 0.5 0.5\n\
+    f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
+
+/// Things of every kind on a coarse grid, so that faces lie in the planes of others; eye and lamp stand on
+/// that grid, too, exactly on surfaces more often than not.
+fn flush(numbers: &mut Numbers, count: usize, folder: &Path) -> Scene {
+    let shapes = [
+        "box = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0] }",
+        "mesh = { file = \"cube.obj\" }",
+        "platform = { center = [0.0, -0.5, 0.0], size = [1.0, 1.0] }",
+        "rectangle = { center = [0.0, 0.0, 0.5], size = [1.0, 1.0], normal = [0.0, 0.0, 1.0] }",
+        "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }",
+        "cylinder = { base = [0.0, -0.5, 0.0], top = [0.0, 0.5, 0.0], radius = 0.5 }",
+        "plane = { point = [0.0, -0.5, 0.0], normal = [0.0, 1.0, 0.0] }",
+        "union.of = [{ shape.box = { center = [0.0, -0.25, 0.0], size = [1.0, 0.5, 1.0] } }, \
+         { shape.sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 } }]",
+    ];
+    let scale = [1e-3, 1.0, 1.0, 1.0, 700.0][numbers.below(5)];
+    let offset = numbers.in_cube(1.0) * [0.0, 1.0, 1e4][numbers.below(3)] * scale;
+    let (axis, degrees) = (numbers.direction(), [0.0, 0.0, 37.0][numbers.below(3)]);
+    let turn = DQuat::from_axis_angle(axis, f64::to_radians(degrees));
+    let place = DAffine3::from_scale_rotation_translation(DVec3::splat(scale), turn, offset);
+    let mut grid = |half: i32, step: f64| {
+        let mut one = || f64::from(numbers.below(2 * half as usize + 1) as i32 - half) * step;
+        DVec3::new(one(), one(), one())
+    };
+    let eye = place.transform_point3(grid(6, 0.5));
+    let forward = turn * (grid(2, 1.0) + DVec3::new(0.1, 0.0, 0.3));
+    let lamp = place.transform_point3(grid(4, 0.5));
+    let at = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+    let mut text = format!(
+        "background.color = [0.2, 0.3, 0.4]\n\
+         [camera]\neye = {}\ndirection = {}\nview_angle.vertical = 70.0\n\
+         [[light]]\nname = \"a\"\npoint.position = {}\nfalloff = \"none\"\n\
+         [[light]]\nname = \"b\"\ndirectional.direction = {}\n\
+         [materials.matte]\ncolor = [0.7, 0.5, 0.3]\n\
+         [materials.mirror]\ndiffuse = 0.2\nreflection = 0.7\n\
+         [materials.glass]\ndiffuse = 0.1\ntransmission = 0.6\n",
+        at(eye),
+        at(forward),
+        at(lamp),
+        at(turn * DVec3::new(0.3, -1.0, 0.2)),
+    );
+    let transparent = numbers.below(2);
+    for _ in 0..count {
+        let material = ["matte", "mirror", "glass"][numbers.below(2 + transparent)];
+        let shape = shapes[numbers.below(shapes.len())];
+        let mut grid = |low: i32, count: usize| f64::from(numbers.below(count) as i32 + low);
+        let size = DVec3::new(grid(1, 3), grid(1, 3), grid(1, 3));
+        let middle = DVec3::new(grid(-3, 7), grid(-3, 7), grid(-3, 7)) * 0.5;
+        write!(
+            text,
+            "[[object]]\nmaterial = \"{material}\"\nshape.{shape}\ntransform = [{{ scale = {} }}, \
+             {{ translate = {} }}, {{ scale = {scale:?} }}, \
+             {{ rotate = {{ axis = {}, degrees = {degrees:?} }} }}, {{ translate = {} }}]\n",
+            at(size),
+            at(middle),
+            at(axis),
+            at(offset)
+        )
+        .unwrap();
+    }
+    let path = folder.join("scene.toml");
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    fs::write(&path, &text).unwrap();
+    Scene::read(&path).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+/// Faces in one plane, and an eye and a lamp in that plane.
+fn flush_scenes(seeds: std::ops::Range<u64>) {
+    let folder = tempfile::tempdir().unwrap();
+    for seed in seeds {
+        let mut numbers = Numbers::new(seed);
+        let count = [2, 3, 5, 12, 40, 120][numbers.below(6)];
+        let scene = sized(flush(&mut numbers, count, folder.path()), [37, 26]);
+        let precision = if seed % 3 == 2 { Precision::Double } else { Precision::Single };
+        same(&format!("seed {seed}, {count} flush things"), &scene, precision, 3);
+    }
+}
+
+#[test]
+fn things_in_one_plane_are_the_same_picture() {
+    flush_scenes(0..120);
+    // A solid's faces lay beside its corners by what the offset rounds off.
+    flush_scenes(1721..1722);
+}
+
+#[test]
+#[ignore = "long: thousands of scenes"]
+fn things_in_one_plane_are_the_same_picture_in_thousands_of_scenes() {
+    flush_scenes(1000..4000);
 }
 
 #[test]

@@ -33,6 +33,22 @@ and every key with a default may be left out. Unknown keys are errors.
   \"dielectric\"` both sides share the light between `reflection` (x F) and `transmission` (x 1 - F)
   as physics has it, so that glass has both at 1. What is transmitted is neither blurred nor
   coloured. Transparent things cast shadows like all others.
+- Where a transparent surface lies on another one, within rounding, as the bottom of a glass on a table,
+  the picture is the limit of a vanishing gap between the two things: light leaves the glass and then
+  meets the table, whichever of the two faces rounding puts in front. Between two glasses that touch
+  there is such a gap, too, whatever their indices: for one body that fills both, let them overlap. Of
+  solids on the same side of a common face, such as a box in the corner of a larger one, the transparent
+  one lies outside of the opaque one, and of transparent ones the one listed last. An open transparent
+  surface that lies on an opaque one is in front of it on either side, and so is the one of two that is
+  listed last. Which of two opaque surfaces in
+  the same place is seen is left to rounding, but is the same for every `acceleration`, number of
+  threads and width of lanes; where it matters, move one of them by a thousandth of its size, or make
+  both one compound, which shows the part listed first.
+- A lamp that lies on a surface, within rounding, lights what a lamp would light that is moved off it
+  towards what it lights, by a distance that vanishes. So a lamp on the ceiling lights all of the room.
+  The surface that it lies on stays dark. A solid is in the way of what is behind it; an open surface
+  (plane, platform, rectangle) has no inside, so that a lamp on it lights both sides: to light one,
+  move the lamp off it.
 - A texture multiplies the `color` of its material in the ambient and the diffuse part, so that white
   shows it as it is: `color = [1.0, 1.0, 1.0]` with `texture.image = { file = \"wood.png\", scale =
   [2.0, 2.0] }` or `texture.checker = { even = \"#ffffff\", odd = \"#202020\" }`. A bump,

@@ -67,6 +67,8 @@ pub struct Bound {
     plane: Option<(DVec3, f64)>,
     /// It does not see itself from outside.
     convex: bool,
+    /// How far rays end from where they are said to.
+    slack: f64,
 }
 
 impl Ball {
@@ -123,7 +125,8 @@ impl Bound {
             Form::Plane { normal, offset } => Some((*normal, *offset)),
             _ => None,
         };
-        Self { ball, plane, convex: !matches!(form, Form::Compound(_) | Form::Mesh { .. }) }
+        let convex = !matches!(form, Form::Compound(_) | Form::Mesh { .. });
+        Self { ball, plane, convex, slack: 0.0 }
     }
 
     /// A ball around it.
@@ -158,7 +161,7 @@ impl Bound {
             // the plane's height above the apex and to the slopes of the lines is allowed for.
             let height = offset - normal.dot(*apex);
             let (height, toward) = (height.abs(), normal * height.signum());
-            let slack = stray(*apex) + STRAY * offset.abs();
+            let slack = self.stray(*apex);
             let slopes = corners.map(|c| (toward.dot(c), STRAY * c.length()));
             if height <= slack {
                 // The apex may be on either side.
@@ -183,18 +186,34 @@ impl Bound {
         Some(if part.radius < ball.radius { part } else { ball })
     }
 
+    /// The same with room around it: for shadow rays that end so far from their lights.
+    pub fn grown(self, by: f64) -> Self {
+        let ball = Ball { radius: self.ball.radius + by, ..self.ball };
+        Self { ball, slack: self.slack + by, ..self }
+    }
+
+    /// How far off a flat thing's plane rays that lead to `point` meet it.
+    fn stray(&self, point: DVec3) -> f64 {
+        let Ball { center, radius } = self.ball;
+        let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
+        let offset = self.plane.map_or(0.0, |(_, offset)| offset.abs());
+        self.slack + stray(point) + STRAY * reach.max(offset)
+    }
+
     /// Whether it may stand between some point of `lit` and the light.
     pub fn shades(&self, lit: &Ball, towards: &Towards) -> bool {
         let slack = stray(lit.center) + STRAY * lit.radius;
         let radius = lit.radius + slack;
         if let Some((normal, offset)) = self.plane {
             let height = normal.dot(lit.center) - offset;
-            let beyond = match towards {
-                Towards::Point(light) => normal.dot(*light) - offset,
-                Towards::Direction(direction) => normal.dot(*direction),
+            // A light on the plane within rounding may be seen on either side.
+            let (beyond, unsure) = match towards {
+                Towards::Point(light) => (normal.dot(*light) - offset, self.stray(*light)),
+                Towards::Direction(direction) => (normal.dot(*direction), STRAY),
             };
+            let sure = height.abs() > lit.radius + self.stray(lit.center) && beyond.abs() > unsure;
             // Both on the same side.
-            if height.abs() > radius && height * beyond > 0.0 {
+            if sure && height.abs() > radius && height * beyond > 0.0 {
                 return false;
             }
         }

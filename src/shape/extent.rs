@@ -75,13 +75,17 @@ pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
     [low - pad, high + pad]
 }
 
+/// What faces and corners of one solid may differ by, as a part of its extent: in a scene far from the
+/// origin of its file both were rounded to what double precision has there.
+const GIVEN: f64 = 1.0 / 4_294_967_296.0;
+
 impl<S: Real> Extent<S> {
     /// Of a form, in its own space if `own` and if it has one; `None`: it has no end.
     pub fn new(form: &Form, own: bool) -> Option<Self> {
         let bounds = form.bounds()?;
         let vector = |v: DVec3| v.to_array().map(S::of);
         let made = |bounds, space| {
-            let [low, high] = padded(bounds, S::EPSILON).map(vector);
+            let [low, high] = padded(bounds, S::EPSILON.max(GIVEN)).map(vector);
             Self { low, high, space }
         };
         let Some((scene_from_own, (low, high))) = form.own_box().filter(|_| own) else {

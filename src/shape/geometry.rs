@@ -9,9 +9,8 @@ use std::fmt;
 use std::ops::Range;
 
 /// From this many bounded items there is a tree. With rays in a ball of spheres it is faster than a list
-/// from some 50 where packets stay together, and from some 300 where they do not; whole pictures, of which
-/// a list's tiles leave out what they do not see, still gain by the list at 95
-/// (`benches/acceleration.rs`).
+/// from some 50 where packets stay together, and from some 300 where they do not; whole pictures, of which a
+/// list's tiles leave out what they do not see, gain by the list up to 95 (`benches/acceleration.rs`).
 pub const TREE_FROM: usize = 96;
 
 impl Selection {
@@ -333,6 +332,14 @@ impl<L: Lanes> Geometry<L> {
             limit_of(blocked)
         });
         blocked
+    }
+
+    /// Where rays meet `item`, a compound's first part for all of it, nearer than `limit`.
+    pub fn closest_to(&self, item: u32, ray: &Ray<L>, limit: L) -> Hit<L> {
+        let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
+        let (i, mut hit) = ((item - part.base) as usize, Hit::nearer_than(limit));
+        part.batch.closest(i..i + 1, part.base, ray, &mut hit);
+        hit
     }
 
     /// The surface of `item` near `point`; `facet`: as the hit has it.

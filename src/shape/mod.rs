@@ -17,6 +17,7 @@ mod form;
 mod geometry;
 mod kinds;
 mod mesh;
+mod normals_at;
 mod plane;
 mod platform;
 mod prism;

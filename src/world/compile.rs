@@ -7,6 +7,7 @@ use super::inventory::Inventory;
 use super::light_buffer::LightBuffer;
 use super::limits;
 use super::media::Media;
+use super::on_surface::OnSurface;
 use super::outlook::{Culling, Outlook, Surroundings};
 use super::precision;
 use super::screen::{Cells, Rectangle};
@@ -44,6 +45,8 @@ pub(super) struct Source<S> {
     pub group: usize,
     /// `None`: 1 in every channel.
     pub weight: Option<[S; 3]>,
+    /// Where shadow rays end, if the lamp lies on surfaces.
+    pub on_surface: Option<OnSurface<S>>,
 }
 
 /// A scene, compiled for the lane type `L`.
@@ -172,9 +175,16 @@ impl<L: Lanes> World<L> {
             .filter_map(|(light, group, weight)| {
                 let lamp = Lamp::new(&scene.lights[light], placed.origin)?;
                 let weight = (weight != [1.0; 3]).then(|| weight.map(L::Scalar::of));
-                Some(Source { lamp, group, weight })
+                let position = scene.lights[light].point.map(|p| DVec3::from(p.position));
+                let on_surface = position.and_then(|position| {
+                    let origin = placed.origin;
+                    OnSurface::new(&placed.forms, position - origin, origin, L::EPSILON)
+                });
+                Some(Source { lamp, group, weight, on_surface })
             })
             .collect();
+        let off_lamps = sources.iter().filter_map(|s| s.on_surface.as_ref());
+        let off_lamps = off_lamps.map(OnSurface::farthest).fold(0.0, f64::max);
         let going_on = finishes.iter().any(|f| f.reflection.is_some() || f.transmission.is_some());
         let glossy =
             |f: &Finish<_>| matches!(f.reflection, Some((_, s)) if !matches!(s, Spread::Mirror));
@@ -196,13 +206,15 @@ impl<L: Lanes> World<L> {
         let farthest =
             view.corners([0, 0], size).map(DVec3::length).into_iter().fold(0.0, f64::max);
         let begin = (view.eye(), scene.camera.near * farthest);
-        let media = Media::new(&placed.forms, geometry.sources(), &finish_of, &finishes, begin);
+        let given = f64::EPSILON * placed.origin.abs().max_element();
+        let media =
+            Media::new(&placed.forms, geometry.sources(), &finish_of, &finishes, begin, given);
         let entered = media.as_ref().map_or(vec![false; finish_of.len()], Media::entered);
         let mut panorama = Outlook::everything(&geometry, lamps.len());
         let mut light_buffers = Vec::new();
         let culling = match acceleration {
             Acceleration::Auto => {
-                let of = Surroundings::new(forms().collect(), eye, &entered, &lamps);
+                let of = Surroundings::new(forms().collect(), eye, &entered, (&lamps, off_lamps));
                 panorama = of.outlook(&geometry, None);
                 if geometry.has_tree() {
                     if level >= Level::Shadows {

@@ -5,6 +5,7 @@
 //! of the glass that is listed after it. Light that leaves the last solid is outside, where the index of
 //! refraction is 1.
 
+use super::contact::Contacts;
 use super::path::{Met, first_tag};
 use crate::lanes::{Lanes, Mask, Real};
 use crate::material::Finish;
@@ -32,6 +33,11 @@ impl<L: Lanes> Inside<L> {
     #[inline(always)]
     fn top(&self) -> L {
         self.ranks[0]
+    }
+
+    /// Whether they are inside of `rank`.
+    pub fn holds(&self, rank: L) -> L::Mask {
+        self.ranks.iter().fold(L::mask(false), |found, of| found | equal(*of, rank))
     }
 
     /// Outside of `rank`.
@@ -80,6 +86,8 @@ pub(super) struct Media<L: Lanes> {
     indices: Vec<L::Scalar>,
     /// The solids that camera rays may begin in, each alone.
     around_eye: Vec<(u32, Geometry<L>)>,
+    /// What touches something that lets light through; `None`: nothing does.
+    pub contacts: Option<Contacts<L::Scalar>>,
 }
 
 /// Where rays meet surfaces that let light through.
@@ -104,13 +112,15 @@ pub(super) struct Crossing<L: Lanes> {
 
 impl<L: Lanes> Media<L> {
     /// `finish_of`: for each of the items that `sources` lists, its finish; `None`: nothing lets light
-    /// through. `nearest`: how far from the eye the camera's rays begin, at most.
+    /// through. `nearest`: how far from the eye the camera's rays begin, at most. `given`: how exactly
+    /// coordinates were given.
     pub fn new(
         forms: &[Form],
         sources: &[Source],
         finish_of: &[u32],
         finishes: &[Finish<L::Scalar>],
         (eye, nearest): (DVec3, f64),
+        given: f64,
     ) -> Option<Self> {
         let through = |finish: u32| finishes[finish as usize].transmission;
         if finishes.iter().all(|f| f.transmission.is_none()) {
@@ -130,7 +140,10 @@ impl<L: Lanes> Media<L> {
                 _ => 0,
             }
         });
-        let rank_of = rank_of.collect();
+        let rank_of: Vec<u32> = rank_of.collect();
+        let transparent: Vec<bool> = finish_of.iter().map(|f| through(*f).is_some()).collect();
+        let rounding = (L::EPSILON, given);
+        let contacts = Contacts::new(forms, sources, (&transparent, &rank_of), rounding);
         let near = |form: &Form| {
             form.bounds().is_none_or(|(low, high)| eye.clamp(low, high).distance(eye) <= nearest)
         };
@@ -140,7 +153,7 @@ impl<L: Lanes> Media<L> {
         };
         let around_eye = indices[1..].iter().enumerate().filter_map(around).collect();
         let indices = indices.into_iter().map(|n| n.unwrap_or(L::Scalar::of(1.0))).collect();
-        Some(Self { rank_of, indices, around_eye })
+        Some(Self { rank_of, indices, around_eye, contacts })
     }
 
     /// For each item, whether paths get inside of what it bounds.

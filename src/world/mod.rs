@@ -4,6 +4,7 @@
 mod brightness;
 mod clearance;
 mod compile;
+mod contact;
 mod groups;
 mod guide;
 mod inventory;
@@ -11,6 +12,7 @@ mod light_buffer;
 mod light_chart;
 mod limits;
 mod media;
+mod on_surface;
 mod outlook;
 mod path;
 mod precision;

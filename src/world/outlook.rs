@@ -80,14 +80,15 @@ pub(super) struct Surroundings {
 
 impl Surroundings {
     /// `eye`: where paths begin; `None`: not known. `entered`: for each item, whether paths get inside
-    /// it.
+    /// it. `off_lamps`: how far from the lamps shadow rays end at most.
     pub fn new<S: Real>(
         forms: Vec<&Form>,
         eye: Option<DVec3>,
         entered: &[bool],
-        lamps: &[Lamp<S>],
+        (lamps, off_lamps): (&[Lamp<S>], f64),
     ) -> Self {
-        let bounds: Vec<Bound> = forms.into_iter().map(Bound::new).collect();
+        let bound = |form: &Form| Bound::new(form).grown(off_lamps);
+        let bounds: Vec<Bound> = forms.into_iter().map(bound).collect();
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let towards = lamps.iter().map(|lamp| match lamp {
             Lamp::Falling { position } | Lamp::Even { position } => {

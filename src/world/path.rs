@@ -52,9 +52,9 @@ pub(super) struct Met<L: Lanes> {
     /// The surface's own, on the viewer's side: the same but on smooth meshes and bumps. Light comes from that side.
     pub geometric: V3<L>,
     /// Where the rays end, on the surface.
-    point: V3<L>,
+    pub point: V3<L>,
     /// How far from there rays start that leave the surface.
-    lift: L,
+    pub lift: L,
     /// Lanes that met the side that the surface's own normal points to.
     pub front: L::Mask,
     /// Tag of the item.
@@ -117,6 +117,12 @@ impl<L: Lanes> Met<L> {
         self.lit = self.lit.and_not(lanes);
         self.shining = self.shining.and_not(lanes);
         self.reflecting = self.reflecting.and_not(lanes);
+    }
+
+    /// No light comes to `lanes`.
+    #[inline(always)]
+    pub fn shade(&mut self, lanes: L::Mask) {
+        self.lit = self.lit.and_not(lanes);
     }
 
     /// What would go into the surface goes as steeply out of it.
@@ -326,8 +332,11 @@ impl<L: Lanes> World<L> {
             }
             if self.shadows {
                 counts.rays += u64::from(lit.bits().count_ones());
-                let ray = Ray { origin: start, direction: arrival.towards };
-                let within = arrival.distance;
+                let (direction, within) = match &source.on_surface {
+                    None => (arrival.towards, arrival.distance),
+                    Some(on) => on.end(start),
+                };
+                let ray = Ray { origin: start, direction };
                 let blocked = if PLAIN {
                     self.geometry.blocked_by_listed(&ray, within, lit, shading)
                 } else if let Some(Some(buffer)) = self.light_buffers.get(number) {

@@ -1,13 +1,14 @@
 //! The paths of worlds with surfaces that let light through: trees of reflected and transmitted rays.
 
 use super::compile::World;
+use super::contact::{Contacts, Layer, Seam};
 use super::media::{Crossing, Inside, Media};
 use super::outlook::Outlook;
-use super::path::{Counts, Met, Path, Radiance};
+use super::path::{Counts, Met, Path, Radiance, first_tag};
 use crate::lanes::{Lanes, Mask, V3};
 use crate::material::{Interface, Spread};
 use crate::sampling::Draws;
-use crate::shape::Ray;
+use crate::shape::{Hit, Ray};
 
 /// At so many surfaces, counted from the eye, a path follows both the reflected and the transmitted ray;
 /// from then on one of them, by chance.
@@ -22,6 +23,8 @@ struct Arm<L: Lanes> {
     inside: Inside<L>,
     /// Surfaces met before.
     bounce: u32,
+    /// Where the rays begin on surfaces that lie on others.
+    seam: Seam<L>,
 }
 
 /// Arms that wait until those that left the same surfaces are done.
@@ -70,7 +73,7 @@ impl<L: Lanes> World<L> {
         let inside = media.at_start(&ray);
         let path = Path { ray, weight: V3::of([1.0; 3]) };
         let mut waiting = Waiting { arms: [None; BOTH] };
-        let mut arm = Arm { path, lanes, inside, bounce: 0 };
+        let mut arm = Arm { path, lanes, inside, bounce: 0, seam: Seam::none() };
         loop {
             let outlook = if arm.bounce == 0 { outlook } else { &self.panorama };
             if !self.follow(media, &mut arm, outlook, draws, &mut waiting, out, &mut counts) {
@@ -95,15 +98,31 @@ impl<L: Lanes> World<L> {
         out: &mut Radiance<L>,
         counts: &mut Counts,
     ) -> bool {
-        let Arm { path, inside, bounce, .. } = *arm;
+        let Arm { mut path, inside, bounce, seam, .. } = *arm;
         counts.rays += u64::from(arm.lanes.bits().count_ones());
-        let hit = self.geometry.closest_of(&path.ray, &outlook.seen, arm.lanes);
+        let mut hit = self.geometry.closest_of(&path.ray, &outlook.seen, arm.lanes);
+        let mut behind = None;
+        if let Some(contacts) = &media.contacts
+            && (seam.lanes & arm.lanes).any()
+        {
+            let seam = Seam { lanes: seam.lanes & arm.lanes, ..seam };
+            let next = contacts.next(&self.geometry, &seam, &inside);
+            let origin = V3::select(next.lanes, seam.point, path.ray.origin);
+            path.ray.origin = origin;
+            hit.take_in(next.lanes, L::zero(), (next.item, next.facet));
+            behind = Some(next);
+        }
         let ended = hit.t.lt(L::of(L::MAX));
         if let Some(group) = self.background {
             out.groups[group] += path.weight.only(arm.lanes.and_not(ended));
         }
         let lanes = arm.lanes & ended;
         let Some(mut met) = self.meet::<false>(&path.ray, &hit, lanes) else { return false };
+        let mut seam = Seam::none();
+        if let Some(contacts) = &media.contacts {
+            seam =
+                self.seam(contacts, &path, (&mut hit, &mut met), lanes, behind.as_ref(), &inside);
+        }
         let crossing = self.crossing(media, &met, lanes, &inside);
         if let Some(crossing) = &crossing {
             met.leave_out(crossing.hidden);
@@ -116,6 +135,7 @@ impl<L: Lanes> World<L> {
         let Some(crossing) = crossing else {
             arm.lanes = self.bounce::<false>(&mut arm.path, &met, draws, bounce - 1, counts);
             arm.bounce = bounce;
+            arm.seam = seam.reversed();
             return arm.lanes.any();
         };
         let ways = self.ways(&path, &met, &crossing, draws, bounce - 1, counts);
@@ -134,6 +154,7 @@ impl<L: Lanes> World<L> {
             lanes: both,
             inside: Inside::select(crossing.lanes, &crossing.before, &inside),
             bounce,
+            seam: seam.reversed(),
         };
         // Lanes that go through, and what their paths and those of the others count.
         let (mut through, mut mirrored_weight, mut passed_weight) =
@@ -160,8 +181,60 @@ impl<L: Lanes> World<L> {
             weight: V3::select(through, passed_weight, mirrored_weight),
         };
         let inside = Inside::select(through, &crossing.behind, &mirrored.inside);
-        *arm = Arm { path, lanes, inside, bounce };
+        let seam = Seam::select(through, &seam, &mirrored.seam);
+        *arm = Arm { path, lanes, inside, bounce, seam };
         lanes.any()
+    }
+
+    /// Where the rays of `lanes` ended on surfaces that lie on others, on which side they go on when they
+    /// pass. Of such surfaces it puts those into `hit` and `met` that come first; `behind`: those that
+    /// were found behind the ones that the rays left.
+    fn seam(
+        &self,
+        contacts: &Contacts<L::Scalar>,
+        path: &Path<L>,
+        (hit, met): (&mut Hit<L>, &mut Met<L>),
+        lanes: L::Mask,
+        behind: Option<&Layer<L>>,
+        inside: &Inside<L>,
+    ) -> Seam<L> {
+        let (mut layer, mut lift, mut among) = (L::zero(), met.lift, L::mask(false));
+        if let Some(next) = behind {
+            // Light that comes from the side of the rays is blocked by what they left.
+            if self.shadows {
+                met.shade(next.lanes);
+            }
+            (layer, among) = (next.layer, next.lanes);
+            lift = lift.max(next.lift.only(among));
+        }
+        let mut fresh = L::mask(false);
+        let mut left = lanes.and_not(among);
+        while let Some((item, here)) = first_tag(met.item, left) {
+            if contacts.touches(item) {
+                fresh = fresh | here;
+            }
+            left = left.and_not(here);
+        }
+        if fresh.any() {
+            let (item, point, axis) = (met.item, met.point, -met.geometric);
+            let seam = Seam { lanes: fresh, item, point, axis, layer: L::zero() };
+            let first = contacts.first(&self.geometry, &seam, !met.front, inside);
+            if first.lanes.any() {
+                hit.take_in(first.lanes, hit.t, (first.item, first.facet));
+                if let Some(other) = self.meet::<false>(&path.ray, hit, lanes) {
+                    *met = other;
+                    lift = lift.max(met.lift);
+                    if let (Some(next), true) = (behind, self.shadows) {
+                        met.shade(next.lanes);
+                    }
+                }
+            }
+            layer = L::select(first.touching, first.layer, layer);
+            among = among | first.touching;
+            lift = lift.max(first.lift.only(first.touching));
+        }
+        met.lift = L::select(among, lift, met.lift);
+        Seam { lanes: among, item: met.item, point: met.point, axis: -met.geometric, layer }
     }
 
     /// Where the rays of `lanes` meet surfaces that let light through; `None`: none of them does.

@@ -171,7 +171,10 @@ impl<S: Real> Meshes<S> {
                 continue;
             }
             let (inner, length) = item.ray(ray);
-            let limit = L::select(near, hit.t * length, L::of(-1.0));
+            // Beyond by what the way into the mesh's space and back rounds off: what is known decides only
+            // here below, in the scene's distances, so that the order of things does not matter.
+            let limit = hit.t * length * L::of(1.0 + 4.0 * L::EPSILON);
+            let limit = L::select(near, limit, L::of(-1.0));
             let found = facets::closest(&item.mesh, &inner, limit);
             let met = found.t.lt(limit);
             let before = hit.t;

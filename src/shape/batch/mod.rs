@@ -74,6 +74,14 @@ impl<L: Lanes> Hit<L> {
         Self { t, item: L::tag(0), facet: L::tag(0) }
     }
 
+    /// Takes a distance and the tags of an item and a triangle in `lanes`, whatever is known there.
+    #[inline(always)]
+    pub fn take_in(&mut self, lanes: L::Mask, t: L, (item, facet): (L, L)) {
+        self.t = L::select(lanes, t, self.t);
+        self.item = L::select(lanes, item, self.item);
+        self.facet = L::select(lanes, facet, self.facet);
+    }
+
     /// Takes `t` and `item` where `t` is positive, nearer than what is known, and `mask` is true.
     #[inline(always)]
     fn narrow(&mut self, mask: L::Mask, t: L, item: u32) {

@@ -1,0 +1,249 @@
+//! Transparent things that touch others: the picture is the limit of a vanishing gap.
+
+use crate::common::Numbers;
+use crate::rays::{Line, Traced};
+use glam::{DAffine3, DQuat, DVec3};
+use std::fs;
+use std::path::Path;
+use zerkalo::scene::Scene;
+use zerkalo::world::Precision;
+
+/// How wide the gap is that contact is compared with.
+const GAP: f64 = 1e-4;
+
+/// Things that stand on the plane y = 0, up to y = 1, or lie in it.
+const UPPER: [&str; 7] = [
+    "box = { center = [0, 0.5, 0], size = [2, 1, 2] }",
+    "mesh = { file = \"upper.obj\", normals = \"flat\" }",
+    "cylinder = { base = [0, 0, 0], top = [0, 1, 0], radius = 1.2 }",
+    "cone = { base = [0, 0, 0], apex = [0, 1, 0], radius = 1.2 }",
+    "union.of = [{ shape.box = { center = [-0.25, 0.5, 0], size = [1.5, 1, 2] } }, \
+     { shape.box = { center = [0.5, 0.5, 0], size = [1, 1, 2] } }]",
+    "sphere = { center = [0, 1, 0], radius = 1 }",
+    "platform = { center = [0, 0, 0], size = [2, 2] }",
+];
+
+/// Things whose highest points are at y = 0.
+const LOWER: [&str; 6] = [
+    "platform = { center = [0, 0, 0], size = [5, 5] }",
+    "plane = { point = [0, 0, 0], normal = [0, 1, 0] }",
+    "box = { center = [0, -0.5, 0], size = [5, 1, 5] }",
+    "mesh = { file = \"lower.obj\", normals = \"flat\" }",
+    "difference.of = [{ shape.box = { center = [0, 0, 0], size = [5, 1, 5] } }, \
+     { shape.box = { center = [0, 0.5, 0], size = [6, 1, 6] } }]",
+    "cylinder = { base = [0, -1, 0], top = [0, 0, 0], radius = 3 }",
+];
+
+/// The materials of the upper and the lower thing.
+const MATERIALS: [(&str, &str); 8] = [
+    ("glass", "matte"),
+    ("glass", "mirror"),
+    ("glass", "glass"),
+    ("glass", "water"),
+    ("matte", "glass"),
+    ("mirror", "water"),
+    ("thin", "matte"),
+    ("thin", "thin"),
+];
+
+/// A box between two corners as a mesh.
+fn slab(low: DVec3, high: DVec3) -> String {
+    let mut out = String::new();
+    for z in [low.z, high.z] {
+        for (x, y) in [(low.x, low.y), (high.x, low.y), (high.x, high.y), (low.x, high.y)] {
+            out += &format!("v {x} {y} {z}\n");
+        }
+    }
+    out + "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n"
+}
+
+struct Setting<'a> {
+    upper: &'a str,
+    lower: &'a str,
+    materials: (&'a str, &'a str),
+    place: DAffine3,
+    folder: &'a Path,
+}
+
+/// A box whose lower face is common with that of a larger one around it.
+const OUTER: &str = "box = { center = [0, 0.5, 0], size = [3, 1, 3] }";
+const INNER: &str = "box = { center = [0, 0.25, 0], size = [1.4, 0.5, 1.4] }";
+
+impl Setting<'_> {
+    /// With the upper thing lifted by `gap`.
+    fn traced(&self, gap: f64, precision: Precision) -> Traced {
+        let (scale, turn, offset) = self.place.to_scale_rotation_translation();
+        let (axis, angle) = turn.to_axis_angle();
+        let at = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+        let moved = |lift: f64| {
+            format!(
+                "transform = [{{ translate = [0, {lift:?}, 0] }}, {{ scale = {:?} }}, \
+                 {{ rotate = {{ axis = {}, degrees = {:?} }} }}, {{ translate = {} }}]\n",
+                scale.x,
+                at(axis),
+                angle.to_degrees(),
+                at(offset)
+            )
+        };
+        let placed = |p: DVec3| at(self.place.transform_point3(p));
+        let text = format!(
+            "background.color = [0.2, 0.5, 0.9]\nambient.color = [1, 1, 1]\n\
+             trace.depth = 6\n[camera]\neye = {}\ntarget = {}\n\
+             [[light]]\npoint.position = {}\nfalloff = \"none\"\n\
+             [materials.matte]\ncolor = [0.9, 0.6, 0.3]\nambient = 0.5\n\
+             [materials.mirror]\ncolor = [0.9, 0.6, 0.3]\nambient = 0.2\nreflection = 0.7\n\
+             [materials.glass]\ncolor = [0.3, 0.9, 0.6]\nambient = 0.1\ndiffuse = 0.1\nreflection = 1\n\
+             transmission = 1\nfresnel = \"dielectric\"\n\
+             [materials.water]\ndiffuse = 0\nreflection = 1\ntransmission = 1\nindex = 1.33\n\
+             fresnel = \"dielectric\"\n\
+             [materials.thin]\ncolor = [0.3, 0.9, 0.6]\nambient = 0.1\ndiffuse = 0.1\nreflection = 0.2\n\
+             transmission = 0.7\n\
+             [[object]]\nmaterial = \"{}\"\nshape.{}\n{}[[object]]\nmaterial = \"{}\"\nshape.{}\n{}",
+            placed(DVec3::new(0.3, 4.0, 5.0)),
+            placed(DVec3::ZERO),
+            placed(DVec3::new(3.0, 4.0, 2.0)),
+            self.materials.0,
+            self.upper,
+            moved(gap),
+            self.materials.1,
+            self.lower,
+            moved(0.0),
+        );
+        let file = |name: &str, text: &str| fs::write(self.folder.join(name), text).unwrap();
+        file("upper.obj", &slab(DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 1.0, 1.0)));
+        file("lower.obj", &slab(DVec3::new(-2.5, -1.0, -2.5), DVec3::new(2.5, 0.0, 2.5)));
+        file("scene.toml", &text);
+        let scene = Scene::read(&self.folder.join("scene.toml"));
+        Traced::new(&scene.unwrap_or_else(|e| panic!("{e}\n{text}")), precision)
+    }
+
+    /// Lines through the middle of the contact, from above or from below.
+    fn lines(&self, above: bool, count: usize) -> Vec<Line> {
+        let mut numbers = Numbers::new(5);
+        let line = |_| {
+            let [x, z] = [numbers.between(-0.5, 0.5), numbers.between(-0.5, 0.5)];
+            let mut way = numbers.direction();
+            way.y = way.y.abs() + 0.1;
+            let from = DVec3::new(x, 0.0, z) + way * if above { 4.0 } else { -4.0 };
+            let (from, to) = (
+                self.place.transform_point3(from),
+                self.place.transform_point3(DVec3::new(x, 0.0, z)),
+            );
+            (from, (to - from).normalize())
+        };
+        (0..count).map(line).collect()
+    }
+
+    /// Contact from both sides.
+    fn check(&self, precision: Precision, count: usize) {
+        let both_flat = !solid(self.upper) && !solid(self.lower);
+        // Of two flat things in one plane the transparent one, or the one listed last, is in front.
+        let front_is_lower = !["matte", "mirror"].contains(&self.materials.1);
+        for above in [true, false] {
+            let gap = if both_flat && above == front_is_lower { -GAP } else { GAP };
+            self.compare(gap, above, precision, count);
+        }
+    }
+
+    /// Contact with the upper thing lifted by `gap`.
+    fn compare(&self, gap: f64, above: bool, precision: Precision, count: usize) {
+        let lines = self.lines(above, count);
+        let touching = self.traced(0.0, precision).radiance(&lines);
+        let apart = self.traced(gap, precision).radiance(&lines);
+        let mut differ = 0;
+        let mut sum = DVec3::ZERO;
+        for (a, b) in touching.iter().zip(&apart) {
+            let difference = DVec3::from(*a) - DVec3::from(*b);
+            sum += difference;
+            differ += usize::from(difference.abs().max_element() > 0.02);
+        }
+        let mean = (sum / count as f64).abs().max_element();
+        let told = || {
+            format!(
+                "{} on {}, {:?}, {}, {precision:?}, above: {above}: {differ} of {count} differ, \
+                     the mean by {mean}",
+                self.upper, self.lower, self.materials, self.place
+            )
+        };
+        assert!(differ * 100 <= 2 * count, "{}", told());
+        assert!(mean < 4e-3, "{}", told());
+    }
+}
+
+fn solid(shape: &str) -> bool {
+    !shape.starts_with("pla")
+}
+
+/// Every pair of kinds, with every pair of materials, in either precision.
+#[test]
+fn contact_is_the_limit_of_a_gap() {
+    let folder = tempfile::tempdir().unwrap();
+    for upper in UPPER {
+        for lower in LOWER {
+            for materials in MATERIALS {
+                if materials == ("thin", "thin") && (solid(upper) || solid(lower)) {
+                    continue;
+                }
+                let (place, folder) = (DAffine3::IDENTITY, folder.path());
+                let setting = Setting { upper, lower, materials, place, folder };
+                for precision in [Precision::Single, Precision::Double] {
+                    setting.check(precision, 512);
+                }
+            }
+        }
+    }
+}
+
+/// Tilted, far from the origin, small and large.
+#[test]
+fn contact_is_the_limit_of_a_gap_everywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut numbers = Numbers::new(9);
+    for scale in [1e-4, 1.0, 1e4] {
+        for far in [0.0, 1.0, 1e5] {
+            // Decimals of the file end at 1e-16 of the offset.
+            if far == 1e5 && scale < 1.0 {
+                continue;
+            }
+            for upper in UPPER {
+                for lower in LOWER {
+                    let turn =
+                        DQuat::from_axis_angle(numbers.direction(), numbers.between(0.0, 3.0));
+                    let offset = numbers.direction() * far;
+                    let place = DAffine3::from_scale_rotation_translation(
+                        DVec3::splat(scale),
+                        turn,
+                        offset,
+                    );
+                    let materials = MATERIALS[numbers.below(6)];
+                    let folder = folder.path();
+                    let setting = Setting { upper, lower, materials, place, folder };
+                    for precision in [Precision::Single, Precision::Double] {
+                        setting.check(precision, 512);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Of solids on the same side of a common face, a transparent one lies outside of an opaque one, and of
+/// transparent ones the one that is listed last.
+#[test]
+fn common_faces_of_nested_solids_have_an_order() {
+    let folder = tempfile::tempdir().unwrap();
+    for (upper, lower, materials, gap) in [
+        (OUTER, INNER, ("glass", "water"), GAP),
+        (INNER, OUTER, ("water", "glass"), GAP),
+        (OUTER, INNER, ("glass", "matte"), -GAP),
+        (INNER, OUTER, ("mirror", "water"), GAP),
+    ] {
+        for place in [DAffine3::IDENTITY, DAffine3::from_rotation_x(0.7)] {
+            let setting = Setting { upper, lower, materials, place, folder: folder.path() };
+            for precision in [Precision::Single, Precision::Double] {
+                setting.compare(gap, true, precision, 512);
+                setting.compare(gap, false, precision, 512);
+            }
+        }
+    }
+}
