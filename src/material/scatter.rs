@@ -25,19 +25,18 @@ fn along_tan2<L: Lanes>(h: V3<L>, n: V3<L>) -> (L, L) {
     (along, (across.length2() / (along * along)).min(L::of(1e15)))
 }
 
-/// cos^alpha of the angle between `a` and `b`, which have unit length but for roundings; 0 from 90 degrees on.
+/// `cos`^alpha, of a cosine that was computed from unit vectors; 0 from 90 degrees on.
 ///
 /// The cosine of two rounded vectors may exceed 1 by a few roundings, and 1.000001^1e6 is 2.7: it is at most 1
 /// here.
 #[inline(always)]
-fn cosine_power<L: Lanes>(a: V3<L>, b: V3<L>, alpha: L) -> L {
-    let cos = a.dot(b);
+fn cosine_power<L: Lanes>(cos: L, alpha: L) -> L {
     let power = (cos.max(L::of(1e-30)).min(L::one()).ln() * alpha).exp();
     power.only(cos.gt(L::zero()))
 }
 
-/// The same for alpha above [`SHARP_EXPONENT`](super::finish::SHARP_EXPONENT), whatever the lengths of `a` and
-/// `b`.
+/// The same of the angle between `a` and `b`, for alpha above
+/// [`SHARP_EXPONENT`](super::finish::SHARP_EXPONENT), whatever the vectors' lengths.
 ///
 /// Near 1 the cosine has no digits left, but the tangent t = |a x b| / a.b has: cos^alpha = exp(-alpha / 2
 /// ln(1 + t^2)), and ln(1 + t^2) = 2 artanh(s) with s = t^2 / (2 + t^2). Of its series in s^2 four terms leave
@@ -161,7 +160,8 @@ impl<S: Real> Finish<S> {
                 let power = if *sharp {
                     sharp_cosine_power(r, view, alpha)
                 } else {
-                    cosine_power(r, view, alpha)
+                    let cos = r.dot(view);
+                    cosine_power(cos, alpha)
                 };
                 let value = L::splat(*strength) * power * L::of(FRAC_1_PI);
                 V3::new(value, value, value)

@@ -157,6 +157,43 @@ fn files_tell_how_they_were_made() {
     assert!(text.contains("exposure -0.5 EV"));
 }
 
+/// Mirrors that make light stronger at every bounce, until the film does not hold it.
+#[test]
+fn samples_that_were_changed_are_told_everywhere() {
+    let desk = Desk::new();
+    let wall = |z: f64| {
+        format!(
+            "[[object]]\nmaterial = \"mirror\"\nshape.rectangle = {{ center = [0.0, 0.0, {z}], \
+             size = [9.0, 9.0], normal = [0.0, 0.0, 1.0] }}\n"
+        )
+    };
+    let scene = "trace = { depth = 60 }\ncamera = { eye = [0.0, 0.0, 0.0], direction = [0.0, 0.0, -1.0] }\n\
+                 background = { color = [1.0, 1.0, 1.0] }\n\
+                 [materials.mirror]\ndiffuse = 0.0\nreflection = 3.0\n";
+    fs::write(desk.path("scene.toml"), format!("{scene}{}{}", wall(-1.0), wall(1.0))).unwrap();
+    let run = desk.render("a.png", &["--spp", "8", "--uniform", "--stats", "stats.json"]);
+    assert_eq!(run.status, 0, "{}", run.err);
+    let stats = fs::read_to_string(desk.path("stats.json")).unwrap();
+    let stats: serde_json::Value = serde_json::from_str(&stats).unwrap();
+    let count = stats["saturated_samples"].as_u64().unwrap();
+    assert!(count > 0 && stats["bad_samples"] == 0, "{stats}");
+    let words = format!("{count} saturated samples");
+    assert!(
+        [&run.out, &run.err].iter().any(|text| text.contains(&words)),
+        "{} {}",
+        run.out,
+        run.err
+    );
+    desk.render("a.exr", &["--spp", "8", "--uniform"]);
+    for name in ["a.png", "a.exr"] {
+        let bytes = fs::read(desk.path(name)).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        let (_, after) = text.split_once("Saturated samples").expect(name);
+        let digits = after.trim_start_matches(|c: char| !c.is_ascii_digit());
+        assert!(digits.contains(&count.to_string()), "{name}: {}", &digits[..40]);
+    }
+}
+
 #[test]
 fn statistics_have_every_key() {
     let desk = Desk::new();

@@ -27,8 +27,11 @@ fn mean(rendering: &Rendering) -> f64 {
     pixels.iter().map(|p| p[1]).sum::<f64>() / pixels.len() as f64
 }
 
+/// The colour of things without a material.
+const MATT: f64 = 0.8;
+
 /// A picture that looks straight down on a surface from `height`, with a lamp beside the eye; the view angle is
-/// small, so that all pixels have the radiance intensity / (pi height^2).
+/// small, so that all pixels have the radiance [`MATT`] intensity / (pi height^2).
 fn below_a_lamp(height: f64, place: [f64; 3], object: &str) -> Scene {
     parsed(&to_toml(height, place, object))
 }
@@ -42,7 +45,7 @@ fn to_toml(height: f64, [x, y, z]: [f64; 3], object: &str) -> String {
          [[object]]\n{object}\n",
         y + 0.99 * height,
         y + height,
-        std::f64::consts::PI * height * height,
+        std::f64::consts::PI * height * height / MATT,
     )
 }
 
