@@ -36,20 +36,6 @@ pub(super) fn clearance_of(form: &Form, point: DVec3) -> Option<f64> {
     }
 }
 
-/// The same where it is cheap; `None`: `point` is in the box of a curved thing or a mesh.
-pub(super) fn outer_clearance_of(form: &Form, point: DVec3) -> Option<f64> {
-    match form {
-        Form::Ellipsoid { .. } | Form::Tapered { .. } | Form::Mesh { .. } => {
-            box_distance(form, point).filter(|d| *d > 0.0)
-        }
-        Form::Compound(compound) => {
-            let parts = compound.parts.iter().filter_map(|part| outer_clearance_of(part, point));
-            parts.reduce(f64::min)
-        }
-        _ => clearance_of(form, point),
-    }
-}
-
 /// How far `point` is from the form's box: 0 inside it; `None`: the form has no end.
 pub(super) fn box_distance(form: &Form, point: DVec3) -> Option<f64> {
     let (low, high) = form.bounds()?;

@@ -6,7 +6,7 @@
 //! to the eye. Each of them has its ratio here; `tests/extremes/precision.rs` measures what single
 //! precision gets wrong at each.
 
-use super::clearance::{clearance, outer_clearance_of};
+use super::clearance::{clearance, clearance_of};
 use crate::camera::View;
 use crate::scene::Scene;
 use crate::shape::Form;
@@ -55,7 +55,7 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     let angle = view.pixel_angle();
     let distance = |form: &Form| {
         let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
-        Some(outer_clearance_of(form, view.eye())? * if flat { FLAT } else { 1.0 })
+        Some(clearance_of(form, view.eye())? * if flat { FLAT } else { 1.0 })
     };
     let seen_from =
         forms.iter().filter_map(distance).fold(f64::INFINITY, f64::min).max(scene.camera.near);

@@ -337,6 +337,31 @@ fn auto_takes_double_for_the_extremes_beyond_single() {
 }
 
 /// Everything that is shipped is traced in single precision, and nothing of that shows.
+/// The box around a cylinder, a cone, an ellipsoid or a mesh holds points close to its surface and points far from it.
+#[test]
+fn eye_inside_a_box_of_a_round_solid_decides_by_its_distance_from_the_surface() {
+    let scene = |shape: &str, eye: [f64; 3]| {
+        parsed(&format!(
+            "[film]\nsize = [16, 16]\n[camera]\neye = {eye:?}\ndirection = [0.0, 1.0, 1.0]\n\
+             [[light]]\ndirectional.direction = [0.0, -1.0, 0.0]\n[[object]]\nshape.{shape}\n"
+        ))
+    };
+    let cylinder = "cylinder = { base = [0.0, -1.0, 0.0], top = [0.0, 1.0, 0.0], radius = 1.0 }";
+    let cone = "tapered_cylinder = { base = [0.0, -1.0, 0.0], base_radius = 1.0, \
+                top = [0.0, 1.0, 0.0], top_radius = 0.0 }";
+    let ellipsoid = "sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }\n\
+                     transform = [{ scale = [1.0, 2.0, 1.0] }]";
+    for (shape, far, near) in [
+        (cylinder, [0.0, 0.0, 0.0], [1.0 - 1e-9, 0.0, 0.0]),
+        (cylinder, [0.9, 0.0, 0.9], [0.0, 1.0 - 1e-9, 0.0]),
+        (cone, [0.8, 0.7, 0.0], [0.5 + 1e-9, 0.0, 0.0]),
+        (ellipsoid, [0.0, 1.0, 0.0], [1.0 - 1e-9, 0.0, 0.0]),
+    ] {
+        assert!(takes_single(&scene(shape, far)), "{shape} from {far:?}");
+        assert!(!takes_single(&scene(shape, near)), "{shape} from {near:?}");
+    }
+}
+
 #[test]
 fn shipped_scenes_stay_in_single_precision() {
     // In glass and between mirrors some paths end elsewhere after a rounding. That is noise, not error: in
