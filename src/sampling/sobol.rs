@@ -232,8 +232,8 @@ mod tests {
             assert_eq!(found, (worst, first_lobes), "2^{m} points");
         }
         assert_eq!((gain(5, 6, 6), gain(4, 7, 6)), (32.0, 16.0));
-        // The dimensions of one pair are a (0, 2)-sequence.
-        assert!((0..4).all(|pair| gain(2 * pair, 2 * pair + 1, 6) <= 1.0));
+        // The dimensions of one pair are a (0, 2)-sequence, whose gain is at most 2 in base 2.
+        assert!((0..4).all(|pair| gain(2 * pair, 2 * pair + 1, 6) <= 2.0));
     }
 
     /// Sixteen aligned points are one point XOR sixteen constants: what the packets rely on.

@@ -185,7 +185,7 @@ const EXTREMES: [(&str, &str, &str, &str); 30] = [
         "the error told is the error left",
         "true / told 0.9 .. 1.1; at most 1.1 times the target",
         "estimator_honesty",
-        "tests/honesty.rs",
+        "tests/honesty/main.rs",
     ),
 ];
 
