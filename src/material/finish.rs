@@ -46,7 +46,7 @@ pub enum Shine<S> {
         strength: S,
         /// alpha.
         exponent: S,
-        /// alpha exceeds [`SHARP_EXPONENT`].
+        /// alpha exceeds `SHARP_EXPONENT`.
         sharp: bool,
     },
     /// k_s D G F / (4 N.L N.V).
