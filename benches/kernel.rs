@@ -7,13 +7,14 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use glam::DVec3;
 use std::hint::black_box;
 use std::sync::atomic::AtomicBool;
+use zerkalo::bvh::Ray;
 use zerkalo::film::{Display, Estimator, Film, Header, Mix};
 use zerkalo::lanes::{Double, Lanes, Real, Single, V3};
+use zerkalo::primitive::{Form, Geometry};
 use zerkalo::render::pass;
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
-use zerkalo::shape::{Form, Geometry, Ray};
 use zerkalo::world::{AnyWorld, Options, Precision, World};
 
 const SAMPLING: SampleSettings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };

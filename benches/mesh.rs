@@ -11,8 +11,9 @@ use common::{Random, ball, in_turns, towards};
 use std::hint::black_box;
 use std::time::Instant;
 use zerkalo::asset::Mesh;
+use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
-use zerkalo::shape::{Ray, facets};
+use zerkalo::primitive::triangle_mesh;
 
 /// Random rays of each measurement.
 const RAYS: usize = 1 << 19;
@@ -71,8 +72,8 @@ fn speed<L: Lanes>(mesh: &Mesh, rays: &[Ray<L>], how: Option<bool>) -> f64 {
             let hits: u32 = rays
                 .iter()
                 .map(|ray| match how {
-                    None => facets::closest(mesh, ray, limit),
-                    Some(together) => facets::closest_by(mesh, ray, limit, together),
+                    None => triangle_mesh::closest(mesh, ray, limit),
+                    Some(together) => triangle_mesh::closest_by(mesh, ray, limit, together),
                 })
                 .map(|found| found.t.lt(limit).bits().count_ones())
                 .sum();

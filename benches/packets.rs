@@ -13,13 +13,15 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use zerkalo::asset::Mesh;
+use zerkalo::bvh::Ray;
 use zerkalo::film::{Display, Estimator, Film, Header, Mix};
 use zerkalo::lanes::{Double, Lanes, Real, Single, V3};
+use zerkalo::primitive::{Form, Geometry};
 use zerkalo::render::pass;
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Document, Scene};
-use zerkalo::shape::{EXAMPLES, Form, Geometry, Ray};
+use zerkalo::shape::EXAMPLES;
 use zerkalo::world::World;
 
 /// Rays of each measurement.

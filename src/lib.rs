@@ -3,6 +3,7 @@
 //! The map of the rooms, and who may import whom, stands in ARCHITECTURE.md; a test holds it.
 
 pub mod asset;
+pub mod bvh;
 pub mod camera;
 pub mod command;
 pub mod dashboard;
@@ -11,9 +12,11 @@ pub mod lanes;
 pub mod light;
 pub mod material;
 pub mod measure;
+pub mod primitive;
 pub mod render;
 pub mod sampling;
 pub mod scene;
 pub mod shape;
+pub mod terminal;
 pub mod value;
 pub mod world;

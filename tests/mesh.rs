@@ -4,8 +4,9 @@
 use std::sync::Arc;
 use zerkalo::asset::Assets;
 use zerkalo::asset::Mesh;
+use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
-use zerkalo::shape::{Ray, facets};
+use zerkalo::primitive::triangle_mesh;
 
 /// Random numbers from 0 to 1 (xorshift: Marsaglia 2003).
 struct Random(u64);
@@ -89,9 +90,9 @@ fn nothing_slips_through<L: Lanes>(mesh: &Mesh, rays: usize) {
             origin: V3::<L>::of(origin),
             direction: V3::<L>::from_fn(|i| directions[i].map(L::Scalar::of)),
         };
-        let found = facets::closest(mesh, &ray, limit);
-        let blocked = facets::blocked(mesh, &ray, limit);
-        let both = [true, false].map(|how| facets::closest_by(mesh, &ray, limit, how));
+        let found = triangle_mesh::closest(mesh, &ray, limit);
+        let blocked = triangle_mesh::blocked(mesh, &ray, limit);
+        let both = [true, false].map(|how| triangle_mesh::closest_by(mesh, &ray, limit, how));
         for (i, direction) in directions.iter().enumerate() {
             let t = found.t.lane(i);
             assert!(t < limit.lane(i), "missed from {origin:?} to {direction:?}");
@@ -127,7 +128,7 @@ fn a_tree_finds_what_a_list_finds() {
         let origin: [f64; 3] = std::array::from_fn(|_| 4.0 * (random.next() - 0.5));
         let direction = unit(std::array::from_fn(|_| random.next() - 0.5));
         let ray = Ray { origin: V3::<f64>::of(origin), direction: V3::<f64>::of(direction) };
-        let found = facets::closest(&mesh, &ray, f64::MAX);
+        let found = triangle_mesh::closest(&mesh, &ray, f64::MAX);
         // Möller and Trumbore's test of every triangle.
         let mut best = f64::MAX;
         for t in &mesh.mesh().triangles {

@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use support::{picture, rendered};
 use zerkalo::asset::Assets;
 use zerkalo::film::Part;
+use zerkalo::primitive::Form;
 use zerkalo::scene::edit::{Subject, add_object, set};
 use zerkalo::scene::{Scene, SceneFile};
-use zerkalo::shape::Form;
 use zerkalo::world::{AnyWorld, Options, Precision, Sight};
 
 /// A tube round a trefoil knot, of quadrilaterals, as binary PLY.

@@ -1,8 +1,8 @@
 //! The scene files that come with the program, and those that must be refused.
 
 use std::path::{Path, PathBuf};
+use zerkalo::primitive::Form;
 use zerkalo::scene::{Document, Scene};
-use zerkalo::shape::Form;
 
 fn files(folder: &str) -> Vec<PathBuf> {
     let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)

@@ -18,8 +18,8 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use terminal::{Start, Terminal};
-use zerkalo::dashboard::raster::Oklab;
 use zerkalo::scene::BUILT_IN;
+use zerkalo::terminal::cells::Oklab;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 const SIZE: [u16; 2] = [160, 45];

@@ -1,9 +1,9 @@
 //! Files that were read, shared between compilations of a scene.
 
-use super::error::AssetError;
-use super::file::{MAX_BYTES, Source, unreadable};
-use super::image::Image;
-use super::mesh::{Mesh, TriangleMesh};
+use crate::asset::error::AssetError;
+use crate::asset::file::{MAX_BYTES, Source, unreadable};
+use crate::asset::image::Image;
+use crate::asset::mesh::{Mesh, TriangleMesh};
 use std::collections::HashMap;
 use std::fmt;
 use std::hash::Hash;

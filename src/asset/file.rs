@@ -1,6 +1,6 @@
 //! Reading whole files within a limit, and finding those that a file names.
 
-use super::error::{AssetError, Place};
+use crate::asset::error::{AssetError, Place};
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};

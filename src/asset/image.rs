@@ -1,7 +1,7 @@
 //! Images for textures: PNG and JPEG.
 
-use super::error::{AssetError, Place};
-use super::file::Source;
+use crate::asset::error::{AssetError, Place};
+use crate::asset::file::Source;
 use crate::value::linear_from_srgb;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
 use std::io::Cursor;

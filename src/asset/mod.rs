@@ -7,15 +7,12 @@
 //!
 //! A file may name others (the MTL of an OBJ, the buffers of a glTF): only such that lie in its own
 //! folder or below, by relative paths without `..`. Nothing is ever fetched from elsewhere.
-
-mod boxes;
 mod cache;
 mod error;
 mod file;
 mod image;
 mod mesh;
 
-pub use boxes::{Boxes, Branch, Built, LEAF, WIDE};
 pub use cache::{Assets, Stage};
 pub use error::{AssetError, Place};
 pub use file::MAX_BYTES;

@@ -1,9 +1,9 @@
 //! The camera: a pinhole.
 
 mod navigate;
-mod view;
+mod pinhole;
 
-pub use view::View;
+pub use pinhole::View;
 
 use crate::value::{Checks, Fault, Field, Range, Takes, unit};
 use glam::DVec3;

@@ -5,7 +5,7 @@
 //! coordinates, no distance left) leaves the old one. Turns are relative to `up`; the view never
 //! comes nearer to it than 0.1 degrees.
 
-use super::{Camera, ViewAngle};
+use crate::camera::{Camera, ViewAngle};
 use crate::value::{decade, rounded_to, significant, unit};
 use glam::DVec3;
 

@@ -1,8 +1,8 @@
 //! `zerkalo check`: is a scene valid, and what is in it?
 
-use super::args::CheckArgs;
-use super::files::Told;
-use super::{Failure, say, warn};
+use crate::command::args::CheckArgs;
+use crate::command::load_progress::Told;
+use crate::command::{Failure, say, warn};
 use crate::film::{TILE, TILE_PIXELS};
 use crate::scene::Document;
 use crate::world::{self, AnyWorld};

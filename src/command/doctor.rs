@@ -1,14 +1,14 @@
 //! `zerkalo doctor`: what the terminal and the line to it can do, how the dashboard will use them, and
 //! what would make it better.
 
-use super::args::DoctorArgs;
-use super::{Failure, say};
-use crate::dashboard::link::{DEFAULT_RATE, Mode};
-use crate::dashboard::places::wrapped;
+use crate::command::args::DoctorArgs;
+use crate::command::{Failure, say};
+use crate::dashboard::overlay_layout::wrapped;
 use crate::dashboard::run::{Colors, Examined, examine};
-use crate::dashboard::still::Protocol;
-use crate::dashboard::terminal::{Capabilities, Multiplexer, Surroundings};
 use crate::scene::{kept_in, state_folder};
+use crate::terminal::flow::{DEFAULT_RATE, Mode};
+use crate::terminal::image::Protocol;
+use crate::terminal::{Capabilities, Multiplexer, Surroundings};
 use crate::value::printable;
 use std::env;
 use std::io::{self, IsTerminal};

@@ -1,17 +1,17 @@
 //! `zerkalo [SCENE]`: the dashboard.
 
-use super::args::{ColorArg, EditArgs};
-use super::files::Told;
-use super::{Failure, all_threads, say, warn};
 use crate::asset::Assets;
+use crate::command::args::{ColorArg, EditArgs};
+use crate::command::load_progress::Told;
+use crate::command::{Failure, all_threads, say, warn};
 use crate::dashboard::message::Exported;
 use crate::dashboard::run::{Colors, DEFAULT_STOP, Setup, run as run_dashboard};
-use crate::dashboard::terminal::Surroundings;
 use crate::film::Display;
 use crate::render::Options;
 use crate::render::schedule::{Criterion, Settings};
 use crate::sampling::{SampleSettings, SamplerKind};
 use crate::scene::{BUILT_IN, Recovery, SceneErrors, SceneFile, state_folder};
+use crate::terminal::Surroundings;
 use crate::value::printable;
 use crate::world;
 use std::env;

@@ -5,7 +5,7 @@ mod check;
 mod cpu;
 mod doctor;
 mod edit;
-mod files;
+mod load_progress;
 mod measure;
 mod new;
 mod progress;

@@ -1,7 +1,7 @@
 //! `zerkalo new`: a scene to start from.
 
-use super::args::NewArgs;
-use super::{Failure, say};
+use crate::command::args::NewArgs;
+use crate::command::{Failure, say};
 use crate::scene::starter;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};

@@ -1,11 +1,11 @@
 //! `zerkalo render`: a scene file to a picture file.
 
-use super::args::RenderArgs;
-use super::files::Told;
-use super::progress::Progress;
-use super::signals::Signals;
-use super::stats::{Stats, peak_rss_bytes};
-use super::{Failure, all_threads, say, warn};
+use crate::command::args::RenderArgs;
+use crate::command::load_progress::Told;
+use crate::command::progress::Progress;
+use crate::command::signals::Signals;
+use crate::command::stats::{Stats, peak_rss_bytes};
+use crate::command::{Failure, all_threads, say, warn};
 use crate::film::{Depth, Display, Target, WriteError};
 use crate::render::export::{Origin, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};

@@ -1,6 +1,6 @@
 //! One line of text being typed.
 
-use super::input::{Code, Key};
+use crate::terminal::event::{Code, Key};
 use tui_input::{Input, InputRequest};
 
 /// The most characters that are taken: enough for a path, too few to slow anything down.

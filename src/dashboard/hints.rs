@@ -1,8 +1,8 @@
 //! What the hint line, the help and docs/keys.md say: all from the key table.
 
-use super::keymap::{Chapter, Context, KEYMAP};
-use super::model::Model;
-use super::overlay::Overlay;
+use crate::dashboard::keymap::{Chapter, Context, KEYMAP};
+use crate::dashboard::model::Model;
+use crate::dashboard::overlay::Overlay;
 
 /// A hint: keys as they are shown, one key that stands for them, what they do.
 pub type Hint = (&'static str, &'static str, &'static str);

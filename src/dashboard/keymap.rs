@@ -1,10 +1,11 @@
 //! The table of keys: one row an action. Help, hints, palette and docs/keys.md are made from it.
 
-use super::action::Action::{self, *};
-use super::action::Change::{Down as Less, Up as More};
-use super::action::Pace::{Coarse, Fine};
-use super::action::Way::{Down, In, Left, Out, Right, Up};
-use super::input::Key;
+use crate::dashboard::action::Action;
+use crate::dashboard::action::Action::*;
+use crate::dashboard::action::Change::{Down as Less, Up as More};
+use crate::dashboard::action::Pace::{Coarse, Fine};
+use crate::dashboard::action::Way::{Down, In, Left, Out, Right, Up};
+use crate::terminal::event::Key;
 use std::collections::HashMap;
 use std::sync::OnceLock;
 

@@ -1,35 +1,6 @@
 //! Where everything is on the screen: a pure function, used to draw and to know what a click means.
 
-/// A rectangle of cells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Area {
-    /// First column.
-    pub x: u16,
-    /// First row.
-    pub y: u16,
-    /// Columns.
-    pub width: u16,
-    /// Rows.
-    pub height: u16,
-}
-
-impl Area {
-    /// Whether the cell in this column and row lies in it.
-    pub fn contains(&self, column: u16, row: u16) -> bool {
-        (self.x..self.x + self.width).contains(&column)
-            && (self.y..self.y + self.height).contains(&row)
-    }
-
-    /// What is left inside a border of one cell.
-    pub fn inner(&self) -> Self {
-        Self {
-            x: self.x + 1,
-            y: self.y + 1,
-            width: self.width.saturating_sub(2),
-            height: self.height.saturating_sub(2),
-        }
-    }
-}
+use crate::terminal::Area;
 
 /// Who gets the keys that mean something else in every panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -1,12 +1,12 @@
 //! What comes in and what goes out: everything that `update` learns, and everything that it asks for.
 
-use super::input::{Key, Mouse};
-use super::link::Reading;
-use super::still::Still;
 use crate::film::{Display, Linear};
 use crate::render::schedule::Stop;
 use crate::render::session::Snapshot;
 use crate::scene::{SaveError, Scene, SceneErrors};
+use crate::terminal::event::{Key, Mouse};
+use crate::terminal::flow::Reading;
+use crate::terminal::image::Still;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -47,7 +47,7 @@ pub enum Message {
     /// What is known of the line to the terminal.
     Line(Option<Reading>),
     /// Time has passed. At least once a second while something on the screen depends on it
-    /// ([`Model::wakes_at`](super::model::Model::wakes_at)).
+    /// ([`Model::wakes_at`](crate::dashboard::model::Model::wakes_at)).
     Tick,
 }
 

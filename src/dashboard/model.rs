@@ -1,20 +1,20 @@
 //! The model: everything that the screen depends on.
 
-use super::convergence::Convergence;
-use super::editor::Editor;
-use super::input::Button;
-use super::keymap::Context;
-use super::layout::{Focus, Layout, Request, layout};
-use super::link::Reading;
-use super::message::{Channel, Format, LeftBehind};
-use super::overlay::Overlay;
-use super::places::wrapped;
-pub use super::raster::Colors;
+use crate::dashboard::convergence::Convergence;
+use crate::dashboard::editor::Editor;
+use crate::dashboard::keymap::Context;
+use crate::dashboard::layout::{Focus, Layout, Request, layout};
+use crate::dashboard::message::{Channel, Format, LeftBehind};
+use crate::dashboard::overlay::Overlay;
+use crate::dashboard::overlay_layout::wrapped;
 use crate::film::{Display, Linear, Probe};
 use crate::render::schedule::Stop;
 use crate::render::session::Snapshot;
 use crate::scene::edit::Subject;
 use crate::scene::{History, Scene, SceneErrors};
+pub use crate::terminal::cells::Colors;
+use crate::terminal::event::Button;
+use crate::terminal::flow::Reading;
 use crate::value::printable;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -345,7 +345,7 @@ impl Model {
         }
     }
 
-    /// When the screen changes by itself: send a [`Tick`](super::message::Message::Tick) then.
+    /// When the screen changes by itself: send a [`Tick`](crate::dashboard::message::Message::Tick) then.
     pub fn wakes_at(&self) -> Option<Duration> {
         self.notice.as_ref().and_then(|notice| notice.until)
     }

@@ -1,26 +1,26 @@
 //! What can lie over the panels and take the keys: help, lists, forms, prompts, questions.
 
-use super::editor::Editor;
-use super::still::Still;
+use crate::dashboard::editor::Editor;
 use crate::scene::Scene;
 use crate::scene::edit::Subject;
+use crate::terminal::image::Still;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// What lies over the panels.
 #[derive(Clone, Debug)]
 pub enum Overlay {
-    /// All keys: [`help`](super::hints::help).
+    /// All keys: [`help`](crate::dashboard::hints::help).
     Help {
         /// First line shown.
         scroll: usize,
     },
-    /// What the compiled scene contains: [`Model::inventory`](super::model::Model::inventory).
+    /// What the compiled scene contains: [`Model::inventory`](crate::dashboard::model::Model::inventory).
     Inventory {
         /// First line shown.
         scroll: usize,
     },
-    /// What each quality costs: [`Model::qualities`](super::model::Model::qualities).
+    /// What each quality costs: [`Model::qualities`](crate::dashboard::model::Model::qualities).
     Quality {
         /// Position of the chosen one.
         cursor: usize,

@@ -1,6 +1,6 @@
 //! From radiance to the numbers of a picture file: exposure, tone curve, sRGB.
 
-use super::curve::Curve;
+use crate::film::srgb_table::Curve;
 use std::fmt;
 use std::str::FromStr;
 

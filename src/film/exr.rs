@@ -5,9 +5,9 @@
 //! replicates, whose half difference is the picture's error; `light_NAME.R ..` what each light group
 //! contributes, summing up to the picture; `count` the samples of a pixel.
 
-use super::exr_header::Ordered;
-use super::mix::{Part, Sums};
-use super::target::{Picture, Sink};
+use crate::film::exr_header::Ordered;
+use crate::film::light_weights::{Part, Sums};
+use crate::film::output::{Picture, Sink};
 use exr::block::UncompressedBlock;
 use exr::block::writer::ChunksWriter;
 use exr::compression::Compression;

@@ -23,12 +23,12 @@
 //! The error of a sparse picture (stars, hairlines) sits in few pixels. Its estimate is as uncertain as those are few,
 //! by 1 / sqrt(2 k) of the RMSE for k effective pixels, and so is the true error itself.
 
-use super::TILE;
-use super::curve::Curve;
-use super::display::{Display, Tone, toned};
-use super::mix::Mix;
-use super::storage::Film;
-use super::tile::Tile;
+use crate::film::TILE;
+use crate::film::display::{Display, Tone, toned};
+use crate::film::film::Film;
+use crate::film::light_weights::Mix;
+use crate::film::srgb_table::Curve;
+use crate::film::tile::Tile;
 
 /// Mean square error over pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,9 +1,9 @@
 //! Estimates against errors that are known.
 
-use super::noise::*;
-use super::testing::{Rng, each_tile, fill, film, white};
-use super::*;
-use super::{Part, quantised_8};
+use crate::film::noise::*;
+use crate::film::testing::{Rng, each_tile, fill, film, white};
+use crate::film::*;
+use crate::film::{Part, quantised_8};
 
 /// A pixel whose samples have a known mean: each is `dark + LIGHT` with probability `chance` and
 /// else `dark`, or normal around the mean.

@@ -1,8 +1,8 @@
 //! PNG: what the display shows, in 8 or 16 bits per channel, sRGB, with text metadata.
 
-use super::display::quantised_16;
-use super::mix::Part;
-use super::target::{Depth, Picture, Sink};
+use crate::film::display::quantised_16;
+use crate::film::light_weights::Part;
+use crate::film::output::{Depth, Picture, Sink};
 use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SourceChromaticities,
     SrgbRenderingIntent,

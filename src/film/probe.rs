@@ -1,10 +1,10 @@
 //! One pixel, looked at closely.
 
-use super::TILE;
-use super::display::Display;
-use super::mix::{Mix, Part};
-use super::noise::Estimator;
-use super::storage::Film;
+use crate::film::TILE;
+use crate::film::display::Display;
+use crate::film::film::Film;
+use crate::film::light_weights::{Mix, Part};
+use crate::film::noise::Estimator;
 
 /// What the film knows about one pixel under one mix of lights and one display transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,8 +64,8 @@ impl Film {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{each_tile, fill, film};
     use super::*;
+    use crate::film::testing::{each_tile, fill, film};
 
     #[test]
     fn a_pixel_and_its_error() {

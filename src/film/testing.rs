@@ -1,8 +1,8 @@
 //! Films with known contents, for the tests of this room.
 
-use super::storage::{Film, Header};
-use super::tile::Tile;
-use super::{Mix, TILE};
+use crate::film::film::{Film, Header};
+use crate::film::tile::Tile;
+use crate::film::{Mix, TILE};
 
 /// Numbers for tests (SplitMix64).
 pub struct Rng(pub u64);

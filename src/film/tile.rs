@@ -1,7 +1,7 @@
 //! One 16x16 square of the film: integer sums for both replicates.
 
-use super::bad::BadSamples;
-use super::{BadSample, TILE};
+use crate::film::invalid::BadSamples;
+use crate::film::{BadSample, TILE};
 use crate::lanes::prefetch;
 
 /// Number of pixels in a tile.

@@ -1,6 +1,6 @@
 //! The width-1 instances: plain `f32` and `f64`, the same operations in the same order.
 
-use super::{Bits, Lanes, MAX_WIDTH, Mask, round_i64};
+use crate::lanes::{Bits, Lanes, MAX_WIDTH, Mask, round_i64};
 
 impl Mask for bool {
     #[inline(always)]

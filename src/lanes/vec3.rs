@@ -1,6 +1,6 @@
 //! Vectors and orthonormal frames of lanes.
 
-use super::{Lanes, Real};
+use crate::lanes::{Lanes, Real};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 /// Three coordinates (or three colour channels), each a vector of lanes.

@@ -1,6 +1,6 @@
 //! The vector instances, over the types of the `wide` crate.
 
-use super::{Bits, Lanes, MAX_WIDTH, Mask, ROUNDER};
+use crate::lanes::{Bits, Lanes, MAX_WIDTH, Mask, ROUNDER};
 use wide::bytemuck::cast;
 use wide::{f32x4, f32x8, f64x2, f64x4, i32x4, i32x8, i64x4, u32x4, u32x8};
 #[cfg(target_feature = "avx512f")]

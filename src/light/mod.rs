@@ -1,8 +1,8 @@
 //! Lights.
 
-mod lamp;
+mod delta;
 
-pub use lamp::{Arrival, Lamp};
+pub use delta::{Arrival, Lamp};
 
 use crate::value::{Checks, Choice, Color, Fault, Field, Range, Takes};
 use serde::{Deserialize, Serialize};

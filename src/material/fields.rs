@@ -1,6 +1,6 @@
 //! What may be written in a material.
 
-use super::texture_fields::{BUMP_KINDS, TEXTURE_KINDS};
+use crate::material::texture_fields::{BUMP_KINDS, TEXTURE_KINDS};
 use crate::value::{Choice, Field, Range, Takes};
 
 /// The keys of `[materials.NAME]`.

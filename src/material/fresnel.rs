@@ -1,7 +1,7 @@
 //! Reflectance against angle, per channel.
 
-use super::{Fresnel, Material};
 use crate::lanes::{Lanes, Real, V3};
+use crate::material::{Fresnel, Material};
 
 /// Index of refraction that reflects `f0` of the light at normal incidence: (1 + sqrt F0) /
 /// (1 - sqrt F0); infinite for F0 = 1.

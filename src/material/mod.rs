@@ -1,28 +1,28 @@
 //! Materials: how a surface answers light.
 
-mod claims;
+mod bsdf;
+mod bsdf_eval;
 mod fields;
-mod finish;
 mod fresnel;
-mod lookup;
-mod projection;
+mod mapping;
+mod properties;
 mod refraction;
-mod scatter;
 mod texture;
+mod texture_eval;
 mod texture_fields;
 
-pub use claims::{Claims, Energy};
+pub use bsdf::{Facets, Finish, SMOOTH_ALPHA, Shine, Spread, Transmission, one_minus_cos_of_tan};
+pub use bsdf_eval::Reflected;
 pub use fields::FIELDS;
-pub use finish::{Facets, Finish, SMOOTH_ALPHA, Shine, Spread, Transmission, one_minus_cos_of_tan};
 pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
-pub use lookup::{Heights, Pattern};
-pub use projection::{Coordinates, Projection, Projector};
+pub use mapping::{Coordinates, Projection, Projector};
+pub use properties::{Claims, Energy};
 pub use refraction::{Interface, Split};
-pub use scatter::Reflected;
 pub use texture::{
     Axis, Bump, Checker, HeightImage, ImageTexture, Mapping, Placement, Texture, TextureFilter,
     Wrap,
 };
+pub use texture_eval::{Heights, Pattern};
 
 use crate::value::{Checks, Color, Fault};
 use serde::{Deserialize, Serialize};

@@ -2,8 +2,8 @@
 //!
 //! Born and Wolf, *Principles of Optics*, sections 1.5.2 and 1.5.4.
 
-use super::finish::Transmission;
 use crate::lanes::{Lanes, Mask, V3};
+use crate::material::bsdf::Transmission;
 
 /// Where rays cross from one medium to another.
 #[derive(Clone, Copy, Debug)]

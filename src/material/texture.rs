@@ -7,8 +7,8 @@
 //! bump.image = { file = "bricks.png", height = 0.02 }
 //! ```
 
-use super::texture_fields::{BUMP_FIELDS, CHECKER_FIELDS, IMAGE_FIELDS};
 use crate::asset::{AssetError, Image};
+use crate::material::texture_fields::{BUMP_FIELDS, CHECKER_FIELDS, IMAGE_FIELDS};
 use crate::value::{Checks, Color, Fault, Field};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -359,7 +359,7 @@ impl Bump {
     }
 }
 
-impl super::Material {
+impl crate::material::Material {
     /// The named files of its texture and its bump, with what was found in them.
     fn files_mut(&mut self) -> impl Iterator<Item = (&String, &mut Loaded)> {
         let texture = match &mut self.texture {

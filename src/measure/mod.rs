@@ -5,18 +5,18 @@
 //! repetitions, taken in turns so that a slow moment of the machine hits all settings alike, and those
 //! in which other programs took the processors are left out.
 
-mod calm;
-mod curve;
-mod picture;
-mod plan;
+mod contention;
+mod convergence_order;
+mod error_curve;
+mod experiment;
 pub mod plot;
+mod reference;
 mod result;
 mod run;
-mod slope;
 
-pub use curve::Point;
-pub use picture::{Bias, Errors, Reference};
-pub use plan::{Plan, Topic, Variation};
+pub use convergence_order::Slope;
+pub use error_curve::Point;
+pub use experiment::{Plan, Topic, Variation};
+pub use reference::{Bias, Errors, Reference};
 pub use result::{Crossing, Expected, Measured, Measurement, Steadiness, median, spread};
 pub use run::{Progress, measure};
-pub use slope::Slope;

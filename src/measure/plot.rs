@@ -1,7 +1,7 @@
 //! Error against time, drawn: a panel for each setting, log-log, the default beside its variations.
 
-use super::plan::Topic;
-use super::result::{Measured, Measurement, median};
+use crate::measure::experiment::Topic;
+use crate::measure::result::{Measured, Measurement, median};
 use epaint_default_fonts::UBUNTU_LIGHT;
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -99,7 +99,7 @@ fn grid(panels: usize) -> (i32, i32) {
 
 /// (seconds, codes) of the points that have both.
 fn points(measured: &Measured) -> Vec<(f64, f64)> {
-    let of = |p: &super::Point| (median(&measured.seconds(p)), p.errors.rmse_codes);
+    let of = |p: &crate::measure::Point| (median(&measured.seconds(p)), p.errors.rmse_codes);
     measured.points.iter().map(of).filter(|(s, e)| *s > 0.0 && *e > 0.0).collect()
 }
 

@@ -1,9 +1,9 @@
 //! What came out.
 
-use super::curve::Point;
-use super::picture::Bias;
-use super::plan::{Topic, Variation};
-use super::slope::Slope;
+use crate::measure::convergence_order::Slope;
+use crate::measure::error_curve::Point;
+use crate::measure::experiment::{Topic, Variation};
+use crate::measure::reference::Bias;
 
 /// When a way reached a given noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -261,8 +261,8 @@ impl Measurement {
 
 #[cfg(test)]
 mod tests {
-    use super::super::picture::Errors;
     use super::*;
+    use crate::measure::reference::Errors;
 
     fn measured(points: &[(f64, f64)]) -> Measured {
         let point = |(step, (spp, codes)): (usize, &(f64, f64))| Point {

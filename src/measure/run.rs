@@ -1,9 +1,9 @@
 //! The measurement itself.
 
-use super::curve::{End, repeat, walk};
-use super::picture::Reference;
-use super::plan::{Plan, Topic, Variation};
-use super::result::{Expected, Measured, Measurement, spread};
+use crate::measure::error_curve::{End, repeat, walk};
+use crate::measure::experiment::{Plan, Topic, Variation};
+use crate::measure::reference::Reference;
+use crate::measure::result::{Expected, Measured, Measurement, spread};
 use crate::render::Course;
 use crate::scene::Scene;
 use std::io;
@@ -190,9 +190,9 @@ fn make_reference(default: &Variation, codes: f64, seconds: f64) -> io::Result<M
 
 #[cfg(test)]
 mod tests {
-    use super::super::curve::Point;
-    use super::super::picture::Errors;
     use super::*;
+    use crate::measure::error_curve::Point;
+    use crate::measure::reference::Errors;
 
     /// A way with these seconds and codes.
     fn way(points: &[(f64, f64)]) -> Measured {

@@ -1,9 +1,9 @@
 //! Picture files of a rendering, and what they say about how it was made. Equal pictures say the
 //! same: no dates, no times, no threads.
 
-use super::rendering::Rendering;
-use super::session::Report;
 use crate::film::{Depth, Display, Picture, Target, Tone, WriteError};
+use crate::render::render_state::Rendering;
+use crate::render::session::Report;
 use crate::sampling::SamplerKind;
 use crate::value::fnv1a64;
 

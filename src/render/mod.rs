@@ -1,18 +1,18 @@
 //! From a scene to a growing film: what to trace next, and the threads that do it.
 
-mod course;
 pub mod export;
-mod first;
-mod guide;
-mod lighting;
+mod feature_buffer;
+mod first_pass;
 pub mod pass;
-mod rendering;
+mod pixel_block;
+mod relighting;
+mod render_state;
 pub mod schedule;
 pub mod session;
-mod sites;
+mod sync_render;
 pub mod wave;
 
-pub use course::Course;
-pub use guide::Guide;
-pub use lighting::Lighting;
-pub use rendering::{Options, Rendering};
+pub use feature_buffer::Guide;
+pub use relighting::Lighting;
+pub use render_state::{Options, Rendering};
+pub use sync_render::Course;

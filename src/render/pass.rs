@@ -1,9 +1,9 @@
 //! The synchronous core: traces the jobs of one wave into the film.
 
-use super::sites::Sites;
-use super::wave::{Job, JobReport, Wave, WaveReport};
 use crate::film::{BadSample, Estimator, Film, Slot, TILE, TILE_PIXELS, Tile};
 use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::render::pixel_block::Sites;
+use crate::render::wave::{Job, JobReport, Wave, WaveReport};
 use crate::sampling::{Draws, Points, SampleSettings, Sampler};
 use crate::world::{AnyWorld, Counts, MAX_GROUPS, Outlook, Radiance, World};
 use rayon::prelude::*;

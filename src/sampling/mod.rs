@@ -1,9 +1,9 @@
 //! Numbers for samples: a sample is a pure function of (seed, pixel, replicate, index), never of
 //! thread, order or time.
 
-mod draws;
 mod hash;
+mod packet_sampler;
 mod sobol;
 pub mod warp;
 
-pub use draws::{Draws, Points, SampleSettings, Sampler, SamplerKind};
+pub use packet_sampler::{Draws, Points, SampleSettings, Sampler, SamplerKind};

@@ -15,7 +15,7 @@
 //!
 //! Values are stored with the first binary digit in bit 0, as the scrambling hash wants them.
 
-use super::hash::mix1;
+use crate::sampling::hash::mix1;
 
 /// Dimensions of one joint set.
 pub const DIMENSIONS: usize = 8;

@@ -1,11 +1,11 @@
 //! A scene file as text with its comments, beside the scene that it describes.
 
-use super::locate::located;
-use super::message::{Message, SceneErrors};
-use super::read::read_text;
-use super::rewrite::rewrite;
-use super::{Library, Scene};
 use crate::asset::Assets;
+use crate::scene::diagnostic::{Message, SceneErrors};
+use crate::scene::format::patch::rewrite;
+use crate::scene::format::read::read_text;
+use crate::scene::format::source_map::located;
+use crate::scene::{Library, Scene};
 use std::path::Path;
 use std::sync::Arc;
 use toml_edit::DocumentMut;

@@ -1,8 +1,8 @@
 //! A scene and the file that it is kept in: opening, saving without harm, noticing other writers.
 
-use super::recovery::{TEMPORARY, claim};
-use super::{Document, Scene, SceneErrors};
 use crate::asset::Assets;
+use crate::scene::recovery::{TEMPORARY, claim};
+use crate::scene::{Document, Scene, SceneErrors};
 use crate::value::{fnv1a64, printable};
 use std::fmt;
 use std::fs::{self, File};

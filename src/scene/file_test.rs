@@ -1,6 +1,6 @@
 //! Saving and reloading on a real file system.
 
-use super::{BUILT_IN, DiskState, SaveError, Scene, SceneFile};
+use crate::scene::{BUILT_IN, DiskState, SaveError, Scene, SceneFile};
 use std::fs;
 use std::path::{Path, PathBuf};
 

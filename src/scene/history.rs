@@ -1,9 +1,9 @@
 //! Undo and redo of whole scenes.
 
-use super::{Object, Scene, Step};
 use crate::camera::Camera;
 use crate::light::Light;
 use crate::material::Material;
+use crate::scene::{Object, Scene, Step};
 use std::collections::VecDeque;
 use std::sync::Arc;
 

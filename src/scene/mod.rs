@@ -1,43 +1,36 @@
 //! The scene: what the user wrote, checked, in double precision, editable.
-
-mod align;
-mod check;
+mod asset_resolver;
+mod builtin;
+mod diagnostic;
 mod document;
 pub mod edit;
 mod file;
-mod fresh;
+mod format;
 mod history;
-mod included;
-mod keep;
-mod library;
-mod locate;
-mod message;
+mod lints;
 mod object;
-mod read;
 mod recovery;
 mod reference;
-mod rewrite;
-mod schema;
 mod settings;
-mod suggest;
-mod warn;
+mod validate;
 
-pub use crate::shape::{Acceleration, Rotate, STEP_FIELDS, Scale, Step};
-pub use check::Finding;
+pub use crate::primitive::Acceleration;
+pub use crate::scene::format::schema::FIELDS;
+pub use crate::shape::{Rotate, STEP_FIELDS, Scale, Step};
+pub use asset_resolver::Library;
+pub use builtin::{BUILT_IN, built_in, starter};
+pub use diagnostic::{Message, SceneErrors};
 pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};
 pub use history::History;
-pub use included::{BUILT_IN, built_in, starter};
-pub use library::Library;
-pub use message::{Message, SceneErrors};
 pub use object::{OBJECT_FIELDS, Object};
 pub use recovery::{Found, Lost, Recovery, kept_in, state_folder, sweep};
 pub use reference::reference;
-pub use schema::FIELDS;
 pub use settings::{
     AMBIENT_FIELDS, Ambient, BACKGROUND_FIELDS, Background, FILM_FIELDS, FilmSettings, Filter,
     Horizon, Level, MAX_PIXELS, TRACE_FIELDS, Trace,
 };
+pub use validate::Finding;
 
 use crate::camera::Camera;
 use crate::light::Light;

@@ -1,6 +1,7 @@
 //! Objects: a shape, where it stands, what it is made of.
 
-use crate::shape::{Form, KINDS, STEP_FIELDS, Shape, Step, chained, misplaced};
+use crate::primitive::Form;
+use crate::shape::{KINDS, STEP_FIELDS, Shape, Step, chained, misplaced};
 use crate::value::{Checks, Fault, Field, Takes};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};

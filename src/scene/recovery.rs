@@ -60,7 +60,7 @@ pub struct Lost {
     kept: Kept,
     /// The scene's file as it would have been saved.
     pub text: String,
-    /// [`super::SceneFile::fingerprint`] of what was edited; `None`: it was in no file, or it is not
+    /// [`crate::scene::SceneFile::fingerprint`] of what was edited; `None`: it was in no file, or it is not
     /// known.
     pub base: Option<u64>,
     /// When they were written.

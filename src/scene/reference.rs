@@ -1,6 +1,6 @@
 //! The reference of the scene file format, generated from the tables of fields.
 
-use super::schema::FIELDS;
+use crate::scene::format::schema::FIELDS;
 use crate::shape::{EXAMPLES, KINDS, STEP_FIELDS};
 use crate::value::{Field, Preset, Takes};
 use std::fmt::Write as _;

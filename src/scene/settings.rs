@@ -1,6 +1,6 @@
 //! What holds for the whole picture: raster, tracing, background, ambient light.
 
-use crate::shape::Acceleration;
+use crate::primitive::Acceleration;
 use crate::value::{Checks, Choice, Color, Fault, Field, Range, Takes};
 use serde::{Deserialize, Serialize};
 

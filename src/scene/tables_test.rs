@@ -1,7 +1,7 @@
 //! The tables of fields against what serde really reads and writes.
 
-use super::*;
 use crate::material::{Bump, Checker, HeightImage, ImageTexture, Texture};
+use crate::scene::*;
 use crate::shape::{EXAMPLES, KINDS, MAX_DEPTH, Part, Shape};
 use crate::value::{Field, Preset, Takes};
 use serde::Serialize;

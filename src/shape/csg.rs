@@ -1,71 +1,272 @@
-//! Compound solids as what they are computed from: parts and how they are combined.
+//! Compound objects: union, intersection and difference of solids, nested to any depth.
+//!
+//! A part is written like an object, with `shape`, and if needed `material` and `transform`, so that
+//! objects and parts can be copied into each other.
 
-use super::Form;
-use glam::{DAffine3, DVec3};
+use crate::primitive::Form;
+use crate::primitive::csg_tree::{Compound, Tree};
+use crate::shape::registry::KIND_TABLE;
+use crate::shape::transform::{STEP_FIELDS, Step, chained, misplaced};
+use crate::shape::{Cuboid, Kind, Shape, Sphere};
+use crate::value::{Checks, Fault, Field, Takes};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
-/// How parts are combined.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Tree {
-    /// A part, by its position in [`Compound::parts`].
-    Part(usize),
-    /// The points that are in any of these.
-    Union(Vec<Tree>),
-    /// The points that are in all of these.
-    Intersection(Vec<Tree>),
-    /// The points of the first that are in none of the others.
-    Difference(Vec<Tree>),
+/// The deepest nesting of compounds in compounds.
+pub const MAX_DEPTH: usize = 64;
+
+/// A part of a compound.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// What it looks like: a solid, or a plane for the half-space behind it.
+    pub shape: Shape,
+    /// Key of the scene's `materials`; empty: that of the whole.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub material: String,
+    /// Steps that move, turn and scale it inside the whole, the first step first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub transform: Vec<Step>,
 }
 
-impl Tree {
-    /// The same tree over parts that stand `by` places later.
-    pub(super) fn shifted(self, by: usize) -> Self {
-        let all = |list: Vec<Self>| list.into_iter().map(|t| t.shifted(by)).collect();
-        match self {
-            Self::Part(i) => Self::Part(i + by),
-            Self::Union(list) => Self::Union(all(list)),
-            Self::Intersection(list) => Self::Intersection(all(list)),
-            Self::Difference(list) => Self::Difference(all(list)),
+static PART_FIELDS: [Field; 3] = [
+    Field::required(
+        "shape",
+        Takes::OneOf(&KIND_TABLE),
+        "",
+        "What it looks like: a solid, or a plane for the half-space behind it.",
+    ),
+    Field::without(
+        "material",
+        Takes::Text,
+        "",
+        "that of the whole",
+        "Name of one of the `[materials.NAME]`.",
+    ),
+    Field::without(
+        "transform",
+        Takes::ListOf(STEP_FIELDS),
+        "",
+        "it stays as its shape says",
+        "Steps that move, turn and scale it, the first step first.",
+    ),
+];
+
+/// The keys of a compound kind.
+pub(super) static OF_FIELDS: [Field; 1] = [Field::required(
+    "of",
+    Takes::Tables(&PART_FIELDS),
+    "",
+    "Two parts or more, each written like an object: `shape`, `material`, `transform`.",
+)];
+
+macro_rules! compounds {
+    ($($kind:ident, $doc:literal, $example:literal);+ $(;)?) => {$(
+        #[doc = $doc]
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $kind {
+            /// The parts.
+            pub of: Vec<Part>,
+        }
+
+        impl Kind for $kind {
+            const DOC: &'static str = $doc;
+            const EXAMPLE: &'static str = $example;
+            const FIELDS: &'static [Field] = &OF_FIELDS;
+
+            fn form(&self) -> Form {
+                Form::Compound(combined(&self.of, Tree::$kind))
+            }
+
+            fn faults(&self) -> Vec<Fault> {
+                let faults = part_faults(&self.of, 1);
+                if !faults.is_empty() || self.form().bounds().is_some() {
+                    return faults;
+                }
+                vec![Fault::new(
+                    "of",
+                    "the parts together have no end",
+                    "a solid with an end: planes can be taken from one, or intersected with one",
+                )]
+            }
+
+            fn standing(base: DVec3, size: DVec3) -> Self {
+                Self { of: standing(base, size).map(Part::new).into() }
+            }
+
+            fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+                Vec::new()
+            }
+
+            fn turn(&mut self, _: f64) -> bool {
+                false
+            }
+        }
+    )+};
+}
+
+compounds! {
+    Union,
+    "Solids joined into one: every point that is in any part.",
+    "shape.union.of = [
+    { shape.sphere = { center = [0.0, 0.4, 0.0], radius = 0.4 } },
+    { shape.cylinder = { base = [0.0, 0.4, 0.0], top = [0.0, 1.2, 0.0], radius = 0.2 } },
+]";
+    Intersection,
+    "What solids have in common: every point that is in all parts.",
+    "shape.intersection.of = [
+    { shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0 } },
+    { shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.65 } },
+]";
+    Difference,
+    "The first part without the others: every point of it that is in none of them. A cut shows \
+     the material of the part that cut it.",
+    "shape.difference.of = [
+    { shape.box = { center = [0.0, 0.5, 0.0], size = [1.0, 1.0, 1.0] } },
+    { shape.sphere = { center = [0.5, 1.0, 0.5], radius = 0.6 } },
+]";
+}
+
+/// A block of this size on `base`, and a ball that reaches out of it at its upper right near corner.
+fn standing(base: DVec3, size: DVec3) -> [Shape; 2] {
+    let block = Cuboid::standing(base, size * 0.9);
+    let radius = 0.4 * size.min_element();
+    let corner = base + DVec3::new(0.5 * size.x, size.y, 0.5 * size.z) - radius;
+    let ball = Sphere { center: corner.to_array(), radius };
+    [Shape::Cuboid(block), Shape::Sphere(ball)]
+}
+
+impl Part {
+    /// A shape as it is, of the material of the whole.
+    pub fn new(shape: Shape) -> Self {
+        Self { shape, material: String::new(), transform: Vec::new() }
+    }
+}
+
+/// The parts of a compound kind; `None`: the shape is a simple one.
+pub(super) fn parts_of(shape: &Shape) -> Option<&[Part]> {
+    match shape {
+        Shape::Union(Union { of })
+        | Shape::Intersection(Intersection { of })
+        | Shape::Difference(Difference { of }) => Some(of),
+        _ => None,
+    }
+}
+
+/// [`parts_of`], to be changed.
+fn parts_of_mut(shape: &mut Shape) -> &mut [Part] {
+    match shape {
+        Shape::Union(Union { of })
+        | Shape::Intersection(Intersection { of })
+        | Shape::Difference(Difference { of }) => of,
+        _ => &mut [],
+    }
+}
+
+fn combined(of: &[Part], join: fn(Vec<Tree>) -> Tree) -> Compound {
+    let mut parts = Vec::new();
+    let mut trees = Vec::new();
+    for part in of {
+        match part.shape.form().transformed(&chained(&part.transform)) {
+            Form::Compound(inner) => {
+                trees.push(inner.tree.shifted(parts.len()));
+                parts.extend(inner.parts);
+            }
+            simple => {
+                trees.push(Tree::Part(parts.len()));
+                parts.push(simple);
+            }
         }
     }
+    Compound { parts, tree: join(trees) }
 }
 
-/// A solid made of solids.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Compound {
-    /// Convex solids: `Sphere`, `Ellipsoid`, `Convex`, `Tapered`, and `Plane` for the half-space
-    /// behind it.
-    pub parts: Vec<Form>,
-    /// Every part occurs once, in order.
-    pub tree: Tree,
+/// Why the shape cannot be a part, if it cannot.
+fn unfit(shape: &Shape) -> Option<&'static str> {
+    match shape {
+        Shape::Rectangle(_) | Shape::Platform(_) => Some("is flat: nothing is inside it"),
+        Shape::MeshFile(_) => Some("cannot be a part of a compound"),
+        _ => None,
+    }
 }
 
-impl Compound {
-    /// After the invertible affine map `map`.
-    pub(super) fn transformed(self, map: &DAffine3) -> Self {
-        let parts = self.parts.into_iter().map(|p| p.transformed(map)).collect();
-        Self { parts, tree: self.tree }
+fn part_faults(of: &[Part], depth: usize) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    if of.len() < 2 {
+        let found = ["of is an empty list", "of is a list of one part"][of.len()];
+        faults.push(Fault::new("of", found, "at least two parts"));
     }
-
-    /// Corners of an axis-parallel box around it; `None` if it has no end as far as the boxes of its
-    /// parts tell.
-    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        self.bounds_of(&self.tree)
+    if depth > MAX_DEPTH {
+        faults.push(Fault::new(
+            "of",
+            format!("compounds are nested more than {MAX_DEPTH} deep"),
+            "a flatter tree: a union, intersection or difference takes any number of parts",
+        ));
+        return faults;
     }
-
-    fn bounds_of(&self, tree: &Tree) -> Option<(DVec3, DVec3)> {
-        match tree {
-            Tree::Part(i) => self.parts[*i].bounds(),
-            Tree::Union(list) => {
-                let boxes: Option<Vec<_>> = list.iter().map(|t| self.bounds_of(t)).collect();
-                boxes?.into_iter().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
-            }
-            Tree::Intersection(list) => {
-                let boxes = list.iter().filter_map(|t| self.bounds_of(t));
-                let (low, high) = boxes.reduce(|a, b| (a.0.max(b.0), a.1.min(b.1)))?;
-                // Boxes that do not overlap leave nothing: a box without extent.
-                Some((low, high.max(low)))
-            }
-            Tree::Difference(list) => self.bounds_of(list.first()?),
+    for (i, part) in of.iter().enumerate() {
+        let inner = match parts_of(&part.shape) {
+            Some(of) => part_faults(of, depth + 1)
+                .into_iter()
+                .map(|fault| fault.under(part.shape.key()))
+                .collect(),
+            None => part.shape.faults(),
+        };
+        let open = unfit(&part.shape).map(|why| {
+            let found = format!("a {} {why}", part.shape.key());
+            Fault::new("shape", found, "a solid")
+        });
+        let mut checks = Checks::new(&PART_FIELDS).inner("shape", inner).and(open);
+        for (k, step) in part.transform.iter().enumerate() {
+            checks = checks.inner(&format!("transform.{k}"), step.faults());
         }
+        let moved = if checks.clean() { misplaced(&part.shape, &part.transform) } else { None };
+        faults.extend(checks.and(moved).faults().into_iter().map(|f| f.under(&format!("of.{i}"))));
+    }
+    faults
+}
+
+/// A material that a shape's parts name: where (dotted keys below the shape's own), and its name.
+pub type Named<'a> = (String, &'a str);
+
+impl Shape {
+    /// The material of each part of the shape's form, in the order of [`Compound::parts`]: the part's
+    /// own, else that of what it is a part of, at last `whole`. A simple shape has one part.
+    pub fn part_materials<'a>(&'a self, whole: &'a str) -> Vec<&'a str> {
+        match parts_of(self) {
+            None => vec![whole],
+            Some(of) => of
+                .iter()
+                .flat_map(|part| {
+                    let own = if part.material.is_empty() { whole } else { &part.material };
+                    part.shape.part_materials(own)
+                })
+                .collect(),
+        }
+    }
+
+    /// The names of materials that its parts carry, those that are empty too.
+    pub fn part_names_mut(&mut self) -> Vec<&mut String> {
+        let mut names = Vec::new();
+        for part in parts_of_mut(self) {
+            names.push(&mut part.material);
+            names.extend(part.shape.part_names_mut());
+        }
+        names
+    }
+
+    /// The materials that its parts name.
+    pub fn named_materials(&self) -> Vec<Named<'_>> {
+        let mut named = Vec::new();
+        for (i, part) in parts_of(self).into_iter().flatten().enumerate() {
+            let at = format!("{}.of.{i}", self.key());
+            if !part.material.is_empty() {
+                named.push((format!("{at}.material"), part.material.as_str()));
+            }
+            let inner = part.shape.named_materials().into_iter();
+            named.extend(inner.map(|(key, name)| (format!("{at}.shape.{key}"), name)));
+        }
+        named
     }
 }

@@ -3,8 +3,9 @@
 //! Centre and sizes, like platform and rectangle: one key moves it, and no pair of corners can be
 //! given inside out. A `transform` turns it.
 
-use super::upright::upright;
-use super::{Form, Kind};
+use crate::primitive::Form;
+use crate::shape::Kind;
+use crate::shape::prismoid::upright;
 use crate::value::{Checks, Fault, Field, Range, Takes};
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,8 @@
 //! Triangle meshes from files.
 
-use super::{Form, Kind, Shape};
 use crate::asset::{AssetError, Mesh, TriangleMesh};
+use crate::primitive::Form;
+use crate::shape::{Kind, Shape};
 use crate::value::{Choice, Fault, Field, Takes};
 use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};

@@ -1,59 +1,43 @@
 //! Shapes: what users describe, one kind a file, and what rays meet, one batch per form.
-
-mod apart;
-mod batch;
-mod bound;
-mod cast;
-mod compound;
+mod axial;
 mod cone;
 mod csg;
 mod cube;
 mod cuboid;
 mod cylinder;
-mod extent;
-pub mod facets;
-mod facing;
-mod form;
-mod geometry;
-mod kinds;
+mod horizontal_rectangle;
 mod mesh;
-mod normals_at;
 mod plane;
-mod platform;
 mod prism;
+mod prismoid;
 mod pyramid;
 mod rectangle;
+mod registry;
 mod sphere;
-mod tapered;
 mod tapered_cylinder;
-mod texture;
+mod texture_space;
 mod transform;
-mod tree;
-mod unit_cylinder;
-mod upright;
-mod walk;
+mod unit_frustum;
 
-pub use batch::{Hit, OwnUv, Ray, Source, Surface};
-pub use bound::{Ball, Bound, Pencil, STRAY, Towards};
-pub use compound::{Difference, Intersection, MAX_DEPTH, Part, Union};
 pub use cone::Cone;
-pub use csg::{Compound, Tree as CompoundTree};
+pub use csg::{Difference, Intersection, MAX_DEPTH, Part, Union};
 pub use cube::Cube;
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
-pub use extent::Acceleration;
-pub use facing::facing;
-pub use form::{Form, HalfSpace};
-pub use geometry::{Geometry, Selection, TREE_FROM};
-pub use kinds::{EXAMPLES, KINDS, Kind, Shape};
+pub use horizontal_rectangle::Platform;
 pub use mesh::{MeshFile, Normals};
 pub use plane::Plane;
-pub use platform::Platform;
 pub use prism::Prism;
 pub use pyramid::Pyramid;
 pub use rectangle::Rectangle;
+pub use registry::{EXAMPLES, KINDS, Kind, Shape};
 pub use sphere::Sphere;
 pub use tapered_cylinder::TaperedCylinder;
-pub use texture::{TextureSpace, Unwrapped};
+pub use texture_space::{TextureSpace, Unwrapped};
 pub use transform::{Rotate, STEP_FIELDS, Scale, Step, chained, misplaced};
-pub use unit_cylinder::UnitCylinder;
+pub use unit_frustum::UnitCylinder;
+
+#[cfg(test)]
+mod normals_at_test;
+#[cfg(test)]
+mod ray_query_test;

@@ -1,7 +1,8 @@
 //! Infinite plane.
 
-use super::texture::on_plane;
-use super::{Form, Kind};
+use crate::primitive::Form;
+use crate::shape::Kind;
+use crate::shape::texture_space::on_plane;
 use crate::value::{Checks, Fault, Field, Range, Takes, turned, unit};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};

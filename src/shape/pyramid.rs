@@ -1,10 +1,11 @@
 //! Regular pyramid with a square base, whole or truncated.
 
-use super::cube::square;
-use super::kinds::turned_rotation;
-use super::texture::turned_axes;
-use super::upright::{lower_left, upright};
-use super::{Form, Kind};
+use crate::primitive::Form;
+use crate::shape::Kind;
+use crate::shape::cube::square;
+use crate::shape::prismoid::{lower_left, upright};
+use crate::shape::registry::turned_rotation;
+use crate::shape::texture_space::turned_axes;
 use crate::value::{Checks, Fault, Field, Range, Takes};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,7 @@
 //! Rectangle anywhere: the flat mirror.
 
-use super::{Form, Kind};
+use crate::primitive::Form;
+use crate::shape::Kind;
 
 use crate::value::{Checks, Fault, Field, Range, Takes, turned, unit};
 use glam::{DMat3, DVec3};

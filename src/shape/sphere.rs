@@ -1,6 +1,7 @@
 //! Sphere: the points at distance `radius` from `center`.
 
-use super::{Form, Kind};
+use crate::primitive::Form;
+use crate::shape::Kind;
 use crate::value::{Checks, Fault, Field, Range, Takes, clean};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

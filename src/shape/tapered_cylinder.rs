@@ -1,8 +1,9 @@
 //! Tapered cylinder: its radius changes evenly along the axis between two points.
 
-use super::tapered::axes_between;
-use super::tapered::{between, height, is_upright, no_axis};
-use super::{Form, Kind};
+use crate::primitive::Form;
+use crate::shape::Kind;
+use crate::shape::axial::axes_between;
+use crate::shape::axial::{between, height, is_upright, no_axis};
 use crate::value::{Checks, Fault, Field, Range, Takes};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};

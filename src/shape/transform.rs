@@ -1,6 +1,7 @@
 //! Transforms: steps that move, turn and scale an object or a part of one, one after the other.
 
-use super::{Form, Shape};
+use crate::primitive::Form;
+use crate::shape::Shape;
 use crate::value::{Checks, Fault, Field, Range, Takes, sin_cos_degrees, unit};
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};

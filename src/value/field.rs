@@ -1,7 +1,7 @@
 //! Tables of what may be written: one [`Field`] a key. Reading, messages, range checks, the
 //! generated reference and every form that edits a description use the same tables.
 
-use super::Range;
+use crate::value::Range;
 use std::fmt;
 
 /// One key of a description.

@@ -5,19 +5,19 @@
 mod angle;
 mod color;
 mod direction;
-mod fault;
 mod field;
 mod hash;
-mod range;
+mod number_range;
 mod round;
 mod text;
+mod validation;
 
 pub use angle::sin_cos_degrees;
 pub use color::{Color, linear_from_srgb};
 pub use direction::unit;
-pub use fault::{Checks, Fault};
 pub use field::{Choice, Field, Preset, Takes};
 pub use hash::fnv1a64;
-pub use range::{Range, number};
+pub use number_range::{Range, number};
 pub use round::{clean, decade, rounded_to, significant, turned};
 pub use text::{excerpt, printable};
+pub use validation::{Checks, Fault};

@@ -46,7 +46,7 @@ pub fn turned(v: [f64; 3], degrees: f64) -> [f64; 3] {
         return v;
     }
     let heading = rounded_to((x.atan2(z).to_degrees() + degrees).rem_euclid(360.0), -3);
-    let (sin, cos) = super::sin_cos_degrees(heading);
+    let (sin, cos) = crate::value::sin_cos_degrees(heading);
     let digits = decade(flat) - 6;
     [rounded_to(flat * sin, digits), y, rounded_to(flat * cos, digits)]
 }

@@ -1,7 +1,8 @@
 //! How close a point is to the surfaces of things.
 
-use crate::asset::{LEAF, Mesh};
-use crate::shape::Form;
+use crate::asset::Mesh;
+use crate::bvh::LEAF;
+use crate::primitive::Form;
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::TAU;
 

@@ -1,23 +1,23 @@
 //! From a scene to a world.
 
-use super::brightness;
-use super::groups::{Groups, Member};
-use super::guide::Sight;
-use super::inventory::Inventory;
-use super::light_buffer::LightBuffer;
-use super::limits;
-use super::media::Media;
-use super::on_surface::OnSurface;
-use super::outlook::{Culling, Outlook, Surroundings};
-use super::precision;
-use super::screen::{Cells, Rectangle};
-use super::skin::Skins;
 use crate::camera::View;
 use crate::lanes::{Double, Lanes, Real, Single};
 use crate::light::Lamp;
 use crate::material::{Finish, Material, Spread};
+use crate::primitive::{Acceleration, Form, Geometry};
 use crate::scene::{Filter, Horizon, Level, Scene};
-use crate::shape::{Acceleration, Form, Geometry};
+use crate::world::culling::light_buffer::LightBuffer;
+use crate::world::culling::screen_grid::{Cells, Rectangle};
+use crate::world::culling::tile::{Culling, Outlook, Surroundings};
+use crate::world::integrator::first_hit::Sight;
+use crate::world::integrator::nested_dielectrics::Media;
+use crate::world::integrator::surface_textures::Skins;
+use crate::world::inventory::Inventory;
+use crate::world::light_groups::{Groups, Member};
+use crate::world::lights_on_surfaces::OnSurface;
+use crate::world::precision;
+use crate::world::radiance_range;
+use crate::world::truncation_bias;
 use glam::{DAffine3, DVec3};
 
 /// The precision that a scene is traced in.
@@ -150,7 +150,8 @@ impl<L: Lanes> World<L> {
         let finish_of: Vec<u32> =
             geometry.sources().iter().map(|item| finish_of_object[item.form][item.part]).collect();
 
-        let of_part = |s: &crate::shape::Source| used[finish_of_object[s.form][s.part] as usize];
+        let of_part =
+            |s: &crate::primitive::Source| used[finish_of_object[s.form][s.part] as usize];
         let skins = Skins::new(scene, geometry.sources(), placed.origin, of_part);
 
         let lit = finishes.iter().any(|f| f.wants_light);
@@ -161,7 +162,7 @@ impl<L: Lanes> World<L> {
         let materials_of = |form: usize| {
             finish_of_object[form].iter().map(|finish| used[*finish as usize]).collect()
         };
-        let surroundings = brightness::Surroundings::new(
+        let surroundings = radiance_range::Surroundings::new(
             scene,
             &placed.forms,
             materials_of,
@@ -257,7 +258,7 @@ impl<L: Lanes> World<L> {
             names: groups.names(scene),
             jitter: scene.film.filter == Filter::Box,
             glossy: finishes.iter().any(glossy),
-            biases: limits::biases(scene),
+            biases: truncation_bias::biases(scene),
             media,
             geometry,
             finish_of,

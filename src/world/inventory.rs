@@ -1,8 +1,8 @@
 //! What a world contains, in words.
 
-use super::groups::Member;
 use crate::material::{Finish, Shine, Spread};
 use crate::scene::{Filter, Horizon, Level, Scene};
+use crate::world::light_groups::Member;
 use std::fmt;
 
 /// What a world contains; printing it gives one line.

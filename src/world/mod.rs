@@ -1,29 +1,21 @@
 //! The world: a scene compiled for one lane type, holding only what this scene requires, and the
 //! paths traced in it.
 
-mod brightness;
 mod clearance;
 mod compile;
-mod contact;
-mod groups;
-mod guide;
+mod culling;
+mod integrator;
 mod inventory;
-mod light_buffer;
-mod light_chart;
-mod limits;
-mod media;
-mod on_surface;
-mod outlook;
-mod path;
+mod light_groups;
+mod lights_on_surfaces;
 mod precision;
-mod screen;
-mod serving;
-mod skin;
-mod through;
+mod radiance_range;
+mod reuse;
+mod truncation_bias;
 
+pub use crate::world::culling::tile::Outlook;
+pub use crate::world::integrator::first_hit::Sight;
+pub use crate::world::integrator::opaque::{Counts, Radiance};
 pub use compile::{AnyWorld, Options, Precision, World};
-pub use groups::{Groups, MAX_GROUPS, Member};
-pub use guide::Sight;
 pub use inventory::Inventory;
-pub use outlook::Outlook;
-pub use path::{Counts, Radiance};
+pub use light_groups::{Groups, MAX_GROUPS, Member};

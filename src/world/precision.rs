@@ -6,10 +6,10 @@
 //! to the eye. Each of them has its ratio here; `tests/extremes/precision.rs` measures what single
 //! precision gets wrong at each.
 
-use super::clearance::{clearance, clearance_of};
 use crate::camera::View;
+use crate::primitive::Form;
 use crate::scene::Scene;
-use crate::shape::Form;
+use crate::world::clearance::{clearance, clearance_of};
 use glam::DVec3;
 use std::ops::Range;
 

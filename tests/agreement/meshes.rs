@@ -2,7 +2,8 @@
 
 use glam::{DVec2, DVec3};
 use std::collections::HashMap;
-use zerkalo::shape::{Form, Kind, MeshFile};
+use zerkalo::primitive::Form;
+use zerkalo::shape::{Kind, MeshFile};
 
 /// The least cosine between the normal that light sees and the direction to the viewer.
 const LEAST_COSINE: f64 = 0.02;

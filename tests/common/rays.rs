@@ -4,10 +4,12 @@
 
 use crate::common::Numbers;
 use glam::{DAffine3, DQuat, DVec3};
+use zerkalo::bvh::{Hit, Ray};
 use zerkalo::lanes::{Lanes, Mask, Real, V3};
+use zerkalo::primitive::{Form, Geometry, Surface};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
-use zerkalo::shape::{EXAMPLES, Form, Geometry, Hit, Ray, Surface};
+use zerkalo::shape::EXAMPLES;
 use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Precision, Radiance, World};
 
 /// Origin and unit direction.

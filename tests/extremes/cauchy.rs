@@ -8,7 +8,8 @@ use crate::told::{LEFT, told};
 use glam::{DMat3, DVec3};
 use std::f64::consts::{PI, TAU};
 use zerkalo::lanes::{Double, Lanes, Single};
-use zerkalo::shape::{Cuboid, Form, Geometry, HalfSpace, Kind, Prism, Pyramid};
+use zerkalo::primitive::{Form, Geometry, HalfSpace};
+use zerkalo::shape::{Cuboid, Kind, Prism, Pyramid};
 
 /// Area of one face: the corners on it, sorted around their middle.
 fn face_area(face: &HalfSpace, corners: &[DVec3], size: f64) -> f64 {

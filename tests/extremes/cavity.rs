@@ -5,7 +5,8 @@ use crate::compound::{block, difference, geometry};
 use crate::rays::{Line, closest};
 use glam::DVec3;
 use zerkalo::lanes::{Double, Lanes, Single};
-use zerkalo::shape::{Cylinder, Form, Kind};
+use zerkalo::primitive::Form;
+use zerkalo::shape::{Cylinder, Kind};
 
 fn ball(radius: f64) -> Form {
     Form::Sphere { center: DVec3::ZERO, radius }

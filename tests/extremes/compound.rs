@@ -5,7 +5,8 @@ use crate::rays::{Line, Met, blocked, closest};
 use crate::told::told;
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, Lanes, Single};
-use zerkalo::shape::{Compound, CompoundTree as Tree, Cuboid, Form, Geometry, Kind};
+use zerkalo::primitive::{Compound, CompoundTree as Tree, Form, Geometry};
+use zerkalo::shape::{Cuboid, Kind};
 
 pub fn ball(x: f64, y: f64, z: f64, radius: f64) -> Form {
     Form::Sphere { center: DVec3::new(x, y, z), radius }

@@ -5,7 +5,8 @@ use crate::rays::{Line, any_line, ball, blocked, closest, every_kind, forms};
 use crate::told::{precision, told};
 use glam::DVec3;
 use zerkalo::lanes::{Double, Lanes, Single};
-use zerkalo::shape::{Cuboid, Form, Geometry, Kind};
+use zerkalo::primitive::{Form, Geometry};
+use zerkalo::shape::{Cuboid, Kind};
 
 /// Convex solids: compounds and meshes have tests of their own.
 fn is_solid(form: &Form) -> bool {

@@ -11,8 +11,8 @@ use std::fmt::Write;
 use std::sync::Arc;
 use zerkalo::asset::{Assets, Mesh};
 use zerkalo::lanes::{Double, Lanes, Mask, Single};
+use zerkalo::primitive::{Form, Geometry};
 use zerkalo::scene::Scene;
-use zerkalo::shape::{Form, Geometry};
 use zerkalo::world::{AnyWorld, Options};
 
 /// An icosahedron around the origin, each of its triangles cut in four `times` times, its corners on

@@ -7,7 +7,7 @@ use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::camera::{Camera, View, ViewAngle};
 use zerkalo::lanes::{Double, Lanes, Single, V3};
-use zerkalo::shape::{Form, Geometry};
+use zerkalo::primitive::{Form, Geometry};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 /// An unevaluated sum of two doubles: about 106 bits (Dekker 1971, Knuth).

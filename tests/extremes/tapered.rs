@@ -5,7 +5,8 @@ use crate::rays::{Line, Met, closest};
 use crate::told::{LEFT, precision, told};
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, Lanes, Single};
-use zerkalo::shape::{Cone, Cylinder, Form, Geometry, Kind, TaperedCylinder, UnitCylinder};
+use zerkalo::primitive::{Form, Geometry};
+use zerkalo::shape::{Cone, Cylinder, Kind, TaperedCylinder, UnitCylinder};
 
 fn canonical(s: f64) -> Form {
     Form::tapered(DAffine3::IDENTITY, s)

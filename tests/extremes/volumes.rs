@@ -7,7 +7,8 @@ use crate::told::told;
 use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::PI;
 use zerkalo::lanes::Double;
-use zerkalo::shape::{Cylinder, Form, Kind};
+use zerkalo::primitive::Form;
+use zerkalo::shape::{Cylinder, Kind};
 
 /// The volume of what stands in the cube from -half to half, by the chords of parallel lines, one in
 /// each cell of a lattice, and its standard error.

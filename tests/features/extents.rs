@@ -3,8 +3,8 @@
 use crate::row::{Verdict, ensure, row};
 use crate::sight::sees;
 use crate::support::{rendered, shipped, sized};
+use zerkalo::primitive::Acceleration;
 use zerkalo::scene::Scene;
-use zerkalo::shape::Acceleration;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 /// The bytes of a film.

@@ -3,8 +3,9 @@
 use crate::common::Numbers;
 use crate::rays::{Line, packets, surface};
 pub use crate::rays::{any_line, forms};
+use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
-use zerkalo::shape::{Form, Geometry, Ray};
+use zerkalo::primitive::{Form, Geometry};
 
 fn lane_of<L: Lanes<Scalar = S>, S: Real + Lanes<Scalar = S>>(v: V3<L>, i: usize) -> V3<S> {
     let [x, y, z] = v.lane(i);

@@ -4,7 +4,7 @@ use crate::common::Numbers;
 use crate::rays::{Line, Traced, closest, scene};
 use glam::DVec3;
 use zerkalo::lanes::Double;
-use zerkalo::shape::Geometry;
+use zerkalo::primitive::Geometry;
 use zerkalo::world::Precision;
 
 const THINGS: &str = r#"

@@ -5,7 +5,7 @@ use crate::common::Numbers;
 use crate::rays::{Line, ball, closest, every_kind, scene};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use zerkalo::lanes::Double;
-use zerkalo::shape::{Form, Geometry};
+use zerkalo::primitive::{Form, Geometry};
 
 fn random_map(numbers: &mut Numbers) -> DAffine3 {
     let mut factor = || {

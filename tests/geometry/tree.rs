@@ -5,7 +5,7 @@ use crate::common::Numbers;
 use crate::rays::{Line, packets};
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, Lanes, Mask, Real, Single};
-use zerkalo::shape::{Acceleration, Form, Geometry};
+use zerkalo::primitive::{Acceleration, Form, Geometry};
 
 /// A random scene of `count` items of every kind, crowded in the ball of radius 10 or lined up on a
 /// lattice, where many faces lie in common planes.

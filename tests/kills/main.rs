@@ -20,9 +20,9 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
-use zerkalo::dashboard::terminal::{ENTER, LEAVE};
 use zerkalo::film::read_exr;
 use zerkalo::scene::Recovery;
+use zerkalo::terminal::{ENTER, LEAVE};
 
 /// Lives, and how many at a time. Mostly they sleep.
 const LIVES: usize = 200;

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::num::NonZeroU16;
 use std::time::Duration;
-use zerkalo::dashboard::link::{FRAME_INTERVAL, Link, Mode, Start};
-use zerkalo::dashboard::pacing::{Pacing, Wanted};
+use zerkalo::terminal::diff::{Pacing, Wanted};
+use zerkalo::terminal::flow::{FRAME_INTERVAL, Link, Mode, Start};
 
 /// The line, the terminal, and the program's idea of both.
 pub struct Line {

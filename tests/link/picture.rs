@@ -4,13 +4,13 @@ use crate::support;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
-use zerkalo::dashboard::pacing::Wanted;
-use zerkalo::dashboard::raster::{Colors, Ink, Oklab, PictureCells, Raster};
 use zerkalo::film::{Display, Part};
 use zerkalo::render::Rendering;
 use zerkalo::render::schedule::{Schedule, Step, Stop};
 use zerkalo::render::session::Traced;
 use zerkalo::scene::Scene;
+use zerkalo::terminal::cells::{Colors, Ink, Oklab, PictureCells, Raster};
+use zerkalo::terminal::diff::Wanted;
 use zerkalo::world::Precision;
 
 pub const SCREEN: [u16; 2] = [160, 45];

@@ -2,10 +2,11 @@
 
 use crate::setup::*;
 use crate::told::told;
+use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
 use zerkalo::material::Interface;
+use zerkalo::primitive::Geometry;
 use zerkalo::scene::Scene;
-use zerkalo::shape::{Geometry, Ray};
 
 fn mean(samples: &[Vector]) -> Vector {
     let all: Vec<_> = samples.iter().map(|s| (1.0 / samples.len() as f64, *s)).collect();

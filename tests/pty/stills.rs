@@ -9,7 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 use icy_sixel::SixelImage;
 use std::time::Duration;
 use terminal::Answer;
-use zerkalo::dashboard::terminal::LEAVE;
+use zerkalo::terminal::LEAVE;
 
 const SIZE: [u16; 2] = [120, 36];
 const CELL: Answer = (b"\x1b[16t", "\x1b[6;20;10t");

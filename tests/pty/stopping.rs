@@ -4,8 +4,8 @@ use super::life::signal;
 use super::*;
 use std::os::unix::fs::PermissionsExt;
 use std::time::Duration;
-use zerkalo::dashboard::terminal::{ENTER, LEAVE};
 use zerkalo::scene::BUILT_IN;
+use zerkalo::terminal::{ENTER, LEAVE};
 
 /// A shell with job control whose prompt and messages are plain.
 fn shell(desk: &Desk) -> Terminal {

@@ -10,10 +10,10 @@ use std::ops::Range;
 use toml::{Table, Value};
 use zerkalo::camera::{Camera, ViewAngle};
 use zerkalo::light::{Directional, Falloff, Light, Point};
+use zerkalo::primitive::Form;
 use zerkalo::scene::{
     Acceleration, Document, FilmSettings, Object, Scale, Scene, Step, TRACE_FIELDS, Trace,
 };
-use zerkalo::shape::Form;
 use zerkalo::value::{Color, Field};
 
 /// A random scene.

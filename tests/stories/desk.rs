@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use zerkalo::dashboard::action::Action;
-use zerkalo::dashboard::input::{Button, Code, Key, Mouse, MouseKind};
 use zerkalo::dashboard::keymap::{KEYMAP, lookup};
 use zerkalo::dashboard::message::{Effect, Exported, Message};
 use zerkalo::dashboard::model::{Colors, Model, Start};
@@ -16,6 +15,7 @@ use zerkalo::film::{Film, Header, Mix};
 use zerkalo::render::schedule::Stop;
 use zerkalo::scene::edit::Subject;
 use zerkalo::scene::{Document, SaveError, Scene};
+use zerkalo::terminal::event::{Button, Code, Key, Mouse, MouseKind};
 
 /// The file of the scene.
 pub const FILE: &str = "room.toml";

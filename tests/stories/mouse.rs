@@ -1,13 +1,13 @@
 //! Stories with the mouse.
 
 use crate::desk::{Desk, ROOM};
-use zerkalo::dashboard::input::{Button, MouseKind};
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::Effect;
 use zerkalo::dashboard::overlay::Overlay;
-use zerkalo::dashboard::panels::{OutlineLine, outline};
+use zerkalo::dashboard::panel_lines::{OutlineLine, outline};
 use zerkalo::scene::edit::Subject;
 use zerkalo::shape::Shape;
+use zerkalo::terminal::event::{Button, MouseKind};
 
 /// The cell in the middle of the picture: the ball is seen there.
 fn middle(desk: &Desk) -> [u16; 2] {

@@ -5,11 +5,11 @@ use crate::desk::{Desk, ROOM};
 use std::collections::HashSet;
 use std::time::Duration;
 use zerkalo::dashboard::action::Action;
-use zerkalo::dashboard::input::{Button, Code, Key, MouseKind};
 use zerkalo::dashboard::keymap::{KEYMAP, lookup};
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::scene::BUILT_IN;
+use zerkalo::terminal::event::{Button, Code, Key, MouseKind};
 
 const EVENTS: usize = 10_000;
 

@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use zerkalo::dashboard::action::{Action, Change, Pace, Way};
 use zerkalo::dashboard::hints::reference;
-use zerkalo::dashboard::input::Key;
 use zerkalo::dashboard::keymap::{KEYMAP, lookup};
+use zerkalo::terminal::event::Key;
 
 #[test]
 fn every_key_has_one_meaning_in_its_context() {

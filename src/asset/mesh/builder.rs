@@ -1,9 +1,9 @@
 //! Collects the parts of a mesh as a reader finds them, then checks and compacts them.
 
-use super::normals::smooth;
-use super::{MAX_TRIANGLES, MAX_VERTICES, TriangleMesh};
 use crate::asset::error::{AssetError, Place};
 use crate::asset::file::Source;
+use crate::asset::mesh::normals::smooth;
+use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, TriangleMesh};
 use std::collections::HashMap;
 
 /// Largest magnitude of a coordinate.

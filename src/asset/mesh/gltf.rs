@@ -5,10 +5,10 @@
 //! The library reads and validates the description. The numbers are read here: its own iterators
 //! trust offsets and types, and panic or wrap where a file lies about them.
 
-use super::TriangleMesh;
-use super::builder::Builder;
 use crate::asset::error::{AssetError, Place};
 use crate::asset::file::{MAX_BYTES, Source};
+use crate::asset::mesh::TriangleMesh;
+use crate::asset::mesh::builder::Builder;
 use crate::value::excerpt;
 use base64::Engine;
 use glam::{DAffine3, DMat4, DVec3};

@@ -1,17 +1,17 @@
 //! Triangle meshes from OBJ, PLY, STL and glTF files.
 
 mod builder;
+mod bvh;
 mod gltf;
 mod normals;
 mod obj;
 mod ply;
 mod stl;
-mod tree;
 
-pub use tree::{Leaf, Mesh};
+pub use bvh::{Leaf, Mesh};
 
-use super::error::{AssetError, Place};
-use super::file::Source;
+use crate::asset::error::{AssetError, Place};
+use crate::asset::file::Source;
 
 /// The most triangles of a mesh: 64 Mi.
 pub const MAX_TRIANGLES: usize = 1 << 26;

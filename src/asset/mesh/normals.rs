@@ -1,6 +1,6 @@
 //! Normals of vertices from the triangles around them.
 
-use super::builder::{cross, minus};
+use crate::asset::mesh::builder::{cross, minus};
 use std::collections::HashMap;
 
 /// For each vertex the mean of the normals of the triangles that meet there, weighted by the angle

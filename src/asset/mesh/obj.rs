@@ -3,10 +3,10 @@
 //! The library reads; a pass before it counts and checks the indices of faces, because the library
 //! tells no lines and computes with indices before it checks them.
 
-use super::TriangleMesh;
-use super::builder::Builder;
 use crate::asset::error::{AssetError, Place};
 use crate::asset::file::Source;
+use crate::asset::mesh::TriangleMesh;
+use crate::asset::mesh::builder::Builder;
 use crate::value::excerpt;
 use std::cell::RefCell;
 use std::io::{BufRead, Read};

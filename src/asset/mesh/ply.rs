@@ -1,9 +1,9 @@
 //! PLY, ASCII and binary of both byte orders: positions, normals, texture coordinates, polygons.
 
-use super::TriangleMesh;
-use super::builder::Builder;
 use crate::asset::error::{AssetError, Place};
 use crate::asset::file::Source;
+use crate::asset::mesh::TriangleMesh;
+use crate::asset::mesh::builder::Builder;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
     ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,

@@ -1,10 +1,10 @@
 //! STL, ASCII and binary. Its triangles have no vertices in common: those at the same place are
 //! joined here, so that normals can be smooth. Its normals say nothing that the corners do not.
 
-use super::TriangleMesh;
-use super::builder::{Builder, Welder};
 use crate::asset::error::{AssetError, Place};
 use crate::asset::file::Source;
+use crate::asset::mesh::TriangleMesh;
+use crate::asset::mesh::builder::{Builder, Welder};
 use std::io::{Cursor, Read, Seek, SeekFrom};
 
 /// Bytes before the first triangle of a binary file, and of each triangle.

@@ -1,6 +1,6 @@
 //! A measurement for programs. Keys are for scripts: they stay.
 
-use super::table::About;
+use crate::command::measure::table::About;
 use crate::measure::{Measured, Measurement, median, spread};
 use serde::Serialize;
 

@@ -3,9 +3,9 @@
 mod data;
 mod table;
 
-use super::args::MeasureArgs;
-use super::signals::Signals;
-use super::{Failure, say, warn};
+use crate::command::args::MeasureArgs;
+use crate::command::signals::Signals;
+use crate::command::{Failure, say, warn};
 use crate::film::{self, Display};
 use crate::measure::{self, Plan, Reference, Topic};
 use crate::scene::Document;

@@ -1,13 +1,13 @@
 //! From the model to the terminal's bytes: a frame is drawn, thinned out, encoded, sent.
 
-use super::sending::Sending;
-use super::writer::{Writer, Written};
-use crate::dashboard::link::{Allowance, Link, Queue, Reading, Start};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::pacing::{Pacing, Wanted};
-use crate::dashboard::terminal::{Capabilities, Tty, copied, cursor_question};
+use crate::dashboard::run::image_upload::Sending;
+use crate::dashboard::run::writer::{Writer, Written};
 use crate::dashboard::view::{View, is_settled};
+use crate::terminal::diff::{Pacing, Wanted};
+use crate::terminal::flow::{Allowance, Link, Queue, Reading, Start};
+use crate::terminal::{Capabilities, Tty, copied, cursor_question};
 use crossbeam_channel::Receiver;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};

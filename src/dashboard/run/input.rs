@@ -1,8 +1,8 @@
 //! From what the terminal sends to the dashboard's messages.
 
-use crate::dashboard::input::{Mouse, MouseKind};
 use crate::dashboard::message::Message;
-use crate::dashboard::terminal::{Keyboard, Timed};
+use crate::terminal::event::{Mouse, MouseKind};
+use crate::terminal::{Keyboard, Timed};
 use crossbeam_channel::{Receiver, unbounded};
 use std::io;
 use std::thread;
@@ -65,7 +65,7 @@ pub fn join(queue: &mut Vec<Input>, input: Input) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dashboard::input::{Button, Code, Key};
+    use crate::terminal::event::{Button, Code, Key};
 
     fn at(kind: MouseKind, column: u16) -> Input {
         let mouse = Mouse { kind, column, row: 1, modified: false };

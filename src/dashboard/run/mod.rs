@@ -1,46 +1,46 @@
 //! The dashboard at work: terminal, keys, renderer, files, time. One thread decides and draws; whatever
 //! could keep it waiting has a thread of its own.
 
-mod examine;
-mod exports;
-mod files;
+mod autosave;
+mod diagnose;
+mod effects;
+mod exporter;
+mod file_worker;
 mod frames;
-mod hands;
+mod image_upload;
+mod image_viewer;
 mod input;
-mod journal;
-mod life;
-mod names;
-mod sending;
+mod job_control;
+mod latency;
+mod paths;
 mod signals;
-mod stills;
-mod trace;
 mod writer;
 
-use super::link::Reading;
-use super::message::{Effect, Exported, Message};
-use super::model::{Model, Start};
-use super::terminal::{
-    Capabilities, Event, Keyboard, Reply, Screen, Surroundings, Timed, probe, size,
-};
-use super::update::update;
+use crate::dashboard::message::{Effect, Exported, Message};
+use crate::dashboard::model::{Model, Start};
+use crate::dashboard::update::update;
 use crate::render::Options;
 use crate::render::schedule::{Settings, Stop};
 use crate::render::session::{Snapshot, State};
 use crate::scene::{SceneErrors, SceneFile};
+use crate::terminal::flow::Reading;
+use crate::terminal::{
+    Capabilities, Event, Keyboard, Reply, Screen, Surroundings, Timed, probe, size,
+};
 use crossbeam_channel::{Receiver, after, never, select};
+use effects::{Hands, Tools};
 use frames::{Drawn, Frames};
-use hands::{Hands, Tools};
 use input::Input;
-use life::{Line, Resizing};
+use job_control::{Line, Resizing};
+use latency::Trace;
 use signals::{HUNG_UP, Whom};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use trace::Trace;
 
-pub use super::model::Colors;
-pub use examine::{Examined, examine};
+pub use crate::dashboard::model::Colors;
+pub use diagnose::{Examined, examine};
 
 /// What a dashboard is started with.
 pub struct Setup {
@@ -297,7 +297,7 @@ impl Dashboard {
             self.quit |= effect == Effect::Quit;
             self.suspend |= effect == Effect::Suspend;
             if let Effect::Copy(path) = &effect {
-                self.frames.copy(&names::full(path));
+                self.frames.copy(&paths::full(path));
             }
             let scene = match &effect {
                 Effect::Show(scene) => Some(Arc::clone(scene)),

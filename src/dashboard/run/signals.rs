@@ -1,7 +1,7 @@
 //! Signals: those that end the program, which the dashboard is told and has a while to do by itself,
 //! and those that tell of a new size, or to stop and to go on.
 
-use crate::dashboard::terminal::Tty;
+use crate::terminal::Tty;
 use crossbeam_channel::{Receiver, unbounded};
 use rustix::process::{Signal, getpid, kill_current_process_group, kill_process};
 use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGWINCH};

@@ -1,6 +1,6 @@
 //! Frames on their way to the terminal: a slow one holds up its thread, never the dashboard.
 
-use crate::dashboard::terminal::Tty;
+use crate::terminal::Tty;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::sync::Arc;

@@ -1,11 +1,11 @@
 //! Which method carries out which action.
 
-use super::Turn;
 use crate::dashboard::action::{Action, Change, Pace, Way};
 use crate::dashboard::layout::Focus;
 use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::{Compared, Inspector, Mode};
 use crate::dashboard::overlay::Overlay;
+use crate::dashboard::update::Turn;
 
 /// Coarse steps are 1 (or -1), fine ones a tenth: as `scene::edit::step` counts.
 pub(super) fn steps(change: Change, pace: Pace) -> f64 {

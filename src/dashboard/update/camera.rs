@@ -1,8 +1,8 @@
 //! Moving the camera by keys and by hand.
 
-use super::{Hold, Turn};
 use crate::camera::Camera;
 use crate::dashboard::action::{Change, Pace, Way};
+use crate::dashboard::update::{Hold, Turn};
 use crate::scene::Scene;
 use crate::scene::edit::{
     Edit, Refusal, Subject, bounds, focus_distance, recall_view, scene_bounds, step_length,

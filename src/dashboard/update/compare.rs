@@ -1,9 +1,9 @@
 //! What the picture shows: exposure, tone curve, channel, probe, kept against live.
 
-use super::Turn;
 use crate::dashboard::action::{Pace, Way};
 use crate::dashboard::message::{Channel, Effect};
 use crate::dashboard::model::{Compared, Mode};
+use crate::dashboard::update::Turn;
 use crate::film::{Linear, Tone};
 use std::sync::Arc;
 

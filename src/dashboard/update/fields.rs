@@ -1,10 +1,10 @@
 //! The fields of the inspector and of forms: walking, stepping, typing.
 
-use super::{Hold, Turn};
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::overlay::{Overlay, Pick, PickFor};
-use crate::dashboard::panels::{FieldLine, walk_fields};
+use crate::dashboard::panel_lines::{FieldLine, walk_fields};
+use crate::dashboard::update::{Hold, Turn};
 use crate::scene::edit::{self, Edit, Entry, Refusal, Row};
 
 impl Turn<'_> {

@@ -1,9 +1,9 @@
 //! Undo, saving, reloading, quitting, and what became of the pictures that were written.
 
-use super::Turn;
 use crate::dashboard::message::{Effect, Exported};
 use crate::dashboard::model::{Tone, short_name};
 use crate::dashboard::overlay::Answer;
+use crate::dashboard::update::Turn;
 use crate::scene::edit::Subject;
 use crate::scene::{SaveError, Scene, SceneErrors};
 use crate::value::printable;

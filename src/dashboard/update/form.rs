@@ -1,7 +1,7 @@
 //! New objects and lights: a kind from a list, then a form that the picture previews.
 
-use super::{Hold, Turn};
 use crate::dashboard::overlay::{Form, Overlay, Pick, PickFor};
+use crate::dashboard::update::{Hold, Turn};
 use crate::scene::edit::{self, Edit, Refusal, Word};
 use std::sync::Arc;
 

@@ -1,12 +1,12 @@
 //! Keys: first to a line of text that is open, then through the key table.
 
-use super::Turn;
 use crate::dashboard::action::Action;
 use crate::dashboard::editor::Editor;
-use crate::dashboard::input::{Code, Key};
 use crate::dashboard::keymap::{Context, lookup};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
+use crate::dashboard::update::Turn;
+use crate::terminal::event::{Code, Key};
 
 /// The character that a key types, if it is one that types.
 fn typed(key: Key) -> Option<char> {

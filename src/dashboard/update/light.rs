@@ -1,6 +1,6 @@
 //! The keys that act on a light.
 
-use super::{Hold, Turn};
+use crate::dashboard::update::{Hold, Turn};
 use crate::scene::edit::{Edit, Refusal, Subject, step, toggle};
 use crate::value::number;
 

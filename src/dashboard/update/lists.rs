@@ -1,13 +1,13 @@
 //! Moving over lines and choosing: outline, inspector, palette, lists, help, questions.
 
-use super::Turn;
 use crate::dashboard::action::Way;
 use crate::dashboard::editor::Editor;
 use crate::dashboard::hints::help;
 use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::overlay::{Answer, Overlay, Palette, PickFor, Question};
-use crate::dashboard::panels::{OutlineLine, outline, outline_position, scrolled};
+use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
+use crate::dashboard::update::Turn;
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
@@ -201,8 +201,8 @@ impl Turn<'_> {
                 self.model.quit_when_saved = true;
                 self.save();
             }
-            Answer::Quit => self.emit(super::Effect::Quit),
-            Answer::Load => self.emit(super::Effect::Load),
+            Answer::Quit => self.emit(crate::dashboard::update::Effect::Quit),
+            Answer::Load => self.emit(crate::dashboard::update::Effect::Load),
             Answer::Overwrite(path) => self.write(path, true),
             Answer::SaveAs => self.ask_path(),
             Answer::TakeUp => self.take_up(),

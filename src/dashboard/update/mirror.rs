@@ -1,6 +1,6 @@
 //! The keys that act on the mirror.
 
-use super::{Hold, Turn};
+use crate::dashboard::update::{Hold, Turn};
 use crate::scene::edit::{self, Edit, Refusal, Subject};
 use crate::value::{excerpt, number};
 

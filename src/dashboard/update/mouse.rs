@@ -1,14 +1,15 @@
 //! The mouse: clicks select, drags turn and move, the wheel goes nearer.
 
-use super::Turn;
-use crate::dashboard::input::{Button, Mouse, MouseKind};
-use crate::dashboard::layout::{Area, Focus};
+use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{Drag, Mode};
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::panels::{Line, OutlineLine, outline};
+use crate::dashboard::panel_lines::{Line, OutlineLine, outline};
+use crate::dashboard::update::Turn;
 use crate::render::session::QUALITIES;
 use crate::scene::Scene;
 use crate::scene::edit::Subject;
+use crate::terminal::Area;
+use crate::terminal::event::{Button, Mouse, MouseKind};
 use glam::DVec3;
 
 /// Lines that a tick of the wheel scrolls.

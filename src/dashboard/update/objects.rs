@@ -1,8 +1,8 @@
 //! Moving, turning, copying, removing what is selected.
 
-use super::{Hold, Turn};
 use crate::dashboard::action::{Pace, Way};
 use crate::dashboard::model::Mode;
+use crate::dashboard::update::{Hold, Turn};
 use crate::scene::edit::{self, bounds, step_length};
 use glam::{DVec2, DVec3};
 

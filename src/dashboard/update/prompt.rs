@@ -1,10 +1,10 @@
 //! Lines of text that are asked for: names, paths, when to stop, sizes.
 
-use super::{Hold, Turn};
 use crate::dashboard::editor::Editor;
 use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::RunningExport;
 use crate::dashboard::overlay::{Overlay, Prompt, PromptFor};
+use crate::dashboard::update::{Hold, Turn};
 use crate::render::schedule::Stop;
 use crate::scene::edit::{self, Subject};
 use crate::value::{excerpt, number};

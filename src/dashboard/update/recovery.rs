@@ -1,9 +1,9 @@
 //! Unsaved edits: those of a program that was killed, and those of this one, which may be.
 
-use super::Turn;
 use crate::dashboard::message::{Effect, LeftBehind};
 use crate::dashboard::model::Tone;
 use crate::dashboard::overlay::Answer;
+use crate::dashboard::update::Turn;
 use std::sync::Arc;
 use std::time::Duration;
 

@@ -1,11 +1,11 @@
 //! The work: pause, restart, targets, threads; exports; the terminal's colours.
 
-use super::Turn;
-use super::prompt::stop_text;
 use crate::dashboard::action::Change;
 use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::Colors;
 use crate::dashboard::overlay::Overlay;
+use crate::dashboard::update::Turn;
+use crate::dashboard::update::prompt::stop_text;
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
 

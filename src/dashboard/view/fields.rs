@@ -1,16 +1,17 @@
 //! Fields with their values: the inspector, and the body of a form.
 
-use super::frame::{panel, scroll_mark};
-use super::is_active;
-use super::text::{Row, columns, skip};
-use super::theme::Theme;
 use crate::dashboard::editor::Editor;
-use crate::dashboard::layout::{Area, Focus, Layout};
+use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::model::Model;
-use crate::dashboard::panels::{FieldLine, Line};
-use crate::dashboard::places::wrapped;
+use crate::dashboard::overlay_layout::wrapped;
+use crate::dashboard::panel_lines::{FieldLine, Line};
+use crate::dashboard::view::frame::{panel, scroll_mark};
+use crate::dashboard::view::is_active;
+use crate::dashboard::view::text::{Row, columns, skip};
+use crate::dashboard::view::theme::Theme;
 use crate::film::Display;
 use crate::scene::edit::Entry;
+use crate::terminal::Area;
 use crate::value::{number, significant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;

@@ -1,12 +1,13 @@
 //! Panels' borders with their titles, and the picture's panel.
 
-use super::legend::Legend;
-use super::text::{Row, columns, number, rect};
-use super::theme::Theme;
-use crate::dashboard::layout::{Area, Focus, Layout};
+use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::message::Channel;
 use crate::dashboard::model::{Compared, Mode, Model};
+use crate::dashboard::view::legend::Legend;
+use crate::dashboard::view::text::{Row, columns, number, rect};
+use crate::dashboard::view::theme::Theme;
 use crate::film::Tone;
+use crate::terminal::Area;
 use ratatui::buffer::Buffer;
 use ratatui::style::{Modifier, Style};
 use ratatui::widgets::{Block, Clear, Widget};
@@ -67,7 +68,7 @@ pub fn draw(
     if model.only_picture {
         return;
     }
-    let focused = super::is_active(model, Focus::Picture);
+    let focused = crate::dashboard::view::is_active(model, Focus::Picture);
     panel(area, "", focused, theme, buffer);
     let chips = chips(model);
     let chip_columns: usize = chips.iter().map(|(text, _)| columns(text) + 3).sum();
@@ -85,7 +86,7 @@ pub fn draw(
     };
     let unsaved = if model.is_unsaved() { 2 } else { 0 };
     let room = row.left().saturating_sub(2 + unsaved);
-    row.put(" ", name).put(&super::text::cut(&model.file.name, room), name);
+    row.put(" ", name).put(&crate::dashboard::view::text::cut(&model.file.name, room), name);
     if unsaved > 0 {
         row.put(" ●", theme.warn());
     }

@@ -1,10 +1,10 @@
 //! What the colours of a picture of numbers mean.
 
-use super::image::paint;
-use super::text::{Row, columns, number};
-use super::theme::Theme;
-use crate::dashboard::layout::Area;
-use crate::dashboard::raster::{PictureCells, Raster, Scale, difference, magnitude};
+use crate::dashboard::view::picture::paint;
+use crate::dashboard::view::text::{Row, columns, number};
+use crate::dashboard::view::theme::Theme;
+use crate::terminal::Area;
+use crate::terminal::cells::{PictureCells, Raster, Scale, difference, magnitude};
 use ratatui::buffer::Buffer;
 use ratatui::style::Style;
 

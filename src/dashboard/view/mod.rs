@@ -5,26 +5,26 @@
 
 mod fields;
 mod frame;
-mod image;
+mod image_viewer;
 mod legend;
+mod message_view;
 mod outline;
 mod overlay;
+mod picture;
 mod plot;
 mod probe;
-mod reading;
 mod status;
-mod still;
 #[cfg(test)]
 mod tests;
 mod text;
 mod theme;
 
-use super::layout::{Focus, Layout, SMALLEST};
-use super::model::Model;
-use super::overlay::Overlay;
-use super::raster::{Colors, PictureCells};
-use image::Imager;
-pub use image::is_settled;
+use crate::dashboard::layout::{Focus, Layout, SMALLEST};
+use crate::dashboard::model::Model;
+use crate::dashboard::overlay::Overlay;
+use crate::terminal::cells::{Colors, PictureCells};
+use picture::Imager;
+pub use picture::is_settled;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use text::{Row, rect};
@@ -50,7 +50,7 @@ impl View {
     pub fn picture(&mut self, model: &Model, layout: &Layout) -> &PictureCells {
         let version = (model.picture_version, layout.raster, model.colors);
         if self.made_for != Some(version) {
-            let settled = image::is_settled(model);
+            let settled = picture::is_settled(model);
             let raster = self.imager.raster(model, layout.raster);
             self.picture = PictureCells::new(&raster, model.colors, settled);
             self.made_for = Some(version);
@@ -68,9 +68,9 @@ impl View {
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme::new(model.colors);
         if let Some(Overlay::Still(looked)) = &model.overlay {
-            let shown = still::draw(model, looked, &theme, buffer);
+            let shown = image_viewer::draw(model, looked, &theme, buffer);
             (self.place, self.uncovered) = match (shown, &looked.still) {
-                (Some(cells), Some(still)) => image::uncovered(&cells, still.place, buffer),
+                (Some(cells), Some(still)) => picture::uncovered(&cells, still.place, buffer),
                 _ => (Rect::ZERO, Vec::new()),
             };
             return None;
@@ -83,10 +83,10 @@ impl View {
         self.picture(model, &layout);
         frame::draw(model, &layout, self.imager.legend(), &theme, buffer);
         if model.file.blank {
-            reading::broken(model, &layout, &theme, buffer);
+            message_view::broken(model, &layout, &theme, buffer);
         } else {
-            image::paint(&self.picture, layout.image, buffer);
-            reading::failure(model, &layout, &theme, buffer);
+            picture::paint(&self.picture, layout.image, buffer);
+            message_view::failure(model, &layout, &theme, buffer);
             probe::draw(model, &layout, &theme, buffer);
         }
         status::draw(model, layout.status, &theme, buffer);
@@ -102,7 +102,7 @@ impl View {
             cursor = overlay::draw(model, &theme, buffer);
         }
         if !model.file.blank {
-            (self.place, self.uncovered) = image::uncovered(&self.picture, layout.image, buffer);
+            (self.place, self.uncovered) = picture::uncovered(&self.picture, layout.image, buffer);
         }
         cursor
     }
@@ -120,8 +120,8 @@ fn too_small([width, height]: [u16; 2], buffer: &mut Buffer) {
         "zerkalo needs at least {columns} columns and {rows} rows; this terminal has {width} and \
          {height}."
     );
-    let lines = super::places::wrapped(&text, width.max(1));
-    let area = super::layout::Area { x: 0, y: 0, width, height };
+    let lines = crate::dashboard::overlay_layout::wrapped(&text, width.max(1));
+    let area = crate::terminal::Area { x: 0, y: 0, width, height };
     let top = height.saturating_sub(lines.len() as u16) / 2;
     for (row, line) in (top..).zip(&lines) {
         let indent = usize::from(width).saturating_sub(text::columns(line)) / 2;

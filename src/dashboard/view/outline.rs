@@ -1,15 +1,15 @@
 //! The outline: everything in the scene.
 
-use super::frame::{panel, scroll_mark};
-use super::is_active;
-use super::text::{Row, columns};
-use super::theme::Theme;
 use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::message::Channel;
 use crate::dashboard::model::{Compared, Model};
-use crate::dashboard::panels::{OutlineLine, outline};
-use crate::dashboard::raster::object_color;
+use crate::dashboard::panel_lines::{OutlineLine, outline};
+use crate::dashboard::view::frame::{panel, scroll_mark};
+use crate::dashboard::view::is_active;
+use crate::dashboard::view::text::{Row, columns};
+use crate::dashboard::view::theme::Theme;
 use crate::scene::edit::Subject;
+use crate::terminal::cells::object_color;
 use ratatui::buffer::Buffer;
 
 /// Draws it, if it is not folded away.

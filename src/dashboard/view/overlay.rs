@@ -1,16 +1,16 @@
 //! What lies over the panels: help, lists, forms, prompts, questions.
 
-use super::fields::{Fields, typed};
-use super::frame::{overlay, scroll_mark};
-use super::text::{Row, columns, cut, duration, durations};
-use super::theme::Theme;
 use crate::dashboard::hints::{HelpLine, help};
 use crate::dashboard::keymap::KEYMAP;
-use crate::dashboard::layout::Area;
 use crate::dashboard::model::Model;
+use crate::dashboard::noise_targets::{ABOUT, Cost};
 use crate::dashboard::overlay::{Form, Overlay, Palette, Pick, Prompt, Question};
-use crate::dashboard::places::{Place, wrapped};
-use crate::dashboard::quality::{ABOUT, Cost};
+use crate::dashboard::overlay_layout::{Place, wrapped};
+use crate::dashboard::view::fields::{Fields, typed};
+use crate::dashboard::view::frame::{overlay, scroll_mark};
+use crate::dashboard::view::text::{Row, columns, cut, duration, durations};
+use crate::dashboard::view::theme::Theme;
+use crate::terminal::Area;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::Style;

@@ -1,10 +1,11 @@
 //! How the error falls: noise against seconds, both by ratio, with the target and the way there.
 
-use super::frame::panel;
-use super::text::{Row, columns, number};
-use super::theme::Theme;
-use crate::dashboard::layout::{Area, Layout};
+use crate::dashboard::layout::Layout;
 use crate::dashboard::model::Model;
+use crate::dashboard::view::frame::panel;
+use crate::dashboard::view::text::{Row, columns, number};
+use crate::dashboard::view::theme::Theme;
+use crate::terminal::Area;
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Style};
 use ratatui::symbols::Marker;
@@ -127,7 +128,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
             let at = place(last.seconds, last.noise_codes);
             canvas.draw(&line(at, at, theme.accent()));
         })
-        .render(super::rect(plot), buffer);
+        .render(crate::dashboard::view::rect(plot), buffer);
 }
 
 /// Pieces of a broken line across the plot.

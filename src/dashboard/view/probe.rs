@@ -1,12 +1,13 @@
 //! The probe: a mark on the picture and numbers beside it.
 
-use super::frame::overlay;
-use super::text::{Row, columns, number};
-use super::theme::Theme;
-use crate::dashboard::layout::{Area, Layout};
+use crate::dashboard::layout::Layout;
 use crate::dashboard::model::Model;
+use crate::dashboard::view::frame::overlay;
+use crate::dashboard::view::text::{Row, columns, number};
+use crate::dashboard::view::theme::Theme;
 use crate::film::quantised_8;
 use crate::scene::edit::Subject;
+use crate::terminal::Area;
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier, Style};
 

@@ -1,14 +1,14 @@
 //! The two lowest lines: where the work stands, and what the keys do or what has just happened.
 
-use super::text::{Row, columns, duration, durations, number};
-use super::theme::Theme;
 use crate::dashboard::hints::{Hint, hints};
-use crate::dashboard::layout::Area;
-use crate::dashboard::link::Mode;
 use crate::dashboard::model::{Model, Tone};
-use crate::dashboard::terminal::Multiplexer;
+use crate::dashboard::view::text::{Row, columns, duration, durations, number};
+use crate::dashboard::view::theme::Theme;
 use crate::render::schedule::StoppedBy;
 use crate::render::session::{Report, State};
+use crate::terminal::Area;
+use crate::terminal::Multiplexer;
+use crate::terminal::flow::Mode;
 use ratatui::buffer::Buffer;
 use ratatui::style::{Modifier, Style};
 

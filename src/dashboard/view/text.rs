@@ -1,6 +1,6 @@
 //! Text in cells: measured in columns, cut with an ellipsis, never outside its area.
 
-use crate::dashboard::layout::Area;
+use crate::terminal::Area;
 use crate::value::printable;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;

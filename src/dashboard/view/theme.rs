@@ -3,7 +3,7 @@
 //! Whether the terminal is dark or light is not known: the tones are readable on both, and text that
 //! matters most has the terminal's own colour.
 
-use crate::dashboard::raster::{Colors, nearest_indexed};
+use crate::terminal::cells::{Colors, nearest_indexed};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::BorderType;
 

@@ -6,8 +6,8 @@
 //! a feature that only validation pixels show raises the error of all tiles that look as empty as its own. An
 //! estimate that is high by chance draws few samples that others should have.
 
-use super::tile::Tile;
-use super::{Criterion, FULL, PACKET, Schedule, to_packet};
+use crate::render::schedule::tile::Tile;
+use crate::render::schedule::{Criterion, FULL, PACKET, Schedule, to_packet};
 use crate::render::wave::Job;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};

@@ -7,19 +7,19 @@
 //! ends the work.
 
 mod allocation;
-mod change;
+mod convergence_fit;
+mod retarget;
 mod settings;
 mod stop;
 #[cfg(test)]
 mod tests;
 mod tile;
-mod trend;
 
 use crate::film::Noise;
 use crate::render::wave::{Job, Wave, WaveReport};
+use convergence_fit::Trend;
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
-use trend::Trend;
 
 /// Samples per replicate that every tile gets before samples go where the noise is. Estimates begin here:
 /// below, they say little and cost as much as the samples. Sixteen would spend a third of the mirror

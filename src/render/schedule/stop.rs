@@ -1,7 +1,7 @@
 //! When the work is done, and how long it will take.
 
-use super::tile::Tile;
-use super::{Criterion, FULL, Schedule, StoppedBy};
+use crate::render::schedule::tile::Tile;
+use crate::render::schedule::{Criterion, FULL, Schedule, StoppedBy};
 
 impl Schedule {
     /// A lower and an upper guess of the seconds left until the first of the targets, `seconds` after

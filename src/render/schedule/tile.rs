@@ -1,7 +1,7 @@
 //! What the schedule remembers of one tile.
 
-use super::Criterion;
 use crate::film::TileNoise;
+use crate::render::schedule::Criterion;
 use crate::render::wave::JobReport;
 
 /// The most doublings of the sample count over which a slope is fitted.

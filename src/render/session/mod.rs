@@ -12,17 +12,17 @@
 //!
 //! Who calls a session is never kept waiting, except by [`Session::with`] and [`Session::wait`].
 
-mod pace;
+mod active_render;
 mod report;
 mod snapshot;
 #[cfg(test)]
 mod tests;
 mod threads;
-mod work;
+mod throughput;
 mod worker;
 
 use crate::film::{Display, Estimator, Film, Mix};
-use crate::render::lighting::Lighting;
+use crate::render::relighting::Lighting;
 use crate::render::schedule::{Schedule, Settings, Stop};
 use crate::render::wave::{Wave, WaveReport};
 use crate::scene::Scene;

@@ -25,7 +25,7 @@ pub enum State {
 /// Where the work stands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// Which scene this is about: what [`Session::set_scene`](super::Session::set_scene) returned.
+    /// Which scene this is about: what [`Session::set_scene`](crate::render::session::Session::set_scene) returned.
     pub generation: u64,
     /// What the session is doing.
     pub state: State,

@@ -1,9 +1,9 @@
 //! What a session shows its guests.
 
-use super::report::Report;
 use crate::film::{Display, Film, Mix, Probe, Raster, Stale, Thumbnail};
-use crate::render::guide::Guide;
-use crate::render::lighting::Lighting;
+use crate::render::feature_buffer::Guide;
+use crate::render::relighting::Lighting;
+use crate::render::session::report::Report;
 use crate::scene::Scene;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,9 +1,9 @@
 //! The session with a double in place of a scene: it counts what is asked of it and fills a film with
 //! nothing.
 
-use super::*;
 use crate::film::{Header, Mse, Noise, TILE, TileNoise};
 use crate::render::schedule::{Criterion, Spp, Stop, StoppedBy};
+use crate::render::session::*;
 use crate::render::wave::JobReport;
 use crate::world::Groups;
 use std::sync::atomic::AtomicUsize;

@@ -1,11 +1,11 @@
 //! The session's thread: takes in commands, decides what is done next.
 
-use super::report::{Report, State};
-use super::snapshot::{Snapshot, View};
-use super::work::{Site, Work};
-use super::{Command, Shared, Task, Traced};
 use crate::film::Display;
 use crate::render::schedule::{Settings, Step, Stop};
+use crate::render::session::active_render::{Site, Work};
+use crate::render::session::report::{Report, State};
+use crate::render::session::snapshot::{Snapshot, View};
+use crate::render::session::{Command, Shared, Task, Traced};
 use crate::scene::Scene;
 use crossbeam_channel::{Receiver, Sender};
 use std::ops::ControlFlow;

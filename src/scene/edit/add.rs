@@ -1,14 +1,15 @@
 //! New things, with defaults that fit the scene at hand.
 
-use super::extent::{Ball, scene_bounds};
-use super::ground::place_for;
-use super::names::{free_light, free_material, free_object};
-use super::rows::Word;
-use super::{Edit, Refusal, Subject};
 use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::Material;
+use crate::primitive::Form;
+use crate::scene::edit::bounds::{Ball, scene_bounds};
+use crate::scene::edit::placement::place_for;
+use crate::scene::edit::properties::Word;
+use crate::scene::edit::unique_name::{free_light, free_material, free_object};
+use crate::scene::edit::{Edit, Refusal, Subject};
 use crate::scene::{Object, Scale, Scene, Step};
-use crate::shape::{Form, KINDS, Shape, chained};
+use crate::shape::{KINDS, Shape, chained};
 use crate::value::{Color, clean, number, rounded_to, significant, unit};
 use glam::DVec3;
 
@@ -109,7 +110,7 @@ fn usual_size(scene: &Scene) -> f64 {
     let solid = |object: &Object| {
         let form = object.form();
         let (low, high) = form.bounds()?;
-        super::extent::is_solid(&form).then(|| (high - low).max_element())
+        crate::scene::edit::bounds::is_solid(&form).then(|| (high - low).max_element())
     };
     let mut sizes: Vec<f64> = scene.objects.iter().filter_map(solid).collect();
     sizes.sort_by(f64::total_cmp);

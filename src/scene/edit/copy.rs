@@ -1,12 +1,12 @@
 //! Copying, deleting, renaming.
 
-use super::extent::bounds;
-use super::ground::place_for;
-use super::motion::move_object;
-use super::names::{free_light, free_material, free_object, free_view};
-use super::typed::name;
-use super::{Edit, Refusal, Subject};
 use crate::scene::Scene;
+use crate::scene::edit::bounds::bounds;
+use crate::scene::edit::parse_value::name;
+use crate::scene::edit::placement::place_for;
+use crate::scene::edit::translate::move_object;
+use crate::scene::edit::unique_name::{free_light, free_material, free_object, free_view};
+use crate::scene::edit::{Edit, Refusal, Subject};
 use crate::value::excerpt;
 use glam::DVec3;
 
@@ -49,8 +49,9 @@ pub fn duplicate(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
                 copy.name = free_light(scene, &copy.name);
             }
             if let Some(point) = &mut copy.point {
-                let step = super::step_length(scene);
-                point.position = super::motion::moved(point.position, [5.0 * step, 0.0, 0.0]);
+                let step = crate::scene::edit::step_length(scene);
+                point.position =
+                    crate::scene::edit::translate::moved(point.position, [5.0 * step, 0.0, 0.0]);
             }
             next.lights.push(copy);
             Subject::Light(next.lights.len() - 1)

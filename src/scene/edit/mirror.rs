@@ -1,9 +1,9 @@
 //! The keys that act on the scene's mirror.
 
-use super::subject::mirror_of;
-use super::{Edit, Refusal, Subject, step, toggle};
+use crate::primitive::Form;
 use crate::scene::Scene;
-use crate::shape::Form;
+use crate::scene::edit::target::mirror_of;
+use crate::scene::edit::{Edit, Refusal, Subject, step, toggle};
 
 /// The material that the mirror keys act on: that of the selected object (or the selected material) if
 /// it reflects; else that of the first rectangle that reflects; else the one that reflects most among

@@ -5,38 +5,38 @@
 //! faults, or a [`Refusal`] that says why not. The given scene must have no faults.
 
 mod add;
+mod bounds;
+mod convert;
 mod copy;
-mod extent;
-mod ground;
-mod kinds;
-mod mirror;
-mod motion;
-mod names;
-mod rows;
-mod set;
-mod step;
+mod increment;
 #[cfg(test)]
-mod step_test;
-mod subject;
-mod tree;
-mod turning;
-mod typed;
-mod views;
+mod increment_test;
+mod mirror;
+mod parse_value;
+mod placement;
+mod properties;
+mod rotate;
+mod set;
+mod target;
+mod toml_view;
+mod translate;
+mod unique_name;
+mod viewpoints;
 
 pub use add::{add_light, add_material, add_object, light_kinds, object_kinds};
+pub use bounds::{Ball, bounds, focus_distance, scene_bounds, step_length};
 pub use copy::{delete, duplicate, own_material, rename};
-pub use extent::{Ball, bounds, focus_distance, scene_bounds, step_length};
-pub use ground::drop_down;
+pub use increment::{step, toggle};
 pub use mirror::{mirror, next_lobe, reflect, roughen};
-pub use motion::move_by;
-pub use rows::{Entry, Row, Word, rows};
+pub use placement::drop_down;
+pub use properties::{Entry, Row, Word, rows};
+pub use rotate::turn;
 pub use set::{set, set_component};
-pub use step::{step, toggle};
-pub use subject::{Section, Subject, outline};
-pub use turning::turn;
-pub use views::{recall_view, store_view};
+pub use target::{Section, Subject, outline};
+pub use translate::move_by;
+pub use viewpoints::{recall_view, store_view};
 
-use super::Scene;
+use crate::scene::Scene;
 use crate::value::excerpt;
 use std::fmt;
 

@@ -1,15 +1,16 @@
 //! Setting one value by typed text.
 
-use super::kinds::{self, AIM, KIND};
-use super::rows::is_material;
-use super::tree::{field, fields, get, put, read, rivals, write};
-use super::typed::{floats, parse, word};
-use super::{Edit, Refusal, Subject};
 use crate::scene::Scene;
+use crate::scene::edit::convert;
+use crate::scene::edit::convert::{AIM, KIND};
+use crate::scene::edit::parse_value::{floats, parse, word};
+use crate::scene::edit::properties::is_material;
+use crate::scene::edit::toml_view::{field, fields, get, put, read, rivals, write};
+use crate::scene::edit::{Edit, Refusal, Subject};
 use crate::value::{Field, Preset, Takes};
 use toml::{Table, Value};
 
-/// Sets what stands behind `key` (of a [`Row`](super::Row)) to what `text` says. Empty text takes the
+/// Sets what stands behind `key` (of a [`Row`](crate::scene::edit::Row)) to what `text` says. Empty text takes the
 /// key away where it may be left out, so that its default holds; an empty step of a transform goes.
 ///
 /// # Errors
@@ -25,7 +26,7 @@ pub fn set(scene: &Scene, subject: &Subject, key: &str, text: &str) -> Result<Ed
         Takes::OneOf(kinds) if !(text.is_empty() && optional) => {
             let names: Vec<_> = kinds.iter().map(|k| k.name).collect();
             let name = names[word(field, text, &names)?];
-            return kinds::switch(scene, subject, key, name);
+            return convert::switch(scene, subject, key, name);
         }
         Takes::ListOf(steps) => {
             let mut object = values;
@@ -34,7 +35,7 @@ pub fn set(scene: &Scene, subject: &Subject, key: &str, text: &str) -> Result<Ed
                 _ => {
                     let names: Vec<_> = steps.iter().map(|k| k.name).collect();
                     let name = names[word(field, text, &names)?];
-                    kinds::append_step(&mut object, key, name);
+                    convert::append_step(&mut object, key, name);
                 }
             }
             return finish(scene, subject, key, object);
@@ -51,7 +52,7 @@ pub fn set(scene: &Scene, subject: &Subject, key: &str, text: &str) -> Result<Ed
         parse(field, text)?
     };
     if let (Subject::Light(i), "falloff") = (subject, key) {
-        return kinds::switch_falloff(scene, *i, values, value);
+        return convert::switch_falloff(scene, *i, values, value);
     }
     replace(scene, subject, key, values, value)
 }

@@ -1,7 +1,7 @@
 //! The text of every screen against `tests/screens`.
 
-use super::states::{STATES, tracing};
-use super::{drawn, row_text};
+use crate::dashboard::view::tests::states::{STATES, tracing};
+use crate::dashboard::view::tests::{drawn, row_text};
 use std::fmt::Write as _;
 use std::path::Path;
 

@@ -8,8 +8,8 @@ mod robust;
 mod states;
 mod styles;
 
-use super::View;
 use crate::dashboard::model::Model;
+use crate::dashboard::view::View;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 
@@ -32,7 +32,7 @@ fn row_text(buffer: &Buffer, y: u16) -> String {
             continue;
         }
         let symbol = buffer[(x, y)].symbol();
-        hidden = super::text::columns(symbol).saturating_sub(1);
+        hidden = crate::dashboard::view::text::columns(symbol).saturating_sub(1);
         text += symbol;
     }
     text.trim_end().to_string()

@@ -2,15 +2,15 @@
 //! `ZERKALO_SCREENS=folder cargo test --lib paint -- --ignored`, then `cat` one in a terminal of its
 //! size.
 
-use super::drawn;
-use super::states::{STATES, tracing};
 use crate::dashboard::model::{Colors, Model};
-use crate::dashboard::pacing::Encoder;
+use crate::dashboard::view::tests::drawn;
+use crate::dashboard::view::tests::states::{STATES, tracing};
 use crate::film::Display;
 use crate::render::schedule::{Criterion, Settings, Stop};
 use crate::render::session::{Session, Snapshot, State, View};
 use crate::render::{Options, Rendering};
 use crate::sampling::{SampleSettings, SamplerKind};
+use crate::terminal::diff::Encoder;
 use crate::world;
 use std::path::Path;
 use std::sync::Arc;

@@ -1,8 +1,8 @@
 //! No size and no colours are too few for any state.
 
-use super::drawn;
-use super::states::{STATES, tracing};
 use crate::dashboard::model::Colors;
+use crate::dashboard::view::tests::drawn;
+use crate::dashboard::view::tests::states::{STATES, tracing};
 use proptest::prelude::*;
 
 proptest! {

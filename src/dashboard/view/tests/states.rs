@@ -10,7 +10,7 @@ use crate::dashboard::model::{
 use crate::dashboard::overlay::{
     Answer, Form, Overlay, Palette, Pick, PickFor, Prompt, PromptFor, Question,
 };
-use crate::dashboard::panels::{Line, scrolled};
+use crate::dashboard::panel_lines::{Line, scrolled};
 use crate::dashboard::testing::report;
 use crate::dashboard::update::update;
 use crate::film::{Mix, Probe};

@@ -1,9 +1,10 @@
 //! Looks that text does not tell.
 
-use super::states::{STATES, tracing};
-use super::{drawn, row_text};
-use crate::dashboard::layout::{Area, Focus};
+use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{Colors, Model};
+use crate::dashboard::view::tests::states::{STATES, tracing};
+use crate::dashboard::view::tests::{drawn, row_text};
+use crate::terminal::Area;
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier};
 

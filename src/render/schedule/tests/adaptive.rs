@@ -1,7 +1,7 @@
 //! Where samples go.
 
-use super::*;
 use crate::render::schedule::allocation::EXPLORATION;
+use crate::render::schedule::tests::*;
 
 #[test]
 fn adaptive_spp_is_the_mean_and_goes_where_the_noise_is() {

@@ -1,6 +1,6 @@
 //! What changes while the work goes on: aims, estimates, the length of pieces.
 
-use super::*;
+use crate::render::schedule::tests::*;
 
 /// Traces until it rests; every wave in pieces of `tiles` jobs at most, of `longest` samples.
 fn in_pieces(model: &mut Model, schedule: &mut Schedule, tiles: u64, longest: u32) -> StoppedBy {

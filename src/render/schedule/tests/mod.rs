@@ -4,8 +4,8 @@ mod adaptive;
 mod changes;
 mod stops;
 
-use super::*;
 use crate::film::{Mse, TileNoise};
+use crate::render::schedule::*;
 use crate::render::wave::JobReport;
 
 /// Pixels of a whole tile.

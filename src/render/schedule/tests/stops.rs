@@ -1,6 +1,6 @@
 //! How waves count, when they end, and how long that takes.
 
-use super::*;
+use crate::render::schedule::tests::*;
 
 #[test]
 fn waves_count_as_the_sequence_likes_it() {

@@ -1,0 +1,40 @@
+//! What is told while files are read that a scene names.
+
+use crate::asset::{Assets, Stage};
+use crate::command::warn;
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Files and trees that take longer than a moment: so many bytes, so many triangles.
+const LARGE: (u64, usize) = (8 << 20, 200_000);
+
+/// Where files are remembered, and who tells of large ones on a terminal's stderr.
+pub struct Told {
+    /// To be shared by all that read scenes.
+    pub assets: Arc<Assets>,
+    aloud: Arc<AtomicBool>,
+}
+
+impl Told {
+    /// Aloud if somebody looks on.
+    pub fn new() -> Self {
+        let aloud = Arc::new(AtomicBool::new(std::io::stderr().is_terminal()));
+        let heard = aloud.clone();
+        let tell = move |stage: &Stage| {
+            let large = match stage {
+                Stage::Reading { bytes, .. } => *bytes >= LARGE.0,
+                Stage::Building { triangles, .. } => *triangles >= LARGE.1,
+            };
+            if large && heard.load(Ordering::Relaxed) {
+                warn(&stage.to_string());
+            }
+        };
+        Self { assets: Arc::new(Assets::new(tell)), aloud }
+    }
+
+    /// Says no more: the terminal is somebody else's.
+    pub fn hush(&self) {
+        self.aloud.store(false, Ordering::Relaxed);
+    }
+}

@@ -1,0 +1,198 @@
+//! Where overlays lie and where the rows of panels are: pure, used to draw and to know what a click
+//! means.
+
+use crate::dashboard::model::Model;
+use crate::dashboard::noise_targets::ABOUT;
+use crate::dashboard::overlay::Overlay;
+use crate::render::session::QUALITIES;
+use crate::terminal::Area;
+
+/// Where an overlay lies. Parts without rows are not there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The box with its border.
+    pub frame: Area,
+    /// Where text is typed: one row.
+    pub input: Area,
+    /// Rows of a list, of a form, of text.
+    pub list: Area,
+    /// Rows for what is to be said: a help line, a problem, a question.
+    pub help: Area,
+}
+
+impl Model {
+    /// Where the overlay lies; `None`: there is none, or the terminal is too small.
+    pub fn place(&self) -> Option<Place> {
+        let layout = self.layout()?;
+        let [width, height] = self.screen;
+        let centred = |columns: u16, rows: u16| {
+            // The two lowest lines tell where the work stands and what the keys do.
+            let (columns, rows) = (columns.min(width - 2), rows.min(height - 2));
+            let [x, y] = [(width - columns) / 2, (height - 2 - rows) / 2];
+            Area { x, y, width: columns, height: rows }
+        };
+        let low = |columns: u16, rows: u16| {
+            let y = height.saturating_sub(3 + rows);
+            Area { y, ..centred(columns, rows) }
+        };
+        Some(match self.overlay.as_ref()? {
+            Overlay::Still(_) => {
+                Place { frame: Area { x: 0, y: 0, width, height }, ..Place::default() }
+            }
+            Overlay::Help { .. } => whole(centred(84, height - 2)),
+            Overlay::Inventory { .. } => {
+                let columns = 84.min(width - 2);
+                let rows = self.inventory(columns - 2).len() as u16;
+                whole(centred(columns, rows.saturating_add(2)))
+            }
+            Overlay::Quality { .. } => {
+                let about = wrapped_rows(ABOUT, 76.min(width - 2) - 5);
+                let frame = low(76, QUALITIES.len() as u16 + 2 + about);
+                let inner = frame.inner();
+                let list = Area { height: inner.height.min(QUALITIES.len() as u16), ..inner };
+                let help = Area {
+                    x: inner.x + 3,
+                    y: inner.y + list.height,
+                    width: inner.width - 3,
+                    height: inner.height - list.height,
+                };
+                Place { frame, input: Area::default(), list, help }
+            }
+            Overlay::Palette(_) => {
+                let frame = centred(72, height.min(26) - 2);
+                let inner = frame.inner();
+                let input = Area { height: 1, ..inner };
+                let list = Area { y: inner.y + 1, height: inner.height - 1, ..inner };
+                Place { frame, input, list, help: Area::default() }
+            }
+            Overlay::Pick(pick) => {
+                whole(centred(76, (pick.entries.len() as u16).saturating_add(2)))
+            }
+            Overlay::Form(form) => {
+                // Beside the picture, which shows what is being filled in.
+                let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
+                let columns = side.min(width);
+                let x = width - columns;
+                let frame = Area { x, y: 0, width: columns, height: height - 2 };
+                let problem = form.problem.is_some()
+                    || form.editor.as_ref().is_some_and(|editor| editor.problem.is_some());
+                let (list, help) = split(frame.inner(), problem);
+                Place { frame, input: Area::default(), list, help }
+            }
+            Overlay::Prompt(prompt) => {
+                let columns = 64.min(width - 2);
+                let said = prompt.editor.problem.as_ref().unwrap_or(&prompt.help);
+                let rows = wrapped_rows(said, columns - 2);
+                let frame = low(columns, rows + 3);
+                let inner = frame.inner();
+                let input = Area { height: 1, ..inner };
+                let help = Area { y: inner.y + 1, height: inner.height - 1, ..inner };
+                Place { frame, input, list: Area::default(), help }
+            }
+            Overlay::Question(question) => {
+                let columns = 64.min(width - 2);
+                let answers = question.answers.len() as u16;
+                // A column free on both sides.
+                let rows = wrapped_rows(&question.text, columns - 4);
+                let frame = low(columns, rows + answers + 2);
+                let inner = frame.inner();
+                let answers = answers.min(inner.height);
+                let height = inner.height - answers;
+                let help = Area { x: inner.x + 1, width: inner.width - 2, height, ..inner };
+                let list = Area { y: inner.y + height, height: answers, ..inner };
+                Place { frame, input: Area::default(), list, help }
+            }
+        })
+    }
+
+    /// The rows of the outline's lines; `None`: folded away.
+    pub fn outline_rows(&self) -> Option<Area> {
+        self.layout()?.outline.map(|area| area.inner())
+    }
+
+    /// The rows of the inspector's lines, and those for what is to be said about the field under the
+    /// cursor; `None`: folded away.
+    pub fn inspector_rows(&self) -> Option<(Area, Area)> {
+        let problem = self.inspector.editor.as_ref().is_some_and(|e| e.problem.is_some());
+        self.layout()?.inspector.map(|area| split(area.inner(), problem))
+    }
+}
+
+/// A box full of rows.
+fn whole(frame: Area) -> Place {
+    Place { frame, list: frame.inner(), ..Place::default() }
+}
+
+/// Rows for lines, and below them rows for what is to be said: more of them if there is a problem.
+fn split(inner: Area, problem: bool) -> (Area, Area) {
+    let rows = match (inner.height, problem) {
+        (0..4, _) => 0,
+        (_, true) => (inner.height / 2).min(5),
+        (0..8, _) => 0,
+        (8..14, _) => 2,
+        _ => 3,
+    };
+    let lines = Area { height: inner.height - rows, ..inner };
+    (lines, Area { y: inner.y + lines.height, height: rows, ..inner })
+}
+
+/// Rows that `text` takes when it is broken between words to `width` columns.
+pub fn wrapped_rows(text: &str, width: u16) -> u16 {
+    wrapped(text, width).len() as u16
+}
+
+/// `text` broken between words to `width` columns; a longer word is broken where it must be. Columns
+/// are counted as characters.
+pub fn wrapped(text: &str, width: u16) -> Vec<String> {
+    let width = usize::from(width.max(1));
+    let mut lines = Vec::new();
+    let mut line = String::new();
+    let mut columns = 0;
+    for word in text.split_whitespace() {
+        let mut rest: Vec<char> = word.chars().collect();
+        if columns > 0 && columns + 1 + rest.len() > width {
+            lines.push(std::mem::take(&mut line));
+            columns = 0;
+        }
+        while rest.len() > width {
+            lines.push(rest.drain(..width).collect());
+        }
+        if columns > 0 {
+            line.push(' ');
+            columns += 1;
+        }
+        columns += rest.len();
+        line.extend(rest);
+    }
+    if !line.is_empty() || lines.is_empty() {
+        lines.push(line);
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_kept_whole_where_they_fit() {
+        assert_eq!(wrapped("one two three", 7), ["one two", "three"]);
+        assert_eq!(wrapped("abcdefgh ij", 3), ["abc", "def", "gh", "ij"]);
+        assert_eq!(wrapped("abcdef", 3), ["abc", "def", ""].map(String::from)[..2]);
+        assert_eq!(wrapped("", 5), [""]);
+        assert!(wrapped("a\nb\tc", 1).iter().all(|line| line.chars().count() == 1));
+    }
+
+    #[test]
+    fn lines_and_help_share_a_panel() {
+        for height in 0..40 {
+            for problem in [false, true] {
+                let inner = Area { x: 3, y: 2, width: 20, height };
+                let (lines, help) = split(inner, problem);
+                assert_eq!(lines.height + help.height, height);
+                assert_eq!(help.y, inner.y + lines.height);
+                assert!(lines.height >= height / 2);
+            }
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! The lines of outline, inspector and form as data: view paints them, update moves over them.
+
+use crate::dashboard::model::Model;
+use crate::dashboard::overlay::{Form, Overlay};
+use crate::scene::Scene;
+use crate::scene::edit::{Entry, Row, Subject, outline as subjects, rows};
+use crate::value::excerpt;
+
+/// A line of the outline.
+#[derive(Clone, Debug, PartialEq)]
+pub enum OutlineLine {
+    /// The heading of a section.
+    Heading(&'static str),
+    /// Something that can be selected.
+    Entry {
+        /// What it is.
+        subject: Subject,
+        /// Its name, printable.
+        label: String,
+        /// What else there is to say: an object's material, `off`, a view's key; may be empty.
+        note: String,
+    },
+}
+
+/// A line of the inspector or of a form.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Line {
+    /// A heading: what the fields below belong to.
+    Heading(String),
+    /// A value.
+    Field(Box<FieldLine>),
+}
+
+/// A value with all that is to be known about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FieldLine {
+    /// Whose value.
+    pub subject: Subject,
+    /// Its key, dotted.
+    pub key: String,
+    /// Which of the numbers behind the key, if it has several.
+    pub component: Option<usize>,
+    /// What stands before the value.
+    pub label: String,
+    /// How deep it stands below others: 0, 1, 2.
+    pub depth: usize,
+    /// What kind of value.
+    pub entry: Entry,
+    /// The value as it can be typed, printable; empty: none is given.
+    pub value: String,
+    /// The colour that the value belongs to, linear, on the first line of a colour.
+    pub swatch: Option<[f64; 3]>,
+    /// Unit; may be empty.
+    pub unit: &'static str,
+    /// Whether it is the value that holds when nothing is said.
+    pub is_default: bool,
+    /// What holds when nothing is said; `None`: something must be said.
+    pub default: Option<String>,
+    /// What may be typed, as a phrase.
+    pub expected: String,
+    /// What it is, in a sentence.
+    pub doc: &'static str,
+}
+
+impl Line {
+    /// The field, if it is one.
+    pub fn field(&self) -> Option<&FieldLine> {
+        match self {
+            Self::Field(field) => Some(field),
+            Self::Heading(_) => None,
+        }
+    }
+}
+
+/// The outline of a scene.
+pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
+    let mut lines = Vec::new();
+    let mut last = None;
+    let mut views = 0;
+    for (section, subject) in subjects(scene) {
+        if last != Some(section) {
+            lines.push(OutlineLine::Heading(section.title()));
+            last = Some(section);
+        }
+        let note = match &subject {
+            Subject::View(_) => {
+                views += 1;
+                if views <= 9 { format!("key {views}") } else { String::new() }
+            }
+            Subject::Light(i) if !scene.lights[*i].on => "off".to_string(),
+            Subject::Object(i) => excerpt(&scene.objects[*i].material),
+            _ => String::new(),
+        };
+        lines.push(OutlineLine::Entry { label: subject.label(scene), subject, note });
+    }
+    lines
+}
+
+/// Where `subject` stands in the outline.
+pub fn outline_position(lines: &[OutlineLine], subject: &Subject) -> Option<usize> {
+    lines
+        .iter()
+        .position(|line| matches!(line, OutlineLine::Entry { subject: s, .. } if s == subject))
+}
+
+/// The fields of `subject`; below those of an object the ones of its material.
+pub fn inspector(scene: &Scene, subject: &Subject) -> Vec<Line> {
+    let mut lines = fields(scene, subject);
+    let material = subject.material(scene).filter(|material| material != subject);
+    if let Some(Subject::Material(name)) = &material {
+        let users = scene.objects.iter().filter(|o| o.names_material(name)).count();
+        let shared = if users > 1 { format!(" · shared by {users}") } else { String::new() };
+        lines.push(Line::Heading(format!("material {}{shared}", excerpt(name))));
+        lines.extend(fields(scene, &Subject::Material(name.clone())));
+    }
+    lines
+}
+
+/// The fields of a form: those of the new thing and of a material that is new with it. `base` is the
+/// scene without both.
+pub fn form(form: &Form, base: &Scene) -> Vec<Line> {
+    let own = match form.subject.material(&form.scene) {
+        Some(Subject::Material(name)) => !base.materials.contains_key(&name),
+        _ => false,
+    };
+    match own {
+        true => inspector(&form.scene, &form.subject),
+        false => fields(&form.scene, &form.subject),
+    }
+}
+
+fn fields(scene: &Scene, subject: &Subject) -> Vec<Line> {
+    // Something that is not there has no fields.
+    let rows = rows(scene, subject).unwrap_or_default();
+    rows.iter().flat_map(|row| lines_of(subject, row)).map(|f| Line::Field(Box::new(f))).collect()
+}
+
+/// One line for each number of a list, otherwise one line.
+fn lines_of(subject: &Subject, row: &Row) -> Vec<FieldLine> {
+    let line = |component: Option<usize>, label: String, value: String| FieldLine {
+        subject: subject.clone(),
+        key: row.key.clone(),
+        component,
+        label,
+        depth: row.depth,
+        entry: row.entry,
+        value: crate::value::printable(&value),
+        swatch: row.color.filter(|_| component.unwrap_or(0) == 0),
+        unit: row.unit,
+        is_default: row.is_default,
+        default: row.default.clone(),
+        expected: row.expected.clone(),
+        doc: row.doc,
+    };
+    if row.components.len() < 2 {
+        return vec![line(None, row.label.clone(), row.value.clone())];
+    }
+    let names: &[&str] = match (row.entry, row.components.len()) {
+        (Entry::Color, _) => &["red", "green", "blue"],
+        (_, 2) => &["width", "height"],
+        _ => &["x", "y", "z"],
+    };
+    let of = |(i, value): (usize, &String)| {
+        let name = names.get(i).copied().unwrap_or_default();
+        line(Some(i), format!("{} {name}", row.label), value.clone())
+    };
+    row.components.iter().enumerate().map(of).collect()
+}
+
+impl Model {
+    /// The lines of the inspector, or of the form that is open.
+    pub fn field_lines(&self) -> Vec<Line> {
+        match &self.overlay {
+            Some(Overlay::Form(open)) => form(open, self.history.scene()),
+            _ => inspector(self.scene(), &self.selection),
+        }
+    }
+}
+
+/// The position of the field nearest to `wanted`: it, or the next one below, or the last.
+pub fn nearest_field(lines: &[Line], wanted: usize) -> usize {
+    let field = |i: &usize| lines[*i].field().is_some();
+    (wanted..lines.len())
+        .find(field)
+        .or_else(|| (0..lines.len().min(wanted)).rev().find(field))
+        .unwrap_or(0)
+}
+
+/// The position `steps` fields below (negative: above) the one at `cursor`; stops at the ends.
+pub fn walk_fields(lines: &[Line], cursor: usize, steps: isize) -> usize {
+    let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].field().is_some()).collect();
+    let at = fields.iter().position(|i| *i >= cursor).unwrap_or(fields.len().saturating_sub(1));
+    let to = at.saturating_add_signed(steps).min(fields.len().saturating_sub(1));
+    fields.get(to).copied().unwrap_or(0)
+}
+
+/// The first line to show so that line `cursor` of `len` is in view in `rows` rows, with a line
+/// above it (a heading, perhaps), moving as little as possible from `scroll`.
+pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize {
+    let lowest = (cursor + 1).saturating_sub(rows);
+    let highest = if rows > 2 { cursor.saturating_sub(1) } else { cursor };
+    scroll.clamp(lowest.min(highest), highest).min(len.saturating_sub(rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+
+    #[test]
+    fn every_subject_has_its_line_and_every_field_its_place() {
+        let mut scene = built_in();
+        scene.views.insert("left".into(), scene.camera.clone());
+        scene.lights[0].on = false;
+        let lines = outline(&scene);
+        for (_, subject) in subjects(&scene) {
+            assert!(outline_position(&lines, &subject).is_some(), "{subject:?}");
+            let fields = inspector(&scene, &subject);
+            assert!(!fields.is_empty(), "{subject:?}");
+        }
+        let notes: Vec<_> = lines
+            .iter()
+            .filter_map(|line| match line {
+                OutlineLine::Entry { label, note, .. } => Some(format!("{label}/{note}")),
+                OutlineLine::Heading(_) => None,
+            })
+            .collect();
+        assert!(notes.contains(&"lamp/off".to_string()) && notes.contains(&"left/key 1".into()));
+        let ball = inspector(&scene, &Subject::Object(2));
+        let labels: Vec<_> = ball.iter().filter_map(|l| Some(l.field()?.label.clone())).collect();
+        for label in ["center x", "center z", "radius", "color green", "roughness"] {
+            assert!(labels.contains(&label.to_string()), "{labels:?}");
+        }
+        assert!(ball.contains(&Line::Heading("material red".into())));
+    }
+
+    #[test]
+    fn the_cursor_walks_over_headings() {
+        let scene = built_in();
+        let lines = inspector(&scene, &Subject::Object(2));
+        let heading = lines.iter().position(|l| l.field().is_none()).unwrap();
+        assert_eq!(walk_fields(&lines, heading - 1, 1), heading + 1);
+        assert_eq!(walk_fields(&lines, heading + 1, -1), heading - 1);
+        assert_eq!(walk_fields(&lines, 0, -5), 0);
+        assert_eq!(walk_fields(&lines, 0, 1000), lines.len() - 1);
+        assert_eq!(nearest_field(&lines, heading), heading + 1);
+        assert_eq!(nearest_field(&lines, 1000), lines.len() - 1);
+        assert_eq!((walk_fields(&[], 3, 1), nearest_field(&[], 3)), (0, 0));
+    }
+
+    #[test]
+    fn scrolling_keeps_the_cursor_in_view() {
+        for rows in 0..12 {
+            for len in 1..30 {
+                let mut scroll = 0;
+                for cursor in (0..len).chain((0..len).rev()) {
+                    scroll = scrolled(scroll, cursor, len, rows);
+                    let seen = scroll <= cursor && cursor < scroll + rows.max(1);
+                    assert!(seen || rows == 0, "{cursor} of {len} in {rows} from {scroll}");
+                    assert!(scroll + rows <= len.max(rows));
+                }
+            }
+        }
+    }
+}

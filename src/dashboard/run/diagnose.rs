@@ -1,0 +1,152 @@
+//! The terminal and the line to it, looked at without showing anything.
+
+use crate::dashboard::run::signals::{expect, watch};
+use crate::terminal::flow::{Mode, Queue, Start};
+use crate::terminal::{
+    Capabilities, Event, Keyboard, Multiplexer, Reply, Screen, Surroundings, Tty, cell_px,
+    cursor_question, probe, size,
+};
+use rustix::termios::tcgetwinsize;
+use std::io;
+use std::time::{Duration, Instant};
+
+/// How long to wait for whoever may not answer at all.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// How long to wait for a terminal that has answered before.
+const LONG_PATIENCE: Duration = Duration::from_secs(10);
+/// A line is measured when something took so much longer than nothing,
+const MEASURED: Duration = Duration::from_millis(300);
+/// or with so many bytes.
+const MOST_BYTES: usize = 1 << 20;
+
+/// What was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Examined {
+    /// What the terminal can do.
+    pub terminal: Capabilities,
+    /// How the dashboard knows what has arrived.
+    pub mode: Mode,
+    /// Columns and rows.
+    pub cells: [u16; 2],
+    /// Width and height in pixels.
+    pub pixels: Option<[u16; 2]>,
+    /// What the line carries, bytes a second, if that was to be measured and somebody answered.
+    pub rate: Option<f64>,
+}
+
+/// Looks at the terminal that stdin comes from and stdout leads to; it is restored. `measure`: how
+/// fast it is, too, which takes a second or some.
+///
+/// # Errors
+/// If there is no terminal, or it is gone.
+pub fn examine(surroundings: Surroundings, measure: bool) -> io::Result<Examined> {
+    // On a screen of its own, which goes with whatever a terminal shows of questions that it does not
+    // understand.
+    let signals = expect()?;
+    let screen = Screen::enter()?;
+    let tty = screen.tty();
+    watch(signals, screen.tty(), Duration::ZERO)?;
+    let mut keyboard = Keyboard::new(&surroundings);
+    let mut terminal = probe(&tty, &mut keyboard, surroundings, &|| false)?;
+    let multiplexer = terminal.surroundings.multiplexer;
+    if multiplexer.is_some() && terminal.passthrough.is_none() {
+        terminal.passthrough = answer(&tty, &mut keyboard, multiplexer, &[], PATIENCE)?;
+    }
+    let queue = terminal.surroundings.ssh.as_deref().and_then(Queue::find);
+    let mode = Start::of(&terminal, queue.is_some(), None).mode;
+    // Answers of somebody in between say nothing about the line.
+    let through = match mode {
+        Mode::Local => Some(None),
+        Mode::Answers(through) => Some(through),
+        Mode::Queue | Mode::Fixed => None,
+    };
+    let round_trip = match through {
+        Some(Some(_)) => terminal.passthrough,
+        _ => terminal.round_trip,
+    };
+    let rate = match (through, round_trip) {
+        (Some(through), Some(round_trip)) if measure => {
+            rate(&tty, &mut keyboard, through, round_trip)?
+        }
+        _ => None,
+    };
+    terminal.cell_px = cell_px().or(terminal.cell_px);
+    let window = tcgetwinsize(io::stdout())?;
+    let cells = size()?;
+    let known = window.ws_xpixel > 0 && window.ws_ypixel > 0;
+    let by_cells = || terminal.cell_px.map(|px| [0, 1].map(|i| px[i].saturating_mul(cells[i])));
+    let pixels = known.then_some([window.ws_xpixel, window.ws_ypixel]).or_else(by_cells);
+    Ok(Examined { terminal, mode, cells, pixels, rate })
+}
+
+/// Writes `before` and asks where the cursor is: how long the answer took; `None`: there was none.
+fn answer(
+    tty: &Tty,
+    keyboard: &mut Keyboard,
+    through: Option<Multiplexer>,
+    before: &[u8],
+    patience: Duration,
+) -> io::Result<Option<Duration>> {
+    let asked = Instant::now();
+    tty.write(&[before, cursor_question(through).as_bytes()].concat())?;
+    loop {
+        let came = keyboard.wait(Some(asked + patience))?;
+        let is_answer = |event: &Event| matches!(event, Event::Reply(Reply::Cursor { .. }));
+        if let Some(answer) = came.iter().find(|came| is_answer(&came.event)) {
+            return Ok(Some(answer.at.saturating_duration_since(asked)));
+        }
+        if came.is_empty() {
+            return Ok(None);
+        }
+    }
+}
+
+/// Bytes a second, by more and more bytes until they take long enough.
+fn rate(
+    tty: &Tty,
+    keyboard: &mut Keyboard,
+    through: Option<Multiplexer>,
+    round_trip: Duration,
+) -> io::Result<Option<f64>> {
+    let mut bytes = 1 << 12;
+    loop {
+        let text = hidden_text(bytes);
+        let Some(took) = answer(tty, keyboard, through, &text, LONG_PATIENCE)? else {
+            return Ok(None);
+        };
+        let span = took.saturating_sub(round_trip);
+        if span >= MEASURED || bytes >= MOST_BYTES {
+            let seconds = span.max(Duration::from_millis(1)).as_secs_f64();
+            return Ok(Some(text.len() as f64 / seconds));
+        }
+        bytes *= 4;
+    }
+}
+
+/// So many letters that nobody sees and that compress badly, over and over on the same screen.
+fn hidden_text(bytes: usize) -> Vec<u8> {
+    let mut text = b"\x1b[8m\x1b[H".to_vec();
+    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+    for _ in 0..bytes {
+        // xorshift64 (Marsaglia 2003).
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        text.push(b'!' + (state % 94) as u8);
+    }
+    text.extend(b"\x1b[0m");
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_sent_to_measure_steers_nothing() {
+        let text = hidden_text(4096);
+        let inner = text.strip_prefix(b"\x1b[8m\x1b[H").unwrap().strip_suffix(b"\x1b[0m").unwrap();
+        assert_eq!(inner.len(), 4096);
+        assert!(inner.iter().all(u8::is_ascii_graphic));
+    }
+}

@@ -1,0 +1,62 @@
+//! Looking at a picture that was written.
+
+use crate::dashboard::message::Effect;
+use crate::dashboard::model::short_name;
+use crate::dashboard::overlay::{Looked, Overlay};
+use crate::dashboard::update::Turn;
+use crate::terminal::image::Still;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+impl Turn<'_> {
+    /// Shows the last picture that was written.
+    pub(super) fn look_at_export(&mut self) {
+        match self.model.last_export.clone() {
+            Some(path) => self.look_at(path),
+            None => self.say("No picture was written yet · p writes one"),
+        }
+    }
+
+    fn look_at(&mut self, path: PathBuf) {
+        let (display, screen) = (self.model.display, self.model.screen);
+        self.emit(Effect::Look { path: path.clone(), display, screen });
+        self.model.drag = None;
+        self.model.overlay = Some(Overlay::Still(Looked { path, still: None, sent: 0.0 }));
+        self.repaint();
+    }
+
+    /// On a screen of another size.
+    pub(super) fn look_again(&mut self) {
+        if let Some(Overlay::Still(looked)) = &self.model.overlay {
+            self.look_at(looked.path.clone());
+        }
+    }
+
+    /// Back to the panels.
+    pub(super) fn look_away(&mut self) {
+        self.model.overlay = None;
+        self.repaint();
+    }
+
+    /// A picture is ready, or cannot be read.
+    pub(super) fn still(&mut self, path: &Path, result: Result<Arc<Still>, String>) {
+        let screen = self.model.screen;
+        let Some(Overlay::Still(looked)) = &mut self.model.overlay else { return };
+        if looked.path != path {
+            return;
+        }
+        match result {
+            Ok(still) if still.screen == screen => {
+                looked.still = Some(still);
+                self.repaint();
+            }
+            // It was made before the screen changed.
+            Ok(_) => {}
+            Err(why) => {
+                let name = short_name(path);
+                self.look_away();
+                self.refuse(&format!("{name} cannot be shown: {why}"));
+            }
+        }
+    }
+}

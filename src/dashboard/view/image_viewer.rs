@@ -1,0 +1,68 @@
+//! A written picture on the whole screen.
+
+use crate::dashboard::model::{Model, short_name};
+use crate::dashboard::overlay::Looked;
+use crate::dashboard::view::picture::paint;
+use crate::dashboard::view::text::Row;
+use crate::dashboard::view::theme::Theme;
+use crate::terminal::Area;
+use crate::terminal::cells::PictureCells;
+use crate::terminal::image::{Protocol, Still};
+use ratatui::buffer::Buffer;
+use ratatui::style::{Color, Style};
+
+/// Draws it: in half blocks, over which it comes crisply where it can. The cells that show it, if they
+/// are a picture and not text.
+pub fn draw(
+    model: &Model,
+    looked: &Looked,
+    theme: &Theme,
+    buffer: &mut Buffer,
+) -> Option<PictureCells> {
+    let [width, height] = model.screen;
+    let last = Area { x: 0, y: height.saturating_sub(1), width, height: 1 };
+    let mut row = Row::new(buffer, last, 0);
+    row.skip(1);
+    let Some(still) = &looked.still else {
+        row.put("reading ", theme.dim()).put(&short_name(&looked.path), theme.text());
+        return None;
+    };
+    let (important, more) = told(looked, still);
+    row.put(&short_name(&looked.path), theme.text()).put("  ", theme.dim());
+    row.put(&important, theme.text()).put("  ·  any key returns", theme.accent());
+    row.put(more, theme.dim());
+    let place = still.place;
+    if looked.sent >= 1.0 && still.placeholder(0).is_some() {
+        for y in 0..place.height {
+            let Some((symbol, color)) = still.placeholder(y) else { continue };
+            for x in 0..place.width {
+                if let Some(cell) = buffer.cell_mut((place.x + x, place.y + y)) {
+                    cell.set_symbol(&symbol).set_style(Style::new().fg(Color::Indexed(color)));
+                }
+            }
+        }
+        return None;
+    }
+    let cells = PictureCells::new(&still.raster, model.colors, true);
+    paint(&cells, place, buffer);
+    Some(cells)
+}
+
+/// What is seen, and why it is not better.
+fn told(looked: &Looked, still: &Still) -> (String, &'static str) {
+    let [width, height] = still.size;
+    let whole = format!("{width}×{height}");
+    let size = match still.shown {
+        [w, h] if [w, h] == still.size => whole,
+        _ if still.protocol == Protocol::Blocks => format!("{whole} in half blocks"),
+        [w, h] => format!("{w}×{h} of {whole}"),
+    };
+    match still.protocol {
+        Protocol::Blocks => (size, "  ·  zerkalo doctor tells what crisp ones need"),
+        _ if looked.sent < 1.0 => {
+            let kilobytes = still.transfer.bytes.len() as f64 * 1e-3;
+            (format!("{size}  {:.0} % of {kilobytes:.0} KB", 100.0 * looked.sent), "")
+        }
+        _ => (size, ""),
+    }
+}

@@ -1,0 +1,266 @@
+//! The picture: from the newest snapshot to a raster of half cells.
+
+use crate::dashboard::message::Channel;
+use crate::dashboard::model::{Compared, Model};
+use crate::dashboard::overlay::Overlay;
+use crate::dashboard::view::legend::Legend;
+use crate::film::{Display, Linear, TILE};
+use crate::render::session::{Snapshot, State};
+use crate::terminal::Area;
+use crate::terminal::cells::{
+    Ink, PictureCell, PictureCells, Raster, Scale, depth, difference, normals, objects,
+};
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::{Color, Style};
+use std::sync::Arc;
+
+/// Makes rasters of models, and remembers what is slow to make.
+#[derive(Debug, Default)]
+pub struct Imager {
+    legend: Option<Legend>,
+    kept: Option<Kept>,
+}
+
+/// A kept picture of the size of the screen.
+#[derive(Debug)]
+struct Kept {
+    of: Arc<Linear>,
+    size: [usize; 2],
+    radiance: Vec<[f32; 3]>,
+}
+
+/// Whether the picture will stay as it is until somebody does something.
+pub fn is_settled(model: &Model) -> bool {
+    if let Some(Overlay::Still(_)) = model.overlay {
+        return true;
+    }
+    let resting = |s: &Snapshot| matches!(s.report.state, State::Resting(_) | State::Paused);
+    model.snapshot.as_ref().is_some_and(|s| resting(s)) || model.comparison.shown == Compared::Kept
+}
+
+impl Imager {
+    /// What the colours of the last raster mean, if they stand for numbers.
+    pub fn legend(&self) -> Option<&Legend> {
+        self.legend.as_ref()
+    }
+
+    /// What the model shows, in columns and rows of half cells; empty if there is nothing to show.
+    pub fn raster(&mut self, model: &Model, size: [usize; 2]) -> Raster {
+        self.legend = None;
+        let made = match (model.comparison.shown, model.channel) {
+            (Compared::Kept, _) => {
+                self.kept(model, size).map(|kept| shown(kept, &model.display, size))
+            }
+            (Compared::Difference, _) => self.difference(model, size),
+            (Compared::Live, channel) => self.live(model, channel, size),
+        };
+        made.unwrap_or_default()
+    }
+
+    fn live(&mut self, model: &Model, channel: Channel, size: [usize; 2]) -> Option<Raster> {
+        let snapshot = model.snapshot.as_deref()?;
+        match channel {
+            Channel::Beauty => {
+                let (radiance, from) = live_radiance(model, snapshot)?;
+                Some(resized(shown(&radiance, &model.display, from), size))
+            }
+            Channel::Noise => {
+                let noise = &snapshot.tiles.noise_codes;
+                self.tiles(model, snapshot, "codes of noise", size, |i| {
+                    noise.get(i).map(|n| f64::from(*n))
+                })
+            }
+            Channel::Samples => {
+                let spp = &snapshot.tiles.spp;
+                self.tiles(model, snapshot, "samples per pixel", size, |i| {
+                    spp.get(i).map(|n| f64::from(*n))
+                })
+            }
+            Channel::Objects | Channel::Normals | Channel::Depth => {
+                let guide = snapshot.guide.as_deref()?;
+                let (columns, rows, sights) = (guide.columns, guide.rows, guide.sights());
+                let hit = |i: usize| sights.get(i).filter(|s| s.object.is_some());
+                let all = columns * rows;
+                let raster = match channel {
+                    Channel::Objects => {
+                        let ids: Vec<_> = (0..all).map(|i| hit(i).and_then(|s| s.object)).collect();
+                        objects(columns, rows, &ids)
+                    }
+                    Channel::Normals => {
+                        let found: Vec<_> = (0..all).map(|i| hit(i).map(|s| s.normal)).collect();
+                        normals(columns, rows, &found)
+                    }
+                    _ => {
+                        let found: Vec<_> = (0..all).map(|i| hit(i).map(|s| s.depth)).collect();
+                        let (raster, scale) = depth(columns, rows, &found);
+                        self.legend = Some(Legend::magnitude(scale, "from the eye"));
+                        raster
+                    }
+                };
+                Some(resized(raster, size))
+            }
+        }
+    }
+
+    /// Values of tiles, by ratio.
+    fn tiles(
+        &mut self,
+        model: &Model,
+        snapshot: &Snapshot,
+        unit: &'static str,
+        [width, height]: [usize; 2],
+        value: impl Fn(usize) -> Option<f64>,
+    ) -> Option<Raster> {
+        let tiles = &snapshot.tiles;
+        let all = tiles.columns * tiles.rows;
+        let values: Vec<f64> = (0..all).map(&value).collect::<Option<_>>()?;
+        let mut scale = Scale::logarithmic(values.iter().copied());
+        // Nothing is learned from what is below a thousandth of the largest.
+        scale.low = scale.low.max(1e-3 * scale.high);
+        self.legend = Some(Legend::magnitude(scale, unit));
+        let film = model.scene().film.size.map(|n| n as usize);
+        let tile = |at: usize, cells: usize, pixels: usize, tiles: usize| {
+            ((2 * at + 1) * pixels / (2 * cells) / TILE).min(tiles.saturating_sub(1))
+        };
+        (all > 0).then(|| {
+            Raster::from_fn(width, height, |i| {
+                let column = tile(i % width, width, film[0], tiles.columns);
+                let row = tile(i / width, height, film[1], tiles.rows);
+                scale.color(values[row * tiles.columns + column])
+            })
+        })
+    }
+
+    fn kept(&mut self, model: &Model, size: [usize; 2]) -> Option<&[[f32; 3]]> {
+        let (picture, _) = model.comparison.kept.as_ref()?;
+        let same = |kept: &Kept| Arc::ptr_eq(&kept.of, picture) && kept.size == size;
+        if !self.kept.as_ref().is_some_and(same) {
+            let radiance = picture.resampled(size[0], size[1]);
+            self.kept = Some(Kept { of: Arc::clone(picture), size, radiance });
+        }
+        self.kept.as_ref().map(|kept| &*kept.radiance)
+    }
+
+    /// Live less kept, in codes of luma, on a scale that reaches the largest difference.
+    fn difference(&mut self, model: &Model, size: [usize; 2]) -> Option<Raster> {
+        let snapshot = model.snapshot.as_deref()?;
+        let (live, from) = live_radiance(model, snapshot)?;
+        let live = resized(shown(&live, &model.display, from), size);
+        let kept = shown(self.kept(model, size)?, &model.display, size);
+        let (mut squares, mut largest) = (0.0, 0.0f64);
+        let mut lumas = Vec::with_capacity(live.pixels.len());
+        for (live, kept) in live.pixels.iter().zip(&kept.pixels) {
+            let by = [0, 1, 2].map(|c| f64::from(live[c]) - f64::from(kept[c]));
+            squares += (by[0] * by[0] + by[1] * by[1] + by[2] * by[2]) / 3.0;
+            // Weights of Rec. 709.
+            let luma = 0.2126 * by[0] + 0.7152 * by[1] + 0.0722 * by[2];
+            largest = largest.max(luma.abs());
+            lumas.push(luma);
+        }
+        let rms = (squares / lumas.len().max(1) as f64).sqrt();
+        let end = round_up(largest.max(1.0));
+        self.legend = Some(Legend::difference(end, rms));
+        Some(Raster::from_fn(size[0], size[1], |i| difference(lumas[i] / end)))
+    }
+}
+
+/// The next of 1, 2, 5, 10, 20, 50, …
+fn round_up(value: f64) -> f64 {
+    let decade = 10f64.powf(value.log10().floor());
+    [1.0, 2.0, 5.0].into_iter().map(|m| m * decade).find(|v| *v >= value).unwrap_or(10.0 * decade)
+}
+
+/// The snapshot's picture in the newest light, and its size.
+fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [usize; 2])> {
+    let picture = snapshot.picture.as_ref()?;
+    let newest = snapshot.mix_for(model.scene());
+    let mixed = picture.mixed(newest.as_ref().unwrap_or(&snapshot.mix));
+    Some((mixed, [picture.cols, picture.rows]))
+}
+
+/// Radiance as displayed.
+fn shown(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 2]) -> Raster {
+    let to_8 = display.to_8();
+    Raster::from_fn(width, height, |i| to_8(radiance[i].map(f64::from)))
+}
+
+/// For the moment after the terminal's size has changed: the raster stretched.
+fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
+    if [raster.width, raster.height] == [width, height] || raster.pixels.is_empty() {
+        return raster;
+    }
+    Raster::from_fn(width, height, |i| {
+        let (x, y) = (i % width * raster.width / width, i / width * raster.height / height);
+        raster.pixels[y * raster.width + x]
+    })
+}
+
+/// Puts cells into `area`, from its upper left corner; what does not fit is left out.
+pub fn paint(cells: &PictureCells, area: Area, buffer: &mut Buffer) {
+    for row in 0..area.height.min(cells.rows) {
+        for column in 0..area.width.min(cells.columns) {
+            let Some(cell) = cells.cell(column, row) else { continue };
+            if let Some(to) = buffer.cell_mut((area.x + column, area.y + row)) {
+                let [fg, bg] = colors(cell);
+                to.set_char(cell.glyph);
+                to.set_style(Style::new().fg(fg).bg(bg));
+            }
+        }
+    }
+}
+
+/// Where cells that were painted into `area` are now, and which of them nothing else was drawn over.
+pub fn uncovered(cells: &PictureCells, area: Area, buffer: &Buffer) -> (Rect, Vec<bool>) {
+    let Area { x, y, width, height } = area;
+    let (width, height) = (width.min(cells.columns), height.min(cells.rows));
+    let place = Rect { x, y, width, height }.intersection(buffer.area);
+    let uncovered = place.positions().map(|at| {
+        let (Some(cell), now) = (cells.cell(at.x - x, at.y - y), &buffer[at]) else {
+            return false;
+        };
+        let same_glyph = now.symbol().chars().eq([cell.glyph]);
+        same_glyph && [now.fg, now.bg] == colors(cell) && now.modifier.is_empty()
+    });
+    (place, uncovered.collect())
+}
+
+fn colors(cell: &PictureCell) -> [Color; 2] {
+    [cell.fg, cell.bg].map(|ink| match ink {
+        Ink::Plain => Color::Reset,
+        Ink::Rgb([r, g, b]) => Color::Rgb(r, g, b),
+        Ink::Indexed(index) => Color::Indexed(index),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scales_end_at_round_numbers() {
+        assert_eq!(
+            [1.0, 1.5, 4.0, 9.0, 30.0, 255.0].map(round_up),
+            [1.0, 2.0, 5.0, 10.0, 50.0, 500.0]
+        );
+    }
+
+    #[test]
+    fn old_pictures_are_stretched() {
+        let old = Raster::from_fn(2, 1, |i| [i as u8; 3]);
+        let new = resized(old, [4, 2]);
+        let reds: Vec<_> = new.pixels.iter().map(|p| p[0]).collect();
+        assert_eq!(reds, [0, 0, 1, 1, 0, 0, 1, 1]);
+        assert_eq!(resized(Raster::default(), [4, 2]), Raster::default());
+    }
+
+    #[test]
+    fn exposure_and_tone_curve_are_those_of_the_film() {
+        let display = Display { exposure_ev: 1.25, ..Display::default() };
+        let radiance = [[0.01, 0.2, 3.0], [0.5, 0.0, 0.1]];
+        let raster = shown(&radiance, &display, [2, 1]);
+        for (pixel, radiance) in raster.pixels.iter().zip(radiance) {
+            assert_eq!(*pixel, display.codes_8(radiance.map(f64::from)));
+        }
+    }
+}

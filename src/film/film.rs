@@ -1,0 +1,394 @@
+//! The film: tiles of integer sums, restarted lazily, added exactly.
+
+use crate::film::TILE;
+use crate::film::invalid::BadSamples;
+use crate::film::tile::{MAX_FILM_GROUPS, Tile};
+use std::fmt;
+
+/// What two films must share to be added.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// Columns, in pixels, at least 1.
+    pub width: usize,
+    /// Rows, in pixels, at least 1.
+    pub height: usize,
+    /// For each light group, what a sample is multiplied with before it is rounded to an integer; a
+    /// power of two, so that the product is exact.
+    pub scales: Vec<f64>,
+    /// The seed of all samples.
+    pub seed: u64,
+    /// What they were traced in, `single` or `double`: how many lanes side by side changes no bit.
+    pub precision: String,
+}
+
+/// Sums of samples for every pixel, light group, channel and replicate, in integers: the same bits in
+/// whatever order they were added. Sample sums of a pixel divided by `scale * count` are radiance.
+#[derive(Debug)]
+pub struct Film {
+    header: Header,
+    epoch: u64,
+    tiles: Vec<Tile>,
+}
+
+/// A tile handed to a worker, which makes it ready (allocates or clears it) by [`Slot::open`].
+#[derive(Debug)]
+pub struct Slot<'a> {
+    /// Number of the tile.
+    pub index: usize,
+    /// Column and row of its upper left pixel.
+    pub origin: [usize; 2],
+    tile: &'a mut Tile,
+    epoch: u64,
+}
+
+impl<'a> Slot<'a> {
+    /// The tile, ready to be added to.
+    pub fn open(self) -> &'a mut Tile {
+        self.tile.touch(self.epoch);
+        self.tile
+    }
+}
+
+/// Why two films cannot be added.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Mismatch {
+    /// They differ in what is named; what each has.
+    Header(&'static str, String, String),
+    /// Both hold parts of the first sample of the tile with this number.
+    Overlap(usize),
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Header(what, ours, theirs) => write!(
+                f,
+                "these films cannot be added: {what} {ours} here, {theirs} there; \
+                 only films of the same scene, size, seed and precision can"
+            ),
+            Self::Overlap(tile) => write!(
+                f,
+                "these films cannot be added: both hold the first sample of tile {tile}; \
+                 only films of disjoint sample ranges can"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for Mismatch {}
+
+impl Film {
+    /// A film without samples.
+    ///
+    /// # Panics
+    /// If width, height or the number of groups is 0, there are more than [`MAX_FILM_GROUPS`], or a
+    /// scale is not a power of two.
+    pub fn new(header: Header) -> Self {
+        let Header { width, height, scales, .. } = &header;
+        assert!(*width > 0 && *height > 0, "a film of {width} x {height} pixels");
+        assert!(!scales.is_empty(), "a film without light groups");
+        assert!(scales.len() <= MAX_FILM_GROUPS, "a film of {} light groups", scales.len());
+        for scale in scales {
+            let power_of_two = scale.is_normal() && *scale > 0.0 && scale.to_bits() << 12 == 0;
+            assert!(power_of_two, "a film scale of {scale}, which is not a power of two");
+        }
+        let [columns, rows] = [width.div_ceil(TILE), height.div_ceil(TILE)];
+        let inside = |size: usize, i: usize| (size - i * TILE).min(TILE);
+        let tiles = (0..columns * rows)
+            .map(|t| [inside(*width, t % columns), inside(*height, t / columns)])
+            .map(|extent| Tile::untouched(scales.len(), extent))
+            .collect();
+        Self { epoch: 1, tiles, header }
+    }
+
+    /// A film without samples in the memory of this one, which may be of another kind.
+    ///
+    /// # Panics
+    /// As [`Film::new`].
+    pub fn renewed(mut self, header: Header) -> Self {
+        if header == self.header {
+            self.restart();
+            return self;
+        }
+        let mut film = Self::new(header);
+        // Beyond every epoch of the old tiles.
+        film.epoch = self.epoch + 1;
+        let memory = self.tiles.into_iter().map(Tile::into_memory);
+        film.tiles = film
+            .tiles
+            .into_iter()
+            .zip(memory.chain(std::iter::repeat(Vec::new())))
+            .map(|(tile, memory)| tile.with_memory(memory))
+            .collect();
+        film
+    }
+
+    /// Columns, in pixels.
+    pub fn width(&self) -> usize {
+        self.header.width
+    }
+
+    /// Rows, in pixels.
+    pub fn height(&self) -> usize {
+        self.header.height
+    }
+
+    /// Number of light groups.
+    pub fn groups(&self) -> usize {
+        self.header.scales.len()
+    }
+
+    /// What a sample of each group is multiplied with before rounding; powers of two.
+    pub fn scales(&self) -> &[f64] {
+        &self.header.scales
+    }
+
+    /// Size, scales, seed and precision.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Changes whenever samples are forgotten. Within one epoch, equal counts of a tile mean equal
+    /// contents.
+    pub(super) fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// Forgets all samples. Tiles are cleared when they are next touched, pixel by pixel.
+    pub fn restart(&mut self) {
+        self.epoch += 1;
+    }
+
+    /// Number of tiles; they are numbered row by row.
+    pub fn tile_count(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// Tiles in a row of tiles.
+    pub fn tile_columns(&self) -> usize {
+        self.header.width.div_ceil(TILE)
+    }
+
+    /// Column and row of a tile's upper left pixel.
+    pub fn tile_origin(&self, index: usize) -> [usize; 2] {
+        let columns = self.tile_columns();
+        [index % columns * TILE, index / columns * TILE]
+    }
+
+    /// A tile, if it has been touched since the last restart.
+    pub fn tile(&self, index: usize) -> Option<&Tile> {
+        Some(&self.tiles[index]).filter(|tile| tile.is_of(self.epoch))
+    }
+
+    /// The touched tiles and their numbers.
+    pub fn touched(&self) -> impl Iterator<Item = (usize, &Tile)> {
+        self.tiles.iter().enumerate().filter(|(_, tile)| tile.is_of(self.epoch))
+    }
+
+    /// Tiles to be written to, in the order of `indices`, each to be opened by the thread that works
+    /// on it.
+    ///
+    /// # Panics
+    /// If an index is named twice or is not below [`Film::tile_count`].
+    pub fn slots(&mut self, indices: &[usize]) -> Vec<Slot<'_>> {
+        let mut order: Vec<usize> = (0..indices.len()).collect();
+        order.sort_unstable_by_key(|i| indices[*i]);
+        let (columns, epoch) = (self.tile_columns(), self.epoch);
+        let mut found: Vec<Option<Slot>> = indices.iter().map(|_| None).collect();
+        let mut rest = self.tiles.as_mut_slice();
+        let mut passed = 0;
+        for i in order {
+            let index = indices[i];
+            assert!(index >= passed, "tile {index} is named twice");
+            let (tile, after) = rest[index - passed..].split_first_mut().expect("tile in range");
+            let origin = [index % columns * TILE, index / columns * TILE];
+            found[i] = Some(Slot { index, origin, tile, epoch });
+            (rest, passed) = (after, index + 1);
+        }
+        found.into_iter().flatten().collect()
+    }
+
+    /// Samples of all pixels and both replicates.
+    pub fn samples(&self) -> u64 {
+        let of_tile = |tile: &Tile| {
+            let [width, height] = tile.extent();
+            let counts = tile.counts().map(u64::from);
+            let lattice = match tile.lattice_px() {
+                0 => 0,
+                step => width.div_ceil(step) * height.div_ceil(step),
+            };
+            (counts[0] + counts[1]) * (width * height) as u64 + lattice as u64
+        };
+        self.touched().map(|(_, tile)| of_tile(tile)).sum()
+    }
+
+    /// Bad samples since the last restart.
+    pub fn bad_samples(&self) -> BadSamples {
+        let mut all = BadSamples::default();
+        self.touched().for_each(|(_, tile)| all.merge(tile.bad()));
+        all
+    }
+
+    /// Samples since the last restart that were brighter than the film holds.
+    pub fn saturated_samples(&self) -> u64 {
+        self.touched().map(|(_, tile)| tile.saturated_samples()).sum()
+    }
+
+    /// Number of channel sums that have reached the largest value a sum can have.
+    pub fn saturated(&self) -> u64 {
+        self.touched().map(|(_, tile)| tile.saturated()).sum()
+    }
+
+    /// Number of pixels with such a sum: more samples make them darker than they are.
+    pub fn saturated_pixels(&self) -> u64 {
+        self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
+    }
+
+    /// Adds the samples of another film. Films of disjoint sample ranges, added in any order, equal
+    /// the film of the whole. Nothing is changed on error.
+    pub fn add(&mut self, other: &Self) -> Result<(), Mismatch> {
+        self.check_addable(other)?;
+        for (index, theirs) in other.touched() {
+            let ours = &mut self.tiles[index];
+            ours.touch(self.epoch);
+            ours.add_tile(theirs).map_err(|()| Mismatch::Overlap(index))?;
+        }
+        Ok(())
+    }
+
+    fn check_addable(&self, other: &Self) -> Result<(), Mismatch> {
+        let (ours, theirs) = (&self.header, &other.header);
+        let show = |h: &Header| -> [(&'static str, String); 4] {
+            [
+                ("size", format!("{}x{}", h.width, h.height)),
+                ("light group scales", format!("{:?}", h.scales)),
+                ("seed", h.seed.to_string()),
+                ("precision", h.precision.clone()),
+            ]
+        };
+        for ((what, ours), (_, theirs)) in show(ours).into_iter().zip(show(theirs)) {
+            if ours != theirs {
+                return Err(Mismatch::Header(what, ours, theirs));
+            }
+        }
+        let clash = other.touched().find(|(index, theirs)| {
+            theirs.lattice_px() != 0 && self.tile(*index).is_some_and(|t| t.lattice_px() != 0)
+        });
+        clash.map_or(Ok(()), |(index, _)| Err(Mismatch::Overlap(index)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::testing::{fill, film, white};
+
+    #[test]
+    fn tiles_cover_the_film() {
+        let film = film(33, 17, &[1.0]);
+        assert_eq!((film.tile_count(), film.tile_columns()), (6, 3));
+        assert_eq!((film.tile_origin(5), film.tiles[5].extent()), ([32, 16], [1, 1]));
+        assert_eq!((film.tile_origin(1), film.tiles[1].extent()), ([16, 0], [16, 16]));
+        assert_eq!(film.touched().count(), 0);
+    }
+
+    #[test]
+    fn slots_come_in_the_order_asked_for() {
+        let mut film = film(48, 32, &[1.0]);
+        let slots = film.slots(&[4, 0, 5, 2]);
+        let order: Vec<_> = slots.iter().map(|slot| (slot.index, slot.origin)).collect();
+        assert_eq!(order, [(4, [16, 16]), (0, [0, 0]), (5, [32, 16]), (2, [32, 0])]);
+        // Only opened tiles are touched.
+        slots.into_iter().nth(2).unwrap().open().advance(0, 3);
+        let touched: Vec<_> = film.touched().map(|(i, tile)| (i, tile.counts())).collect();
+        assert_eq!(touched, [(5, [3, 0])]);
+        assert_eq!(film.samples(), 3 * 256);
+    }
+
+    #[test]
+    #[should_panic(expected = "tile 2 is named twice")]
+    fn no_tile_is_handed_out_twice() {
+        film(48, 32, &[1.0]).slots(&[2, 1, 2]);
+    }
+
+    #[test]
+    fn a_restart_forgets() {
+        let (mut film, empty) = (film(20, 20, &[1.0]), film(20, 20, &[1.0]).bytes());
+        fill(&mut film, 2, |x, _, _| vec![x as f64; 3]);
+        let full = film.bytes();
+        film.restart();
+        assert_eq!((film.samples(), film.bytes()), (0, empty));
+        fill(&mut film, 2, |x, _, _| vec![x as f64; 3]);
+        assert_eq!(film.bytes(), full);
+    }
+
+    #[test]
+    fn memory_used_again_holds_nothing() {
+        let value = |x: usize| vec![x as f64 + 1.0; 3];
+        let mut old = film(40, 40, &[1.0]);
+        fill(&mut old, 2, |x, _, _| value(x));
+        let wanted = |width, height, groups: usize| {
+            let header = film(width, height, &vec![4.0; groups]).header().clone();
+            let mut fresh = Film::new(header.clone());
+            fill(&mut fresh, 1, |x, _, _| value(x).repeat(groups));
+            (header, fresh.bytes())
+        };
+        // Fewer, more and equally many tiles; more and fewer groups.
+        for (width, height, groups) in [(20, 20, 1), (70, 30, 3), (70, 30, 2), (40, 40, 1)] {
+            let (header, bytes) = wanted(width, height, groups);
+            old = old.renewed(header);
+            assert_eq!((old.samples(), old.touched().count()), (0, 0));
+            fill(&mut old, 1, |x, _, _| value(x).repeat(groups));
+            assert_eq!(old.bytes(), bytes, "{width} x {height}, {groups} groups");
+        }
+    }
+
+    #[test]
+    fn only_alike_films_add_up() {
+        let mut ours = film(20, 20, &[1.0]);
+        fill(&mut ours, 2, |x, _, _| vec![x as f64; 3]);
+        let before = ours.bytes();
+        let alter = |change: fn(&mut Header)| {
+            let mut header = ours.header().clone();
+            change(&mut header);
+            Film::new(header)
+        };
+        let others = [
+            (alter(|h| h.width = 19), "size 20x20 here, 19x20 there"),
+            (alter(|h| h.scales = vec![2.0]), "scales [1.0] here, [2.0] there"),
+            (alter(|h| h.scales = vec![1.0, 1.0]), "[1.0] here, [1.0, 1.0] there"),
+            (alter(|h| h.seed = 2), "seed 1 here, 2 there"),
+            (alter(|h| h.precision = "double".into()), "precision single here, double there"),
+        ];
+        for (other, words) in others {
+            let message = ours.add(&other).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+        assert_eq!(ours.bytes(), before);
+        ours.add(&film(20, 20, &[1.0])).unwrap();
+        assert_eq!(ours.bytes(), before);
+    }
+
+    #[test]
+    fn the_first_sample_is_not_added_twice() {
+        let lattice = || {
+            let mut film = film(16, 16, &[1.0]);
+            film.slots(&[0]).remove(0).open().set_lattice(8);
+            film
+        };
+        let mut ours = lattice();
+        assert_eq!(ours.add(&lattice()), Err(Mismatch::Overlap(0)));
+        let mut rest = film(16, 16, &[1.0]);
+        fill(&mut rest, 4, |_, _, _| vec![4.0; 3]);
+        rest.add(&ours).unwrap();
+        assert_eq!(rest.samples(), 2 * 4 * 256 + 4);
+        assert_eq!(rest.pixel(8, 8, &white(1)), [8.0 / 9.0; 3]);
+        assert_eq!(rest.pixel(9, 8, &white(1)), [1.0; 3]);
+    }
+
+    #[test]
+    #[should_panic(expected = "not a power of two")]
+    fn scales_are_powers_of_two() {
+        film(1, 1, &[3.0]);
+    }
+}

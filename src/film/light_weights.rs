@@ -1,0 +1,170 @@
+//! From sums to radiance: the colour and strength of each light are put in here.
+
+use crate::film::TILE;
+use crate::film::film::Film;
+use crate::film::tile::Tile;
+
+/// Colour times intensity of the lights whose unit-light sums the film holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mix {
+    /// For each light group: red, green, blue, at least 0.
+    pub weights: Vec<[f64; 3]>,
+}
+
+impl Mix {
+    /// One group of a film of `groups` groups, in unit light.
+    pub fn only(group: usize, groups: usize) -> Self {
+        Self { weights: (0..groups).map(|g| [f64::from(u8::from(g == group)); 3]).collect() }
+    }
+
+    /// The factors that turn sums into radiance times count.
+    pub(super) fn per_unit(&self, scales: &[f64]) -> Vec<f64> {
+        assert_eq!(self.weights.len(), scales.len(), "weights for the groups of the film");
+        self.weights.iter().zip(scales).flat_map(|(w, scale)| w.map(|w| w / scale)).collect()
+    }
+}
+
+/// Which samples are looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// All of them: the picture.
+    Both,
+    /// Replicate A.
+    A,
+    /// Replicate B.
+    B,
+}
+
+/// The sums and counts of one pixel.
+#[derive(Clone, Copy)]
+pub(super) struct Sums<'a> {
+    /// `[group][channel]`, replicates A and B.
+    pub values: [&'a [i64]; 2],
+    /// Samples of A and B.
+    pub counts: [u32; 2],
+}
+
+impl Sums<'_> {
+    /// Samples that count in `part`.
+    pub fn count(&self, part: Part) -> u32 {
+        match part {
+            Part::Both => self.counts[0].saturating_add(self.counts[1]),
+            Part::A => self.counts[0],
+            Part::B => self.counts[1],
+        }
+    }
+
+    /// Sum `i` of `[group][channel]`, as far as it counts in `part`.
+    #[inline(always)]
+    pub fn value(&self, part: Part, i: usize) -> f64 {
+        match part {
+            Part::Both => self.values[0][i] as f64 + self.values[1][i] as f64,
+            Part::A => self.values[0][i] as f64,
+            Part::B => self.values[1][i] as f64,
+        }
+    }
+
+    /// Radiance, or black without samples; `per_unit` from [`Mix::per_unit`].
+    #[inline(always)]
+    pub fn mean(&self, part: Part, per_unit: &[f64]) -> [f64; 3] {
+        let count = self.count(part);
+        if count == 0 {
+            return [0.0; 3];
+        }
+        let mut sum = [0.0; 3];
+        for (group, factors) in per_unit.chunks_exact(3).enumerate() {
+            for c in 0..3 {
+                sum[c] += self.value(part, 3 * group + c) * factors[c];
+            }
+        }
+        sum.map(|s| s / f64::from(count))
+    }
+}
+
+impl Tile {
+    #[inline(always)]
+    pub(super) fn sums(&self, pixel: usize) -> Sums<'_> {
+        let values = [self.pixel(0, pixel), self.pixel(1, pixel)];
+        Sums { values, counts: self.counts_of(pixel) }
+    }
+}
+
+impl Film {
+    /// Radiance of the pixel in column `x`, row `y`: the mean over all its samples of both
+    /// replicates; black without samples.
+    pub fn pixel(&self, x: usize, y: usize, mix: &Mix) -> [f64; 3] {
+        assert!(x < self.width() && y < self.height(), "pixel ({x}, {y}) of the film");
+        let index = y / TILE * self.tile_columns() + x / TILE;
+        let pixel = y % TILE * TILE + x % TILE;
+        let per_unit = mix.per_unit(self.scales());
+        self.tile(index).map_or([0.0; 3], |tile| tile.sums(pixel).mean(Part::Both, &per_unit))
+    }
+
+    /// Row `y` of the picture, radiance; `row` is resized to the film's width.
+    pub fn row(&self, y: usize, part: Part, mix: &Mix, row: &mut Vec<[f64; 3]>) {
+        row.clear();
+        row.resize(self.width(), [0.0; 3]);
+        let per_unit = mix.per_unit(self.scales());
+        self.visit_row(y, |x, sums| row[x] = sums.mean(part, &per_unit));
+    }
+
+    /// Calls `f` with the column and the sums of each pixel of row `y` in touched tiles.
+    pub(super) fn visit_row(&self, y: usize, mut f: impl FnMut(usize, Sums)) {
+        let columns = self.tile_columns();
+        for column in 0..columns {
+            let Some(tile) = self.tile(y / TILE * columns + column) else { continue };
+            for x in 0..tile.extent()[0] {
+                f(column * TILE + x, tile.sums(y % TILE * TILE + x));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::testing::{each_tile, fill, film, white};
+
+    #[test]
+    fn a_pixel_is_the_mixed_mean_of_both_replicates() {
+        let mut film = film(20, 18, &[2f64.powi(20), 2f64.powi(-3)]);
+        fill(&mut film, 4, |x, y, r| {
+            let (x, y, r) = (x as f64, y as f64, r as f64);
+            vec![x, y, 1.0 + r, 64.0 * x, 128.0, 64.0 * r]
+        });
+        let mix = Mix { weights: vec![[1.0, 2.0, 3.0], [0.5, 0.0, 1.0]] };
+        // Sums over 4 + 4 samples: A and B alike in x and y; 1 + 2 and 0 + 64 in blue.
+        let expected = |x: f64, y: f64| [x / 4.0 + 8.0 * x, 2.0 * y / 4.0, 9.0 / 8.0 + 8.0];
+        for (x, y) in [(0, 0), (19, 17), (16, 15), (3, 16)] {
+            assert_eq!(film.pixel(x, y, &mix), expected(x as f64, y as f64), "{x} {y}");
+        }
+        let mut row = Vec::new();
+        film.row(17, Part::Both, &mix, &mut row);
+        assert_eq!(row.len(), 20);
+        assert_eq!(row[19], expected(19.0, 17.0));
+        film.row(17, Part::B, &Mix::only(0, 2), &mut row);
+        assert_eq!(row[5], [5.0 / 4.0, 17.0 / 4.0, 0.5]);
+    }
+
+    #[test]
+    fn unequal_counts_weigh_the_replicates() {
+        let mut film = film(1, 1, &[1.0]);
+        each_tile(&mut film, |tile, _| {
+            tile.add(0, 0, &[30, 30, 30]);
+            tile.advance(0, 3);
+            tile.add(1, 0, &[6, 0, 2]);
+            tile.advance(1, 1);
+        });
+        assert_eq!(film.pixel(0, 0, &white(1)), [9.0, 7.5, 8.0]);
+    }
+
+    #[test]
+    fn without_samples_all_is_black() {
+        let mut film = film(3, 3, &[1.0]);
+        assert_eq!(film.pixel(2, 2, &white(1)), [0.0; 3]);
+        fill(&mut film, 1, |_, _, _| vec![1.0; 3]);
+        assert_eq!(film.pixel(2, 2, &white(1)), [1.0; 3]);
+        film.restart();
+        assert_eq!(film.pixel(2, 2, &white(1)), [0.0; 3]);
+    }
+}

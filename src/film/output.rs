@@ -1,0 +1,352 @@
+//! Picture files: which format a path asks for, and writing so that a failure leaves the old file.
+
+use crate::film::display::Display;
+use crate::film::film::Film;
+use crate::film::light_weights::Mix;
+use crate::film::{exr, png};
+use std::ffi::OsStr;
+use std::fmt;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, ErrorKind, Seek, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// Everything that goes into a picture file.
+#[derive(Clone, Copy, Debug)]
+pub struct Picture<'a> {
+    /// The samples.
+    pub film: &'a Film,
+    /// Colour and strength of the light groups.
+    pub mix: &'a Mix,
+    /// Name of each light group, for the layers of formats that have layers.
+    pub group_names: &'a [String],
+    /// Exposure and tone curve, for formats that hold what a display shows.
+    pub display: Display,
+    /// Bits per channel, for formats that hold what a display shows.
+    pub depth: Depth,
+    /// Keys and values to be written into the file. Keys: 1 to 79 printable ASCII characters without
+    /// leading, trailing or double spaces, the first one a capital (OpenEXR's own begin small).
+    pub metadata: &'a [(String, String)],
+}
+
+/// Bits per channel of a picture file in display codes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Depth {
+    /// 8 bits: 256 codes.
+    #[default]
+    Eight,
+    /// 16 bits: 65 536 codes.
+    Sixteen,
+}
+
+/// Where encoders write to.
+pub(super) trait Sink: Write + Seek {}
+impl<T: Write + Seek> Sink for T {}
+
+/// A picture file format.
+struct Format {
+    extension: &'static str,
+    encode: fn(&Picture, &mut dyn Sink) -> io::Result<()>,
+}
+
+/// Every format that can be written.
+static FORMATS: [Format; 2] = [
+    Format { extension: "png", encode: png::encode },
+    Format { extension: "exr", encode: exr::encode },
+];
+
+/// A picture file to be written: a path whose extension names a known format.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Target {
+    path: PathBuf,
+    format: usize,
+    /// There must be no file yet.
+    fresh: bool,
+}
+
+/// Why a picture cannot be written: the path, what is wrong, what would help.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WriteError {
+    /// The file that was asked for.
+    pub path: PathBuf,
+    /// What is wrong, as a clause.
+    pub what: String,
+    /// What would help, as a clause.
+    pub remedy: String,
+}
+
+impl fmt::Display for WriteError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "cannot write {}: {}; {}", self.path.display(), self.what, self.remedy)
+    }
+}
+
+impl std::error::Error for WriteError {}
+
+impl Target {
+    /// Finds the format by the path's extension, in upper or lower case. Touches no file.
+    pub fn from_path(path: impl Into<PathBuf>) -> Result<Self, WriteError> {
+        let path = path.into();
+        let extension = path.extension().map(OsStr::to_string_lossy);
+        let known = extension
+            .as_ref()
+            .and_then(|e| FORMATS.iter().position(|f| e.eq_ignore_ascii_case(f.extension)));
+        match known {
+            Some(format) => Ok(Self { path, format, fresh: false }),
+            None => {
+                let known: Vec<_> = FORMATS.iter().map(|f| format!(".{}", f.extension)).collect();
+                Err(WriteError {
+                    what: match extension {
+                        Some(e) => format!("no picture format has the extension .{e}"),
+                        None => "its name has no extension to tell the picture format".to_string(),
+                    },
+                    remedy: format!("known extensions: {}", known.join(", ")),
+                    path,
+                })
+            }
+        }
+    }
+
+    /// The same, but a file that is there, or comes into being before this one is complete, is not
+    /// overwritten: writing fails.
+    pub fn fresh(self) -> Self {
+        Self { fresh: true, ..self }
+    }
+
+    /// The file that is to be written.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Finds out whether the file could be written now, without changing it: for use before work
+    /// whose result would be lost.
+    pub fn check_writable(&self) -> Result<(), WriteError> {
+        self.prepare().map(drop)
+    }
+
+    /// Writes the picture to a temporary file beside its place, and puts it there when it is complete
+    /// and on the disk. On failure a file that was there before is untouched.
+    pub fn write(&self, picture: &Picture) -> Result<(), WriteError> {
+        self.replace(|sink| (FORMATS[self.format].encode)(picture, sink))
+    }
+
+    fn replace(
+        &self,
+        encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>,
+    ) -> Result<(), WriteError> {
+        let Place { file, directory, temporary } = self.prepare()?;
+        let explain = |error| self.explained(&error, &directory);
+        let mut out = BufWriter::with_capacity(1 << 16, temporary);
+        encode(&mut out).and_then(|()| out.flush()).map_err(explain)?;
+        let temporary = out.into_inner().map_err(|e| explain(e.into_error()))?;
+        temporary.as_file().sync_all().map_err(explain)?;
+        let put = match self.fresh {
+            true => temporary.persist_noclobber(&file),
+            false => temporary.persist(&file),
+        };
+        put.map_err(|e| explain(e.error))?;
+        // Makes the new name durable. Not every system lets a directory be opened or synced; the
+        // picture is complete either way.
+        if let Ok(directory) = File::open(&directory) {
+            let _ = directory.sync_all();
+        }
+        Ok(())
+    }
+
+    fn prepare(&self) -> Result<Place, WriteError> {
+        // A link stays a link: what it points to is replaced.
+        let is_link = self.path.symlink_metadata().is_ok_and(|m| m.file_type().is_symlink());
+        let file = match is_link.then(|| fs::canonicalize(&self.path)) {
+            Some(Ok(real)) => real,
+            _ => self.path.clone(),
+        };
+        let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let directory = parent.unwrap_or(Path::new(".")).to_path_buf();
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".zerkalo-").suffix(".tmp");
+        let existing = fs::metadata(&file).ok();
+        if let Some(existing) = &existing {
+            if existing.is_dir() {
+                return Err(self.error("it is a directory", "add a file name"));
+            }
+            if !existing.is_file() {
+                let remedy = "name a regular file";
+                return Err(self.error("it is not a file that can be replaced", remedy));
+            }
+            if existing.permissions().readonly() {
+                let remedy = "make it writable or name another file";
+                return Err(self.error("the existing file is read-only", remedy));
+            }
+        }
+        // An existing file keeps its permissions; a new one gets those that the user's umask leaves.
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(fs::Permissions::from_mode(0o666));
+        }
+        let made = builder.tempfile_in(&directory).and_then(|temporary| {
+            // The sign that it is not a left-over; where files cannot be locked nobody removes those.
+            let _ = temporary.as_file().try_lock();
+            if let Some(existing) = &existing {
+                temporary.as_file().set_permissions(existing.permissions())?;
+            }
+            Ok(temporary)
+        });
+        let temporary = made.map_err(|error| self.explained(&error, &directory))?;
+        Ok(Place { file, directory, temporary })
+    }
+
+    fn error(&self, what: impl Into<String>, remedy: impl Into<String>) -> WriteError {
+        WriteError { path: self.path.clone(), what: what.into(), remedy: remedy.into() }
+    }
+
+    fn explained(&self, error: &io::Error, directory: &Path) -> WriteError {
+        let shown = directory.display();
+        match error.kind() {
+            ErrorKind::AlreadyExists => {
+                self.error("there is such a file already", "name another one")
+            }
+            ErrorKind::NotFound if !directory.exists() => self.error(
+                format!("the directory {shown} does not exist"),
+                "create it first or name another one",
+            ),
+            ErrorKind::NotADirectory => {
+                self.error(format!("{shown} is not a directory"), "name a directory")
+            }
+            ErrorKind::PermissionDenied => self.error(
+                format!("no permission to write in the directory {shown}"),
+                "name a directory that you may write to",
+            ),
+            ErrorKind::ReadOnlyFilesystem => self.error(
+                format!("the file system of {shown} is read-only"),
+                "name a directory on another one",
+            ),
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => self.error(
+                format!("no space is left for it in {shown}"),
+                "free some space or name a directory on another disk",
+            ),
+            _ => self.error(error.to_string(), "if that is unclear, try another directory"),
+        }
+    }
+}
+
+/// A temporary file ready to be filled, and where it goes.
+struct Place {
+    file: PathBuf,
+    directory: PathBuf,
+    temporary: NamedTempFile,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(path: &Path) -> String {
+        let target = Target::from_path(path).unwrap();
+        target.check_writable().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_extension_tells_the_format() {
+        for good in ["a.png", "A.PNG", "dir.x/b.Exr"] {
+            assert_eq!(Target::from_path(good).unwrap().path(), Path::new(good));
+        }
+        let error = Target::from_path("out.jpeg").unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "cannot write out.jpeg: no picture format has the extension .jpeg; \
+             known extensions: .png, .exr"
+        );
+        let error = Target::from_path("picture").unwrap_err().to_string();
+        assert!(error.contains("has no extension") && error.contains(".png, .exr"), "{error}");
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_said_before() {
+        let dir = tempfile::tempdir().unwrap();
+        let missing = message(&dir.path().join("no/such/a.png"));
+        assert!(missing.contains("no/such does not exist; create it first"), "{missing}");
+        let folder = dir.path().join("folder.png");
+        fs::create_dir(&folder).unwrap();
+        assert!(message(&folder).contains("it is a directory; add a file name"));
+        let through_file = dir.path().join("file");
+        fs::write(&through_file, "").unwrap();
+        let under_file = message(&through_file.join("a.png"));
+        assert!(under_file.contains("is not a directory"), "{under_file}");
+        let locked = dir.path().join("locked.png");
+        fs::write(&locked, "old").unwrap();
+        let mut permissions = fs::metadata(&locked).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&locked, permissions).unwrap();
+        assert!(message(&locked).contains("the existing file is read-only; make it writable"));
+    }
+
+    #[test]
+    fn a_check_leaves_nothing_behind() {
+        let dir = tempfile::tempdir().unwrap();
+        let old = dir.path().join("old.png");
+        fs::write(&old, "old").unwrap();
+        for path in [&old, &dir.path().join("new.png")] {
+            Target::from_path(path).unwrap().check_writable().unwrap();
+        }
+        assert_eq!(fs::read(&old).unwrap(), b"old");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_failure_leaves_the_old_file_and_says_why() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        fs::write(&path, "old").unwrap();
+        let target = Target::from_path(&path).unwrap();
+        for (kind, words) in [
+            (ErrorKind::StorageFull, "no space is left"),
+            (ErrorKind::ReadOnlyFilesystem, "read-only"),
+            (ErrorKind::PermissionDenied, "no permission"),
+            (ErrorKind::Other, "other error"),
+        ] {
+            let failing = |sink: &mut dyn Sink| {
+                sink.write_all(&[7; 100_000])?;
+                Err(kind.into())
+            };
+            let error = target.replace(failing).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+            assert_eq!(fs::read(&path).unwrap(), b"old");
+            assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+        }
+    }
+
+    #[test]
+    fn what_is_to_be_fresh_overwrites_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let target = Target::from_path(&path).unwrap().fresh();
+        target.replace(|sink| sink.write_all(b"new")).unwrap();
+        let error = target.replace(|sink| sink.write_all(b"newer")).unwrap_err().to_string();
+        assert!(error.contains("such a file already"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn links_and_permissions_are_kept() {
+        use std::os::unix::fs::PermissionsExt;
+        let dir = tempfile::tempdir().unwrap();
+        let (real, link) = (dir.path().join("real.png"), dir.path().join("link.png"));
+        fs::write(&real, "old").unwrap();
+        fs::set_permissions(&real, fs::Permissions::from_mode(0o640)).unwrap();
+        std::os::unix::fs::symlink(&real, &link).unwrap();
+        let target = Target::from_path(&link).unwrap();
+        target.replace(|sink| sink.write_all(b"new")).unwrap();
+        assert!(link.symlink_metadata().unwrap().file_type().is_symlink());
+        assert_eq!(fs::read(&real).unwrap(), b"new");
+        assert_eq!(fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o640);
+        // A new file is readable as any other that the user creates.
+        let (new, plain) = (dir.path().join("new.png"), dir.path().join("plain"));
+        Target::from_path(&new).unwrap().replace(|sink| sink.write_all(b"new")).unwrap();
+        fs::write(&plain, "").unwrap();
+        let mode = |path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&new), mode(&plain));
+    }
+}

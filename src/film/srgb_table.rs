@@ -1,0 +1,109 @@
+//! The sRGB curve by table, many times cheaper than the power function.
+
+use crate::film::display::{quantised_8, srgb_from_linear};
+use std::sync::LazyLock;
+
+/// Segments per octave (power of two).
+const SEGMENTS_LOG2: u32 = 7;
+/// Below two to the power of this the curve is its straight part (which ends at 0.0031308).
+const FIRST_OCTAVE: i32 = -9;
+const SHIFT: u32 = 52 - SEGMENTS_LOG2;
+/// The upper bits of 2^FIRST_OCTAVE, less one: entry 0 is the straight part.
+const BASE: u64 = (((1023 + FIRST_OCTAVE) as u64) << SEGMENTS_LOG2) - 1;
+const ENTRIES: usize = ((-FIRST_OCTAVE as usize) << SEGMENTS_LOG2) + 2;
+
+/// Largest difference from the exact curve, in codes of 0..=255.
+const MAX_ERROR_CODES: f64 = 5.5e-4;
+
+/// sRGB codes by chords between exact points, 128 to an octave of linear light.
+pub(super) struct Curve {
+    /// `[at 0, slope]` of each chord, in codes.
+    chords: [[f64; 2]; ENTRIES],
+}
+
+static CURVE: LazyLock<Curve> = LazyLock::new(Curve::tabulated);
+
+impl Curve {
+    pub fn shared() -> &'static Self {
+        &CURVE
+    }
+
+    fn tabulated() -> Self {
+        let mut chords = [[0.0; 2]; ENTRIES];
+        chords[0] = [0.0, 255.0 * 12.92];
+        let node = |i: usize| f64::from_bits((BASE + i as u64) << SHIFT);
+        for (i, chord) in chords.iter_mut().enumerate().skip(1) {
+            let (from, to) = (node(i), node(i + 1));
+            let (low, high) = (255.0 * srgb_from_linear(from), 255.0 * srgb_from_linear(to));
+            let slope = (high - low) / (to - from);
+            *chord = [low - slope * from, slope];
+        }
+        Self { chords }
+    }
+
+    /// The code, 0..=255 unrounded, of linear light 0..=1; within 5.5e-4 of the exact one.
+    #[inline(always)]
+    pub fn code(&self, linear: f64) -> f64 {
+        let entry = (linear.to_bits() >> SHIFT).saturating_sub(BASE) as usize;
+        let [at_zero, slope] = self.chords[entry.min(ENTRIES - 1)];
+        at_zero + slope * linear
+    }
+
+    /// The exact code, rounded to 8 bits, of linear light 0..=1.
+    #[inline]
+    pub fn code_8(&self, linear: f64) -> u8 {
+        let above = self.code(linear) + 0.5;
+        let nearest = above.floor();
+        if (above - nearest - 0.5).abs() >= 0.5 - MAX_ERROR_CODES {
+            return quantised_8(255.0 * srgb_from_linear(linear));
+        }
+        nearest as u8
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_keeps_its_bound() {
+        let mut worst = 0.0f64;
+        for i in 0..=1_000_000 {
+            let even = f64::from(i) * 1e-6;
+            for linear in [even, even * even * even] {
+                let exact = 255.0 * srgb_from_linear(linear);
+                worst = worst.max((Curve::shared().code(linear) - exact).abs());
+            }
+        }
+        assert!(worst < MAX_ERROR_CODES, "{worst}");
+        assert!(worst > MAX_ERROR_CODES / 2.0, "the stated bound is too loose: {worst}");
+    }
+
+    #[test]
+    fn eight_bits_are_those_of_the_exact_curve() {
+        let exact = |linear| quantised_8(255.0 * srgb_from_linear(linear));
+        for i in 0..=200_000 {
+            let linear = f64::from(i) * 5e-6;
+            assert_eq!(Curve::shared().code_8(linear), exact(linear), "{linear}");
+        }
+        // Around every border between two codes.
+        for border in (0..255).map(|code| (f64::from(code) + 0.5) / 255.0) {
+            let linear = if border <= 0.04045 {
+                border / 12.92
+            } else {
+                ((border + 0.055) / 1.055).powf(2.4)
+            };
+            for step in -2000..=2000 {
+                let linear = linear * (1.0 + f64::from(step) * 1e-8);
+                assert_eq!(Curve::shared().code_8(linear), exact(linear), "{linear}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_ends_are_exact() {
+        assert_eq!(Curve::shared().code(0.0), 0.0);
+        assert!((Curve::shared().code(1.0) - 255.0).abs() < 1e-12);
+        assert_eq!(Curve::shared().code(f64::MIN_POSITIVE), 255.0 * 12.92 * f64::MIN_POSITIVE);
+    }
+}

@@ -1,0 +1,89 @@
+//! A light, compiled: of unit strength and white. Colour and intensity are applied to the finished
+//! sums, so that changing them needs no new samples.
+
+use crate::lanes::{Lanes, Real, V3};
+use crate::light::{Falloff, Light};
+use crate::value::unit;
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// A light, compiled.
+#[derive(Clone, Copy, Debug)]
+pub enum Lamp<S> {
+    /// A point whose irradiance falls with the square of the distance: 1 / d^2.
+    Falling {
+        /// Where it stands.
+        position: [S; 3],
+    },
+    /// A point with the same normal irradiance, pi, everywhere.
+    Even {
+        /// Where it stands.
+        position: [S; 3],
+    },
+    /// Light along one direction with normal irradiance pi.
+    Directional {
+        /// Unit vector towards the light.
+        towards: [S; 3],
+    },
+}
+
+/// Unit light arriving at points.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrival<L> {
+    /// Unit vector towards the light.
+    pub towards: V3<L>,
+    /// Distance to the light; the largest number for light from infinity.
+    pub distance: L,
+    /// Irradiance of a surface that faces the light.
+    pub irradiance: L,
+}
+
+impl<S: Real> Lamp<S> {
+    /// Compiles `light` for a scene shifted so that `origin` becomes zero. `None`: it has no kind
+    /// or no direction.
+    pub fn new(light: &Light, origin: DVec3) -> Option<Self> {
+        if let Some(point) = &light.point {
+            let position = (DVec3::from(point.position) - origin).to_array().map(S::of);
+            return Some(match light.falloff {
+                Falloff::InverseSquare => Self::Falling { position },
+                Falloff::None => Self::Even { position },
+            });
+        }
+        let towards = -unit(light.directional?.direction)?;
+        Some(Self::Directional { towards: towards.to_array().map(S::of) })
+    }
+
+    /// The light that arrives at `point`, if nothing is in the way.
+    #[inline(always)]
+    pub fn at<L: Lanes<Scalar = S>>(&self, point: V3<L>) -> Arrival<L> {
+        match self {
+            Self::Directional { towards } => Arrival {
+                towards: V3::splat(*towards),
+                distance: L::of(L::MAX),
+                irradiance: L::of(PI),
+            },
+            Self::Falling { position } | Self::Even { position } => {
+                let to = V3::splat(*position) - point;
+                let distance = to.length2().sqrt();
+                let inverse = L::one() / distance;
+                let irradiance = match self {
+                    // Infinity times black would be no number.
+                    Self::Falling { .. } => (inverse * inverse).min(L::of(L::MAX)),
+                    _ => L::of(PI),
+                };
+                Arrival { towards: to * inverse, distance, irradiance }
+            }
+        }
+    }
+
+    /// Normal irradiance at a typical place: at the origin, but not nearer than `radius`.
+    pub fn typical_irradiance(&self, radius: f64) -> f64 {
+        match self {
+            Self::Falling { position } => {
+                let d = DVec3::from(position.map(S::to_f64)).length().max(radius);
+                if d > 0.0 { 1.0 / (d * d) } else { 1.0 }
+            }
+            _ => PI,
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! A material, compiled: only numbers that the kernel needs.
+
+use crate::lanes::Real;
+use crate::material::fresnel::Reflectance;
+use crate::material::{Fresnel, Highlight, Lobe, Masking, Material};
+
+/// Microfacet slopes below this are mirrors (for reflected rays) or this (for highlights of lights).
+pub const SMOOTH_ALPHA: f64 = 1e-3;
+
+/// Phong exponents above this have highlights so small that their cosine, rounded in single precision, tells
+/// too little: the power's relative error is the exponent times some 1.5e-7.
+pub const SHARP_EXPONENT: f64 = 1024.0;
+
+/// A distribution of microfacets.
+#[derive(Clone, Copy, Debug)]
+pub struct Facets<S> {
+    /// GGX instead of Beckmann.
+    pub ggx: bool,
+    /// Slope, at least [`SMOOTH_ALPHA`].
+    pub alpha: S,
+    /// Its square.
+    pub alpha2: S,
+    /// One over its square.
+    pub inverse_alpha2: S,
+    /// How facets hide each other.
+    pub masking: Masking,
+}
+
+impl<S: Real> Facets<S> {
+    /// Of slope `alpha`.
+    pub fn new(ggx: bool, alpha: f64, masking: Masking) -> Self {
+        let alpha2 = alpha * alpha;
+        let [alpha, alpha2, inverse_alpha2] = [alpha, alpha2, 1.0 / alpha2].map(S::of);
+        Self { ggx, alpha, alpha2, inverse_alpha2, masking }
+    }
+}
+
+/// How a light's highlight is computed.
+#[derive(Clone, Copy, Debug)]
+pub enum Shine<S> {
+    /// No highlight.
+    None,
+    /// k_s (R.V)^alpha.
+    Phong {
+        /// k_s.
+        strength: S,
+        /// alpha.
+        exponent: S,
+        /// alpha exceeds `SHARP_EXPONENT`.
+        sharp: bool,
+    },
+    /// k_s D G F / (4 N.L N.V).
+    Facets {
+        /// k_s.
+        strength: S,
+        /// D and G.
+        facets: Facets<S>,
+    },
+}
+
+/// How a reflected ray is spread.
+#[derive(Clone, Copy, Debug)]
+pub enum Spread<S> {
+    /// Not at all.
+    Mirror,
+    /// Uniformly in a cone.
+    Cone {
+        /// 1 - cos of the half-angle.
+        one_minus_cos: S,
+    },
+    /// Uniformly on a square at unit distance.
+    Square {
+        /// Its side.
+        side: S,
+    },
+    /// As microfacets reflect.
+    Facets(Facets<S>),
+}
+
+/// How a surface lets light through.
+#[derive(Clone, Copy, Debug)]
+pub struct Transmission<S> {
+    /// k_t.
+    pub strength: S,
+    /// Index of refraction of the inside.
+    pub index: S,
+    /// Fresnel's equations share the light between reflection and transmission; otherwise k_r and k_t
+    /// are what they are.
+    pub dielectric: bool,
+}
+
+/// A material, compiled.
+#[derive(Clone, Copy, Debug)]
+pub struct Finish<S> {
+    /// k_a x colour.
+    pub ambient: [S; 3],
+    /// k_d x colour.
+    pub diffuse: [S; 3],
+    /// The lights' highlights.
+    pub shine: Shine<S>,
+    /// k_r and its spread, if it reflects at all.
+    pub reflection: Option<(S, Spread<S>)>,
+    /// k_t and what bends the light, if it lets any through.
+    pub transmission: Option<Transmission<S>>,
+    /// F of the highlight.
+    pub reflectance: Reflectance<S>,
+    /// F of the reflection, as far as it does not depend on what lies on the other side.
+    pub mirrored: Reflectance<S>,
+    /// Whether lights matter to it.
+    pub wants_light: bool,
+    /// Whether its back is like its front.
+    pub two_sided: bool,
+}
+
+/// 1 - cos(atan(r)), without cancellation: r^2 / (1 + r^2 + sqrt(1 + r^2)).
+pub fn one_minus_cos_of_tan(r: f64) -> f64 {
+    let square = r * r;
+    if square.is_infinite() { 1.0 } else { square / (1.0 + square + (1.0 + square).sqrt()) }
+}
+
+impl<S: Real> Finish<S> {
+    /// Compiles `material`; `reflects`: the scene traces reflected and transmitted rays at all.
+    pub fn new(material: &Material, reflects: bool) -> Self {
+        let slope = material.slope().max(SMOOTH_ALPHA);
+        let facets = |ggx| Facets::new(ggx, slope, material.masking);
+        let strength = S::of(material.specular);
+        let shine = match material.highlight {
+            _ if material.specular == 0.0 => Shine::None,
+            Highlight::Phong => Shine::Phong {
+                strength,
+                exponent: S::of(material.exponent),
+                sharp: material.exponent > SHARP_EXPONENT,
+            },
+            Highlight::CookTorrance => {
+                Shine::Facets { strength, facets: facets(material.lobe == Lobe::Ggx) }
+            }
+        };
+        let r = material.roughness;
+        let spread = match material.lobe {
+            Lobe::Mirror => Spread::Mirror,
+            Lobe::Cone | Lobe::Square if r == 0.0 => Spread::Mirror,
+            Lobe::Cone => Spread::Cone { one_minus_cos: S::of(one_minus_cos_of_tan(r)) },
+            Lobe::Square => Spread::Square { side: S::of(std::f64::consts::PI.sqrt() * r) },
+            Lobe::Beckmann | Lobe::Ggx if material.slope() < SMOOTH_ALPHA => Spread::Mirror,
+            Lobe::Beckmann => Spread::Facets(facets(false)),
+            Lobe::Ggx => Spread::Facets(facets(true)),
+        };
+        let (k_r, k_t) = (material.reflection, material.transmission);
+        let dielectric = material.law() == Fresnel::Dielectric;
+        let transmission = (reflects && k_t > 0.0).then(|| Transmission {
+            strength: S::of(k_t),
+            index: S::of(material.index),
+            dielectric,
+        });
+        let reflectance = Reflectance::new(material);
+        let shared = dielectric && transmission.is_some();
+        let black = material.diffuse == 0.0 || material.color.0 == [0.0; 3];
+        Self {
+            ambient: material.color.0.map(|c| S::of(c * material.ambient)),
+            diffuse: material.color.0.map(|c| S::of(c * material.diffuse)),
+            shine,
+            reflection: (reflects && k_r > 0.0).then(|| (S::of(k_r), spread)),
+            transmission,
+            reflectance,
+            mirrored: if shared { Reflectance::white() } else { reflectance },
+            wants_light: !black || material.specular != 0.0,
+            two_sided: material.two_sided,
+        }
+    }
+}

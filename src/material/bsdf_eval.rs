@@ -1,0 +1,298 @@
+//! What a finish does with light, in lanes: highlights of lights and directions of reflected rays.
+
+use crate::lanes::{Frame, Lanes, Mask, Real, V3};
+use crate::material::Masking;
+use crate::material::bsdf::{Facets, Finish, Shine, Spread};
+use crate::sampling::warp;
+use std::f64::consts::{FRAC_1_PI, PI};
+
+/// A reflected ray's direction and what its radiance counts.
+#[derive(Clone, Copy, Debug)]
+pub struct Reflected<L> {
+    /// Unit direction.
+    pub direction: V3<L>,
+    /// Factor of the radiance that comes from there; zero: the ray is lost.
+    pub weight: V3<L>,
+}
+
+/// Component along the unit vector `n` of `h`, of any length, and the squared tangent of the angle
+/// between them, from the part of `h` across `n`, so that small angles keep their digits. The tangent
+/// is bounded, so that what is computed from it stays finite.
+#[inline(always)]
+fn along_tan2<L: Lanes>(h: V3<L>, n: V3<L>) -> (L, L) {
+    let along = h.dot(n);
+    let across = h - n * along;
+    (along, (across.length2() / (along * along)).min(L::of(1e15)))
+}
+
+/// `cos`^alpha, of a cosine that was computed from unit vectors; 0 from 90 degrees on.
+///
+/// The cosine of two rounded vectors may exceed 1 by a few roundings, and 1.000001^1e6 is 2.7: it is at most 1
+/// here.
+#[inline(always)]
+fn cosine_power<L: Lanes>(cos: L, alpha: L) -> L {
+    let power = (cos.max(L::of(1e-30)).min(L::one()).ln() * alpha).exp();
+    power.only(cos.gt(L::zero()))
+}
+
+/// The same of the angle between `a` and `b`, for alpha above
+/// [`SHARP_EXPONENT`](crate::material::bsdf::SHARP_EXPONENT), whatever the vectors' lengths.
+///
+/// Near 1 the cosine has no digits left, but the tangent t = |a x b| / a.b has: cos^alpha = exp(-alpha / 2
+/// ln(1 + t^2)), and ln(1 + t^2) = 2 artanh(s) with s = t^2 / (2 + t^2). Of its series in s^2 four terms leave
+/// a relative error of s^8 / 9: below 1e-9 while alpha s < 88, beyond which the power is no normal number of
+/// single precision.
+#[inline(always)]
+fn sharp_cosine_power<L: Lanes>(a: V3<L>, b: V3<L>, alpha: L) -> L {
+    let (along, across2) = (a.dot(b), a.cross(b).length2());
+    let s = across2 / (along * along * L::of(2.0) + across2);
+    let s2 = s * s;
+    let series = [1.0 / 5.0, 1.0 / 3.0, 1.0]
+        .into_iter()
+        .fold(L::of(1.0 / 7.0), |sum, term| sum.mul_add(s2, L::of(term)));
+    (-(alpha * s * series)).exp().only(along.gt(L::zero()))
+}
+
+/// Microfacet terms in a lane type.
+pub trait FacetsOf<L: Lanes> {
+    /// D [1/sr] for a facet normal at `tan2` from the surface normal.
+    fn density(&self, tan2: L) -> L;
+    /// G, the share of facets with normal h that both directions see, as numerator and denominator.
+    /// `nh`, `nv`, `nl`, `vh` are cosines, all positive; `nh` and `vh` may have a factor in common.
+    fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L);
+    /// Smith's Lambda at cosine `c` > 0 from the normal.
+    fn lambda(&self, c: L) -> L;
+}
+
+/// Beckmann's Lambda is below 3e-10 from here on.
+const STEEP: f64 = 4.0;
+
+/// Beckmann's Lambda (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)) for 0 < a < [`STEEP`]; beyond,
+/// anything. Heitz 2014, eq. 57.
+///
+/// It is exp(-a^2) k(a) / (2 a sqrt(pi) (1 + 2 a^2)) with a smooth k between 0.6 and 1, here the
+/// Chebyshev fit of degree 10 in 2 - 6 / (a + 2). Error below 1e-8 (1 + Lambda).
+#[inline(always)]
+fn beckmann_lambda<L: Lanes>(a: L) -> L {
+    const K: [f64; 11] = [
+        0.726_383_531_676_393_2,
+        0.221_492_853_638_683_35,
+        0.159_588_281_416_975_67,
+        -0.247_616_611_436_622_9,
+        0.093_493_669_224_564_09,
+        -0.000_193_709_867_889_302_33,
+        -0.006_363_589_005_963_344,
+        -0.000_203_411_755_586_691,
+        0.000_456_536_003_607_954_65,
+        5.661_643_591_547_971e-5,
+        -2.270_107_819_080_595_3e-5,
+    ];
+    let x = L::of(2.0) - L::of(6.0) / (a + L::of(2.0));
+    let k = K.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::of(*k)));
+    let a2 = a * a;
+    let below = a * a2.mul_add(L::of(4.0 * PI.sqrt()), L::of(2.0 * PI.sqrt()));
+    (-a2).exp() * k / below
+}
+
+impl<L: Lanes> FacetsOf<L> for Facets<L::Scalar> {
+    #[inline(always)]
+    fn density(&self, tan2: L) -> L {
+        let inverse_alpha2 = L::splat(self.inverse_alpha2);
+        if self.ggx {
+            warp::ggx_d(tan2, inverse_alpha2)
+        } else {
+            warp::beckmann_d(tan2, inverse_alpha2)
+        }
+    }
+
+    /// Torrance and Sparrow 1967 (V-cavities): min(1, 2 N.H min(N.V, N.L) / V.H); Heitz 2014,
+    /// *Understanding the Masking-Shadowing Function* (height-correlated Smith): 1 / (1 + Lambda(V) +
+    /// Lambda(L)).
+    #[inline(always)]
+    fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L) {
+        match self.masking {
+            Masking::VCavity => ((L::of(2.0) * nh * nv.min(nl)).min(vh), vh),
+            Masking::Smith => (L::one(), L::one() + self.lambda(nv) + self.lambda(nl)),
+        }
+    }
+
+    /// With a = 1 / (alpha tan).
+    #[inline(always)]
+    fn lambda(&self, c: L) -> L {
+        let alpha2 = L::splat(self.alpha2);
+        let (cos2, sin2) = (c * c, (L::one() - c * c).max(L::zero()));
+        if self.ggx {
+            return ((alpha2 * sin2 / cos2 + L::one()).sqrt() - L::one()) * L::of(0.5);
+        }
+        // Seen steeply by all lanes, as most surfaces are: nothing is hidden.
+        let flat = cos2.lt(sin2 * alpha2 * L::of(STEEP * STEEP));
+        if flat.none() {
+            return L::zero();
+        }
+        beckmann_lambda(c / (alpha2 * sin2).sqrt()).only(flat)
+    }
+}
+
+impl<S: Real> Finish<S> {
+    /// Whether lights leave highlights on it.
+    #[inline(always)]
+    pub fn shines(&self) -> bool {
+        !matches!(self.shine, Shine::None)
+    }
+
+    /// The highlight of a light: radiance towards `view` per irradiance of a surface that faces the
+    /// light [1/sr] (so with the cosine of the incident light, where the formula has one).
+    ///
+    /// `n`, `view`, `light`: unit vectors away from the surface; `nl`, `nv`: their cosines.
+    #[inline(always)]
+    pub fn highlight<L: Lanes<Scalar = S>>(
+        &self,
+        n: V3<L>,
+        view: V3<L>,
+        light: V3<L>,
+        nl: L,
+        nv: L,
+    ) -> V3<L> {
+        match &self.shine {
+            Shine::None => V3::zero(),
+            Shine::Phong { strength, exponent, sharp } => {
+                let (r, alpha) = (-light.reflect(n), L::splat(*exponent));
+                let power = if *sharp {
+                    sharp_cosine_power(r, view, alpha)
+                } else {
+                    let cos = r.dot(view);
+                    cosine_power(cos, alpha)
+                };
+                let value = L::splat(*strength) * power * L::of(FRAC_1_PI);
+                V3::new(value, value, value)
+            }
+            Shine::Facets { strength, facets } => {
+                // The half vector, not of unit length: its square is twice its product with either.
+                let h = view + light;
+                let (nh, tan2) = along_tan2(h, n);
+                let h2 = h.length2();
+                let (seen, all) = facets.masking(nh, nv, nl, h2 * L::of(0.5));
+                // f N.L = D G F / (4 N.V): the light's cosine cancels.
+                let d: L = facets.density(tan2);
+                let k = L::of(0.25 * strength.to_f64());
+                let value = d * seen * k / (nv * all);
+                let valid = nh.gt(L::zero()) & nv.gt(L::zero());
+                self.reflectance.times(|| h2.sqrt() * L::of(0.5), value).only(valid)
+            }
+        }
+    }
+
+    /// A reflected ray for the surface seen along `incident` (unit, towards the surface) with normal
+    /// `n` on the viewer's side; `u`, `v` uniform in [0, 1). `fold`: lobes that dip under the surface
+    /// are mirrored up, otherwise lost there.
+    #[inline(always)]
+    pub fn reflect<L: Lanes<Scalar = S>>(
+        &self,
+        strength: S,
+        spread: &Spread<S>,
+        incident: V3<L>,
+        n: V3<L>,
+        (u, v): (L, L),
+        fold: bool,
+    ) -> Reflected<L> {
+        let mirror = incident.reflect(n);
+        let k = L::splat(strength);
+        let (direction, weight) = match spread {
+            Spread::Mirror => (mirror, k),
+            Spread::Cone { one_minus_cos } => {
+                let local = warp::cone(u, v, L::splat(*one_minus_cos));
+                (Frame::around(mirror.renormalize()).to_world(local), k)
+            }
+            Spread::Square { side } => {
+                let local = warp::square(u, v, L::splat(*side));
+                (Frame::around(mirror.renormalize()).to_world(local), k)
+            }
+            Spread::Facets(facets) => return self.facet(k, facets, incident, n, (u, v)),
+        };
+        let up = direction.dot(n);
+        let below = up.le(L::zero());
+        let (direction, weight) = if fold {
+            (V3::select(below, direction.reflect(n), direction), weight)
+        } else {
+            (direction, L::select(below, L::zero(), weight))
+        };
+        // The facet that would send this ray: half-way between view and reflected direction, whose
+        // cosine with either is half the length of their sum (without cancellation at grazing angles).
+        let cos = || ((direction - incident).length2().sqrt() * L::of(0.5)).min(L::one());
+        Reflected { direction, weight: self.mirrored.times(cos, weight) }
+    }
+
+    /// Reflection at a sampled microfacet. Below the surface G is zero, and so is the weight.
+    #[inline(always)]
+    fn facet<L: Lanes<Scalar = S>>(
+        &self,
+        k: L,
+        facets: &Facets<S>,
+        incident: V3<L>,
+        n: V3<L>,
+        (u, v): (L, L),
+    ) -> Reflected<L> {
+        let frame = Frame::around(n);
+        let view = frame.to_local(-incident);
+        let alpha = L::splat(facets.alpha);
+        let h = if facets.ggx {
+            warp::ggx_visible(u, v, alpha, view)
+        } else {
+            warp::beckmann(u, v, alpha)
+        };
+        let vh = view.dot(h);
+        let light = h * (vh + vh) - view;
+        let (seen, all) = facets.masking(h.z, view.z, light.z, vh);
+        let weight: L = if facets.ggx {
+            // Visible normals: density D G1 V.H / N.V, so that f N.L / density = F G / G1.
+            k * seen * (L::one() + FacetsOf::<L>::lambda(facets, view.z)) / all
+        } else {
+            // Normals by D N.H: f N.L / density = F G V.H / (N.V N.H).
+            k * seen * vh / (all * view.z * h.z)
+        };
+        let valid = vh.gt(L::zero()) & light.z.gt(L::zero()) & view.z.gt(L::zero());
+        Reflected {
+            direction: frame.to_world(light).renormalize(),
+            weight: self.mirrored.times(|| vh, weight).only(valid),
+        }
+    }
+
+    /// Density [1/sr] with which [`Finish::reflect`] draws `direction` before folding, one lane at a
+    /// time, in double precision: what tests integrate. `None` for a mirror.
+    pub fn density(
+        &self,
+        spread: &Spread<S>,
+        incident: V3<f64>,
+        n: V3<f64>,
+        direction: V3<f64>,
+    ) -> Option<f64> {
+        let mirror = incident.reflect(n);
+        match spread {
+            Spread::Mirror => None,
+            Spread::Cone { one_minus_cos } => {
+                Some(warp::cone_pdf(mirror.dot(direction), one_minus_cos.to_f64()))
+            }
+            Spread::Square { side } => {
+                let local = Frame::around(mirror).to_local(direction);
+                Some(warp::square_pdf([local.x, local.y, local.z], side.to_f64()))
+            }
+            Spread::Facets(facets) => {
+                let facets = Facets::<f64>::new(facets.ggx, facets.alpha.to_f64(), facets.masking);
+                let view = -incident;
+                let h = (view + direction).normalize();
+                let (nh, tan2) = along_tan2(h, n);
+                let vh = view.dot(h);
+                if nh <= 0.0 || vh <= 0.0 {
+                    return Some(0.0);
+                }
+                let d = facets.density(tan2);
+                let nv = view.dot(n);
+                Some(if facets.ggx {
+                    d / ((1.0 + FacetsOf::<f64>::lambda(&facets, nv)) * 4.0 * nv)
+                } else {
+                    d * nh / (4.0 * vh)
+                })
+            }
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! What each model of reflection promises, so that tests can hold it to that.
+
+use crate::material::{Fresnel, Highlight, Lobe, Masking};
+
+/// How much of the light that a model gets it gives back, at coefficient 1 and reflectance 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Energy {
+    /// All of it, at every angle (with lobes folded at the horizon).
+    Kept,
+    /// At most all of it: what would bounce between microfacets is lost.
+    AtMost,
+    /// Perhaps more than it gets.
+    Unbounded,
+}
+
+/// What a model of reflection promises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Claims {
+    /// f(light, view) = f(view, light).
+    pub reciprocal: bool,
+    /// Whether light may be lost or won.
+    pub energy: Energy,
+}
+
+impl Claims {
+    /// The claims of the diffuse part, Lambert's law f = albedo / pi: the only model without a name
+    /// in scene files.
+    pub const LAMBERT: Self = Self { reciprocal: true, energy: Energy::Kept };
+}
+
+impl Lobe {
+    /// Every lobe, in the order of the field table.
+    pub const ALL: [Self; 5] = [Self::Mirror, Self::Cone, Self::Square, Self::Beckmann, Self::Ggx];
+
+    /// What the reflection by this lobe promises.
+    ///
+    /// Cone and square spread light evenly about the mirror direction: the density is symmetric, so
+    /// that f = density / cos of the light is not.
+    pub fn claims(self) -> Claims {
+        match self {
+            Self::Mirror => Claims { reciprocal: true, energy: Energy::Kept },
+            Self::Cone | Self::Square => Claims { reciprocal: false, energy: Energy::Kept },
+            Self::Beckmann | Self::Ggx => Claims { reciprocal: true, energy: Energy::AtMost },
+        }
+    }
+}
+
+impl Highlight {
+    /// Every formula, in the order of the field table.
+    pub const ALL: [Self; 2] = [Self::Phong, Self::CookTorrance];
+
+    /// What the formula promises.
+    pub fn claims(self) -> Claims {
+        match self {
+            Self::Phong => Claims { reciprocal: false, energy: Energy::Unbounded },
+            Self::CookTorrance => Claims { reciprocal: true, energy: Energy::AtMost },
+        }
+    }
+}
+
+impl Masking {
+    /// Every formula, in the order of the field table.
+    pub const ALL: [Self; 2] = [Self::VCavity, Self::Smith];
+}
+
+impl Fresnel {
+    /// Every law, in the order of the field table.
+    pub const ALL: [Self; 4] = [Self::Constant, Self::Schlick, Self::Exact, Self::Dielectric];
+
+    /// What a transparent surface with this law promises of what it reflects and transmits together.
+    pub fn claims_of_transmission(self) -> Claims {
+        match self {
+            Self::Dielectric => Claims { reciprocal: true, energy: Energy::Kept },
+            // k_r and k_t are not weighted against each other; inner sides do not reflect.
+            _ => Claims { reciprocal: false, energy: Energy::Unbounded },
+        }
+    }
+}

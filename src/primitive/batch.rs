@@ -1,0 +1,235 @@
+//! What rays meet: one batch per form, all items of a form side by side, so that a form that does
+//! not occur costs nothing.
+
+use crate::bvh::{Hit, Ray};
+use crate::lanes::{Lanes, Mask, V3};
+use crate::primitive::conical_frustum::Tapered;
+use crate::primitive::convex_polyhedron::Convex;
+use crate::primitive::csg::Compounds;
+use crate::primitive::ellipsoid::Ellipsoid;
+use crate::primitive::form::Form;
+use crate::primitive::mesh_instance::Meshes;
+use crate::primitive::planar::{Parallelogram, Plane};
+use crate::primitive::sphere::Sphere;
+use std::ops::Range;
+
+/// Where a ray meets a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface<L> {
+    /// The point, put back on the surface as exactly as the precision allows.
+    pub point: V3<L>,
+    /// Unit geometric normal: outward for solids, on the front for flat shapes.
+    pub normal: V3<L>,
+    /// Largest magnitude of a coordinate that took part in computing the point: its rounding error
+    /// is a few units of the last place of this.
+    pub reach: L,
+}
+
+/// Texture coordinates that a shape has of its own, at one point.
+#[derive(Clone, Copy, Debug)]
+pub struct OwnUv<L> {
+    /// u to the right, v up.
+    pub uv: [L; 2],
+    /// Their gradients along the surface, in the shape's own axes.
+    pub gradients: [V3<L>; 2],
+}
+
+impl<L: Lanes> Surface<L> {
+    /// How far from the point rays start that leave the surface: a few roundings of the largest number
+    /// involved.
+    #[inline(always)]
+    pub fn lift(&self) -> L {
+        self.reach.max(self.point.max_abs()) * L::of(8.0 * L::EPSILON)
+    }
+}
+
+/// One thing that rays meet, compiled for the lane type.
+pub trait Item<L: Lanes> {
+    /// Distance at which each line through a ray meets the item first in front of the ray's origin, and
+    /// where it meets it; there, a distance that is not positive is no hit. `None`: it meets it nowhere.
+    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;
+
+    /// The surface at `point` (near it, from `ray.at(t)`).
+    fn surface(&self, point: V3<L>) -> Surface<L>;
+}
+
+/// All items of one form.
+pub enum Batch<L: Lanes> {
+    /// Parallelograms.
+    Parallelograms(Vec<Parallelogram<L::Scalar>>),
+    /// Infinite planes.
+    Planes(Vec<Plane<L::Scalar>>),
+    /// Spheres.
+    Spheres(Vec<Sphere<L::Scalar>>),
+    /// Ellipsoids.
+    Ellipsoids(Vec<Ellipsoid<L::Scalar>>),
+    /// Convex solids.
+    Convex(Vec<Convex<L::Scalar>>),
+    /// Tapered cylinders.
+    Tapered(Vec<Tapered<L::Scalar>>),
+    /// Compounds, whose items are parts.
+    Compounds(Compounds<L::Scalar>),
+    /// Meshes.
+    Meshes(Meshes<L::Scalar>),
+}
+
+/// The same expression for the items of any form but compounds and meshes, and one for each of those.
+macro_rules! each {
+    ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
+        $meshes:ident => $third:expr) => {
+        match $batch {
+            Batch::Parallelograms($items) => $value,
+            Batch::Planes($items) => $value,
+            Batch::Spheres($items) => $value,
+            Batch::Ellipsoids($items) => $value,
+            Batch::Convex($items) => $value,
+            Batch::Tapered($items) => $value,
+            Batch::Compounds($compounds) => $other,
+            Batch::Meshes($meshes) => $third,
+        }
+    };
+}
+
+impl<L: Lanes> Batch<L> {
+    /// Narrows `hit` by the items in `range`; an item's tag is `base` + its number.
+    #[inline(always)]
+    pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
+        each!(self,
+            items => closest(&items[range.clone()], base + range.start as u32, ray, hit),
+            compounds => compounds.closest(range, base, ray, hit),
+            meshes => meshes.closest(range, base, ray, hit));
+    }
+
+    /// Where a surface of the items in `range` lies at a distance in (0, limit) of the ray. May stop
+    /// early once all lanes of `wanted` are blocked.
+    #[inline(always)]
+    pub fn blocked(&self, range: Range<usize>, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+        each!(self,
+            items => blocked(&items[range], ray, limit, wanted),
+            compounds => compounds.blocked(range, ray, limit, wanted),
+            meshes => meshes.blocked(range, ray, limit, wanted))
+    }
+
+    /// The surface of `item` at `point` (near it, from `ray.at(t)`); `facet`: tag of a mesh's triangle.
+    #[inline(always)]
+    pub fn surface(&self, item: usize, facet: L, point: V3<L>) -> Surface<L> {
+        each!(self,
+            items => items[item].surface(point),
+            compounds => compounds.surface(item, point),
+            meshes => meshes.surface(item, facet, point))
+    }
+}
+
+#[inline(always)]
+fn closest<L: Lanes>(items: &[impl Item<L>], first: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
+    for (tag, item) in (first..).zip(items) {
+        if let Some((t, meets)) = item.crossing(ray) {
+            hit.narrow(meets, t, tag);
+        }
+    }
+}
+
+#[inline(always)]
+fn blocked<L: Lanes>(items: &[impl Item<L>], ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+    let mut blocked = L::mask(false);
+    for item in items {
+        if let Some((t, meets)) = item.crossing(ray) {
+            blocked = blocked | (meets & t.gt(L::zero()) & t.lt(limit));
+            if wanted.and_not(blocked).none() {
+                break;
+            }
+        }
+    }
+    blocked
+}
+
+/// What an item came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// Position in the list given to `compile`.
+    pub form: usize,
+    /// Which part of a compound; 0 for all other forms. Part 0 stands for the whole compound where
+    /// rays ask for items; its other parts never meet anything by themselves.
+    pub part: usize,
+}
+
+/// A compiled batch and what its items came from.
+pub struct Compiled<L: Lanes> {
+    /// The batch.
+    pub batch: Batch<L>,
+    /// `sources[item]`: which form, which part of it.
+    pub sources: Vec<Source>,
+    /// How the inventory counts the items: singular and plural.
+    pub noun: (&'static str, &'static str),
+    /// What it says behind that.
+    pub detail: String,
+    /// Items without an end, which no tree can hold.
+    pub infinite: bool,
+}
+
+/// One batch per form that occurs in `forms`.
+pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
+    let mut out = Vec::new();
+    /// The items that `new` makes of some forms, as one batch.
+    macro_rules! add {
+        ($batch:ident, $item:ident, $noun:expr, $infinite:expr) => {
+            let made = forms
+                .iter()
+                .enumerate()
+                .filter_map(|(form, f)| Some((Source { form, part: 0 }, $item::new(f)?)));
+            let (sources, items): (Vec<_>, Vec<_>) = made.unzip();
+            if !items.is_empty() {
+                let batch = Batch::$batch(items);
+                let detail = String::new();
+                out.push(Compiled { batch, sources, noun: $noun, detail, infinite: $infinite });
+            }
+        };
+    }
+    add!(Parallelograms, Parallelogram, ("rectangle", "rectangles"), false);
+    add!(Planes, Plane, ("plane", "planes"), true);
+    add!(Spheres, Sphere, ("sphere", "spheres"), false);
+    add!(Ellipsoids, Ellipsoid, ("ellipsoid", "ellipsoids"), false);
+    add!(Convex, Convex, ("convex solid", "convex solids"), false);
+    add!(Tapered, Tapered, ("tapered cylinder", "tapered cylinders"), false);
+    let compounds = forms.iter().enumerate().filter(|(_, f)| matches!(f, Form::Compound(_)));
+    let sources: Vec<_> = compounds
+        .flat_map(|(form, f)| (0..f.parts()).map(move |part| Source { form, part }))
+        .collect();
+    if !sources.is_empty() {
+        let batch = Batch::Compounds(Compounds::new(forms));
+        let (noun, detail) = (("compound", "compounds"), String::new());
+        out.push(Compiled { batch, sources, noun, detail, infinite: false });
+    }
+    let mut triangles = 0;
+    let mut sources = Vec::new();
+    for (form, f) in forms.iter().enumerate() {
+        if let Form::Mesh { mesh, .. } = f {
+            triangles += mesh.mesh().triangles.len();
+            sources.push(Source { form, part: 0 });
+        }
+    }
+    if !sources.is_empty() {
+        let batch = Batch::Meshes(Meshes::new(forms));
+        let detail = format!(" of {} triangles", grouped(triangles));
+        out.push(Compiled { batch, sources, noun: ("mesh", "meshes"), detail, infinite: false });
+    }
+    out
+}
+
+/// `69,451`
+fn grouped(n: usize) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// Largest magnitude of a coordinate in a bounded form.
+pub(crate) fn reach(form: &Form) -> f64 {
+    form.bounds().map_or(0.0, |(low, high)| low.abs().max(high.abs()).max_element())
+}

@@ -1,0 +1,388 @@
+//! Where things are, roughly: enough to tell that some rays cannot meet them. In double precision, and
+//! with room for the roundings of single: whatever a ray in lanes may meet is never ruled out.
+
+use crate::primitive::form::Form;
+use glam::DVec3;
+
+/// Rays in single precision stray by a few times 2^-24 of the largest coordinate; this is more.
+pub const STRAY: f64 = 1e-5;
+
+/// A ball.
+#[derive(Clone, Copy, Debug)]
+pub struct Ball {
+    /// Centre.
+    pub center: DVec3,
+    /// Radius; infinite for things without an end.
+    pub radius: f64,
+}
+
+/// Where shadow rays lead.
+#[derive(Clone, Copy, Debug)]
+pub enum Towards {
+    /// To a point.
+    Point(DVec3),
+    /// Far away in a direction of unit length.
+    Direction(DVec3),
+}
+
+/// Straight lines that leave one point through a convex quadrilateral.
+#[derive(Clone, Copy, Debug)]
+pub struct Pencil {
+    /// The point.
+    pub apex: DVec3,
+    /// Forward, of unit length.
+    pub forward: DVec3,
+    /// From the apex to the quadrilateral's corners, which lie at distance 1 along `forward`.
+    pub corners: [DVec3; 4],
+}
+
+impl Pencil {
+    /// Whether a ball may reach between the lines: into the cone around them, if that is narrower than a half
+    /// space; otherwise, as no circular cone is convex then, to the inner side of the four planes through the
+    /// apex and neighbouring corners.
+    fn meets(&self, ball: &Ball) -> bool {
+        let Self { apex, forward, corners } = self;
+        let axis = corners.iter().sum::<DVec3>().normalize();
+        let cos = corners.iter().map(|c| c.normalize().dot(axis)).fold(1.0, f64::min);
+        if cos > 0.0 {
+            let cone = Cone { apex: *apex, axis, cos, sin: (1.0 - cos * cos).sqrt() };
+            return cone.meets(ball);
+        }
+        let to = ball.center - *apex;
+        let reach = ball.reach(*apex);
+        let is_outside = |i: usize| {
+            let normal = corners[i].cross(corners[(i + 1) % 4]);
+            let inward = normal * normal.dot(axis).signum();
+            inward.dot(to) < -reach * normal.length()
+        };
+        to.dot(*forward) >= -reach && !(0..4).any(is_outside)
+    }
+}
+
+/// The surroundings of one thing.
+#[derive(Clone, Copy, Debug)]
+pub struct Bound {
+    ball: Ball,
+    /// Unit normal and offset of the plane that a flat thing lies in.
+    plane: Option<(DVec3, f64)>,
+    /// It does not see itself from outside.
+    convex: bool,
+    /// How far rays end from where they are said to.
+    slack: f64,
+}
+
+impl Ball {
+    fn around(points: &[DVec3]) -> Self {
+        let center = points.iter().sum::<DVec3>() / points.len() as f64;
+        let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
+        Self { center, radius }
+    }
+
+    /// Whether `point` lies inside or near the surface.
+    pub fn holds(&self, point: DVec3) -> bool {
+        self.center.distance(point) <= self.radius + stray(self.center) + stray(point)
+    }
+
+    /// Its radius, with room for the roundings of rays from `apex`.
+    fn reach(&self, apex: DVec3) -> f64 {
+        self.radius * (1.0 + STRAY) + stray(self.center) + stray(apex)
+    }
+}
+
+fn stray(point: DVec3) -> f64 {
+    STRAY * point.abs().max_element()
+}
+
+impl Bound {
+    /// Of a form.
+    pub fn new(form: &Form) -> Self {
+        let ball = match form {
+            Form::Sphere { center, radius } => Ball { center: *center, radius: *radius },
+            Form::Convex { corners, .. } => Ball::around(corners),
+            Form::Parallelogram { corner, u, v } => {
+                Ball::around(&[*corner, corner + u, corner + v, corner + u + v])
+            }
+            Form::Ellipsoid { scene_from_unit: map } => {
+                let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis]
+                    .map(|a| a.length_squared());
+                // The largest singular value is at most the root of the sum of squares.
+                Ball { center: map.translation, radius: (x + y + z).sqrt() }
+            }
+            Form::Tapered { .. } | Form::Compound(_) | Form::Mesh { .. } | Form::Plane { .. } => {
+                match form.bounds() {
+                    Some((low, high)) => {
+                        Ball { center: 0.5 * (low + high), radius: 0.5 * low.distance(high) }
+                    }
+                    None => Ball { center: DVec3::ZERO, radius: f64::INFINITY },
+                }
+            }
+        };
+        let plane = match form {
+            Form::Parallelogram { corner, u, v } => {
+                let normal = u.cross(*v).normalize();
+                Some((normal, normal.dot(*corner)))
+            }
+            Form::Plane { normal, offset } => Some((*normal, *offset)),
+            _ => None,
+        };
+        let convex = !matches!(form, Form::Compound(_) | Form::Mesh { .. });
+        Self { ball, plane, convex, slack: 0.0 }
+    }
+
+    /// A ball around it.
+    pub fn ball(&self) -> Ball {
+        self.ball
+    }
+
+    /// Whether it is flat: a ray that leaves it does not meet it again.
+    pub fn is_flat(&self) -> bool {
+        self.plane.is_some()
+    }
+
+    /// Whether it is convex: its outside does not see itself.
+    pub fn is_convex(&self) -> bool {
+        self.convex
+    }
+
+    /// A ball around all of it that the pencil's lines meet in front of the apex; `None`: nothing.
+    pub fn part_in(&self, pencil: &Pencil) -> Option<Ball> {
+        let Pencil { apex, forward, corners } = pencil;
+        let ball = self.ball;
+        if ball.radius.is_finite() && !pencil.meets(&ball) {
+            return None;
+        }
+        let room = stray(*apex) + stray(ball.center);
+        // Depths along `forward` between which the thing lies.
+        let middle = (ball.center - *apex).dot(*forward);
+        let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
+        if let Some((normal, offset)) = self.plane {
+            // Along lines that have the same length in depth, 1 / depth of a plane is linear: its
+            // extremes are at the corners, if the plane crosses all four in front. What rounding may do to
+            // the plane's height above the apex and to the slopes of the lines is allowed for.
+            let height = offset - normal.dot(*apex);
+            let (height, toward) = (height.abs(), normal * height.signum());
+            let slack = self.stray(*apex);
+            let slopes = corners.map(|c| (toward.dot(c), STRAY * c.length()));
+            if height <= slack {
+                // The apex may be on either side.
+            } else if slopes.iter().all(|(slope, stray)| slope > stray) {
+                let nearest = slopes.map(|(slope, stray)| (height - slack) / (slope + stray));
+                let farthest = slopes.map(|(slope, stray)| (height + slack) / (slope - stray));
+                near = near.max(nearest.into_iter().fold(f64::INFINITY, f64::min));
+                far = far.min(farthest.into_iter().fold(0.0, f64::max));
+            } else if slopes.iter().all(|(slope, stray)| *slope < -stray) {
+                return None;
+            }
+        }
+        if !far.is_finite() {
+            return Some(ball);
+        }
+        let near = near.max(0.0);
+        let far = far.max(near);
+        let ends: [DVec3; 8] =
+            std::array::from_fn(|i| *apex + corners[i % 4] * if i < 4 { near } else { far });
+        let part = Ball::around(&ends);
+        let part = Ball { radius: part.radius + room, ..part };
+        Some(if part.radius < ball.radius { part } else { ball })
+    }
+
+    /// The same with room around it: for shadow rays that end so far from their lights.
+    pub fn grown(self, by: f64) -> Self {
+        let ball = Ball { radius: self.ball.radius + by, ..self.ball };
+        Self { ball, slack: self.slack + by, ..self }
+    }
+
+    /// How far off a flat thing's plane rays that lead to `point` meet it.
+    fn stray(&self, point: DVec3) -> f64 {
+        let Ball { center, radius } = self.ball;
+        let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
+        let offset = self.plane.map_or(0.0, |(_, offset)| offset.abs());
+        self.slack + stray(point) + STRAY * reach.max(offset)
+    }
+
+    /// Whether it may stand between some point of `lit` and the light.
+    pub fn shades(&self, lit: &Ball, towards: &Towards) -> bool {
+        let slack = stray(lit.center) + STRAY * lit.radius;
+        let radius = lit.radius + slack;
+        if let Some((normal, offset)) = self.plane {
+            let height = normal.dot(lit.center) - offset;
+            // A light on the plane within rounding may be seen on either side.
+            let (beyond, unsure) = match towards {
+                Towards::Point(light) => (normal.dot(*light) - offset, self.stray(*light)),
+                Towards::Direction(direction) => (normal.dot(*direction), STRAY),
+            };
+            let sure = height.abs() > lit.radius + self.stray(lit.center) && beyond.abs() > unsure;
+            // Both on the same side.
+            if sure && height.abs() > radius && height * beyond > 0.0 {
+                return false;
+            }
+        }
+        if !lit.radius.is_finite() || !self.ball.radius.is_finite() {
+            return true;
+        }
+        match towards {
+            Towards::Direction(direction) => {
+                let to = self.ball.center - lit.center;
+                let along = to.dot(*direction);
+                let across = (to - *direction * along).length();
+                let both = (radius + self.ball.radius) * (1.0 + STRAY) + stray(self.ball.center);
+                across <= both && along >= -both
+            }
+            Towards::Point(light) => {
+                let to = lit.center - *light;
+                let distance = to.length();
+                if distance <= radius {
+                    return true;
+                }
+                let sin = radius / distance;
+                let (axis, cos) = (to / distance, (1.0 - sin * sin).sqrt());
+                let cone = Cone { apex: *light, axis, sin, cos };
+                let nearest = (self.ball.center - *light).length() - self.ball.radius;
+                nearest <= distance + radius && cone.meets(&self.ball)
+            }
+        }
+    }
+}
+
+/// All directions within an angle below 90 degrees of an axis.
+struct Cone {
+    apex: DVec3,
+    axis: DVec3,
+    sin: f64,
+    cos: f64,
+}
+
+impl Cone {
+    /// Whether a ball may reach into the cone: it is not all behind the apex, and its centre is no
+    /// farther from the cone's side than its radius.
+    fn meets(&self, ball: &Ball) -> bool {
+        let to = ball.center - self.apex;
+        let along = to.dot(self.axis);
+        let across = (to - self.axis * along).length();
+        let radius = ball.reach(self.apex);
+        along >= -radius && across * self.cos - along * self.sin <= radius
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ball(center: [f64; 3], radius: f64) -> Form {
+        Form::Sphere { center: center.into(), radius }
+    }
+
+    /// A square of side 2 about `center`, facing up.
+    fn tile(center: [f64; 3]) -> Form {
+        let corner = DVec3::from(center) - DVec3::new(1.0, 0.0, 1.0);
+        Form::Parallelogram { corner, u: DVec3::Z * 2.0, v: DVec3::X * 2.0 }
+    }
+
+    /// Looks from (0, 0, 5) along -z, 0.1 to each side at unit distance.
+    fn pencil() -> Pencil {
+        let corners = [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)];
+        Pencil {
+            apex: DVec3::Z * 5.0,
+            forward: DVec3::NEG_Z,
+            corners: corners.map(|(x, y)| DVec3::new(x, y, -1.0)),
+        }
+    }
+
+    #[test]
+    fn a_pencil_meets_what_is_in_front_of_it() {
+        let part = |form: &Form| Bound::new(form).part_in(&pencil());
+        assert!(part(&ball([0.0, 0.0, 0.0], 1.0)).is_some());
+        assert!(part(&ball([1.4, 0.0, 0.0], 1.0)).is_some());
+        assert!(part(&ball([2.0, 0.0, 0.0], 1.0)).is_none());
+        assert!(part(&ball([0.0, 0.0, 7.0], 1.0)).is_none());
+        let wall = Form::Plane { normal: DVec3::Z, offset: 0.0 };
+        let seen = part(&wall).unwrap();
+        // A square with half-sides 0.5.
+        assert!(seen.center.length() < 1e-3 && (seen.radius - 0.5f64.sqrt()).abs() < 1e-3);
+        assert!(part(&Form::Plane { normal: DVec3::Z, offset: 6.0 }).is_none());
+        // Seen edge-on, without an end.
+        let floor = part(&Form::Plane { normal: DVec3::Y, offset: -0.1 }).unwrap();
+        assert!(floor.radius.is_infinite());
+    }
+
+    #[test]
+    fn only_what_is_between_shades() {
+        let lit = Ball { center: DVec3::ZERO, radius: 0.5 };
+        let lamp = Towards::Point(DVec3::Y * 4.0);
+        let sun = Towards::Direction(DVec3::Y);
+        for (form, by_lamp, by_sun) in [
+            (ball([0.0, 2.0, 0.0], 0.1), true, true),
+            (ball([0.4, 2.0, 0.0], 0.1), false, true),
+            (ball([0.3, 2.0, 0.0], 0.1), true, true),
+            (ball([0.0, 5.0, 0.0], 0.5), false, true),
+            (ball([0.0, -2.0, 0.0], 1.0), false, false),
+            (tile([0.0, 1.0, 0.0]), true, true),
+            (tile([0.0, -0.6, 0.0]), false, false),
+            (tile([0.0, -0.4, 0.0]), true, true),
+            (tile([0.0, 6.0, 0.0]), false, true),
+        ] {
+            let bound = Bound::new(&form);
+            assert_eq!(bound.shades(&lit, &lamp), by_lamp, "lamp {form:?}");
+            assert_eq!(bound.shades(&lit, &sun), by_sun, "sun {form:?}");
+        }
+    }
+
+    /// Lines in all directions that a picture of 175 degrees shows in its only tile; the eye is not in the
+    /// middle of the tile's corners, which lie more than 90 degrees from their mean.
+    #[test]
+    fn a_wide_pencil_meets_what_its_lines_meet() {
+        let apex = DVec3::new(1.0, -2.0, 5.0);
+        let edge = 87.5f64.to_radians().tan();
+        let ends =
+            [(-edge, edge), (0.6 * edge, edge), (0.6 * edge, -0.6 * edge), (-edge, -0.6 * edge)];
+        let corners = ends.map(|(x, y)| DVec3::new(x, y, -1.0));
+        let pencil = Pencil { apex, forward: DVec3::NEG_Z, corners };
+        let meets = |center: DVec3, radius: f64| {
+            Bound::new(&Form::Sphere { center, radius }).part_in(&pencil).is_some()
+        };
+        let (mut outside, mut inside) = (0, 0);
+        for i in 0..=40 {
+            for j in 0..=40 {
+                // Points on the picture plane, in the tile and around it.
+                let [x, y] = [i, j].map(|k| edge * (f64::from(k) / 16.0 - 1.25));
+                let seen = x > -edge && x < 0.6 * edge && y > -0.6 * edge && y < edge;
+                for distance in [0.01, 1.0, 300.0] {
+                    let direction = DVec3::new(x, y, -1.0).normalize();
+                    let met = meets(apex + direction * distance, 1e-4 * distance);
+                    assert!(met || !seen, "{direction} at {distance}");
+                    inside += u32::from(met && seen);
+                    outside += u32::from(!met && !seen);
+                }
+            }
+        }
+        assert!(inside > 1000 && outside > 1000, "{inside} {outside}");
+        assert!(!meets(apex + DVec3::Z, 0.5) && meets(apex + DVec3::Z, 2.0));
+    }
+
+    /// A plane whose height above the eye is lost in rounding is seen from either side.
+    #[test]
+    fn a_plane_through_the_eye_is_not_ruled_out() {
+        for offset in [5.0 - 1e-7, 5.0, 5.0 + 1e-7] {
+            let plane = Bound::new(&Form::Plane { normal: DVec3::Z, offset });
+            assert!(plane.part_in(&pencil()).is_some(), "{offset}");
+        }
+    }
+
+    /// No point of a thing seen through the pencil lies outside the ball.
+    #[test]
+    fn the_part_seen_holds_every_point_met() {
+        let mut random = 1u64;
+        let mut unit = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (random >> 40) as f64 / 16_777_216.0
+        };
+        let slanted = Form::Plane { normal: DVec3::new(0.3, 0.4, 0.5).normalize(), offset: 0.2 };
+        let part = Bound::new(&slanted).part_in(&pencil()).unwrap();
+        let Form::Plane { normal, offset } = slanted else { unreachable!() };
+        for _ in 0..1000 {
+            let toward = DVec3::new(0.2 * unit() - 0.1, 0.2 * unit() - 0.1, -1.0);
+            let t = (offset - normal.dot(pencil().apex)) / normal.dot(toward);
+            assert!(t > 0.0 && part.holds(pencil().apex + toward * t));
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Bounded convex solids as intersections of slabs (parallel pairs of faces) and half-spaces.
+
+use crate::bvh::Ray;
+use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::primitive::batch::{Item, Surface, reach};
+use crate::primitive::form::Form;
+use crate::primitive::solid::{Span, Spans};
+use glam::DVec3;
+
+/// The points p with low <= normal . (p - center) <= high.
+struct Slab<S> {
+    normal: [S; 3],
+    low: S,
+    high: S,
+}
+
+/// The points p with normal . (p - center) <= high.
+struct Face<S> {
+    normal: [S; 3],
+    high: S,
+}
+
+/// One solid: its bounding sphere, slabs and single faces.
+pub struct Convex<S> {
+    center: [S; 3],
+    radius2: S,
+    reach: S,
+    slabs: Vec<Slab<S>>,
+    faces: Vec<Face<S>>,
+}
+
+impl<S: Real> Convex<S> {
+    /// `None`: the form is another.
+    pub fn new(form: &Form) -> Option<Self> {
+        let Form::Convex { faces, corners } = form else { return None };
+        let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+        let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let center = 0.5 * (low + high);
+        let radius2 = corners.iter().map(|c| c.distance_squared(center)).fold(0.0, f64::max);
+        let mut out = Self {
+            center: center.to_array().map(S::of),
+            // Rounded up: the test may let a miss through, never lose a hit.
+            radius2: S::of(radius2 * (1.0 + 8.0 * S::EPSILON)),
+            reach: S::of(reach(form)),
+            slabs: Vec::new(),
+            faces: Vec::new(),
+        };
+        let mut paired = vec![false; faces.len()];
+        for (i, face) in faces.iter().enumerate() {
+            if paired[i] {
+                continue;
+            }
+            let opposite = (i + 1..faces.len())
+                .find(|j| !paired[*j] && (faces[*j].normal + face.normal).length() < 1e-14);
+            let high = face.offset - face.normal.dot(center);
+            let normal = face.normal.to_array().map(S::of);
+            match opposite {
+                Some(j) => {
+                    paired[j] = true;
+                    let low = -(faces[j].offset - faces[j].normal.dot(center));
+                    out.slabs.push(Slab { normal, low: S::of(low), high: S::of(high) });
+                }
+                None => out.faces.push(Face { normal, high: S::of(high) }),
+            }
+        }
+        Some(out)
+    }
+}
+
+impl<S: Real> Convex<S> {
+    /// Distances at which the line enters and leaves, and where it meets the solid.
+    #[inline(always)]
+    fn chord<L: Lanes<Scalar = S>>(&self, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
+        let from_center = ray.origin - V3::splat(self.center);
+        let along = from_center.dot(ray.direction);
+        let across = ray.direction.mul_add(-along, from_center);
+        let near = across.length2().le(L::splat(self.radius2));
+        if near.none() {
+            return None;
+        }
+        let mut enter = L::of(-L::MAX);
+        let mut leave = L::of(L::MAX);
+        // A direction parallel to a face becomes one that is so nearly, on the side of its zero's
+        // sign: 0 / 0 cannot occur, a line inside the face is not cut by it, one beyond it has an
+        // empty chord, and one in the face's plane touches the solid or not by that sign.
+        let tiny = L::of(1e-30);
+        let steep = |speed: L| speed.abs().max(tiny).copysign(speed);
+        for slab in &self.slabs {
+            let normal = V3::splat(slab.normal);
+            let inverse = L::one() / steep(ray.direction.dot(normal));
+            let height = from_center.dot(normal);
+            let t0 = (L::splat(slab.low) - height) * inverse;
+            let t1 = (L::splat(slab.high) - height) * inverse;
+            enter = t0.min(t1).max(enter);
+            leave = t0.max(t1).min(leave);
+        }
+        for face in &self.faces {
+            let normal = V3::splat(face.normal);
+            let speed = steep(ray.direction.dot(normal));
+            let t = (L::splat(face.high) - from_center.dot(normal)) / speed;
+            let entering = speed.lt(L::zero());
+            enter = L::select(entering, t.max(enter), enter);
+            leave = L::select(entering, leave, t.min(leave));
+        }
+        // Each lane by itself: company in the packet must not decide about a line past a corner.
+        Some((enter, leave, near & enter.le(leave)))
+    }
+}
+
+impl<L: Lanes> Item<L> for Convex<L::Scalar> {
+    #[inline(always)]
+    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+        let (enter, leave, meets) = self.chord(ray)?;
+        Some((L::select(enter.gt(L::zero()), enter, leave), meets))
+    }
+
+    /// The face is the one whose plane is nearest to the point: outside by most, or inside by least.
+    #[inline(always)]
+    fn surface(&self, point: V3<L>) -> Surface<L> {
+        let from_center = point - V3::splat(self.center);
+        let mut outside = L::of(-L::MAX);
+        let mut normal = V3::zero();
+        for slab in &self.slabs {
+            let n = V3::splat(slab.normal);
+            let height = from_center.dot(n);
+            let above = height - L::splat(slab.high);
+            let below = L::splat(slab.low) - height;
+            let upper = above.gt(below);
+            let distance = L::select(upper, above, below);
+            let nearer = distance.gt(outside);
+            outside = L::select(nearer, distance, outside);
+            normal = V3::select(nearer, V3::select(upper, n, -n), normal);
+        }
+        for face in &self.faces {
+            let n = V3::splat(face.normal);
+            let distance = from_center.dot(n) - L::splat(face.high);
+            let nearer = distance.gt(outside);
+            outside = L::select(nearer, distance, outside);
+            normal = V3::select(nearer, n, normal);
+        }
+        Surface { point: normal.mul_add(-outside, point), normal, reach: L::splat(self.reach) }
+    }
+}
+
+impl<L: Lanes> Spans<L> for Convex<L::Scalar> {
+    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+        let (enter, leave, meets) = self.chord(ray)?;
+        let from_center = ray.origin - V3::splat(self.center);
+        // The face at an end is the one that is nearest there, of those that the line crosses in
+        // the right sense.
+        let mut best = (L::of(-L::MAX), L::of(-L::MAX));
+        let mut cosines = (L::one(), L::one());
+        let mut face = |normal: V3<L>, offset: L| {
+            let speed = normal.dot(ray.direction);
+            let height = from_center.dot(normal) - offset;
+            let above = |t: L| speed.mul_add(t, height);
+            let nearer = speed.lt(L::zero()) & above(enter).gt(best.0);
+            best.0 = L::select(nearer, above(enter), best.0);
+            cosines.0 = L::select(nearer, -speed, cosines.0);
+            let nearer = speed.gt(L::zero()) & above(leave).gt(best.1);
+            best.1 = L::select(nearer, above(leave), best.1);
+            cosines.1 = L::select(nearer, speed, cosines.1);
+        };
+        for slab in &self.slabs {
+            let normal = V3::splat(slab.normal);
+            face(normal, L::splat(slab.high));
+            face(-normal, -L::splat(slab.low));
+        }
+        for half_space in &self.faces {
+            face(V3::splat(half_space.normal), L::splat(half_space.high));
+        }
+        let (enter_cosine, leave_cosine) = cosines;
+        Some(Span { enter, leave, enter_cosine, leave_cosine, meets })
+    }
+}

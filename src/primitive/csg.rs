@@ -1,0 +1,355 @@
+//! Compounds: unions, intersections and differences of convex solids, by intervals (Roth 1982, *Ray
+//! Casting for Modeling Solids*).
+//!
+//! Every part gives the span in which a line is inside it. The ends of all spans, sorted, cut the line
+//! into gaps; in each of them every part is either inside or outside, and so is the whole. Where that
+//! changes from one gap to the next there is a surface.
+//!
+//! Ends that are nearer to each other than [`TIE`] roundings across the surface have no gap between
+//! them: they happen at once. So a cut that is flush with a face leaves no skin, and parts that touch
+//! leave no crack, whichever of two equal faces rounding puts in front. What is thinner than that is
+//! nothing.
+
+use crate::bvh::{Hit, Ray};
+use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::primitive::batch::{Item, Surface, reach};
+use crate::primitive::conical_frustum::Tapered;
+use crate::primitive::convex_polyhedron::Convex;
+use crate::primitive::csg_interval::{Change, End, Inside, both_ends, insert, with_room};
+use crate::primitive::csg_tree::{Compound, Tree};
+use crate::primitive::ellipsoid::Ellipsoid;
+use crate::primitive::form::Form;
+use crate::primitive::planar::Plane;
+use crate::primitive::solid::Spans;
+use crate::primitive::sphere::Sphere;
+use std::ops::Range;
+
+/// Surfaces that are so many roundings of the largest coordinate apart lie on each other: two faces
+/// given four units of the last place apart, each met with a few roundings.
+const TIE: f64 = 16.0;
+
+/// A step of the computation of "inside the whole" from "inside a part", on a stack.
+#[derive(Clone, Copy, Debug)]
+enum Op {
+    /// Pushes a part.
+    Part(u32),
+    /// Replaces two entries by the one that is in either.
+    Or,
+    /// Replaces two entries by the one that is in both.
+    And,
+    /// Replaces two entries by the one that is in the lower, but not in the upper.
+    Minus,
+}
+
+/// What a part is.
+enum Solid<S> {
+    Sphere(Sphere<S>),
+    Ellipsoid(Ellipsoid<S>),
+    Convex(Convex<S>),
+    Tapered(Tapered<S>),
+    /// The half-space behind it.
+    Plane(Plane<S>),
+}
+
+/// The same expression for a solid of any form.
+macro_rules! each {
+    ($solid:expr, $item:ident => $value:expr) => {
+        match $solid {
+            Solid::Sphere($item) => $value,
+            Solid::Ellipsoid($item) => $value,
+            Solid::Convex($item) => $value,
+            Solid::Tapered($item) => $value,
+            Solid::Plane($item) => $value,
+        }
+    };
+}
+
+impl<S: Real> Solid<S> {
+    /// `None`: the form is no convex solid.
+    fn new(form: &Form) -> Option<Self> {
+        (Sphere::new(form).map(Self::Sphere))
+            .or_else(|| Ellipsoid::new(form).map(Self::Ellipsoid))
+            .or_else(|| Convex::new(form).map(Self::Convex))
+            .or_else(|| Tapered::new(form).map(Self::Tapered))
+            .or_else(|| Plane::new(form).map(Self::Plane))
+    }
+}
+
+/// A part: its solid, and whether the whole's outside is on the solid's inside.
+struct Part<S> {
+    solid: Solid<S>,
+    reversed: bool,
+}
+
+/// One compound: a ball around it and the ranges of its parts and operations.
+struct One<S> {
+    center: [S; 3],
+    radius2: S,
+    reach: S,
+    parts: Range<usize>,
+    ops: Range<usize>,
+    /// Entries on the stack at most.
+    depth: usize,
+}
+
+/// All compounds of a scene. Every part is an item of its own, so that a hit tells the part; the
+/// first one of a compound stands for it where rays ask for items.
+pub struct Compounds<S> {
+    compounds: Vec<One<S>>,
+    parts: Vec<Part<S>>,
+    ops: Vec<Op>,
+    /// For each part the compound that begins with it.
+    first: Vec<Option<u32>>,
+}
+
+impl<S: Real> Compounds<S> {
+    /// Those of `forms` that are compounds, in order.
+    pub fn new(forms: &[Form]) -> Self {
+        let mut out =
+            Self { compounds: Vec::new(), parts: Vec::new(), ops: Vec::new(), first: Vec::new() };
+        for form in forms {
+            if let Form::Compound(compound) = form {
+                out.add(compound);
+            }
+        }
+        out
+    }
+
+    fn add(&mut self, compound: &Compound) {
+        let (first_part, first_op) = (self.parts.len(), self.ops.len());
+        for (i, part) in compound.parts.iter().enumerate() {
+            let solid = Solid::new(part).expect("parts are convex solids");
+            self.parts.push(Part { solid, reversed: false });
+            self.first.push((i == 0).then_some(self.compounds.len() as u32));
+        }
+        let depth = self.plan(&compound.tree, first_part, false);
+        let (low, high) = compound.bounds().unwrap_or_default();
+        let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * S::EPSILON);
+        self.compounds.push(One {
+            center: (0.5 * (low + high)).to_array().map(S::of),
+            radius2: S::of(radius * radius),
+            reach: S::of(compound.parts.iter().map(reach).fold(0.0, f64::max)),
+            parts: first_part..self.parts.len(),
+            ops: first_op..self.ops.len(),
+            depth,
+        });
+    }
+
+    /// Appends the operations of `tree` and returns how high the stack grows; `reversed`: its inside
+    /// is outside the whole.
+    fn plan(&mut self, tree: &Tree, first_part: usize, reversed: bool) -> usize {
+        let (list, op) = match tree {
+            Tree::Part(i) => {
+                self.parts[first_part + i].reversed = reversed;
+                self.ops.push(Op::Part(*i as u32));
+                return 1;
+            }
+            Tree::Union(list) => (list, Op::Or),
+            Tree::Intersection(list) => (list, Op::And),
+            Tree::Difference(list) => (list, Op::Minus),
+        };
+        let mut depth = 0;
+        for (n, inner) in list.iter().enumerate() {
+            let cuts = matches!(op, Op::Minus) && n > 0;
+            let above = self.plan(inner, first_part, reversed ^ cuts);
+            depth = depth.max(above + usize::from(n > 0));
+            if n > 0 {
+                self.ops.push(op);
+            }
+        }
+        depth
+    }
+
+    /// Where the point at distance `t` of each line is inside the whole.
+    #[inline(always)]
+    fn inside<L: Lanes<Scalar = S>>(&self, one: &One<S>, spans: &[Inside<L>], t: L) -> L::Mask {
+        with_room(one.depth, L::mask(false), |stack| {
+            let mut top = 0;
+            for op in &self.ops[one.ops.clone()] {
+                if let Op::Part(i) = op {
+                    stack[top] = spans[*i as usize].at(t);
+                    top += 1;
+                    continue;
+                }
+                top -= 1;
+                let (a, b) = (stack[top - 1], stack[top]);
+                stack[top - 1] = match op {
+                    Op::Or => a | b,
+                    Op::And => a & b,
+                    Op::Part(_) | Op::Minus => a.and_not(b),
+                };
+            }
+            stack[0]
+        })
+    }
+
+    /// What is to be seen of the surface between the distances `before` and `after`.
+    fn change<L: Lanes<Scalar = S>>(
+        &self,
+        one: &One<S>,
+        spans: &[Inside<L>],
+        base: u32,
+        before: L,
+        after: L,
+    ) -> Change<L> {
+        let nothing =
+            Change { before: L::mask(false), after: L::mask(false), t: L::zero(), tag: L::tag(0) };
+        with_room(one.depth, nothing, |stack| {
+            let mut top = 0;
+            for op in &self.ops[one.ops.clone()] {
+                if let Op::Part(i) = op {
+                    let span = &spans[*i as usize];
+                    let (was, is) = (span.at(before), span.at(after));
+                    let t = L::select(is, span.enter, span.leave);
+                    let tag = L::tag(base + one.parts.start as u32 + i);
+                    stack[top] = Change { before: was, after: is, t, tag };
+                    top += 1;
+                    continue;
+                }
+                top -= 1;
+                let (a, b) = (stack[top - 1], stack[top]);
+                stack[top - 1] = match op {
+                    Op::Or => a.or(b),
+                    Op::And => a.and(b),
+                    Op::Part(_) | Op::Minus => a.and(b.inverted()),
+                };
+            }
+            stack[0]
+        })
+    }
+
+    /// Narrows `hit` by the lanes of `wanted`.
+    fn meet<L: Lanes<Scalar = S>>(
+        &self,
+        one: &One<S>,
+        base: u32,
+        ray: &Ray<L>,
+        wanted: L::Mask,
+        hit: &mut Hit<L>,
+    ) {
+        let from_center = ray.origin - V3::splat(one.center);
+        let along = from_center.dot(ray.direction);
+        let across = ray.direction.mul_add(-along, from_center);
+        let radius2 = L::splat(one.radius2);
+        // Ahead, or around the origin.
+        let ahead = along.le(L::zero()) | from_center.length2().le(radius2);
+        let near = wanted & across.length2().le(radius2) & ahead;
+        if near.none() {
+            return;
+        }
+        let (never, always) = (L::of(L::MAX), L::of(-L::MAX));
+        let parts = &self.parts[one.parts.clone()];
+        let outside = Inside { enter: never, leave: always };
+        let end = End { t: never, tie: L::zero() };
+        with_room(parts.len(), outside, |spans| {
+            with_room(2 * parts.len(), end, |ends| {
+                let tie = ray.origin.max_abs().max(L::splat(one.reach)) * L::of(TIE * L::EPSILON);
+                let mut count = 0;
+                for (span, part) in spans.iter_mut().zip(parts) {
+                    let found = each!(&part.solid, solid => solid.span(ray));
+                    let Some(found) = found else { continue };
+                    *span = Inside {
+                        enter: L::select(found.meets, found.enter, never),
+                        leave: L::select(found.meets, found.leave, always),
+                    };
+                    for end in both_ends(&found, tie) {
+                        insert(end, ends, count);
+                        count += 1;
+                    }
+                }
+                self.sweep(one, (&*spans, &ends[..count]), base, near, hit);
+            });
+        });
+    }
+
+    /// Narrows `hit` by the first surface of the lanes in `open`: from gap to gap along the lines.
+    ///
+    /// Faces that lie on each other are met at the same angle, so both ends must be as near as their
+    /// ties: a face that is met flatly does not swallow others that are not.
+    #[inline(always)]
+    fn sweep<L: Lanes<Scalar = S>>(
+        &self,
+        one: &One<S>,
+        (spans, ends): (&[Inside<L>], &[End<L>]),
+        base: u32,
+        mut open: L::Mask,
+        hit: &mut Hit<L>,
+    ) {
+        let last = End { t: L::of(L::MAX), tie: L::zero() };
+        let mut state = L::mask(false);
+        let mut before = L::of(-L::MAX);
+        for (i, end) in ends.iter().enumerate() {
+            let next = ends.get(i + 1).unwrap_or(&last);
+            let gap = open & (next.t - end.t).gt(end.tie.min(next.tie));
+            if gap.none() {
+                continue;
+            }
+            let middle = L::of(0.5) * end.t + L::of(0.5) * next.t;
+            let inside = self.inside(one, spans, middle);
+            let changed = gap & (inside.and_not(state) | state.and_not(inside));
+            if changed.any() {
+                let seen = self.change(one, spans, base, before, middle);
+                let ahead = changed & seen.t.gt(L::zero());
+                let nearer = ahead & seen.t.lt(hit.t);
+                hit.t = L::select(nearer, seen.t, hit.t);
+                hit.item = L::select(nearer, seen.tag, hit.item);
+                open = open.and_not(ahead);
+            }
+            // Everything behind this end is farther than what is known.
+            open = open.and_not(gap & next.t.gt(hit.t));
+            if open.none() {
+                return;
+            }
+            state = (inside & gap) | state.and_not(gap);
+            before = L::select(gap, middle, before);
+        }
+    }
+}
+
+impl<S: Real> Compounds<S> {
+    /// Narrows `hit` by the compounds that begin in `range`; a part's tag is `base` + its number.
+    #[inline(never)]
+    pub fn closest<L: Lanes<Scalar = S>>(
+        &self,
+        range: Range<usize>,
+        base: u32,
+        ray: &Ray<L>,
+        hit: &mut Hit<L>,
+    ) {
+        for compound in self.first[range].iter().flatten() {
+            self.meet(&self.compounds[*compound as usize], base, ray, L::mask(true), hit);
+        }
+    }
+
+    /// Where a surface of the compounds that begin in `range` lies at a distance in (0, limit) of the
+    /// ray, of the lanes in `wanted`.
+    #[inline(never)]
+    pub fn blocked<L: Lanes<Scalar = S>>(
+        &self,
+        range: Range<usize>,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+    ) -> L::Mask {
+        let mut blocked = L::mask(false);
+        for compound in self.first[range].iter().flatten() {
+            let open = wanted.and_not(blocked);
+            if open.none() {
+                break;
+            }
+            let mut hit = Hit::nearer_than(limit);
+            self.meet(&self.compounds[*compound as usize], 0, ray, open, &mut hit);
+            blocked = blocked | hit.t.lt(limit);
+        }
+        blocked
+    }
+
+    /// The surface of a part at `point`, outward of the whole.
+    #[inline(never)]
+    pub fn surface<L: Lanes<Scalar = S>>(&self, part: usize, point: V3<L>) -> Surface<L> {
+        let part = &self.parts[part];
+        let surface: Surface<L> = each!(&part.solid, solid => solid.surface(point));
+        let normal = if part.reversed { -surface.normal } else { surface.normal };
+        Surface { normal, ..surface }
+    }
+}

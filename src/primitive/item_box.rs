@@ -1,0 +1,150 @@
+//! What is asked before a thing is asked whether a ray meets it.
+
+use crate::bvh::Ray;
+use crate::bvh::packet::Beam;
+use crate::lanes::{Lanes, Real, V3};
+use crate::primitive::form::Form;
+use crate::value::Choice;
+use glam::{DAffine3, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// How rays are kept from things that they cannot meet. No way changes a picture, only its time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Acceleration {
+    /// What has been measured to be fastest: a tree for many things, else for each part of the picture
+    /// the things that its rays may meet.
+    #[default]
+    Auto,
+    /// Every ray meets everything.
+    None,
+    /// Camera rays meet what stands on their part of the screen: each thing has a rectangle there.
+    Projected,
+    /// Each thing has a box in its own space.
+    Object,
+    /// Each thing has a box in the scene's space.
+    World,
+    /// A tree of boxes.
+    Hierarchy,
+}
+
+impl Acceleration {
+    /// All of them, in the order of [`Acceleration::CHOICES`].
+    pub const ALL: [Self; 6] =
+        [Self::Auto, Self::None, Self::Projected, Self::Object, Self::World, Self::Hierarchy];
+
+    /// Their names and what they mean.
+    pub const CHOICES: &'static [Choice] = &[
+        Choice { name: "auto", doc: "the fastest, by measurement" },
+        Choice { name: "none", doc: "every ray meets everything" },
+        Choice { name: "projected", doc: "a rectangle on the screen per thing, for camera rays" },
+        Choice { name: "object", doc: "a box per thing, in its own space" },
+        Choice { name: "world", doc: "a box per thing, in the scene's space" },
+        Choice { name: "hierarchy", doc: "a tree of boxes" },
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Self::CHOICES[self as usize].name
+    }
+}
+
+/// A box around one thing.
+pub struct Extent<S> {
+    low: [S; 3],
+    high: [S; 3],
+    /// The box's space; `None`: the scene's.
+    space: Option<Space<S>>,
+}
+
+/// A space of its own: p becomes `rows (p - center)`.
+struct Space<S> {
+    center: [S; 3],
+    rows: [[S; 3]; 3],
+    /// For each row the sum of its magnitudes: coordinates grow by so much at most.
+    growth: [S; 3],
+    /// Largest magnitude of a coordinate of the thing in the scene.
+    reach: S,
+}
+
+/// Corners rounded outward by a few units in the last place, `epsilon`, of the largest coordinate, which
+/// is also what an item's own test may err by, in any direction.
+pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
+    let reach = low.abs().max(high.abs()).max_element();
+    let pad = DVec3::splat(reach * 4.0 * epsilon);
+    [low - pad, high + pad]
+}
+
+/// What faces and corners of one solid may differ by, as a part of its extent: in a scene far from the
+/// origin of its file both were rounded to what double precision has there.
+const GIVEN: f64 = 1.0 / 4_294_967_296.0;
+
+impl<S: Real> Extent<S> {
+    /// Of a form, in its own space if `own` and if it has one; `None`: it has no end.
+    pub fn new(form: &Form, own: bool) -> Option<Self> {
+        let bounds = form.bounds()?;
+        let vector = |v: DVec3| v.to_array().map(S::of);
+        let made = |bounds, space| {
+            let [low, high] = padded(bounds, S::EPSILON.max(GIVEN)).map(vector);
+            Self { low, high, space }
+        };
+        let Some((scene_from_own, (low, high))) = form.own_box().filter(|_| own) else {
+            return Some(made(bounds, None));
+        };
+        let rows = scene_from_own.matrix3.inverse().transpose();
+        let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
+        let middle = 0.5 * (low + high);
+        let space = Space {
+            center: vector(scene_from_own.transform_point3(middle)),
+            rows: rows.map(vector),
+            growth: rows.map(|r| S::of(r.abs().element_sum())),
+            reach: S::of(bounds.0.abs().max(bounds.1.abs()).max_element()),
+        };
+        Some(made((low - middle, high - middle), Some(space)))
+    }
+
+    /// Which rays may meet the thing no farther than `limit`.
+    #[inline(always)]
+    pub fn meets<L: Lanes<Scalar = S>>(&self, ray: &Ray<L>, limit: L) -> L::Mask {
+        let far = ray.origin.max_abs();
+        let beam = match &self.space {
+            None => {
+                let pad = far * L::of(4.0 * L::EPSILON);
+                Beam::new(ray, V3::new(pad, pad, pad))
+            }
+            Some(space) => {
+                // What origin, direction and centre lose on their way into the space, at most, by the
+                // time the ray has come to the thing.
+                let lost = (far + L::splat(space.reach)) * L::of(64.0 * L::EPSILON);
+                let rows = space.rows.map(V3::splat);
+                let of = |v: V3<L>| V3::new(rows[0].dot(v), rows[1].dot(v), rows[2].dot(v));
+                let inner = Ray {
+                    origin: of(ray.origin - V3::splat(space.center)),
+                    direction: of(ray.direction),
+                };
+                Beam::new(&inner, V3::splat(space.growth) * lost)
+            }
+        };
+        beam.enters(V3::splat(self.low), V3::splat(self.high), limit)
+    }
+}
+
+impl Form {
+    /// The space in which a form was described, and a box around it there, if it still has one: those
+    /// that keep their map do.
+    fn own_box(&self) -> Option<(DAffine3, (DVec3, DVec3))> {
+        match self {
+            Self::Ellipsoid { scene_from_unit } => {
+                Some((*scene_from_unit, (DVec3::NEG_ONE, DVec3::ONE)))
+            }
+            Self::Tapered { scene_from_unit, .. } => {
+                Some((*scene_from_unit, (DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE)))
+            }
+            Self::Mesh { mesh, scene_from_mesh, .. } => {
+                let [low, high] = mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
+                Some((*scene_from_mesh, (low, high)))
+            }
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! Meshes: a ray goes into the mesh's space, walks its tree there, and what it meets comes back.
+//!
+//! Coordinates of a mesh are in single precision whatever the lanes; all computation is in the lanes'.
+
+use crate::asset;
+use crate::bvh::{Hit, Ray};
+use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::primitive::batch::{OwnUv, Surface, reach};
+use crate::primitive::facing;
+use crate::primitive::form::Form;
+use crate::primitive::item_box::Extent;
+use crate::primitive::triangle_mesh;
+use glam::DVec3;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// One mesh in its place.
+struct Placed<S> {
+    mesh: Arc<asset::Mesh>,
+    /// A box around it in the scene: most rays need not be carried over.
+    extent: Extent<S>,
+    /// Columns of the linear part.
+    mesh_from_scene: [[S; 3]; 3],
+    /// The middle of the mesh's box, in the scene and in the mesh: points are carried over relative to
+    /// it, so that their error is that of the mesh's size and distance.
+    center: [S; 3],
+    mesh_center: [S; 3],
+    reach: S,
+    smooth: bool,
+}
+
+/// All meshes of a scene. Each is one item; the triangle of a hit is its facet.
+pub struct Meshes<S> {
+    items: Vec<Placed<S>>,
+}
+
+/// The corners of one triangle per lane, in the mesh's space.
+struct Triangle<L> {
+    corners: [V3<L>; 3],
+}
+
+impl<S: Real> Placed<S> {
+    fn new(form: &Form) -> Option<Self> {
+        let Form::Mesh { mesh, scene_from_mesh, smooth } = form else { return None };
+        let [low, high] = mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
+        let middle = (0.5 * (low + high)).as_vec3().as_dvec3();
+        let inverse = scene_from_mesh.matrix3.inverse();
+        let columns = [inverse.x_axis, inverse.y_axis, inverse.z_axis];
+        let linear = scene_from_mesh.matrix3;
+        let scale = [linear.x_axis, linear.y_axis, linear.z_axis]
+            .into_iter()
+            .map(DVec3::length)
+            .fold(0.0, f64::max);
+        // Coordinates in the mesh's space are rounded as well, at most those of its corners.
+        let inner = low.abs().max(high.abs()).max_element() * scale;
+        let outer = reach(form);
+        Some(Self {
+            mesh: mesh.clone(),
+            extent: Extent::new(form, false)?,
+            mesh_from_scene: columns.map(|c| c.to_array().map(S::of)),
+            center: scene_from_mesh.transform_point3(middle).to_array().map(S::of),
+            mesh_center: middle.to_array().map(S::of),
+            reach: S::of(outer.max(inner)),
+            smooth: *smooth,
+        })
+    }
+
+    #[inline(always)]
+    fn vector<L: Lanes<Scalar = S>>(&self, v: V3<L>) -> V3<L> {
+        let [x, y, z] = self.mesh_from_scene.map(V3::splat);
+        x * v.x + y * v.y + z * v.z
+    }
+
+    /// A normal in the scene from one in the mesh, not normalised: by the inverse's transpose.
+    #[inline(always)]
+    fn normal<L: Lanes<Scalar = S>>(&self, n: V3<L>) -> V3<L> {
+        let [x, y, z] = self.mesh_from_scene.map(V3::splat);
+        V3::new(x.dot(n), y.dot(n), z.dot(n))
+    }
+
+    #[inline(always)]
+    fn point<L: Lanes<Scalar = S>>(&self, p: V3<L>) -> V3<L> {
+        self.vector(p - V3::splat(self.center)) + V3::splat(self.mesh_center)
+    }
+
+    /// The ray in the mesh's space, and how much longer its directions are there.
+    #[inline(always)]
+    fn ray<L: Lanes<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
+        let direction = self.vector(ray.direction);
+        let length = direction.length2().sqrt();
+        let direction = direction * (L::one() / length);
+        (Ray { origin: self.point(ray.origin), direction }, length)
+    }
+
+    /// Per lane something of the vertices of the triangle tagged `facet`.
+    #[inline(always)]
+    fn vertices<L: Lanes<Scalar = S>>(&self, facet: L, of: &[[f32; 3]]) -> [V3<L>; 3] {
+        let triangles = &self.mesh.mesh().triangles;
+        // Lanes that met something else may hold any tag.
+        let number = |lane| (facet.tag_lane(lane) as usize).min(triangles.len() - 1);
+        std::array::from_fn(|k| {
+            V3::from_fn(|lane| of[triangles[number(lane)][k] as usize].map(|x| S::of(f64::from(x))))
+        })
+    }
+
+    /// Per lane the pairs of the vertices of the triangle tagged `facet`.
+    #[inline(always)]
+    fn pairs<L: Lanes<Scalar = S>>(&self, facet: L, of: &[[f32; 2]]) -> [[L; 2]; 3] {
+        let triangles = &self.mesh.mesh().triangles;
+        let number = |lane| (facet.tag_lane(lane) as usize).min(triangles.len() - 1);
+        let one = |vertex: usize, k: usize| {
+            let pair = |lane| of[triangles[number(lane)][vertex] as usize][k];
+            L::from_fn(|lane| S::of(f64::from(pair(lane))))
+        };
+        std::array::from_fn(|vertex| [one(vertex, 0), one(vertex, 1)])
+    }
+
+    #[inline(always)]
+    fn triangle<L: Lanes<Scalar = S>>(&self, facet: L) -> Triangle<L> {
+        Triangle { corners: self.vertices(facet, &self.mesh.mesh().positions) }
+    }
+}
+
+impl<L: Lanes> Triangle<L> {
+    /// Twice the area, along the normal of the front.
+    #[inline(always)]
+    fn normal(&self) -> V3<L> {
+        let [a, b, c] = self.corners;
+        (b - a).cross(c - a)
+    }
+
+    /// The gradients in the triangle's plane of the second and of the third corner's weight.
+    #[inline(always)]
+    fn gradients(&self) -> [V3<L>; 2] {
+        let [a, b, c] = self.corners;
+        let (to_b, to_c) = (b - a, c - a);
+        let normal = to_b.cross(to_c);
+        let inverse = L::one() / normal.length2();
+        [to_c.cross(normal) * inverse, normal.cross(to_b) * inverse]
+    }
+
+    /// Weights of the corners at the point nearest to `p`, about: positive, with the sum 1.
+    #[inline(always)]
+    fn weights(&self, p: V3<L>) -> [L; 3] {
+        let normal = self.normal();
+        let [a, b, c] = self.corners.map(|c| c - p);
+        let part = |a: V3<L>, b| normal.dot(a.cross(b)).max(L::zero());
+        let parts = [part(b, c), part(c, a), part(a, b)];
+        let inverse = L::one() / (parts[0] + parts[1] + parts[2]);
+        parts.map(|part| part * inverse)
+    }
+}
+
+impl<S: Real> Meshes<S> {
+    /// Those of `forms` that are meshes, in order.
+    pub fn new(forms: &[Form]) -> Self {
+        Self { items: forms.iter().filter_map(Placed::new).collect() }
+    }
+
+    /// Narrows `hit` by the meshes in `range`; a mesh's tag is `base` + its number.
+    #[inline(never)]
+    pub fn closest<L: Lanes<Scalar = S>>(
+        &self,
+        range: Range<usize>,
+        base: u32,
+        ray: &Ray<L>,
+        hit: &mut Hit<L>,
+    ) {
+        for (tag, item) in (base + range.start as u32..).zip(&self.items[range]) {
+            let near = item.extent.meets(ray, hit.t);
+            if near.none() {
+                continue;
+            }
+            let (inner, length) = item.ray(ray);
+            // Beyond by what the way into the mesh's space and back rounds off: what is known decides only
+            // here below, in the scene's distances, so that the order of things does not matter.
+            let limit = hit.t * length * L::of(1.0 + 4.0 * L::EPSILON);
+            let limit = L::select(near, limit, L::of(-1.0));
+            let found = triangle_mesh::closest(&item.mesh, &inner, limit);
+            let met = found.t.lt(limit);
+            let before = hit.t;
+            hit.narrow(met, found.t / length, tag);
+            hit.facet = L::select(hit.t.lt(before), found.triangle, hit.facet);
+        }
+    }
+
+    /// Which of the `wanted` lanes meet one of the meshes in `range` at a distance in (0, limit).
+    #[inline(never)]
+    pub fn blocked<L: Lanes<Scalar = S>>(
+        &self,
+        range: Range<usize>,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+    ) -> L::Mask {
+        let mut blocked = L::mask(false);
+        for item in &self.items[range] {
+            let open = wanted.and_not(blocked);
+            if open.none() {
+                break;
+            }
+            let open = open & item.extent.meets(ray, limit);
+            if open.none() {
+                continue;
+            }
+            let (inner, length) = item.ray(ray);
+            let limit = L::select(open, limit * length, L::of(-1.0));
+            blocked = blocked | triangle_mesh::blocked(&item.mesh, &inner, limit);
+        }
+        blocked
+    }
+
+    /// The surface of `item` at `point`, which lies near its triangles tagged `facet`.
+    #[inline(never)]
+    pub fn surface<L: Lanes<Scalar = S>>(&self, item: usize, facet: L, point: V3<L>) -> Surface<L> {
+        let item = &self.items[item];
+        let triangle = item.triangle(facet);
+        // Neither the largest nor the smallest triangle may lose its area to the range of numbers.
+        let flat = triangle.normal();
+        let largest = flat.max_abs();
+        let sound = largest.gt(L::zero());
+        let flat = V3::select(sound, flat * (L::one() / largest), V3::of([0.0, 0.0, 1.0]));
+        let height = flat.dot(item.point(point) - triangle.corners[0]);
+        let normal = item.normal(flat);
+        let inverse = L::one() / normal.length2().sqrt();
+        let normal = normal * inverse;
+        let point = normal.mul_add(-height * inverse, point);
+        Surface { point, normal, reach: L::splat(item.reach) }
+    }
+
+    /// The normal that light is computed with where rays along `direction` meet the triangles tagged
+    /// `facet` of `item` at `point`; `normal` is their geometric one on the viewer's side. It stays on
+    /// that side, and where it would turn away from the viewer it is bent back to him.
+    #[inline(never)]
+    pub fn shading_normal<L: Lanes<Scalar = S>>(
+        &self,
+        item: usize,
+        facet: L,
+        (point, normal): (V3<L>, V3<L>),
+        direction: V3<L>,
+    ) -> V3<L> {
+        let item = &self.items[item];
+        if !item.smooth {
+            return normal;
+        }
+        let weights = item.triangle(facet).weights(item.point(point));
+        let [a, b, c] = item.vertices(facet, item.mesh.smooth_normals());
+        let smooth = item.normal(a * weights[0] + b * weights[1] + c * weights[2]);
+        let smooth = smooth * (L::one() / smooth.length2().sqrt());
+        // Normals that cancel, or a triangle without area, leave no number.
+        facing(smooth, normal, direction)
+    }
+
+    /// The texture coordinates of `item` at `point`, which lies near its triangles tagged `facet`;
+    /// `None`: its file has none.
+    #[inline(never)]
+    pub fn uv<L: Lanes<Scalar = S>>(
+        &self,
+        item: usize,
+        facet: L,
+        point: V3<L>,
+    ) -> Option<OwnUv<L>> {
+        let item = &self.items[item];
+        let triangle = item.triangle(facet);
+        let corners = item.pairs(facet, item.mesh.mesh().uvs.as_deref()?);
+        let weights = triangle.weights(item.point(point));
+        let gradient = triangle.gradients();
+        let along = |k: usize| {
+            let [a, b, c] = corners.map(|pair| pair[k]);
+            let value = a * weights[0] + b * weights[1] + c * weights[2];
+            (value, gradient[0] * (b - a) + gradient[1] * (c - a))
+        };
+        let ((u, du), (v, dv)) = (along(0), along(1));
+        Some(OwnUv { uv: [u, v], gradients: [du, dv] })
+    }
+
+    /// Base colour of the triangles tagged `facet` of `item`; `None`: its file names none.
+    #[inline(never)]
+    pub fn color<L: Lanes<Scalar = S>>(&self, item: usize, facet: L) -> Option<V3<L>> {
+        let mesh = self.items[item].mesh.mesh();
+        mesh.color(0)?;
+        let number = |lane| (facet.tag_lane(lane) as usize).min(mesh.triangles.len() - 1);
+        let white = [1.0; 3];
+        Some(V3::from_fn(|lane| {
+            mesh.color(number(lane)).unwrap_or(white).map(|x| S::of(f64::from(x)))
+        }))
+    }
+
+    /// Whether light sees anything but the triangles' own normals.
+    pub fn is_smooth(&self) -> bool {
+        self.items.iter().any(|item| item.smooth)
+    }
+
+    /// Whether a file names colours.
+    pub fn is_colored(&self) -> bool {
+        self.items.iter().any(|item| item.mesh.mesh().color(0).is_some())
+    }
+}

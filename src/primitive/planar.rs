@@ -1,0 +1,110 @@
+//! Flat shapes: parallelograms (rectangles, platforms) and infinite planes.
+
+use crate::bvh::Ray;
+use crate::lanes::{Lanes, Real, V3};
+use crate::primitive::batch::{Item, Surface, reach};
+use crate::primitive::form::Form;
+use crate::primitive::solid::{Span, Spans};
+use glam::DVec3;
+
+/// One parallelogram. A point p of its plane has the coordinates (p - corner) . dual, both in 0..1
+/// inside.
+#[derive(Clone, Copy)]
+pub struct Parallelogram<S> {
+    corner: [S; 3],
+    normal: [S; 3],
+    dual_u: [S; 3],
+    dual_v: [S; 3],
+    reach: S,
+}
+
+impl<S: Real> Parallelogram<S> {
+    /// `None`: the form is another.
+    pub fn new(form: &Form) -> Option<Self> {
+        let Form::Parallelogram { corner, u, v } = form else { return None };
+        let n = u.cross(*v);
+        let area2 = n.length_squared();
+        let of = |v: DVec3| v.to_array().map(S::of);
+        Some(Self {
+            corner: of(*corner),
+            normal: of(n.normalize()),
+            dual_u: of(v.cross(n) / area2),
+            dual_v: of(n.cross(*u) / area2),
+            reach: S::of(reach(form)),
+        })
+    }
+}
+
+impl<L: Lanes> Item<L> for Parallelogram<L::Scalar> {
+    #[inline(always)]
+    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+        let normal = V3::splat(self.normal);
+        let from_corner = ray.origin - V3::splat(self.corner);
+        // Parallel rays divide by zero: infinite or NaN distances fail every comparison.
+        let t = -from_corner.dot(normal) / ray.direction.dot(normal);
+        let at = ray.direction.mul_add(t, from_corner);
+        let a = at.dot(V3::splat(self.dual_u));
+        let b = at.dot(V3::splat(self.dual_v));
+        let inside = a.ge(L::zero()) & a.le(L::one()) & b.ge(L::zero()) & b.le(L::one());
+        Some((t, inside))
+    }
+
+    #[inline(always)]
+    fn surface(&self, point: V3<L>) -> Surface<L> {
+        let normal = V3::splat(self.normal);
+        let above = (point - V3::splat(self.corner)).dot(normal);
+        Surface { point: normal.mul_add(-above, point), normal, reach: L::splat(self.reach) }
+    }
+}
+
+/// One infinite plane.
+#[derive(Clone, Copy)]
+pub struct Plane<S> {
+    normal: [S; 3],
+    offset: S,
+}
+
+impl<S: Real> Plane<S> {
+    /// `None`: the form is another.
+    pub fn new(form: &Form) -> Option<Self> {
+        let Form::Plane { normal, offset } = form else { return None };
+        Some(Self { normal: normal.to_array().map(S::of), offset: S::of(*offset) })
+    }
+}
+
+impl<L: Lanes> Item<L> for Plane<L::Scalar> {
+    #[inline(always)]
+    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+        let normal = V3::splat(self.normal);
+        // Infinite or NaN for a parallel ray.
+        let t = (L::splat(self.offset) - ray.origin.dot(normal)) / ray.direction.dot(normal);
+        Some((t, L::mask(true)))
+    }
+
+    #[inline(always)]
+    fn surface(&self, point: V3<L>) -> Surface<L> {
+        let normal = V3::splat(self.normal);
+        let above = point.dot(normal) - L::splat(self.offset);
+        let reach = L::splat(self.offset).abs();
+        Surface { point: normal.mul_add(-above, point), normal, reach }
+    }
+}
+
+/// The half-spaces behind the planes.
+impl<L: Lanes> Spans<L> for Plane<L::Scalar> {
+    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+        let normal = V3::splat(self.normal);
+        let speed = ray.direction.dot(normal);
+        let height = ray.origin.dot(normal) - L::splat(self.offset);
+        let (all, none) = (L::of(L::MAX), L::of(-L::MAX));
+        let t = -height / speed;
+        let (enters, leaves) = (speed.lt(L::zero()), speed.gt(L::zero()));
+        // A line parallel to the plane is behind it or before it for ever. A crossing beyond all
+        // numbers is none.
+        let enter = L::select(enters, t.max(none).min(all), none);
+        let leave = L::select(leaves, t.max(none).min(all), all);
+        let meets = enters | leaves | height.le(L::zero());
+        let cosine = speed.abs();
+        Some(Span { enter, leave, enter_cosine: cosine, leave_cosine: cosine, meets })
+    }
+}

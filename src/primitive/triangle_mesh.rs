@@ -1,0 +1,257 @@
+//! Rays through the triangles of one mesh, in the mesh's own space.
+//!
+//! Packets whose rays stay together go through the tree together; others ray by ray, eight boxes or
+//! triangles at a time. Both compute each triangle by the same operations, so that a ray meets the
+//! same triangle at the same distance either way.
+
+use crate::asset::{Leaf, Mesh};
+use crate::bvh::Ray;
+use crate::bvh::WIDE;
+use crate::bvh::packet::{Beam, Sheaf, all, fresh, lanes_of, together, with_stack};
+use crate::bvh::single::apart;
+use crate::lanes::{Frame, Lanes, MAX_WIDTH, Mask, Real, V3, prefetch};
+
+/// Packets go together whose directions differ by no more than this for each lane over the root of the
+/// number of triangles (length of the difference of unit vectors), and whose origins by no more than that
+/// share of the mesh's size. Measured by `benches/mesh.rs`, lines `together or apart`: packets of eight are
+/// faster up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million; those of
+/// four up to half of that.
+const TOGETHER: f64 = 2.5;
+
+/// At most so much for each lane, however few triangles there are.
+const TOGETHER_AT_MOST: f64 = 0.04;
+
+/// The nearest triangle of each lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Facet<L> {
+    /// Distance, in lengths of the ray's direction; the limit where nothing nearer was met.
+    pub t: L,
+    /// Tag of the triangle's number; meaningless where nothing was met.
+    pub triangle: L,
+}
+
+/// Rays as triangles want them: a packet, or one ray in every lane.
+#[derive(Clone, Copy)]
+struct Pierce<L> {
+    origin: V3<L>,
+    frame: Frame<L>,
+}
+
+/// A packet as boxes want it. A ray that passes a box's edge within the rounding of its frame and of the
+/// corners' distances may still meet a triangle there.
+#[inline(always)]
+fn beam<L: Lanes>(ray: &Ray<L>, mesh: &Mesh) -> Beam<L> {
+    let [low, high] = mesh.mesh().bounds;
+    let reach = low.iter().chain(&high).fold(0.0f32, |m, x| m.max(x.abs()));
+    let pad = (ray.origin.max_abs() + all(reach)) * L::of(8.0 * L::EPSILON);
+    Beam::new(ray, V3::new(pad, pad, pad))
+}
+
+impl<L: Lanes> Pierce<L> {
+    #[inline(always)]
+    fn new(ray: &Ray<L>) -> Self {
+        Self { origin: ray.origin, frame: Frame::around(ray.direction) }
+    }
+
+    /// Of each lane what describes its ray: origin and frame.
+    #[inline(always)]
+    fn each(&self) -> [[[L::Scalar; 3]; 4]; MAX_WIDTH] {
+        let Frame { t, b, n } = self.frame;
+        let mut each = [[[L::Scalar::default(); 3]; 4]; MAX_WIDTH];
+        for (lane, one) in each.iter_mut().enumerate().take(L::WIDTH) {
+            *one = [self.origin, t, b, n].map(|v| v.lane(lane));
+        }
+        each
+    }
+
+    /// The ray of one lane in every lane.
+    #[inline(always)]
+    fn only(one: &[[L::Scalar; 3]; 4]) -> Self {
+        let [origin, t, b, n] = one.map(V3::splat);
+        Self { origin, frame: Frame { t, b, n } }
+    }
+
+    /// Where the ray meets a triangle, at a positive distance, on either side.
+    ///
+    /// The corners are projected along the ray onto the plane through its origin. A corner has one
+    /// projection, whichever triangle it belongs to, and the sign of each edge's area is that of the
+    /// exact value or zero: so no ray slips between two triangles that share an edge or a corner
+    /// (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an orthonormal
+    /// frame for the shear).
+    #[inline(always)]
+    fn meet(&self, corners: [V3<L>; 3]) -> (L, L::Mask) {
+        let p = corners.map(|c| self.frame.to_local(c - self.origin));
+        // Not fused: products rounded alike cannot change places.
+        let area = |a: V3<L>, b: V3<L>| a.x * b.y - a.y * b.x;
+        let (u, v, w) = (area(p[1], p[2]), area(p[2], p[0]), area(p[0], p[1]));
+        let zero = L::zero();
+        let left = u.ge(zero) & v.ge(zero) & w.ge(zero);
+        let right = u.le(zero) & v.le(zero) & w.le(zero);
+        // Seen edge on, the triangle is a line: 0 / 0 is met nowhere.
+        let t = (u * p[0].z + v * p[1].z + w * p[2].z) / (u + v + w);
+        (t, (left | right) & t.gt(zero))
+    }
+
+    /// The eight corners `k` of a leaf's triangles, a part of them in lanes.
+    #[inline(always)]
+    fn corners(leaf: &Leaf, part: usize) -> [V3<L>; 3] {
+        leaf.corners.each_ref().map(|c| {
+            let axis = |a: usize| lanes_of(&c[a], part);
+            V3::new(axis(0), axis(1), axis(2))
+        })
+    }
+}
+
+/// A walk of some rays through a mesh. `ANY`: the first triangle ends the walk of a ray.
+struct Walk<'a, const ANY: bool> {
+    mesh: &'a Mesh,
+}
+
+impl<const ANY: bool> Walk<'_, ANY> {
+    /// All lanes together.
+    #[inline(always)]
+    fn together<L: Lanes>(&self, (ray, beam): (&Ray<L>, &Beam<L>), limit: L) -> Facet<L> {
+        let pierce = Pierce::new(ray);
+        let wanted = limit.gt(L::zero()).bits();
+        let mut found = Facet { t: limit, triangle: L::tag(0) };
+        if wanted == 0 {
+            return found;
+        }
+        let bounds = Sheaf::around(beam, wanted);
+        let boxes = self.mesh.boxes();
+        let leaf = |number: usize, _| {
+            let leaf = &self.mesh.leaves()[number];
+            let first = self.mesh.first(number);
+            for part in 0..WIDE.div_ceil(L::WIDTH) {
+                let [a, b, c] = Pierce::<L>::corners(leaf, part);
+                // The triangles whose own boxes the packet may meet.
+                let low = V3::new(a.x.min(b.x), a.y.min(b.y), a.z.min(b.z));
+                let high = V3::new(a.x.max(b.x), a.y.max(b.y), a.z.max(b.z));
+                let sides = [
+                    low.x.min(c.x),
+                    low.y.min(c.y),
+                    low.z.min(c.z),
+                    high.x.max(c.x),
+                    high.y.max(c.y),
+                    high.z.max(c.z),
+                ];
+                let bits = match &bounds {
+                    Some(bounds) => bounds.meets::<false, L>(|k| sides[k], L::of(L::MAX)).1.bits(),
+                    None => fresh(),
+                };
+                let mut bits = bits & fresh() & ((1 << L::WIDTH) - 1);
+                while bits != 0 {
+                    let i = part * L::WIDTH + bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    let one =
+                        |c: &[[f32; WIDE]; 3]| V3::new(all(c[0][i]), all(c[1][i]), all(c[2][i]));
+                    let (t, met) = pierce.meet(leaf.corners.each_ref().map(one));
+                    let tie = met & t.le(found.t);
+                    if tie.none() {
+                        continue;
+                    }
+                    let number = L::tag(first + i as u32);
+                    let nearer = tie & (t.lt(found.t) | number.lt(found.triangle));
+                    let t = if ANY { L::of(-1.0) } else { t };
+                    found.t = L::select(nearer, t, found.t);
+                    found.triangle = L::select(nearer, number, found.triangle);
+                }
+            }
+            found.t
+        };
+        with_stack::<_, _, 128, 512>(WIDE, boxes, |stack| {
+            together(boxes, (beam, bounds.as_ref()), limit, stack, leaf)
+        });
+        found
+    }
+
+    #[inline(always)]
+    fn go<L: Lanes>(&self, ray: &Ray<L>, limit: L) -> Facet<L> {
+        let beam = beam(ray, self.mesh);
+        let wanted = limit.gt(L::zero()).bits();
+        if is_together(ray, wanted, self.mesh) {
+            return self.together((ray, &beam), limit);
+        }
+        self.apart((ray, &beam), limit)
+    }
+
+    /// Each lane by itself.
+    #[inline(always)]
+    fn apart<L: Lanes>(&self, (ray, beam): (&Ray<L>, &Beam<L>), limit: L) -> Facet<L> {
+        let rays = Pierce::new(ray).each();
+        let wanted = limit.gt(L::zero()).bits();
+        let mut found = [(L::Scalar::default(), 0u32); MAX_WIDTH];
+        for (lane, found) in found.iter_mut().enumerate().take(L::WIDTH) {
+            *found = (limit.lane(lane), 0);
+        }
+        let leaf = |lane: usize, number: usize, limit: L::Scalar| {
+            let leaf = &self.mesh.leaves()[number];
+            let pierce = Pierce::<L>::only(&rays[lane]);
+            let (best, triangle) = &mut found[lane];
+            for part in 0..WIDE.div_ceil(L::WIDTH) {
+                let (t, met) = pierce.meet(Pierce::corners(leaf, part));
+                let mut bits = (met & t.le(L::splat(*best))).bits() & fresh();
+                while bits != 0 {
+                    let lane = bits.trailing_zeros();
+                    bits &= bits - 1;
+                    let t = t.lane(lane as usize);
+                    let number = self.mesh.first(number) + (part * L::WIDTH) as u32 + lane;
+                    if t < *best || t == *best && number < *triangle {
+                        (*best, *triangle) = (t, number);
+                    }
+                }
+            }
+            if ANY && *best < limit { L::Scalar::of(-1.0) } else { *best }
+        };
+        let soon = |number: usize| {
+            let rows = self.mesh.leaves()[number].corners.as_flattened();
+            rows.iter().step_by(2).for_each(prefetch);
+        };
+        let boxes = self.mesh.boxes();
+        with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {
+            apart(boxes, (beam, limit), wanted, stack, soon, leaf)
+        });
+        let t = L::from_fn(|i| found[i].0);
+        let t = if ANY { L::select(t.lt(limit), L::of(-1.0), limit) } else { t };
+        let mut triangle = L::tag(0);
+        let lanes = L::from_fn(|i| L::Scalar::of(i as f64));
+        for (lane, (_, number)) in found.iter().enumerate().take(L::WIDTH) {
+            let here = lanes.le(L::of(lane as f64)) & lanes.ge(L::of(lane as f64));
+            triangle = L::select(here, L::tag(*number), triangle);
+        }
+        Facet { t, triangle }
+    }
+}
+
+/// Whether the wanted rays of a packet are worth going together.
+#[inline(always)]
+fn is_together<L: Lanes>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
+    if L::WIDTH == 1 || wanted.count_ones() < 2 {
+        return false;
+    }
+    let [low, high] = mesh.mesh().bounds;
+    let size = (0..3).map(|i| f64::from(high[i]) - f64::from(low[i])).fold(0.0, f64::max);
+    let turn = (TOGETHER / (mesh.mesh().triangles.len() as f64).sqrt()).min(TOGETHER_AT_MOST);
+    let turn = turn * L::WIDTH as f64;
+    ray.spread(wanted, turn, turn * size)
+}
+
+/// The nearest triangle nearer than `limit`; of several at the same distance the one with the lowest
+/// number. Directions have unit length. Lanes whose limit is not positive are left out.
+#[inline(never)]
+pub fn closest<L: Lanes>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> Facet<L> {
+    Walk::<false> { mesh }.go(ray, limit)
+}
+
+/// Which lanes meet a triangle nearer than `limit`.
+#[inline(never)]
+pub fn blocked<L: Lanes>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
+    Walk::<true> { mesh }.go(ray, limit).t.lt(limit)
+}
+
+/// As [`closest`], all lanes together or each by itself: for tests and benches.
+#[inline(never)]
+pub fn closest_by<L: Lanes>(mesh: &Mesh, ray: &Ray<L>, limit: L, all: bool) -> Facet<L> {
+    let (beam, walk) = (beam(ray, mesh), Walk::<false> { mesh });
+    if all { walk.together((ray, &beam), limit) } else { walk.apart((ray, &beam), limit) }
+}

@@ -1,0 +1,68 @@
+//! How the noise of the whole picture falls with the rays spent, and when it will reach a target.
+
+use crate::render::schedule::tile::{FLATTEST, STEEPEST, clamp_slope};
+
+/// Points are kept at every half doubling of the rays; this many span three doublings.
+const POINTS: usize = 7;
+
+/// Relative uncertainty of an extrapolated time with a well fitted slope. The slope falls a little while the work goes on:
+/// the rays of exploration are a smaller share of the rays at the beginning than at the end. At slope 0.75 that
+/// lengthens an extrapolation over two doublings by 4 to 10 %.
+const SPREAD: f64 = 0.15;
+
+/// Noise against work, the last three doublings of the work.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Trend {
+    /// Rays and RMSE, oldest first.
+    points: Vec<(f64, f64)>,
+}
+
+impl Trend {
+    /// Notes that `rays` rays brought the picture's RMSE to `noise`.
+    pub fn note(&mut self, rays: f64, noise: f64) {
+        if !(rays > 0.0 && noise > 0.0) {
+            return;
+        }
+        // The latest point moves until it is half a doubling away from the one before it.
+        if let [.., (before, _), (latest, _)] = self.points.as_slice()
+            && *latest < before * std::f64::consts::SQRT_2
+        {
+            self.points.pop();
+        }
+        self.points.push((rays, noise));
+        if self.points.len() > POINTS {
+            self.points.remove(0);
+        }
+    }
+
+    /// How many rays will have been traced, in all, when the noise has fallen to `target`: a lower and an upper
+    /// guess, from the steepest and the flattest of the slopes over the last one, two and three
+    /// doublings; before there is one, from the limits of all slopes. `None` without any noise.
+    pub fn rays_needed(&self, target: f64) -> Option<(f64, f64)> {
+        let (rays, noise) = *self.points.last()?;
+        if noise <= target {
+            return Some((rays, rays));
+        }
+        let slopes = [2, 4, 6].into_iter().filter_map(|back| {
+            let (rays0, noise0) = *self.points.get(self.points.len().checked_sub(back + 1)?)?;
+            Some(clamp_slope((noise0 / noise).ln() / (rays / rays0).ln()))
+        });
+        let (flat, steep) = slopes
+            .map(|p| (p, p))
+            .reduce(|(low, high), (p, _)| (low.min(p), high.max(p)))
+            .unwrap_or((FLATTEST, STEEPEST));
+        let more = |p: f64| rays * ((noise / target).powf(1.0 / p) - 1.0);
+        Some((rays + more(steep) * (1.0 - SPREAD), rays + more(flat) * (1.0 + SPREAD)))
+    }
+
+    /// The slope over the last three doublings (or what there is of them), 0.5 before there are two
+    /// points.
+    pub fn slope(&self) -> f64 {
+        match (self.points.first(), self.points.last()) {
+            (Some((r0, n0)), Some((r1, n1))) if r1 > r0 => {
+                clamp_slope((n0 / n1).ln() / (r1 / r0).ln())
+            }
+            _ => 0.5,
+        }
+    }
+}

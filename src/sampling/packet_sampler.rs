@@ -1,0 +1,210 @@
+//! The random numbers of a packet of samples.
+
+use crate::lanes::{Bits, Lanes, MAX_WIDTH};
+use crate::sampling::hash::{fold, mix, mix1, owen, owen_begin, owen_factor, owen_rest};
+use crate::sampling::sobol;
+use crate::sampling::sobol::DIMENSIONS;
+
+/// Which sequence samples come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SamplerKind {
+    /// A joint Owen-scrambled Sobol set in eight dimensions, padded by further sets.
+    Sobol,
+    /// Independent random numbers.
+    Random,
+}
+
+impl SamplerKind {
+    /// As written on the command line and in file headers.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sobol => "sobol",
+            Self::Random => "random",
+        }
+    }
+}
+
+/// What every sample of a picture depends on beside its pixel, replicate and index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SampleSettings {
+    /// Any number; another number gives another, independent picture of the same scene.
+    pub seed: u64,
+    /// The sequence.
+    pub kind: SamplerKind,
+}
+
+/// The last dimensions of the joint set are for a path's first choices.
+const CHOICES: u32 = 2;
+
+/// Powers of two up to the widest packet.
+const SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
+
+/// The numbers that samples of a lane type start from.
+pub struct Sampler<L: Lanes> {
+    settings: SampleSettings,
+    /// Two words per replicate, from the seed.
+    seeds: [[u32; 2]; 2],
+    /// Dimensions of the first lobe: after the two of the pixel, if these are used.
+    first_lobe: usize,
+    /// `low[k][d]`: Sobol points 0..2^k in dimension d, again and again.
+    low: [[L::Bits; DIMENSIONS]; SHAPES],
+    /// 0, 1, 2, ... in the lanes.
+    ramp: L::Bits,
+    /// A constant per dimension that sets its scrambling apart.
+    apart: [u32; DIMENSIONS],
+}
+
+/// The part of a packet's numbers that depends on the samples' indices alone.
+pub struct Points<'a, L: Lanes> {
+    sampler: &'a Sampler<L>,
+    /// Index in each lane.
+    index: L::Bits,
+    /// `begun[d]`: the Sobol points of the indices in dimension d, their scrambling begun.
+    begun: [L::Bits; DIMENSIONS],
+}
+
+impl<L: Lanes> Sampler<L> {
+    /// `jitter`: samples move inside their pixel and use the first two dimensions for that;
+    /// otherwise the lobes have them.
+    pub fn new(settings: SampleSettings, jitter: bool) -> Self {
+        let word = |replicate: u32, use_: u32| {
+            fold(&[settings.seed as u32, (settings.seed >> 32) as u32, replicate, use_])
+        };
+        let low =
+            |k: usize, d| L::Bits::from_fn(|lane| sobol::point(d, lane as u32 & ((1u32 << k) - 1)));
+        Self {
+            settings,
+            seeds: [0, 1].map(|replicate| [word(replicate, 0), word(replicate, 1)]),
+            first_lobe: if jitter { 2 } else { 0 },
+            low: std::array::from_fn(|k| std::array::from_fn(|d| low(k, d))),
+            ramp: L::Bits::from_fn(|lane| lane as u32),
+            apart: std::array::from_fn(|d| mix1(d as u32 + 1)),
+        }
+    }
+
+    /// The indices `first..first + count`, in packets that hold as many of each of WIDTH / `count` pixels:
+    /// lane i has index `first + i % count`. `count` is a power of two, at most WIDTH, and `first` a multiple
+    /// of it.
+    pub fn block(&self, first: u32, count: usize) -> Points<'_, L> {
+        debug_assert!(count.is_power_of_two() && count <= L::WIDTH);
+        debug_assert!((first as usize).is_multiple_of(count));
+        // Aligned points are one point XOR constants.
+        let low = &self.low[count.ilog2() as usize];
+        let point = |d| L::Bits::splat(sobol::point(d, first)) ^ low[d];
+        let begun = std::array::from_fn(|d| owen_begin(point(d)));
+        let within = self.ramp & L::Bits::splat(count as u32 - 1);
+        Points { sampler: self, index: L::Bits::splat(first) + within, begun }
+    }
+
+    /// The key of a pixel's samples in one replicate (0: A, 1: B). Distinct for all pixels of a
+    /// picture up to 65536 x 65536, since every step is a bijection of the packed coordinates.
+    #[inline(always)]
+    pub fn key(&self, (x, y): (u32, u32), replicate: usize) -> u32 {
+        let [before, after] = self.seeds[replicate];
+        mix1(mix1((x | y << 16) ^ before) ^ after)
+    }
+}
+
+impl<L: Lanes> Points<'_, L> {
+    /// Samples of the pixel that [`Sampler::key`] gave a key.
+    #[inline(always)]
+    pub fn of_pixel(&self, key: u32) -> Draws<'_, L> {
+        Draws { points: self, key: L::Bits::splat(key), of_one: Some(key) }
+    }
+
+    /// Samples of several pixels, by the keys of the pixels in the lanes.
+    #[inline(always)]
+    pub fn of_pixels(&self, keys: L::Bits) -> Draws<'_, L> {
+        Draws { points: self, key: keys, of_one: None }
+    }
+}
+
+/// The random numbers of one packet.
+pub struct Draws<'a, L: Lanes> {
+    points: &'a Points<'a, L>,
+    /// Key of the pixel in each lane.
+    key: L::Bits,
+    /// The key, if all lanes have the same pixel.
+    of_one: Option<u32>,
+}
+
+impl<L: Lanes> Draws<'_, L> {
+    /// Where in its pixel a sample lies, each coordinate in [0, 1).
+    #[inline(always)]
+    pub fn pixel(&self) -> (L, L) {
+        (self.joint(0), self.joint(1))
+    }
+
+    /// Two numbers in [0, 1) for the lobe of the surface met after `bounce` reflections.
+    #[inline(always)]
+    pub fn lobe(&self, bounce: u32) -> (L, L) {
+        let d = self.points.sampler.first_lobe + 2 * bounce as usize;
+        if bounce < 2 { (self.joint(d), self.joint(d + 1)) } else { self.padded(bounce - 2) }
+    }
+
+    /// A number in [0, 1) for choice `number` of a path, from 0: one of two ways to go on.
+    #[inline(always)]
+    pub fn choice(&self, number: u32) -> L {
+        if number < CHOICES {
+            self.joint(DIMENSIONS - CHOICES as usize + number as usize)
+        } else {
+            self.padded_choice(number - CHOICES)
+        }
+    }
+
+    /// Dimension `d` of the joint set.
+    #[inline(always)]
+    fn joint(&self, d: usize) -> L {
+        let points = self.points;
+        let apart = points.sampler.apart[d];
+        let seed = match self.of_one {
+            Some(key) => L::Bits::splat(mix1(key ^ apart)),
+            None => mix(self.key ^ L::Bits::splat(apart)),
+        };
+        match points.sampler.settings.kind {
+            SamplerKind::Random => L::unit(mix(mix(points.index ^ seed) + self.key)),
+            SamplerKind::Sobol => {
+                L::unit(owen_rest(points.begun[d], seed, owen_factor(seed)).reverse())
+            }
+        }
+    }
+
+    /// Two numbers for lobe `pair` of the padded sets: four lobes share a set.
+    #[cold]
+    fn padded(&self, pair: u32) -> (L, L) {
+        let d = 2 * (pair % 4) as usize;
+        let [a, b] = self.padded_set((pair / 4 + 1) ^ 0x5bd1_e995, [d, d + 1]);
+        (a, b)
+    }
+
+    /// A number for choice `number` of the padded sets: eight choices share a set.
+    #[cold]
+    fn padded_choice(&self, number: u32) -> L {
+        let per_set = DIMENSIONS as u32;
+        let [x] =
+            self.padded_set((number / per_set + 1) ^ 0x9e37_79b9, [(number % per_set) as usize]);
+        x
+    }
+
+    /// Some dimensions of the padded set `set`, whose indices are shuffled by a key of its own.
+    #[inline(always)]
+    fn padded_set<const N: usize>(&self, set: u32, dimensions: [usize; N]) -> [L; N] {
+        let Points { sampler, index, .. } = self.points;
+        let key = mix(self.key + L::Bits::splat(mix1(set)));
+        let shuffled = owen(index.reverse(), key).reverse();
+        let mut at = [0; MAX_WIDTH];
+        for (lane, at) in at.iter_mut().enumerate().take(L::WIDTH) {
+            *at = shuffled.lane(lane);
+        }
+        dimensions.map(|d| {
+            let seed = mix(key ^ L::Bits::splat(sampler.apart[d]));
+            match sampler.settings.kind {
+                SamplerKind::Random => L::unit(mix(mix(*index ^ seed) + key)),
+                SamplerKind::Sobol => {
+                    let x = L::Bits::from_fn(|lane| sobol::point(d, at[lane]));
+                    L::unit(owen(x, seed).reverse())
+                }
+            }
+        })
+    }
+}

@@ -1,0 +1,38 @@
+//! Scenes that are part of the program.
+
+use crate::scene::Scene;
+
+/// The text of the built-in scene, the mirror room: `scenes/mirror-room.toml`.
+pub const BUILT_IN: &str = include_str!("../../scenes/mirror-room.toml");
+
+/// The built-in scene: the mirror room.
+pub fn built_in() -> Scene {
+    Scene::parse(BUILT_IN, "mirror-room.toml").expect("the built-in scene is tested")
+}
+
+/// The commented text of a small scene to start from.
+pub fn starter() -> &'static str {
+    include_str!("starter.toml")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_can_be_read_without_a_warning() {
+        assert!(built_in().objects.len() >= 6);
+        for text in [BUILT_IN, starter()] {
+            let scene = Scene::parse(text, "text").unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(scene.warnings(), []);
+            assert!(text.starts_with("# "));
+        }
+    }
+
+    #[test]
+    fn the_starter_names_every_shape() {
+        for (key, _) in crate::shape::EXAMPLES {
+            assert!(starter().contains(key), "{key}");
+        }
+    }
+}

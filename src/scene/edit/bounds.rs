@@ -1,0 +1,129 @@
+//! How large things are and where: for framing, for steps, for placing.
+
+use crate::primitive::Form;
+use crate::scene::edit::Subject;
+use crate::scene::{Object, Scene};
+use crate::value::decade;
+use glam::DVec3;
+
+/// A ball around something.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Its centre, in scene units.
+    pub center: [f64; 3],
+    /// Its radius, in scene units; greater than 0.
+    pub radius: f64,
+}
+
+/// An axis-parallel box: its lowest and its highest corner.
+pub(super) type Extent = (DVec3, DVec3);
+
+/// A ball around an object (of a plane: around the point that places it), a point light, or what a
+/// camera looks at; `None` for what is nowhere in particular.
+pub fn bounds(scene: &Scene, subject: &Subject) -> Option<Ball> {
+    match subject {
+        Subject::Object(i) => {
+            let object = scene.objects.get(*i)?;
+            Some(match object.form().bounds() {
+                Some(extent) => ball(extent),
+                None => {
+                    let point = object.shape.place();
+                    let at = object.scene_from_object().transform_point3(point);
+                    Ball { center: at.to_array(), radius: scene_bounds(scene).radius }
+                }
+            })
+        }
+        Subject::Light(i) => {
+            let position = scene.lights.get(*i)?.point?.position;
+            Some(Ball { center: position, radius: scene_bounds(scene).radius / 10.0 })
+        }
+        Subject::Material(name) => {
+            let used = scene.objects.iter().filter(|o| o.names_material(name));
+            used.filter_map(|o| o.form().bounds()).reduce(union).map(ball)
+        }
+        _ => None,
+    }
+}
+
+/// A ball around the solids of the scene; without solids around whatever has an end; in an empty
+/// scene around the origin with radius 1.
+pub fn scene_bounds(scene: &Scene) -> Ball {
+    middle(scene).map_or(Ball { center: [0.0; 3], radius: 1.0 }, ball)
+}
+
+/// The box around the solids, or else around whatever has an end.
+fn middle(scene: &Scene) -> Option<Extent> {
+    let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
+    let solids = forms.iter().filter(|form| is_solid(form)).filter_map(Form::bounds);
+    solids.reduce(union).or_else(|| forms.iter().filter_map(Form::bounds).reduce(union))
+}
+
+/// Whether a form fills space.
+pub(super) fn is_solid(form: &Form) -> bool {
+    !matches!(form, Form::Parallelogram { .. } | Form::Plane { .. })
+}
+
+pub(super) fn union(a: Extent, b: Extent) -> Extent {
+    (a.0.min(b.0), a.1.max(b.1))
+}
+
+/// The ball through the corners of a box.
+fn ball((low, high): Extent) -> Ball {
+    let radius = (high - low).length() / 2.0;
+    let center = low + (high - low) / 2.0;
+    Ball { center: center.to_array(), radius: radius.max(f64::MIN_POSITIVE) }
+}
+
+/// The coarse step of a coordinate: a power of ten, between a hundredth and a tenth of the diameter of
+/// the scene's solids (0.1 in a room with things a few units apart). A fine step is a tenth of it.
+pub fn step_length(scene: &Scene) -> f64 {
+    let exponent = decade(2.0 * scene_bounds(scene).radius) - 1;
+    format!("1e{}", exponent.clamp(-12, 8)).parse().unwrap_or(0.1)
+}
+
+/// How far from the eye the camera's pivot is: its target, or, if it only has a direction, the point
+/// of the view axis nearest to the scene's middle. Greater than 0.
+pub fn focus_distance(scene: &Scene) -> f64 {
+    let eye = DVec3::from_array(scene.camera.eye);
+    if let Some(target) = scene.camera.target {
+        return (DVec3::from_array(target) - eye).length();
+    }
+    let Ball { center, radius } = scene_bounds(scene);
+    let along = scene.camera.view().map_or(0.0, |w| w.dot(DVec3::from_array(center) - eye));
+    if along > 0.1 * radius { along } else { radius }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+
+    #[test]
+    fn solids_give_the_scene_its_size() {
+        let mut scene = built_in();
+        let room = scene_bounds(&scene);
+        assert!(room.radius > 1.5 && room.radius < 3.0, "{room:?}");
+        assert_eq!(step_length(&scene), 0.1);
+        let floor = bounds(&scene, &Subject::Object(0)).unwrap();
+        assert!((floor.radius - 32f64.sqrt()).abs() < 1e-12 && floor.center == [0.0; 3]);
+        let red = bounds(&scene, &Subject::Material("red".into())).unwrap();
+        assert_eq!(red, bounds(&scene, &Subject::Object(2)).unwrap());
+        assert_eq!(bounds(&scene, &Subject::Film), None);
+        scene.objects.truncate(1);
+        assert_eq!(scene_bounds(&scene), floor, "without solids what there is");
+        scene.objects.clear();
+        assert_eq!(scene_bounds(&scene).radius, 1.0);
+    }
+
+    #[test]
+    fn the_pivot_is_in_front_of_the_eye() {
+        let mut scene = built_in();
+        let target = focus_distance(&scene);
+        let w = scene.camera.view().unwrap();
+        scene.camera.target = None;
+        scene.camera.direction = Some(w.to_array());
+        assert!((focus_distance(&scene) / target - 1.0).abs() < 0.3);
+        scene.camera.direction = Some((-w).to_array());
+        assert!(focus_distance(&scene) > 0.0);
+    }
+}

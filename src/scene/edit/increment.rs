@@ -1,0 +1,387 @@
+//! Arrow steps: the next clean value up or down, whatever the kind of number, and the next word.
+
+use crate::scene::Scene;
+use crate::scene::edit::bounds::step_length;
+use crate::scene::edit::convert;
+use crate::scene::edit::convert::chosen;
+use crate::scene::edit::parse_value::floats;
+use crate::scene::edit::properties::is_material;
+use crate::scene::edit::set::{label, lookup, replace};
+use crate::scene::edit::toml_view::{get, read};
+use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::value::{Field, Preset, Range, Takes, decade, rounded_to};
+use toml::Value;
+
+/// Moves the numbers behind `key` by `steps`: a whole number of coarse steps, or otherwise of fine ones
+/// (0.1 is one, -0.3 three back). `component`: only that number, from 0; `None`: all together, of a
+/// colour its brightness. Sizes, intensities and roughness go by about a tenth (fine: a hundredth),
+/// coordinates by [`step_length`], angles by 5 degrees, shares by 0.05. At the end of a range, and
+/// where other keys forbid the value (the note says so then), the scene stays as it is. A key without
+/// numbers goes to the next or previous word ([`toggle`]).
+///
+/// # Errors
+/// If there is no such key or number, or it has no value to start from.
+pub fn step(
+    scene: &Scene,
+    subject: &Subject,
+    key: &str,
+    component: Option<usize>,
+    steps: f64,
+) -> Result<Edit, Refusal> {
+    let values = read(scene, subject)?;
+    let Some(field) = lookup(subject, key) else {
+        return Err(Refusal::new(&format!("there is no key {key} here"), ""));
+    };
+    let Some(rule) = Rule::of(field, scene) else {
+        return toggle(scene, subject, key, steps > 0.0);
+    };
+    let given = get(&values, key).cloned().or_else(|| start(field, scene, subject));
+    let Some(numbers) = given.as_ref().and_then(floats) else {
+        return Err(Refusal::new(&format!("{} has no value yet", field.name), "Type one."));
+    };
+    if component.is_some_and(|c| c >= numbers.len()) {
+        return Err(Refusal::new(&format!("{key} has no such number"), ""));
+    }
+    let count = Count::of(steps);
+    let next = match (component, field.takes) {
+        (None, Takes::Color(range)) => brightened(&numbers, range, count),
+        (None, Takes::Wholes(_, range)) => resized(&numbers, range, count),
+        _ => {
+            let moved = |(i, x): (usize, &f64)| match component {
+                Some(c) if c != i => *x,
+                _ => rule.stepped(*x, &numbers, count),
+            };
+            numbers.iter().enumerate().map(moved).collect()
+        }
+    };
+    // A direction of zeros would be a fault: such a step is left out.
+    let lost = matches!(field.takes, Takes::Direction) && next.iter().all(|x| *x == 0.0);
+    let next = if lost { numbers.clone() } else { next };
+    let whole = matches!(field.takes, Takes::Whole(_) | Takes::Wholes(..));
+    let one = |x: f64| if whole { Value::Integer(x as i64) } else { Value::Float(x) };
+    let value = match given {
+        Some(Value::Array(_)) => Value::Array(next.into_iter().map(one).collect()),
+        _ => one(next[0]),
+    };
+    replace(scene, subject, key, values, value).or_else(|refusal| {
+        let (scene, subject) = (scene.clone(), subject.clone());
+        let label = label(&scene, &subject, key);
+        Ok(Edit { scene, subject, label, note: Some(refusal.to_string()) })
+    })
+}
+
+/// Goes to the next word behind `key` (or the previous one), round and round: of a choice, a switch, a
+/// kind, an object's material. A choice without a value has that as a place in the round.
+///
+/// # Errors
+/// If there is no such key or no words behind it.
+pub fn toggle(scene: &Scene, subject: &Subject, key: &str, forward: bool) -> Result<Edit, Refusal> {
+    let values = read(scene, subject)?;
+    let Some(field) = lookup(subject, key) else {
+        return Err(Refusal::new(&format!("there is no key {key} here"), ""));
+    };
+    let value = get(&values, key);
+    let optional = matches!(field.preset, Preset::Without(_));
+    let (words, at): (Vec<&str>, Option<usize>) = match field.takes {
+        Takes::Switch => {
+            let on = value.and_then(Value::as_bool).unwrap_or(false);
+            return crate::scene::edit::set(scene, subject, key, if on { "false" } else { "true" });
+        }
+        Takes::OneOf(kinds) => {
+            let now = match get(&values, key).and_then(Value::as_table) {
+                Some(inner) => kinds.iter().find(|k| inner.contains_key(k.name)).map(|k| k.name),
+                None => chosen(subject, &values),
+            };
+            let words: Vec<_> = kinds.iter().map(|k| k.name).collect();
+            let at = words.iter().position(|w| Some(*w) == now);
+            return match next(at, words.len(), forward, optional) {
+                Some(at) => convert::switch(scene, subject, key, words[at]),
+                None => crate::scene::edit::set(scene, subject, key, ""),
+            };
+        }
+        Takes::Choice(choices) => {
+            let words: Vec<_> = choices.iter().map(|c| c.name).collect();
+            let now = value.and_then(Value::as_str);
+            let at = words.iter().position(|w| Some(*w) == now);
+            (words, at)
+        }
+        _ if is_material(subject, field) => {
+            let words: Vec<_> = scene.materials.keys().map(String::as_str).collect();
+            let now = value.and_then(Value::as_str);
+            let at = words.iter().position(|w| Some(*w) == now);
+            (words, at)
+        }
+        _ => {
+            let found = format!("{} has no words to choose from", field.name);
+            return Err(Refusal::new(&found, &format!("Type {}.", field.takes)));
+        }
+    };
+    let text = next(at, words.len(), forward, optional).map_or("", |at| words[at]);
+    crate::scene::edit::set(scene, subject, key, text)
+}
+
+/// The place after (or before) `at` in a round of `n` words; with `optional` one more place, `None`.
+fn next(at: Option<usize>, n: usize, forward: bool, optional: bool) -> Option<usize> {
+    match (at, forward) {
+        _ if n == 0 => None,
+        (None, true) => Some(0),
+        (None, false) => Some(n - 1),
+        (Some(at), true) if at + 1 < n => Some(at + 1),
+        (Some(at), false) if at > 0 => Some(at - 1),
+        (Some(_), _) if optional => None,
+        (Some(_), true) => Some(0),
+        (Some(_), false) => Some(n - 1),
+    }
+}
+
+/// The value from which a key that is left out takes its first step.
+fn start(field: &Field, scene: &Scene, subject: &Subject) -> Option<Value> {
+    let material = match subject {
+        Subject::Material(name) => scene.materials.get(name),
+        _ => None,
+    };
+    match (field.name, material) {
+        ("alpha", Some(material)) => Some(Value::Float(rounded_to(material.slope(), -4))),
+        ("reflectance", Some(material)) => {
+            Some(Value::Array(material.f0().0.map(Value::Float).to_vec()))
+        }
+        _ => None,
+    }
+}
+
+/// How many steps, of which width.
+#[derive(Clone, Copy)]
+struct Count {
+    steps: i64,
+    fine: bool,
+}
+
+impl Count {
+    fn of(steps: f64) -> Self {
+        let limited = steps.clamp(-1e3, 1e3);
+        if limited.fract() == 0.0 {
+            Self { steps: limited as i64, fine: false }
+        } else {
+            Self { steps: (limited * 10.0).round() as i64, fine: true }
+        }
+    }
+}
+
+/// How a number goes up and down.
+#[derive(Clone, Copy)]
+enum Rule {
+    /// By rungs of about a tenth. Below `floor` the next rung is 0, and from 0 it is `floor`.
+    Rungs { floor: f64, range: Range },
+    /// By `unit` (fine: a tenth of it).
+    Units { unit: f64, range: Range },
+    /// By 5 degrees (fine: 0.5).
+    Degrees { range: Range },
+    /// By a twentieth of the largest number of the direction.
+    Direction,
+    /// By rungs, the sign kept.
+    Factor,
+    /// By tens (fine: ones).
+    Tens { range: Range },
+    /// By doubling and halving (fine: ones). From 0 to 1.
+    Doubles { range: Range },
+}
+
+impl Rule {
+    /// `None`: no numbers.
+    fn of(field: &Field, scene: &Scene) -> Option<Self> {
+        Some(match field.takes {
+            Takes::Number(range) | Takes::Numbers(_, range) => {
+                if field.unit == "degrees" {
+                    Self::Degrees { range }
+                } else if range == Range::SIZE {
+                    Self::Rungs { floor: 0.0, range }
+                } else if range == Range::COORDINATE {
+                    Self::Units { unit: step_length(scene), range }
+                } else if field.name == "scale" {
+                    // Of a texture.
+                    Self::Rungs { floor: 0.0, range }
+                } else if field.name == "offset" {
+                    Self::Units { unit: 0.05, range }
+                } else if field.name == "height" {
+                    // Of a bump: a hundredth of what it stands on, or less.
+                    Self::Units { unit: 0.005, range }
+                } else if matches!(field.name, "roughness" | "alpha") {
+                    // From 0 to what can just be told from it at the far end of a room.
+                    Self::Rungs { floor: 0.001, range }
+                } else if range == Range::SHARE || range == Range::COEFFICIENT {
+                    Self::Units { unit: 0.05, range }
+                } else if field.unit == "scene units" {
+                    Self::Rungs { floor: step_length(scene) / 10.0, range }
+                } else if range == Range::LIGHT {
+                    Self::Rungs { floor: 0.01, range }
+                } else {
+                    // An exponent.
+                    Self::Rungs { floor: 1.0, range }
+                }
+            }
+            Takes::Direction => Self::Direction,
+            Takes::Factor => Self::Factor,
+            Takes::Color(range) => Self::Units { unit: 0.05, range },
+            Takes::Whole(range) if field.name == "rays_per_pixel" => Self::Doubles { range },
+            Takes::Wholes(_, range) => Self::Doubles { range },
+            Takes::Whole(range) => Self::Tens { range },
+            _ => return None,
+        })
+    }
+
+    /// `x` after the steps; `all`: the numbers beside it.
+    fn stepped(self, x: f64, all: &[f64], count: Count) -> f64 {
+        let Count { steps, fine } = count;
+        match self {
+            Self::Rungs { floor, range } => climb(x, floor, range, count),
+            Self::Units { unit, range } if range == Range::COEFFICIENT && x > 2.0 => {
+                climb(x, unit, range, count)
+            }
+            Self::Units { unit, range } => within(added(x, unit, count), range, x),
+            Self::Degrees { range } => {
+                let moved = added(x, 5.0, count);
+                // An opening angle has no room for its last 5 degrees.
+                let ends = Range::closed(range.low + 0.5, range.high - 0.5);
+                if range.low.is_finite() { within(moved, ends, x) } else { moved }
+            }
+            Self::Direction => {
+                let largest = all.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+                let unit = rounded_to(0.05, -2) * 10f64.powi(decade(largest));
+                let moved = added(x, unit, count);
+                if moved.is_finite() { moved } else { x }
+            }
+            Self::Factor => {
+                let range = Range::closed(1e-6, 1e6);
+                climb(x.abs(), 0.0, range, count) * x.signum()
+            }
+            Self::Tens { range } => {
+                within(x + (if fine { 1 } else { 10 } * steps) as f64, range, x)
+            }
+            Self::Doubles { range } => doubled(x, range, count),
+        }
+    }
+}
+
+/// x + unit * steps, rounded to a hundredth of a fine step.
+fn added(x: f64, unit: f64, Count { steps, fine }: Count) -> f64 {
+    let width = if fine { unit / 10.0 } else { unit };
+    rounded_to(x + width * steps as f64, decade(unit) - 3)
+}
+
+/// `x` brought into the range; if that has no end there, `old`.
+fn within(x: f64, range: Range, old: f64) -> f64 {
+    if range.holds(x) {
+        x
+    } else if x >= range.high && range.high_in {
+        range.high
+    } else if x <= range.low && range.low_in {
+        range.low
+    } else {
+        old
+    }
+}
+
+/// Twice or half as much per step, or one more or less.
+fn doubled(x: f64, range: Range, Count { steps, fine }: Count) -> f64 {
+    let moved = match steps {
+        _ if fine => x + steps as f64,
+        0.. if x == 0.0 && steps > 0 => 2f64.powi((steps.min(40) - 1) as i32),
+        _ => (x * 2f64.powi(steps.clamp(-40, 40) as i32)).floor(),
+    };
+    within(moved, range, x)
+}
+
+/// The rungs of a decade in hundredths, about a tenth apart, every digit among them.
+const RUNGS: [i64; 23] = [
+    100, 110, 120, 130, 140, 160, 180, 200, 220, 250, 280, 300, 330, 360, 400, 450, 500, 550, 600,
+    650, 700, 800, 900,
+];
+
+/// The rung of a fine ladder above `hundredths`: 1.00, 1.01 ... 2.00, 2.02 ... 5.00, 5.05 ...
+fn fine_width(hundredths: i64) -> i64 {
+    match hundredths {
+        ..200 => 1,
+        200..500 => 2,
+        _ => 5,
+    }
+}
+
+/// `x` > 0 (or 0) after that many rungs: always on the ladder, so that up and down lead back.
+fn climb(x: f64, floor: f64, range: Range, Count { steps, fine }: Count) -> f64 {
+    let up = steps > 0;
+    let mut x = x;
+    for _ in 0..steps.unsigned_abs() {
+        let next = if x == 0.0 { if up { floor } else { 0.0 } } else { rung(x, up, fine) };
+        let next = if next < floor && !up { 0.0 } else { next };
+        let held = within(next, range, x);
+        if held == x {
+            break;
+        }
+        x = held;
+    }
+    x
+}
+
+/// The next rung above or below `x` > 0.
+fn rung(x: f64, up: bool, fine: bool) -> f64 {
+    let e = decade(x);
+    let scale = format!("1e{}", 2 - e).parse().unwrap_or(1.0);
+    let mantissa = x * scale;
+    // A number on a rung has been rounded on its way there.
+    let nearest = mantissa.round();
+    let on = (mantissa - nearest).abs() < 1e-6;
+    let below = if on { nearest as i64 } else { mantissa.floor() as i64 };
+    let hundredths = match (up, fine) {
+        (true, true) => {
+            let width = fine_width(below);
+            (below / width + 1) * width
+        }
+        (false, true) => {
+            let reach = if on { below - 1 } else { below };
+            let width = fine_width(reach.max(100));
+            // Below 1.00 the next decade's 9.95 comes.
+            if reach < 100 {
+                return rounded_to(9.95 * 10f64.powi(e - 1), e - 3);
+            } else {
+                reach / width * width
+            }
+        }
+        (true, false) => RUNGS.iter().copied().find(|r| *r > below).unwrap_or(1000),
+        (false, false) => {
+            let under = |r: &i64| if on { *r < below } else { *r <= below };
+            RUNGS.iter().rev().copied().find(under).unwrap_or(90)
+        }
+    };
+    format!("{hundredths}e{}", e - 2).parse().unwrap_or(x)
+}
+
+/// A colour brighter or darker as a whole; black becomes a dark grey.
+fn brightened(channels: &[f64], range: Range, count: Count) -> Vec<f64> {
+    let largest = channels.iter().fold(0.0f64, |m, x| m.max(*x));
+    let rule = Rule::Units { unit: 0.05, range };
+    let next = match largest > 2.0 {
+        true => climb(largest, 0.0, range, count),
+        false => rule.stepped(largest, channels, count),
+    };
+    if largest == 0.0 {
+        return vec![next; channels.len()];
+    }
+    // Its hue cannot be had back from black: the darkest step stays above.
+    let next = if next <= 0.0 { largest.min(0.005) } else { next };
+    channels.iter().map(|x| rounded_to(x * next / largest, decade(next) - 3)).collect()
+}
+
+/// Width and height together, the ratio kept as far as whole numbers can; fine: by 16 pixels of the
+/// width.
+fn resized(sides: &[f64], range: Range, count: Count) -> Vec<f64> {
+    let width = sides[0];
+    let next = match count.fine {
+        true => ((width / 16.0).round() + count.steps as f64) * 16.0,
+        false => doubled(width, range, count),
+    };
+    let factor = next / width;
+    let scaled: Vec<_> = sides.iter().map(|s| (s * factor).round()).collect();
+    let pixels: f64 = scaled.iter().product();
+    let fits = scaled.iter().all(|s| range.holds(*s)) && pixels <= crate::scene::MAX_PIXELS as f64;
+    if fits { scaled } else { sides.to_vec() }
+}

@@ -1,0 +1,253 @@
+//! Values as people type and read them.
+
+use crate::scene::edit::Refusal;
+use crate::scene::format::suggest::nearest;
+use crate::value::{Color, Field, Takes, excerpt, number, printable};
+use toml::Value;
+
+/// The value that `text` stands for behind the key `field`. Says nothing about ranges, except where
+/// the number would have no place at all.
+pub(super) fn parse(field: &Field, text: &str) -> Result<Value, Refusal> {
+    let text = text.trim();
+    let wrong = || {
+        let found = format!("{} cannot be \"{}\"", field.name, excerpt(text));
+        Refusal::new(&found, &format!("Expected {}.", field.takes))
+    };
+    let list = |n: usize| match numbers(text) {
+        Some(list) if list.len() == n => Ok(list),
+        Some(list) => {
+            let found = format!("{} needs {n} numbers, not {}", field.name, list.len());
+            Err(Refusal::new(&found, &format!("Expected {}.", field.takes)))
+        }
+        None => Err(wrong()),
+    };
+    let floats = |list: Vec<f64>| Value::Array(list.into_iter().map(Value::Float).collect());
+    let whole = |x: f64, range: crate::value::Range| {
+        let fits = x.fract() == 0.0 && range.holds(x);
+        if fits { Ok(Value::Integer(x as i64)) } else { Err(wrong()) }
+    };
+    match field.takes {
+        Takes::Text => name(field.name, unquoted(text)).map(Value::String),
+        Takes::Switch => {
+            let words = ["true", "on", "yes", "1", "false", "off", "no", "0"];
+            let at = choose(text, &words).ok_or_else(wrong)?;
+            Ok(Value::Boolean(at < 4))
+        }
+        Takes::Choice(choices) => {
+            let words: Vec<_> = choices.iter().map(|c| c.name).collect();
+            word(field, unquoted(text), &words).map(|at| Value::String(words[at].to_string()))
+        }
+        Takes::Whole(range) => list(1).and_then(|list| whole(list[0], range)),
+        Takes::Wholes(n, range) => {
+            let wholes = list(n)?.into_iter().map(|x| whole(x, range));
+            wholes.collect::<Result<_, _>>().map(Value::Array)
+        }
+        Takes::Number(_) => list(1).map(|list| Value::Float(list[0])),
+        Takes::Numbers(n, _) => list(n).map(floats),
+        Takes::Direction => list(3).map(floats),
+        Takes::Factor => match numbers(text).as_deref() {
+            Some([factor]) => Ok(Value::Float(*factor)),
+            Some(list @ [_, _, _]) => Ok(floats(list.to_vec())),
+            _ => Err(wrong()),
+        },
+        Takes::Color(_) => match Color::from_hex(unquoted(text)) {
+            Some(color) => Ok(floats(color.0.to_vec())),
+            None if text.contains('#') => Err(wrong()),
+            None => list(3).map(floats),
+        },
+        Takes::Table(_)
+        | Takes::OneOf(_)
+        | Takes::ListOf(_)
+        | Takes::Tables(_)
+        | Takes::Named(_) => Err(wrong()),
+    }
+}
+
+/// The position of the one of `words` that `text` means: it, or the only one that begins with it.
+pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
+    let text = text.to_lowercase();
+    if let Some(at) = words.iter().position(|word| word.to_lowercase() == text) {
+        return Some(at);
+    }
+    let starts = |word: &&str| !text.is_empty() && word.to_lowercase().starts_with(&text);
+    let mut begun = words.iter().enumerate().filter(|(_, word)| starts(word));
+    match (begun.next(), begun.next()) {
+        (Some((at, _)), None) => Some(at),
+        _ => None,
+    }
+}
+
+/// As `choose`, with the reason if there is none or more than one.
+pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, Refusal> {
+    choose(text, words).ok_or_else(|| {
+        let quote = |word: &str| format!("\"{}\"", excerpt(word));
+        let quoted: Vec<_> = words.iter().take(20).map(|w| quote(w)).collect();
+        let more = if quoted.len() < words.len() { ", …" } else { "" };
+        let mut help = format!("Expected one of {}{more}.", quoted.join(", "));
+        if let Some(meant) = nearest(text, words.iter().copied()) {
+            help += &format!(" Did you mean {}?", quote(meant));
+        }
+        Refusal::new(&format!("{} cannot be \"{}\"", field.name, excerpt(text)), &help)
+    })
+}
+
+/// `text` as a name that a file, an outline and a terminal can show.
+pub(super) fn name(what: &str, text: &str) -> Result<String, Refusal> {
+    let text = text.trim();
+    let help = "Expected at most 60 characters, none of them a control character.";
+    if text.chars().count() > 60 || printable(text) != text {
+        return Err(Refusal::new(&format!("{what} cannot be \"{}\"", excerpt(text)), help));
+    }
+    Ok(text.to_string())
+}
+
+fn unquoted(text: &str) -> &str {
+    text.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(text)
+}
+
+/// Numbers between commas, semicolons or spaces (or the `x` of `640x480` and `640 x 480`), brackets
+/// around them or not.
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    let inner = match text.strip_prefix('[') {
+        Some(rest) => rest.strip_suffix(']')?,
+        None => text,
+    };
+    let words: Vec<_> =
+        inner.split([',', ';', ' ', '\t']).filter(|word| !word.is_empty()).collect();
+    let is_number = |at: usize| words.get(at).is_some_and(|word| digits(word));
+    let between = |at: usize| {
+        ["x", "×"].contains(&words[at]) && at > 0 && is_number(at - 1) && is_number(at + 1)
+    };
+    let parts = (0..words.len()).filter(|at| !between(*at));
+    let parts = parts.flat_map(|at| words[at].split(['x', '×']));
+    parts.map(|part| digits(part).then(|| part.parse().ok())?).collect()
+}
+
+/// Whether a word is a number in digits: `inf` and `nan` are words that no field takes.
+fn digits(part: &str) -> bool {
+    part.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b))
+        && part.bytes().any(|b| b.is_ascii_digit())
+}
+
+/// A value as it is shown: shortest digits, lists without brackets, colours as `#rrggbb` where that
+/// is exact and shorter.
+pub(super) fn show(takes: Takes, value: &Value) -> String {
+    if let (Takes::Color(_), Some(color)) = (takes, color(value)) {
+        let channels = join(&color.0.map(number));
+        return color.to_hex().filter(|hex| hex.len() < channels.len()).unwrap_or(channels);
+    }
+    match value {
+        Value::Array(list) => join(&list.iter().map(|v| show(Takes::Text, v)).collect::<Vec<_>>()),
+        Value::Float(x) => number(*x),
+        Value::Integer(i) => i.to_string(),
+        Value::Boolean(yes) => yes.to_string(),
+        Value::String(text) => printable(text),
+        other => other.to_string(),
+    }
+}
+
+fn join(parts: &[String]) -> String {
+    parts.join(", ")
+}
+
+/// The numbers of a value: one, or those of a list.
+pub(super) fn floats(value: &Value) -> Option<Vec<f64>> {
+    let one = |value: &Value| match value {
+        Value::Float(x) => Some(*x),
+        Value::Integer(i) => Some(*i as f64),
+        _ => None,
+    };
+    match value {
+        Value::Array(list) => list.iter().map(one).collect(),
+        other => one(other).map(|x| vec![x]),
+    }
+}
+
+/// A value that is a colour.
+pub(super) fn color(value: &Value) -> Option<Color> {
+    floats(value)?.try_into().ok().map(Color)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::value::{Choice, Range};
+
+    fn field(takes: Takes) -> Field {
+        Field::required("it", takes, "", "")
+    }
+
+    #[test]
+    fn numbers_are_read_as_people_type_them() {
+        let one = field(Takes::Number(Range::FINITE));
+        for (text, expected) in
+            [("0.5", 0.5), (".5", 0.5), (" 5. ", 5.0), ("1e-3", 1e-3), ("+2", 2.0), ("[3]", 3.0)]
+        {
+            assert_eq!(parse(&one, text), Ok(Value::Float(expected)), "{text}");
+        }
+        for text in [
+            "", "x", "inf", "nan", "1 2", "0,5", "--1", "1e", "[1", "e", "0x10", "1x", "x1", "1 x",
+            "×2",
+        ] {
+            assert!(parse(&one, text).is_err(), "{text}");
+        }
+        let three = field(Takes::Numbers(3, Range::FINITE));
+        for text in ["1, 2, 3", "1 2 3", "[1,2,3]", "1;2 ;3", " [ 1 2 3 ] "] {
+            assert_eq!(floats(&parse(&three, text).unwrap()), Some(vec![1.0, 2.0, 3.0]), "{text}");
+        }
+        let refusal = parse(&three, "1 2").unwrap_err();
+        assert_eq!(refusal.found, "it needs 3 numbers, not 2");
+        let size = field(Takes::Wholes(2, Range::closed(1.0, 100.0)));
+        for text in ["64x48", "64 x 48", "64×48", "64 48"] {
+            assert_eq!(floats(&parse(&size, text).unwrap()), Some(vec![64.0, 48.0]), "{text}");
+        }
+        for text in
+            ["64x", "x64", "64 48x", "64xx48", "64 x x 48", "64 x", "64 0", "64 4.5", "64 1e9"]
+        {
+            assert!(parse(&size, text).is_err(), "{text}");
+        }
+        let factor = field(Takes::Factor);
+        assert!(parse(&factor, "2").is_ok() && parse(&factor, "1 2 3").is_ok());
+        assert!(parse(&factor, "1 2").is_err());
+    }
+
+    #[test]
+    fn colours_and_words() {
+        let color = field(Takes::Color(Range::SHARE));
+        assert_eq!(floats(&parse(&color, "#ff0000").unwrap()), Some(vec![1.0, 0.0, 0.0]));
+        assert_eq!(floats(&parse(&color, ".5 0 1").unwrap()), Some(vec![0.5, 0.0, 1.0]));
+        assert!(parse(&color, "#ff00").is_err() && parse(&color, "red").is_err());
+        let switch = field(Takes::Switch);
+        for (text, expected) in
+            [("true", true), ("ON", true), ("y", true), ("of", false), ("n", false), ("f", false)]
+        {
+            assert_eq!(parse(&switch, text), Ok(Value::Boolean(expected)), "{text}");
+        }
+        assert!(parse(&switch, "o").is_err(), "on or off");
+        let lobes: &[Choice] =
+            &[Choice { name: "mirror", doc: "" }, Choice { name: "monkey", doc: "" }];
+        let lobe = field(Takes::Choice(lobes));
+        assert_eq!(parse(&lobe, "mi"), Ok(Value::String("mirror".into())));
+        let refusal = parse(&lobe, "miror").unwrap_err().to_string();
+        assert!(refusal.ends_with("Did you mean \"mirror\"?"), "{refusal}");
+        assert!(parse(&lobe, "m").is_err() && parse(&lobe, "").is_err());
+    }
+
+    #[test]
+    fn values_are_shown_short() {
+        let list = |list: &[f64]| Value::Array(list.iter().map(|x| Value::Float(*x)).collect());
+        let color = Takes::Color(Range::LIGHT);
+        assert_eq!(show(Takes::Direction, &list(&[0.1, -3.0, 1e9])), "0.1, -3, 1e9");
+        assert_eq!(show(color, &list(&[1.0, 0.0, 0.5])), "1, 0, 0.5");
+        assert_eq!(show(color, &list(&Color::from_hex("#80ff01").unwrap().0)), "#80ff01");
+        assert_eq!(show(Takes::Switch, &Value::Boolean(true)), "true");
+    }
+
+    #[test]
+    fn names_stay_printable() {
+        assert_eq!(name("name", " café 2 "), Ok("café 2".into()));
+        for bad in ["a\nb", "\u{1b}[31m", "a\u{202e}b", &"x".repeat(61)] {
+            assert!(name("name", bad).is_err(), "{bad:?}");
+        }
+    }
+}

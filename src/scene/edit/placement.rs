@@ -1,0 +1,240 @@
+//! What things stand on, and room to stand.
+
+use crate::camera::Camera;
+use crate::primitive::Form;
+use crate::scene::edit::bounds::{Ball, Extent, is_solid, scene_bounds};
+use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::{Object, Scene, Step};
+use crate::value::{decade, rounded_to, significant};
+use glam::{DVec2, DVec3};
+
+/// Lowers (or lifts) an object until its lowest point rests on the highest surface below its middle,
+/// or, if nothing is below, on the lowest above. What stands under it is looked for under its middle
+/// and under its lowest corners.
+///
+/// # Errors
+/// For what is no object, has no lowest point, or if nothing is under or above it.
+pub fn drop_down(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
+    let Subject::Object(index) = subject else {
+        return Err(Refusal::new("only objects can be dropped", "Select an object."));
+    };
+    let object = scene.objects.get(*index).ok_or_else(|| Refusal::gone(subject))?;
+    let form = object.form();
+    let Some((low, high)) = form.bounds() else {
+        return Err(Refusal::new("a plane without end has no lowest point", ""));
+    };
+    let others: Vec<_> = scene
+        .objects
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| i != index)
+        .map(|(_, object)| object.form())
+        .collect();
+    let level = (low.y + high.y) / 2.0;
+    let feet = feet(&form, (low, high));
+    let heights = |down: bool| {
+        let found = feet.iter().flat_map(|foot| {
+            let from = DVec3::new(foot.x, level, foot.y);
+            let direction = if down { DVec3::NEG_Y } else { DVec3::Y };
+            others.iter().filter_map(move |form| {
+                let t = form.cast(from, direction)?;
+                // A rounded difference of two heights would put it next to the surface.
+                Some(significant(from.y + direction.y * t, 13))
+            })
+        });
+        found.collect::<Vec<_>>()
+    };
+    let below = heights(true).into_iter().reduce(f64::max);
+    let rest = below.or_else(|| heights(false).into_iter().reduce(f64::min));
+    let Some(rest) = rest else {
+        let help = "Add a platform or a plane first.";
+        return Err(Refusal::new("nothing is under it to rest on", help));
+    };
+    let mut next = scene.clone();
+    let dropped = &mut next.objects[*index];
+    // A second and third time for what rounding left over.
+    for _ in 0..3 {
+        let lowest = dropped.form().bounds().map_or(rest, |(low, _)| low.y);
+        lift(dropped, rest - lowest);
+    }
+    let label = format!("drop {}", subject.label(scene));
+    Edit::checked(next, subject.clone(), label)
+}
+
+/// Moves an object up by exactly `by`.
+fn lift(object: &mut Object, by: f64) {
+    if by == 0.0 {
+        return;
+    }
+    match object.transform.last_mut() {
+        None if !object.shape.anchors().is_empty() => {
+            object.shape.anchors().into_iter().for_each(|anchor| anchor[1] += by);
+        }
+        Some(Step::Translate(last)) => last[1] += by,
+        _ => object.transform.push(Step::Translate([0.0, by, 0.0])),
+    }
+}
+
+/// The points (x, z) that an object stands on: its middle and its lowest corners.
+fn feet(form: &Form, (low, high): Extent) -> Vec<DVec2> {
+    let flat = |p: DVec3| DVec2::new(p.x, p.z);
+    let middle = flat(low + (high - low) / 2.0);
+    let mut feet = vec![middle];
+    let corners = match form {
+        Form::Convex { corners, .. } => corners.clone(),
+        Form::Parallelogram { corner, u, v } => {
+            vec![*corner, corner + u, corner + v, corner + u + v]
+        }
+        _ => Vec::new(),
+    };
+    let near = 1e-9 * (high - low).max_element();
+    let lowest = corners.iter().filter(|c| c.y - low.y <= near).map(|c| flat(*c));
+    // Just inside, so that neighbours that only touch carry nothing.
+    feet.extend(lowest.map(|c| middle + (c - middle) * (1.0 - 1e-6)));
+    feet
+}
+
+/// The middle of the underside of a new thing with the lengths `size`: in the middle of what the
+/// camera sees, on what is there, and free of what stands there already.
+pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
+    let Ball { radius, .. } = scene_bounds(scene);
+    let eye = DVec3::from_array(scene.camera.eye);
+    let forward = scene.camera.view().unwrap_or(DVec3::NEG_Z);
+    let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
+    let aim = eye + forward * crate::scene::edit::focus_distance(scene);
+    let solids: Vec<Extent> =
+        forms.iter().filter(|f| is_solid(f)).filter_map(Form::bounds).collect();
+    let walls: Vec<&Form> = forms.iter().filter(|form| !is_solid(form)).collect();
+    let floors: Vec<&Form> = walls.iter().copied().filter(|form| is_level(form)).collect();
+    // New places are round numbers: of a thing one metre wide, whole centimetres.
+    let grid = decade(size.min_element()) - 2;
+    let candidate = |offset: DVec2| {
+        let at = DVec3::new(aim.x + offset.x, aim.y, aim.z + offset.y);
+        let ground = ground_under(&floors, at).unwrap_or(aim.y - size.y / 2.0);
+        DVec3::new(rounded_to(at.x, grid), significant(ground, 13), rounded_to(at.z, grid))
+    };
+    let spread = size.x.max(size.z);
+    let spots = (0..400).map(|i| {
+        // A sunflower spiral: the area is covered evenly from the middle outwards.
+        let angle = f64::from(i) * 2.399_963_229_728_653;
+        DVec2::from_angle(angle) * (0.45 * spread * f64::from(i).sqrt())
+    });
+    let reach = 6.0 * radius.max(spread);
+    let free = spots.take_while(|offset| offset.length() <= reach).map(candidate).filter(|base| {
+        let half = DVec3::new(spread / 2.0, 0.0, spread / 2.0);
+        let room = (*base - half, *base + half + DVec3::Y * size.y);
+        !walls.iter().any(|wall| cuts(wall, room))
+            && !solids.iter().any(|solid| overlap(*solid, room))
+    });
+    // In full view, else hidden but in the picture, else anywhere.
+    let (mut hidden, mut outside) = (None, None);
+    for base in free {
+        let middle = base + DVec3::Y * (size.y / 2.0);
+        if !in_view(&scene.camera, scene.film.size, middle) {
+            outside = outside.or(Some(base));
+        } else if !is_visible(&forms, eye, middle) {
+            hidden = hidden.or(Some(base));
+        } else {
+            return base;
+        }
+    }
+    hidden.or(outside).unwrap_or_else(|| candidate(DVec2::ZERO))
+}
+
+/// Whether a flat thing is level within 60 degrees, so that something can stand on it.
+fn is_level(form: &Form) -> bool {
+    match form {
+        Form::Plane { normal, .. } => normal.y.abs() > 0.5,
+        Form::Parallelogram { u, v, .. } => u.cross(*v).normalize().y.abs() > 0.5,
+        _ => false,
+    }
+}
+
+/// Height of the highest of `floors` below `at`, else of the lowest above it.
+fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
+    let heights = |direction: DVec3| {
+        floors.iter().filter_map(move |form| Some(at.y + direction.y * form.cast(at, direction)?))
+    };
+    heights(DVec3::NEG_Y).reduce(f64::max).or_else(|| heights(DVec3::Y).reduce(f64::min))
+}
+
+/// Whether a flat thing (a wall) goes through the inside of a box.
+fn cuts(form: &Form, (low, high): Extent) -> bool {
+    let shrink = (high - low) * 1e-6;
+    let (low, high) = (low + shrink, high - shrink);
+    let edge = high - low;
+    let corners = [low, low + DVec3::X * edge.x, low + DVec3::Z * edge.z, high - DVec3::Y * edge.y];
+    let diagonals =
+        [high, high - DVec3::X * edge.x, high - DVec3::Z * edge.z, low + DVec3::Y * edge.y];
+    corners
+        .iter()
+        .zip(diagonals)
+        .any(|(from, to)| form.cast(*from, to - from).is_some_and(|t| t < 1.0))
+}
+
+fn overlap(a: Extent, b: Extent) -> bool {
+    a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()
+}
+
+/// Whether a point is well inside the picture.
+fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
+    let [right, up, forward] = camera.frame();
+    let to = point - DVec3::from_array(camera.eye);
+    let depth = to.dot(forward);
+    let [half_width, half_height] = camera.half_size(f64::from(size[0]) / f64::from(size[1]));
+    depth > 0.0
+        && to.dot(right).abs() < 0.85 * half_width * depth
+        && to.dot(up).abs() < 0.85 * half_height * depth
+}
+
+/// Whether nothing stands between the eye and a point.
+fn is_visible(forms: &[Form], eye: DVec3, point: DVec3) -> bool {
+    !forms.iter().any(|form| form.cast(eye, point - eye).is_some_and(|t| t < 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+    use crate::scene::edit::move_by;
+
+    fn lowest(scene: &Scene, i: usize) -> f64 {
+        scene.objects[i].form().bounds().unwrap().0.y
+    }
+
+    #[test]
+    fn dropped_things_stand_exactly() {
+        let scene = built_in();
+        for i in 2..6 {
+            for by in [[0.0, 1.23, 0.0], [0.0, -0.217, 0.0], [0.1, 0.777, 0.1]] {
+                let subject = Subject::Object(i);
+                let up = move_by(&scene, &subject, by).unwrap().scene;
+                let down = drop_down(&up, &subject).unwrap();
+                assert_eq!(lowest(&down.scene, i), 0.0, "object {i} {by:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_cube_lands_on_a_table_and_is_lifted_onto_the_ground_from_below() {
+        let text = "[[object]]\nshape.plane = { point = [0, -1, 0], normal = [0, 1, 0] }\n\
+                    [[object]]\nshape.box = { center = [0, 0, 0], size = [2, 0.5, 2] }\n\
+                    [[object]]\nshape.cube = { corner = [-0.5, 3, 0.5], edge = 1 }\n\
+                    transform = [{ rotate_y = 30.0 }]\n";
+        let scene = Scene::parse(text, "text").unwrap();
+        let cube = Subject::Object(2);
+        let on_table = drop_down(&scene, &cube).unwrap().scene;
+        assert!((lowest(&on_table, 2) - 0.25).abs() < 1e-15);
+        let aside = move_by(&scene, &cube, [5.0, 0.0, 0.0]).unwrap().scene;
+        assert!((lowest(&drop_down(&aside, &cube).unwrap().scene, 2) + 1.0).abs() < 1e-15);
+        let corner = move_by(&scene, &cube, [1.3, 0.0, 0.0]).unwrap().scene;
+        assert!((lowest(&drop_down(&corner, &cube).unwrap().scene, 2) - 0.25).abs() < 1e-15);
+        let sunk = move_by(&aside, &cube, [0.0, -9.0, 0.0]).unwrap().scene;
+        assert!((lowest(&drop_down(&sunk, &cube).unwrap().scene, 2) + 1.0).abs() < 1e-15);
+        let refusal = drop_down(&scene, &Subject::Object(0)).unwrap_err();
+        assert!(refusal.found.contains("no lowest point"), "{refusal}");
+        let alone = Scene { objects: vec![scene.objects[2].clone()], ..Scene::default() };
+        let refusal = drop_down(&alone, &Subject::Object(0)).unwrap_err();
+        assert!(refusal.found.contains("nothing is under it"), "{refusal}");
+    }
+}

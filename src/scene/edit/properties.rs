@@ -1,0 +1,322 @@
+//! What an inspector shows of a subject: one row a key, from the tables of fields.
+
+use crate::scene::Scene;
+use crate::scene::edit::convert::{AIM, KIND, chosen};
+use crate::scene::edit::parse_value::{color, floats, show};
+use crate::scene::edit::toml_view::{fields, get, read, rivals};
+use crate::scene::edit::{Refusal, Subject};
+use crate::value::{Field, Preset, Range, Takes, number};
+use toml::{Table, Value};
+
+/// A word that may stand in a row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Word {
+    /// The word; the name of a material may hold any character that a file may.
+    pub name: String,
+    /// What it means; may be empty.
+    pub doc: String,
+}
+
+/// What kind of value a row holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// Any text: a name.
+    Text,
+    /// `true` or `false`.
+    Switch,
+    /// One of [`Row::words`].
+    Choice,
+    /// One of [`Row::words`]; other rows below depend on it. A shape's kind, a light's kind.
+    Kind,
+    /// A list of steps; each of [`Row::words`], typed here, adds one at the end.
+    List,
+    /// One or more numbers.
+    Numbers,
+    /// Three numbers from [`Row::color`], or `#rrggbb`.
+    Color,
+}
+
+/// One row of an inspector.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// The key to set it by, dotted: `shape.sphere.radius`, `transform.0.rotate_y`.
+    pub key: String,
+    /// The last part of the key, in words.
+    pub label: String,
+    /// How deep it stands below other rows: 0, 1, 2.
+    pub depth: usize,
+    /// What kind of value it holds.
+    pub entry: Entry,
+    /// The value as it can be typed again, printable; empty: none is given.
+    pub value: String,
+    /// The numbers of the value one by one, as text; empty unless it holds numbers or a colour. A
+    /// colour always has three.
+    pub components: Vec<String>,
+    /// The value if it is a colour: linear red, green, blue.
+    pub color: Option<[f64; 3]>,
+    /// Unit of its numbers; may be empty.
+    pub unit: &'static str,
+    /// What may be written, as a phrase: `a number from 0 to 1`.
+    pub expected: String,
+    /// The words that may stand here; empty: not a choice.
+    pub words: Vec<Word>,
+    /// What it is, in a sentence.
+    pub doc: &'static str,
+    /// Whether the value is the one that holds when the key is left out (or it is left out).
+    pub is_default: bool,
+    /// What holds when the key is left out, as text; `None`: it must be given.
+    pub default: Option<String>,
+}
+
+/// The rows of `subject` in the order of its table. An object's material has rows of its own
+/// ([`Subject::material`]).
+///
+/// # Errors
+/// If the scene has no such subject.
+pub fn rows(scene: &Scene, subject: &Subject) -> Result<Vec<Row>, Refusal> {
+    let values = read(scene, subject)?;
+    let mut walk = Walk { scene, subject, rows: Vec::new() };
+    let virtual_kind = match subject {
+        Subject::Light(_) => Some(&KIND),
+        Subject::Camera | Subject::View(_) => Some(&AIM),
+        _ => None,
+    };
+    for field in fields(subject) {
+        if let Some(kind) = virtual_kind
+            && rivals(subject).contains(&field.name)
+        {
+            // One row to choose which of the two it is, then only the one that is given.
+            if rivals(subject)[0] == field.name {
+                walk.kind(kind, chosen(subject, &values), kind.name.to_string(), 0);
+            }
+            if values.contains_key(field.name) {
+                walk.field(field, &values, field.name.to_string(), 1);
+            }
+            continue;
+        }
+        walk.field(field, &values, field.name.to_string(), 0);
+    }
+    Ok(walk.rows)
+}
+
+struct Walk<'a> {
+    scene: &'a Scene,
+    subject: &'a Subject,
+    rows: Vec<Row>,
+}
+
+impl Walk<'_> {
+    fn field(&mut self, field: &'static Field, values: &Table, key: String, depth: usize) {
+        let value = get(values, field.name);
+        match (field.takes, value) {
+            (Takes::Table(inner), Some(Value::Table(values))) => {
+                for field in inner {
+                    self.field(field, values, format!("{key}.{}", field.name), depth);
+                }
+            }
+            (Takes::OneOf(_), None) => self.kind(field, None, key, depth),
+            (Takes::OneOf(kinds), Some(Value::Table(values))) => {
+                let given = kinds.iter().find(|k| values.contains_key(k.name));
+                self.kind(field, given.map(|k| k.name), key.clone(), depth);
+                if let Some(kind) = given {
+                    self.field(kind, values, format!("{key}.{}", kind.name), depth + 1);
+                }
+            }
+            (Takes::ListOf(_), value) => self.steps(field, value, &key, depth),
+            _ => self.leaf(field, value, key, depth),
+        }
+    }
+
+    fn steps(&mut self, field: &'static Field, value: Option<&Value>, key: &str, depth: usize) {
+        let Takes::ListOf(kinds) = field.takes else { return };
+        let list = value.and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+        let mut row = self.row(field, key.to_string(), depth);
+        row.entry = Entry::List;
+        row.value = match list.len() {
+            0 => String::new(),
+            1 => "1 step".to_string(),
+            n => format!("{n} steps"),
+        };
+        row.words = words(kinds);
+        row.is_default = list.is_empty();
+        self.rows.push(row);
+        for (i, step) in list.iter().enumerate() {
+            let Some(values) = step.as_table() else { continue };
+            let given = kinds.iter().find(|k| values.contains_key(k.name));
+            let Some(kind) = given else { continue };
+            let from = self.rows.len();
+            self.field(kind, values, format!("{key}.{i}.{}", kind.name), depth + 1);
+            for row in &mut self.rows[from..] {
+                row.label = format!("{} {}", i + 1, row.label);
+            }
+        }
+    }
+
+    fn kind(&mut self, field: &'static Field, given: Option<&str>, key: String, depth: usize) {
+        let mut row = self.row(field, key, depth);
+        if let Takes::OneOf(kinds) = field.takes {
+            row.words = words(kinds);
+        }
+        row.entry = Entry::Kind;
+        row.value = given.unwrap_or_default().to_string();
+        let optional = matches!(field.preset, Preset::Without(_));
+        row.default = row.default.filter(|_| optional);
+        row.is_default = optional && given.is_none();
+        self.rows.push(row);
+    }
+
+    fn leaf(&mut self, field: &'static Field, value: Option<&Value>, key: String, depth: usize) {
+        let mut row = self.row(field, key, depth);
+        row.value = value.map_or(String::new(), |value| show(field.takes, value));
+        match field.takes {
+            Takes::Text => row.entry = Entry::Text,
+            Takes::Switch => row.entry = Entry::Switch,
+            Takes::Choice(choices) => {
+                row.entry = Entry::Choice;
+                let word =
+                    |c: &crate::value::Choice| Word { name: c.name.into(), doc: c.doc.into() };
+                row.words = choices.iter().map(word).collect();
+            }
+            Takes::Color(_) => {
+                row.entry = Entry::Color;
+                row.color = value.and_then(color).map(|c| c.0);
+            }
+            _ => {}
+        }
+        if matches!(row.entry, Entry::Numbers | Entry::Color) {
+            let numbers = value.and_then(floats).unwrap_or_default();
+            row.components = numbers.into_iter().map(number).collect();
+        }
+        if is_material(self.subject, field) {
+            row.entry = Entry::Choice;
+            let name = |name: &String| Word { name: name.clone(), doc: String::new() };
+            row.words = self.scene.materials.keys().map(name).collect();
+        }
+        row.is_default = match field.preset {
+            Preset::Required => false,
+            Preset::Without(_) => value.is_none(),
+            Preset::Is(text) => value == preset(text).as_ref(),
+        };
+        self.rows.push(row);
+    }
+
+    fn row(&self, field: &'static Field, key: String, depth: usize) -> Row {
+        Row {
+            key,
+            label: field.name.replace('_', " "),
+            depth,
+            entry: Entry::Numbers,
+            value: String::new(),
+            components: Vec::new(),
+            color: None,
+            unit: field.unit,
+            expected: expected(field.takes),
+            words: Vec::new(),
+            doc: field.doc,
+            is_default: false,
+            default: match field.preset {
+                Preset::Required => None,
+                Preset::Is(text) => Some(text.trim_matches('"').to_string()),
+                Preset::Without(instead) => Some(instead.to_string()),
+            },
+        }
+    }
+}
+
+/// Whether `field` of `subject` names a material.
+pub(super) fn is_material(subject: &Subject, field: &Field) -> bool {
+    matches!(subject, Subject::Object(_)) && field.name == "material"
+}
+
+/// The value that a default stands for.
+pub(super) fn preset(text: &str) -> Option<Value> {
+    format!("value = {text}").parse::<Table>().ok()?.remove("value")
+}
+
+fn words(kinds: &[Field]) -> Vec<Word> {
+    kinds.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
+}
+
+/// As the reference says it, without what belongs to files only.
+fn expected(takes: Takes) -> String {
+    match takes {
+        Takes::Text => "text".to_string(),
+        Takes::Numbers(n, range) => format!("{n} numbers, each {range}"),
+        Takes::Wholes(n, range) => format!("{n} whole numbers, each {range}"),
+        Takes::Direction => "3 numbers, not all zero".to_string(),
+        Takes::Factor => "a number other than 0, or 3 of them".to_string(),
+        Takes::Color(Range { high, .. }) => {
+            format!("red, green, blue (linear, 0 to {}) or #rrggbb", number(high))
+        }
+        Takes::OneOf(kinds) | Takes::ListOf(kinds) => {
+            let names: Vec<_> = kinds.iter().map(|k| k.name).collect();
+            format!("one of {}", names.join(", "))
+        }
+        Takes::Choice(choices) => {
+            let names: Vec<_> = choices.iter().map(|c| c.name).collect();
+            format!("one of {}", names.join(", "))
+        }
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+    use crate::scene::edit::{outline, set};
+
+    fn row(scene: &Scene, subject: &Subject, key: &str) -> Row {
+        let rows = rows(scene, subject).unwrap();
+        rows.into_iter().find(|r| r.key == key).unwrap_or_else(|| panic!("no row {key}"))
+    }
+
+    #[test]
+    fn nested_tables_are_flat_and_their_kind_shows() {
+        let scene = built_in();
+        let keys = |subject: &Subject| -> Vec<String> {
+            rows(&scene, subject).unwrap().into_iter().map(|r| r.key).collect()
+        };
+        let ball = ["name", "material", "shape", "shape.sphere.center", "shape.sphere.radius"];
+        assert_eq!(keys(&Subject::Object(2))[..5], ball);
+        assert_eq!(
+            keys(&Subject::Camera),
+            ["eye", "aim", "target", "up", "view_angle", "view_angle.vertical", "near"]
+        );
+        assert_eq!(keys(&Subject::Light(0))[..3], ["name", "kind", "point.position"]);
+        let radius = row(&scene, &Subject::Object(2), "shape.sphere.radius");
+        assert_eq!((radius.value.as_str(), radius.components.len()), ("0.5", 1));
+        assert_eq!((radius.unit, radius.depth, radius.is_default), ("scene units", 1, false));
+        assert_eq!(radius.expected, "a number greater than 0, at most 1e9");
+        let shape = row(&scene, &Subject::Object(2), "shape");
+        assert_eq!((shape.value.as_str(), shape.entry), ("sphere", Entry::Kind));
+        assert_eq!(shape.words.len(), crate::shape::KINDS.len());
+        let alpha = row(&scene, &Subject::Material("red".into()), "alpha");
+        assert!(alpha.value.is_empty() && alpha.components.is_empty() && alpha.is_default);
+        assert_eq!(alpha.default.as_deref(), Some("roughness / (2 √2)"));
+        let material = row(&scene, &Subject::Object(2), "material");
+        assert_eq!((material.entry, material.words.len()), (Entry::Choice, 6));
+    }
+
+    /// Whatever a row shows can be typed back without a change.
+    #[test]
+    fn every_value_can_be_typed_again() {
+        let mut scene = built_in();
+        let steps = "[{ rotate = { axis = [1, 0, 0], degrees = 5 } }, { scale = 2.0 }]";
+        let text = format!(
+            "[[object]]\nshape.plane = {{ point = [0, -9, 0], normal = [0, 1, 0] }}\ntransform = {steps}\n"
+        );
+        scene.objects.extend(Scene::parse(&text, "").unwrap().objects);
+        scene.views.insert("left".into(), scene.camera.clone());
+        for (_, subject) in outline(&scene) {
+            for row in rows(&scene, &subject).unwrap() {
+                if row.entry == Entry::List || row.value.is_empty() {
+                    continue;
+                }
+                let again = set(&scene, &subject, &row.key, &row.value);
+                let again = again.unwrap_or_else(|e| panic!("{subject:?} {}: {e}", row.key));
+                assert_eq!(again.scene, scene, "{subject:?} {}", row.key);
+            }
+        }
+    }
+}

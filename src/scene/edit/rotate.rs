@@ -1,0 +1,158 @@
+//! Turning things about the vertical.
+
+use crate::scene::edit::bounds::scene_bounds;
+use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::{Object, Scene, Step};
+use crate::value::{decade, rounded_to, sin_cos_degrees, turned};
+use glam::DVec3;
+
+/// Turns by `degrees` about the vertical, counter-clockwise seen from above: an object about its own
+/// middle, a light about the scene's. An object without a transform is turned by its shape's own keys,
+/// if it has any; otherwise two steps at the end of its transform, a turn and a translation, do it, and
+/// later turns change these two.
+///
+/// # Errors
+/// For what cannot be turned.
+pub fn turn(scene: &Scene, subject: &Subject, degrees: f64) -> Result<Edit, Refusal> {
+    if !degrees.is_finite() {
+        return Err(Refusal::new("that is no angle to turn by", ""));
+    }
+    let mut next = scene.clone();
+    match subject {
+        Subject::Object(i) => {
+            let object = next.objects.get_mut(*i).ok_or_else(|| Refusal::gone(subject))?;
+            if !object.transform.is_empty() || !object.shape.turn(degrees) {
+                turn_by_steps(object, degrees);
+            }
+        }
+        Subject::Light(i) => {
+            let light = next.lights.get_mut(*i).ok_or_else(|| Refusal::gone(subject))?;
+            if let Some(directional) = &mut light.directional {
+                directional.direction = turned(directional.direction, degrees);
+            }
+            if let Some(point) = &mut light.point {
+                let pivot = scene_bounds(scene).center;
+                let arm = std::array::from_fn(|i| point.position[i] - pivot[i]);
+                let arm = turned(arm, degrees);
+                let digits = decade(arm[0].hypot(arm[2])) - 6;
+                let place = |i| rounded_to(pivot[i] + arm[i], digits);
+                point.position = [place(0), point.position[1], place(2)];
+            }
+        }
+        _ => {
+            let found = format!("{} cannot be turned", subject.label(scene));
+            return Err(Refusal::new(&found, "Select an object or a light."));
+        }
+    }
+    let label = format!("turn {}", subject.label(scene));
+    Edit::checked(next, subject.clone(), label)
+}
+
+/// Makes the object's last steps `rotate_y`, `translate` (or what is left of them), so that it stands
+/// turned about the vertical through its middle.
+fn turn_by_steps(object: &mut Object, degrees: f64) {
+    let (angle, shift, own) = match object.transform[..] {
+        [.., Step::RotateY(angle), Step::Translate(shift)] => (angle, shift, 2),
+        [.., Step::RotateY(angle)] => (angle, [0.0; 3], 1),
+        _ => (0.0, [0.0; 3], 0),
+    };
+    let kept = object.transform.len() - own;
+    object.transform.truncate(kept);
+    let form = object.form();
+    let (middle, scale) = match form.bounds() {
+        Some((low, high)) => (low + (high - low) / 2.0, (high - low).max_element()),
+        None => {
+            let point = object.shape.place();
+            (object.scene_from_object().transform_point3(point), 1.0)
+        }
+    };
+    let after = |angle: f64| {
+        let (sin, cos) = sin_cos_degrees(angle);
+        DVec3::new(middle.x * cos + middle.z * sin, middle.y, middle.z * cos - middle.x * sin)
+    };
+    let stands = after(angle) + DVec3::from_array(shift);
+    let wound = rounded_to((angle + degrees).rem_euclid(360.0), -6);
+    let angle = if wound > 180.0 { rounded_to(wound - 360.0, -6) } else { wound };
+    let shift = stands - after(angle);
+    let digits = decade(scale.max(middle.x.hypot(middle.z))) - 6;
+    let shift = shift.map(|x| rounded_to(x, digits)).to_array();
+    if angle != 0.0 {
+        object.transform.push(Step::RotateY(angle));
+    }
+    if shift != [0.0; 3] {
+        object.transform.push(Step::Translate(shift));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+    use crate::shape::{KINDS, Shape};
+
+    fn middle(object: &Object) -> DVec3 {
+        let (low, high) = object.form().bounds().unwrap();
+        (low + high) / 2.0
+    }
+
+    #[test]
+    fn shapes_with_a_rotation_use_it() {
+        let scene = built_in();
+        let edit = turn(&scene, &Subject::Object(3), 5.0).unwrap();
+        let Shape::Cube(cube) = &edit.scene.objects[3].shape else { panic!() };
+        assert!(cube.rotation == 35.0 && edit.scene.objects[3].transform.is_empty());
+        let edit = turn(&scene, &Subject::Object(1), 90.0).unwrap();
+        let Shape::Rectangle(mirror) = &edit.scene.objects[1].shape else { panic!() };
+        assert_eq!(mirror.normal, [1.0, 0.0, 0.0]);
+    }
+
+    /// Every kind, with and without a transform: it stays where it is, and a whole turn in small
+    /// steps leads back.
+    #[test]
+    fn turns_are_about_the_middle_and_come_round() {
+        for kind in KINDS {
+            let base = DVec3::new(3.0, 0.0, -2.0);
+            let shape = Shape::standing(kind.name, base, DVec3::new(1.0, 0.5, 2.0)).unwrap();
+            for transform in [vec![], vec![Step::RotateX(20.0)], vec![Step::RotateY(7.0)]] {
+                let object = Object {
+                    name: String::new(),
+                    material: String::new(),
+                    shape: shape.clone(),
+                    transform,
+                };
+                let start = Scene { objects: vec![object], ..Scene::default() };
+                let mut scene = start.clone();
+                for _ in 0..72 {
+                    scene = turn(&scene, &Subject::Object(0), 5.0).unwrap().scene;
+                    let steps = scene.objects[0].transform.len();
+                    assert!(steps <= 3, "{}: {steps} steps", kind.name);
+                }
+                if kind.name != "plane" {
+                    let (a, b) = (middle(&start.objects[0]), middle(&scene.objects[0]));
+                    assert!((a - b).length() < 1e-5, "{}: {a} {b}", kind.name);
+                    let half = turn(&start, &Subject::Object(0), 180.0).unwrap().scene;
+                    let c = middle(&half.objects[0]);
+                    // The box around what is uneven does not turn with it.
+                    let uneven = ["prism", "union", "intersection", "difference"];
+                    let slack = if uneven.contains(&kind.name) { 0.5 } else { 1e-5 };
+                    assert!((a - c).length() < slack, "{}: {a} {c}", kind.name);
+                }
+                let map = |scene: &Scene| scene.objects[0].scene_from_object();
+                assert!(map(&start).abs_diff_eq(map(&scene), 2e-5), "{}", kind.name);
+            }
+        }
+    }
+
+    #[test]
+    fn lights_turn_about_the_scene() {
+        let scene = built_in();
+        let mut round = scene.clone();
+        for _ in 0..72 {
+            round = turn(&round, &Subject::Light(0), 5.0).unwrap().scene;
+        }
+        let [a, b] = [&scene, &round].map(|s| DVec3::from(s.lights[0].point.unwrap().position));
+        assert!((a - b).length() < 1e-4, "{a} {b}");
+        assert!(turn(&scene, &Subject::Camera, 5.0).is_err());
+        assert!(turn(&scene, &Subject::Light(0), f64::NAN).is_err());
+    }
+}

@@ -1,0 +1,135 @@
+//! Moving things by a vector.
+
+use crate::light::{Directional, Light};
+use crate::scene::edit::bounds::scene_bounds;
+use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::{Object, Scene, Step};
+use crate::value::{decade, rounded_to, unit};
+use glam::DVec3;
+
+/// Moves an object, a light, the camera or a view by the vector `by`, in scene units. An object
+/// without a transform is moved by its shape's own key, another one by a translation behind its last
+/// step. A directional light turns as a lamp would that keeps pointing at the middle of the scene.
+///
+/// # Errors
+/// For what cannot be moved, and at the end of the coordinates.
+pub fn move_by(scene: &Scene, subject: &Subject, by: [f64; 3]) -> Result<Edit, Refusal> {
+    if by.iter().any(|x| !x.is_finite()) {
+        return Err(Refusal::new("that is no distance to move by", ""));
+    }
+    let mut next = scene.clone();
+    match subject {
+        Subject::Object(i) => {
+            let object = next.objects.get_mut(*i).ok_or_else(|| Refusal::gone(subject))?;
+            move_object(object, by);
+        }
+        Subject::Light(i) => {
+            let light = next.lights.get_mut(*i).ok_or_else(|| Refusal::gone(subject))?;
+            move_light(light, by, scene);
+        }
+        Subject::Camera | Subject::View(_) => {
+            let camera = match subject {
+                Subject::View(name) => next.views.get_mut(name),
+                _ => Some(&mut next.camera),
+            };
+            let camera = camera.ok_or_else(|| Refusal::gone(subject))?;
+            camera.eye = moved(camera.eye, by);
+            camera.target = camera.target.map(|target| moved(target, by));
+        }
+        _ => {
+            let found = format!("{} cannot be moved", subject.label(scene));
+            return Err(Refusal::new(&found, "Select an object, a light or the camera."));
+        }
+    }
+    let label = format!("move {}", subject.label(scene));
+    Edit::checked(next, subject.clone(), label)
+}
+
+/// `at + by`; a coordinate that changes is rounded to a thousandth of the digits of the change.
+pub(super) fn moved(at: [f64; 3], by: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| match by[i] {
+        0.0 => at[i],
+        by => rounded_to(at[i] + by, decade(by) - 3),
+    })
+}
+
+pub(super) fn move_object(object: &mut Object, by: [f64; 3]) {
+    match object.transform.last_mut() {
+        None if !object.shape.anchors().is_empty() => {
+            for anchor in object.shape.anchors() {
+                *anchor = moved(*anchor, by);
+            }
+        }
+        Some(Step::Translate(last)) => {
+            *last = moved(*last, by);
+            if *last == [0.0; 3] {
+                object.transform.pop();
+            }
+        }
+        _ if by == [0.0; 3] => {}
+        _ => object.transform.push(Step::Translate(moved([0.0; 3], by))),
+    }
+}
+
+fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
+    if let Some(point) = &mut light.point {
+        point.position = moved(point.position, by);
+    }
+    if let Some(Directional { direction }) = &mut light.directional {
+        let reach = 3.0 * scene_bounds(scene).radius;
+        let lamp = -unit(*direction).unwrap_or(DVec3::NEG_Y) * reach;
+        let lamp = lamp + DVec3::from_array(by);
+        // Through the middle there is no direction left: it stays.
+        if let Some(aimed) = unit(-lamp) {
+            *direction = aimed.map(|x| rounded_to(x, -4)).to_array();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+    use crate::shape::Shape;
+
+    #[test]
+    fn objects_move_by_their_own_keys_or_a_last_translation() {
+        let scene = built_in();
+        let ball = Subject::Object(2);
+        let edit = move_by(&scene, &ball, [0.1, 0.0, -0.2]).unwrap();
+        assert_eq!(edit.label, "move ball");
+        let Shape::Sphere(sphere) = &edit.scene.objects[2].shape else { panic!() };
+        assert_eq!(sphere.center, [-0.8, 0.5, -0.2]);
+        let mut turned = scene.clone();
+        turned.objects[2].transform = vec![Step::RotateY(30.0)];
+        let once = move_by(&turned, &ball, [0.1, 0.2, 0.0]).unwrap().scene;
+        let twice = move_by(&once, &ball, [0.1, 0.2, 0.0]).unwrap().scene;
+        let steps = [Step::RotateY(30.0), Step::Translate([0.2, 0.4, 0.0])];
+        assert_eq!(twice.objects[2].transform, steps);
+        let back = move_by(&twice, &ball, [-0.2, -0.4, 0.0]).unwrap().scene;
+        assert_eq!(back, turned);
+    }
+
+    #[test]
+    fn lights_move_and_turn() {
+        let mut scene = built_in();
+        let lamp = Subject::Light(0);
+        let edit = move_by(&scene, &lamp, [0.0, 0.1, 0.0]).unwrap();
+        assert_eq!(edit.scene.lights[0].point.unwrap().position, [2.0, 4.1, 3.0]);
+        scene.lights[0].point = None;
+        scene.lights[0].directional = Some(Directional { direction: [0.0, -2.0, 0.0] });
+        let edit = move_by(&scene, &lamp, [1.0, 0.0, 0.0]).unwrap();
+        let [x, y, z] = edit.scene.lights[0].directional.unwrap().direction;
+        assert!(x < 0.0 && y < 0.0 && z == 0.0, "{x} {y} {z}");
+    }
+
+    #[test]
+    fn the_end_of_the_world_is_a_refusal() {
+        let scene = built_in();
+        assert!(move_by(&scene, &Subject::Object(2), [1e10, 0.0, 0.0]).is_err());
+        assert!(move_by(&scene, &Subject::Object(2), [f64::NAN, 0.0, 0.0]).is_err());
+        assert!(move_by(&scene, &Subject::Film, [1.0, 0.0, 0.0]).is_err());
+        let camera = move_by(&scene, &Subject::Camera, [0.5, 0.0, 0.0]).unwrap().scene.camera;
+        assert_eq!((camera.eye, camera.target), ([1.1, 1.4, 4.5], Some([0.5, 0.8, -0.5])));
+    }
+}

@@ -1,0 +1,138 @@
+//! Comments that belong to the file rather than to the table below them, and the order of tables.
+
+use toml_edit::{DocumentMut, Item, Table};
+
+/// Remembers comments of removed tables that stand apart from them.
+#[derive(Default)]
+pub(crate) struct Keeper {
+    /// Where the removed table stood, and the comment.
+    kept: Vec<(isize, String)>,
+}
+
+impl Keeper {
+    /// Takes note of what stands above the tables of a removed item.
+    pub(crate) fn removed(&mut self, item: &Item) {
+        match item {
+            Item::Table(table) => {
+                let apart = split(prefix(table)).0;
+                if let Some(position) = table.position().filter(|_| apart.contains('#')) {
+                    self.kept.push((position, apart.to_string()));
+                }
+                for (_, inner) in table.iter() {
+                    self.removed(inner);
+                }
+            }
+            Item::ArrayOfTables(list) => {
+                for table in list {
+                    self.removed(&Item::Table(table.clone()));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Puts what was kept above the next table that is left, or at the end of the file.
+    pub(crate) fn put_back(self, document: &mut DocumentMut) {
+        let mut kept = self.kept;
+        kept.sort_by_key(|(position, _)| -position);
+        for (position, comment) in kept {
+            let mut after: Option<isize> = None;
+            each(document.as_table_mut(), &mut |table| {
+                if let Some(p) = table.position().filter(|p| *p > position) {
+                    after = Some(after.map_or(p, |a| a.min(p)));
+                }
+            });
+            match after {
+                Some(after) => each(document.as_table_mut(), &mut |table| {
+                    if table.position() == Some(after) {
+                        put_above(table, &comment);
+                    }
+                }),
+                None => {
+                    let end = document.trailing().as_str().unwrap_or_default();
+                    document.set_trailing(format!(
+                        "{}{end}",
+                        comment.trim_end_matches('\n').to_owned() + "\n"
+                    ));
+                }
+            }
+        }
+    }
+}
+
+/// Every table with a header that has a place in the file.
+fn each(table: &mut Table, act: &mut dyn FnMut(&mut Table)) {
+    for (_, item) in table.iter_mut() {
+        match item {
+            Item::Table(inner) => {
+                if !inner.is_dotted() && !inner.is_implicit() {
+                    act(inner);
+                }
+                each(inner, act);
+            }
+            Item::ArrayOfTables(list) => {
+                for inner in list.iter_mut() {
+                    act(inner);
+                    each(inner, act);
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+fn prefix(table: &Table) -> &str {
+    table.decor().prefix().and_then(|p| p.as_str()).unwrap_or_default()
+}
+
+/// What stands above a table, cut after its last empty line: what stands apart, and what belongs to
+/// the table.
+fn split(above: &str) -> (&str, &str) {
+    let mut cut = 0;
+    let mut at = 0;
+    for line in above.split_inclusive('\n') {
+        at += line.len();
+        if line.trim().is_empty() {
+            cut = at;
+        }
+    }
+    above.split_at(cut)
+}
+
+fn put_above(table: &mut Table, comment: &str) {
+    let own = prefix(table);
+    let own = own.strip_prefix('\n').unwrap_or(own);
+    let joined = format!("{comment}{own}");
+    table.decor_mut().set_prefix(joined);
+}
+
+/// Gives `tables`, entry by entry the old ones `from` (or new), places in the file that follow
+/// their order. Nothing happens if the old ones kept theirs and the new ones come last.
+pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
+    let old: Vec<usize> = from.iter().flatten().copied().collect();
+    let tail_only = from.iter().skip_while(|i| i.is_some()).all(Option::is_none);
+    if tail_only && old.is_sorted() {
+        return;
+    }
+    let first = tables.iter().filter_map(Table::position).min();
+    let Some(top) = tables.iter().position(|t| t.position() == first && first.is_some()) else {
+        return;
+    };
+    // The comment that opens the file stays on top.
+    let (apart, own) = split(prefix(&tables[top]));
+    let (apart, own) = (apart.to_string(), own.to_string());
+    if top > 0 && apart.contains('#') {
+        tables[top].decor_mut().set_prefix(format!("\n{own}"));
+        put_above(&mut tables[0], &apart);
+    }
+    for table in tables.iter_mut() {
+        forget_place(table);
+    }
+    tables[0].set_position(first);
+}
+
+/// A table without a place follows the one before it.
+fn forget_place(table: &mut Table) {
+    table.set_position(None);
+    each(table, &mut |inner| inner.set_position(None));
+}

@@ -1,0 +1,126 @@
+//! New pieces of a scene file: only what differs from the defaults, in the layout of the reference.
+
+use crate::value::{Color, Field, Preset, Takes};
+use toml::Value;
+use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table};
+
+/// What is written for `value`. `headers`: whether tables may have `[headers]`.
+pub(crate) fn fresh(takes: Takes, value: &Value, headers: bool) -> Item {
+    match (takes, value) {
+        (Takes::Table(fields), Value::Table(table)) if headers => {
+            Item::Table(fresh_table(fields, table))
+        }
+        (Takes::Named(fields), Value::Table(named)) if headers => {
+            let mut outer = Table::new();
+            outer.set_implicit(true);
+            for (name, value) in named {
+                outer.insert(name, fresh(Takes::Table(fields), value, true));
+            }
+            Item::Table(outer)
+        }
+        (Takes::Tables(_), Value::Array(list)) if headers => {
+            let tables: ArrayOfTables = list.iter().map(|v| fresh_entry(takes, v)).collect();
+            Item::ArrayOfTables(tables)
+        }
+        (Takes::OneOf(fields), Value::Table(table)) if headers => {
+            let mut dotted = fresh_table(fields, table);
+            dotted.set_dotted(true);
+            Item::Table(dotted)
+        }
+        (Takes::Table(fields) | Takes::OneOf(fields), Value::Table(table)) => {
+            let table = fresh_table(fields, table).into_inline_table();
+            Item::Value(toml_edit::Value::InlineTable(table))
+        }
+        (Takes::Named(fields), Value::Table(named)) => {
+            let mut outer = InlineTable::new();
+            for (name, value) in named {
+                if let Ok(entry) = fresh(Takes::Table(fields), value, false).into_value() {
+                    outer.insert(name, entry);
+                }
+            }
+            Item::Value(toml_edit::Value::InlineTable(outer))
+        }
+        (Takes::Tables(_) | Takes::ListOf(_), Value::Array(list)) => {
+            let entries = list.iter().map(|v| fresh_entry(takes, v).into_inline_table());
+            Item::Value(toml_edit::Value::Array(entries.collect::<Array>()))
+        }
+        (Takes::Color(_), value) => Item::Value(color_leaf(value)),
+        _ => Item::Value(leaf(value)),
+    }
+}
+
+/// A colour: three numbers, or `#rrggbb` where that stands for it and the numbers would be long.
+fn color_leaf(value: &Value) -> toml_edit::Value {
+    let code = color(value).filter(|c| c.0.iter().any(|x| x.fract() != 0.0));
+    code.and_then(Color::to_hex).map_or_else(|| leaf(value), toml_edit::Value::from)
+}
+
+/// Three numbers.
+pub(crate) fn color(value: &Value) -> Option<Color> {
+    let channels: Vec<f64> = value.as_array()?.iter().filter_map(Value::as_float).collect();
+    channels.try_into().ok().map(Color)
+}
+
+/// An entry of a list that takes `list`, as a table that can become an inline one.
+pub(crate) fn fresh_entry(list: Takes, value: &Value) -> Table {
+    match (list, value) {
+        (Takes::Tables(fields) | Takes::ListOf(fields), Value::Table(table)) => {
+            fresh_table(fields, table)
+        }
+        _ => Table::new(),
+    }
+}
+
+/// A table with those keys of `values` that differ from their defaults. Kinds (`shape`,
+/// `view_angle`) become dotted keys, all other tables inline ones.
+pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Table {
+    let mut table = Table::new();
+    for field in fields {
+        let Some(value) = values.get(field.name).filter(|v| !is_default(field, v)) else {
+            continue;
+        };
+        let dotted = matches!(field.takes, Takes::OneOf(_));
+        table.insert(field.name, fresh(field.takes, value, dotted));
+    }
+    table
+}
+
+/// Whether `value` is what holds without the key.
+fn is_default(field: &Field, value: &Value) -> bool {
+    match field.preset {
+        Preset::Is(text) => {
+            let line = format!("value = {text}");
+            line.parse::<toml::Table>().is_ok_and(|table| table.get("value") == Some(value))
+        }
+        Preset::Required | Preset::Without(_) => false,
+    }
+}
+
+/// A value that is no table, in the layout `[1.0, 2.0]`.
+pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
+    match value {
+        Value::String(text) => text.as_str().into(),
+        Value::Integer(whole) => (*whole).into(),
+        Value::Float(number) => float(*number),
+        Value::Boolean(yes) => (*yes).into(),
+        Value::Datetime(time) => time.to_string().into(),
+        Value::Array(list) => list.iter().map(leaf).collect::<Array>().into(),
+        Value::Table(table) => {
+            let mut inline = InlineTable::new();
+            for (key, value) in table {
+                inline.insert(key, leaf(value));
+            }
+            inline.into()
+        }
+    }
+}
+
+/// The shortest digits that read back as `number`, with an exponent where zeros would be many.
+fn float(number: f64) -> toml_edit::Value {
+    let size = number.abs();
+    let zeros = number.is_finite() && size != 0.0 && !(1e-5..1e16).contains(&size);
+    if zeros && let Ok(value) = format!("{number:e}").parse() {
+        return value;
+    }
+    number.into()
+}

@@ -1,0 +1,291 @@
+//! Carries the difference between two scenes into the text of a scene file, and nothing else.
+//!
+//! Scenes are compared as trees of TOML values. Where both trees agree the text is not touched. A
+//! key that is not in the text has its default; it is written only when its value differs from
+//! that.
+
+use crate::scene::format::comments::Keeper;
+use crate::scene::format::emit::{color, fresh, fresh_entry, leaf};
+use crate::scene::format::list_diff::align;
+use crate::scene::format::schema;
+use crate::value::{Color, Field, Takes};
+use toml::Value;
+use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike};
+
+/// Makes `document`, which describes the scene `old`, describe `new`.
+pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml::Table) {
+    let mut rewriter = Rewriter { keeper: Keeper::default() };
+    rewriter.table(document.as_table_mut(), true, old, new, &Keys::These(schema::FIELDS));
+    rewriter.keeper.put_back(document);
+    if document.as_table().iter().all(|(_, item)| is_nothing(item)) {
+        // A file without any key would not be read as a scene.
+        if let Some(size) = new.get("film").and_then(|film| film.get("size")) {
+            let mut film = toml_edit::Table::new();
+            film.insert("size", Item::Value(leaf(size)));
+            document.as_table_mut().insert("film", Item::Table(film));
+        }
+    }
+}
+
+/// Whether an item leaves no trace in the text.
+fn is_nothing(item: &Item) -> bool {
+    match item {
+        Item::None => true,
+        Item::Value(_) => false,
+        Item::Table(table) => table.is_implicit() && table.iter().all(|(_, item)| is_nothing(item)),
+        Item::ArrayOfTables(list) => list.is_empty(),
+    }
+}
+
+/// Which keys a table may have, and what stands behind them.
+enum Keys {
+    /// These.
+    These(&'static [Field]),
+    /// Any; behind each a table with these keys.
+    Any(&'static [Field]),
+}
+
+impl Keys {
+    /// The keys of `old` and `new` in the order in which new ones are written.
+    fn of(&self, old: &toml::Table, new: &toml::Table) -> Vec<(String, Takes)> {
+        match self {
+            Self::These(fields) => fields.iter().map(|f| (f.name.to_string(), f.takes)).collect(),
+            Self::Any(fields) => {
+                let gone = old.keys().filter(|k| !new.contains_key(*k));
+                gone.chain(new.keys()).map(|k| (k.clone(), Takes::Table(fields))).collect()
+            }
+        }
+    }
+}
+
+struct Rewriter {
+    keeper: Keeper,
+}
+
+impl Rewriter {
+    /// `headers`: whether tables inside may have `[headers]` of their own.
+    fn table(
+        &mut self,
+        table: &mut dyn TableLike,
+        headers: bool,
+        old: &toml::Table,
+        new: &toml::Table,
+        keys: &Keys,
+    ) {
+        let renamed;
+        let old = match keys {
+            Keys::Any(_) => {
+                renamed = rename(table, old, new);
+                &renamed
+            }
+            Keys::These(_) => old,
+        };
+        let mut gone = Vec::new();
+        let mut come = Vec::new();
+        for (key, takes) in keys.of(old, new) {
+            match (old.get(&key), new.get(&key)) {
+                (Some(_), None) if table.contains_key(&key) => gone.push(key),
+                (old, Some(new)) if old != Some(new) => match table.get_mut(&key) {
+                    Some(item) => self.item(item, headers, old, new, takes),
+                    None => come.push((key, takes, new)),
+                },
+                _ => {}
+            }
+        }
+        // One key in another's place (a shape of another kind, a direction instead of a target)
+        // takes over its comments.
+        let heir = if gone.len() == 1 { come.first().map(|(key, ..)| key.clone()) } else { None };
+        for key in gone {
+            let decor = table.key(&key).map(|k| k.leaf_decor().clone());
+            let Some(item) = table.remove(&key) else { continue };
+            self.keeper.removed(&item);
+            if let (Some(heir), Some(decor), Item::Value(value)) = (&heir, decor, &item) {
+                let Some((_, takes, new)) = come.iter().find(|(key, ..)| key == heir) else {
+                    continue;
+                };
+                let mut item = fresh(*takes, new, false);
+                if let Some(new_value) = item.as_value_mut() {
+                    *new_value.decor_mut() = value.decor().clone();
+                }
+                table.insert(heir, item);
+                if let Some(mut key) = table.key_mut(heir) {
+                    *key.leaf_decor_mut() = decor;
+                }
+            }
+        }
+        for (key, takes, value) in come {
+            if !table.contains_key(&key) {
+                table.insert(&key, fresh(takes, value, headers));
+            }
+        }
+    }
+
+    fn item(
+        &mut self,
+        item: &mut Item,
+        headers: bool,
+        old: Option<&Value>,
+        new: &Value,
+        takes: Takes,
+    ) {
+        let headers = headers && !item.as_table().is_some_and(|t| t.is_dotted());
+        let headers_inside = headers && (item.is_table() || item.is_array_of_tables());
+        match (takes, old, new) {
+            (
+                Takes::Table(fields) | Takes::OneOf(fields),
+                Some(Value::Table(a)),
+                Value::Table(b),
+            ) => {
+                if let Some(table) = item.as_table_like_mut() {
+                    self.table(table, headers_inside, a, b, &Keys::These(fields));
+                }
+            }
+            (Takes::Named(fields), Some(Value::Table(a)), Value::Table(b)) => {
+                if let Some(table) = item.as_table_like_mut() {
+                    self.table(table, headers_inside, a, b, &Keys::Any(fields));
+                }
+            }
+            (
+                Takes::Tables(fields) | Takes::ListOf(fields),
+                Some(Value::Array(a)),
+                Value::Array(b),
+            ) => self.list(item, a, b, takes, fields),
+            _ => edit_leaf(item, old, new),
+        }
+    }
+
+    fn list(
+        &mut self,
+        item: &mut Item,
+        old: &[Value],
+        new: &[Value],
+        takes: Takes,
+        fields: &'static [Field],
+    ) {
+        let from = align(old, new);
+        let edit = |rewriter: &mut Self, table: &mut dyn TableLike, i: usize, j: usize, headers| {
+            if let (Value::Table(a), Value::Table(b)) = (&old[i], &new[j]) {
+                rewriter.table(table, headers, a, b, &Keys::These(fields));
+            }
+        };
+        match item {
+            Item::ArrayOfTables(list) => {
+                let mut tables: Vec<_> = list.iter().cloned().map(Some).collect();
+                list.clear();
+                let mut next = Vec::new();
+                for (j, origin) in from.iter().enumerate() {
+                    match origin.and_then(|i| Some((i, tables.get_mut(i)?.take()?))) {
+                        Some((i, mut table)) => {
+                            edit(self, &mut table, i, j, true);
+                            next.push(table);
+                        }
+                        None => next.push(fresh_entry(takes, &new[j])),
+                    }
+                }
+                let gone: ArrayOfTables = tables.into_iter().flatten().collect();
+                self.keeper.removed(&Item::ArrayOfTables(gone));
+                crate::scene::format::comments::in_order(&mut next, &from);
+                list.extend(next);
+            }
+            Item::Value(toml_edit::Value::Array(list)) => {
+                let mut values: Vec<_> = list.iter().cloned().map(Some).collect();
+                let before = values.iter().flatten().map(spaces_before).next_back();
+                let indent = before.filter(|spaces| !spaces.is_empty()).unwrap_or(" ".into());
+                list.clear();
+                for (j, origin) in from.iter().enumerate() {
+                    match origin.and_then(|i| Some((i, values.get_mut(i)?.take()?))) {
+                        Some((i, mut value)) => {
+                            if let Some(table) = value.as_inline_table_mut() {
+                                edit(self, table, i, j, false);
+                            }
+                            list.push_formatted(value);
+                        }
+                        None => {
+                            let mut value = fresh_entry(takes, &new[j]).into_inline_table();
+                            if j > 0 {
+                                let above = comment_of_the_last(list, j + 1 == new.len());
+                                value.decor_mut().set_prefix(above + &indent);
+                            }
+                            list.push_formatted(toml_edit::Value::InlineTable(value));
+                        }
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Gives named tables their new names, in their place and with their comments: one that is gone and one
+/// that has come are the same if their values are. Returns `old` under the new names.
+fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
+    let mut renamed = old.clone();
+    for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {
+        let mut come = new.iter().filter(|(key, _)| !renamed.contains_key(*key));
+        let Some((is, _)) = come.find(|(_, other)| *other == value) else { continue };
+        let decor =
+            table.key(was).map(|key| (key.leaf_decor().clone(), key.dotted_decor().clone()));
+        let Some(item) = table.remove(was) else { continue };
+        table.insert(is, item);
+        if let (Some((leaf, dotted)), Some(mut key)) = (decor, table.key_mut(is)) {
+            *key.leaf_decor_mut() = leaf;
+            *key.dotted_decor_mut() = dotted;
+        }
+        if let Some(value) = renamed.remove(was) {
+            renamed.insert(is.clone(), value);
+        }
+    }
+    renamed
+}
+
+/// Takes away the comment behind the last entry of `list`, if another one comes behind that.
+fn comment_of_the_last(list: &mut toml_edit::Array, comes: bool) -> String {
+    let trailing = list.trailing().as_str().unwrap_or_default();
+    match trailing.rfind('\n') {
+        Some(end) if comes && list.trailing_comma() && trailing.contains('#') => {
+            let (comment, rest) = (trailing[..end].to_string(), trailing[end..].to_string());
+            list.set_trailing(rest);
+            comment
+        }
+        _ => String::new(),
+    }
+}
+
+/// The white space before a value in a list, without comments.
+fn spaces_before(value: &toml_edit::Value) -> String {
+    let prefix = value.decor().prefix().and_then(|p| p.as_str()).unwrap_or_default();
+    match prefix.rfind('\n') {
+        Some(end) => prefix[end..].to_string(),
+        None => prefix.to_string(),
+    }
+}
+
+/// A value that is no table: replaced; of a list of numbers only those that differ.
+fn edit_leaf(item: &mut Item, old: Option<&Value>, new: &Value) {
+    let Some(value) = item.as_value_mut() else {
+        *item = Item::Value(leaf(new));
+        return;
+    };
+    if let (toml_edit::Value::Array(list), Value::Array(new)) = (&mut *value, new)
+        && list.len() == new.len()
+    {
+        let old = old.and_then(Value::as_array).filter(|old| old.len() == new.len());
+        for (i, number) in new.iter().enumerate() {
+            if old.is_none_or(|old| old[i] != *number)
+                && let Some(place) = list.get_mut(i)
+            {
+                replace(place, leaf(number));
+            }
+        }
+        return;
+    }
+    // A colour that is written `#rrggbb` stays so as long as a code stands for it.
+    let code = if value.is_str() { color(new).and_then(Color::to_hex) } else { None };
+    replace(value, code.map_or_else(|| leaf(new), toml_edit::Value::from));
+}
+
+/// Puts `new` where `place` is, with the comments and spaces around it.
+fn replace(place: &mut toml_edit::Value, mut new: toml_edit::Value) {
+    *new.decor_mut() = place.decor().clone();
+    *place = new;
+}

@@ -1,0 +1,109 @@
+//! From a file to a checked scene.
+
+use crate::scene::diagnostic::SceneErrors;
+use crate::scene::format::schema;
+use crate::scene::format::source_map::{located, place};
+use crate::scene::{Library, Scene};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
+use toml::de::DeTable;
+
+/// Largest file that is read [bytes]: some hundred thousand objects.
+const MAX_BYTES: u64 = 64 << 20;
+
+impl Scene {
+    /// Reads and checks the scene file at `path`.
+    ///
+    /// # Errors
+    /// Everything wrong with it, with line and column: unreadable, no UTF-8, no TOML, unknown keys,
+    /// wrong types, values out of range, names that lead nowhere. What is wrong with the form hides
+    /// what is wrong with the values.
+    pub fn read(path: &Path) -> Result<Self, SceneErrors> {
+        let library = Library::of(path, Arc::default());
+        read_text(path).and_then(|t| Self::parse_in(&t, &path.display().to_string(), library))
+    }
+
+    /// Reads and checks a scene from `text`; messages call it `name`, and names of files start from
+    /// that path's folder.
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub fn parse(text: &str, name: &str) -> Result<Self, SceneErrors> {
+        Self::parse_in(text, name, Library::of(Path::new(name), Arc::default()))
+    }
+
+    /// As [`Scene::parse`], with the files that the scene names in `library`.
+    pub(crate) fn parse_in(text: &str, name: &str, library: Library) -> Result<Self, SceneErrors> {
+        let (root, syntax) = DeTable::parse_recoverable(text);
+        let at = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
+        if let Some(error) = syntax.iter().min_by_key(|e| at(e)) {
+            let place = Some(place(text, at(error)));
+            let found = format!("this is not TOML: {}", error.message());
+            return Err(SceneErrors::at(name, place, found, ""));
+        }
+        if root.get_ref().is_empty() {
+            return Err(SceneErrors::at(
+                name,
+                Some((1, 1)),
+                "the file holds no scene".to_string(),
+                "Expected at least one [[object]]; `zerkalo new FILE` writes a scene to start from.",
+            ));
+        }
+        let form = schema::check(name, text, &root);
+        if !form.is_empty() {
+            return Err(SceneErrors::new(form));
+        }
+        let mut scene: Self = toml::from_str(text).map_err(|error| {
+            let place = error.span().map(|span| place(text, span.start));
+            SceneErrors::at(name, place, error.message().to_string(), "")
+        })?;
+        scene.library = library;
+        scene.resolve();
+        match scene.faults() {
+            faults if faults.is_empty() => Ok(scene),
+            faults => Err(SceneErrors::new(located(name, text, faults))),
+        }
+    }
+}
+
+/// The text of the scene file at `path`.
+pub(crate) fn read_text(path: &Path) -> Result<String, SceneErrors> {
+    let name = path.display().to_string();
+    let fail = |found: &str, help: &str| SceneErrors::of_file(&name, found.to_string(), help);
+    let io = |error: std::io::Error| match error.kind() {
+        std::io::ErrorKind::NotFound => {
+            fail("there is no such file", "`zerkalo new FILE` writes a scene to start from.")
+        }
+        std::io::ErrorKind::PermissionDenied => {
+            fail("permission to read the file is denied", "Check who may read it.")
+        }
+        _ => fail(&format!("the file cannot be read: {error}"), ""),
+    };
+    let file = File::open(path).map_err(io)?;
+    let metadata = file.metadata().map_err(io)?;
+    if metadata.is_dir() {
+        return Err(fail("this is a directory", "Expected a scene file (TOML)."));
+    }
+    let mut bytes = Vec::new();
+    // One byte more than allowed tells; a device without end is not read to its end.
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(fail(
+            &format!("the file is larger than {} MiB", MAX_BYTES >> 20),
+            "Expected a scene file (TOML).",
+        ));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let good = error.utf8_error().valid_up_to();
+        let bytes = error.as_bytes();
+        let text = String::from_utf8_lossy(&bytes[..good]);
+        SceneErrors::at(
+            &name,
+            Some(place(&text, good)),
+            format!("this is not UTF-8 text: byte 0x{:02x}", bytes[good]),
+            "Expected a scene file (TOML), saved as UTF-8.",
+        )
+    })
+}

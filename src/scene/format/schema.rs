@@ -1,0 +1,327 @@
+//! The form of a scene file, checked against the tables of fields: unknown keys, values of a wrong
+//! type, keys that are missing. Everything wrong is found in one walk.
+
+use crate::scene::OBJECT_FIELDS;
+use crate::scene::diagnostic::Message;
+use crate::scene::format::source_map::place;
+use crate::scene::format::suggest::nearest;
+use crate::scene::settings::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, TRACE_FIELDS};
+use crate::scene::validate::subject;
+use crate::value::{Color, Field, Preset, Range, Takes, excerpt};
+use crate::{camera, light, material};
+use std::ops;
+use toml::Spanned;
+use toml::de::{DeInteger, DeTable, DeValue};
+
+/// The keys of a scene file.
+pub const FIELDS: &[Field] = &[
+    table("film", FILM_FIELDS, "The picture's raster."),
+    table("trace", TRACE_FIELDS, "How far paths are followed."),
+    Field::without(
+        "camera",
+        Takes::Table(camera::FIELDS),
+        "",
+        "it stands at [0.0, 1.0, 5.0] and looks at the origin",
+        "The view: a pinhole camera.",
+    ),
+    Field::without(
+        "views",
+        Takes::Named(camera::FIELDS),
+        "",
+        "there are none",
+        "Other viewpoints by name, to come back to. The picture is taken from `[camera]`.",
+    ),
+    table("background", BACKGROUND_FIELDS, "What a ray sees that meets nothing."),
+    table("ambient", AMBIENT_FIELDS, "Light from everywhere, without shadows."),
+    Field::without("light", Takes::Tables(light::FIELDS), "", "there are none", "The lights."),
+    Field::without(
+        "materials",
+        Takes::Named(material::FIELDS),
+        "",
+        "there are none",
+        "Finishes by name, for the key `material` of objects.",
+    ),
+    Field::without("object", Takes::Tables(OBJECT_FIELDS), "", "there are none", "The objects."),
+];
+
+const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) -> Field {
+    Field::without(name, Takes::Table(fields), "", "its keys have their defaults", doc)
+}
+
+/// Everything wrong with the form of the scene file `file`, whose `text` is TOML.
+pub(crate) fn check(file: &str, text: &str, root: &Spanned<DeTable>) -> Vec<Message> {
+    let mut walk =
+        Walk { file, text, root: root.get_ref(), path: Vec::new(), messages: Vec::new() };
+    walk.table(root.get_ref(), 0..0, FIELDS);
+    walk.messages
+}
+
+/// Keys as people name them: `shape.sphere`, `step 2 of transform`, `shape.cube of part 1 of
+/// shape.union`.
+fn phrase(keys: &[String]) -> String {
+    let number = |position: &String| position.parse().map_or(0, |i: usize| i + 1);
+    if let Some(of) = keys.iter().rposition(|key| key == "of")
+        && let [position, inner @ ..] = &keys[of + 1..]
+    {
+        let part = format!("part {} of {}", number(position), phrase(&keys[..of]));
+        return if inner.is_empty() { part } else { format!("{} of {part}", phrase(inner)) };
+    }
+    match keys {
+        [transform, step, rest @ ..] if transform == "transform" => {
+            let rest: String = rest.iter().map(|key| format!(".{key}")).collect();
+            format!("step {} of transform{rest}", number(step))
+        }
+        keys => keys.join("."),
+    }
+}
+
+struct Walk<'a> {
+    file: &'a str,
+    text: &'a str,
+    root: &'a DeTable<'a>,
+    path: Vec<String>,
+    messages: Vec<Message>,
+}
+
+impl Walk<'_> {
+    fn add(&mut self, span: ops::Range<usize>, found: String, help: String) {
+        let subject = subject(&self.path, |list, index| {
+            let entry = self.root.get(list)?.get_ref().as_array()?.get(index)?;
+            entry.get_ref().as_table()?.get("name")?.get_ref().as_str().map(str::to_string)
+        });
+        let place = Some(place(self.text, span.start));
+        self.messages.push(Message { file: self.file.to_string(), place, subject, found, help });
+    }
+
+    /// The keys below the thing that the subject names: `shape.sphere`.
+    fn inner(&self) -> String {
+        let above = match self.path.first().map(String::as_str) {
+            Some("object" | "light" | "materials" | "views") => 2,
+            _ => 1,
+        };
+        phrase(self.path.get(above..).unwrap_or_default())
+    }
+
+    /// `radius`, or `shape.sphere` for what has no key of its own.
+    fn wrong(&mut self, span: ops::Range<usize>, value: &DeValue, expected: &str) {
+        let name = match self.inner() {
+            inner if inner.is_empty() => "it".to_string(),
+            inner => inner,
+        };
+        self.add(span, format!("{name} is {}", describe(value)), format!("Expected {expected}."));
+    }
+
+    /// Returns the key that was probably meant.
+    fn unknown(
+        &mut self,
+        key: &Spanned<toml::de::DeString>,
+        fields: &[Field],
+    ) -> Option<&'static str> {
+        let names = || fields.iter().map(|f| f.name);
+        let mut help = format!("Known: {}.", names().collect::<Vec<_>>().join(", "));
+        let meant = nearest(key.get_ref(), names());
+        if let Some(meant) = meant {
+            help += &format!(" Did you mean {meant:?}?");
+        }
+        let place = match self.inner() {
+            inner if inner.is_empty() => String::new(),
+            inner => format!(" in {}", excerpt(&inner)),
+        };
+        let found = format!("unknown key \"{}\"{place}", excerpt(key.get_ref()));
+        self.add(key.span(), found, help);
+        meant
+    }
+
+    fn table(&mut self, table: &DeTable, span: ops::Range<usize>, fields: &'static [Field]) {
+        let mut meant = Vec::new();
+        for (key, value) in table {
+            match fields.iter().find(|f| f.name == key.get_ref().as_ref()) {
+                Some(field) => self.field(field, value),
+                None => meant.extend(self.unknown(key, fields)),
+            }
+        }
+        for field in fields.iter().filter(|f| f.preset == Preset::Required) {
+            if !table.contains_key(field.name) && !meant.contains(&field.name) {
+                let place = match self.inner() {
+                    inner if inner.is_empty() => String::new(),
+                    inner => format!(" in {inner}"),
+                };
+                self.add(
+                    span.clone(),
+                    format!("key \"{}\" is missing{place}", field.name),
+                    format!("Expected {} = {}.", field.name, field.takes),
+                );
+            }
+        }
+    }
+
+    fn one_of(&mut self, table: &DeTable, span: ops::Range<usize>, fields: &'static [Field]) {
+        let mut known: Vec<_> = Vec::new();
+        for (key, value) in table {
+            match fields.iter().find(|f| f.name == key.get_ref().as_ref()) {
+                Some(field) => known.push((key, value, field)),
+                None => {
+                    self.unknown(key, fields);
+                }
+            }
+        }
+        known.sort_by_key(|(key, ..)| key.span().start);
+        for (_, value, field) in known.iter().take(1) {
+            self.field(field, value);
+        }
+        let expected =
+            || format!("Expected {}.", Takes::OneOf(fields)).replace("a table with ", "");
+        if let [_, second, ..] = known.as_slice() {
+            let found =
+                format!("{} has both {} and {}", self.inner(), known[0].2.name, second.2.name);
+            self.add(second.0.span(), found, expected());
+        } else if table.is_empty() {
+            self.add(span, format!("{} is empty", self.inner()), expected());
+        }
+    }
+
+    fn field(&mut self, field: &'static Field, value: &Spanned<DeValue>) {
+        self.path.push(field.name.to_string());
+        self.value(field, value);
+        self.path.pop();
+    }
+
+    /// Each entry of a list, with its position in the path.
+    fn entries(
+        &mut self,
+        list: &[Spanned<DeValue>],
+        expected: &str,
+        each: impl Fn(&mut Self, &DeTable, ops::Range<usize>),
+    ) {
+        for (i, entry) in list.iter().enumerate() {
+            self.path.push(i.to_string());
+            match entry.get_ref() {
+                DeValue::Table(table) => each(self, table, entry.span()),
+                other => self.wrong(entry.span(), other, expected),
+            }
+            self.path.pop();
+        }
+    }
+
+    fn value(&mut self, field: &'static Field, spanned: &Spanned<DeValue>) {
+        let (value, span) = (spanned.get_ref(), spanned.span());
+        match (field.takes, value) {
+            (Takes::Table(fields), DeValue::Table(table)) => self.table(table, span, fields),
+            (Takes::OneOf(fields), DeValue::Table(table)) => self.one_of(table, span, fields),
+            (Takes::ListOf(fields), DeValue::Array(list)) => {
+                let expected = Takes::OneOf(fields).to_string();
+                self.entries(list, &expected, |w, t, s| w.one_of(t, s, fields));
+            }
+            (Takes::Tables(fields), DeValue::Array(list)) => {
+                self.entries(list, "a table", |w, t, s| w.table(t, s, fields));
+            }
+            (Takes::Named(fields), DeValue::Table(named)) => {
+                for (name, entry) in named {
+                    self.path.push(name.get_ref().to_string());
+                    match entry.get_ref() {
+                        DeValue::Table(table) => self.table(table, entry.span(), fields),
+                        other => self.wrong(entry.span(), other, "a table"),
+                    }
+                    self.path.pop();
+                }
+            }
+            (takes, value) if fits(takes, value) => {}
+            (Takes::Choice(choices), DeValue::String(word)) => {
+                let mut help = format!("Expected {}.", field.takes);
+                if let Some(meant) = nearest(word, choices.iter().map(|c| c.name)) {
+                    help += &format!(" Did you mean {meant:?}?");
+                }
+                self.add(span, format!("{} is {}", self.inner(), describe(value)), help);
+            }
+            (Takes::Tables(_), _) if self.path.len() == 1 => {
+                let expected = format!("tables that begin with [[{}]]", field.name);
+                self.wrong(span, value, &expected);
+            }
+            (Takes::Named(_), _) => {
+                let expected = format!("tables that begin with [{}.NAME]", field.name);
+                self.wrong(span, value, &expected);
+            }
+            (takes, _) => self.wrong(span, value, &takes.to_string()),
+        }
+    }
+}
+
+/// Whether a value that is no table has the right type. Ranges of whole numbers are checked here,
+/// since what lies outside has no place in an unsigned integer; all other ranges in `faults`.
+fn fits(takes: Takes, value: &DeValue) -> bool {
+    let list = |n: usize, each: &dyn Fn(&DeValue) -> bool| match value {
+        DeValue::Array(list) => list.len() == n && list.iter().all(|v| each(v.get_ref())),
+        _ => false,
+    };
+    match takes {
+        Takes::Text => value.is_str(),
+        Takes::Switch => value.is_bool(),
+        Takes::Choice(choices) => {
+            value.as_str().is_some_and(|word| choices.iter().any(|c| c.name == word))
+        }
+        Takes::Whole(range) => is_whole(value, range),
+        Takes::Wholes(n, range) => list(n, &|v| is_whole(v, range)),
+        Takes::Number(_) => is_number(value),
+        Takes::Numbers(n, _) => list(n, &is_number),
+        Takes::Direction => list(3, &is_number),
+        Takes::Factor => is_number(value) || list(3, &is_number),
+        Takes::Color(_) => match value {
+            DeValue::String(text) => Color::from_hex(text).is_some(),
+            _ => list(3, &is_number),
+        },
+        Takes::Table(_)
+        | Takes::OneOf(_)
+        | Takes::ListOf(_)
+        | Takes::Tables(_)
+        | Takes::Named(_) => false,
+    }
+}
+
+fn integer(digits: &DeInteger) -> Option<i64> {
+    i64::from_str_radix(digits.as_str(), digits.radix()).ok()
+}
+
+fn is_whole(value: &DeValue, range: Range) -> bool {
+    value.as_integer().and_then(integer).is_some_and(|i| range.holds(i as f64))
+}
+
+fn is_number(value: &DeValue) -> bool {
+    value.is_float() || value.as_integer().and_then(integer).is_some()
+}
+
+/// `the string "abc"`, `the number -2`, `a list of 2`.
+fn describe(value: &DeValue) -> String {
+    match value {
+        DeValue::String(text) => format!("the string \"{}\"", excerpt(text)),
+        DeValue::Integer(digits) => match integer(digits) {
+            Some(number) => format!("the number {number}"),
+            None => format!("a whole number too large for 64 bits, {}", excerpt(digits.as_str())),
+        },
+        DeValue::Float(digits) => format!("the number {}", excerpt(digits.as_str())),
+        DeValue::Boolean(yes) => format!("{yes}"),
+        DeValue::Datetime(_) => "a date or time".to_string(),
+        DeValue::Array(list) => describe_list(list),
+        DeValue::Table(_) => "a table".to_string(),
+    }
+}
+
+fn describe_list(list: &[Spanned<DeValue>]) -> String {
+    if list.is_empty() {
+        return "an empty list".to_string();
+    }
+    let shown: Vec<_> = list
+        .iter()
+        .take(4)
+        .map(|entry| match entry.get_ref() {
+            DeValue::String(text) => format!("\"{}\"", excerpt(text)),
+            DeValue::Integer(digits) => excerpt(digits.as_str()),
+            DeValue::Float(digits) => excerpt(digits.as_str()),
+            DeValue::Boolean(yes) => yes.to_string(),
+            DeValue::Datetime(_) => "a date".to_string(),
+            DeValue::Array(_) => "a list".to_string(),
+            DeValue::Table(_) => "a table".to_string(),
+        })
+        .collect();
+    let rest = if list.len() > shown.len() { ", …" } else { "" };
+    format!("[{}{rest}]", shown.join(", "))
+}

@@ -1,0 +1,114 @@
+//! What is legal but probably not meant.
+
+use crate::material::{Fresnel, Highlight, Material};
+use crate::scene::Scene;
+use crate::scene::validate::Finding;
+use crate::value::{Color, number};
+
+impl Scene {
+    /// What is legal but dubious, one finding per kind of doubt: the first case, and how many more.
+    /// [`Document::warnings`](crate::scene::Document::warnings) adds file, line and column.
+    pub fn warnings(&self) -> Vec<Finding> {
+        let materials = |dubious: &dyn Fn(&Material) -> Option<(&'static str, String)>| {
+            let mut cases = self.materials.iter().filter_map(|(n, m)| Some((n, dubious(m)?)));
+            let (name, (key, found)) = cases.next()?;
+            Some((
+                vec!["materials".to_string(), name.clone(), key.to_string()],
+                found,
+                cases.count(),
+            ))
+        };
+        let mut findings = Vec::new();
+        let mut add = |case: Option<(Vec<String>, String, usize)>, help: &str| {
+            let Some((path, found, others)) = case else { return };
+            let path: Vec<&str> = path.iter().map(String::as_str).collect();
+            let more = match others {
+                0 => String::new(),
+                1 => " (and one more like it)".to_string(),
+                n => format!(" (and {n} more like it)"),
+            };
+            findings.push(self.finding(&path, found + &more, help.to_string()));
+        };
+        add(
+            materials(&brighter_than_its_light),
+            "Legal: the picture is clipped only when it is shown.",
+        );
+        add(
+            materials(&|m| {
+                let alpha = m.alpha.filter(|a| *a > 2.0 && m.has_microfacets())?;
+                Some((
+                    "alpha",
+                    format!("alpha is {}, grooves far steeper than they are wide", number(alpha)),
+                ))
+            }),
+            "Surfaces have an alpha from 0 to about 1.",
+        );
+        add(
+            materials(&|m| {
+                (m.alpha.is_some() && !m.has_microfacets())
+                    .then(|| ("alpha", "alpha has no effect here".to_string()))
+            }),
+            "It belongs to lobe \"beckmann\" or \"ggx\", or to highlight \"cook-torrance\".",
+        );
+        add(self.dark_light(), "Leave the light out, or write on = false.");
+        add(
+            self.objects.is_empty().then(|| (Vec::new(), "there is no object".to_string(), 0)),
+            "The picture will show nothing but the background. An object begins with [[object]].",
+        );
+        add(
+            self.is_dark().then(|| {
+                (Vec::new(), "there is no light, no ambient and no background".to_string(), 0)
+            }),
+            "The picture will be black. A light begins with [[light]].",
+        );
+        findings
+    }
+
+    fn dark_light(&self) -> Option<(Vec<String>, String, usize)> {
+        let mut dark = self.lights.iter().enumerate().filter(|(_, light)| {
+            light.on && (light.intensity == 0.0 || light.color == Color::BLACK)
+        });
+        let (i, light) = dark.next()?;
+        let (key, what) = if light.intensity == 0.0 {
+            ("intensity", "intensity is 0")
+        } else {
+            ("color", "color is black")
+        };
+        let path = vec!["light".to_string(), i.to_string(), key.to_string()];
+        Some((path, format!("{what}, so that it gives no light"), dark.count()))
+    }
+
+    fn is_dark(&self) -> bool {
+        !self.objects.is_empty()
+            && self.lights.is_empty()
+            && self.ambient.color == Color::BLACK
+            && self.background.color == Color::BLACK
+    }
+}
+
+/// The parts of a material that answer one and the same ray of light: diffuse, highlight,
+/// reflection. A Cook-Torrance highlight is the reflection of a light in the surface, not a part
+/// beside it.
+fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
+    let mirrored = match m.highlight {
+        Highlight::Phong => m.specular + m.reflection,
+        Highlight::CookTorrance => m.specular.max(m.reflection),
+    };
+    let f0 = m.metal.map(|metal| metal.f0()).or(m.reflectance).unwrap_or(Color::WHITE).largest();
+    let passed = match m.law() {
+        // F and 1 - F of the same light.
+        Fresnel::Dielectric => mirrored.max(m.transmission),
+        _ => mirrored * f0 + m.transmission,
+    };
+    let sum = m.diffuse * m.color.largest() + passed;
+    (sum > 1.0 + 1e-9).then(|| {
+        let key = if m.reflection > 0.0 { "reflection" } else { "diffuse" };
+        let through =
+            if m.transmission > 0.0 { ", reflection and transmission" } else { " and reflection" };
+        let found = format!(
+            "diffuse x color, specular{through} add up to {}, more than the light that comes in",
+            number((sum * 1000.0).round() / 1000.0)
+        );
+        (key, found)
+    })
+}

@@ -1,0 +1,202 @@
+//! What is wrong with a scene beyond the form of its file: values out of range, names that lead
+//! nowhere or to two places.
+
+use crate::material::Mapping;
+use crate::scene::Scene;
+use crate::scene::format::suggest::nearest;
+use crate::value::{Fault, excerpt};
+use std::collections::HashMap;
+use std::fmt;
+
+/// Something wrong or dubious in a scene, without file and line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// The keys (and positions in lists, from 0) that lead to it: `object`, `3`, `shape`, `sphere`.
+    pub path: Vec<String>,
+    /// What it is about: `object "queen"`; empty: the scene.
+    pub subject: String,
+    /// What was found, as a phrase.
+    pub found: String,
+    /// What would be right, and the remedy, in sentences.
+    pub help: String,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        use crate::value::printable;
+        if !self.subject.is_empty() {
+            write!(f, "{}: ", printable(&self.subject))?;
+        }
+        write!(f, "{}. {}", printable(&self.found), printable(&self.help))
+    }
+}
+
+/// How messages name what stands behind the first keys of a path: `object "queen"`, `light 2`.
+/// `name` gives the name of an entry of a list, if it has one.
+pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<String>) -> String {
+    match path {
+        [list, index, ..] if list == "object" || list == "light" => {
+            let index: usize = index.parse().unwrap_or(0);
+            match name(list, index).filter(|n| !n.is_empty()) {
+                Some(name) => format!("{list} \"{}\"", excerpt(&name)),
+                None => format!("{list} {}", index + 1),
+            }
+        }
+        [list, name, ..] if list == "materials" => format!("material \"{}\"", excerpt(name)),
+        [list, name, ..] if list == "views" => format!("view \"{}\"", excerpt(name)),
+        [first, ..] => first.clone(),
+        [] => String::new(),
+    }
+}
+
+fn keys(parts: &[&str]) -> Vec<String> {
+    parts.iter().map(|p| p.to_string()).collect()
+}
+
+impl Scene {
+    /// How messages name the thing at `path`.
+    pub(super) fn subject(&self, path: &[String]) -> String {
+        subject(path, |list, index| match list {
+            "object" => self.objects.get(index).map(|o| o.name.clone()),
+            _ => self.lights.get(index).map(|l| l.name.clone()),
+        })
+    }
+
+    pub(super) fn finding(&self, path: &[&str], found: String, help: String) -> Finding {
+        let path = keys(path);
+        Finding { subject: self.subject(&path), path, found, help }
+    }
+
+    /// Looks for the files that it names, those that have not been looked for yet. What is wrong with
+    /// them is among the faults from then on.
+    pub fn resolve(&mut self) {
+        let library = &self.library;
+        for object in &mut self.objects {
+            object.shape.resolve(|name| library.mesh(name));
+        }
+        for material in self.materials.values_mut() {
+            material.resolve(|name| library.image(name));
+        }
+    }
+
+    /// Everything wrong with the scene; a scene that was read has nothing wrong, an edited one may.
+    pub fn faults(&self) -> Vec<Finding> {
+        let mut findings = Vec::new();
+        let mut add = |path: &[&str], faults: Vec<Fault>| {
+            findings.extend(faults.into_iter().map(|fault| {
+                let mut all = path.to_vec();
+                all.extend(fault.key.split('.').filter(|k| !k.is_empty()));
+                self.finding(&all, fault.found, format!("Expected {}.", fault.expected))
+            }));
+        };
+        add(&["film"], self.film.faults());
+        add(&["trace"], self.trace.faults());
+        add(&["camera"], self.camera.faults());
+        for (name, view) in &self.views {
+            add(&["views", name], view.faults());
+        }
+        add(&["background"], self.background.faults());
+        add(&["ambient"], self.ambient.faults());
+        for (i, light) in self.lights.iter().enumerate() {
+            add(&["light", &i.to_string()], light.faults());
+        }
+        for (name, material) in &self.materials {
+            add(&["materials", name], material.faults());
+        }
+        for (i, object) in self.objects.iter().enumerate() {
+            add(&["object", &i.to_string()], object.faults());
+        }
+        if findings.is_empty() {
+            self.missing_coordinates(&mut findings);
+        }
+        self.missing_materials(&mut findings);
+        self.same_names("light", self.lights.iter().map(|l| &l.name), &mut findings);
+        self.same_names("object", self.objects.iter().map(|o| &o.name), &mut findings);
+        findings
+    }
+
+    /// Materials whose textures ask for coordinates that the object's shape does not have. Shapes have no
+    /// faults.
+    fn missing_coordinates(&self, findings: &mut Vec<Finding>) {
+        let asks = |name: &str| {
+            let material = self.materials.get(name)?;
+            let texture = material.texture.as_ref().map(|t| t.placement().mapping);
+            let bump = material.bump.as_ref().map(|b| b.placement().mapping);
+            (texture == Some(Mapping::Uv))
+                .then_some("texture")
+                .or((bump == Some(Mapping::Uv)).then_some("bump"))
+        };
+        for (i, object) in self.objects.iter().enumerate() {
+            let materials = object.shape.part_materials(&object.material);
+            let asking: Vec<_> = materials.iter().map(|name| asks(name)).collect();
+            if asking.iter().all(Option::is_none) {
+                continue;
+            }
+            let spaces = object.shape.texture_spaces();
+            let lacking = |k: &usize| asking[*k].is_some() && !spaces[*k].has_uv();
+            let Some(part) = (0..spaces.len()).find(lacking) else { continue };
+            let what = match object.shape.file() {
+                Some(file) => format!("there are none in \"{}\"", excerpt(file)),
+                None if spaces.len() > 1 => format!("parts of a {} have none", object.shape.key()),
+                None => format!("a {} has none", object.shape.key()),
+            };
+            let found = format!(
+                "the {} of material \"{}\" asks for texture coordinates (mapping = \"uv\"), and {what}",
+                asking[part].unwrap_or_default(),
+                excerpt(materials[part]),
+            );
+            let help =
+                "Expected a mesh whose file has them, a rectangle or a platform. On other shapes \
+                        another mapping works: \"auto\" takes the one that suits the shape."
+                    .to_string();
+            findings.push(self.finding(&["object", &i.to_string(), "material"], found, help));
+        }
+    }
+
+    fn missing_materials(&self, findings: &mut Vec<Finding>) {
+        let mut named = Vec::new();
+        for (i, object) in self.objects.iter().enumerate() {
+            named.push((format!("object.{i}.material"), object.material.as_str()));
+            let parts = object.shape.named_materials().into_iter();
+            named.extend(parts.map(|(key, name)| (format!("object.{i}.shape.{key}"), name)));
+        }
+        for (key, name) in named {
+            if name.is_empty() || self.materials.contains_key(name) {
+                continue;
+            }
+            let defined: Vec<_> =
+                self.materials.keys().take(20).map(|n| format!("\"{}\"", excerpt(n))).collect();
+            let mut help = match defined.as_slice() {
+                [] => "No material is defined; one begins with [materials.NAME].".to_string(),
+                names if names.len() < self.materials.len() => {
+                    format!("Defined: {}, and more.", names.join(", "))
+                }
+                names => format!("Defined: {}.", names.join(", ")),
+            };
+            let known = self.materials.keys().map(String::as_str);
+            if let Some(meant) = nearest(name, known) {
+                help += &format!(" Did you mean \"{}\"?", excerpt(meant));
+            }
+            let found = format!("material \"{}\" is not defined", excerpt(name));
+            findings.push(self.finding(&key.split('.').collect::<Vec<_>>(), found, help));
+        }
+    }
+
+    fn same_names<'a>(
+        &self,
+        list: &str,
+        names: impl Iterator<Item = &'a String>,
+        findings: &mut Vec<Finding>,
+    ) {
+        let mut first = HashMap::new();
+        for (i, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
+            if let Some(other) = first.get(name) {
+                let found = format!("{list} {} has the same name", other + 1);
+                let help = "Expected a name of its own, or none.".to_string();
+                findings.push(self.finding(&[list, &i.to_string(), "name"], found, help));
+            } else {
+                first.insert(name, i);
+            }
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Solids around an axis from one point to another: what cylinder, cone and tapered cylinder have in
+//! common.
+
+use crate::primitive::Form;
+use crate::shape::texture_space::around_axis;
+use crate::value::{Fault, unit};
+use glam::{DAffine3, DMat3, DVec3};
+
+/// The solid around the axis from `base` to `top`, two different points, with these radii there, both
+/// at least 0 and not both 0.
+pub(super) fn between(base: [f64; 3], top: [f64; 3], base_radius: f64, top_radius: f64) -> Form {
+    let (base, top) = (DVec3::from_array(base), DVec3::from_array(top));
+    // The wider end first: the canonical base has radius 1.
+    let (from, to, wide, narrow) = if base_radius >= top_radius {
+        (base, top, base_radius, top_radius)
+    } else {
+        (top, base, top_radius, base_radius)
+    };
+    let axis = to - from;
+    let (u, v) = unit(axis).unwrap_or(DVec3::Y).any_orthonormal_pair();
+    let linear = DMat3::from_cols(u * wide, v * wide, axis);
+    Form::tapered(DAffine3::from_mat3_translation(linear, from), narrow / wide)
+}
+
+/// The axes in which textures lie on it: y from `base` to `top`.
+pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
+    let axis = DVec3::from_array(top) - DVec3::from_array(base);
+    around_axis(unit(axis).unwrap_or(DVec3::Y))
+}
+
+/// The fault of an axis of length 0, which ends at the key `name`.
+pub(super) fn no_axis(base: [f64; 3], top: [f64; 3], name: &str) -> Option<Fault> {
+    (base == top).then(|| {
+        Fault::new(name, format!("{name} is the same point as base"), "a point away from base")
+    })
+}
+
+/// Whether the axis is vertical.
+pub(super) fn is_upright(base: [f64; 3], top: [f64; 3]) -> bool {
+    base[0] == top[0] && base[2] == top[2]
+}
+
+/// Distance of the ends of the axis: a size of the solid.
+pub(super) fn height(base: [f64; 3], top: [f64; 3]) -> f64 {
+    DVec3::from_array(base).distance(DVec3::from_array(top))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ends(form: &Form) -> (DVec3, DVec3, f64) {
+        let Form::Tapered { scene_from_unit: m, top } = form else { panic!("{form:?}") };
+        (m.translation, m.translation + m.matrix3.z_axis, *top)
+    }
+
+    #[test]
+    fn the_wider_end_is_the_base() {
+        let (a, b) = ([0.0, 1.0, 0.0], [2.0, 1.0, -3.0]);
+        let narrowing = between(a, b, 2.0, 0.5);
+        assert_eq!(ends(&narrowing), (a.into(), b.into(), 0.25));
+        let widening = between(a, b, 0.5, 2.0);
+        assert_eq!(ends(&widening), (b.into(), a.into(), 0.25));
+        let (low, high) = narrowing.bounds().unwrap();
+        let (low2, high2) = between(b, a, 0.5, 2.0).bounds().unwrap();
+        assert!((low - low2).length() < 1e-15 && (high - high2).length() < 1e-15);
+    }
+
+    #[test]
+    fn the_canonical_form_may_widen() {
+        let map = DAffine3::from_translation(DVec3::X);
+        for s in [0.0, 0.3, 1.0, 4.0] {
+            let form = Form::tapered(map, s);
+            let (low, high) = form.bounds().unwrap();
+            let r = s.max(1.0);
+            assert!((low - DVec3::new(1.0 - r, -r, 0.0)).length() < 1e-15, "{s}: {low}");
+            assert!((high - DVec3::new(1.0 + r, r, 1.0)).length() < 1e-15, "{s}: {high}");
+            // A point of the rim at z = 1, and whether it is at the same distance from the axis.
+            let Form::Tapered { scene_from_unit: m, top } = form else { panic!("{form:?}") };
+            let at_one = if s > 1.0 { DVec3::X } else { DVec3::new(top, 0.0, 1.0) };
+            let rim = m.transform_point3(at_one);
+            assert!((rim - DVec3::new(1.0 + s, 0.0, 1.0)).length() < 1e-15, "{s}: {rim}");
+        }
+    }
+}

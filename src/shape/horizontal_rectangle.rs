@@ -1,0 +1,68 @@
+//! Platform: the ground that things stand on.
+
+use crate::primitive::Form;
+use crate::shape::Kind;
+use crate::shape::texture_space::on_plane;
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// A horizontal rectangle that faces up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Platform {
+    /// Centre.
+    pub center: [f64; 3],
+    /// Lengths along x and z.
+    pub size: [f64; 2],
+}
+
+impl Kind for Platform {
+    const DOC: &'static str =
+        "A horizontal rectangle that faces up: the ground that things stand on.";
+    const EXAMPLE: &'static str =
+        "shape.platform = { center = [0.0, 0.0, 0.0], size = [8.0, 8.0] }";
+    const FIELDS: &'static [Field] = &[
+        Field::required("center", Takes::Numbers(3, Range::COORDINATE), "scene units", "Centre."),
+        Field::required(
+            "size",
+            Takes::Numbers(2, Range::SIZE),
+            "scene units",
+            "Lengths along x and z.",
+        ),
+    ];
+
+    fn form(&self) -> Form {
+        let [x, z] = self.size;
+        Form::Parallelogram {
+            corner: DVec3::from_array(self.center) - DVec3::new(x, 0.0, z) / 2.0,
+            u: DVec3::new(0.0, 0.0, z),
+            v: DVec3::new(x, 0.0, 0.0),
+        }
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        Checks::new(Self::FIELDS)
+            .numbers("center", &self.center)
+            .numbers("size", &self.size)
+            .ratio(&self.size.map(|s| ("size", s)), &self.center)
+            .faults()
+    }
+
+    /// A table top: at the height of the box's upper side.
+    fn standing(base: DVec3, size: DVec3) -> Self {
+        Self { center: [base.x, base.y + size.y, base.z], size: [size.x, size.z] }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.center]
+    }
+
+    fn turn(&mut self, _: f64) -> bool {
+        false
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        on_plane(DVec3::Y)
+    }
+}

@@ -1,0 +1,172 @@
+//! The space in which textures lie on a shape.
+
+use crate::primitive::Form;
+use crate::shape::Shape;
+use crate::shape::csg::parts_of;
+use crate::shape::transform::chained;
+use glam::{DAffine3, DMat3, DVec3};
+
+/// How a texture lies on a shape if nobody says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unwrapped {
+    /// It is flat.
+    Plane,
+    /// It is round on all sides.
+    Ball,
+    /// It is round about an axis.
+    Turned,
+    /// It has flat sides, or a form of any kind.
+    Sides,
+    /// A mesh with texture coordinates of its own.
+    Uv,
+}
+
+/// The space in which textures lie on a simple shape: x to the right, y up or along its axis, z to the
+/// front or along its normal; as large as the scene is before the object's transform.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureSpace {
+    /// From it to the space of the whole shape.
+    pub shape_from_texture: DAffine3,
+    /// Corners of the box around the shape in it; of a plane both are its point.
+    pub corners: [DVec3; 2],
+    /// How a texture lies on it if nobody says.
+    pub unwrapped: Unwrapped,
+}
+
+impl TextureSpace {
+    /// Of a simple shape without faults.
+    fn new(shape: &Shape) -> Self {
+        let form = shape.form();
+        let shape_from_texture = DAffine3::from_mat3(shape.texture_axes());
+        let texture_from_shape = shape_from_texture.inverse();
+        let unwrapped = match &form {
+            Form::Parallelogram { .. } | Form::Plane { .. } => Unwrapped::Plane,
+            Form::Sphere { .. } | Form::Ellipsoid { .. } => Unwrapped::Ball,
+            Form::Tapered { .. } => Unwrapped::Turned,
+            Form::Mesh { mesh, .. } if mesh.mesh().uvs.is_some() => Unwrapped::Uv,
+            Form::Convex { .. } | Form::Compound(_) | Form::Mesh { .. } => Unwrapped::Sides,
+        };
+        let point = texture_from_shape.transform_point3(shape.place());
+        let corners = form.transformed(&texture_from_shape).bounds().unwrap_or((point, point));
+        Self { shape_from_texture, corners: corners.into(), unwrapped }
+    }
+
+    /// Whether it has texture coordinates of its own: a mesh whose file has them, or what is flat and
+    /// has edges.
+    pub fn has_uv(&self) -> bool {
+        let [low, high] = self.corners;
+        match self.unwrapped {
+            Unwrapped::Uv => true,
+            Unwrapped::Plane => low != high,
+            _ => false,
+        }
+    }
+}
+
+impl Shape {
+    /// The spaces in which textures lie on its parts, in the order of [`Form::parts`]; of a shape
+    /// without faults.
+    pub fn texture_spaces(&self) -> Vec<TextureSpace> {
+        let Some(of) = parts_of(self) else { return vec![TextureSpace::new(self)] };
+        let inner = |part: &crate::shape::Part| {
+            let map = chained(&part.transform);
+            let spaces = part.shape.texture_spaces().into_iter();
+            spaces.map(move |space| TextureSpace {
+                shape_from_texture: map * space.shape_from_texture,
+                ..space
+            })
+        };
+        of.iter().flat_map(inner).collect()
+    }
+}
+
+/// The axes around `y`, of unit length: x as far to the right as can be.
+pub(super) fn around_axis(y: DVec3) -> DMat3 {
+    let across = y.cross(DVec3::Z);
+    let x = if across.length() > 1e-3 { across.normalize() } else { DVec3::X };
+    let x = (x - y * x.dot(y)).normalize();
+    DMat3::from_cols(x, y, x.cross(y))
+}
+
+/// The axes on a plane with the unit normal `z`: y as far up as can be; on what lies flat, away from the
+/// viewer.
+pub(super) fn on_plane(z: DVec3) -> DMat3 {
+    let up = if z.y.abs() > 0.999 { DVec3::NEG_Z * z.y.signum() } else { DVec3::Y };
+    let x = up.cross(z).normalize();
+    DMat3::from_cols(x, z.cross(x), z)
+}
+
+/// The axes of a shape that is turned about the vertical, counter-clockwise seen from above.
+pub(super) fn turned_axes(degrees: f64) -> DMat3 {
+    let (sin, cos) = crate::value::sin_cos_degrees(degrees);
+    DMat3::from_cols(DVec3::new(cos, 0.0, -sin), DVec3::Y, DVec3::new(sin, 0.0, cos))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::{EXAMPLES, KINDS};
+
+    fn shape(text: &str) -> Shape {
+        let table: toml::Table = text.parse().unwrap();
+        table["shape"].clone().try_into().unwrap()
+    }
+
+    #[test]
+    fn every_kind_has_right_handed_axes_and_a_box() {
+        for (kind, (key, text)) in KINDS.iter().zip(EXAMPLES) {
+            for space in shape(text).texture_spaces() {
+                let axes = space.shape_from_texture.matrix3;
+                assert!((axes.determinant() - 1.0).abs() < 1e-12, "{key}");
+                let gram = axes.transpose() * axes;
+                assert!(gram.abs_diff_eq(DMat3::IDENTITY, 1e-12), "{key}");
+                let [low, high] = space.corners;
+                assert!(low.cmple(high).all() && (kind.name == "plane" || low != high), "{key}");
+            }
+        }
+    }
+
+    #[test]
+    fn axes_follow_the_shape() {
+        let one = |text: &str| shape(text).texture_spaces()[0];
+        let column = |space: &TextureSpace, i: usize| space.shape_from_texture.matrix3.col(i);
+        let floor = one("shape.plane = { point = [1.0, 2.0, 3.0], normal = [0.0, 2.0, 0.0] }");
+        assert_eq!([column(&floor, 0), column(&floor, 1)], [DVec3::X, DVec3::NEG_Z]);
+        let point = floor.shape_from_texture.transform_point3(floor.corners[0]);
+        assert!((point - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12 && !floor.has_uv());
+        let ceiling = one("shape.plane = { point = [0.0, 2.0, 0.0], normal = [0.0, -1.0, 0.0] }");
+        assert_eq!([column(&ceiling, 0), column(&ceiling, 1)], [DVec3::X, DVec3::Z]);
+        let wall = one(
+            "shape.rectangle = { center = [0.0, 0.0, 0.0], size = [3.0, 2.0], normal = [0.0, 0.0, 1.0] }",
+        );
+        assert_eq!([column(&wall, 0), column(&wall, 1)], [DVec3::X, DVec3::Y]);
+        assert!(wall.has_uv() && (wall.corners[1] - wall.corners[0]).length() > 3.0);
+        let pole =
+            one("shape.cylinder = { base = [0.0, 0.0, 0.0], top = [3.0, 0.0, 0.0], radius = 0.5 }");
+        assert!((column(&pole, 1) - DVec3::X).length() < 1e-12);
+        assert!((pole.corners[1].y - pole.corners[0].y - 3.0).abs() < 1e-12);
+        let cube = one("shape.cube = { corner = [4.0, 0.0, 1.0], edge = 1.5, rotation = 33.0 }");
+        let size = cube.corners[1] - cube.corners[0];
+        assert!((size - DVec3::splat(1.5)).length() < 1e-12, "its own sides: {size}");
+        assert_eq!(cube.unwrapped, Unwrapped::Sides);
+    }
+
+    #[test]
+    fn parts_keep_their_order_and_their_transforms() {
+        let compound = shape(
+            "shape.union.of = [
+                { shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 } },
+                { shape.difference.of = [
+                    { shape.cube = { corner = [0.0, 0.0, 0.0], edge = 1.0 }, transform = [{ scale = 2.0 }] },
+                    { shape.cone = { base = [0.0, 0.0, 0.0], apex = [0.0, 1.0, 0.0], radius = 1.0 } },
+                ], transform = [{ translate = [5.0, 0.0, 0.0] }] },
+            ]",
+        );
+        let spaces = compound.texture_spaces();
+        assert_eq!(spaces.len(), compound.form().parts());
+        let kinds: Vec<_> = spaces.iter().map(|s| s.unwrapped).collect();
+        assert_eq!(kinds, [Unwrapped::Ball, Unwrapped::Sides, Unwrapped::Turned]);
+        let corner = spaces[1].shape_from_texture.transform_point3(DVec3::ONE);
+        assert!((corner - DVec3::new(7.0, 2.0, 2.0)).length() < 1e-12, "{corner}");
+    }
+}

@@ -1,0 +1,55 @@
+//! The tapered cylinder in its canonical place:
+//!   x^2 + y^2 <= (1 + (s - 1) z)^2, 0 <= z <= 1
+
+use crate::primitive::Form;
+use crate::shape::Kind;
+use crate::shape::texture_space::around_axis;
+use crate::value::{Checks, Fault, Field, Range, Takes};
+use glam::{DAffine3, DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// The canonical tapered cylinder, to be placed by a transform: its axis runs from the origin to
+/// z = 1, its radius is 1 there and s here.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UnitCylinder {
+    /// Radius at z = 1: 0 a cone, 1 a cylinder, above 1 it widens.
+    pub s: f64,
+}
+
+impl Kind for UnitCylinder {
+    const DOC: &'static str = "The canonical tapered cylinder, to be placed by `transform`: its axis runs from the \
+         origin to z = 1; its radius is 1 at z = 0 and `s` at z = 1.";
+    const EXAMPLE: &'static str = "shape.unit_cylinder = { s = 0.5 }";
+    const FIELDS: &'static [Field] = &[Field::required(
+        "s",
+        Takes::Number(Range::closed(0.0, 1e6)),
+        "",
+        "Radius at z = 1: 0 makes a cone, 1 a cylinder, more than 1 widens.",
+    )];
+
+    fn form(&self) -> Form {
+        Form::tapered(DAffine3::IDENTITY, self.s)
+    }
+
+    fn faults(&self) -> Vec<Fault> {
+        Checks::new(Self::FIELDS).numbers("s", &[self.s]).faults()
+    }
+
+    /// A cylinder at the origin: only a transform places it.
+    fn standing(_: DVec3, _: DVec3) -> Self {
+        Self { s: 1.0 }
+    }
+
+    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+        Vec::new()
+    }
+
+    fn turn(&mut self, _: f64) -> bool {
+        false
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        around_axis(DVec3::Z)
+    }
+}

@@ -1,0 +1,80 @@
+//! Ordered dithering to 256 colours, for pictures that do not change any more.
+//!
+//! Thomas Knoll's pattern dithering: a few colours of the table whose mean is the wanted colour,
+//! sorted by lightness, of which the place in an ordered pattern takes one. The mean is one of linear
+//! light, as the eye mixes it.
+
+use crate::terminal::cells::Raster;
+use crate::terminal::cells::oklab::{code, linear};
+use crate::terminal::cells::palette256;
+
+/// Colours that are mixed: the cells of the pattern.
+const MIXED: usize = 4;
+/// Bayer's pattern of order 2.
+const PATTERN: [[usize; 2]; 2] = [[0, 2], [3, 1]];
+/// How much of the error so far the next colour makes good. 1 reproduces the mean best but mixes
+/// colours that are far apart, which looks coarse at the size of a cell.
+const STRENGTH: f32 = 0.5;
+
+/// A number of the table of 256 for each pixel.
+pub fn dithered(raster: &Raster) -> Vec<u8> {
+    let mut last = None;
+    let mut mixed = [0; MIXED];
+    let mut indices = Vec::with_capacity(raster.pixels.len());
+    for (at, rgb) in raster.pixels.iter().enumerate() {
+        if last != Some(*rgb) {
+            mixed = mixture(*rgb);
+            last = Some(*rgb);
+        }
+        let (x, y) = (at % raster.width, at / raster.width);
+        indices.push(mixed[PATTERN[y % 2][x % 2]]);
+    }
+    indices
+}
+
+/// Colours whose mean is about `rgb`, from dark to light.
+fn mixture(rgb: [u8; 3]) -> [u8; MIXED] {
+    let wanted = linear(rgb);
+    let mut missing = [0.0f32; 3];
+    let mut mixed = [0; MIXED];
+    for index in &mut mixed {
+        let goal = [0, 1, 2].map(|c| code(wanted[c] + STRENGTH * missing[c]));
+        *index = palette256::nearest(goal);
+        let got = linear(palette256::rgb(*index));
+        (0..3).for_each(|c| missing[c] += wanted[c] - got[c]);
+    }
+    mixed.sort_by(|a, b| palette256::lightness(*a).total_cmp(&palette256::lightness(*b)));
+    mixed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terminal::cells::Oklab;
+
+    /// The mean over the pattern is closer to a colour between two of the table than either.
+    #[test]
+    fn means_come_closer() {
+        let (mut plain, mut mixed) = (0.0, 0.0);
+        for step in 0..64u8 {
+            let rgb = [40 + 3 * step, 90 + step, 200 - 2 * step];
+            let wanted = Oklab::of(rgb);
+            let raster = Raster::from_fn(8, 8, |_| rgb);
+            let mut mean = [0.0f32; 3];
+            for index in dithered(&raster) {
+                let got = linear(palette256::rgb(index));
+                (0..3).for_each(|c| mean[c] += got[c] / 64.0);
+            }
+            mixed += Oklab::of_linear(mean).distance(wanted);
+            plain += Oklab::of(palette256::rgb(palette256::nearest(rgb))).distance(wanted);
+        }
+        assert!(mixed < 0.6 * plain, "{mixed} after {plain}");
+    }
+
+    #[test]
+    fn colours_of_the_table_stay() {
+        for index in 16..=255 {
+            assert_eq!(mixture(palette256::rgb(index)), [index; MIXED]);
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! Pictures of numbers: false colour with a scale that says which colour means what.
+//!
+//! Magnitudes use the map *inferno* (Stéfan van der Walt and Nathaniel Smith, 2015), because it
+//! goes evenly through lightness, so equal steps look equal, also without colour vision.
+
+use crate::terminal::cells::Raster;
+
+/// Which numbers the colours of a picture stand for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// At the dark end.
+    pub low: f64,
+    /// At the bright end.
+    pub high: f64,
+    /// Equal ratios instead of equal steps are equally far apart; `low` is greater than 0 then.
+    pub logarithmic: bool,
+    /// The dark end is on top: near is bright.
+    pub reversed: bool,
+}
+
+impl Scale {
+    /// Equal steps from `low` to `high`.
+    pub fn linear(low: f64, high: f64) -> Self {
+        Self { low, high, logarithmic: false, reversed: false }
+    }
+
+    /// Equal ratios around the positive ones of `values`; from 1 to 10 if there are none.
+    pub fn logarithmic(values: impl IntoIterator<Item = f64>) -> Self {
+        let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+        for value in values.into_iter().filter(|v| *v > 0.0 && v.is_finite()) {
+            low = low.min(value);
+            high = high.max(value);
+        }
+        if low > high {
+            (low, high) = (1.0, 10.0);
+        }
+        Self { low, high, logarithmic: true, reversed: false }
+    }
+
+    /// Where `value` lies, 0 dark to 1 bright; a value that is no number is dark.
+    pub fn part(&self, value: f64) -> f64 {
+        let [low, high, value] =
+            [self.low, self.high, value].map(|v| if self.logarithmic { v.ln() } else { v });
+        let part = if high > low { (value - low) / (high - low) } else { 1.0 };
+        let part = if part.is_nan() { 0.0 } else { part.clamp(0.0, 1.0) };
+        if self.reversed { 1.0 - part } else { part }
+    }
+
+    /// The number at `part` of the way from dark to bright.
+    pub fn value(&self, part: f64) -> f64 {
+        let part = if self.reversed { 1.0 - part } else { part };
+        if self.logarithmic {
+            self.low * (self.high / self.low).powf(part)
+        } else {
+            self.low + (self.high - self.low) * part
+        }
+    }
+
+    /// The colour of a value.
+    pub fn color(&self, value: f64) -> [u8; 3] {
+        magnitude(self.part(value))
+    }
+}
+
+/// The colour of a magnitude, 0 dark to 1 bright.
+pub fn magnitude(part: f64) -> [u8; 3] {
+    let color = colorous::INFERNO.eval_continuous(part.clamp(0.0, 1.0));
+    [color.r, color.g, color.b]
+}
+
+/// The colour of no difference.
+const DIFFERENCE_MIDDLE: [u8; 3] = [24, 24, 27];
+
+/// The colour of a signed difference, -1 (blue: darker) over 0 (nearly black) to 1 (orange:
+/// brighter).
+pub fn difference(part: f64) -> [u8; 3] {
+    const LESS: [u8; 3] = [96, 178, 255];
+    const MORE: [u8; 3] = [255, 152, 64];
+    let part = if part.is_nan() { 0.0 } else { part.clamp(-1.0, 1.0) };
+    let end = if part < 0.0 { LESS } else { MORE };
+    [0, 1, 2].map(|c| {
+        let (from, to) = (f64::from(DIFFERENCE_MIDDLE[c]), f64::from(end[c]));
+        (from + (to - from) * part.abs()).round() as u8
+    })
+}
+
+/// Colours for things by number: neighbours in number are far apart in hue.
+pub fn object_color(id: u32) -> [u8; 3] {
+    // Steps of the golden angle through hues never come back to where they were; lightness and
+    // strength take turns so that even close hues stay apart.
+    let hue = (f64::from(id) * 0.618_033_988_749_895).fract() * std::f64::consts::TAU;
+    let lightness = [0.74, 0.58, 0.86][id as usize % 3];
+    let chroma = [0.13, 0.15, 0.09][id as usize % 3];
+    displayable(lightness, chroma, hue)
+}
+
+/// sRGB of OKLab in polar form; chroma is lowered until it can be shown.
+fn displayable(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
+    let mut chroma = chroma;
+    loop {
+        let linear = linear_from_oklab(lightness, chroma * hue.cos(), chroma * hue.sin());
+        if chroma < 0.005 || linear.iter().all(|c| (0.0..=1.0).contains(c)) {
+            return linear.map(|c| crate::terminal::cells::oklab::code(c as f32));
+        }
+        chroma *= 0.95;
+    }
+}
+
+/// Ottosson's inverse.
+fn linear_from_oklab(l: f64, a: f64, b: f64) -> [f64; 3] {
+    let [l, m, s] = [
+        l + 0.396_337_777_4 * a + 0.215_803_757_3 * b,
+        l - 0.105_561_345_8 * a - 0.063_854_172_8 * b,
+        l - 0.089_484_177_5 * a - 1.291_485_548_0 * b,
+    ]
+    .map(|v| v * v * v);
+    [
+        4.076_741_662_1 * l - 3.307_711_591_3 * m + 0.230_969_929_2 * s,
+        -1.268_438_004_6 * l + 2.609_757_401_1 * m - 0.341_319_396_5 * s,
+        -0.004_196_086_3 * l - 0.703_418_614_7 * m + 1.707_614_701_0 * s,
+    ]
+}
+
+/// What stands for "nothing was hit".
+const NOTHING: [u8; 3] = [14, 14, 16];
+
+/// Which thing is seen, `None`: none.
+pub fn objects(width: usize, height: usize, ids: &[Option<u32>]) -> Raster {
+    Raster::from_fn(width, height, |i| ids.get(i).copied().flatten().map_or(NOTHING, object_color))
+}
+
+/// Unit normals, each component from -1..=1 to 0..=255.
+pub fn normals(width: usize, height: usize, normals: &[Option<[f32; 3]>]) -> Raster {
+    Raster::from_fn(width, height, |i| {
+        normals.get(i).copied().flatten().map_or(NOTHING, |normal| {
+            normal.map(|n| (255.0 * (0.5 * n + 0.5)).round().clamp(0.0, 255.0) as u8)
+        })
+    })
+}
+
+/// Distances, near bright, and the scale they are shown on: by ratio, from the nearest to the
+/// farthest.
+pub fn depth(width: usize, height: usize, distances: &[Option<f32>]) -> (Raster, Scale) {
+    let known = distances.iter().flatten().map(|d| f64::from(*d));
+    let scale = Scale { reversed: true, ..Scale::logarithmic(known) };
+    let raster = Raster::from_fn(width, height, |i| {
+        distances.get(i).copied().flatten().map_or(NOTHING, |d| scale.color(f64::from(d)))
+    });
+    (raster, scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terminal::cells::Oklab;
+
+    #[test]
+    fn scales_and_their_inverse() {
+        let log = Scale::logarithmic([0.0, 8.0, f64::INFINITY, 0.5, f64::NAN]);
+        assert_eq!((log.low, log.high), (0.5, 8.0));
+        for scale in [log, Scale::linear(-3.0, 9.0), Scale { reversed: true, ..log }] {
+            for step in 0..=10 {
+                let part = f64::from(step) / 10.0;
+                assert!((scale.part(scale.value(part)) - part).abs() < 1e-12, "{scale:?}");
+            }
+            assert_eq!(scale.part(f64::NAN), f64::from(u8::from(scale.reversed)));
+        }
+        assert!((log.value(0.5) - 2.0).abs() < 1e-12);
+        assert_eq!([log.part(0.1), log.part(100.0)], [0.0, 1.0]);
+        let none = Scale::logarithmic([]);
+        assert_eq!((none.low, none.high), (1.0, 10.0));
+        // All alike: something is shown.
+        assert_eq!(Scale::logarithmic([4.0]).part(4.0), 1.0);
+    }
+
+    /// Equal steps of the value are about equally large steps of lightness.
+    #[test]
+    fn magnitudes_are_even() {
+        let lightness: Vec<_> =
+            (0..=16).map(|i| Oklab::of(magnitude(f64::from(i) / 16.0)).l).collect();
+        for pair in lightness.windows(2).skip(2) {
+            let step = pair[1] - pair[0];
+            assert!((0.02..0.1).contains(&step), "{lightness:?}");
+        }
+    }
+
+    #[test]
+    fn differences_are_even_on_both_sides() {
+        assert_eq!(difference(0.0), DIFFERENCE_MIDDLE);
+        assert_eq!(difference(f64::NAN), DIFFERENCE_MIDDLE);
+        let middle = Oklab::of(DIFFERENCE_MIDDLE);
+        let [less, more] = [-1.0, 1.0].map(|part| Oklab::of(difference(part)).distance(middle));
+        assert!((less - more).abs() < 0.05, "{less} {more}");
+    }
+
+    #[test]
+    fn things_are_told_apart() {
+        // Any two of the first 12, and neighbours in number for ever.
+        let far = |a, b| Oklab::of(object_color(a)).distance(Oklab::of(object_color(b)));
+        for a in 0..12 {
+            for b in 0..a {
+                assert!(far(a, b) > 0.06, "{a} {b} {}", far(a, b));
+            }
+        }
+        for a in 0..1000 {
+            assert!(far(a, a + 1) > 0.15, "{a}");
+        }
+    }
+
+    #[test]
+    fn normals_and_depth() {
+        let raster = normals(2, 1, &[Some([1.0, 0.0, -1.0]), None]);
+        assert_eq!(raster.pixels, [[255, 128, 0], NOTHING]);
+        let (raster, scale) = depth(3, 1, &[Some(1.0), Some(4.0), None]);
+        assert_eq!((scale.low, scale.high), (1.0, 4.0));
+        assert_eq!(raster.pixels, [magnitude(1.0), magnitude(0.0), NOTHING]);
+        assert_eq!(objects(1, 1, &[None]).pixels, [NOTHING]);
+    }
+}

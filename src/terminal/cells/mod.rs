@@ -1,0 +1,223 @@
+//! Pictures as cells: colours of half cells in, glyphs and colours of terminal cells out.
+//!
+//! A cell is about twice as high as it is wide, so each shows two square pixels, one above the other.
+//! Nothing here knows a scene, a terminal or a screen's layout.
+
+mod dither;
+mod false_color;
+mod mosaic;
+mod oklab;
+mod palette16;
+mod palette256;
+mod palette_cache;
+
+pub use false_color::{Scale, depth, difference, magnitude, normals, object_color, objects};
+pub use mosaic::blocks;
+pub use oklab::Oklab;
+pub(crate) use oklab::{code, linear};
+pub use palette256::nearest as nearest_indexed;
+
+/// How many colours the terminal has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Colors {
+    /// 24 bits.
+    True,
+    /// The 256 of xterm.
+    Indexed,
+    /// The 16 of every terminal.
+    Sixteen,
+    /// None.
+    Mono,
+}
+
+impl Colors {
+    /// All of them, in the order of the action that walks them.
+    pub const ALL: [Self; 4] = [Self::True, Self::Indexed, Self::Sixteen, Self::Mono];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::True => "24-bit colour",
+            Self::Indexed => "256 colours",
+            Self::Sixteen => "16 colours",
+            Self::Mono => "no colour",
+        }
+    }
+}
+
+/// An image of square pixels, two to a cell.
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
+pub struct Raster {
+    /// Pixels in a row, one to a cell.
+    pub width: usize,
+    /// Rows of pixels, two to a row of cells.
+    pub height: usize,
+    /// sRGB, `[row][column]`, `width * height` of them.
+    pub pixels: Vec<[u8; 3]>,
+}
+
+impl Raster {
+    /// An image of `width` x `height` pixels made by `pixel(index)`, row by row.
+    pub fn from_fn(width: usize, height: usize, pixel: impl FnMut(usize) -> [u8; 3]) -> Self {
+        Self { width, height, pixels: (0..width * height).map(pixel).collect() }
+    }
+
+    fn at(&self, x: usize, y: usize) -> Option<[u8; 3]> {
+        (x < self.width && y < self.height).then(|| self.pixels[y * self.width + x])
+    }
+}
+
+/// A colour of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Ink {
+    /// What the terminal has by itself.
+    #[default]
+    Plain,
+    /// 24-bit sRGB.
+    Rgb([u8; 3]),
+    /// Number in the terminal's table of 256.
+    Indexed(u8),
+}
+
+/// What stands in one cell of the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PictureCell {
+    /// One column wide.
+    pub glyph: char,
+    /// Colour of the glyph.
+    pub fg: Ink,
+    /// Colour behind it.
+    pub bg: Ink,
+}
+
+impl PictureCell {
+    /// How the upper and the lower half look in a terminal of dark ground that follows xterm.
+    pub fn halves(&self) -> [Oklab; 2] {
+        let rgb = |ink, plain| match ink {
+            Ink::Plain => plain,
+            Ink::Rgb(rgb) => rgb,
+            Ink::Indexed(index) => palette256::rgb(index),
+        };
+        let (fg, bg) = (rgb(self.fg, PLAIN_FG), rgb(self.bg, PLAIN_BG));
+        match self.glyph {
+            '▀' => [Oklab::of(fg), Oklab::of(bg)],
+            '▄' => [Oklab::of(bg), Oklab::of(fg)],
+            glyph => [palette16::mixture(fg, bg, palette16::coverage(glyph)); 2],
+        }
+    }
+}
+
+impl PictureCell {
+    /// The colours of the upper and the lower half, if it shows two of 24 bits.
+    pub fn colors(&self) -> Option<[[u8; 3]; 2]> {
+        let halves = match self.glyph {
+            '▀' => [self.fg, self.bg],
+            '▄' => [self.bg, self.fg],
+            ' ' => [self.bg; 2],
+            '█' => [self.fg; 2],
+            _ => return None,
+        };
+        match halves {
+            [Ink::Rgb(upper), Ink::Rgb(lower)] => Some([upper, lower]),
+            _ => None,
+        }
+    }
+}
+
+impl Default for PictureCell {
+    fn default() -> Self {
+        Self { glyph: ' ', fg: Ink::Plain, bg: Ink::Plain }
+    }
+}
+
+/// What a glyph without colour is assumed to look like, and the ground behind it.
+const PLAIN_FG: [u8; 3] = [229; 3];
+const PLAIN_BG: [u8; 3] = [0; 3];
+
+/// A picture as cells.
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
+pub struct PictureCells {
+    /// Cells in a row.
+    pub columns: u16,
+    /// Rows of cells.
+    pub rows: u16,
+    /// `[row][column]`, `columns * rows` of them.
+    pub cells: Vec<PictureCell>,
+}
+
+impl PictureCells {
+    /// `raster` in a terminal of `colors`. `settled`: the picture will not change soon, so it may be
+    /// dithered where colours are few; dithering a picture that changes would make it flicker.
+    ///
+    /// The last row of cells is half empty if the raster has an odd number of rows.
+    pub fn new(raster: &Raster, colors: Colors, settled: bool) -> Self {
+        let cell = |upper: Option<[u8; 3]>, lower: Option<[u8; 3]>| match (upper, lower) {
+            (Some(upper), Some(lower)) => pair(upper, lower, colors),
+            (Some(upper), None) => half('▀', upper, colors),
+            (None, Some(lower)) => half('▄', lower, colors),
+            (None, None) => PictureCell::default(),
+        };
+        let dithered = (settled && colors == Colors::Indexed).then(|| dither::dithered(raster));
+        let rows = raster.height.div_ceil(2);
+        let mut cells = Vec::with_capacity(raster.width * rows);
+        for y in 0..rows {
+            for x in 0..raster.width {
+                let (upper, lower) = (raster.at(x, 2 * y), raster.at(x, 2 * y + 1));
+                cells.push(match &dithered {
+                    None => cell(upper, lower),
+                    Some(indices) => {
+                        let index = |y: usize| indices[y * raster.width + x];
+                        joined(
+                            Ink::Indexed(index(2 * y)),
+                            lower.map(|_| Ink::Indexed(index(2 * y + 1))),
+                        )
+                    }
+                });
+            }
+        }
+        Self { columns: raster.width as u16, rows: rows as u16, cells }
+    }
+
+    /// The cell in `column` of `row`, if there is one.
+    pub fn cell(&self, column: u16, row: u16) -> Option<&PictureCell> {
+        let inside = column < self.columns && row < self.rows;
+        inside.then(|| {
+            &self.cells[usize::from(row) * usize::from(self.columns) + usize::from(column)]
+        })
+    }
+}
+
+/// Two colours in one cell, if there is a lower one; a single colour needs no glyph.
+fn joined(upper: Ink, lower: Option<Ink>) -> PictureCell {
+    match lower {
+        Some(lower) if lower == upper => PictureCell { glyph: ' ', fg: Ink::Plain, bg: upper },
+        Some(lower) => PictureCell { glyph: '▀', fg: upper, bg: lower },
+        None => PictureCell { glyph: '▀', fg: upper, bg: Ink::Plain },
+    }
+}
+
+fn pair(upper: [u8; 3], lower: [u8; 3], colors: Colors) -> PictureCell {
+    match colors {
+        Colors::True => joined(Ink::Rgb(upper), Some(Ink::Rgb(lower))),
+        Colors::Indexed => {
+            let index = |rgb| Ink::Indexed(palette256::nearest(rgb));
+            joined(index(upper), Some(index(lower)))
+        }
+        Colors::Sixteen => palette16::pair(upper, lower),
+        Colors::Mono => palette16::pair_mono(upper, lower),
+    }
+}
+
+fn half(glyph: char, rgb: [u8; 3], colors: Colors) -> PictureCell {
+    let fg = match colors {
+        Colors::True => Ink::Rgb(rgb),
+        Colors::Indexed => Ink::Indexed(palette256::nearest(rgb)),
+        Colors::Sixteen => Ink::Indexed(palette16::nearest(rgb)),
+        Colors::Mono if Oklab::of(rgb).l < 0.5 => return PictureCell::default(),
+        Colors::Mono => Ink::Plain,
+    };
+    PictureCell { glyph, fg, bg: Ink::Plain }
+}
+
+#[cfg(test)]
+mod tests;

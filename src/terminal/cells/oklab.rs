@@ -1,0 +1,120 @@
+//! OKLab: a space in which distances are about as large as differences look.
+//!
+//! Björn Ottosson, "A perceptual color space for image processing" (2020), with the matrices for
+//! linear sRGB as he published them in 2021.
+
+use std::sync::LazyLock;
+
+/// A colour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Oklab {
+    /// Lightness, 0 black to 1 white.
+    pub l: f32,
+    /// From green (negative) to red; -0.24..=0.28 within sRGB.
+    pub a: f32,
+    /// From blue (negative) to yellow; -0.32..=0.2 within sRGB.
+    pub b: f32,
+}
+
+/// Linear light, 0..=1, of 8-bit sRGB codes (IEC 61966-2-1).
+static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
+    std::array::from_fn(|code| {
+        let v = code as f64 / 255.0;
+        (if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }) as f32
+    })
+});
+
+/// Linear light, 0..=1, of 8-bit sRGB.
+pub(crate) fn linear(rgb: [u8; 3]) -> [f32; 3] {
+    let table = &*LINEAR;
+    rgb.map(|code| table[usize::from(code)])
+}
+
+/// The 8-bit sRGB code whose linear light is nearest; `linear` is clamped to 0..=1.
+pub(crate) fn code(linear: f32) -> u8 {
+    let table = &*LINEAR;
+    let above = table.partition_point(|l| *l < linear).min(255);
+    let below = above.saturating_sub(1);
+    if linear - table[below] < table[above] - linear { below as u8 } else { above as u8 }
+}
+
+impl Oklab {
+    /// Of 8-bit sRGB.
+    pub fn of(rgb: [u8; 3]) -> Self {
+        Self::of_linear(linear(rgb))
+    }
+
+    /// Of linear sRGB, usually 0..=1.
+    pub fn of_linear([r, g, b]: [f32; 3]) -> Self {
+        let l = (0.412_221_47 * r + 0.536_332_54 * g + 0.051_445_993 * b).cbrt();
+        let m = (0.211_903_5 * r + 0.680_699_5 * g + 0.107_396_96 * b).cbrt();
+        let s = (0.088_302_46 * r + 0.281_718_84 * g + 0.629_978_7 * b).cbrt();
+        Self {
+            l: 0.210_454_26 * l + 0.793_617_8 * m - 0.004_072_047 * s,
+            a: 1.977_998_5 * l - 2.428_592_2 * m + 0.450_593_7 * s,
+            b: 0.025_904_037 * l + 0.782_771_77 * m - 0.808_675_77 * s,
+        }
+    }
+
+    /// How different two colours look; black and white are 1 apart, 0.02 is just seen side by side.
+    pub fn distance(self, other: Self) -> f32 {
+        self.distance_squared(other).sqrt()
+    }
+
+    pub(crate) fn distance_squared(self, other: Self) -> f32 {
+        let (l, a, b) = (self.l - other.l, self.a - other.a, self.b - other.b);
+        l * l + a * a + b * b
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(got: Oklab, [l, a, b]: [f32; 3], tolerance: f32) {
+        let worst = (got.l - l).abs().max((got.a - a).abs()).max((got.b - b).abs());
+        assert!(worst < tolerance, "{got:?}, not {:?}", [l, a, b]);
+    }
+
+    /// The table of XYZ and OKLab pairs in the publication, rounded there to three places.
+    #[test]
+    fn published_pairs() {
+        // Linear sRGB from CIE XYZ at D65 (IEC 61966-2-1).
+        let from_xyz = |[x, y, z]: [f32; 3]| {
+            [
+                3.240_625_5 * x - 1.537_208 * y - 0.498_628_6 * z,
+                -0.968_930_7 * x + 1.875_756_1 * y + 0.041_517_524 * z,
+                0.055_710_12 * x - 0.204_021_05 * y + 1.056_995_9 * z,
+            ]
+        };
+        for (xyz, lab) in [
+            ([0.950, 1.000, 1.089], [1.000, 0.000, 0.000]),
+            ([1.000, 0.000, 0.000], [0.450, 1.236, -0.019]),
+            ([0.000, 1.000, 0.000], [0.922, -0.671, 0.263]),
+            ([0.000, 0.000, 1.000], [0.153, -1.415, -0.449]),
+        ] {
+            near(Oklab::of_linear(from_xyz(xyz)), lab, 2e-3);
+        }
+    }
+
+    /// The primaries as CSS Color 4 and its test suite have them.
+    #[test]
+    fn primaries() {
+        near(Oklab::of([255, 255, 255]), [1.0, 0.0, 0.0], 1e-4);
+        near(Oklab::of([0, 0, 0]), [0.0, 0.0, 0.0], 1e-6);
+        near(Oklab::of([255, 0, 0]), [0.627_96, 0.224_86, 0.125_85], 1e-4);
+        near(Oklab::of([0, 255, 0]), [0.866_44, -0.233_89, 0.179_5], 1e-4);
+        near(Oklab::of([0, 0, 255]), [0.452_01, -0.032_46, -0.311_53], 1e-4);
+    }
+
+    #[test]
+    fn codes_and_linear_light_are_each_others_inverse() {
+        for c in 0..=255u8 {
+            assert_eq!(code(linear([c; 3])[0]), c);
+        }
+        assert_eq!([code(-1.0), code(2.0), code(f32::NAN)], [0, 255, 0]);
+        // The border between two codes lies in the middle.
+        let [low, high] = [100, 101].map(|c| linear([c; 3])[0]);
+        assert_eq!([code(0.51 * low + 0.49 * high), code(0.49 * low + 0.51 * high)], [100, 101]);
+    }
+}

@@ -1,0 +1,166 @@
+//! Few colours or none: the density of glyphs carries what colours cannot.
+
+use crate::terminal::cells::oklab::{Oklab, code, linear};
+use crate::terminal::cells::palette_cache::Choices;
+use crate::terminal::cells::{Ink, PLAIN_BG, PLAIN_FG, PictureCell, palette256};
+use std::sync::LazyLock;
+
+/// Glyphs and how much of their cell they cover. Shades are what their names say; the others were
+/// measured in DejaVu Sans Mono.
+const COVERAGE: [(char, f32); 9] = [
+    (' ', 0.0),
+    ('.', 0.025),
+    (':', 0.05),
+    ('+', 0.11),
+    ('%', 0.18),
+    ('░', 0.25),
+    ('▒', 0.5),
+    ('▓', 0.75),
+    ('█', 1.0),
+];
+/// Glyphs for mixtures of two colours.
+const SHADES: [char; 3] = ['░', '▒', '▓'];
+/// Colours that others are mixed with: black, greys and white, which keep the hue.
+const NEUTRAL: [u8; 4] = [0, 7, 8, 15];
+/// By how much two half blocks must be nearer than one shade before they are taken: a picture that
+/// changes should not flicker between them.
+const HALVES_GAIN: f32 = 0.05;
+
+/// How much of its cell a glyph covers, 0..=1; half blocks are not asked for.
+pub fn coverage(glyph: char) -> f32 {
+    COVERAGE.iter().find(|(known, _)| *known == glyph).map_or(0.5, |(_, part)| *part)
+}
+
+/// How a cell looks of which the part `coverage` is `fg` and the rest `bg`.
+pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
+    let (fg, bg) = (linear(fg), linear(bg));
+    Oklab::of_linear([0, 1, 2].map(|c| coverage * fg[c] + (1.0 - coverage) * bg[c]))
+}
+
+/// The 16 colours, and shades of pairs of them.
+static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
+    let mixed = NEUTRAL.into_iter().flat_map(|bg| (0..16).map(move |fg| (fg, bg)));
+    let mixed = mixed.filter(|(fg, bg)| fg != bg).flat_map(|(fg, bg)| {
+        SHADES.map(|glyph| PictureCell { glyph, fg: Ink::Indexed(fg), bg: Ink::Indexed(bg) })
+    });
+    (0..16).map(flat).chain(mixed).collect()
+});
+
+/// What [`CELLS`] look like.
+static SHADED: LazyLock<Choices> = LazyLock::new(|| {
+    let look = |cell: &PictureCell| match (cell.fg, cell.bg) {
+        (Ink::Indexed(fg), Ink::Indexed(bg)) => {
+            mixture(palette256::rgb(fg), palette256::rgb(bg), coverage(cell.glyph))
+        }
+        (_, Ink::Indexed(bg)) => Oklab::of(palette256::rgb(bg)),
+        _ => Oklab::of(PLAIN_BG),
+    };
+    Choices::new(CELLS.iter().map(look).collect())
+});
+
+/// What the 16 colours look like.
+static BARE: LazyLock<Choices> = LazyLock::new(|| {
+    Choices::new((0..16).map(|index| Oklab::of(palette256::rgb(index))).collect())
+});
+
+fn flat(index: u8) -> PictureCell {
+    PictureCell { glyph: ' ', fg: Ink::Plain, bg: Ink::Indexed(index) }
+}
+
+/// The nearest of the 16 colours.
+pub fn nearest(rgb: [u8; 3]) -> u8 {
+    BARE.nearest(rgb) as u8
+}
+
+/// Two halves in 16 colours: one shade of two colours for both, or a colour for each.
+pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
+    let wanted = [upper, lower].map(Oklab::of);
+    let [a, b] = [upper, lower].map(linear);
+    let shade = SHADED.nearest([0, 1, 2].map(|c| code(0.5 * (a[c] + b[c]))));
+    // Halves that look alike are never better apart.
+    if wanted[0].distance(wanted[1]) < HALVES_GAIN {
+        return CELLS[shade];
+    }
+    let [top, bottom] = [upper, lower].map(nearest);
+    let error = |looks: [Oklab; 2]| wanted[0].distance(looks[0]) + wanted[1].distance(looks[1]);
+    let of_halves = error([top, bottom].map(|index| BARE.look(index.into())));
+    if top != bottom && of_halves + HALVES_GAIN < error([SHADED.look(shade); 2]) {
+        return PictureCell { glyph: '▀', fg: Ink::Indexed(top), bg: Ink::Indexed(bottom) };
+    }
+    CELLS[shade]
+}
+
+/// Two halves without colours, by lightness.
+pub fn pair_mono(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
+    static LIGHTNESS: LazyLock<Vec<(char, f32)>> = LazyLock::new(|| {
+        COVERAGE.map(|(glyph, part)| (glyph, mixture(PLAIN_FG, PLAIN_BG, part).l)).to_vec()
+    });
+    let [top, bottom] = [upper, lower].map(|rgb| Oklab::of(rgb).l);
+    let wanted = mixture(upper, lower, 0.5).l;
+    let (glyph, look) = LIGHTNESS
+        .iter()
+        .min_by(|a, b| (a.1 - wanted).abs().total_cmp(&(b.1 - wanted).abs()))
+        .copied()
+        .unwrap_or((' ', 0.0));
+    let of_shade = (top - look).abs() + (bottom - look).abs();
+    let white = LIGHTNESS.last().map_or(1.0, |(_, l)| *l);
+    let halves = |glyph, light: f32, dark: f32| {
+        let error = (light - white).abs() + dark;
+        (error + HALVES_GAIN < of_shade).then_some(glyph)
+    };
+    let glyph = if top > bottom { halves('▀', top, bottom) } else { halves('▄', bottom, top) }
+        .unwrap_or(glyph);
+    PictureCell { glyph, fg: Ink::Plain, bg: Ink::Plain }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lightness_without_colours_rises_with_density() {
+        let mut last = 0.0;
+        for code in 0..=255u8 {
+            let cell = pair_mono([code; 3], [code; 3]);
+            assert_eq!((cell.fg, cell.bg), (Ink::Plain, Ink::Plain));
+            assert!(coverage(cell.glyph) >= last, "{code}: {}", cell.glyph);
+            last = coverage(cell.glyph);
+        }
+        assert_eq!(last, 1.0);
+        assert_eq!(pair_mono([0; 3], [0; 3]).glyph, ' ');
+        // An edge between light and dark keeps its place within the cell.
+        assert_eq!(pair_mono([255; 3], [0; 3]).glyph, '▀');
+        assert_eq!(pair_mono([0; 3], [255; 3]).glyph, '▄');
+    }
+
+    #[test]
+    fn sixteen_colours_keep_hues_and_edges() {
+        let flat = |rgb| pair(rgb, rgb);
+        assert_eq!(flat([255, 0, 0]), super::flat(9));
+        assert_eq!(flat([0, 0, 0]), super::flat(0));
+        // A dark red is red with black, a light one red with white.
+        for (rgb, neutral) in [([110, 0, 0], 0), ([255, 150, 140], 15)] {
+            let PictureCell { glyph, fg: Ink::Indexed(fg), bg: Ink::Indexed(bg) } = flat(rgb)
+            else {
+                panic!("{rgb:?}");
+            };
+            assert!(SHADES.contains(&glyph) && [1, 9].contains(&fg), "{rgb:?} {fg}");
+            assert!(bg == neutral || bg == 7, "{rgb:?} {bg}");
+        }
+        let edge = pair([255, 255, 255], [0, 0, 238]);
+        assert_eq!(edge, PictureCell { glyph: '▀', fg: Ink::Indexed(15), bg: Ink::Indexed(4) });
+    }
+
+    /// Shades bring the picture much closer than the bare 16 colours.
+    #[test]
+    fn shades_pay() {
+        let (mut bare, mut shaded) = (0.0, 0.0);
+        for i in 0..512usize {
+            let rgb = [i / 64, i / 8 % 8, i % 8].map(|c| (c * 36) as u8);
+            let wanted = Oklab::of(rgb);
+            bare += Oklab::of(palette256::rgb(nearest(rgb))).distance(wanted);
+            shaded += pair(rgb, rgb).halves()[0].distance(wanted);
+        }
+        assert!(shaded < 0.6 * bare, "{shaded} of {bare}");
+    }
+}

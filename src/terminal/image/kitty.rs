@@ -1,0 +1,156 @@
+//! Kitty's graphics protocol (sw.kovidgoyal.net/kitty/graphics-protocol): a PNG in pieces.
+
+use crate::terminal::Area;
+use crate::terminal::image::transfer::Transfer;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+/// Letters of a piece. The protocol allows 4096; fewer, so that a piece fits into every budget. Of all
+/// but the last a multiple of 4.
+const PIECE: usize = 1024;
+
+/// The image's number: small, so that a colour of the table of 256 can tell it.
+pub const IMAGE: u8 = 163;
+
+/// The character for a part of an image among text.
+const PLACEHOLDER: char = '\u{10eeee}';
+
+/// Marks that number the rows of placeholders: first and last of each run of the protocol's table.
+const MARKS: [[u32; 2]; 29] = [
+    [0x305, 0x305],
+    [0x30d, 0x30e],
+    [0x310, 0x310],
+    [0x312, 0x312],
+    [0x33d, 0x33f],
+    [0x346, 0x346],
+    [0x34a, 0x34c],
+    [0x350, 0x352],
+    [0x357, 0x357],
+    [0x35b, 0x35b],
+    [0x363, 0x36f],
+    [0x483, 0x487],
+    [0x592, 0x595],
+    [0x597, 0x599],
+    [0x59c, 0x5a1],
+    [0x5a8, 0x5a9],
+    [0x5ab, 0x5ac],
+    [0x5af, 0x5af],
+    [0x5c4, 0x5c4],
+    [0x610, 0x617],
+    [0x657, 0x65b],
+    [0x65d, 0x65e],
+    [0x6d6, 0x6dc],
+    [0x6df, 0x6e2],
+    [0x6e4, 0x6e4],
+    [0x6e7, 0x6e8],
+    [0x6eb, 0x6ec],
+    [0x730, 0x730],
+    [0x732, 0x733],
+];
+
+/// The most rows that placeholders can tell.
+pub fn most_rows() -> u16 {
+    MARKS.iter().map(|[first, last]| (last - first + 1) as u16).sum()
+}
+
+/// What stands in each cell of a row of the image: its number, and with it that columns go on from the
+/// left.
+pub fn placeholder(row: u16) -> String {
+    let mark = MARKS.iter().flat_map(|[first, last]| *first..=*last).nth(usize::from(row));
+    [Some(PLACEHOLDER), mark.and_then(char::from_u32)].into_iter().flatten().collect()
+}
+
+/// What shows `png` at `place`, pixel by pixel or stretched to its cells. `through_tmux`: wrapped so that
+/// it reaches the terminal behind, which then shows it where there are placeholders.
+pub fn transfer(png: &[u8], place: Area, stretched: bool, through_tmux: bool) -> Transfer {
+    let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
+    let letters = STANDARD.encode(png);
+    let remove = format!("\x1b_Ga=d,d=I,i={IMAGE},q=2\x1b\\");
+    // An image whose pieces have not all come is given up: the last one makes it a broken one.
+    let give_up = "\x1b_Gm=0,q=2;\x1b\\".to_string();
+    let remove = [give_up, remove].map(wrap).concat().into_bytes();
+    let mut transfer = Transfer { remove, ..Transfer::default() };
+    let Area { x, y, width, height } = place;
+    // It appears where the cursor is when its last piece has come.
+    let go = match through_tmux {
+        true => String::new(),
+        false => format!("\x1b[{};{}H", y + 1, x + 1),
+    };
+    let mut how = if through_tmux { "U=1" } else { "C=1" }.to_string();
+    if stretched || through_tmux {
+        how += &format!(",c={width},r={height}");
+    }
+    let count = letters.len().div_ceil(PIECE);
+    for at in 0..count {
+        let piece = &letters[at * PIECE..letters.len().min((at + 1) * PIECE)];
+        let first = match at {
+            0 => format!("a=T,f=100,i={IMAGE},{how},"),
+            _ => String::new(),
+        };
+        let more = u8::from(at + 1 < count);
+        let go = if at == 0 || more == 0 { &*go } else { "" };
+        let piece = wrap(format!("\x1b_G{first}q=2,m={more};{piece}\x1b\\"));
+        transfer.add(format!("{go}{piece}").as_bytes());
+    }
+    transfer
+}
+
+/// Through tmux to the terminal behind it.
+fn wrapped(sequence: &str) -> String {
+    format!("\x1bPtmux;{}\x1b\\", sequence.replace('\x1b', "\x1b\x1b"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terminal::Decoder;
+    use std::time::Duration;
+
+    const PLACE: Area = Area { x: 3, y: 1, width: 40, height: 12 };
+
+    #[test]
+    fn pieces_carry_the_whole_file() {
+        for length in [1, 767, 768, 769, 5000] {
+            let png: Vec<u8> = (0..length).map(|i| (i % 251) as u8).collect();
+            for (stretched, tmux) in [(false, false), (true, false), (false, true)] {
+                let transfer = transfer(&png, PLACE, stretched, tmux);
+                let text = String::from_utf8(transfer.bytes.clone()).unwrap();
+                let plain = text.replace("\x1b\x1b", "\x1b").replace("\x1bPtmux;", "");
+                let pieces: Vec<_> = plain.split("\x1b_G").skip(1).collect();
+                let parts = pieces.iter().map(|piece| {
+                    let (keys, letters) = piece.split_once(';').unwrap();
+                    assert!(keys.contains("q=2") && piece.contains("\x1b\\"));
+                    (keys, letters.split_once('\x1b').unwrap().0)
+                });
+                let (keys, letters): (Vec<_>, Vec<_>) = parts.unzip();
+                assert!(letters.iter().all(|l| l.len() <= 4096));
+                assert!(letters[..letters.len() - 1].iter().all(|l| l.len() % 4 == 0));
+                assert_eq!(STANDARD.decode(letters.concat()).unwrap(), png);
+                let open = keys.iter().filter(|keys| keys.contains("m=1")).count();
+                assert_eq!(open, keys.len() - 1);
+                assert!(keys[0].contains("a=T,f=100,i=163"));
+                assert_eq!(keys[0].contains("c=40,r=12"), stretched || tmux);
+                assert_eq!(plain.contains("\x1b[2;4H"), !tmux);
+                assert!(String::from_utf8_lossy(&transfer.remove).contains("a=d,d=I,i=163"));
+            }
+        }
+    }
+
+    #[test]
+    fn rows_of_placeholders_are_told_apart() {
+        let rows: std::collections::BTreeSet<_> = (0..most_rows()).map(placeholder).collect();
+        assert_eq!(rows.len(), usize::from(most_rows()));
+        assert!(rows.iter().all(|row| row.chars().count() == 2));
+        assert!(rows.iter().all(|row| unicode_width::UnicodeWidthStr::width(&**row) == 1));
+        assert_eq!(placeholder(0), "\u{10eeee}\u{305}");
+        assert_eq!(placeholder(11), "\u{10eeee}\u{34c}");
+    }
+
+    /// What a terminal answers although it should be quiet does no harm.
+    #[test]
+    fn answers_are_no_keys() {
+        let mut decoder = Decoder::new(Duration::from_millis(10));
+        let events = decoder.take(b"\x1b_Gi=163;EINVAL:broken\x1b\\\x1b_Gi=163;OK\x1b\\");
+        assert!(events.iter().all(|e| matches!(e, crate::terminal::Event::Reply(_))));
+    }
+}

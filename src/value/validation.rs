@@ -1,0 +1,134 @@
+//! What is wrong with a value, before anybody knows where in the file it stands.
+
+use crate::value::{Field, Range, Takes, number};
+
+/// One thing wrong in a description. The scene room adds file, line, column and object.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// The key inside the description, dotted (`center`, `shape.sphere.radius`); empty: the whole.
+    pub key: String,
+    /// What was found, as a phrase: `radius is -1`.
+    pub found: String,
+    /// What would be right, as a phrase: `a number greater than 0`.
+    pub expected: String,
+}
+
+impl Fault {
+    /// From its three parts.
+    pub fn new(key: &str, found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self { key: key.to_string(), found: found.into(), expected: expected.into() }
+    }
+
+    /// The same fault of a description that stands behind the key `outer` of another.
+    pub fn under(mut self, outer: &str) -> Self {
+        self.key =
+            if self.key.is_empty() { outer.to_string() } else { format!("{outer}.{}", self.key) };
+        self
+    }
+}
+
+/// Collects the faults of one description against its table of fields.
+#[derive(Debug)]
+pub struct Checks {
+    fields: &'static [Field],
+    faults: Vec<Fault>,
+}
+
+impl Checks {
+    /// None found yet.
+    pub fn new(fields: &'static [Field]) -> Self {
+        Self { fields, faults: Vec::new() }
+    }
+
+    /// Checks the numbers behind the key `name` against what the table says about it.
+    ///
+    /// # Panics
+    /// If the table has no such key: an error of the program, found by the first test of the kind.
+    pub fn numbers(mut self, name: &str, values: &[f64]) -> Self {
+        let field = self.fields.iter().find(|f| f.name == name);
+        let takes = field.unwrap_or_else(|| panic!("no field `{name}` in its table")).takes;
+        let each = |range: Range| values.iter().all(|x| range.holds(*x));
+        let right = match takes {
+            Takes::Number(range)
+            | Takes::Numbers(_, range)
+            | Takes::Whole(range)
+            | Takes::Wholes(_, range)
+            | Takes::Color(range) => each(range),
+            Takes::Direction => each(Range::FINITE) && values.iter().any(|x| *x != 0.0),
+            Takes::Factor => each(Range::FINITE) && values.iter().all(|x| *x != 0.0),
+            _ => true,
+        };
+        if !right {
+            self.faults.push(Fault::new(name, is(name, values), takes.to_string()));
+        }
+        self
+    }
+
+    /// As `numbers`, if there is a value.
+    pub fn maybe(self, name: &str, values: Option<&[f64]>) -> Self {
+        match values {
+            Some(values) => self.numbers(name, values),
+            None => self,
+        }
+    }
+
+    /// Checks that no number here is more than 1e12 times as large as the smallest of `sizes`:
+    /// beyond that a coordinate has no digits left for the size. Says nothing about values found
+    /// wrong above.
+    pub fn ratio(mut self, sizes: &[(&str, f64)], coordinates: &[f64]) -> Self {
+        let smallest = sizes.iter().copied().reduce(|a, b| if b.1 < a.1 { b } else { a });
+        let largest = sizes
+            .iter()
+            .map(|s| s.1)
+            .chain(coordinates.iter().map(|c| c.abs()))
+            .fold(0.0, f64::max);
+        if let Some((name, smallest)) = smallest
+            && self.faults.is_empty()
+            && largest > 1e12 * smallest
+        {
+            self.faults.push(Fault::new(
+                name,
+                format!(
+                    "{name} is {}, too small beside {} in the same shape",
+                    number(smallest),
+                    number(largest)
+                ),
+                "sizes and coordinates within a factor of 1e12 of each other",
+            ));
+        }
+        self
+    }
+
+    /// Adds `fault` if there is one.
+    pub fn and(mut self, fault: Option<Fault>) -> Self {
+        self.faults.extend(fault);
+        self
+    }
+
+    /// Adds the faults of a description behind the key `outer`.
+    pub fn inner(mut self, outer: &str, faults: Vec<Fault>) -> Self {
+        self.faults.extend(faults.into_iter().map(|f| f.under(outer)));
+        self
+    }
+
+    /// Whether none was found so far.
+    pub fn clean(&self) -> bool {
+        self.faults.is_empty()
+    }
+
+    /// What was found.
+    pub fn faults(self) -> Vec<Fault> {
+        self.faults
+    }
+}
+
+/// `radius is -1`, `center is [NaN, 0, 0]`.
+fn is(name: &str, values: &[f64]) -> String {
+    match values {
+        [x] => format!("{name} is {}", number(*x)),
+        many => {
+            let list: Vec<_> = many.iter().map(|x| number(*x)).collect();
+            format!("{name} is [{}]", list.join(", "))
+        }
+    }
+}

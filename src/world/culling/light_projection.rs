@@ -1,0 +1,261 @@
+//! How a light sees things: from a point among them or before them, or from far away.
+
+use crate::bvh::Ray;
+use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::primitive::{Ball, Towards};
+use glam::{DVec2, DVec3};
+use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
+
+/// A window reaches no farther to the sides than so many times its distance.
+const WIDEST: f64 = 3.0;
+
+/// Where the light sees a point: on a face, at two coordinates from 0 to 1.
+pub(crate) enum Chart<S> {
+    /// From a point among the things, on six faces of a cube around it.
+    Cube,
+    /// From a point before the things, in a window in front of them; the third axis leads through it.
+    Window { axes: [[S; 3]; 3], low: [S; 2], scale: [S; 2] },
+    /// From far away, along two axes.
+    Far { axes: [[S; 3]; 2], low: [S; 2], scale: [S; 2] },
+}
+
+impl<S: Real> Chart<S> {
+    /// How many faces it has.
+    pub fn faces(&self) -> usize {
+        if matches!(self, Self::Cube) { 6 } else { 1 }
+    }
+
+    /// In which cell the light sees where rays begin, and at which depth. What is seen nowhere gets some
+    /// cell.
+    #[inline(always)]
+    pub fn place<L: Lanes<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
+        let side = L::of(side as f64);
+        // A number below 2^22 plus this has no fraction bits left in single precision; in double one
+        // below 2^51.
+        let rounder = L::of(1.5 / L::EPSILON);
+        let half = L::of(0.5);
+        let number = |x: L| {
+            let x = x.mul_add(side, -half).max(L::zero()).min(side - L::one());
+            (x + rounder) - rounder
+        };
+        let d = -ray.direction;
+        match self {
+            Self::Cube => {
+                let size = V3::new(d.x.abs(), d.y.abs(), d.z.abs());
+                let x = size.x.ge(size.y) & size.x.ge(size.z);
+                let y = size.y.ge(size.z).and_not(x);
+                let pick = |of_x, of_y, of_z| L::select(x, of_x, L::select(y, of_y, of_z));
+                let major = pick(d.x, d.y, d.z);
+                let scale = half / major.abs();
+                let (u, v) = (pick(d.y, d.z, d.x), pick(d.z, d.x, d.y));
+                let face =
+                    pick(L::zero(), L::of(2.0), L::of(4.0)) + L::one().only(major.lt(L::zero()));
+                let (u, v) = (number(u.mul_add(scale, half)), number(v.mul_add(scale, half)));
+                (face.mul_add(side, v).mul_add(side, u), limit)
+            }
+            Self::Window { axes, low, scale } => {
+                let [a, b, c] = axes.map(|axis| d.dot(V3::splat(axis)));
+                let inverse = L::one() / c;
+                let along = |x: L, i: usize| {
+                    number(x.mul_add(inverse, -L::splat(low[i])) * L::splat(scale[i]))
+                };
+                (along(b, 1).mul_add(side, along(a, 0)), limit)
+            }
+            Self::Far { axes, low, scale } => {
+                let along = |i: usize| {
+                    let x = ray.origin.dot(V3::splat(axes[i]));
+                    number((x - L::splat(low[i])) * L::splat(scale[i]))
+                };
+                (along(1).mul_add(side, along(0)), -ray.origin.dot(ray.direction))
+            }
+        }
+    }
+}
+
+/// Where a ball is seen: on a face, between two corners with coordinates from 0 to 1.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    face: usize,
+    low: DVec2,
+    high: DVec2,
+}
+
+impl Place {
+    /// The cells that it reaches into.
+    pub fn cells(&self, side: usize) -> impl Iterator<Item = usize> + use<> {
+        // The conversion to integers saturates.
+        let cell = |x: f64| ((x * side as f64) as usize).min(side - 1);
+        let span = |low: f64, high: f64| -> Range<usize> { cell(low)..cell(high) + 1 };
+        let (columns, rows) = (span(self.low.x, self.high.x), span(self.low.y, self.high.y));
+        let first = self.face * side * side;
+        rows.flat_map(move |row| columns.clone().map(move |column| first + row * side + column))
+    }
+}
+
+/// A chart and what is seen on it.
+pub(crate) struct Charted<S> {
+    /// The chart.
+    pub chart: Chart<S>,
+    /// Of each ball.
+    pub places: Vec<Vec<Place>>,
+    /// So many cells are good in a row.
+    pub side: usize,
+}
+
+impl<S: Real> Charted<S> {
+    /// Of balls, whose places are relative to a light that stands somewhere.
+    pub fn new(towards: &Towards, balls: &[Ball]) -> Self {
+        let (chart, places) = match towards {
+            Towards::Direction(direction) => far(*direction, balls),
+            Towards::Point(_) => window(balls).unwrap_or_else(|| cube(balls)),
+        };
+        let finest = if matches!(chart, Chart::Cube) { 2.0 } else { 4.0 };
+        let side = (finest * (balls.len() as f64).sqrt()).clamp(8.0, 128.0) as usize;
+        Self { chart, places, side }
+    }
+}
+
+/// Of the directions to the points of a ball in front of a plane through the origin, the smallest and the
+/// largest x / z: `x` and `z` are its centre's. `None`: it is all behind.
+fn slopes(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
+    let distance = x.hypot(z);
+    if distance <= radius {
+        return Some((f64::NEG_INFINITY, f64::INFINITY));
+    }
+    let (middle, spread) = (x.atan2(z), (radius / distance).asin());
+    let (low, high) = (middle - spread, middle + spread);
+    let slope = |angle: f64| {
+        if angle.abs() < FRAC_PI_2 { angle.tan() } else { f64::INFINITY.copysign(angle) }
+    };
+    (low < FRAC_PI_2 && high > -FRAC_PI_2).then(|| (slope(low), slope(high)))
+}
+
+/// Balls around a light.
+fn cube<S: Real>(balls: &[Ball]) -> (Chart<S>, Vec<Vec<Place>>) {
+    let on = |ball: &Ball, face: usize| {
+        let axis = |i: usize| ball.center[(face / 2 + i) % 3];
+        let z = if face.is_multiple_of(2) { axis(0) } else { -axis(0) };
+        let (x, y) = (slopes(axis(1), z, ball.radius)?, slopes(axis(2), z, ball.radius)?);
+        let (low, high) = (DVec2::new(x.0, y.0), DVec2::new(x.1, y.1));
+        let half = |v: DVec2| 0.5 * v.clamp(DVec2::NEG_ONE, DVec2::ONE) + 0.5;
+        let is_seen = low.max_element() <= 1.0 && high.min_element() >= -1.0;
+        is_seen.then(|| Place { face, low: half(low), high: half(high) })
+    };
+    let places = |ball: &Ball| (0..6).filter_map(|face| on(ball, face)).collect();
+    (Chart::Cube, balls.iter().map(places).collect())
+}
+
+/// Balls on one side of a light; `None`: they are not.
+fn window<S: Real>(balls: &[Ball]) -> Option<(Chart<S>, Vec<Vec<Place>>)> {
+    let forward = balls.iter().map(|b| b.center).sum::<DVec3>().try_normalize()?;
+    let (right, up) = forward.any_orthonormal_pair();
+    let axes = [right, up, forward];
+    let seen = |ball: &Ball| {
+        let [x, y, z] = axes.map(|axis| ball.center.dot(axis));
+        let (x, y) = (slopes(x, z, ball.radius)?, slopes(y, z, ball.radius)?);
+        let seen = (DVec2::new(x.0, y.0), DVec2::new(x.1, y.1));
+        let widest = seen.0.abs().max(seen.1.abs()).max_element();
+        (z > ball.radius && widest <= WIDEST).then_some(seen)
+    };
+    let seen: Vec<_> = balls.iter().map(seen).collect::<Option<_>>()?;
+    let (low, scale, places) = fitted(&seen);
+    let axes = axes.map(|axis| axis.to_array().map(S::of));
+    Some((Chart::Window { axes, low, scale }, places))
+}
+
+/// Balls seen against `direction`.
+fn far<S: Real>(direction: DVec3, balls: &[Ball]) -> (Chart<S>, Vec<Vec<Place>>) {
+    let (right, up) = direction.any_orthonormal_pair();
+    let seen = |ball: &Ball| {
+        let at = DVec2::new(ball.center.dot(right), ball.center.dot(up));
+        (at - ball.radius, at + ball.radius)
+    };
+    let seen: Vec<_> = balls.iter().map(seen).collect();
+    let (low, scale, places) = fitted(&seen);
+    let axes = [right, up].map(|axis| axis.to_array().map(S::of));
+    (Chart::Far { axes, low, scale }, places)
+}
+
+/// What has to be taken from coordinates and what they are multiplied with so that all that is seen, between
+/// two corners each, lies from 0 to 1; and where it lies then.
+fn fitted<S: Real>(seen: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<Place>>) {
+    let low = seen.iter().map(|s| s.0).fold(DVec2::INFINITY, DVec2::min);
+    let high = seen.iter().map(|s| s.1).fold(DVec2::NEG_INFINITY, DVec2::max);
+    let scale = (high - low).recip();
+    let at = |v: DVec2| (v - low) * scale;
+    let place = |s: &(DVec2, DVec2)| vec![Place { face: 0, low: at(s.0), high: at(s.1) }];
+    let reals = |v: DVec2| v.to_array().map(S::of);
+    (reals(low), reals(scale), seen.iter().map(place).collect())
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::lanes::{Double, Single};
+
+    pub struct Random(pub u64);
+
+    impl Random {
+        pub fn unit(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (self.0 >> 40) as f64 / 16_777_216.0
+        }
+
+        pub fn point(&mut self, half: f64) -> DVec3 {
+            DVec3::from([0; 3].map(|_| half * (2.0 * self.unit() - 1.0)))
+        }
+    }
+
+    fn points_are_in_the_cells_of_their_ball<L: Lanes>(slack: f64) {
+        let mut random = Random(2);
+        let side = 64;
+        for round in 0..600 {
+            let away = [DVec3::ZERO, DVec3::new(30.0, -9.0, 4.0), DVec3::Y * 20.0][round % 3];
+            let center = random.point(5.0) + away;
+            let ball = Ball { center, radius: 0.2 + 2.0 * random.unit() };
+            // With another one, so that the ball is not all of the chart.
+            let balls = [ball, Ball { center: center + DVec3::new(0.5, 1.0, 0.7), radius: 0.1 }];
+            let (chart, places) = match round / 3 % 3 {
+                0 => cube::<L::Scalar>(&balls),
+                1 => match window(&balls) {
+                    Some(window) => window,
+                    None => continue,
+                },
+                _ => far(random.point(1.0).normalize(), &balls),
+            };
+            let cells: Vec<usize> = places[0].iter().flat_map(|place| place.cells(side)).collect();
+            for _ in 0..100 {
+                // On an axis and on a diagonal, too.
+                let to =
+                    [random.point(1.0), DVec3::X, DVec3::ONE, DVec3::NEG_Z][round % 4].normalize();
+                let point = center + to * ball.radius * (1.0 - slack);
+                let origin = V3::of(point.to_array());
+                let direction = V3::of((-point.normalize()).to_array());
+                let (cell, _) = chart.place(&Ray { origin, direction }, L::one(), side);
+                let cell = cell.lane(0).to_f64();
+                assert!(cells.contains(&(cell as usize)), "{round}: {ball:?}, {point}: {cell}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_light_sees_points_of_a_ball_where_it_sees_the_ball() {
+        points_are_in_the_cells_of_their_ball::<Double>(1e-9);
+        points_are_in_the_cells_of_their_ball::<Single>(1e-4);
+    }
+
+    /// Directions along which charts divide by zero get some cell.
+    #[test]
+    fn every_direction_has_a_cell() {
+        let balls = [Ball { center: DVec3::NEG_Y * 5.0, radius: 1.0 }];
+        let (window, _) = window::<f32>(&balls).expect("it is on one side");
+        for chart in [cube(&balls).0, window, far(DVec3::Y, &balls).0] {
+            for to in [[1.0, 0.0, 0.0], [0.0, 1.0, -0.0], [-0.0, 0.0, -1.0], [f64::NAN; 3]] {
+                let ray = Ray { origin: V3::of(to), direction: V3::<Single>::of(to) };
+                let cell = chart.place(&ray, Single::one(), 8).0.as_array()[0];
+                assert!(cell >= 0.0 && cell < (chart.faces() * 64) as f32, "{to:?}: {cell}");
+            }
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! What paths are inside of: transparent solids, several of which may hold one point.
+//!
+//! Where solids overlap, the one that the scene lists last fills the common space; the surfaces of the
+//! others are not there. So a bubble is listed after its ball, and water may reach a little into the wall
+//! of the glass that is listed after it. Light that leaves the last solid is outside, where the index of
+//! refraction is 1.
+
+use crate::bvh::Ray;
+use crate::lanes::{Lanes, Mask, Real};
+use crate::material::Finish;
+use crate::primitive::{Form, Geometry, Source};
+use crate::world::integrator::coincident_surfaces::Contacts;
+use crate::world::integrator::opaque::{Met, first_tag};
+use glam::DVec3;
+
+/// So many solids around one point are told apart; of more, those that are listed last.
+const NESTED: usize = 4;
+
+/// The solids that paths are inside, by rank: 0 is none; of two the one with the higher rank fills the
+/// space. From the highest down.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Inside<L> {
+    ranks: [L; NESTED],
+}
+
+impl<L: Lanes> Inside<L> {
+    /// Outside of everything.
+    #[inline(always)]
+    pub fn nothing() -> Self {
+        Self { ranks: [L::zero(); NESTED] }
+    }
+
+    /// Rank of the solid that fills the space.
+    #[inline(always)]
+    fn top(&self) -> L {
+        self.ranks[0]
+    }
+
+    /// Whether they are inside of `rank`.
+    pub fn holds(&self, rank: L) -> L::Mask {
+        self.ranks.iter().fold(L::mask(false), |found, of| found | equal(*of, rank))
+    }
+
+    /// Outside of `rank`.
+    #[inline(always)]
+    fn without(&self, rank: L) -> Self {
+        let mut out = *self;
+        let mut found = L::mask(false);
+        for (i, of) in self.ranks.iter().enumerate() {
+            found = found | equal(*of, rank);
+            let next = self.ranks.get(i + 1).copied().unwrap_or(L::zero());
+            out.ranks[i] = L::select(found, next, *of);
+        }
+        out
+    }
+
+    /// Inside of `rank`, beside what holds already.
+    #[inline(always)]
+    fn with(&self, rank: L) -> Self {
+        let mut out = self.without(rank);
+        let mut rank = rank;
+        for of in &mut out.ranks {
+            let (high, low) = (of.max(rank), of.min(rank));
+            (*of, rank) = (high, low);
+        }
+        out
+    }
+
+    /// `yes` where `mask` is true, `no` elsewhere.
+    #[inline(always)]
+    pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
+        Self { ranks: std::array::from_fn(|i| L::select(mask, yes.ranks[i], no.ranks[i])) }
+    }
+}
+
+#[inline(always)]
+fn equal<L: Lanes>(a: L, b: L) -> L::Mask {
+    a.le(b) & b.le(a)
+}
+
+/// The transparent solids of a world.
+pub(crate) struct Media<L: Lanes> {
+    /// For each item of the geometry, the rank of the transparent solid that it bounds; 0: it bounds
+    /// none.
+    rank_of: Vec<u32>,
+    /// By rank, the index of refraction; that of rank 0 is 1.
+    indices: Vec<L::Scalar>,
+    /// The solids that camera rays may begin in, each alone.
+    around_eye: Vec<(u32, Geometry<L>)>,
+    /// What touches something that lets light through; `None`: nothing does.
+    pub contacts: Option<Contacts<L::Scalar>>,
+}
+
+/// Where rays meet surfaces that let light through.
+pub(crate) struct Crossing<L: Lanes> {
+    /// Lanes that do.
+    pub lanes: L::Mask,
+    /// Of these, those that meet a solid's surface from outside.
+    pub outer: L::Mask,
+    /// Those that meet an open surface, a thin pane.
+    pub pane: L::Mask,
+    /// Those that meet a surface which is not there, because another solid fills the space.
+    pub hidden: L::Mask,
+    /// Index of refraction before the surface.
+    pub n_i: L,
+    /// Index of refraction behind it; for a pane, of what it is made of.
+    pub n_t: L,
+    /// What reflected rays are inside.
+    pub before: Inside<L>,
+    /// What transmitted rays are inside.
+    pub behind: Inside<L>,
+}
+
+impl<L: Lanes> Media<L> {
+    /// `finish_of`: for each of the items that `sources` lists, its finish; `None`: nothing lets light
+    /// through. `nearest`: how far from the eye the camera's rays begin, at most. `given`: how exactly
+    /// coordinates were given.
+    pub fn new(
+        forms: &[Form],
+        sources: &[Source],
+        finish_of: &[u32],
+        finishes: &[Finish<L::Scalar>],
+        (eye, nearest): (DVec3, f64),
+        given: f64,
+    ) -> Option<Self> {
+        let through = |finish: u32| finishes[finish as usize].transmission;
+        if finishes.iter().all(|f| f.transmission.is_none()) {
+            return None;
+        }
+        let mut indices = vec![None; forms.len() + 1];
+        let rank_of = sources.iter().zip(finish_of).map(|(source, finish)| {
+            let flat =
+                matches!(forms[source.form], Form::Parallelogram { .. } | Form::Plane { .. });
+            let rank = source.form + 1;
+            match through(*finish) {
+                Some(transmission) if !flat => {
+                    // The first part of a compound that lets light through says what is inside.
+                    indices[rank].get_or_insert(transmission.index);
+                    rank as u32
+                }
+                _ => 0,
+            }
+        });
+        let rank_of: Vec<u32> = rank_of.collect();
+        let transparent: Vec<bool> = finish_of.iter().map(|f| through(*f).is_some()).collect();
+        let rounding = (L::EPSILON, given);
+        let contacts = Contacts::new(forms, sources, (&transparent, &rank_of), rounding);
+        let near = |form: &Form| {
+            form.bounds().is_none_or(|(low, high)| eye.clamp(low, high).distance(eye) <= nearest)
+        };
+        let around = |(form, index): (usize, &Option<_>)| {
+            let around = index.is_some() && near(&forms[form]);
+            around.then(|| (form as u32 + 1, Geometry::with_tree(&forms[form..=form], false)))
+        };
+        let around_eye = indices[1..].iter().enumerate().filter_map(around).collect();
+        let indices = indices.into_iter().map(|n| n.unwrap_or(L::Scalar::of(1.0))).collect();
+        Some(Self { rank_of, indices, around_eye, contacts })
+    }
+
+    /// For each item, whether paths get inside of what it bounds.
+    pub fn entered(&self) -> Vec<bool> {
+        self.rank_of.iter().map(|rank| *rank > 0).collect()
+    }
+
+    /// What rays begin inside of: the solids that they meet from inside first.
+    pub fn at_start(&self, ray: &Ray<L>) -> Inside<L> {
+        let mut inside = Inside::nothing();
+        for (rank, solid) in &self.around_eye {
+            let hit = solid.closest(ray, solid.all());
+            let mut left = hit.t.lt(L::of(L::MAX));
+            let mut within = L::mask(false);
+            while let Some((item, here)) = first_tag(hit.item, left) {
+                let normal = solid.surface(item, hit.facet, ray.at(hit.t)).normal;
+                within = within | (here & normal.dot(ray.direction).gt(L::zero()));
+                left = left.and_not(here);
+            }
+            let entered = inside.with(L::of(f64::from(*rank)));
+            inside = Inside::select(within, &entered, &inside);
+        }
+        inside
+    }
+
+    /// Index of refraction inside of what the ranks say.
+    fn index(&self, rank: L) -> L {
+        let of = |rank: L::Scalar| self.indices[rank.to_f64() as usize];
+        let first = rank.lane(0);
+        if equal(rank, L::splat(first)).all() {
+            return L::splat(of(first));
+        }
+        L::from_fn(|lane| of(rank.lane(lane)))
+    }
+
+    /// Where the rays of `lanes`, which are `inside` what they are, meet surfaces that let light through.
+    /// `index_of_pane`: what those are made of that are open.
+    pub fn cross(
+        &self,
+        met: &Met<L>,
+        lanes: L::Mask,
+        inside: &Inside<L>,
+        index_of_pane: L,
+    ) -> Crossing<L> {
+        let outer = lanes & met.front;
+        let mut rank = L::zero();
+        let mut left = lanes;
+        while let Some((item, here)) = first_tag(met.item, left) {
+            rank = L::select(here, L::of(f64::from(self.rank_of[item as usize])), rank);
+            left = left.and_not(here);
+        }
+        let solid = rank.gt(L::zero());
+        let (outside, within) = (inside.without(rank), inside.with(rank));
+        let pick = |yes, no| Inside::select(solid, &Inside::select(outer, yes, no), inside);
+        let (before, behind) = (pick(&outside, &within), pick(&within, &outside));
+        let n_i = self.index(before.top());
+        Crossing {
+            lanes,
+            outer,
+            pane: lanes.and_not(solid),
+            hidden: lanes & solid & equal(before.top(), behind.top()),
+            n_i,
+            n_t: L::select(solid, self.index(behind.top()), index_of_pane),
+            before,
+            behind,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ranks(inside: &Inside<f64>) -> [f64; NESTED] {
+        inside.ranks
+    }
+
+    #[test]
+    fn the_solid_listed_last_fills_the_space() {
+        let mut inside = Inside::<f64>::nothing();
+        for rank in [2.0, 5.0, 1.0, 5.0] {
+            inside = inside.with(rank);
+        }
+        assert_eq!(ranks(&inside), [5.0, 2.0, 1.0, 0.0]);
+        assert_eq!(ranks(&inside.without(2.0)), [5.0, 1.0, 0.0, 0.0]);
+        assert_eq!(ranks(&inside.without(3.0)), ranks(&inside));
+        assert_eq!(ranks(&inside.without(5.0).without(1.0).without(2.0)), [0.0; 4]);
+        // Of more than can be held those that are listed last.
+        let full = inside.with(3.0).with(4.0);
+        assert_eq!(ranks(&full), [5.0, 4.0, 3.0, 2.0]);
+    }
+}

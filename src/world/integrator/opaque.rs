@@ -1,0 +1,402 @@
+//! The paths: camera rays, the light that surfaces return, reflections.
+
+use crate::bvh::{Hit, Ray};
+use crate::lanes::{Lanes, Mask, V3};
+use crate::material::Spread;
+use crate::sampling::Draws;
+use crate::world::compile::World;
+use crate::world::culling::tile::Outlook;
+use crate::world::integrator::surface_textures::Patch;
+use crate::world::light_groups::MAX_GROUPS;
+use std::f64::consts::FRAC_1_PI;
+
+/// The radiance of a packet's samples, per light group, for unit white light.
+pub struct Radiance<L> {
+    /// The first [`World::groups`] are used.
+    pub groups: [V3<L>; MAX_GROUPS],
+}
+
+/// What a packet cost.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Counts {
+    /// Rays of every kind.
+    pub rays: u64,
+    /// A glossy lobe was met, or one of two rays was chosen by chance.
+    pub glossy: bool,
+}
+
+/// Where a packet's paths are.
+#[derive(Clone, Copy)]
+pub(crate) struct Path<L> {
+    pub ray: Ray<L>,
+    /// What radiance from along the ray counts.
+    pub weight: V3<L>,
+}
+
+impl<L: Lanes> Path<L> {
+    /// Weights above this saturate the film; infinity times black would be no number.
+    const HEAVIEST: f64 = (1u64 << 60) as f64;
+
+    /// `weight`, finite where mirrors amplify without end.
+    #[inline(always)]
+    pub fn bounded(weight: V3<L>) -> V3<L> {
+        let most = L::of(Self::HEAVIEST);
+        V3::new(most.min(weight.x), most.min(weight.y), most.min(weight.z))
+    }
+}
+
+/// The surfaces that a packet met.
+pub(crate) struct Met<L: Lanes> {
+    /// Normal on the viewer's side that light is computed with.
+    pub normal: V3<L>,
+    /// The surface's own, on the viewer's side: the same but on smooth meshes and bumps. Light comes from that side.
+    pub geometric: V3<L>,
+    /// Where the rays end, on the surface.
+    pub point: V3<L>,
+    /// How far from there rays start that leave the surface.
+    pub lift: L,
+    /// Lanes that met the side that the surface's own normal points to.
+    pub front: L::Mask,
+    /// Tag of the item.
+    pub item: L,
+    /// Tag of the finish.
+    finish: L,
+    /// Colour of the thing itself, which multiplies its finish's.
+    tint: V3<L>,
+    /// k_d x colour.
+    diffuse: V3<L>,
+    /// Lanes with a finish: all but those that met the back of a one-sided one.
+    finished: L::Mask,
+    /// Lanes whose finish answers lights.
+    lit: L::Mask,
+    /// Lanes whose finish has highlights.
+    shining: L::Mask,
+    /// Lanes whose finish reflects.
+    pub reflecting: L::Mask,
+}
+
+/// The first lane's tag, and the lanes of `mask` that share it; `None`: the mask is empty.
+#[inline(always)]
+pub(crate) fn first_tag<L: Lanes>(tags: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
+    let bits = mask.bits();
+    if bits == 0 {
+        return None;
+    }
+    let tag = tags.tag_lane(bits.trailing_zeros() as usize);
+    Some((tag, mask & tags.has_tag(tag)))
+}
+
+impl<L: Lanes> Met<L> {
+    /// Each finish that occurs among `lanes`, with its lanes.
+    #[inline(always)]
+    pub fn finishes(&self, lanes: L::Mask) -> impl Iterator<Item = (usize, L::Mask)> {
+        let (finish, mut left) = (self.finish, lanes);
+        std::iter::from_fn(move || {
+            let (tag, here) = first_tag(finish, left)?;
+            left = left.and_not(here);
+            Some((tag as usize, here))
+        })
+    }
+
+    /// Origin of rays that leave on the viewer's side.
+    #[inline(always)]
+    pub fn start(&self) -> V3<L> {
+        self.geometric.mul_add(self.lift, self.point)
+    }
+
+    /// Origin of rays that leave on the other side.
+    #[inline(always)]
+    pub fn beyond(&self) -> V3<L> {
+        self.geometric.mul_add(-self.lift, self.point)
+    }
+
+    /// In `lanes` there is no surface.
+    #[inline(always)]
+    pub fn leave_out(&mut self, lanes: L::Mask) {
+        self.finished = self.finished.and_not(lanes);
+        self.lit = self.lit.and_not(lanes);
+        self.shining = self.shining.and_not(lanes);
+        self.reflecting = self.reflecting.and_not(lanes);
+    }
+
+    /// No light comes to `lanes`.
+    #[inline(always)]
+    pub fn shade(&mut self, lanes: L::Mask) {
+        self.lit = self.lit.and_not(lanes);
+    }
+
+    /// What would go into the surface goes as steeply out of it.
+    #[inline(always)]
+    pub fn outward(&self, direction: V3<L>) -> V3<L> {
+        let height = direction.dot(self.geometric).min(L::zero());
+        self.geometric.mul_add(height * L::of(-2.0), direction)
+    }
+
+    /// Takes what is `other`'s in `lanes`, which have nothing yet.
+    #[inline(always)]
+    fn take(&mut self, lanes: L::Mask, other: &Self) {
+        self.normal = V3::select(lanes, other.normal, self.normal);
+        self.geometric = V3::select(lanes, other.geometric, self.geometric);
+        self.tint = V3::select(lanes, other.tint, self.tint);
+        self.point = V3::select(lanes, other.point, self.point);
+        self.lift = L::select(lanes, other.lift, self.lift);
+        self.front = self.front | other.front;
+        self.finish = L::select(lanes, other.finish, self.finish);
+        self.diffuse = V3::select(lanes, other.diffuse, self.diffuse);
+        self.finished = self.finished | other.finished;
+        self.lit = self.lit | other.lit;
+        self.shining = self.shining | other.shining;
+        self.reflecting = self.reflecting | other.reflecting;
+    }
+}
+
+impl<L: Lanes> World<L> {
+    /// Traces one packet of camera samples: `origin` and `direction` as [`crate::camera::View`] makes
+    /// them. Lanes outside `active` stay black. `outlook`: what these rays and the shadow rays from
+    /// where they end may meet, if that is known.
+    #[inline(always)]
+    pub fn trace(
+        &self,
+        (origin, direction): (V3<L>, V3<L>),
+        outlook: Option<&Outlook>,
+        draws: &Draws<'_, L>,
+        active: L::Mask,
+        out: &mut Radiance<L>,
+    ) -> Counts {
+        for group in &mut out.groups[..self.groups()] {
+            *group = V3::zero();
+        }
+        let ray = Ray { origin, direction };
+        let outlook = outlook.unwrap_or(&self.panorama);
+        if let Some(media) = &self.media {
+            self.trace_through(media, ray, outlook, draws, active, out)
+        } else if self.plain {
+            self.trace_opaque::<true>(ray, outlook, draws, active, out)
+        } else {
+            self.trace_opaque::<false>(ray, outlook, draws, active, out)
+        }
+    }
+
+    /// [`World::trace`] for a world without media. Here and below `PLAIN` says that the world is
+    /// [plain](World::plain).
+    #[inline(never)]
+    fn trace_opaque<'a, const PLAIN: bool>(
+        &'a self,
+        ray: Ray<L>,
+        mut outlook: &'a Outlook,
+        draws: &Draws<'_, L>,
+        mut active: L::Mask,
+        out: &mut Radiance<L>,
+    ) -> Counts {
+        let mut counts = Counts::default();
+        let mut path = Path { ray, weight: V3::of([1.0; 3]) };
+        let mut bounce = 0;
+        loop {
+            counts.rays += u64::from(active.bits().count_ones());
+            let hit = if PLAIN {
+                self.geometry.closest_of_listed(&path.ray, &outlook.seen, active)
+            } else {
+                self.geometry.closest_of(&path.ray, &outlook.seen, active)
+            };
+            let ended = hit.t.lt(L::of(L::MAX));
+            if let Some(group) = self.background {
+                out.groups[group] += path.weight.only(active.and_not(ended));
+            }
+            active = active & ended;
+            let Some(met) = self.meet::<PLAIN>(&path.ray, &hit, active) else { return counts };
+            self.light::<PLAIN>(&path, &met, outlook, out, &mut counts);
+            if bounce == self.depth || met.reflecting.none() {
+                return counts;
+            }
+            active = self.bounce::<PLAIN>(&mut path, &met, draws, bounce, &mut counts);
+            if active.none() {
+                return counts;
+            }
+            bounce += 1;
+            outlook = &self.panorama;
+        }
+    }
+
+    /// The surfaces where the active rays end; `None`: there are no such rays.
+    #[inline(always)]
+    pub(crate) fn meet<const PLAIN: bool>(
+        &self,
+        ray: &Ray<L>,
+        hit: &Hit<L>,
+        active: L::Mask,
+    ) -> Option<Met<L>> {
+        let (item, here) = first_tag(hit.item, active)?;
+        let others = active.and_not(here);
+        Some(if others.none() {
+            self.face::<PLAIN>(ray, hit, item, here)
+        } else {
+            self.meet_several::<PLAIN>(ray, hit, (item, here), others)
+        })
+    }
+
+    /// The surfaces of lanes that met several items.
+    #[inline(never)]
+    fn meet_several<const PLAIN: bool>(
+        &self,
+        ray: &Ray<L>,
+        hit: &Hit<L>,
+        (first, here): (u32, L::Mask),
+        mut left: L::Mask,
+    ) -> Met<L> {
+        let mut met = self.face::<PLAIN>(ray, hit, first, here);
+        while let Some((item, here)) = first_tag(hit.item, left) {
+            met.take(here, &self.face::<PLAIN>(ray, hit, item, here));
+            left = left.and_not(here);
+        }
+        met
+    }
+
+    /// The surface of one item, which the rays of `lanes` meet at `hit`.
+    #[inline(always)]
+    fn face<const PLAIN: bool>(
+        &self,
+        ray: &Ray<L>,
+        hit: &Hit<L>,
+        item: u32,
+        lanes: L::Mask,
+    ) -> Met<L> {
+        let surface = self.geometry.surface(item, hit.facet, ray.at(hit.t));
+        let front = surface.normal.dot(ray.direction).lt(L::zero());
+        let geometric = V3::select(front, surface.normal, -surface.normal);
+        let number = self.finish_of[item as usize];
+        let finish = &self.finishes[number as usize];
+        let mut normal = geometric;
+        let patch = || Patch { item, facet: hit.facet, surface, lanes };
+        if !PLAIN && self.smooth {
+            normal = self.shading_normal(&patch(), (front, geometric), ray.direction);
+        }
+        let mut tint = V3::of([1.0; 3]);
+        let mut diffuse = V3::splat(finish.diffuse);
+        if !PLAIN
+            && self.colored
+            && let Some(color) = self.own_color(&patch())
+        {
+            (tint, diffuse) = (color, diffuse.times(color));
+        }
+        let finished = if finish.two_sided { lanes } else { lanes & front };
+        let those = |having: bool| if having { finished } else { L::mask(false) };
+        Met {
+            normal,
+            geometric,
+            tint,
+            point: surface.point,
+            lift: surface.lift(),
+            front: front & lanes,
+            item: hit.item,
+            finish: L::tag(number),
+            diffuse,
+            finished,
+            lit: those(finish.wants_light),
+            shining: those(finish.shines()),
+            reflecting: those(finish.reflection.is_some()),
+        }
+    }
+
+    /// Adds what the surfaces return of ambient light and of every lamp.
+    #[inline(always)]
+    pub(crate) fn light<const PLAIN: bool>(
+        &self,
+        path: &Path<L>,
+        met: &Met<L>,
+        outlook: &Outlook,
+        out: &mut Radiance<L>,
+        counts: &mut Counts,
+    ) {
+        if let Some(group) = self.ambient {
+            for (finish, lanes) in met.finishes(met.finished) {
+                let mut ambient = V3::splat(self.finishes[finish].ambient);
+                if !PLAIN && self.colored {
+                    ambient = ambient.times(met.tint);
+                }
+                out.groups[group] += path.weight.times(ambient).only(lanes);
+            }
+        }
+        if met.lit.none() {
+            return;
+        }
+        let start = met.start();
+        for (number, (source, shading)) in self.sources.iter().zip(&outlook.shading).enumerate() {
+            let arrival = source.lamp.at(start);
+            let nl = met.normal.dot(arrival.towards);
+            let mut lit = met.lit & nl.gt(L::zero());
+            if !PLAIN && self.smooth {
+                lit = lit & met.geometric.dot(arrival.towards).gt(L::zero());
+            }
+            if lit.none() {
+                continue;
+            }
+            if self.shadows {
+                counts.rays += u64::from(lit.bits().count_ones());
+                let (direction, within) = match &source.on_surface {
+                    None => (arrival.towards, arrival.distance),
+                    Some(on) => on.end(start),
+                };
+                let ray = Ray { origin: start, direction };
+                let blocked = if PLAIN {
+                    self.geometry.blocked_by_listed(&ray, within, lit, shading)
+                } else if let Some(Some(buffer)) = self.light_buffers.get(number) {
+                    let on = (met.item, met.front);
+                    buffer.blocked(&self.geometry, &ray, on, within, lit, shading)
+                } else {
+                    self.geometry.blocked(&ray, within, lit, shading)
+                };
+                lit = lit.and_not(blocked);
+                if lit.none() {
+                    continue;
+                }
+            }
+            let mut value = met.diffuse * (nl * L::of(FRAC_1_PI));
+            for (finish, lanes) in met.finishes(met.shining & lit) {
+                let (finish, view) = (&self.finishes[finish], -path.ray.direction);
+                let nv = met.normal.dot(view);
+                let shine = finish.highlight(met.normal, view, arrival.towards, nl, nv);
+                value += shine.only(lanes);
+            }
+            let mut value = path.weight.times(value) * arrival.irradiance;
+            if let Some(strength) = source.weight {
+                value = value.times(V3::splat(strength));
+            }
+            out.groups[source.group] += value.only(lit);
+        }
+    }
+
+    /// Turns the paths into the directions of reflections; returns the lanes that go on.
+    #[inline(always)]
+    pub(crate) fn bounce<const PLAIN: bool>(
+        &self,
+        path: &mut Path<L>,
+        met: &Met<L>,
+        draws: &Draws<'_, L>,
+        bounce: u32,
+        counts: &mut Counts,
+    ) -> L::Mask {
+        let mut numbers = None;
+        let Path { ray: Ray { direction: incident, .. }, weight } = *path;
+        for (finish, lanes) in met.finishes(met.reflecting) {
+            let finish = &self.finishes[finish];
+            let Some((strength, spread)) = &finish.reflection else { continue };
+            let uv = if matches!(spread, Spread::Mirror) {
+                (L::zero(), L::zero())
+            } else {
+                counts.glossy = true;
+                *numbers.get_or_insert_with(|| draws.lobe(bounce))
+            };
+            let r = finish.reflect(*strength, spread, incident, met.normal, uv, self.fold);
+            let mut out = r.direction;
+            if !PLAIN && self.smooth {
+                out = met.outward(out);
+            }
+            path.ray.direction = V3::select(lanes, out, path.ray.direction);
+            let weight = Path::bounded(weight.times(r.weight));
+            path.weight = V3::select(lanes, weight, path.weight);
+        }
+        path.ray.origin = met.start();
+        let strongest = path.weight.max_element();
+        met.reflecting & strongest.gt(L::zero()) & strongest.ge(L::of(self.min_weight))
+    }
+}

@@ -1,0 +1,177 @@
+//! Textures and bumps on the things of a world: what materials say, laid on shapes where they stand.
+
+use crate::lanes::{Lanes, Mask, V3};
+use crate::material::{
+    Bump, Coordinates, Heights, Mapping, Material, Pattern, Placement, Projection, Projector,
+    Texture,
+};
+use crate::primitive::{Geometry, Source, Surface, facing};
+use crate::scene::Scene;
+use crate::shape::{TextureSpace, Unwrapped};
+use crate::world::compile::World;
+use glam::{DAffine3, DVec3};
+
+/// What one item wears.
+struct Skin<S> {
+    pattern: Option<(Projector<S>, Pattern<S>)>,
+    heights: Option<(Projector<S>, Heights)>,
+}
+
+/// What the items of a world wear.
+pub(crate) struct Skins<L: Lanes> {
+    of_item: Vec<Option<Skin<L::Scalar>>>,
+}
+
+/// A packet's points on the surface of one item. Made only where it is asked for, so that elsewhere
+/// nothing of it leaves the registers.
+pub(crate) struct Patch<L: Lanes> {
+    /// Tag of the item.
+    pub item: u32,
+    /// Tags of the triangles, on a mesh.
+    pub facet: L,
+    /// The points, with the normals that point outwards.
+    pub surface: Surface<L>,
+    /// The lanes that are there.
+    pub lanes: L::Mask,
+}
+
+/// The formula that a mapping comes to on a shape.
+fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
+    match (mapping, space.unwrapped) {
+        (Mapping::Planar, _) | (Mapping::Uv | Mapping::Auto, Unwrapped::Plane) => {
+            Projection::Planar
+        }
+        (Mapping::Spherical, _) | (Mapping::Auto, Unwrapped::Ball) => Projection::Spherical,
+        (Mapping::Cylindrical, _) | (Mapping::Auto, Unwrapped::Turned) => Projection::Cylindrical,
+        (Mapping::Box, _) | (Mapping::Auto, Unwrapped::Sides) => Projection::Box,
+        (Mapping::Uv, _) | (Mapping::Auto, Unwrapped::Uv) => Projection::Uv,
+    }
+}
+
+impl<L: Lanes> Skins<L> {
+    /// For each of the items that `sources` lists what its material says, which `material` finds by
+    /// object and part; `None`: nothing is worn. `origin`: what was subtracted from the scene.
+    pub fn new<'a>(
+        scene: &Scene,
+        sources: &[Source],
+        origin: DVec3,
+        material: impl Fn(&Source) -> &'a Material,
+    ) -> Option<Self> {
+        let worn = |m: &Material| {
+            m.texture.as_ref().is_some_and(Texture::shows)
+                || m.bump.as_ref().is_some_and(Bump::shows)
+        };
+        if !sources.iter().any(|source| worn(material(source))) {
+            return None;
+        }
+        let back = DAffine3::from_translation(-origin);
+        let mut spaces: (usize, Vec<TextureSpace>) = (usize::MAX, Vec::new());
+        let of_item = sources.iter().map(|source| {
+            let material = material(source);
+            if !worn(material) {
+                return None;
+            }
+            let object = &scene.objects[source.form];
+            if spaces.0 != source.form {
+                spaces = (source.form, object.shape.texture_spaces());
+            }
+            let space = &spaces.1[source.part];
+            let there = back * object.scene_from_object() * space.shape_from_texture;
+            let projector = |placement: &Placement| {
+                let projection = projection(placement.mapping, space);
+                Projector::new(placement, projection, &there, space.corners)
+            };
+            let texture = material.texture.as_ref();
+            let bump = material.bump.as_ref();
+            Some(Skin {
+                pattern: texture.and_then(|t| Some((projector(&t.placement()), Pattern::new(t)?))),
+                heights: bump.and_then(|b| Some((projector(&b.placement()), Heights::new(b)?))),
+            })
+        });
+        Some(Self { of_item: of_item.collect() })
+    }
+
+    fn skins(&self) -> impl Iterator<Item = &Skin<L::Scalar>> {
+        self.of_item.iter().flatten()
+    }
+
+    /// Whether colours vary anywhere.
+    pub fn is_colored(&self) -> bool {
+        self.skins().any(|skin| skin.pattern.is_some())
+    }
+
+    /// Whether normals are turned anywhere.
+    pub fn is_bumped(&self) -> bool {
+        self.skins().any(|skin| skin.heights.is_some())
+    }
+
+    /// What occurs, in words.
+    pub fn words(&self) -> Vec<&'static str> {
+        let patterns = || self.skins().filter_map(|skin| skin.pattern.as_ref());
+        let image = |pattern: &Pattern<_>| matches!(pattern, Pattern::Image { .. });
+        let mut words = Vec::new();
+        words.extend(patterns().any(|(_, p)| image(p)).then_some("image texture"));
+        words.extend(patterns().any(|(_, p)| !image(p)).then_some("checker"));
+        words.extend(self.is_bumped().then_some("bump"));
+        words
+    }
+}
+
+/// Coordinates by a projection, or by what the mesh says.
+fn coordinates<L: Lanes>(
+    geometry: &Geometry<L>,
+    projector: &Projector<L::Scalar>,
+    patch: &Patch<L>,
+) -> Coordinates<L> {
+    let surface = &patch.surface;
+    if projector.wants_uv()
+        && let Some(own) = geometry.uv(patch.item, patch.facet, surface.point)
+    {
+        let [u, v] = own.uv;
+        let [du, dv] = own.gradients;
+        return projector.placed(Coordinates { u, v, du, dv });
+    }
+    projector.coordinates(surface.point, surface.normal)
+}
+
+impl<L: Lanes> World<L> {
+    fn skin(&self, item: u32) -> Option<&Skin<L::Scalar>> {
+        self.skins.as_ref()?.of_item[item as usize].as_ref()
+    }
+
+    /// The colour of its own that a thing has, if it has one: that in its mesh's file, and its texture.
+    #[inline(never)]
+    pub(crate) fn own_color(&self, patch: &Patch<L>) -> Option<V3<L>> {
+        let painted = self.geometry.color(patch.item, patch.facet);
+        let Some((projector, pattern)) = self.skin(patch.item).and_then(|s| s.pattern.as_ref())
+        else {
+            return painted;
+        };
+        let at = coordinates(&self.geometry, projector, patch);
+        let color = pattern.colors((at.u, at.v), patch.lanes.bits());
+        Some(painted.map_or(color, |painted| painted.times(color)))
+    }
+
+    /// The normal that light is computed with where rays along `direction` meet a surface whose
+    /// geometric normal on their side is `geometric`: smooth, and turned by bumps; on the same side,
+    /// and facing the viewer. `front`: where that normal points outwards.
+    #[inline(never)]
+    pub(crate) fn shading_normal(
+        &self,
+        patch: &Patch<L>,
+        (front, geometric): (L::Mask, V3<L>),
+        direction: V3<L>,
+    ) -> V3<L> {
+        let at = (patch.surface.point, geometric);
+        let normal = self.geometry.shading_normal((patch.item, patch.facet), at, direction);
+        let Some((projector, heights)) = self.skin(patch.item).and_then(|s| s.heights.as_ref())
+        else {
+            return normal;
+        };
+        let at = coordinates(&self.geometry, projector, patch);
+        let (along_u, along_v) = heights.slopes((at.u, at.v), patch.lanes.bits());
+        let gradient = at.du * along_u + at.dv * along_v;
+        let outward = L::select(front, L::one(), -L::one());
+        facing(projector.bumped(normal, outward, gradient), geometric, direction)
+    }
+}

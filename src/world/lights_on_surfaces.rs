@@ -1,0 +1,88 @@
+//! Lamps that lie on surfaces, such as ceiling lamps: where the shadow rays to them end.
+//!
+//! Shadow rays begin a little off the surface that they leave. To such a lamp they end as far off the
+//! surfaces that it lies on, on the side that they come from: each of them goes to the limit of lamps that
+//! come to the surface from there. A ray that ended at the lamp would be blocked or not by rounding, and
+//! one that ended before it by a fixed length would be blocked by surfaces that it meets flatly.
+
+use crate::lanes::{Lanes, Real, V3};
+use crate::primitive::Form;
+use glam::DVec3;
+
+/// A lamp that is no farther from a surface than so many roundings of the largest coordinate lies on it.
+const ON: f64 = 8.0;
+
+/// Shadow rays end so many roundings of the largest coordinate off the surface.
+const LIFT: f64 = 16.0;
+
+/// At sharp edges shadow rays end farther off, to be clear of both sides; at most so many times.
+const SHARPEST: f64 = 4.0;
+
+/// A lamp and the surfaces that it lies on.
+pub(super) struct OnSurface<S> {
+    position: [S; 3],
+    /// By convex solid, flat shape or mesh the unit normals there.
+    solids: Vec<Vec<[S; 3]>>,
+    lift: S,
+}
+
+impl<S: Real> OnSurface<S> {
+    /// Of a lamp at `position` among `forms`, both around `origin`, where coordinates are rounded to
+    /// `epsilon`; `None`: it lies on none.
+    pub fn new(forms: &[Form], position: DVec3, origin: DVec3, epsilon: f64) -> Option<Self> {
+        let mut solids = Vec::new();
+        let mut largest = 0.0f64;
+        // What the scene's own coordinates, in double precision, round off.
+        let given = f64::EPSILON * origin.abs().max_element();
+        for form in forms {
+            let reach = match form {
+                Form::Plane { offset, .. } => offset.abs(),
+                _ => form.bounds().map_or(0.0, |(l, h)| l.abs().max(h.abs()).max_element()),
+            };
+            let rounding = (epsilon * reach.max(position.abs().max_element())).max(given);
+            let normals = form.normals_at(position, ON * rounding);
+            if !normals.is_empty() {
+                largest = largest.max(rounding);
+            }
+            let rounded = |normal: DVec3| normal.to_array().map(S::of);
+            solids.extend(normals.into_iter().map(|of| of.into_iter().map(rounded).collect()));
+        }
+        let lift = S::of(LIFT * largest);
+        let position = position.to_array().map(S::of);
+        (!solids.is_empty()).then_some(Self { position, solids, lift })
+    }
+
+    /// How far from the lamp shadow rays end at most.
+    pub fn farthest(&self) -> f64 {
+        SHARPEST * self.lift.to_f64() * self.solids.len() as f64
+    }
+
+    /// Unit directions from `start` to where shadow rays end, and how far that is.
+    #[inline(never)]
+    pub fn end<L: Lanes<Scalar = S>>(&self, start: V3<L>) -> (V3<L>, L) {
+        let to = V3::splat(self.position) - start;
+        let mut end = to;
+        for normals in &self.solids {
+            let mut outside = L::mask(false);
+            let (mut out, mut inward) = (V3::zero(), V3::zero());
+            for normal in normals.iter().map(|n| V3::splat(*n)) {
+                let before = to.dot(normal).lt(L::zero());
+                outside = outside | before;
+                out = V3::select(before, out + normal, out);
+                inward = inward - normal;
+            }
+            let lift = V3::select(outside, out, inward);
+            // The least height over the surfaces that the ray ends before.
+            let mut least = L::of(L::MAX);
+            for normal in normals.iter().map(|n| V3::splat(*n)) {
+                let before = to.dot(normal).lt(L::zero()) | !outside;
+                least = L::select(before, least.min(normal.dot(lift).abs()), least);
+            }
+            let longest = lift.length2().sqrt() * L::of(1.0 / SHARPEST);
+            let scale = L::splat(self.lift) / least.max(longest);
+            end = lift.mul_add(scale, end);
+        }
+        let distance = end.length2().sqrt();
+        (end * (L::one() / distance), distance)
+    }
+}

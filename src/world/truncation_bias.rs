@@ -1,0 +1,282 @@
+//! What the limits of path tracing leave out, as a bound.
+
+use crate::material::{Fresnel, Material};
+use crate::primitive::Form;
+use crate::scene::{Level, Object, Scene};
+use glam::DVec3;
+
+/// Largest share of light that a material sends on, reflected and transmitted together, of any channel.
+fn strongest(material: &Material, flat: bool) -> f64 {
+    let (k_r, k_t) = (material.reflection, material.transmission);
+    let f = match material.law() {
+        Fresnel::Constant => material.f0().0.into_iter().fold(0.0, f64::max).min(1.0),
+        // At grazing angles.
+        _ => 1.0,
+    };
+    match material.law() {
+        _ if k_t == 0.0 => k_r * f,
+        Fresnel::Dielectric => k_r.max(k_t),
+        _ if flat => k_r * f + k_t,
+        // Or everything, past the critical angle.
+        _ => (k_r * f + k_t).max(1.0),
+    }
+}
+
+/// What matters of an object's geometry.
+struct Place {
+    flat: bool,
+    /// It may see itself from outside.
+    compound: bool,
+    /// Paths may begin inside.
+    begun_in: bool,
+}
+
+/// How far beside its place rounding to single precision may put the eye, as a share of the scene's extent.
+const ROUNDING: f64 = 1e-6;
+
+impl Place {
+    fn new(object: &Object, scene: &Scene) -> Self {
+        let form = object.form();
+        let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
+        let eye = DVec3::from(scene.camera.eye);
+        let within = form.bounds().is_some_and(|(low, high)| {
+            let extent = low.abs().max(high.abs()).max(eye.abs()).max_element();
+            let room = DVec3::splat(ROUNDING * extent);
+            (low - room).cmple(eye).all() && (high + room).cmpge(eye).all()
+        });
+        Self {
+            flat,
+            compound: matches!(form, Form::Compound(_) | Form::Mesh { .. }),
+            begun_in: !flat && (within || scene.camera.near > 0.0),
+        }
+    }
+
+    /// Whether a path may meet the object twice in a row. Every thing but a compound or a mesh is convex, so only
+    /// its inside sees itself, and only paths that begin inside, or are let in, get there. Bumps do not change
+    /// that: what they would reflect into the surface leaves it, and what they would keep outside goes in.
+    fn sees_itself(&self, material: &Material) -> bool {
+        let let_in = !self.flat && material.transmission > 0.0;
+        self.compound || let_in || self.begun_in && material.two_sided
+    }
+}
+
+/// What surfaces send on.
+struct Reach {
+    /// The largest share of one surface.
+    first: f64,
+    /// The largest product of the shares of two surfaces of which one sees the other.
+    pair: f64,
+    /// Some surface sends on reflected and transmitted light.
+    through: bool,
+}
+
+impl Reach {
+    fn new(scene: &Scene) -> Self {
+        let default = Material::default();
+        let (mut first, mut second, mut pair) = (0.0f64, 0.0f64, 0.0f64);
+        let (mut entered, mut through) = (0, false);
+        for object in &scene.objects {
+            let place = Place::new(object, scene);
+            let mut enters = false;
+            for name in object.materials() {
+                let material = scene.materials.get(name).unwrap_or(&default);
+                let rho = strongest(material, place.flat);
+                if rho > 0.0 && place.sees_itself(material) {
+                    pair = pair.max(rho * rho);
+                }
+                through |= material.transmission > 0.0;
+                enters |= material.transmission > 0.0 && !place.flat;
+                second = second.max(rho.min(first));
+                first = first.max(rho);
+            }
+            entered += u32::from(enters);
+        }
+        pair = pair.max(first * second);
+        if entered > 1 {
+            // Where they overlap, paths meet surfaces that change nothing.
+            (first, pair) = (first.max(1.0), pair.max(1.0));
+        }
+        Self { first, pair, through }
+    }
+
+    /// The most that paths weigh which have met `n` surfaces.
+    fn weight(&self, n: u32) -> f64 {
+        let pairs = self.pair.powi(i32::try_from(n / 2).unwrap_or(i32::MAX));
+        if n.is_multiple_of(2) { pairs } else { pairs * self.first }
+    }
+
+    /// The most that paths weigh which have met `n` surfaces or more; infinite: nothing is known.
+    fn from(&self, n: u32) -> f64 {
+        let sum = self.weight(n) + self.weight(n.saturating_add(1));
+        if self.pair < 1.0 { sum / (1.0 - self.pair) } else { f64::INFINITY }
+    }
+
+    /// The most that paths weigh where they end because they weigh less than `least`, at surfaces of at most
+    /// `depth` after the first. A path that goes one way ends once. One that divides ends in up to two ways at
+    /// every surface, and of such paths there are up to four side by side.
+    fn ended(&self, least: f64, depth: u32) -> f64 {
+        if !self.through {
+            return least;
+        }
+        (1..=depth).map(|n| self.weight(n).min(8.0 * least)).take_while(|w| *w > 0.0).sum()
+    }
+}
+
+/// The brightness that `scene`'s limits can cut off, in words; empty: they cut nothing.
+///
+/// Two surfaces in a row send on at most `pair`, the largest product of the shares of two surfaces of
+/// which one sees the other. So all paths that have met n surfaces weigh at most
+/// w(n) = pair^(n/2) together, for odd n that of n - 1 times the largest share, and all of n and
+/// more at most (w(n) + w(n + 1)) / (1 - pair). What they add is at most that times the brightest surface (or the
+/// background, if that is brighter). So nothing is cut only where nothing sends light on, or a flat or convex thing
+/// does alone, which is met once.
+///
+/// Of a transparent ball it is not claimed that light leaves it where it comes to its surface again: the angles are
+/// equal there, but at the rim rounding decides whether the critical angle is passed, and bumps change them.
+pub fn biases(scene: &Scene) -> Vec<String> {
+    let reach = Reach::new(scene);
+    if scene.trace.level < Level::Full || reach.first == 0.0 {
+        return Vec::new();
+    }
+    let bound = |sum: f64| {
+        if sum.is_finite() {
+            format!("at most {} of the brightest surface", rounded_up(sum))
+        } else {
+            "no bound: surfaces send on all light or more".to_string()
+        }
+    };
+    let mut out = Vec::new();
+    let depth = scene.trace.depth;
+    let cut = reach.from(depth.saturating_add(1));
+    if cut > 0.0 {
+        out.push(format!("depth {depth} cuts longer paths ({})", bound(cut)));
+    }
+    let least = scene.trace.min_weight;
+    // At depth 0 nothing goes on that could end.
+    if least > 0.0 && depth > 0 {
+        let ended = reach.ended(least, depth) * reach.from(0);
+        out.push(format!("min_weight {least} cuts weaker paths ({})", bound(ended)));
+    }
+    out
+}
+
+/// To three digits, and no less than it is.
+fn rounded_up(x: f64) -> String {
+    let text = format!("{x:.2e}");
+    // A last digit that doubles cannot hold is no reason to go up.
+    let short = text.parse::<f64>().is_ok_and(|shown| shown < x * (1.0 - 1e-12));
+    if short { format!("{:.2e}", x + 0.005 * 10f64.powf(x.log10().floor())) } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(eye: &str, things: &[(f64, &str)]) -> Scene {
+        let mut text = format!("[camera]\neye = {eye}\ndirection = [0.0, 0.1, -1.0]\n");
+        for (i, (reflection, shape)) in things.iter().enumerate() {
+            text += &format!(
+                "[materials.m{i}]\nreflection = {reflection}\n\
+                 [[object]]\nmaterial = \"m{i}\"\nshape.{shape}\n"
+            );
+        }
+        Scene::parse(&text, "test").unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    const BALL: &str = "sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }";
+    const FLOOR: &str = "platform = { center = [0.0, -1.0, 0.0], size = [9.0, 9.0] }";
+
+    #[test]
+    fn a_thing_alone_is_met_twice_only_from_inside() {
+        assert_eq!(biases(&scene("[0.0, 0.0, 5.0]", &[(0.9, BALL)])), [""; 0]);
+        assert_eq!(biases(&scene("[0.0, 0.0, 5.0]", &[(0.9, FLOOR)])), [""; 0]);
+        let inside = biases(&scene("[0.0, 0.0, 0.5]", &[(0.9, BALL)]));
+        // 0.9^17 / (1 - 0.9)
+        assert_eq!(
+            inside,
+            ["depth 16 cuts longer paths (at most 1.67e0 of the brightest surface)"]
+        );
+        let mut one = scene("[0.0, 0.0, 5.0]", &[(0.9, BALL)]);
+        one.trace.depth = 0;
+        assert_eq!(
+            biases(&one),
+            ["depth 0 cuts longer paths (at most 9.00e-1 of the brightest surface)"]
+        );
+    }
+
+    #[test]
+    fn a_weak_partner_makes_long_paths_weak() {
+        let mut two = scene("[0.0, 0.0, 5.0]", &[(0.9, BALL), (0.1, FLOOR)]);
+        two.trace.depth = 3;
+        // Four reflections: 0.09^2 (1 + 0.9) / (1 - 0.09)
+        assert_eq!(
+            biases(&two),
+            ["depth 3 cuts longer paths (at most 1.70e-2 of the brightest surface)"]
+        );
+        let full = biases(&scene("[0.0, 0.0, 5.0]", &[(1.0, BALL), (1.0, FLOOR)])).concat();
+        assert!(full.contains("no bound"), "{full}");
+    }
+
+    #[test]
+    fn light_that_is_let_in_meets_the_inside() {
+        let with = |transmission: f64, fresnel: Fresnel, eye: &str, shape: &str| {
+            let mut scene = scene(eye, &[(0.5, shape)]);
+            let material = scene.materials.get_mut("m0").unwrap();
+            (material.transmission, material.fresnel) = (transmission, Some(fresnel));
+            scene
+        };
+        let outside = "[0.0, 0.0, 5.0]";
+        let told = |scene: &Scene| biases(scene).concat();
+        let cube = "box = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0] }";
+        for shape in [BALL, cube] {
+            for eye in [outside, "[0.0, 0.0, 0.5]"] {
+                let solid = with(0.2, Fresnel::Constant, eye, shape);
+                assert!(told(&solid).contains("no bound"), "{shape} from {eye}");
+            }
+        }
+        // 0.5^17 / (1 - 0.5)
+        assert_eq!(
+            biases(&with(0.4, Fresnel::Dielectric, outside, BALL)),
+            ["depth 16 cuts longer paths (at most 1.53e-5 of the brightest surface)"]
+        );
+        // A pane alone is met once.
+        assert_eq!(biases(&with(0.4, Fresnel::Dielectric, outside, FLOOR)), [""; 0]);
+    }
+
+    #[test]
+    fn bounds_are_rounded_up() {
+        for (x, text) in [
+            (0.9, "9.00e-1"),
+            (1.667_7, "1.67e0"),
+            (1.671, "1.68e0"),
+            (9.991e-7, "1.00e-6"),
+            (1.000_1, "1.01e0"),
+            (0.0, "0.00e0"),
+        ] {
+            assert_eq!(rounded_up(x), text, "{x}");
+        }
+    }
+
+    #[test]
+    fn least_weights_end_paths_that_divide_more_than_once() {
+        let mut opaque = scene("[0.0, 0.0, 5.0]", &[(0.5, BALL), (0.5, FLOOR)]);
+        opaque.trace.min_weight = 0.01;
+        // 0.01 (1 + 0.5) / (1 - 0.25)
+        assert_eq!(
+            biases(&opaque)[1],
+            "min_weight 0.01 cuts weaker paths (at most 2.00e-2 of the brightest surface)"
+        );
+        let mut glass = opaque.clone();
+        let m0 = glass.materials.get_mut("m0").unwrap();
+        (m0.transmission, m0.fresnel) = (0.5, Some(Fresnel::Dielectric));
+        let told = biases(&glass).concat();
+        // 0.08, 0.08, 0.08, 1/16, 1/32, ..., 2^-16: 0.365 in all, times 2.
+        assert!(told.contains("min_weight 0.01 cuts weaker paths (at most 7.3"), "{told}");
+    }
+
+    #[test]
+    fn an_eye_that_rounding_puts_inside_begins_inside() {
+        let just = biases(&scene("[0.0, 0.0, 1.00000001]", &[(0.9, BALL)])).concat();
+        assert!(just.contains("depth 16 cuts"), "{just}");
+    }
+}
