@@ -12,7 +12,7 @@ use common::{Random, in_turns};
 use std::fmt::Write;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use zerkalo::film::{Display, Estimator, Film, Header, Mix};
+use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
 use zerkalo::render::pass;
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
@@ -42,7 +42,7 @@ impl Bench {
         scene.film.size = size;
         scene.trace.acceleration = acceleration;
         let world = AnyWorld::compile(&scene, &Options::default());
-        let (scales, mix) = (world.group_scales(), Mix { weights: world.mix(&scene) });
+        let (scales, mix) = (world.group_scales(), LightWeights { weights: world.mix(&scene) });
         let estimator = Estimator::new(&scales, &mix, &Display::default());
         let [width, height] = size.map(|n| n as usize);
         let precision = world.lanes().to_string();

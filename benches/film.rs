@@ -3,7 +3,8 @@
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use zerkalo::film::{
-    Depth, Display, Estimator, Film, Header, Mix, Picture, TILE_PIXELS, Target, Tone,
+    Depth, Display, Estimator, Film, Header, ImageData, ImageOutput, LightWeights, TILE_PIXELS,
+    Tone,
 };
 
 /// A noisy gradient of `groups` lights, 64 + 64 samples in every pixel.
@@ -33,8 +34,8 @@ fn film(width: usize, height: usize, groups: usize) -> Film {
     film
 }
 
-fn white(groups: usize) -> Mix {
-    Mix { weights: vec![[1.0; 3]; groups] }
+fn white(groups: usize) -> LightWeights {
+    LightWeights { weights: vec![[1.0; 3]; groups] }
 }
 
 fn noise(c: &mut Criterion) {
@@ -69,8 +70,8 @@ fn pictures(c: &mut Criterion) {
     for (name, depth) in
         [("8.png", Depth::Eight), ("16.png", Depth::Sixteen), ("32.exr", Depth::Eight)]
     {
-        let target = Target::from_path(dir.path().join(name)).expect("a known extension");
-        let picture = Picture {
+        let target = ImageOutput::from_path(dir.path().join(name)).expect("a known extension");
+        let picture = ImageData {
             film: &one,
             mix: &white(1),
             group_names: &["lamp".to_string()],

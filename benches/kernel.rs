@@ -8,9 +8,9 @@ use glam::DVec3;
 use std::hint::black_box;
 use std::sync::atomic::AtomicBool;
 use zerkalo::bvh::Ray;
-use zerkalo::film::{Display, Estimator, Film, Header, Mix};
-use zerkalo::lanes::{Double, Lanes, Real, Single, V3};
-use zerkalo::primitive::{Form, Geometry};
+use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
+use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
+use zerkalo::primitive::{Aggregate, Form};
 use zerkalo::render::pass;
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
@@ -47,24 +47,24 @@ impl Random {
 
     /// A packet of rays from a sphere of radius 4 towards points within 1 of the origin, lanes
     /// near each other.
-    fn rays<L: Lanes>(&mut self) -> Ray<L> {
+    fn rays<L: SimdFloat>(&mut self) -> Ray<L> {
         let (from, to) = (4.0 * self.direction(), self.direction() * self.next());
         let mut lane = || to + 0.02 * self.direction() - from;
         let directions: Vec<DVec3> = (0..L::WIDTH).map(|_| lane().normalize()).collect();
         Ray {
-            origin: V3::of(from.to_array()),
-            direction: V3::from_fn(|i| directions[i].to_array().map(L::Scalar::of)),
+            origin: Vec3::of(from.to_array()),
+            direction: Vec3::from_fn(|i| directions[i].to_array().map(L::Scalar::of)),
         }
     }
 }
 
 /// Name of a lane type in bench ids.
-fn name<L: Lanes>() -> &'static str {
+fn name<L: SimdFloat>() -> &'static str {
     L::NAME
 }
 
-fn intersect<L: Lanes>(c: &mut Criterion, kind: &str, form: &Form) {
-    let geometry = Geometry::<L>::new(std::slice::from_ref(form));
+fn intersect<L: SimdFloat>(c: &mut Criterion, kind: &str, form: &Form) {
+    let geometry = Aggregate::<L>::new(std::slice::from_ref(form));
     let mut random = Random(7);
     let rays: Vec<Ray<L>> = (0..256).map(|_| random.rays()).collect();
     let mut group = c.benchmark_group(format!("intersect {kind}"));
@@ -103,7 +103,7 @@ fn list_or_tree(c: &mut Criterion) {
             if n > 256 && !tree {
                 continue;
             }
-            let geometry = Geometry::<Single>::with_tree(&forms, tree);
+            let geometry = Aggregate::<Single>::with_tree(&forms, tree);
             group.bench_function(name, |b| {
                 b.iter(|| {
                     for ray in &rays {
@@ -117,12 +117,12 @@ fn list_or_tree(c: &mut Criterion) {
 
 /// Sixteen samples in every pixel of a small physical mirror room on one thread, into the film: what
 /// the lanes bring to a whole render.
-fn paths<L: Lanes>(c: &mut Criterion) {
+fn paths<L: SimdFloat>(c: &mut Criterion) {
     let mut scene = physical();
     scene.film.size = [160, 120];
     let world = World::<L>::new(&scene);
     let scales = world.scales().to_vec();
-    let mix = Mix { weights: vec![[1.0; 3]; scales.len()] };
+    let mix = LightWeights { weights: vec![[1.0; 3]; scales.len()] };
     let estimator = Estimator::new(&scales, &mix, &Display::default());
     let precision = "single".to_string();
     let header = Header { width: 160, height: 120, scales, seed: 1, precision };
@@ -170,7 +170,7 @@ fn wave(c: &mut Criterion) {
     group.sample_size(10);
     for precision in [Precision::Single, Precision::Double] {
         let world = AnyWorld::compile(&scene, &Options { precision });
-        let (scales, mix) = (world.group_scales(), Mix { weights: world.mix(&scene) });
+        let (scales, mix) = (world.group_scales(), LightWeights { weights: world.mix(&scene) });
         let estimator = Estimator::new(&scales, &mix, &Display::default());
         let header = Header {
             width: 640,

@@ -12,7 +12,7 @@ use std::hint::black_box;
 use std::time::Instant;
 use zerkalo::asset::Mesh;
 use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
+use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
 use zerkalo::primitive::triangle_mesh;
 
 /// Random rays of each measurement.
@@ -22,17 +22,17 @@ const RAYS: usize = 1 << 19;
 const SIDE: usize = 1024;
 
 /// A packet from one ray per lane: origin and direction.
-fn packet<L: Lanes>(mut ray: impl FnMut(usize) -> ([f64; 3], [f64; 3])) -> Ray<L> {
+fn packet<L: SimdFloat>(mut ray: impl FnMut(usize) -> ([f64; 3], [f64; 3])) -> Ray<L> {
     let rays: Vec<_> = (0..L::WIDTH).map(&mut ray).collect();
     let vector = |v: [f64; 3]| v.map(L::Scalar::of);
     Ray {
-        origin: V3::from_fn(|i| vector(rays[i].0)),
-        direction: V3::from_fn(|i| vector(rays[i].1)),
+        origin: Vec3::from_fn(|i| vector(rays[i].0)),
+        direction: Vec3::from_fn(|i| vector(rays[i].1)),
     }
 }
 
 /// Camera rays, a block of pixels two rows high in each packet.
-fn camera<L: Lanes>() -> Vec<Ray<L>> {
+fn camera<L: SimdFloat>() -> Vec<Ray<L>> {
     let (eye, across) = ([0.0, 0.0, 3.5], L::WIDTH / 2);
     let pixel = |i: usize| 2.2 * (i as f64 / SIDE as f64) - 1.1;
     let corners = (0..SIDE / 2).flat_map(|y| (0..SIDE / across).map(move |x| (x, 2 * y)));
@@ -46,7 +46,7 @@ fn camera<L: Lanes>() -> Vec<Ray<L>> {
 }
 
 /// Rays whose directions differ by at most `spread` in a packet; above 1: by anything.
-fn scattered<L: Lanes>(spread: f64, rays: usize) -> Vec<Ray<L>> {
+fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
     let mut random = Random(7);
     (0..rays / L::WIDTH)
         .map(|_| {
@@ -64,7 +64,7 @@ fn scattered<L: Lanes>(spread: f64, rays: usize) -> Vec<Ray<L>> {
 }
 
 /// Millions of rays per second; `how`: together, apart, or as the packet itself suggests.
-fn speed<L: Lanes>(mesh: &Mesh, rays: &[Ray<L>], how: Option<bool>) -> f64 {
+fn speed<L: SimdFloat>(mesh: &Mesh, rays: &[Ray<L>], how: Option<bool>) -> f64 {
     let limit = L::of(L::MAX);
     let seconds = in_turns(
         3,
@@ -83,14 +83,14 @@ fn speed<L: Lanes>(mesh: &Mesh, rays: &[Ray<L>], how: Option<bool>) -> f64 {
     (rays.len() * L::WIDTH) as f64 / seconds[0] / 1e6
 }
 
-fn rays<L: Lanes>(mesh: &Mesh) -> [f64; 2] {
+fn rays<L: SimdFloat>(mesh: &Mesh) -> [f64; 2] {
     let camera = speed(mesh, &camera::<L>(), None);
     let random = speed(mesh, &scattered::<L>(9.0, RAYS), None);
     println!("  {}: camera {camera:.1}, random {random:.2} million rays/s", L::NAME);
     [camera, random]
 }
 
-fn together_or_apart<L: Lanes>(mesh: &Mesh) {
+fn together_or_apart<L: SimdFloat>(mesh: &Mesh) {
     print!("  {}, together or apart:", L::NAME);
     for spread in [0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 9.0] {
         let rays = scattered::<L>(spread, RAYS / 4);

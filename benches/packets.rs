@@ -14,9 +14,9 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use zerkalo::asset::Mesh;
 use zerkalo::bvh::Ray;
-use zerkalo::film::{Display, Estimator, Film, Header, Mix};
-use zerkalo::lanes::{Double, Lanes, Real, Single, V3};
-use zerkalo::primitive::{Form, Geometry};
+use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
+use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
+use zerkalo::primitive::{Aggregate, Form};
 use zerkalo::render::pass;
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
@@ -49,12 +49,12 @@ fn lines(form: &Form) -> Vec<([f64; 3], [f64; 3])> {
 }
 
 /// Something that traces the lines.
-fn tracer<L: Lanes>(form: &Form, lines: &[([f64; 3], [f64; 3])]) -> impl FnMut() + use<L> {
-    let geometry = Geometry::<L>::with_tree(std::slice::from_ref(form), false);
+fn tracer<L: SimdFloat>(form: &Form, lines: &[([f64; 3], [f64; 3])]) -> impl FnMut() + use<L> {
+    let geometry = Aggregate::<L>::with_tree(std::slice::from_ref(form), false);
     let vector = |v: [f64; 3]| v.map(L::Scalar::of);
     let packet = |lines: &[([f64; 3], [f64; 3])]| Ray::<L> {
-        origin: V3::from_fn(|i| vector(lines[i].0)),
-        direction: V3::from_fn(|i| vector(lines[i].1)),
+        origin: Vec3::from_fn(|i| vector(lines[i].0)),
+        direction: Vec3::from_fn(|i| vector(lines[i].1)),
     };
     let rays: Vec<_> = lines.chunks_exact(L::WIDTH).map(packet).collect();
     move || {
@@ -67,10 +67,10 @@ fn tracer<L: Lanes>(form: &Form, lines: &[([f64; 3], [f64; 3])]) -> impl FnMut()
 }
 
 /// Something that traces eight samples in every pixel, tile by tile.
-fn renderer<L: Lanes>(scene: &Scene) -> impl FnMut() + use<L> {
+fn renderer<L: SimdFloat>(scene: &Scene) -> impl FnMut() + use<L> {
     let world = World::<L>::new(scene);
     let scales = world.scales().to_vec();
-    let mix = Mix { weights: vec![[1.0; 3]; scales.len()] };
+    let mix = LightWeights { weights: vec![[1.0; 3]; scales.len()] };
     let estimator = Estimator::new(&scales, &mix, &Display::default());
     let [width, height] = scene.film.size.map(|n| n as usize);
     let mut film =

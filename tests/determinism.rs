@@ -12,8 +12,8 @@ use std::time::Duration;
 use support::{Rng, all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
 use told::told;
 use zerkalo::film::Film;
-use zerkalo::render::Rendering;
-use zerkalo::render::session::Traced;
+use zerkalo::render::RenderState;
+use zerkalo::render::session::RenderBackend;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
@@ -219,9 +219,9 @@ fn a_film_used_before_is_as_good_as_new() {
         },
         display: zerkalo::film::Display::default(),
     };
-    let mut rendering = Rendering::new(&other, &options, None);
+    let mut rendering = RenderState::new(&other, &options, None);
     uniform(&mut rendering, 0, 8, &pool(2));
-    let mut rendering = Rendering::new(scene, &options, Some(rendering));
+    let mut rendering = RenderState::new(scene, &options, Some(rendering));
     uniform(&mut rendering, 0, 8, &pool(2));
     assert!(rendering.film.bytes() == whole(scene, Precision::Auto, 8).bytes());
 }

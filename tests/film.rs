@@ -10,8 +10,8 @@ use std::io::BufReader;
 use std::ops::Range;
 use std::path::Path;
 use zerkalo::film::{
-    BadSample, Depth, Display, Film, Header, Mix, Part, Picture, Slot, TILE, Target, Tile, Tone,
-    lattice_pixels, quantised_8, quantised_16,
+    Depth, Display, Film, Header, ImageData, ImageOutput, InvalidSample, LightWeights, Replicates,
+    TILE, Tile, TileHandle, Tone, lattice_pixels, quantised_8, quantised_16,
 };
 
 const WIDTH: usize = 37;
@@ -55,7 +55,7 @@ fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: u
         }
         None => {
             let (x, y) = (x as u32, y as u32);
-            tile.record_bad(BadSample { index, replicate: replicate as u8, y, x });
+            tile.record_bad(InvalidSample { index, replicate: replicate as u8, y, x });
         }
     }
 }
@@ -67,7 +67,7 @@ fn trace(film: &mut Film, tiles: &[usize], replicate: usize, range: Range<u32>) 
     }
 }
 
-fn trace_slot(slot: Slot, replicate: usize, range: Range<u32>) {
+fn trace_slot(slot: TileHandle, replicate: usize, range: Range<u32>) {
     let origin = slot.origin;
     let tile = slot.open();
     let [width, height] = tile.extent();
@@ -190,7 +190,7 @@ proptest! {
 fn extreme_28_milliard_samples() {
     let scale = 2f64.powi(28);
     let mut film = film_of(1, 1, &[scale]);
-    let white = Mix { weights: vec![[1.0; 3]] };
+    let white = LightWeights { weights: vec![[1.0; 3]] };
     let of = |value: f64| (value * scale).round() as i64;
     let tile = film.slots(&[0]).remove(0).open();
     // Red: 0.7. Green: 0, 0.0014, ..., 1.3986, of mean 0.6993. Blue: next to nothing.
@@ -214,7 +214,7 @@ fn extreme_28_milliard_samples() {
 #[test]
 fn extreme_28_saturation_is_flagged() {
     // The limit is (2^63 - 1) / 2^28, about 3.4e10 radiance times samples.
-    let (scale, white) = (2f64.powi(28), Mix { weights: vec![[1.0; 3]] });
+    let (scale, white) = (2f64.powi(28), LightWeights { weights: vec![[1.0; 3]] });
     let mut film = film_of(1, 1, &[scale]);
     let tile = film.slots(&[0]).remove(0).open();
     tile.advance(0, 50);
@@ -242,7 +242,7 @@ fn extreme_28_saturation_is_flagged() {
 
 #[test]
 fn dim_and_bright_lights_keep_the_same_bits() {
-    let white = Mix { weights: vec![[1.0; 3]] };
+    let white = LightWeights { weights: vec![[1.0; 3]] };
     let shown = |exponent: i32| {
         let light = 2f64.powi(exponent);
         let scale = 2f64.powi(28) / light;
@@ -266,16 +266,16 @@ fn metadata() -> Vec<(String, String)> {
         .to_vec()
 }
 
-fn mix() -> Mix {
-    Mix { weights: vec![[1.0, 0.5, 0.25], [0.5, 0.25, 1.5]] }
+fn mix() -> LightWeights {
+    LightWeights { weights: vec![[1.0, 0.5, 0.25], [0.5, 0.25, 1.5]] }
 }
 
 fn write(path: &Path, film: &Film, depth: Depth, display: Display) {
     let group_names = ["lamp".to_string(), "окно-2".to_string()];
     let metadata = metadata();
     let (mix, group_names) = (&mix(), &group_names[..]);
-    let picture = Picture { film, mix, group_names, display, depth, metadata: &metadata };
-    Target::from_path(path).unwrap().write(&picture).unwrap();
+    let picture = ImageData { film, mix, group_names, display, depth, metadata: &metadata };
+    ImageOutput::from_path(path).unwrap().write(&picture).unwrap();
 }
 
 #[test]
@@ -347,7 +347,8 @@ fn exr_files_hold_everything_linear() {
     };
     let mut row = vec![];
     for (x, y) in [(0, 0), (36, 20), (17, 3), (2, 19)] {
-        for (layer, part) in [("", Part::Both), ("A.", Part::A), ("B.", Part::B)] {
+        for (layer, part) in [("", Replicates::Both), ("A.", Replicates::A), ("B.", Replicates::B)]
+        {
             film.row(y, part, &mix(), &mut row);
             for (c, color) in ["R", "G", "B"].into_iter().enumerate() {
                 let got = value(&format!("{layer}{color}"), x, y).to_f32();

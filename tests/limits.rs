@@ -7,7 +7,7 @@ mod support;
 use common::Numbers;
 use std::fmt::Write;
 use support::{parsed, picture, rendered};
-use zerkalo::film::Part;
+use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
 use zerkalo::shape::EXAMPLES;
 use zerkalo::world::{self, AnyWorld, Precision};
@@ -18,7 +18,7 @@ const SAMPLES: u32 = 4;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Told {
     Nothing,
-    Bound(f64),
+    BoundingVolume(f64),
     NoBound,
 }
 
@@ -26,7 +26,7 @@ fn told(scene: &Scene, limit: &str) -> Told {
     let all = AnyWorld::compile(scene, &world::Options::default()).biases();
     let Some(text) = all.iter().find(|text| text.starts_with(limit)) else { return Told::Nothing };
     match text.split_once("at most ") {
-        Some((_, rest)) => Told::Bound(rest.split(' ').next().unwrap().parse().unwrap()),
+        Some((_, rest)) => Told::BoundingVolume(rest.split(' ').next().unwrap().parse().unwrap()),
         None => Told::NoBound,
     }
 }
@@ -103,7 +103,7 @@ fn random(seed: u64) -> (Scene, f64) {
 }
 
 fn values(scene: &Scene) -> Vec<f64> {
-    picture(&rendered(scene, 3, Precision::Single, SAMPLES), Part::Both).concat()
+    picture(&rendered(scene, 3, Precision::Single, SAMPLES), Replicates::Both).concat()
 }
 
 fn apart(a: &[f64], b: &[f64]) -> f64 {
@@ -131,7 +131,7 @@ fn checked(seeds: std::ops::Range<u64>) {
                     counts[row][0] += 1;
                     assert!(off == 0.0, "seed {seed}: {limit} cuts {off:e}, not a word of it");
                 }
-                Told::Bound(bound) => {
+                Told::BoundingVolume(bound) => {
                     counts[row][1] += 1;
                     let allowed = bound * brightest * (1.0 + 1e-4) + 1e-7;
                     assert!(off <= allowed, "seed {seed}: {limit} cuts {off:e} of {bound:e}");

@@ -6,9 +6,9 @@ mod support;
 use support::{
     all_shipped, begin, follow, parsed, picture, pool, rendered, settings, shipped, sized,
 };
-use zerkalo::film::{Display, Mix, Part};
+use zerkalo::film::{Display, LightWeights, Replicates};
 use zerkalo::render::schedule::{Stop, StoppedBy};
-use zerkalo::scene::{Horizon, Level, Scene, Step};
+use zerkalo::scene::{Horizon, Level, Scene, TransformOp};
 use zerkalo::value::Color;
 use zerkalo::world::{self, AnyWorld, Precision};
 
@@ -21,7 +21,7 @@ fn small(name: &str) -> Scene {
 
 /// The picture of a scene with a few samples, radiance by channel.
 fn values(scene: &Scene, precision: Precision) -> Vec<f64> {
-    picture(&rendered(scene, 4, precision, 8), Part::Both).concat()
+    picture(&rendered(scene, 4, precision, 8), Replicates::Both).concat()
 }
 
 /// Largest difference, relative to the largest value.
@@ -69,12 +69,12 @@ fn lights_are_changed_without_tracing_again() {
     });
     for precision in PRECISIONS {
         let rendering = rendered(&before, 4, precision, 8);
-        let unchanged = picture(&rendering, Part::Both).concat();
+        let unchanged = picture(&rendering, Replicates::Both).concat();
         for (what, after) in &changes {
-            let mix = Mix { weights: rendering.world.mix(after) };
+            let mix = LightWeights { weights: rendering.world.mix(after) };
             let (mut mixed, mut row) = (Vec::new(), Vec::new());
             for y in 0..rendering.film.height() {
-                rendering.film.row(y, Part::Both, &mix, &mut row);
+                rendering.film.row(y, Replicates::Both, &mix, &mut row);
                 mixed.extend(row.concat());
             }
             let fresh = values(after, precision);
@@ -117,7 +117,7 @@ fn the_unit_of_light_does_not_matter() {
                 other.background.color = other.background.color.scaled(factor);
                 let rendering = rendered(&other, 4, precision, 8);
                 let display = Display { exposure_ev: -f64::from(ev), ..Display::default() };
-                let shown = picture(&rendering, Part::Both).concat();
+                let shown = picture(&rendering, Replicates::Both).concat();
                 let undone: Vec<f64> = shown.iter().map(|x| x / factor).collect();
                 assert!(undone == expected, "{what}, 2^{ev} in {precision:?}");
                 for (other, original) in shown.chunks(3).zip(expected.chunks(3)) {
@@ -134,7 +134,7 @@ fn moved(scene: &Scene, by: [f64; 3]) -> Scene {
     let mut scene = scene.clone();
     let shift = |p: &mut [f64; 3]| (0..3).for_each(|i| p[i] += by[i]);
     for object in &mut scene.objects {
-        object.transform.push(Step::Translate(by));
+        object.transform.push(TransformOp::Translate(by));
     }
     for point in scene.lights.iter_mut().filter_map(|light| light.point.as_mut()) {
         shift(&mut point.position);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use zerkalo::asset::Assets;
 use zerkalo::asset::Mesh;
 use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
+use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
 use zerkalo::primitive::triangle_mesh;
 
 /// Random numbers from 0 to 1 (xorshift: Marsaglia 2003).
@@ -64,7 +64,7 @@ fn unit(v: [f64; 3]) -> [f64; 3] {
 
 /// Rays from inside a closed mesh to its corners, to its edges and into its triangles: none may miss,
 /// together or apart.
-fn nothing_slips_through<L: Lanes>(mesh: &Mesh, rays: usize) {
+fn nothing_slips_through<L: SimdFloat>(mesh: &Mesh, rays: usize) {
     let mut random = Random(0x5EED);
     let triangles = &mesh.mesh().triangles;
     let corner = |i: u32| mesh.mesh().positions[i as usize].map(f64::from);
@@ -87,8 +87,8 @@ fn nothing_slips_through<L: Lanes>(mesh: &Mesh, rays: usize) {
             })
             .collect();
         let ray = Ray {
-            origin: V3::<L>::of(origin),
-            direction: V3::<L>::from_fn(|i| directions[i].map(L::Scalar::of)),
+            origin: Vec3::<L>::of(origin),
+            direction: Vec3::<L>::from_fn(|i| directions[i].map(L::Scalar::of)),
         };
         let found = triangle_mesh::closest(mesh, &ray, limit);
         let blocked = triangle_mesh::blocked(mesh, &ray, limit);
@@ -127,7 +127,7 @@ fn a_tree_finds_what_a_list_finds() {
     for _ in 0..2_000 {
         let origin: [f64; 3] = std::array::from_fn(|_| 4.0 * (random.next() - 0.5));
         let direction = unit(std::array::from_fn(|_| random.next() - 0.5));
-        let ray = Ray { origin: V3::<f64>::of(origin), direction: V3::<f64>::of(direction) };
+        let ray = Ray { origin: Vec3::<f64>::of(origin), direction: Vec3::<f64>::of(direction) };
         let found = triangle_mesh::closest(&mesh, &ray, f64::MAX);
         // Möller and Trumbore's test of every triangle.
         let mut best = f64::MAX;

@@ -10,11 +10,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use support::{picture, rendered};
 use zerkalo::asset::Assets;
-use zerkalo::film::Part;
+use zerkalo::film::Replicates;
 use zerkalo::primitive::Form;
 use zerkalo::scene::edit::{Subject, add_object, set};
 use zerkalo::scene::{Scene, SceneFile};
-use zerkalo::world::{AnyWorld, Options, Precision, Sight};
+use zerkalo::world::{AnyWorld, FirstHit, Options, Precision};
 
 /// A tube round a trefoil knot, of quadrilaterals, as binary PLY.
 fn knot() -> Vec<u8> {
@@ -178,13 +178,13 @@ const VIEW: &str = "
     material = \"matt\"
 ";
 
-fn sights(scene: &Scene, precision: Precision) -> Vec<Sight> {
+fn sights(scene: &Scene, precision: Precision) -> Vec<FirstHit> {
     let [width, height] = scene.film.size.map(|n| n as usize);
     let world = AnyWorld::compile(scene, &Options { precision });
     let points: Vec<[f64; 2]> = (0..width * height)
         .map(|i| [(i % width) as f64 + 0.37, (i / width) as f64 + 0.61])
         .collect();
-    let mut seen = vec![Sight::NOTHING; points.len()];
+    let mut seen = vec![FirstHit::NOTHING; points.len()];
     world.look(&points, &mut seen);
     seen
 }
@@ -215,7 +215,7 @@ fn a_mesh_of_a_sphere_is_met_where_the_sphere_is() {
         assert!(both * 100 > sphere_pixels * 99, "{both} of {sphere_pixels}");
     }
     let [sphere, smooth] = [&sphere, &mesh].map(|scene| rendered(scene, 7, Precision::Auto, 16));
-    let [sphere, smooth] = [&sphere, &smooth].map(|r| picture(r, Part::Both));
+    let [sphere, smooth] = [&sphere, &smooth].map(|r| picture(r, Replicates::Both));
     let difference = |a: &[[f64; 3]], b: &[[f64; 3]]| {
         a.iter().zip(b).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>() / a.len() as f64
     };
@@ -236,7 +236,7 @@ fn a_closed_mesh_has_no_holes() {
             let scene = desk.scene(&text);
             for precision in [Precision::Single, Precision::Double] {
                 let rendering = rendered(&scene, 3, precision, 16);
-                let pixels = picture(&rendering, Part::Both);
+                let pixels = picture(&rendering, Replicates::Both);
                 let blue = |x: usize, y: usize| pixels[y * 96 + x][2];
                 let mut inner = 0;
                 for y in 0..96usize {
@@ -264,7 +264,8 @@ fn no_light_leaks_through_a_mesh() {
         let text = VIEW.replace("[3.0, 4.0, 5.0]", &format!("{lamp:?}"));
         let text = format!("{text}shape.mesh = {{ file = \"ball.obj\", normals = \"{normals}\" }}");
         let rendering = rendered(&desk.scene(&text), 3, Precision::Single, 64);
-        let brightest = picture(&rendering, Part::Both).iter().fold(0.0f64, |m, p| m.max(p[0]));
+        let brightest =
+            picture(&rendering, Replicates::Both).iter().fold(0.0f64, |m, p| m.max(p[0]));
         assert_eq!(brightest, 0.0, "{normals}");
     }
 }
@@ -285,7 +286,7 @@ fn triangles_do_not_shade_themselves() {
             .replace("target = [0.0, 0.0, 0.0]", &format!("target = [{at:?}, 0.0, 0.0]"))
             .replace("[3.0, 4.0, 5.0]", &format!("[{:?}, 0.002, 2.0]", 8.0 + at));
         let scene = desk.scene(&format!("{view}shape.mesh = {{ file = \"floor.obj\" }}"));
-        let pixels = picture(&rendered(&scene, 3, Precision::Auto, 8), Part::Both);
+        let pixels = picture(&rendered(&scene, 3, Precision::Auto, 8), Replicates::Both);
         let dark = pixels.iter().filter(|p| p[2] == 0.0 && p[0] == 0.0).count();
         let seen = pixels.iter().filter(|p| p[2] == 0.0).count();
         assert!(seen > 4000 && dark == 0, "{dark} of {seen} at {at}");
@@ -303,7 +304,7 @@ fn flat_normals_show_the_triangles() {
         desk.scene(&(VIEW.to_string() + &shape))
     };
     let pictures = [sphere, mesh("smooth"), mesh("flat")]
-        .map(|scene| picture(&rendered(&scene, 7, Precision::Auto, 16), Part::Both));
+        .map(|scene| picture(&rendered(&scene, 7, Precision::Auto, 16), Replicates::Both));
     // Within the silhouettes of both, where the lamp shines on all.
     let apart = |which: usize| {
         let inner = (0..96 * 96).filter(|i| {
@@ -336,7 +337,7 @@ fn colours_of_the_file_multiply_the_materials() {
         material = \"m\"
         shape.mesh = { file = \"two.obj\" }
     ";
-    let pixels = picture(&rendered(&desk.scene(text), 1, Precision::Auto, 2), Part::Both);
+    let pixels = picture(&rendered(&desk.scene(text), 1, Precision::Auto, 2), Replicates::Both);
     for (pixel, expected) in [(24, [0.25, 0.125, 0.0]), (31, [0.0, 0.0, 0.5])] {
         for c in 0..3 {
             // Ambient light and the lamp, whose white matt surface has the brightness 1.

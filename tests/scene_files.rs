@@ -86,7 +86,7 @@ fn the_reference_is_fresh() {
 fn corners(scene: &Scene, name: &str) -> Vec<[f64; 3]> {
     let object = scene.objects.iter().find(|o| o.name == name).unwrap();
     match object.shape.form() {
-        Form::Convex { corners, .. } => corners.iter().map(|c| c.to_array()).collect(),
+        Form::ConvexPolyhedron { corners, .. } => corners.iter().map(|c| c.to_array()).collect(),
         other => panic!("{other:?}"),
     }
 }

@@ -13,8 +13,8 @@ use std::path::PathBuf;
 use support::{
     all_shipped, begin, parsed, picture, pool, rendered, shipped, sized, uniform, without_chance,
 };
-use zerkalo::film::Part;
-use zerkalo::render::Rendering;
+use zerkalo::film::Replicates;
+use zerkalo::render::RenderState;
 use zerkalo::scene::Scene;
 use zerkalo::world::{self, AnyWorld, Precision};
 
@@ -59,9 +59,9 @@ fn every_scene_is_compiled_to_what_it_requires() {
 
 /// Mean colour of each block and the squared standard error of that mean, row by row. The pixels are
 /// independent, and the half difference of the replicates has the variance of their mean.
-fn blocks(rendering: &Rendering) -> Vec<[(f64, f64); 3]> {
+fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     let [columns, rows] = SIZE.map(|n| n as usize / BLOCK);
-    let [a, b] = [Part::A, Part::B].map(|part| picture(rendering, part));
+    let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(rendering, part));
     let mut blocks = vec![[(0.0, 0.0); 3]; columns * rows];
     let pixels = (BLOCK * BLOCK) as f64;
     for (i, (a, b)) in a.iter().zip(&b).enumerate() {
@@ -180,7 +180,7 @@ fn the_furnace_is_exactly_1() {
     for precision in [Precision::Single, Precision::Double] {
         let rendering = rendered(&scene, 3, precision, 16);
         assert_eq!(rendering.film.bad_samples().count, 0);
-        let picture = picture(&rendering, Part::Both);
+        let picture = picture(&rendering, Replicates::Both);
         let wrong = picture.iter().filter(|rgb| **rgb != [1.0; 3]).count();
         assert_eq!(wrong, 0, "{precision:?}: of {} pixels, such as {:?}", picture.len(), {
             picture.iter().find(|rgb| **rgb != [1.0; 3])
@@ -196,7 +196,7 @@ fn without_chance_both_replicates_are_equal() {
         without_chance(&mut scene);
         for precision in [Precision::Single, Precision::Double] {
             let rendering = rendered(&scene, 5, precision, 9);
-            let [a, b] = [Part::A, Part::B].map(|part| picture(&rendering, part));
+            let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
             assert!(a == b, "{name} in {precision:?}");
             assert_eq!(rendering.film.bad_samples().count, 0, "{name}");
         }

@@ -14,12 +14,12 @@ use std::sync::Arc;
 use support::{begin, picture, pool, uniform};
 use tables::{Key, at, keys, put, scene, table};
 use toml::{Table, Value};
-use zerkalo::film::Part;
-use zerkalo::render::Rendering;
-use zerkalo::render::session::Traced;
+use zerkalo::film::Replicates;
+use zerkalo::render::RenderState;
+use zerkalo::render::session::RenderBackend;
 use zerkalo::scene::Scene;
 use zerkalo::shape::EXAMPLES;
-use zerkalo::value::Takes;
+use zerkalo::value::ValueType;
 use zerkalo::world::Precision;
 
 const SEED: u64 = 11;
@@ -110,7 +110,7 @@ fn base() -> Scene {
     Scene::parse(&text, "test").unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn rendered(scene: &Scene, pool: &rayon::ThreadPool) -> Rendering {
+fn rendered(scene: &Scene, pool: &rayon::ThreadPool) -> RenderState {
     let mut rendering = begin(scene, SEED, Precision::Single);
     uniform(&mut rendering, 0, SAMPLES, pool);
     rendering
@@ -144,34 +144,34 @@ fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value
         Value::Array((0..n).map(|_| Value::Float(numbers.unit())).collect())
     };
     Some(match key.takes {
-        Takes::Text => Value::String(match key.path.last()?.as_str() {
+        ValueType::Text => Value::String(match key.path.last()?.as_str() {
             "material" => names[numbers.below(names.len())].clone(),
             "file" if key.path.iter().any(|k| k == "mesh") => "scenes/meshes/vase.ply".into(),
             "file" => format!("scenes/textures/{}.png", ["wood", "sheet"][numbers.below(2)]),
             _ => format!("name {}", numbers.below(1000)),
         }),
-        Takes::Switch => Value::Boolean(!old.and_then(|v| v.as_bool()).unwrap_or(true)),
-        Takes::Choice(words) => Value::String(words[numbers.below(words.len())].name.into()),
-        Takes::Whole(_) => Value::Integer(numbers.below(9) as i64),
-        Takes::Wholes(n, _) => {
+        ValueType::Switch => Value::Boolean(!old.and_then(|v| v.as_bool()).unwrap_or(true)),
+        ValueType::Choice(words) => Value::String(words[numbers.below(words.len())].name.into()),
+        ValueType::Whole(_) => Value::Integer(numbers.below(9) as i64),
+        ValueType::Wholes(n, _) => {
             Value::Array((0..n).map(|_| Value::Integer(8 + numbers.below(24) as i64)).collect())
         }
-        Takes::Number(_) | Takes::Factor => {
+        ValueType::Number(_) | ValueType::Factor => {
             one_of(&old.unwrap_or(Value::Float(numbers.unit())), numbers)
         }
-        Takes::Numbers(n, _) => match old {
+        ValueType::Numbers(n, _) => match old {
             Some(old) => one_of(&old, numbers),
             None => random(n, numbers),
         },
-        Takes::Direction => match old {
+        ValueType::Direction => match old {
             Some(old) => one_of(&old, numbers),
             None => random(3, numbers),
         },
-        Takes::Color(_) => match numbers.below(4) {
+        ValueType::Color(_) => match numbers.below(4) {
             0 => Value::Array(vec![Value::Float(0.0); 3]),
             _ => random(3, numbers),
         },
-        Takes::OneOf(kinds) => {
+        ValueType::OneOf(kinds) => {
             let kind = kinds[numbers.below(kinds.len())].name;
             let value = match EXAMPLES.iter().find(|(key, _)| *key == kind) {
                 Some((_, example)) => {
@@ -183,7 +183,7 @@ fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value
             };
             Value::Table(Table::from_iter([(kind.to_string(), value)]))
         }
-        Takes::ListOf(_) => {
+        ValueType::ListOf(_) => {
             let mut list = old.and_then(|v| v.as_array().cloned()).unwrap_or_default();
             let step = Table::from_iter([("rotate_z".to_string(), Value::Float(10.0))]);
             if numbers.below(2) == 0 {
@@ -193,7 +193,7 @@ fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value
             }
             Value::Array(list)
         }
-        Takes::Tables(_) => {
+        ValueType::Tables(_) => {
             let mut list = old?.as_array()?.clone();
             let i = numbers.below(list.len());
             let mut taken = list.remove(i);
@@ -207,7 +207,7 @@ fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value
             }
             Value::Array(list)
         }
-        Takes::Named(_) => {
+        ValueType::Named(_) => {
             let mut named = old?.as_table()?.clone();
             let name = named.keys().nth(numbers.below(named.len()))?.clone();
             let value = named.remove(&name)?;
@@ -216,7 +216,7 @@ fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value
             }
             Value::Table(named)
         }
-        Takes::Table(_) => old?,
+        ValueType::Table(_) => old?,
     })
 }
 
@@ -232,7 +232,7 @@ fn edit(changed: &mut Table, key: &Key, numbers: &mut Numbers) {
 
 struct Bench {
     base: Scene,
-    film: Rendering,
+    film: RenderState,
     pool: rayon::ThreadPool,
     tried: usize,
     served: usize,
@@ -255,8 +255,8 @@ impl Bench {
             return Some(false);
         }
         self.served += 1;
-        let relit = picture(&self.film, Part::Both);
-        let fresh = picture(&rendered(&edited, &self.pool), Part::Both);
+        let relit = picture(&self.film, Replicates::Both);
+        let fresh = picture(&rendered(&edited, &self.pool), Replicates::Both);
         assert_eq!(relit.len(), fresh.len(), "{what}");
         let brightest = fresh.iter().flatten().fold(1.0f64, |m, x| m.max(*x));
         for (relit, fresh) in relit.iter().flatten().zip(fresh.iter().flatten()) {

@@ -1,7 +1,7 @@
 //! Files that were read, shared between compilations of a scene.
 
 use crate::asset::error::AssetError;
-use crate::asset::file::{MAX_BYTES, Source, unreadable};
+use crate::asset::file::{FileContents, MAX_BYTES, read_error};
 use crate::asset::image::Image;
 use crate::asset::mesh::{Mesh, TriangleMesh};
 use std::collections::HashMap;
@@ -19,7 +19,7 @@ const MAX_IMAGE_BYTES: u64 = 512 << 20;
 
 /// What takes time when a file is loaded.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Stage {
+pub enum LoadProgress {
     /// A file is read.
     Reading {
         /// Its path.
@@ -36,7 +36,7 @@ pub enum Stage {
     },
 }
 
-impl fmt::Display for Stage {
+impl fmt::Display for LoadProgress {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let name =
             |file: &Path| file.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -60,23 +60,23 @@ struct Key {
 }
 
 /// What became of a file, once somebody has read it.
-type Cell<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
+type CacheEntry<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
 
 /// Files of one kind, with the count of askings at which each was last asked for.
-struct Shelf<T> {
-    files: HashMap<Key, (Cell<T>, u64)>,
+struct Cache<T> {
+    files: HashMap<Key, (CacheEntry<T>, u64)>,
     asked: u64,
 }
 
-impl<T> Default for Shelf<T> {
+impl<T> Default for Cache<T> {
     fn default() -> Self {
         Self { files: HashMap::new(), asked: 0 }
     }
 }
 
-impl<T> Shelf<T> {
+impl<T> Cache<T> {
     /// The cell of a file; older states of the same file are forgotten.
-    fn cell(&mut self, key: &Key) -> Cell<T> {
+    fn cell(&mut self, key: &Key) -> CacheEntry<T> {
         self.asked += 1;
         self.files.retain(|k, _| k.path != key.path || k == key);
         let entry = self.files.entry(key.clone()).or_default();
@@ -114,9 +114,9 @@ impl<T> Shelf<T> {
 /// changes on disk; what is wrong with a file is remembered as well. What no scene holds any more
 /// is forgotten when it takes too much memory.
 pub struct Assets {
-    meshes: Mutex<Shelf<Mesh>>,
-    images: Mutex<Shelf<Image>>,
-    progress: Box<dyn Fn(&Stage) + Send + Sync>,
+    meshes: Mutex<Cache<Mesh>>,
+    images: Mutex<Cache<Image>>,
+    progress: Box<dyn Fn(&LoadProgress) + Send + Sync>,
 }
 
 impl Default for Assets {
@@ -135,9 +135,9 @@ impl fmt::Debug for Assets {
 }
 
 impl Assets {
-    /// With nothing read. `progress` is told at the beginning of each [`Stage`], on the thread that
+    /// With nothing read. `progress` is told at the beginning of each [`LoadProgress`], on the thread that
     /// asked for the file.
-    pub fn new(progress: impl Fn(&Stage) + Send + Sync + 'static) -> Self {
+    pub fn new(progress: impl Fn(&LoadProgress) + Send + Sync + 'static) -> Self {
         Self { meshes: Mutex::default(), images: Mutex::default(), progress: Box::new(progress) }
     }
 
@@ -149,7 +149,7 @@ impl Assets {
         let read = |key: &Key| {
             let triangles = TriangleMesh::parse(self.read(path, key, MAX_BYTES)?)?;
             let count = triangles.triangles.len();
-            (self.progress)(&Stage::Building { file: path.to_path_buf(), triangles: count });
+            (self.progress)(&LoadProgress::Building { file: path.to_path_buf(), triangles: count });
             Ok(Mesh::new(triangles))
         };
         load(&self.meshes, path, read, Mesh::bytes)
@@ -164,27 +164,27 @@ impl Assets {
         load(&self.images, path, read, Image::bytes)
     }
 
-    fn read(&self, path: &Path, key: &Key, limit: u64) -> Result<Source, AssetError> {
-        (self.progress)(&Stage::Reading { file: path.to_path_buf(), bytes: key.bytes });
-        Source::read(path, limit)
+    fn read(&self, path: &Path, key: &Key, limit: u64) -> Result<FileContents, AssetError> {
+        (self.progress)(&LoadProgress::Reading { file: path.to_path_buf(), bytes: key.bytes });
+        FileContents::read(path, limit)
     }
 }
 
 /// Nothing of a shelf is half done when a thread dies: a poisoned lock is as good as any.
-fn locked<T>(shelf: &Mutex<Shelf<T>>) -> MutexGuard<'_, Shelf<T>> {
+fn locked<T>(shelf: &Mutex<Cache<T>>) -> MutexGuard<'_, Cache<T>> {
     shelf.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What `shelf` has for the file at `path`, read if need be, without holding the shelf's lock.
 fn load<T>(
-    shelf: &Mutex<Shelf<T>>,
+    shelf: &Mutex<Cache<T>>,
     path: &Path,
     read: impl FnOnce(&Key) -> Result<T, AssetError>,
     bytes_of: impl Fn(&T) -> usize,
 ) -> Result<Arc<T>, AssetError> {
-    let metadata = std::fs::metadata(path).map_err(|e| unreadable(path, &e))?;
+    let metadata = std::fs::metadata(path).map_err(|e| read_error(path, &e))?;
     let key = Key {
-        path: std::fs::canonicalize(path).map_err(|e| unreadable(path, &e))?,
+        path: std::fs::canonicalize(path).map_err(|e| read_error(path, &e))?,
         modified: metadata.modified().ok(),
         bytes: metadata.len(),
     };
@@ -205,7 +205,7 @@ mod tests {
         let count = Arc::new(AtomicUsize::new(0));
         let counter = count.clone();
         let assets = Assets::new(move |stage| {
-            if matches!(stage, Stage::Reading { .. }) {
+            if matches!(stage, LoadProgress::Reading { .. }) {
                 counter.fetch_add(1, Ordering::SeqCst);
             }
         });
@@ -249,9 +249,9 @@ mod tests {
 
     #[test]
     fn what_nobody_holds_is_forgotten_the_oldest_first() {
-        let mut shelf = Shelf::<usize>::default();
+        let mut shelf = Cache::<usize>::default();
         let key = |name: &str| Key { path: name.into(), modified: None, bytes: 0 };
-        let put = |shelf: &mut Shelf<usize>, name| {
+        let put = |shelf: &mut Cache<usize>, name| {
             let file = Arc::new(UNUSED_BYTES / 2);
             shelf.cell(&key(name)).set(Ok(file.clone())).unwrap();
             file
@@ -261,7 +261,7 @@ mod tests {
             drop(put(&mut shelf, name));
         }
         shelf.tidy(|bytes| *bytes);
-        let known = |shelf: &Shelf<usize>, name| shelf.files.contains_key(&key(name));
+        let known = |shelf: &Cache<usize>, name| shelf.files.contains_key(&key(name));
         assert!(known(&shelf, "held") && !known(&shelf, "a"));
         assert!(known(&shelf, "b") && known(&shelf, "c"));
         drop(held);

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 /// Where in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum FileLocation {
     /// The file as a whole.
     Whole,
     /// A line, from 1.
@@ -23,7 +23,7 @@ pub struct AssetError {
     /// The file.
     pub file: PathBuf,
     /// Where in it.
-    pub place: Place,
+    pub place: FileLocation,
     /// What was found, as a phrase.
     pub found: String,
     /// What would be right, as a phrase.
@@ -35,10 +35,10 @@ impl AssetError {
     pub fn what(&self) -> String {
         let file = self.file.display();
         let place = match &self.place {
-            Place::Whole => String::new(),
-            Place::Line(line) => format!(":{line}"),
-            Place::Byte(byte) => format!(", byte {byte}"),
-            Place::Part(part) => format!(", {part}"),
+            FileLocation::Whole => String::new(),
+            FileLocation::Line(line) => format!(":{line}"),
+            FileLocation::Byte(byte) => format!(", byte {byte}"),
+            FileLocation::Part(part) => format!(", {part}"),
         };
         printable(&format!("{file}{place}: {}", self.found))
     }

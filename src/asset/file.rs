@@ -1,6 +1,6 @@
 //! Reading whole files within a limit, and finding those that a file names.
 
-use crate::asset::error::{AssetError, Place};
+use crate::asset::error::{AssetError, FileLocation};
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
@@ -9,24 +9,24 @@ use std::path::{Component, Path, PathBuf};
 pub const MAX_BYTES: u64 = 2 << 30;
 
 /// A file in memory.
-pub struct Source {
+pub struct FileContents {
     /// Where it was read from.
     pub path: PathBuf,
     /// All of it.
     pub bytes: Vec<u8>,
 }
 
-impl Source {
+impl FileContents {
     /// Reads the file at `path`, at most `limit` bytes.
     ///
     /// # Errors
     /// If it cannot be read, or is no regular file, or is larger.
     pub fn read(path: &Path, limit: u64) -> Result<Self, AssetError> {
-        let metadata = std::fs::metadata(path).map_err(|e| unreadable(path, &e))?;
+        let metadata = std::fs::metadata(path).map_err(|e| read_error(path, &e))?;
         let wrong = |found: String, expected: &str| {
             Err(AssetError {
                 file: path.to_path_buf(),
-                place: Place::Whole,
+                place: FileLocation::Whole,
                 found,
                 expected: expected.to_string(),
             })
@@ -39,10 +39,10 @@ impl Source {
             return wrong(found, &format!("at most {} MiB", limit >> 20));
         }
         // Only now: to open a pipe is to wait for its writer.
-        let file = File::open(path).map_err(|e| unreadable(path, &e))?;
+        let file = File::open(path).map_err(|e| read_error(path, &e))?;
         let mut bytes = Vec::with_capacity(metadata.len() as usize);
         // One byte more than the limit tells of a file that grew meanwhile.
-        file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| unreadable(path, &e))?;
+        file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| read_error(path, &e))?;
         if bytes.len() as u64 > limit {
             let found = "the file grew while it was read".to_string();
             return wrong(found, &format!("at most {} MiB", limit >> 20));
@@ -51,7 +51,12 @@ impl Source {
     }
 
     /// An error at `place` of this file.
-    pub fn error(&self, place: Place, found: impl Into<String>, expected: &str) -> AssetError {
+    pub fn error(
+        &self,
+        place: FileLocation,
+        found: impl Into<String>,
+        expected: &str,
+    ) -> AssetError {
         AssetError {
             file: self.path.clone(),
             place,
@@ -62,7 +67,7 @@ impl Source {
 
     /// The path of a file that this one names as `name`: relative to this one's folder, in it or
     /// below. `None`: `name` leads elsewhere (an absolute path, `..`, a URL).
-    pub fn beside(&self, name: &str) -> Option<PathBuf> {
+    pub fn resolve_relative(&self, name: &str) -> Option<PathBuf> {
         let name = name.replace('\\', "/");
         let inside = Path::new(&name)
             .components()
@@ -75,7 +80,7 @@ impl Source {
 }
 
 /// Why a file cannot be read.
-pub fn unreadable(path: &Path, error: &std::io::Error) -> AssetError {
+pub fn read_error(path: &Path, error: &std::io::Error) -> AssetError {
     let (found, expected) = match error.kind() {
         ErrorKind::NotFound => ("there is no such file".to_string(), "the path of a file"),
         ErrorKind::PermissionDenied => {
@@ -84,7 +89,7 @@ pub fn unreadable(path: &Path, error: &std::io::Error) -> AssetError {
         _ => (format!("the file cannot be read: {error}"), "a file that can be read"),
     };
     let expected = expected.to_string();
-    AssetError { file: path.to_path_buf(), place: Place::Whole, found, expected }
+    AssetError { file: path.to_path_buf(), place: FileLocation::Whole, found, expected }
 }
 
 #[cfg(test)]
@@ -93,11 +98,11 @@ mod tests {
 
     #[test]
     fn a_file_reaches_only_its_own_folder() {
-        let source = Source { path: PathBuf::from("meshes/a.obj"), bytes: Vec::new() };
-        assert_eq!(source.beside("a.mtl"), Some(PathBuf::from("meshes/a.mtl")));
-        assert_eq!(source.beside("./x\\b.mtl"), Some(PathBuf::from("meshes/./x/b.mtl")));
+        let source = FileContents { path: PathBuf::from("meshes/a.obj"), bytes: Vec::new() };
+        assert_eq!(source.resolve_relative("a.mtl"), Some(PathBuf::from("meshes/a.mtl")));
+        assert_eq!(source.resolve_relative("./x\\b.mtl"), Some(PathBuf::from("meshes/./x/b.mtl")));
         for name in ["", "../a.mtl", "x/../../a", "/etc/passwd", "C:\\a", "http://a/b", "file:a"] {
-            assert_eq!(source.beside(name), None, "{name}");
+            assert_eq!(source.resolve_relative(name), None, "{name}");
         }
     }
 }

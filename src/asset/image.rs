@@ -1,7 +1,7 @@
 //! Images for textures: PNG and JPEG.
 
-use crate::asset::error::{AssetError, Place};
-use crate::asset::file::Source;
+use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::file::FileContents;
 use crate::value::linear_from_srgb;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
 use std::io::Cursor;
@@ -44,12 +44,12 @@ static WORDS: LazyLock<Vec<f32>> = LazyLock::new(|| table(65535));
 
 impl Image {
     /// From a file in memory; its first bytes say what it is.
-    pub(super) fn parse(source: &Source) -> Result<Self, AssetError> {
+    pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
         let reader = ImageReader::new(Cursor::new(&source.bytes[..])).with_guessed_format();
         let mut reader = reader.map_err(|e| wrong(source, &ImageError::IoError(e)))?;
         if reader.format().is_none() {
             let found = "this is neither a PNG nor a JPEG";
-            return Err(source.error(Place::Whole, found, "a PNG or JPEG image"));
+            return Err(source.error(FileLocation::Whole, found, "a PNG or JPEG image"));
         }
         let mut limits = Limits::default();
         limits.max_alloc = Some(MAX_PIXELS * 8);
@@ -60,11 +60,11 @@ impl Image {
         let size = format!("the image has {width} x {height} pixels");
         if width > MAX_SIDE || height > MAX_SIDE || pixels > MAX_PIXELS {
             let expected = format!("at most {MAX_SIDE} a side and {MAX_PIXELS} altogether");
-            return Err(source.error(Place::Whole, size, &expected));
+            return Err(source.error(FileLocation::Whole, size, &expected));
         }
         if pixels > PIXELS_PER_BYTE * source.bytes.len() as u64 {
             let found = format!("{size}, more than its {} bytes can hold", source.bytes.len());
-            return Err(source.error(Place::Whole, found, "a whole image"));
+            return Err(source.error(FileLocation::Whole, found, "a whole image"));
         }
         let orientation = decoder.orientation().map_err(|e| wrong(source, &e))?;
         let mut image = DynamicImage::from_decoder(decoder).map_err(|e| wrong(source, &e))?;
@@ -135,8 +135,12 @@ impl Image {
     }
 }
 
-fn wrong(source: &Source, error: &ImageError) -> AssetError {
-    source.error(Place::Whole, format!("the image cannot be read: {error}"), "a PNG or JPEG image")
+fn wrong(source: &FileContents, error: &ImageError) -> AssetError {
+    source.error(
+        FileLocation::Whole,
+        format!("the image cannot be read: {error}"),
+        "a PNG or JPEG image",
+    )
 }
 
 #[cfg(test)]
@@ -145,10 +149,10 @@ mod tests {
     use image::{ImageFormat, Luma, Rgba};
     use std::path::PathBuf;
 
-    fn file(image: DynamicImage, format: ImageFormat) -> Source {
+    fn file(image: DynamicImage, format: ImageFormat) -> FileContents {
         let mut bytes = Cursor::new(Vec::new());
         image.write_to(&mut bytes, format).unwrap();
-        Source { path: PathBuf::from("a.png"), bytes: bytes.into_inner() }
+        FileContents { path: PathBuf::from("a.png"), bytes: bytes.into_inner() }
     }
 
     #[test]
@@ -177,7 +181,7 @@ mod tests {
     }
 
     /// A PNG header that announces so many pixels, with a right checksum and no pixels.
-    fn announced(side: u32) -> Source {
+    fn announced(side: u32) -> FileContents {
         let mut source = file(image::GrayImage::new(1, 1).into(), ImageFormat::Png);
         source.bytes[16..20].copy_from_slice(&side.to_be_bytes());
         source.bytes[20..24].copy_from_slice(&side.to_be_bytes());
@@ -200,7 +204,7 @@ mod tests {
             let error = Image::parse(&announced(side)).unwrap_err();
             assert!(error.found.contains(words), "{side}: {error}");
         }
-        let text = Source { path: PathBuf::from("a.png"), bytes: b"no image".to_vec() };
+        let text = FileContents { path: PathBuf::from("a.png"), bytes: b"no image".to_vec() };
         assert!(Image::parse(&text).unwrap_err().found.contains("neither"));
         let mut half = file(image::GrayImage::new(50, 50).into(), ImageFormat::Png);
         half.bytes.truncate(60);

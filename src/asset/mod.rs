@@ -13,8 +13,8 @@ mod file;
 mod image;
 mod mesh;
 
-pub use cache::{Assets, Stage};
-pub use error::{AssetError, Place};
+pub use cache::{Assets, LoadProgress};
+pub use error::{AssetError, FileLocation};
 pub use file::MAX_BYTES;
 pub use image::{Image, MAX_PIXELS, MAX_SIDE};
-pub use mesh::{Leaf, MAX_TRIANGLES, MAX_VERTICES, Mesh, TriangleMesh};
+pub use mesh::{MAX_TRIANGLES, MAX_VERTICES, Mesh, TriangleBlock, TriangleMesh};

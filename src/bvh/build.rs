@@ -12,58 +12,58 @@ use obvhs::bvh2::node::Bvh2Node;
 use std::time::Duration;
 
 /// Boxes of a branch.
-pub const WIDE: usize = 8;
+pub const BVH_WIDTH: usize = 8;
 
 /// Marks a child that is a leaf.
-pub const LEAF: u32 = 1 << 31;
+pub const LEAF_FLAG: u32 = 1 << 31;
 
 /// Eight boxes of a tree. Places without one hold a box that nothing meets.
 #[derive(Clone, Debug)]
 #[repr(align(32))]
-pub struct Branch {
+pub struct Bvh8Node {
     /// Smallest coordinates of the boxes on the three axes, then the largest.
-    pub sides: [[f32; WIDE]; 6],
-    /// What is in each box: the number of a branch, or of a leaf and [`LEAF`].
-    pub child: [u32; WIDE],
+    pub sides: [[f32; BVH_WIDTH]; 6],
+    /// What is in each box: the number of a branch, or of a leaf and [`LEAF_FLAG`].
+    pub child: [u32; BVH_WIDTH],
 }
 
-const NO_BOX: Branch = Branch {
+const EMPTY_NODE: Bvh8Node = Bvh8Node {
     sides: [
-        [f32::INFINITY; WIDE],
-        [f32::INFINITY; WIDE],
-        [f32::INFINITY; WIDE],
-        [f32::NEG_INFINITY; WIDE],
-        [f32::NEG_INFINITY; WIDE],
-        [f32::NEG_INFINITY; WIDE],
+        [f32::INFINITY; BVH_WIDTH],
+        [f32::INFINITY; BVH_WIDTH],
+        [f32::INFINITY; BVH_WIDTH],
+        [f32::NEG_INFINITY; BVH_WIDTH],
+        [f32::NEG_INFINITY; BVH_WIDTH],
+        [f32::NEG_INFINITY; BVH_WIDTH],
     ],
-    child: [LEAF; WIDE],
+    child: [LEAF_FLAG; BVH_WIDTH],
 };
 
-impl Branch {
+impl Bvh8Node {
     /// Numbers of the places that hold a box.
     pub fn places(&self) -> impl Iterator<Item = usize> {
-        (0..WIDE).filter(|i| self.sides[0][*i] <= self.sides[3][*i])
+        (0..BVH_WIDTH).filter(|i| self.sides[0][*i] <= self.sides[3][*i])
     }
 }
 
 /// The tree.
 #[derive(Debug)]
-pub struct Boxes {
-    branches: Vec<Branch>,
+pub struct Bvh8 {
+    branches: Vec<Bvh8Node>,
     depth: usize,
 }
 
 /// What a tree was built into.
-pub struct Built {
+pub struct Bvh8Build {
     /// The tree.
-    pub boxes: Boxes,
+    pub boxes: Bvh8,
     /// The things in the order of the leaves.
     pub order: Vec<u32>,
     /// For each leaf its first place in `order` and its number of things.
     pub leaves: Vec<(u32, u32)>,
 }
 
-impl Boxes {
+impl Bvh8 {
     /// Over `count` things, at least one; `corners`: of the box around each. At most `in_leaf` of them
     /// share a leaf.
     pub fn build(
@@ -71,7 +71,7 @@ impl Boxes {
         corners: impl Fn(usize) -> [[f32; 3]; 2],
         in_leaf: usize,
         quality: BvhBuildParams,
-    ) -> Built {
+    ) -> Bvh8Build {
         let around = |i: usize| {
             let [low, high] = corners(i).map(Vec3A::from_array);
             Aabb::new(low, high)
@@ -79,7 +79,7 @@ impl Boxes {
         let boxes: Vec<Aabb> = (0..count).map(around).collect();
         let params = BvhBuildParams { max_prims_per_leaf: in_leaf as u32, ..quality };
         let binary = build_bvh2(&boxes, params, &mut Duration::default());
-        let mut built = Built {
+        let mut built = Bvh8Build {
             boxes: Self { branches: Vec::new(), depth: 0 },
             order: Vec::new(),
             leaves: Vec::new(),
@@ -90,7 +90,7 @@ impl Boxes {
     }
 
     /// The branches; the first is the root.
-    pub fn branches(&self) -> &[Branch] {
+    pub fn branches(&self) -> &[Bvh8Node] {
         &self.branches
     }
 
@@ -101,24 +101,24 @@ impl Boxes {
 
     /// Memory that it takes \[bytes\].
     pub fn bytes(&self) -> usize {
-        size_of::<Branch>() * self.branches.len()
+        size_of::<Bvh8Node>() * self.branches.len()
     }
 }
 
-impl Built {
+impl Bvh8Build {
     /// Makes branches and leaves of the nodes of a binary tree.
     fn join(&mut self, binary: &Bvh2) {
         let nodes = &binary.nodes;
-        let groups = Groups::of(nodes);
+        let groups = CollapsePlan::of(nodes);
         let mut todo = vec![(0usize, 0usize, 1usize)];
         let branches = &mut self.boxes.branches;
-        branches.push(NO_BOX);
-        let mut inside = Vec::with_capacity(WIDE);
+        branches.push(EMPTY_NODE);
+        let mut inside = Vec::with_capacity(BVH_WIDTH);
         while let Some((node, branch, depth)) = todo.pop() {
             self.boxes.depth = self.boxes.depth.max(depth);
             inside.clear();
             groups.inside(nodes, node, &mut inside);
-            let mut new = NO_BOX;
+            let mut new = EMPTY_NODE;
             for (i, node) in inside.iter().enumerate() {
                 let n = &nodes[*node];
                 let (low, high) = (n.aabb().min.to_array(), n.aabb().max.to_array());
@@ -127,12 +127,12 @@ impl Built {
                     new.sides[axis + 3][i] = high[axis];
                 }
                 if n.is_leaf() {
-                    new.child[i] = LEAF | self.leaves.len() as u32;
+                    new.child[i] = LEAF_FLAG | self.leaves.len() as u32;
                     self.leaves.push((n.first_index, n.prim_count));
                 } else {
                     new.child[i] = branches.len() as u32;
                     todo.push((*node, branches.len(), depth + 1));
-                    branches.push(NO_BOX);
+                    branches.push(EMPTY_NODE);
                 }
             }
             branches[branch] = new;
@@ -143,18 +143,18 @@ impl Built {
 /// How the nodes of a binary tree are joined to branches so that a random ray meets the fewest: the sum
 /// of the areas of the boxes around branches is the least (Ylitie, Karras and Laine 2017, *Efficient
 /// Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*, without their choice of leaves).
-struct Groups {
-    /// For each node and each number of boxes from 1 to [`WIDE`], how many of these the first child's part
+struct CollapsePlan {
+    /// For each node and each number of boxes from 1 to [`BVH_WIDTH`], how many of these the first child's part
     /// of the tree takes, and how many the second's; none: the node's own box is one of them. For one box:
     /// the split of the branch that the node becomes.
-    splits: Vec<[[u8; 2]; WIDE]>,
+    splits: Vec<[[u8; 2]; BVH_WIDTH]>,
 }
 
-impl Groups {
+impl CollapsePlan {
     fn of(nodes: &[Bvh2Node]) -> Self {
-        let mut splits = vec![[[0; 2]; WIDE]; nodes.len()];
+        let mut splits = vec![[[0; 2]; BVH_WIDTH]; nodes.len()];
         // The least sum of areas of a node's part of the tree in at most so many boxes.
-        let mut costs = vec![[0.0f32; WIDE]; nodes.len()];
+        let mut costs = vec![[0.0f32; BVH_WIDTH]; nodes.len()];
         // Branches of boxes without an area are not for nothing.
         let least_area = 1e-7 * nodes[0].aabb().half_area() + f32::MIN_POSITIVE;
         let mut order = vec![0];
@@ -181,10 +181,10 @@ impl Groups {
                     (cost, split.map(|boxes| boxes as u8))
                 })
             };
-            let (inside, split) = least(WIDE);
-            let mut cost = [inside + node.aabb().half_area() + least_area; WIDE];
+            let (inside, split) = least(BVH_WIDTH);
+            let mut cost = [inside + node.aabb().half_area() + least_area; BVH_WIDTH];
             splits[number][0] = split;
-            for boxes in 2..=WIDE {
+            for boxes in 2..=BVH_WIDTH {
                 let (apart, split) = least(boxes);
                 (cost[boxes - 1], splits[number][boxes - 1]) =
                     if apart < cost[0] { (apart, split) } else { (cost[0], [0; 2]) };
@@ -196,7 +196,7 @@ impl Groups {
 
     /// Collects the nodes whose boxes the branch holds that `node` becomes.
     fn inside(&self, nodes: &[Bvh2Node], node: usize, out: &mut Vec<usize>) {
-        let mut todo = Vec::with_capacity(WIDE);
+        let mut todo = Vec::with_capacity(BVH_WIDTH);
         let split = |todo: &mut Vec<(usize, u8)>, node: usize, [left, right]: [u8; 2]| {
             let first = nodes[node].first_index as usize;
             todo.extend([(first + 1, right), (first, left)]);
@@ -228,8 +228,7 @@ mod tests {
 
     /// Everything lies in one leaf, and in all the boxes on the way to it.
     fn holds(count: usize, size: f32, in_leaf: usize) {
-        let built =
-            Boxes::build(count, |i| corners(i, size), in_leaf, BvhBuildParams::fast_build());
+        let built = Bvh8::build(count, |i| corners(i, size), in_leaf, BvhBuildParams::fast_build());
         let (boxes, mut met) = (&built.boxes, vec![0; count]);
         let mut todo = vec![(0u32, 1, Vec::new())];
         let mut deepest = 0;
@@ -240,11 +239,11 @@ mod tests {
                 let mut around: Vec<[f32; 6]> = around.clone();
                 around.push(branch.sides.map(|side| side[place]));
                 let child = branch.child[place];
-                if child & LEAF == 0 {
+                if child & LEAF_FLAG == 0 {
                     todo.push((child, depth + 1, around));
                     continue;
                 }
-                let (first, things) = built.leaves[(child & !LEAF) as usize];
+                let (first, things) = built.leaves[(child & !LEAF_FLAG) as usize];
                 assert!((1..=in_leaf).contains(&(things as usize)), "{things} things in a leaf");
                 for thing in &built.order[first as usize..][..things as usize] {
                     met[*thing as usize] += 1;

@@ -5,5 +5,5 @@ pub(crate) mod packet;
 mod ray;
 pub(crate) mod single;
 
-pub use build::{Boxes, Branch, Built, LEAF, WIDE};
+pub use build::{BVH_WIDTH, Bvh8, Bvh8Build, Bvh8Node, LEAF_FLAG};
 pub use ray::{Hit, Ray};

@@ -7,42 +7,42 @@
 //! operations, as a packet whose bounds coincide.
 
 use crate::bvh::Ray;
-use crate::bvh::{Boxes, Branch, LEAF, WIDE};
-use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 
 /// A packet as boxes want it.
 #[derive(Clone, Copy)]
-pub struct Beam<L> {
+pub struct SlabPacket<L> {
     /// Origins, moved up and down by what the things' own tests round off.
-    pub(crate) above: V3<L>,
-    pub(crate) below: V3<L>,
+    pub(crate) above: Vec3<L>,
+    pub(crate) below: Vec3<L>,
     /// One over the directions, never infinite.
-    pub(crate) inverse: V3<L>,
+    pub(crate) inverse: Vec3<L>,
 }
 
-impl<L: Lanes> Beam<L> {
+impl<L: SimdFloat> SlabPacket<L> {
     /// Rays that meet boxes as if these were larger by `pad` on both sides of each axis.
     #[inline(always)]
-    pub fn new(ray: &Ray<L>, pad: V3<L>) -> Self {
+    pub fn new(ray: &Ray<L>, pad: Vec3<L>) -> Self {
         let safe = |d: L| L::one() / d.abs().max(L::of(1e-30)).copysign(d);
         let d = ray.direction;
-        let inverse = V3::new(safe(d.x), safe(d.y), safe(d.z));
+        let inverse = Vec3::new(safe(d.x), safe(d.y), safe(d.z));
         Self { above: ray.origin + pad, below: ray.origin - pad, inverse }
     }
 
     /// Which rays enter box `i` of a branch no farther than `limit`.
     #[inline(always)]
-    fn meets(&self, branch: &Branch, i: usize, limit: L) -> L::Mask {
+    fn meets(&self, branch: &Bvh8Node, i: usize, limit: L) -> L::Mask {
         let corner = |k: usize| {
             let axis = |a: usize| all(branch.sides[k + a][i]);
-            V3::new(axis(0), axis(1), axis(2))
+            Vec3::new(axis(0), axis(1), axis(2))
         };
         self.enters(corner(0), corner(3), limit)
     }
 
     /// Which rays enter the box between the corners `low` and `high` no farther than `limit`.
     #[inline(always)]
-    pub fn enters(&self, low: V3<L>, high: V3<L>, limit: L) -> L::Mask {
+    pub fn enters(&self, low: Vec3<L>, high: Vec3<L>, limit: L) -> L::Mask {
         let a = (low - self.above).times(self.inverse);
         let b = (high - self.below).times(self.inverse);
         let near = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z)).max(L::zero());
@@ -53,8 +53,8 @@ impl<L: Lanes> Beam<L> {
 
 /// Bounds of rays that run the same way along each axis: of one ray, or of several.
 #[derive(Clone, Copy, Default)]
-pub struct Sheaf<S> {
-    /// By axis, which side of a box they meet first, and which last: as in [`Branch::sides`].
+pub struct PacketBounds<S> {
+    /// By axis, which side of a box they meet first, and which last: as in [`Bvh8Node::sides`].
     pub(crate) near: [usize; 3],
     pub(crate) far: [usize; 3],
     /// What is taken from the near sides, and from the far ones.
@@ -64,10 +64,10 @@ pub struct Sheaf<S> {
     pub(crate) inverse: [[S; 3]; 2],
 }
 
-impl<S: Real> Sheaf<S> {
+impl<S: Float> PacketBounds<S> {
     /// Of the rays of some lanes, at least one; `None`: they do not run the same way.
     #[inline(always)]
-    pub fn around<L: Lanes<Scalar = S>>(beam: &Beam<L>, lanes: u32) -> Option<Self> {
+    pub fn around<L: SimdFloat<Scalar = S>>(beam: &SlabPacket<L>, lanes: u32) -> Option<Self> {
         let d = beam.inverse;
         for axis in [d.x, d.y, d.z] {
             let down = axis.lt(L::zero()).bits() & lanes;
@@ -93,25 +93,25 @@ impl<S: Real> Sheaf<S> {
     }
 
     /// Where at the earliest one of the rays enters boxes whose `side`s are given, as in
-    /// [`Branch::sides`], and which of them one may enter no farther than `limit`. `ONE`: it is one ray.
+    /// [`Bvh8Node::sides`], and which of them one may enter no farther than `limit`. `ONE`: it is one ray.
     ///
     /// Differences and products are monotonic even when rounded, so that the bounds hold for whatever
-    /// [`Beam::meets`] finds.
+    /// [`SlabPacket::meets`] finds.
     #[inline(always)]
-    pub fn meets<const ONE: bool, L: Lanes<Scalar = S>>(
+    pub fn meets<const ONE: bool, L: SimdFloat<Scalar = S>>(
         &self,
         side: impl Fn(usize) -> L,
         limit: L,
     ) -> (L, L::Mask) {
-        let of = |[x, y, z]: [usize; 3]| V3::new(side(x), side(y), side(z));
-        let [low, high] = self.inverse.map(V3::splat);
-        let near = of(self.near) - V3::splat(self.near_origin);
-        let far = of(self.far) - V3::splat(self.far_origin);
+        let of = |[x, y, z]: [usize; 3]| Vec3::new(side(x), side(y), side(z));
+        let [low, high] = self.inverse.map(Vec3::splat);
+        let near = of(self.near) - Vec3::splat(self.near_origin);
+        let far = of(self.far) - Vec3::splat(self.far_origin);
         let (mut first, mut last) = (near.times(low), far.times(low));
         if !ONE {
             let (a, b) = (near.times(high), far.times(high));
-            first = V3::new(first.x.min(a.x), first.y.min(a.y), first.z.min(a.z));
-            last = V3::new(last.x.max(b.x), last.y.max(b.y), last.z.max(b.z));
+            first = Vec3::new(first.x.min(a.x), first.y.min(a.y), first.z.min(a.z));
+            last = Vec3::new(last.x.max(b.x), last.y.max(b.y), last.z.max(b.z));
         }
         let first = first.x.max(first.y).max(first.z).max(L::zero());
         let last = last.x.min(last.y).min(last.z) * grown();
@@ -121,8 +121,8 @@ impl<S: Real> Sheaf<S> {
 
 /// The smallest and the largest coordinates in the lanes `here`, of which `first` is one.
 #[inline(always)]
-fn ends<L: Lanes>(v: V3<L>, here: L::Mask, first: usize) -> ([L::Scalar; 3], [L::Scalar; 3]) {
-    let v = V3::select(here, v, V3::splat(v.lane(first)));
+fn ends<L: SimdFloat>(v: Vec3<L>, here: L::Mask, first: usize) -> ([L::Scalar; 3], [L::Scalar; 3]) {
+    let v = Vec3::select(here, v, Vec3::splat(v.lane(first)));
     let [x, y, z] = [v.x.extremes(), v.y.extremes(), v.z.extremes()];
     ([x.0, y.0, z.0], [x.1, y.1, z.1])
 }
@@ -130,31 +130,31 @@ fn ends<L: Lanes>(v: V3<L>, here: L::Mask, first: usize) -> ([L::Scalar; 3], [L:
 /// The far side of a box moves out by some roundings, so that no hit is lost (Ize 2013, *Robust BVH
 /// Ray Traversal*).
 #[inline(always)]
-fn grown<L: Lanes>() -> L {
+fn grown<L: SimdFloat>() -> L {
     L::of(1.0 + 8.0 * L::EPSILON)
 }
 
 /// One number in all lanes.
 #[inline(always)]
-pub fn all<L: Lanes>(x: f32) -> L {
+pub fn all<L: SimdFloat>(x: f32) -> L {
     L::splat(L::Scalar::of(f64::from(x)))
 }
 
 /// Part `part` of eight numbers, in lanes; lanes beyond them repeat.
 #[inline(always)]
-pub fn lanes_of<L: Lanes>(numbers: &[f32; WIDE], part: usize) -> L {
-    L::from_fn(|i| L::Scalar::of(f64::from(numbers[(part * L::WIDTH + i) % WIDE])))
+pub fn lanes_of<L: SimdFloat>(numbers: &[f32; BVH_WIDTH], part: usize) -> L {
+    L::from_fn(|i| L::Scalar::of(f64::from(numbers[(part * L::WIDTH + i) % BVH_WIDTH])))
 }
 
 /// The lanes of a part that do not repeat.
 #[inline(always)]
 pub const fn fresh() -> u32 {
-    (1 << WIDE) - 1
+    (1 << BVH_WIDTH) - 1
 }
 
 /// What waits to be visited: a child of a branch, and where it is entered.
 #[derive(Clone, Copy, Default)]
-pub struct Entry<S> {
+pub struct StackEntry<S> {
     child: u32,
     near: S,
 }
@@ -164,7 +164,7 @@ pub struct Entry<S> {
 #[inline(always)]
 pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     things: usize,
-    boxes: &Boxes,
+    boxes: &Bvh8,
     walk: impl FnOnce(&mut [T]) -> R,
 ) -> R {
     let room = things * boxes.depth();
@@ -179,7 +179,7 @@ pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
 
 /// Puts an entry on the stack, above those that are entered later, of the ones from `base` on.
 #[inline(always)]
-fn push<S: Real>(stack: &mut [Entry<S>], base: usize, top: &mut usize, entry: Entry<S>) {
+fn push<S: Float>(stack: &mut [StackEntry<S>], base: usize, top: &mut usize, entry: StackEntry<S>) {
     let mut at = *top;
     while at > base && stack[at - 1].near < entry.near {
         stack[at] = stack[at - 1];
@@ -193,23 +193,23 @@ fn push<S: Real>(stack: &mut [Entry<S>], base: usize, top: &mut usize, entry: En
 /// first that are nearer as far as `bounds` knows; `leaf` returns the distances beyond which nothing
 /// matters any more. `bounds`: of the lanes whose limit is not negative, if they have any.
 #[inline(always)]
-pub fn together<L: Lanes>(
-    boxes: &Boxes,
-    (beam, bounds): (&Beam<L>, Option<&Sheaf<L::Scalar>>),
+pub fn together<L: SimdFloat>(
+    boxes: &Bvh8,
+    (beam, bounds): (&SlabPacket<L>, Option<&PacketBounds<L::Scalar>>),
     mut limit: L,
-    stack: &mut [Entry<L::Scalar>],
+    stack: &mut [StackEntry<L::Scalar>],
     mut leaf: impl FnMut(usize, L) -> L,
 ) {
     let mut farthest = limit.extremes().1;
     let (mut top, mut child) = (0, 0);
     loop {
-        if child & LEAF != 0 {
-            limit = leaf((child & !LEAF) as usize, limit);
+        if child & LEAF_FLAG != 0 {
+            limit = leaf((child & !LEAF_FLAG) as usize, limit);
             farthest = limit.extremes().1;
         } else {
             let branch = &boxes.branches()[child as usize];
             let base = top;
-            for part in 0..WIDE.div_ceil(L::WIDTH) {
+            for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
                 let side = |k: usize| lanes_of(&branch.sides[k], part);
                 let (near, met) = match bounds {
                     Some(bounds) => bounds.meets::<false, L>(side, L::splat(farthest)),
@@ -223,7 +223,7 @@ pub fn together<L: Lanes>(
                     let place = part * L::WIDTH + i;
                     if beam.meets(branch, place, limit).any() {
                         let child = branch.child[place];
-                        push(stack, base, &mut top, Entry { child, near: near.lane(i) });
+                        push(stack, base, &mut top, StackEntry { child, near: near.lane(i) });
                     }
                 }
             }

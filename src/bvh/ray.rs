@@ -1,20 +1,20 @@
 //! Ray packets and the nearest hits found along them.
 
-use crate::lanes::{Lanes, Mask, V3};
+use crate::lanes::{Mask, SimdFloat, Vec3};
 
 /// A packet of half-lines.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray<L> {
     /// Origins.
-    pub origin: V3<L>,
+    pub origin: Vec3<L>,
     /// Directions, of unit length.
-    pub direction: V3<L>,
+    pub direction: Vec3<L>,
 }
 
-impl<L: Lanes> Ray<L> {
+impl<L: SimdFloat> Ray<L> {
     /// The point at distance `t`.
     #[inline(always)]
-    pub fn at(&self, t: L) -> V3<L> {
+    pub fn at(&self, t: L) -> Vec3<L> {
         self.direction.mul_add(t, self.origin)
     }
 
@@ -23,8 +23,8 @@ impl<L: Lanes> Ray<L> {
     #[inline(always)]
     pub(crate) fn spread(&self, lanes: u32, turn: f64, shift: f64) -> bool {
         let lane = lanes.trailing_zeros() as usize;
-        let turned = self.direction - V3::splat(self.direction.lane(lane));
-        let shifted = self.origin - V3::splat(self.origin.lane(lane));
+        let turned = self.direction - Vec3::splat(self.direction.lane(lane));
+        let shifted = self.origin - Vec3::splat(self.origin.lane(lane));
         let near = turned.length2().le(L::of(turn * turn)) & shifted.max_abs().le(L::of(shift));
         near.bits() & lanes == lanes
     }
@@ -41,7 +41,7 @@ pub struct Hit<L> {
     pub facet: L,
 }
 
-impl<L: Lanes> Hit<L> {
+impl<L: SimdFloat> Hit<L> {
     /// Nothing met.
     #[inline(always)]
     pub fn none() -> Self {

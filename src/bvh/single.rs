@@ -5,16 +5,16 @@
 //! not in order: the nearest of them is looked for when it is needed, without a jump. For what costs time
 //! with random rays, but for memory, is jumps that the processor foretells wrongly.
 
-use crate::bvh::packet::{Beam, Sheaf, fresh, lanes_of};
-use crate::bvh::{Boxes, Branch, LEAF, WIDE};
-use crate::lanes::{Lanes, MAX_WIDTH, Mask, Real, V3, prefetch};
+use crate::bvh::packet::{PacketBounds, SlabPacket, fresh, lanes_of};
+use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
+use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 
 /// The boxes of a branch that a ray enters and that it has not visited.
 #[derive(Clone, Copy, Default)]
-pub struct Frame {
+pub struct StackFrame {
     /// By place, where the box is entered: the bits of a float, rounded down, the last three of them the
     /// place, so that the least key is the nearest box. [`NO_KEY`] and above: none.
-    keys: [u32; WIDE],
+    keys: [u32; BVH_WIDTH],
     branch: u32,
     /// How many there are.
     left: u32,
@@ -24,12 +24,12 @@ pub struct Frame {
 const NO_KEY: u32 = 0x7f80_0000;
 
 /// The bits of a key that tell the place.
-const PLACE: u32 = WIDE as u32 - 1;
+const PLACE: u32 = BVH_WIDTH as u32 - 1;
 
 /// One of the rays that take turns.
 #[derive(Clone, Copy, Default)]
-struct Walker<S> {
-    ray: Sheaf<S>,
+struct RayTraversal<S> {
+    ray: PacketBounds<S>,
     limit: S,
     /// Where it goes next.
     child: u32,
@@ -42,25 +42,25 @@ struct Walker<S> {
 /// more. `lanes`: those that go. `soon(leaf)` is called before a leaf is needed. `frames`: as many for each
 /// lane as the tree is deep.
 #[inline(never)]
-pub fn apart<L: Lanes>(
-    boxes: &Boxes,
-    (beam, limit): (&Beam<L>, L),
+pub fn apart<L: SimdFloat>(
+    boxes: &Bvh8,
+    (beam, limit): (&SlabPacket<L>, L),
     lanes: u32,
-    frames: &mut [Frame],
+    frames: &mut [StackFrame],
     soon: impl Fn(usize),
     mut leaf: impl FnMut(usize, usize, L::Scalar) -> L::Scalar,
 ) {
     let room = boxes.depth();
-    let mut walkers = Walker::each(beam, limit);
+    let mut walkers = RayTraversal::each(beam, limit);
     // Those whose next is a branch, and those whose next is a leaf.
     let (mut at_branch, mut at_leaf) = (lanes, 0u32);
     while at_branch | at_leaf != 0 {
         let (mut branches, mut leaves) = (at_branch, at_leaf);
         (at_branch, at_leaf) = (0, 0);
         let mut go = |lane: usize, child: u32| {
-            if child & LEAF != 0 {
+            if child & LEAF_FLAG != 0 {
                 at_leaf |= 1 << lane;
-                soon((child & !LEAF) as usize);
+                soon((child & !LEAF_FLAG) as usize);
             } else {
                 at_branch |= 1 << lane;
                 fetch(&boxes.branches()[child as usize]);
@@ -78,7 +78,7 @@ pub fn apart<L: Lanes>(
             let lane = leaves.trailing_zeros() as usize % L::WIDTH;
             leaves &= leaves - 1;
             let (walker, frames) = (&mut walkers[lane], &mut frames[lane * room..][..room]);
-            walker.limit = leaf(lane, (walker.child & !LEAF) as usize, walker.limit);
+            walker.limit = leaf(lane, (walker.child & !LEAF_FLAG) as usize, walker.limit);
             if walker.next(boxes, frames) {
                 go(lane, walker.child);
             }
@@ -88,7 +88,7 @@ pub fn apart<L: Lanes>(
 
 /// Begins to bring a branch from memory.
 #[inline(always)]
-fn fetch(branch: &Branch) {
+fn fetch(branch: &Bvh8Node) {
     let [a, _, b, _, c, _] = &branch.sides;
     prefetch(a);
     prefetch(b);
@@ -98,21 +98,21 @@ fn fetch(branch: &Branch) {
 
 /// Takes the least key; the others stay.
 #[inline(always)]
-fn take(keys: &mut [u32; WIDE]) -> u32 {
+fn take(keys: &mut [u32; BVH_WIDTH]) -> u32 {
     let least = keys.iter().fold(u32::MAX, |least, key| least.min(*key));
     *keys = keys.map(|key| if key == least { NO_KEY } else { key });
     least
 }
 
-impl<S: Real> Walker<S> {
+impl<S: Float> RayTraversal<S> {
     /// Each lane's, at the root.
     #[inline(always)]
-    fn each<L: Lanes<Scalar = S>>(beam: &Beam<L>, limit: L) -> [Self; MAX_WIDTH] {
+    fn each<L: SimdFloat<Scalar = S>>(beam: &SlabPacket<L>, limit: L) -> [Self; MAX_WIDTH] {
         let d = beam.inverse;
         let back = [d.x, d.y, d.z].map(|d| d.lt(L::zero()).bits() as usize);
-        let select = |yes: V3<L>, no: V3<L>| {
+        let select = |yes: Vec3<L>, no: Vec3<L>| {
             let axis = |d: L, yes, no| L::select(d.lt(L::zero()), yes, no);
-            V3::new(axis(d.x, yes.x, no.x), axis(d.y, yes.y, no.y), axis(d.z, yes.z, no.z))
+            Vec3::new(axis(d.x, yes.x, no.x), axis(d.y, yes.y, no.y), axis(d.z, yes.z, no.z))
         };
         let near_origin = select(beam.below, beam.above);
         let far_origin = select(beam.above, beam.below);
@@ -120,7 +120,7 @@ impl<S: Real> Walker<S> {
         for (lane, walker) in each.iter_mut().enumerate().take(L::WIDTH) {
             let back = back.map(|back| back >> lane & 1);
             walker.limit = limit.lane(lane);
-            walker.ray = Sheaf {
+            walker.ray = PacketBounds {
                 near: std::array::from_fn(|a| a + 3 * back[a]),
                 far: std::array::from_fn(|a| a + 3 - 3 * back[a]),
                 near_origin: near_origin.lane(lane),
@@ -134,10 +134,10 @@ impl<S: Real> Walker<S> {
     /// Goes to the nearest of the boxes of the branch at hand that the ray enters and makes a frame of the
     /// others; false: it enters none.
     #[inline(always)]
-    fn open<L: Lanes<Scalar = S>>(&mut self, boxes: &Boxes, frames: &mut [Frame]) -> bool {
+    fn open<L: SimdFloat<Scalar = S>>(&mut self, boxes: &Bvh8, frames: &mut [StackFrame]) -> bool {
         let branch = &boxes.branches()[self.child as usize];
-        let (mut keys, mut met) = ([NO_KEY; WIDE], 0);
-        for part in 0..WIDE.div_ceil(L::WIDTH) {
+        let (mut keys, mut met) = ([NO_KEY; BVH_WIDTH], 0);
+        for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
             let side = |k: usize| lanes_of::<L>(&branch.sides[k], part);
             let (near, enters) = self.ray.meets::<true, L>(side, L::splat(self.limit));
             let first = part * L::WIDTH;
@@ -155,7 +155,7 @@ impl<S: Real> Walker<S> {
         let place = take(&mut keys) & PLACE;
         // Written even if nothing is left: a branch less to foretell.
         let left = met.count_ones() - 1;
-        frames[self.frames] = Frame { keys, branch: self.child, left };
+        frames[self.frames] = StackFrame { keys, branch: self.child, left };
         self.frames += usize::from(left != 0);
         self.child = branch.child[place as usize];
         true
@@ -163,7 +163,7 @@ impl<S: Real> Walker<S> {
 
     /// Goes to the nearest box of the last frame that still matters; false: there is none.
     #[inline(always)]
-    fn next(&mut self, boxes: &Boxes, frames: &mut [Frame]) -> bool {
+    fn next(&mut self, boxes: &Bvh8, frames: &mut [StackFrame]) -> bool {
         while self.frames > 0 {
             let frame = &mut frames[self.frames - 1];
             let least = take(&mut frame.keys);

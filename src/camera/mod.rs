@@ -3,9 +3,9 @@
 mod navigate;
 mod pinhole;
 
-pub use pinhole::View;
+pub use pinhole::PinholeCamera;
 
-use crate::value::{Checks, Fault, Field, Range, Takes, unit};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType, unit};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -74,49 +74,49 @@ impl Default for Camera {
 pub const FIELDS: &[Field] = &[
     Field::preset(
         "eye",
-        Takes::Numbers(3, Range::COORDINATE),
+        ValueType::Numbers(3, NumberRange::COORDINATE),
         "scene units",
         "[0.0, 1.0, 5.0]",
         "Where the picture is taken from.",
     ),
     Field::without(
         "target",
-        Takes::Numbers(3, Range::COORDINATE),
+        ValueType::Numbers(3, NumberRange::COORDINATE),
         "scene units",
         "`direction` is needed",
         "The point looked at. Exactly one of `target` and `direction` is given.",
     ),
     Field::without(
         "direction",
-        Takes::Direction,
+        ValueType::Direction,
         "",
         "`target` is needed",
         "The direction looked in.",
     ),
     Field::preset(
         "up",
-        Takes::Direction,
+        ValueType::Direction,
         "",
         "[0.0, 1.0, 0.0]",
         "What is up in the picture; not parallel to the view direction.",
     ),
     Field::preset(
         "view_angle",
-        Takes::OneOf(VIEW_ANGLES),
+        ValueType::OneOf(VIEW_ANGLES),
         "",
         "{ vertical = 40.0 }",
         "Opening angle, across the height or across the width of the picture.",
     ),
     Field::preset(
         "near",
-        Takes::Number(Range::closed(0.0, 1e9)),
+        ValueType::Number(NumberRange::closed(0.0, 1e9)),
         "scene units",
         "0.0",
         "Nothing nearer than this, measured along the view direction, is seen.",
     ),
 ];
 
-const ANGLE: Takes = Takes::Number(Range::between(0.0, 180.0));
+const ANGLE: ValueType = ValueType::Number(NumberRange::between(0.0, 180.0));
 const VIEW_ANGLES: &[Field] = &[
     Field::required("vertical", ANGLE, "degrees", "Across the picture's height."),
     Field::required("horizontal", ANGLE, "degrees", "Across the picture's width."),
@@ -145,26 +145,26 @@ impl Camera {
     }
 
     /// What is wrong with it.
-    pub fn faults(&self) -> Vec<Fault> {
+    pub fn faults(&self) -> Vec<ValidationError> {
         let (key, degrees) = self.view_angle.key_degrees();
-        let mut angle = Checks::new(VIEW_ANGLES).numbers(key, &[degrees]).faults();
+        let mut angle = Validator::new(VIEW_ANGLES).numbers(key, &[degrees]).faults();
         for fault in &mut angle {
             fault.found = format!("view_angle.{}", fault.found);
         }
         let given = match (&self.target, &self.direction) {
-            (None, None) => Some(Fault::new(
+            (None, None) => Some(ValidationError::new(
                 "",
                 "neither target nor direction is given",
                 "exactly one of them, such as target = [0.0, 0.0, 0.0]",
             )),
-            (Some(_), Some(_)) => Some(Fault::new(
+            (Some(_), Some(_)) => Some(ValidationError::new(
                 "direction",
                 "both target and direction are given",
                 "exactly one of them",
             )),
             _ => None,
         };
-        let checks = Checks::new(FIELDS)
+        let checks = Validator::new(FIELDS)
             .numbers("eye", &self.eye)
             .maybe("target", self.target.as_ref().map(|t| &t[..]))
             .maybe("direction", self.direction.as_ref().map(|d| &d[..]))
@@ -177,9 +177,9 @@ impl Camera {
     }
 
     /// What makes a picture impossible although every number is in its range.
-    fn lost(&self) -> Option<Fault> {
+    fn lost(&self) -> Option<ValidationError> {
         let Some(view) = self.view() else {
-            return Some(Fault::new(
+            return Some(ValidationError::new(
                 "target",
                 "target is the eye itself, which leaves no direction to look in",
                 "a target away from the eye",
@@ -188,7 +188,7 @@ impl Camera {
         let up = unit(self.up)?;
         // Within 1e-6 of parallel the picture's sides are noise.
         (view.cross(up).length() <= 1e-6).then(|| {
-            Fault::new(
+            ValidationError::new(
                 "up",
                 "up is parallel to the view direction, so that the picture could lie any way round",
                 "an `up` across the view direction, such as [0.0, 0.0, -1.0] when looking down",

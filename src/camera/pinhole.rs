@@ -1,14 +1,14 @@
 //! The camera, compiled: rays from pixels.
 
 use crate::camera::{Camera, ViewAngle};
-use crate::lanes::{Lanes, Real, V3};
+use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::value::unit;
 use glam::DVec3;
 
 /// A pinhole camera with its raster. Directions of pixels are computed in double precision and
 /// rounded once; only the offset inside the pixel is computed in the kernel's.
 #[derive(Clone, Copy, Debug)]
-pub struct View {
+pub struct PinholeCamera {
     eye: DVec3,
     /// Right, up and forward, orthonormal.
     u: DVec3,
@@ -22,7 +22,7 @@ pub struct View {
     near: f64,
 }
 
-impl View {
+impl PinholeCamera {
     /// Compiles `camera` for a film of `width` x `height` pixels, in a scene shifted so that `origin`
     /// becomes zero.
     ///
@@ -115,19 +115,19 @@ impl View {
 
     /// From the eye to the corner of a pixel, on the plane at unit distance.
     #[inline(always)]
-    pub fn toward<S: Real>(&self, (x, y): (u32, u32)) -> [S; 3] {
+    pub fn toward<S: Float>(&self, (x, y): (u32, u32)) -> [S; 3] {
         let corner = self.corner + self.right * f64::from(x) + self.down * f64::from(y);
         corner.to_array().map(S::of)
     }
 
-    /// Origins and unit directions of rays through points of pixels: `base` as [`View::toward`] gives it, `(dx,
+    /// Origins and unit directions of rays through points of pixels: `base` as [`PinholeCamera::toward`] gives it, `(dx,
     /// dy)` from there to the right and downward \[pixels\]. They begin on the near plane.
     #[inline(always)]
-    pub fn rays<L: Lanes>(&self, base: V3<L>, (dx, dy): (L, L)) -> (V3<L>, V3<L>) {
-        let right = V3::of(self.right.to_array());
-        let down = V3::of(self.down.to_array());
+    pub fn rays<L: SimdFloat>(&self, base: Vec3<L>, (dx, dy): (L, L)) -> (Vec3<L>, Vec3<L>) {
+        let right = Vec3::of(self.right.to_array());
+        let down = Vec3::of(self.down.to_array());
         let toward = right.mul_add(dx, down.mul_add(dy, base));
-        let eye = V3::of(self.eye.to_array());
+        let eye = Vec3::of(self.eye.to_array());
         // At unit distance along w, `toward` reaches the plane at distance `near` after `near` steps.
         let origin = if self.near > 0.0 { toward.mul_add(L::of(self.near), eye) } else { eye };
         (origin, toward.normalize())

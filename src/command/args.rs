@@ -71,7 +71,7 @@ pub enum Command {
 /// Arguments of `zerkalo render`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "Rendering stops at whichever of --spp, --noise, --rmse and --time is reached \
+    after_help = "RenderState stops at whichever of --spp, --noise, --rmse and --time is reached \
                         first; with none of them, at --noise 0.5."
 )]
 pub struct RenderArgs {

@@ -1,6 +1,6 @@
 //! What is told while files are read that a scene names.
 
-use crate::asset::{Assets, Stage};
+use crate::asset::{Assets, LoadProgress};
 use crate::command::warn;
 use std::io::IsTerminal;
 use std::sync::Arc;
@@ -21,10 +21,10 @@ impl Told {
     pub fn new() -> Self {
         let aloud = Arc::new(AtomicBool::new(std::io::stderr().is_terminal()));
         let heard = aloud.clone();
-        let tell = move |stage: &Stage| {
+        let tell = move |stage: &LoadProgress| {
             let large = match stage {
-                Stage::Reading { bytes, .. } => *bytes >= LARGE.0,
-                Stage::Building { triangles, .. } => *triangles >= LARGE.1,
+                LoadProgress::Reading { bytes, .. } => *bytes >= LARGE.0,
+                LoadProgress::Building { triangles, .. } => *triangles >= LARGE.1,
             };
             if large && heard.load(Ordering::Relaxed) {
                 warn(&stage.to_string());

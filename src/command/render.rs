@@ -6,11 +6,11 @@ use crate::command::progress::Progress;
 use crate::command::signals::Signals;
 use crate::command::stats::{Stats, peak_rss_bytes};
 use crate::command::{Failure, all_threads, say, warn};
-use crate::film::{Depth, Display, Target, WriteError};
-use crate::render::export::{Origin, scene_hash};
+use crate::film::{Depth, Display, ImageOutput, WriteError};
+use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use crate::render::session::{Report, Session, State};
-use crate::render::{Options, Rendering};
+use crate::render::{Options, RenderState};
 use crate::sampling::SampleSettings;
 use crate::scene::{Document, Scene};
 use crate::world;
@@ -26,7 +26,7 @@ const POLL: Duration = Duration::from_millis(50);
 
 pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let target =
-        Target::from_path(&args.output).map_err(|error| Failure::Usage(error.to_string()))?;
+        ImageOutput::from_path(&args.output).map_err(|error| Failure::Usage(error.to_string()))?;
     let document = Document::read_with(&args.scene, Told::new().assets)
         .map_err(|e| Failure::Failed(e.to_string()))?;
     let scene = sized(document.scene(), args)?;
@@ -41,7 +41,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let signals = Signals::watch().map_err(|e| Failure::Failed(format!("no signals: {e}")))?;
 
     let threads = args.threads.map_or_else(all_threads, usize::from);
-    let mut session: Session<Rendering> =
+    let mut session: Session<RenderState> =
         Session::new(threads, options(args), schedule_settings(args)).map_err(|error| {
             Failure::Failed(format!(
                 "cannot start {threads} threads: {error}; try fewer by --threads"
@@ -113,7 +113,7 @@ enum End {
 }
 
 /// Shows progress until the work is done or a signal ends it.
-fn watch(session: &Session<Rendering>, signals: &Signals) -> Result<End, Failure> {
+fn watch(session: &Session<RenderState>, signals: &Signals) -> Result<End, Failure> {
     let mut progress = Progress::on_stderr();
     let end = loop {
         if let Some(status) = signals.caught() {
@@ -134,12 +134,12 @@ type Written = (Report, &'static str, Result<(), WriteError>);
 
 /// Writes the picture where the film lives.
 fn write(
-    session: &Session<Rendering>,
+    session: &Session<RenderState>,
     args: &RenderArgs,
-    target: &Target,
+    target: &ImageOutput,
     hash: String,
 ) -> Option<Written> {
-    let origin = Origin {
+    let origin = Provenance {
         source: args.scene.display().to_string(),
         scene_hash: hash,
         sampler: args.sampler.kind(),

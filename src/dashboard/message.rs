@@ -1,6 +1,6 @@
 //! What comes in and what goes out: everything that `update` learns, and everything that it asks for.
 
-use crate::film::{Display, Linear};
+use crate::film::{Display, LinearImage};
 use crate::render::schedule::Stop;
 use crate::render::session::Snapshot;
 use crate::scene::{SaveError, Scene, SceneErrors};
@@ -25,7 +25,7 @@ pub enum Message {
     /// The renderer has news.
     Snapshot(Box<Snapshot>),
     /// The picture that was asked for with [`Effect::Keep`], and its samples per pixel.
-    Kept(Arc<Linear>, f64),
+    Kept(Arc<LinearImage>, f64),
     /// This scene was written to this path, or not, and why. After [`Effect::Save`].
     Saved(Arc<Scene>, Result<PathBuf, SaveError>),
     /// The file was read. After [`Effect::Load`].

@@ -7,7 +7,7 @@ use crate::dashboard::layout::{Focus, Layout, Request, layout};
 use crate::dashboard::message::{Channel, Format, LeftBehind};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::overlay_layout::wrapped;
-use crate::film::{Display, Linear, Probe};
+use crate::film::{Display, LinearImage, Probe};
 use crate::render::schedule::Stop;
 use crate::render::session::Snapshot;
 use crate::scene::edit::Subject;
@@ -65,7 +65,7 @@ pub struct Inspector {
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
     /// The kept picture and its mean samples per pixel.
-    pub kept: Option<(Arc<Linear>, f64)>,
+    pub kept: Option<(Arc<LinearImage>, f64)>,
     /// What is shown.
     pub shown: Compared,
 }

@@ -1,8 +1,8 @@
 //! The film at another resolution, for displays: box averages of whatever samples exist.
 
-use crate::film::downsample::{Raster, Stale};
+use crate::film::downsample::{DirtyTile, IncrementalDownsample};
 use crate::film::film::Film;
-use crate::film::light_weights::Mix;
+use crate::film::light_weights::LightWeights;
 
 /// Means of the film over the cells of a raster, for each light group by itself, so that lights can
 /// be mixed anew without the film.
@@ -23,13 +23,13 @@ impl Thumbnail {
         Self { cols, rows, means, groups }
     }
 
-    /// Number of light groups: what a [`Mix`] for it needs weights for.
+    /// Number of light groups: what a [`LightWeights`] for it needs weights for.
     pub fn groups(&self) -> usize {
         self.groups
     }
 
     /// Radiance, `[row][column]`.
-    pub fn mixed(&self, mix: &Mix) -> Vec<[f32; 3]> {
+    pub fn mixed(&self, mix: &LightWeights) -> Vec<[f32; 3]> {
         assert_eq!(mix.weights.len(), self.groups, "weights for the groups of the film");
         let weights: Vec<_> = mix.weights.iter().map(|w| w.map(|w| w as f32)).collect();
         let cell = |means: &[f32]| {
@@ -44,7 +44,7 @@ impl Thumbnail {
 }
 
 /// Which pixels a cell covers in one direction, and how much of each.
-pub(super) struct Cover {
+pub(super) struct Coverage {
     /// First pixel.
     pub first: usize,
     /// Covered part of each pixel, from `first` on; 0..=1.
@@ -52,14 +52,14 @@ pub(super) struct Cover {
 }
 
 /// Divides `pixels` into `cells` of equal width.
-pub(super) fn covers(pixels: usize, cells: usize) -> Vec<Cover> {
+pub(super) fn covers(pixels: usize, cells: usize) -> Vec<Coverage> {
     let edge = |cell: usize| cell as f64 * pixels as f64 / cells as f64;
     let cover = |cell: usize| {
         let (from, to) = (edge(cell), edge(cell + 1));
         let first = (from as usize).min(pixels - 1);
         let last = (to.ceil() as usize).clamp(first + 1, pixels);
         let part = |p: usize| (to.min((p + 1) as f64) - from.max(p as f64)).max(0.0);
-        Cover { first, parts: (first..last).map(part).collect() }
+        Coverage { first, parts: (first..last).map(part).collect() }
     };
     (0..cells).map(cover).collect()
 }
@@ -67,7 +67,7 @@ pub(super) fn covers(pixels: usize, cells: usize) -> Vec<Cover> {
 impl Film {
     /// The picture averaged over `cols` x `rows` cells, `[row][column]`, radiance; see
     /// [`Film::thumbnail`].
-    pub fn resampled(&self, cols: usize, rows: usize, mix: &Mix) -> Vec<[f32; 3]> {
+    pub fn resampled(&self, cols: usize, rows: usize, mix: &LightWeights) -> Vec<[f32; 3]> {
         self.thumbnail(cols, rows).mixed(mix)
     }
 
@@ -76,8 +76,8 @@ impl Film {
     /// looks like the nearest one of its row that has some, a row without samples like the nearest
     /// row; a film without samples is black.
     pub fn thumbnail(&self, cols: usize, rows: usize) -> Thumbnail {
-        let mut raster = Raster::new(self, cols, rows);
-        raster.stale(self).into_iter().for_each(Stale::refresh);
+        let mut raster = IncrementalDownsample::new(self, cols, rows);
+        raster.stale(self).into_iter().for_each(DirtyTile::refresh);
         raster.thumbnail()
     }
 }
@@ -141,7 +141,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// By its definition: every pixel against every cell.
-    fn by_definition(film: &Film, cols: usize, rows: usize, mix: &Mix) -> Vec<[f64; 3]> {
+    fn by_definition(film: &Film, cols: usize, rows: usize, mix: &LightWeights) -> Vec<[f64; 3]> {
         let overlap = |cell: usize, cells: usize, pixel: usize, pixels: usize| {
             let edge = |c: usize| c as f64 * pixels as f64 / cells as f64;
             (edge(cell + 1).min((pixel + 1) as f64) - edge(cell).max(pixel as f64)).max(0.0)
@@ -174,7 +174,7 @@ mod tests {
                 let v = (x * 7 + y * 13 + r * 5) as f64;
                 vec![v, v % 11.0, 1.0, v % 3.0, 2.0, v % 17.0]
             });
-            let mix = Mix { weights: vec![[1.0, 0.5, 2.0], [0.0, 1.0, 0.25]] };
+            let mix = LightWeights { weights: vec![[1.0, 0.5, 2.0], [0.0, 1.0, 0.25]] };
             let got = film.resampled(cols, rows, &mix);
             let expected = by_definition(&film, cols, rows, &mix);
             prop_assert_eq!(got.len(), expected.len());

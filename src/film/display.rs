@@ -1,6 +1,6 @@
 //! From radiance to the numbers of a picture file: exposure, tone curve, sRGB.
 
-use crate::film::srgb_table::Curve;
+use crate::film::srgb_table::SrgbTable;
 use std::fmt;
 use std::str::FromStr;
 
@@ -62,7 +62,7 @@ impl Display {
 
     /// [`Display::codes_8`] for many pixels.
     pub fn to_8(&self) -> impl Fn([f64; 3]) -> [u8; 3] + use<> {
-        let (tone, factor, curve) = (self.tone, self.exposure_factor(), Curve::shared());
+        let (tone, factor, curve) = (self.tone, self.exposure_factor(), SrgbTable::shared());
         move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.code_8(c))
     }
 

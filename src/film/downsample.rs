@@ -2,14 +2,14 @@
 //! has changed since the last one, not what the film is large.
 
 use crate::film::TILE;
-use crate::film::box_filter::{Cover, Thumbnail, covers, spread};
+use crate::film::box_filter::{Coverage, Thumbnail, covers, spread};
 use crate::film::film::Film;
-use crate::film::light_weights::Part;
+use crate::film::light_weights::Replicates;
 use crate::film::tile::Tile;
 
 /// A raster of `cols` x `rows` cells that together cover a film. In each cell the mean of its sampled
 /// pixels, weighted by the area that the cell covers of them.
-pub struct Raster {
+pub struct IncrementalDownsample {
     layout: Layout,
     /// In the order of the film's tiles.
     parts: Vec<TilePart>,
@@ -46,15 +46,15 @@ struct TilePart {
     sums: Vec<f64>,
 }
 
-/// A tile that has changed, to be taken in by [`Stale::refresh`], on any thread.
-pub struct Stale<'a> {
+/// A tile that has changed, to be taken in by [`DirtyTile::refresh`], on any thread.
+pub struct DirtyTile<'a> {
     layout: &'a Layout,
     part: &'a mut TilePart,
     film: &'a Film,
     index: usize,
 }
 
-impl Raster {
+impl IncrementalDownsample {
     /// A raster for films like `film` (by size and groups); it has not seen any samples yet.
     pub fn new(film: &Film, cols: usize, rows: usize) -> Self {
         let size = [film.width(), film.height()];
@@ -84,13 +84,13 @@ impl Raster {
 
     /// The tiles that have changed since they were last refreshed. Always call this with the same
     /// film, which may have been restarted.
-    pub fn stale<'a>(&'a mut self, film: &'a Film) -> Vec<Stale<'a>> {
+    pub fn stale<'a>(&'a mut self, film: &'a Film) -> Vec<DirtyTile<'a>> {
         let layout = &self.layout;
         let stale = |(index, part): (usize, &'a mut TilePart)| {
             let of = film.tile(index).map(|t| (film.epoch(), t.counts(), t.lattice_px()));
             let changed = of != part.of;
             part.of = of;
-            changed.then_some(Stale { layout, part, film, index })
+            changed.then_some(DirtyTile { layout, part, film, index })
         };
         self.parts.iter_mut().enumerate().filter_map(stale).collect()
     }
@@ -127,9 +127,10 @@ impl Raster {
 
 impl Span {
     /// Of the tile that begins at pixel `start` of `pixels`.
-    fn new(start: usize, pixels: usize, covers: &[Cover]) -> Self {
+    fn new(start: usize, pixels: usize, covers: &[Coverage]) -> Self {
         let end = (start + TILE).min(pixels);
-        let touched = |cover: &Cover| cover.first < end && cover.first + cover.parts.len() > start;
+        let touched =
+            |cover: &Coverage| cover.first < end && cover.first + cover.parts.len() > start;
         let first = covers.iter().position(touched).unwrap_or(0);
         let len = covers[first.min(covers.len())..].iter().take_while(|c| touched(c)).count();
         let cells_of = |pixel: usize| {
@@ -144,7 +145,7 @@ impl Span {
     }
 }
 
-impl Stale<'_> {
+impl DirtyTile<'_> {
     /// Takes in the tile as it is now.
     pub fn refresh(self) {
         let Self { layout, part, film, index } = self;
@@ -175,7 +176,7 @@ fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], 
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {
         let sums = tile.sums(y * TILE + x);
-        let count = sums.count(Part::Both);
+        let count = sums.count(Replicates::Both);
         if count == 0 {
             continue;
         }
@@ -201,11 +202,11 @@ mod tests {
     #[test]
     fn only_what_has_changed_is_read_again() {
         let mut film = film(70, 40, &[1.0, 2.0]);
-        let mut raster = Raster::new(&film, 9, 7);
-        let refresh = |raster: &mut Raster, film: &Film| {
+        let mut raster = IncrementalDownsample::new(&film, 9, 7);
+        let refresh = |raster: &mut IncrementalDownsample, film: &Film| {
             let stale = raster.stale(film);
             let count = stale.len();
-            stale.into_iter().for_each(Stale::refresh);
+            stale.into_iter().for_each(DirtyTile::refresh);
             assert_eq!(raster.thumbnail(), film.thumbnail(9, 7));
             count
         };

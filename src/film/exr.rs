@@ -6,8 +6,8 @@
 //! contributes, summing up to the picture; `count` the samples of a pixel.
 
 use crate::film::exr_header::Ordered;
-use crate::film::light_weights::{Part, Sums};
-use crate::film::output::{Picture, Sink};
+use crate::film::light_weights::{Replicates, Sums};
+use crate::film::output::{ImageData, WriteSeek};
 use exr::block::UncompressedBlock;
 use exr::block::writer::ChunksWriter;
 use exr::compression::Compression;
@@ -20,7 +20,7 @@ use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::meta::{BlockDescription, Headers};
 use std::io;
 
-pub(super) fn encode(picture: &Picture, sink: &mut dyn Sink) -> io::Result<()> {
+pub(super) fn encode(picture: &ImageData, sink: &mut dyn WriteSeek) -> io::Result<()> {
     encode_to(picture, sink).map_err(|error| match error {
         Error::Io(error) => error,
         other => io::Error::other(other.to_string()),
@@ -31,14 +31,14 @@ pub(super) fn encode(picture: &Picture, sink: &mut dyn Sink) -> io::Result<()> {
 #[derive(Clone, Copy)]
 enum Source {
     /// Radiance of colour channel `.1` in the samples `.0`, all groups together.
-    Mixed(Part, usize),
+    Mixed(Replicates, usize),
     /// What group `.0` contributes to colour channel `.1`.
     Group(usize, usize),
     /// Samples of both replicates.
     Count,
 }
 
-fn encode_to(picture: &Picture, sink: &mut dyn Sink) -> Result<(), Error> {
+fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), Error> {
     let film = picture.film;
     let channels = channels(&layer_names(picture.group_names, film.groups()));
     let size = Vec2(film.width(), film.height());
@@ -90,9 +90,9 @@ fn text(text: &str) -> Text {
 fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
     let mut channels = vec![("count".to_string(), Source::Count)];
     for (c, color) in ["R", "G", "B"].into_iter().enumerate() {
-        channels.push((color.to_string(), Source::Mixed(Part::Both, c)));
-        channels.push((format!("A.{color}"), Source::Mixed(Part::A, c)));
-        channels.push((format!("B.{color}"), Source::Mixed(Part::B, c)));
+        channels.push((color.to_string(), Source::Mixed(Replicates::Both, c)));
+        channels.push((format!("A.{color}"), Source::Mixed(Replicates::A, c)));
+        channels.push((format!("B.{color}"), Source::Mixed(Replicates::B, c)));
         for (group, layer) in group_layers.iter().enumerate() {
             channels.push((format!("{layer}.{color}"), Source::Group(group, c)));
         }
@@ -120,7 +120,7 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
 
 /// One row of the film at a time, as the bytes of each channel.
 struct Rows<'a> {
-    picture: &'a Picture<'a>,
+    picture: &'a ImageData<'a>,
     sources: Vec<Source>,
     mixed: Vec<f64>,
     loaded: Option<usize>,
@@ -128,7 +128,7 @@ struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    fn new(picture: &'a Picture<'a>, sources: Vec<Source>) -> Self {
+    fn new(picture: &'a ImageData<'a>, sources: Vec<Source>) -> Self {
         Self {
             picture,
             mixed: picture.mix.per_unit(picture.film.scales()),
@@ -149,16 +149,17 @@ impl<'a> Rows<'a> {
             bytes.resize(picture.film.width() * 4, 0);
         }
         picture.film.visit_row(y, |x, sums| {
-            let parts = [Part::Both, Part::A, Part::B].map(|part| sums.mean(part, mixed));
+            let parts =
+                [Replicates::Both, Replicates::A, Replicates::B].map(|part| sums.mean(part, mixed));
             for (source, bytes) in sources.iter().zip(bytes.iter_mut()) {
                 let value = match *source {
-                    Source::Mixed(Part::Both, c) => (parts[0][c] as f32).to_ne_bytes(),
-                    Source::Mixed(Part::A, c) => (parts[1][c] as f32).to_ne_bytes(),
-                    Source::Mixed(Part::B, c) => (parts[2][c] as f32).to_ne_bytes(),
+                    Source::Mixed(Replicates::Both, c) => (parts[0][c] as f32).to_ne_bytes(),
+                    Source::Mixed(Replicates::A, c) => (parts[1][c] as f32).to_ne_bytes(),
+                    Source::Mixed(Replicates::B, c) => (parts[2][c] as f32).to_ne_bytes(),
                     Source::Group(group, c) => {
                         group_mean(&sums, mixed, 3 * group + c).to_ne_bytes()
                     }
-                    Source::Count => sums.count(Part::Both).to_ne_bytes(),
+                    Source::Count => sums.count(Replicates::Both).to_ne_bytes(),
                 };
                 bytes[x * 4..][..4].copy_from_slice(&value);
             }
@@ -169,8 +170,8 @@ impl<'a> Rows<'a> {
 
 /// What one group contributes to one colour channel; `i` counts `[group][channel]`.
 fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
-    match sums.count(Part::Both) {
+    match sums.count(Replicates::Both) {
         0 => 0.0,
-        count => (sums.value(Part::Both, i) * per_unit[i] / f64::from(count)) as f32,
+        count => (sums.value(Replicates::Both, i) * per_unit[i] / f64::from(count)) as f32,
     }
 }

@@ -1,7 +1,7 @@
 //! The film: tiles of integer sums, restarted lazily, added exactly.
 
 use crate::film::TILE;
-use crate::film::invalid::BadSamples;
+use crate::film::invalid::InvalidSamples;
 use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::fmt;
 
@@ -30,9 +30,9 @@ pub struct Film {
     tiles: Vec<Tile>,
 }
 
-/// A tile handed to a worker, which makes it ready (allocates or clears it) by [`Slot::open`].
+/// A tile handed to a worker, which makes it ready (allocates or clears it) by [`TileHandle::open`].
 #[derive(Debug)]
-pub struct Slot<'a> {
+pub struct TileHandle<'a> {
     /// Number of the tile.
     pub index: usize,
     /// Column and row of its upper left pixel.
@@ -41,7 +41,7 @@ pub struct Slot<'a> {
     epoch: u64,
 }
 
-impl<'a> Slot<'a> {
+impl<'a> TileHandle<'a> {
     /// The tile, ready to be added to.
     pub fn open(self) -> &'a mut Tile {
         self.tile.touch(self.epoch);
@@ -190,11 +190,11 @@ impl Film {
     ///
     /// # Panics
     /// If an index is named twice or is not below [`Film::tile_count`].
-    pub fn slots(&mut self, indices: &[usize]) -> Vec<Slot<'_>> {
+    pub fn slots(&mut self, indices: &[usize]) -> Vec<TileHandle<'_>> {
         let mut order: Vec<usize> = (0..indices.len()).collect();
         order.sort_unstable_by_key(|i| indices[*i]);
         let (columns, epoch) = (self.tile_columns(), self.epoch);
-        let mut found: Vec<Option<Slot>> = indices.iter().map(|_| None).collect();
+        let mut found: Vec<Option<TileHandle>> = indices.iter().map(|_| None).collect();
         let mut rest = self.tiles.as_mut_slice();
         let mut passed = 0;
         for i in order {
@@ -202,7 +202,7 @@ impl Film {
             assert!(index >= passed, "tile {index} is named twice");
             let (tile, after) = rest[index - passed..].split_first_mut().expect("tile in range");
             let origin = [index % columns * TILE, index / columns * TILE];
-            found[i] = Some(Slot { index, origin, tile, epoch });
+            found[i] = Some(TileHandle { index, origin, tile, epoch });
             (rest, passed) = (after, index + 1);
         }
         found.into_iter().flatten().collect()
@@ -223,8 +223,8 @@ impl Film {
     }
 
     /// Bad samples since the last restart.
-    pub fn bad_samples(&self) -> BadSamples {
-        let mut all = BadSamples::default();
+    pub fn bad_samples(&self) -> InvalidSamples {
+        let mut all = InvalidSamples::default();
         self.touched().for_each(|(_, tile)| all.merge(tile.bad()));
         all
     }

@@ -1,11 +1,11 @@
 //! Samples that are no light: NaN or negative.
 
 /// How many bad samples are remembered one by one; the rest are only counted.
-pub const BAD_REMEMBERED: usize = 16;
+pub const INVALID_REMEMBERED: usize = 16;
 
 /// Where a sample arose; enough to trace it again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct BadSample {
+pub struct InvalidSample {
     /// Index in the replicate's sequence.
     pub index: u32,
     /// 0: A, 1: B.
@@ -16,18 +16,18 @@ pub struct BadSample {
     pub x: u32,
 }
 
-/// A count of bad samples, and the first of them in the order of [`BadSample`]'s fields: an order in
+/// A count of bad samples, and the first of them in the order of [`InvalidSample`]'s fields: an order in
 /// which it does not matter who met them when.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct BadSamples {
+pub struct InvalidSamples {
     /// How many there were.
     pub count: u64,
-    /// The first [`BAD_REMEMBERED`], ascending.
-    pub first: Vec<BadSample>,
+    /// The first [`INVALID_REMEMBERED`], ascending.
+    pub first: Vec<InvalidSample>,
 }
 
-impl BadSamples {
-    pub(super) fn record(&mut self, sample: BadSample) {
+impl InvalidSamples {
+    pub(super) fn record(&mut self, sample: InvalidSample) {
         self.count += 1;
         self.remember(sample);
     }
@@ -37,10 +37,10 @@ impl BadSamples {
         other.first.iter().for_each(|sample| self.remember(*sample));
     }
 
-    fn remember(&mut self, sample: BadSample) {
+    fn remember(&mut self, sample: InvalidSample) {
         let place = self.first.partition_point(|known| *known <= sample);
-        if place < BAD_REMEMBERED {
-            self.first.truncate(BAD_REMEMBERED - 1);
+        if place < INVALID_REMEMBERED {
+            self.first.truncate(INVALID_REMEMBERED - 1);
             self.first.insert(place, sample);
         }
     }
@@ -53,10 +53,10 @@ mod tests {
     #[test]
     fn the_first_do_not_depend_on_the_order() {
         let all: Vec<_> = (0..40)
-            .map(|i| BadSample { index: i * 7 % 40, replicate: (i % 2) as u8, y: i, x: 3 })
+            .map(|i| InvalidSample { index: i * 7 % 40, replicate: (i % 2) as u8, y: i, x: 3 })
             .collect();
-        let gather = |samples: &mut dyn Iterator<Item = &BadSample>| {
-            let mut bad = BadSamples::default();
+        let gather = |samples: &mut dyn Iterator<Item = &InvalidSample>| {
+            let mut bad = InvalidSamples::default();
             samples.for_each(|s| bad.record(*s));
             bad
         };

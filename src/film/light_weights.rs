@@ -6,12 +6,12 @@ use crate::film::tile::Tile;
 
 /// Colour times intensity of the lights whose unit-light sums the film holds.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mix {
+pub struct LightWeights {
     /// For each light group: red, green, blue, at least 0.
     pub weights: Vec<[f64; 3]>,
 }
 
-impl Mix {
+impl LightWeights {
     /// One group of a film of `groups` groups, in unit light.
     pub fn only(group: usize, groups: usize) -> Self {
         Self { weights: (0..groups).map(|g| [f64::from(u8::from(g == group)); 3]).collect() }
@@ -26,7 +26,7 @@ impl Mix {
 
 /// Which samples are looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum Replicates {
     /// All of them: the picture.
     Both,
     /// Replicate A.
@@ -46,27 +46,27 @@ pub(super) struct Sums<'a> {
 
 impl Sums<'_> {
     /// Samples that count in `part`.
-    pub fn count(&self, part: Part) -> u32 {
+    pub fn count(&self, part: Replicates) -> u32 {
         match part {
-            Part::Both => self.counts[0].saturating_add(self.counts[1]),
-            Part::A => self.counts[0],
-            Part::B => self.counts[1],
+            Replicates::Both => self.counts[0].saturating_add(self.counts[1]),
+            Replicates::A => self.counts[0],
+            Replicates::B => self.counts[1],
         }
     }
 
     /// Sum `i` of `[group][channel]`, as far as it counts in `part`.
     #[inline(always)]
-    pub fn value(&self, part: Part, i: usize) -> f64 {
+    pub fn value(&self, part: Replicates, i: usize) -> f64 {
         match part {
-            Part::Both => self.values[0][i] as f64 + self.values[1][i] as f64,
-            Part::A => self.values[0][i] as f64,
-            Part::B => self.values[1][i] as f64,
+            Replicates::Both => self.values[0][i] as f64 + self.values[1][i] as f64,
+            Replicates::A => self.values[0][i] as f64,
+            Replicates::B => self.values[1][i] as f64,
         }
     }
 
-    /// Radiance, or black without samples; `per_unit` from [`Mix::per_unit`].
+    /// Radiance, or black without samples; `per_unit` from [`LightWeights::per_unit`].
     #[inline(always)]
-    pub fn mean(&self, part: Part, per_unit: &[f64]) -> [f64; 3] {
+    pub fn mean(&self, part: Replicates, per_unit: &[f64]) -> [f64; 3] {
         let count = self.count(part);
         if count == 0 {
             return [0.0; 3];
@@ -92,16 +92,16 @@ impl Tile {
 impl Film {
     /// Radiance of the pixel in column `x`, row `y`: the mean over all its samples of both
     /// replicates; black without samples.
-    pub fn pixel(&self, x: usize, y: usize, mix: &Mix) -> [f64; 3] {
+    pub fn pixel(&self, x: usize, y: usize, mix: &LightWeights) -> [f64; 3] {
         assert!(x < self.width() && y < self.height(), "pixel ({x}, {y}) of the film");
         let index = y / TILE * self.tile_columns() + x / TILE;
         let pixel = y % TILE * TILE + x % TILE;
         let per_unit = mix.per_unit(self.scales());
-        self.tile(index).map_or([0.0; 3], |tile| tile.sums(pixel).mean(Part::Both, &per_unit))
+        self.tile(index).map_or([0.0; 3], |tile| tile.sums(pixel).mean(Replicates::Both, &per_unit))
     }
 
     /// Row `y` of the picture, radiance; `row` is resized to the film's width.
-    pub fn row(&self, y: usize, part: Part, mix: &Mix, row: &mut Vec<[f64; 3]>) {
+    pub fn row(&self, y: usize, part: Replicates, mix: &LightWeights, row: &mut Vec<[f64; 3]>) {
         row.clear();
         row.resize(self.width(), [0.0; 3]);
         let per_unit = mix.per_unit(self.scales());
@@ -132,17 +132,17 @@ mod tests {
             let (x, y, r) = (x as f64, y as f64, r as f64);
             vec![x, y, 1.0 + r, 64.0 * x, 128.0, 64.0 * r]
         });
-        let mix = Mix { weights: vec![[1.0, 2.0, 3.0], [0.5, 0.0, 1.0]] };
+        let mix = LightWeights { weights: vec![[1.0, 2.0, 3.0], [0.5, 0.0, 1.0]] };
         // Sums over 4 + 4 samples: A and B alike in x and y; 1 + 2 and 0 + 64 in blue.
         let expected = |x: f64, y: f64| [x / 4.0 + 8.0 * x, 2.0 * y / 4.0, 9.0 / 8.0 + 8.0];
         for (x, y) in [(0, 0), (19, 17), (16, 15), (3, 16)] {
             assert_eq!(film.pixel(x, y, &mix), expected(x as f64, y as f64), "{x} {y}");
         }
         let mut row = Vec::new();
-        film.row(17, Part::Both, &mix, &mut row);
+        film.row(17, Replicates::Both, &mix, &mut row);
         assert_eq!(row.len(), 20);
         assert_eq!(row[19], expected(19.0, 17.0));
-        film.row(17, Part::B, &Mix::only(0, 2), &mut row);
+        film.row(17, Replicates::B, &LightWeights::only(0, 2), &mut row);
         assert_eq!(row[5], [5.0 / 4.0, 17.0 / 4.0, 0.5]);
     }
 

@@ -1,12 +1,12 @@
 //! A whole picture in linear light, kept while the film goes on.
 
-use crate::film::box_filter::{Cover, covers, spread};
+use crate::film::box_filter::{Coverage, covers, spread};
 use crate::film::film::Film;
-use crate::film::light_weights::{Mix, Part};
+use crate::film::light_weights::{LightWeights, Replicates};
 
 /// A picture of the film's size in linear radiance, without the film.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Linear {
+pub struct LinearImage {
     width: usize,
     height: usize,
     /// `[row][column]`.
@@ -16,7 +16,7 @@ pub struct Linear {
 impl Film {
     /// The picture as it is. A pixel without samples looks like the nearest one of its row that has
     /// some, a row without samples like the nearest row.
-    pub fn linear(&self, mix: &Mix) -> Linear {
+    pub fn linear(&self, mix: &LightWeights) -> LinearImage {
         let (width, height) = (self.width(), self.height());
         let per_unit = mix.per_unit(self.scales());
         let mut pixels = vec![[0.0f32; 3]; width * height];
@@ -24,18 +24,18 @@ impl Film {
         for y in 0..height {
             let start = y * width;
             self.visit_row(y, |x, sums| {
-                pixels[start + x] = sums.mean(Part::Both, &per_unit).map(|c| c as f32);
-                known[start + x] = sums.count(Part::Both) > 0;
+                pixels[start + x] = sums.mean(Replicates::Both, &per_unit).map(|c| c as f32);
+                known[start + x] = sums.count(Replicates::Both) > 0;
             });
         }
         if !known.iter().all(|k| *k) {
             spread(pixels.as_flattened_mut(), &mut known, width, height, 3);
         }
-        Linear { width, height, pixels }
+        LinearImage { width, height, pixels }
     }
 }
 
-impl Linear {
+impl LinearImage {
     /// Columns and rows.
     pub fn size(&self) -> [usize; 2] {
         [self.width, self.height]
@@ -65,15 +65,15 @@ impl Linear {
                     (0..3).for_each(|c| sum[c] += height * of_line[c]);
                 }
             }
-            let of = |cover: &Cover| cover.parts.iter().sum::<f64>();
-            let mean = |(sum, x): (&[f64; 3], &Cover)| sum.map(|s| (s / (of(x) * of(y))) as f32);
+            let of = |cover: &Coverage| cover.parts.iter().sum::<f64>();
+            let mean = |(sum, x): (&[f64; 3], &Coverage)| sum.map(|s| (s / (of(x) * of(y))) as f32);
             out.extend(sums.iter().zip(&xs).map(mean));
         }
         out
     }
 }
 
-fn line_sum(line: &[[f32; 3]], x: &Cover) -> [f64; 3] {
+fn line_sum(line: &[[f32; 3]], x: &Coverage) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for (pixel, width) in line[x.first..].iter().zip(&x.parts) {
         (0..3).for_each(|c| sum[c] += width * f64::from(pixel[c]));
@@ -93,7 +93,7 @@ mod tests {
             let v = (x * 7 + y * 13 + r * 5) as f64;
             vec![v, v % 11.0, 1.0, v % 3.0, 2.0, v % 17.0]
         });
-        let mix = Mix { weights: vec![[1.0, 0.5, 2.0], [0.0, 1.0, 0.25]] };
+        let mix = LightWeights { weights: vec![[1.0, 0.5, 2.0], [0.0, 1.0, 0.25]] };
         let kept = film.linear(&mix);
         assert_eq!(kept.size(), [37, 29]);
         assert_eq!(kept.pixel(36, 28), film.pixel(36, 28, &mix).map(|c| c as f32));

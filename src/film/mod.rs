@@ -3,7 +3,7 @@
 //! Two independent replicates, A and B, of the same picture are kept apart: their mean is the
 //! picture, their difference measures the error that is left. Sums are integers, so that no order of
 //! adding changes a bit. Each light (group) has its own sums, taken as if it were white and of unit
-//! strength; a [`Mix`] gives it colour and strength afterwards.
+//! strength; a [`LightWeights`] gives it colour and strength afterwards.
 
 mod box_filter;
 mod canonical_bytes;
@@ -30,14 +30,14 @@ mod tile;
 
 pub use box_filter::Thumbnail;
 pub use display::{Display, Tone, quantised_8, quantised_16};
-pub use downsample::{Raster, Stale};
+pub use downsample::{DirtyTile, IncrementalDownsample};
 pub use exr_read::{ReadPicture, read_exr};
-pub use film::{Film, Header, Mismatch, Slot};
-pub use invalid::{BAD_REMEMBERED, BadSample, BadSamples};
-pub use light_weights::{Mix, Part};
-pub use linear_image::Linear;
+pub use film::{Film, Header, Mismatch, TileHandle};
+pub use invalid::{INVALID_REMEMBERED, InvalidSample, InvalidSamples};
+pub use light_weights::{LightWeights, Replicates};
+pub use linear_image::LinearImage;
 pub use noise::{Estimator, Mse, Noise, TileNoise};
-pub use output::{Depth, Picture, Target, WriteError};
+pub use output::{Depth, ImageData, ImageOutput, WriteError};
 pub use png::png_of_rgb;
 pub use png_read::read_png;
 pub use probe::Probe;

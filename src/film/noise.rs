@@ -26,8 +26,8 @@
 use crate::film::TILE;
 use crate::film::display::{Display, Tone, toned};
 use crate::film::film::Film;
-use crate::film::light_weights::Mix;
-use crate::film::srgb_table::Curve;
+use crate::film::light_weights::LightWeights;
+use crate::film::srgb_table::SrgbTable;
 use crate::film::tile::Tile;
 
 /// Mean square error over pixels and channels.
@@ -70,17 +70,17 @@ pub struct Estimator {
     per_unit: Vec<f64>,
     exposure: f64,
     tone: Tone,
-    curve: &'static Curve,
+    curve: &'static SrgbTable,
 }
 
 impl Estimator {
     /// For tiles of films with these `scales` (see [`Film::scales`]).
-    pub fn new(scales: &[f64], mix: &Mix, display: &Display) -> Self {
+    pub fn new(scales: &[f64], mix: &LightWeights, display: &Display) -> Self {
         Self {
             per_unit: mix.per_unit(scales),
             exposure: display.exposure_factor(),
             tone: display.tone,
-            curve: Curve::shared(),
+            curve: SrgbTable::shared(),
         }
     }
 
@@ -236,7 +236,7 @@ impl Noise {
 
 impl Film {
     /// Estimated error of the picture; `None` while a tile has unequal numbers of samples in A and B.
-    pub fn noise(&self, mix: &Mix, display: &Display) -> Option<Noise> {
+    pub fn noise(&self, mix: &LightWeights, display: &Display) -> Option<Noise> {
         let estimator = Estimator::new(self.scales(), mix, display);
         Noise::of_tiles(
             (0..self.tile_count())

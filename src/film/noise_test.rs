@@ -3,7 +3,7 @@
 use crate::film::noise::*;
 use crate::film::testing::{Rng, each_tile, fill, film, white};
 use crate::film::*;
-use crate::film::{Part, quantised_8};
+use crate::film::{Replicates, quantised_8};
 
 /// A pixel whose samples have a known mean: each is `dark + LIGHT` with probability `chance` and
 /// else `dark`, or normal around the mean.
@@ -148,7 +148,7 @@ fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
 fn one_pixel_by_hand() {
     let mut film = film(1, 1, &[1024.0, 2.0]);
     fill(&mut film, 2, |_, _, r| vec![[0.25, 0.5][r], 1.0, 0.5, 0.0, 0.0, [2.0, 0.0][r]]);
-    let mix = Mix { weights: vec![[1.0; 3], [0.0, 0.0, 0.25]] };
+    let mix = LightWeights { weights: vec![[1.0; 3], [0.0, 0.0, 0.25]] };
     let display = Display { exposure_ev: 1.0, tone: Tone::Clip };
     let tile = Estimator::new(film.scales(), &mix, &display).tile(film.tile(0).unwrap()).unwrap();
     // Red 0.125 and 0.25, blue 0.25 + 0.25 and 0.25.
@@ -164,7 +164,7 @@ fn one_pixel_by_hand() {
     assert_eq!((tile.pixels, tile.guide), (1, tile.told));
     // Far over white nothing is seen of the difference.
     let bright = Display { exposure_ev: 9.0, tone: Tone::Clip };
-    let noise = film.noise(&Mix::only(0, 2), &bright).unwrap();
+    let noise = film.noise(&LightWeights::only(0, 2), &bright).unwrap();
     assert_eq!((noise.rmse_codes, quantised_8(bright.codes([0.125; 3])[0])), (0.0, 255));
     assert!(noise.rmse_linear > 0.0);
 }
@@ -178,7 +178,7 @@ fn both_tone_curves_are_estimated_as_displayed() {
         // The white squares of the chessboard tell the error.
         let mut mse = 0.0;
         for y in 0..16 {
-            let [m, a, b] = [Part::Both, Part::A, Part::B].map(|part| {
+            let [m, a, b] = [Replicates::Both, Replicates::A, Replicates::B].map(|part| {
                 let mut row = vec![];
                 film.row(y, part, &white(1), &mut row);
                 row

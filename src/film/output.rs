@@ -2,7 +2,7 @@
 
 use crate::film::display::Display;
 use crate::film::film::Film;
-use crate::film::light_weights::Mix;
+use crate::film::light_weights::LightWeights;
 use crate::film::{exr, png};
 use std::ffi::OsStr;
 use std::fmt;
@@ -13,11 +13,11 @@ use tempfile::NamedTempFile;
 
 /// Everything that goes into a picture file.
 #[derive(Clone, Copy, Debug)]
-pub struct Picture<'a> {
+pub struct ImageData<'a> {
     /// The samples.
     pub film: &'a Film,
     /// Colour and strength of the light groups.
-    pub mix: &'a Mix,
+    pub mix: &'a LightWeights,
     /// Name of each light group, for the layers of formats that have layers.
     pub group_names: &'a [String],
     /// Exposure and tone curve, for formats that hold what a display shows.
@@ -40,13 +40,13 @@ pub enum Depth {
 }
 
 /// Where encoders write to.
-pub(super) trait Sink: Write + Seek {}
-impl<T: Write + Seek> Sink for T {}
+pub(super) trait WriteSeek: Write + Seek {}
+impl<T: Write + Seek> WriteSeek for T {}
 
 /// A picture file format.
 struct Format {
     extension: &'static str,
-    encode: fn(&Picture, &mut dyn Sink) -> io::Result<()>,
+    encode: fn(&ImageData, &mut dyn WriteSeek) -> io::Result<()>,
 }
 
 /// Every format that can be written.
@@ -57,7 +57,7 @@ static FORMATS: [Format; 2] = [
 
 /// A picture file to be written: a path whose extension names a known format.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Target {
+pub struct ImageOutput {
     path: PathBuf,
     format: usize,
     /// There must be no file yet.
@@ -83,7 +83,7 @@ impl fmt::Display for WriteError {
 
 impl std::error::Error for WriteError {}
 
-impl Target {
+impl ImageOutput {
     /// Finds the format by the path's extension, in upper or lower case. Touches no file.
     pub fn from_path(path: impl Into<PathBuf>) -> Result<Self, WriteError> {
         let path = path.into();
@@ -126,15 +126,15 @@ impl Target {
 
     /// Writes the picture to a temporary file beside its place, and puts it there when it is complete
     /// and on the disk. On failure a file that was there before is untouched.
-    pub fn write(&self, picture: &Picture) -> Result<(), WriteError> {
+    pub fn write(&self, picture: &ImageData) -> Result<(), WriteError> {
         self.replace(|sink| (FORMATS[self.format].encode)(picture, sink))
     }
 
     fn replace(
         &self,
-        encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>,
+        encode: impl FnOnce(&mut dyn WriteSeek) -> io::Result<()>,
     ) -> Result<(), WriteError> {
-        let Place { file, directory, temporary } = self.prepare()?;
+        let PendingFile { file, directory, temporary } = self.prepare()?;
         let explain = |error| self.explained(&error, &directory);
         let mut out = BufWriter::with_capacity(1 << 16, temporary);
         encode(&mut out).and_then(|()| out.flush()).map_err(explain)?;
@@ -153,7 +153,7 @@ impl Target {
         Ok(())
     }
 
-    fn prepare(&self) -> Result<Place, WriteError> {
+    fn prepare(&self) -> Result<PendingFile, WriteError> {
         // A link stays a link: what it points to is replaced.
         let is_link = self.path.symlink_metadata().is_ok_and(|m| m.file_type().is_symlink());
         let file = match is_link.then(|| fs::canonicalize(&self.path)) {
@@ -193,7 +193,7 @@ impl Target {
             Ok(temporary)
         });
         let temporary = made.map_err(|error| self.explained(&error, &directory))?;
-        Ok(Place { file, directory, temporary })
+        Ok(PendingFile { file, directory, temporary })
     }
 
     fn error(&self, what: impl Into<String>, remedy: impl Into<String>) -> WriteError {
@@ -231,7 +231,7 @@ impl Target {
 }
 
 /// A temporary file ready to be filled, and where it goes.
-struct Place {
+struct PendingFile {
     file: PathBuf,
     directory: PathBuf,
     temporary: NamedTempFile,
@@ -242,22 +242,22 @@ mod tests {
     use super::*;
 
     fn message(path: &Path) -> String {
-        let target = Target::from_path(path).unwrap();
+        let target = ImageOutput::from_path(path).unwrap();
         target.check_writable().unwrap_err().to_string()
     }
 
     #[test]
     fn the_extension_tells_the_format() {
         for good in ["a.png", "A.PNG", "dir.x/b.Exr"] {
-            assert_eq!(Target::from_path(good).unwrap().path(), Path::new(good));
+            assert_eq!(ImageOutput::from_path(good).unwrap().path(), Path::new(good));
         }
-        let error = Target::from_path("out.jpeg").unwrap_err().to_string();
+        let error = ImageOutput::from_path("out.jpeg").unwrap_err().to_string();
         assert_eq!(
             error,
             "cannot write out.jpeg: no picture format has the extension .jpeg; \
              known extensions: .png, .exr"
         );
-        let error = Target::from_path("picture").unwrap_err().to_string();
+        let error = ImageOutput::from_path("picture").unwrap_err().to_string();
         assert!(error.contains("has no extension") && error.contains(".png, .exr"), "{error}");
     }
 
@@ -287,7 +287,7 @@ mod tests {
         let old = dir.path().join("old.png");
         fs::write(&old, "old").unwrap();
         for path in [&old, &dir.path().join("new.png")] {
-            Target::from_path(path).unwrap().check_writable().unwrap();
+            ImageOutput::from_path(path).unwrap().check_writable().unwrap();
         }
         assert_eq!(fs::read(&old).unwrap(), b"old");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
@@ -298,14 +298,14 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
         fs::write(&path, "old").unwrap();
-        let target = Target::from_path(&path).unwrap();
+        let target = ImageOutput::from_path(&path).unwrap();
         for (kind, words) in [
             (ErrorKind::StorageFull, "no space is left"),
             (ErrorKind::ReadOnlyFilesystem, "read-only"),
             (ErrorKind::PermissionDenied, "no permission"),
             (ErrorKind::Other, "other error"),
         ] {
-            let failing = |sink: &mut dyn Sink| {
+            let failing = |sink: &mut dyn WriteSeek| {
                 sink.write_all(&[7; 100_000])?;
                 Err(kind.into())
             };
@@ -320,7 +320,7 @@ mod tests {
     fn what_is_to_be_fresh_overwrites_nothing() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
-        let target = Target::from_path(&path).unwrap().fresh();
+        let target = ImageOutput::from_path(&path).unwrap().fresh();
         target.replace(|sink| sink.write_all(b"new")).unwrap();
         let error = target.replace(|sink| sink.write_all(b"newer")).unwrap_err().to_string();
         assert!(error.contains("such a file already"), "{error}");
@@ -337,14 +337,14 @@ mod tests {
         fs::write(&real, "old").unwrap();
         fs::set_permissions(&real, fs::Permissions::from_mode(0o640)).unwrap();
         std::os::unix::fs::symlink(&real, &link).unwrap();
-        let target = Target::from_path(&link).unwrap();
+        let target = ImageOutput::from_path(&link).unwrap();
         target.replace(|sink| sink.write_all(b"new")).unwrap();
         assert!(link.symlink_metadata().unwrap().file_type().is_symlink());
         assert_eq!(fs::read(&real).unwrap(), b"new");
         assert_eq!(fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o640);
         // A new file is readable as any other that the user creates.
         let (new, plain) = (dir.path().join("new.png"), dir.path().join("plain"));
-        Target::from_path(&new).unwrap().replace(|sink| sink.write_all(b"new")).unwrap();
+        ImageOutput::from_path(&new).unwrap().replace(|sink| sink.write_all(b"new")).unwrap();
         fs::write(&plain, "").unwrap();
         let mode = |path| fs::metadata(path).unwrap().permissions().mode();
         assert_eq!(mode(&new), mode(&plain));

@@ -1,22 +1,22 @@
 //! PNG: what the display shows, in 8 or 16 bits per channel, sRGB, with text metadata.
 
 use crate::film::display::quantised_16;
-use crate::film::light_weights::Part;
-use crate::film::output::{Depth, Picture, Sink};
+use crate::film::light_weights::Replicates;
+use crate::film::output::{Depth, ImageData, WriteSeek};
 use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SourceChromaticities,
     SrgbRenderingIntent,
 };
 use std::io;
 
-pub(super) fn encode(picture: &Picture, sink: &mut dyn Sink) -> io::Result<()> {
+pub(super) fn encode(picture: &ImageData, sink: &mut dyn WriteSeek) -> io::Result<()> {
     encode_to(picture, sink).map_err(|error| match error {
         EncodingError::IoError(error) => error,
         other => io::Error::other(other),
     })
 }
 
-fn encode_to(picture: &Picture, sink: &mut dyn Sink) -> Result<(), EncodingError> {
+fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), EncodingError> {
     let film = picture.film;
     let too_large = |_| io::Error::new(io::ErrorKind::InvalidInput, "too large for a PNG file");
     let width = u32::try_from(film.width()).map_err(too_large)?;
@@ -68,7 +68,7 @@ pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> 
 }
 
 /// The picture's bytes: rows of red, green, blue; 16-bit values big end first, as PNG has them.
-fn pixels(picture: &Picture) -> Vec<u8> {
+fn pixels(picture: &ImageData) -> Vec<u8> {
     let (film, mut row) = (picture.film, Vec::new());
     let bytes_per_channel = match picture.depth {
         Depth::Eight => 1,
@@ -77,7 +77,7 @@ fn pixels(picture: &Picture) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(film.width() * film.height() * 3 * bytes_per_channel);
     let to_8 = picture.display.to_8();
     for y in 0..film.height() {
-        film.row(y, Part::Both, picture.mix, &mut row);
+        film.row(y, Replicates::Both, picture.mix, &mut row);
         match picture.depth {
             Depth::Eight => row.iter().for_each(|rgb| bytes.extend(to_8(*rgb))),
             Depth::Sixteen => bytes.extend(

@@ -3,7 +3,7 @@
 use crate::film::TILE;
 use crate::film::display::Display;
 use crate::film::film::Film;
-use crate::film::light_weights::{Mix, Part};
+use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::noise::Estimator;
 
 /// What the film knows about one pixel under one mix of lights and one display transform.
@@ -28,7 +28,12 @@ pub struct Probe {
 
 impl Film {
     /// The pixel in column `x`, row `y`; `None`: it lies outside.
-    pub fn probe(&self, [x, y]: [usize; 2], mix: &Mix, display: &Display) -> Option<Probe> {
+    pub fn probe(
+        &self,
+        [x, y]: [usize; 2],
+        mix: &LightWeights,
+        display: &Display,
+    ) -> Option<Probe> {
         if x >= self.width() || y >= self.height() {
             return None;
         }
@@ -47,10 +52,10 @@ impl Film {
         let per_unit = mix.per_unit(self.scales());
         let sums = tile.sums(y % TILE * TILE + x % TILE);
         probe.samples = sums.counts;
-        probe.radiance = sums.mean(Part::Both, &per_unit);
+        probe.radiance = sums.mean(Replicates::Both, &per_unit);
         probe.codes = display.codes(probe.radiance);
         if !sums.counts.contains(&0) {
-            let [a, b] = [Part::A, Part::B].map(|part| sums.mean(part, &per_unit));
+            let [a, b] = [Replicates::A, Replicates::B].map(|part| sums.mean(part, &per_unit));
             probe.difference = Some([0, 1, 2].map(|c| 0.5 * (a[c] - b[c]).abs()));
         }
         if let Some(noise) = Estimator::new(self.scales(), mix, display).tile_so_far(tile) {
@@ -70,7 +75,7 @@ mod tests {
     #[test]
     fn a_pixel_and_its_error() {
         let mut film = film(20, 18, &[8.0, 4.0]);
-        let mix = Mix { weights: vec![[1.0, 2.0, 0.0], [0.0, 0.0, 3.0]] };
+        let mix = LightWeights { weights: vec![[1.0, 2.0, 0.0], [0.0, 0.0, 3.0]] };
         let display = Display { exposure_ev: -3.0, ..Display::default() };
         let probe = |film: &Film, at| film.probe(at, &mix, &display);
         let empty = probe(&film, [19, 17]).unwrap();

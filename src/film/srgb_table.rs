@@ -16,14 +16,14 @@ const ENTRIES: usize = ((-FIRST_OCTAVE as usize) << SEGMENTS_LOG2) + 2;
 const MAX_ERROR_CODES: f64 = 5.5e-4;
 
 /// sRGB codes by chords between exact points, 128 to an octave of linear light.
-pub(super) struct Curve {
+pub(super) struct SrgbTable {
     /// `[at 0, slope]` of each chord, in codes.
     chords: [[f64; 2]; ENTRIES],
 }
 
-static CURVE: LazyLock<Curve> = LazyLock::new(Curve::tabulated);
+static CURVE: LazyLock<SrgbTable> = LazyLock::new(SrgbTable::tabulated);
 
-impl Curve {
+impl SrgbTable {
     pub fn shared() -> &'static Self {
         &CURVE
     }
@@ -72,7 +72,7 @@ mod tests {
             let even = f64::from(i) * 1e-6;
             for linear in [even, even * even * even] {
                 let exact = 255.0 * srgb_from_linear(linear);
-                worst = worst.max((Curve::shared().code(linear) - exact).abs());
+                worst = worst.max((SrgbTable::shared().code(linear) - exact).abs());
             }
         }
         assert!(worst < MAX_ERROR_CODES, "{worst}");
@@ -84,7 +84,7 @@ mod tests {
         let exact = |linear| quantised_8(255.0 * srgb_from_linear(linear));
         for i in 0..=200_000 {
             let linear = f64::from(i) * 5e-6;
-            assert_eq!(Curve::shared().code_8(linear), exact(linear), "{linear}");
+            assert_eq!(SrgbTable::shared().code_8(linear), exact(linear), "{linear}");
         }
         // Around every border between two codes.
         for border in (0..255).map(|code| (f64::from(code) + 0.5) / 255.0) {
@@ -95,15 +95,15 @@ mod tests {
             };
             for step in -2000..=2000 {
                 let linear = linear * (1.0 + f64::from(step) * 1e-8);
-                assert_eq!(Curve::shared().code_8(linear), exact(linear), "{linear}");
+                assert_eq!(SrgbTable::shared().code_8(linear), exact(linear), "{linear}");
             }
         }
     }
 
     #[test]
     fn the_ends_are_exact() {
-        assert_eq!(Curve::shared().code(0.0), 0.0);
-        assert!((Curve::shared().code(1.0) - 255.0).abs() < 1e-12);
-        assert_eq!(Curve::shared().code(f64::MIN_POSITIVE), 255.0 * 12.92 * f64::MIN_POSITIVE);
+        assert_eq!(SrgbTable::shared().code(0.0), 0.0);
+        assert!((SrgbTable::shared().code(1.0) - 255.0).abs() < 1e-12);
+        assert_eq!(SrgbTable::shared().code(f64::MIN_POSITIVE), 255.0 * 12.92 * f64::MIN_POSITIVE);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::film::film::{Film, Header};
 use crate::film::tile::Tile;
-use crate::film::{Mix, TILE};
+use crate::film::{LightWeights, TILE};
 
 /// Numbers for tests (SplitMix64).
 pub struct Rng(pub u64);
@@ -33,8 +33,8 @@ pub fn film(width: usize, height: usize, scales: &[f64]) -> Film {
 }
 
 /// Unit weights.
-pub fn white(groups: usize) -> Mix {
-    Mix { weights: vec![[1.0; 3]; groups] }
+pub fn white(groups: usize) -> LightWeights {
+    LightWeights { weights: vec![[1.0; 3]; groups] }
 }
 
 /// Opens every tile and calls `f` with it and the column and row of its upper left pixel.

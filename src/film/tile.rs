@@ -1,7 +1,7 @@
 //! One 16x16 square of the film: integer sums for both replicates.
 
-use crate::film::invalid::BadSamples;
-use crate::film::{BadSample, TILE};
+use crate::film::invalid::InvalidSamples;
+use crate::film::{InvalidSample, TILE};
 use crate::lanes::prefetch;
 
 /// Number of pixels in a tile.
@@ -35,7 +35,7 @@ pub struct Tile {
     /// Some sum has reached the largest value.
     full: bool,
     saturated_samples: u64,
-    bad: BadSamples,
+    bad: InvalidSamples,
     /// `[replicate][pixel][group][channel]`; empty until the first touch.
     sums: Vec<i64>,
     /// Bit `p % 64` of `[replicate][p / 64]`: the sums of pixel p are of this epoch. Those of other
@@ -54,7 +54,7 @@ impl Tile {
             lattice_px: 0,
             full: false,
             saturated_samples: 0,
-            bad: BadSamples::default(),
+            bad: InvalidSamples::default(),
             sums: Vec::new(),
             written: Default::default(),
         }
@@ -88,7 +88,7 @@ impl Tile {
         self.lattice_px = 0;
         self.full = false;
         self.saturated_samples = 0;
-        self.bad = BadSamples::default();
+        self.bad = InvalidSamples::default();
     }
 
     pub(super) fn is_of(&self, epoch: u64) -> bool {
@@ -246,11 +246,11 @@ impl Tile {
 
     /// Records a sample that was NaN or negative. It counts as a sample of value 0.
     #[cold]
-    pub fn record_bad(&mut self, sample: BadSample) {
+    pub fn record_bad(&mut self, sample: InvalidSample) {
         self.bad.record(sample);
     }
 
-    pub(super) fn bad(&self) -> &BadSamples {
+    pub(super) fn bad(&self) -> &InvalidSamples {
         &self.bad
     }
 

@@ -1,6 +1,6 @@
 //! The numbers that kernels are written in.
 //!
-//! A kernel (intersection, shading, sampling) is written once, generic over [`Lanes`]: a vector of
+//! A kernel (intersection, shading, sampling) is written once, generic over [`SimdFloat`]: a vector of
 //! `WIDTH` floats that are computed side by side. Instances:
 //!
 //! | type | precision | width | use |
@@ -11,14 +11,14 @@
 //! | `f32`, `f64` | both | 1 | tests, benches, and kinds that resist packets |
 //!
 //! All operations up to `sqrt` are IEEE operations, so that every instance of one precision gives the
-//! same bits; [`Lanes::mul_add`] is fused exactly where the vectors fuse it. Only `sin_cos`, `atan2`, `ln`
+//! same bits; [`SimdFloat::mul_add`] is fused exactly where the vectors fuse it. Only `sin_cos`, `atan2`, `ln`
 //! and `exp` may differ between the vector instances and the width-1 ones, by a few ulps.
 
 mod scalar;
 mod vec3;
 mod vector;
 
-pub use vec3::{Frame, V3};
+pub use vec3::{Frame, Vec3};
 
 use std::fmt::Debug;
 use std::ops::{
@@ -42,7 +42,7 @@ pub type Double = wide::f64x8;
 pub const MAX_WIDTH: usize = if cfg!(target_feature = "avx512f") { 16 } else { 8 };
 
 /// One lane: `f32` or `f64`.
-pub trait Real: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
+pub trait Float: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
     /// Distance from 1 to the next larger number of this precision.
     const EPSILON: f64;
     /// Nearest value of this precision.
@@ -51,7 +51,7 @@ pub trait Real: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
     fn to_f64(self) -> f64;
 }
 
-impl Real for f32 {
+impl Float for f32 {
     const EPSILON: f64 = f32::EPSILON as f64;
     #[inline(always)]
     fn of(x: f64) -> Self {
@@ -63,7 +63,7 @@ impl Real for f32 {
     }
 }
 
-impl Real for f64 {
+impl Float for f64 {
     const EPSILON: f64 = f64::EPSILON;
     #[inline(always)]
     fn of(x: f64) -> Self {
@@ -110,7 +110,7 @@ pub trait Mask:
 }
 
 /// Unsigned 32-bit integers, one per lane, for hashes and sample sequences. Arithmetic wraps.
-pub trait Bits:
+pub trait SimdU32:
     Copy
     + Debug
     + Send
@@ -135,7 +135,7 @@ pub trait Bits:
 }
 
 /// A vector of `WIDTH` floats. See the room's description.
-pub trait Lanes:
+pub trait SimdFloat:
     Copy
     + Debug
     + Send
@@ -159,11 +159,11 @@ pub trait Lanes:
     /// Largest finite number of this precision.
     const MAX: f64;
     /// One lane.
-    type Scalar: Real;
+    type Scalar: Float;
     /// The result of comparisons.
     type Mask: Mask;
     /// Integers of the same width.
-    type Bits: Bits;
+    type SimdU32: SimdU32;
 
     /// The same value in every lane.
     fn splat(x: Self::Scalar) -> Self;
@@ -235,8 +235,8 @@ pub trait Lanes:
         Self::select(mask, self, Self::zero())
     }
 
-    /// A 32-bit label carried through [`Lanes::select`]; not a number to compute with. Labels below
-    /// 2^31 - 2^23 compare by [`Lanes::lt`] and [`Lanes::le`] like integers, as the bits of all
+    /// A 32-bit label carried through [`SimdFloat::select`]; not a number to compute with. Labels below
+    /// 2^31 - 2^23 compare by [`SimdFloat::lt`] and [`SimdFloat::le`] like integers, as the bits of all
     /// positive floats do.
     fn tag(label: u32) -> Self;
     /// The label in lane `i`.
@@ -246,7 +246,7 @@ pub trait Lanes:
 
     /// Uniform in [0, 1) from 32 random bits: 24 of them in single precision, all in double (there
     /// in the middle of its step).
-    fn unit(bits: Self::Bits) -> Self;
+    fn unit(bits: Self::SimdU32) -> Self;
 
     /// The sum over lanes of `round(lane * scale)`. Each lane is rounded by itself, so that the sum
     /// is exact in any grouping; `|lane * scale|` must not exceed 2^49.

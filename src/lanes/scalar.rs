@@ -1,6 +1,6 @@
 //! The width-1 instances: plain `f32` and `f64`, the same operations in the same order.
 
-use crate::lanes::{Bits, Lanes, MAX_WIDTH, Mask, round_i64};
+use crate::lanes::{MAX_WIDTH, Mask, SimdFloat, SimdU32, round_i64};
 
 impl Mask for bool {
     #[inline(always)]
@@ -58,7 +58,7 @@ impl std::ops::Shr<u32> for One {
     }
 }
 
-impl Bits for One {
+impl SimdU32 for One {
     #[inline(always)]
     fn splat(x: u32) -> Self {
         Self(x)
@@ -79,13 +79,13 @@ impl Bits for One {
 
 macro_rules! scalar_lanes {
     ($float:ident, $bits:ident, $unit:expr) => {
-        impl Lanes for $float {
+        impl SimdFloat for $float {
             const WIDTH: usize = 1;
             const NAME: &'static str = stringify!($float);
             const MAX: f64 = $float::MAX as f64;
             type Scalar = $float;
             type Mask = bool;
-            type Bits = One;
+            type SimdU32 = One;
 
             #[inline(always)]
             fn splat(x: $float) -> Self {
@@ -119,7 +119,7 @@ macro_rules! scalar_lanes {
             }
             #[inline(always)]
             fn extremes(self) -> (Self, Self) {
-                (Lanes::min(self, <$float>::MAX), Lanes::max(self, -<$float>::MAX))
+                (SimdFloat::min(self, <$float>::MAX), SimdFloat::max(self, -<$float>::MAX))
             }
             #[inline(always)]
             fn abs(self) -> Self {

@@ -1,11 +1,11 @@
 //! Vectors and orthonormal frames of lanes.
 
-use crate::lanes::{Lanes, Real};
+use crate::lanes::{Float, SimdFloat};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 /// Three coordinates (or three colour channels), each a vector of lanes.
 #[derive(Clone, Copy, Debug)]
-pub struct V3<L> {
+pub struct Vec3<L> {
     /// First coordinate or red.
     pub x: L,
     /// Second coordinate or green.
@@ -14,7 +14,7 @@ pub struct V3<L> {
     pub z: L,
 }
 
-impl<L: Lanes> V3<L> {
+impl<L: SimdFloat> Vec3<L> {
     /// From its coordinates.
     #[inline(always)]
     pub fn new(x: L, y: L, z: L) -> Self {
@@ -117,7 +117,7 @@ impl<L: Lanes> V3<L> {
     }
 }
 
-impl<L: Lanes> Add for V3<L> {
+impl<L: SimdFloat> Add for Vec3<L> {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
@@ -125,14 +125,14 @@ impl<L: Lanes> Add for V3<L> {
     }
 }
 
-impl<L: Lanes> AddAssign for V3<L> {
+impl<L: SimdFloat> AddAssign for Vec3<L> {
     #[inline(always)]
     fn add_assign(&mut self, o: Self) {
         *self = *self + o;
     }
 }
 
-impl<L: Lanes> Sub for V3<L> {
+impl<L: SimdFloat> Sub for Vec3<L> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
@@ -140,7 +140,7 @@ impl<L: Lanes> Sub for V3<L> {
     }
 }
 
-impl<L: Lanes> Mul<L> for V3<L> {
+impl<L: SimdFloat> Mul<L> for Vec3<L> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, s: L) -> Self {
@@ -148,7 +148,7 @@ impl<L: Lanes> Mul<L> for V3<L> {
     }
 }
 
-impl<L: Lanes> Neg for V3<L> {
+impl<L: SimdFloat> Neg for Vec3<L> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -160,36 +160,36 @@ impl<L: Lanes> Neg for V3<L> {
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<L> {
     /// First tangent.
-    pub t: V3<L>,
+    pub t: Vec3<L>,
     /// Second tangent.
-    pub b: V3<L>,
+    pub b: Vec3<L>,
     /// The vector it was built around.
-    pub n: V3<L>,
+    pub n: Vec3<L>,
 }
 
-impl<L: Lanes> Frame<L> {
+impl<L: SimdFloat> Frame<L> {
     /// Branch-free basis around the unit vector `n`, continuous but for n.z = 0. Around a level vector
     /// (n.y = 0) the first tangent is level and the second upright, and so are the axes of the lobes of
     /// an upright mirror.
     ///
     /// Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1).
     #[inline(always)]
-    pub fn around(n: V3<L>) -> Self {
+    pub fn around(n: Vec3<L>) -> Self {
         let sign = L::one().copysign(n.z);
         let a = -(L::one() / (sign + n.z));
         let b = n.x * n.y * a;
-        let t = V3::new((sign * n.x * n.x).mul_add(a, L::one()), sign * b, -(sign * n.x));
-        let b = V3::new(b, (n.y * n.y).mul_add(a, sign), -n.y);
+        let t = Vec3::new((sign * n.x * n.x).mul_add(a, L::one()), sign * b, -(sign * n.x));
+        let b = Vec3::new(b, (n.y * n.y).mul_add(a, sign), -n.y);
         Self { t, b, n }
     }
     /// From coordinates in this frame (t, b, n) to the frame's surroundings.
     #[inline(always)]
-    pub fn to_world(&self, v: V3<L>) -> V3<L> {
+    pub fn to_world(&self, v: Vec3<L>) -> Vec3<L> {
         self.t.mul_add(v.x, self.b.mul_add(v.y, self.n * v.z))
     }
     /// From the frame's surroundings to coordinates (t, b, n).
     #[inline(always)]
-    pub fn to_local(&self, v: V3<L>) -> V3<L> {
-        V3::new(self.t.dot(v), self.b.dot(v), self.n.dot(v))
+    pub fn to_local(&self, v: Vec3<L>) -> Vec3<L> {
+        Vec3::new(self.t.dot(v), self.b.dot(v), self.n.dot(v))
     }
 }

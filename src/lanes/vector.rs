@@ -1,6 +1,6 @@
 //! The vector instances, over the types of the `wide` crate.
 
-use crate::lanes::{Bits, Lanes, MAX_WIDTH, Mask, ROUNDER};
+use crate::lanes::{MAX_WIDTH, Mask, ROUNDER, SimdFloat, SimdU32};
 use wide::bytemuck::cast;
 use wide::{f32x4, f32x8, f64x2, f64x4, i32x4, i32x8, i64x4, u32x4, u32x8};
 #[cfg(target_feature = "avx512f")]
@@ -8,7 +8,7 @@ use wide::{f32x16, f64x8, i32x16, u32x16};
 
 macro_rules! vector_bits {
     ($bits:ident, $n:literal, $reverse:expr) => {
-        impl Bits for $bits {
+        impl SimdU32 for $bits {
             #[inline(always)]
             fn splat(x: u32) -> Self {
                 $bits::splat(x)
@@ -33,7 +33,7 @@ macro_rules! vector_bits {
 /// Reverses the bits of each 32-bit lane by shifts and masks.
 #[inline(always)]
 #[allow(dead_code, reason = "used by the widths that have no byte shuffle of their own")]
-fn reverse_by_shifts<B: Bits>(x: B) -> B {
+fn reverse_by_shifts<B: SimdU32>(x: B) -> B {
     let swap = |x: B, n: u32, m: u32| ((x >> n) & B::splat(m)) | ((x & B::splat(m)) << n);
     let x = swap(x, 1, 0x5555_5555);
     let x = swap(x, 2, 0x3333_3333);
@@ -111,13 +111,13 @@ macro_rules! vector_lanes {
             }
         }
 
-        impl Lanes for $vector {
+        impl SimdFloat for $vector {
             const WIDTH: usize = $n;
             const NAME: &'static str = stringify!($vector);
             const MAX: f64 = $scalar::MAX as f64;
             type Scalar = $scalar;
             type Mask = $vector;
-            type Bits = $bits;
+            type SimdU32 = $bits;
 
             #[inline(always)]
             fn splat(x: $scalar) -> Self {
@@ -147,8 +147,8 @@ macro_rules! vector_lanes {
             fn extremes(self) -> ($scalar, $scalar) {
                 // Both halves at once, then one by one.
                 let most = $vector::splat($scalar::MAX);
-                let [a, b]: [$half; 2] = cast(Lanes::min(self, most));
-                let [c, d]: [$half; 2] = cast(Lanes::max(self, -most));
+                let [a, b]: [$half; 2] = cast(SimdFloat::min(self, most));
+                let [c, d]: [$half; 2] = cast(SimdFloat::max(self, -most));
                 let (low, high) = (a.fast_min(b).to_array(), c.fast_max(d).to_array());
                 let smaller = |a, b| if a < b { a } else { b };
                 let larger = |a, b| if a > b { a } else { b };

@@ -1,7 +1,7 @@
 //! A light, compiled: of unit strength and white. Colour and intensity are applied to the finished
 //! sums, so that changing them needs no new samples.
 
-use crate::lanes::{Lanes, Real, V3};
+use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::light::{Falloff, Light};
 use crate::value::unit;
 use glam::DVec3;
@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 /// A light, compiled.
 #[derive(Clone, Copy, Debug)]
-pub enum Lamp<S> {
+pub enum DeltaLight<S> {
     /// A point whose irradiance falls with the square of the distance: 1 / d^2.
     Falling {
         /// Where it stands.
@@ -29,16 +29,16 @@ pub enum Lamp<S> {
 
 /// Unit light arriving at points.
 #[derive(Clone, Copy, Debug)]
-pub struct Arrival<L> {
+pub struct LightSample<L> {
     /// Unit vector towards the light.
-    pub towards: V3<L>,
+    pub towards: Vec3<L>,
     /// Distance to the light; the largest number for light from infinity.
     pub distance: L,
     /// Irradiance of a surface that faces the light.
     pub irradiance: L,
 }
 
-impl<S: Real> Lamp<S> {
+impl<S: Float> DeltaLight<S> {
     /// Compiles `light` for a scene shifted so that `origin` becomes zero. `None`: it has no kind
     /// or no direction.
     pub fn new(light: &Light, origin: DVec3) -> Option<Self> {
@@ -55,15 +55,15 @@ impl<S: Real> Lamp<S> {
 
     /// The light that arrives at `point`, if nothing is in the way.
     #[inline(always)]
-    pub fn at<L: Lanes<Scalar = S>>(&self, point: V3<L>) -> Arrival<L> {
+    pub fn at<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> LightSample<L> {
         match self {
-            Self::Directional { towards } => Arrival {
-                towards: V3::splat(*towards),
+            Self::Directional { towards } => LightSample {
+                towards: Vec3::splat(*towards),
                 distance: L::of(L::MAX),
                 irradiance: L::of(PI),
             },
             Self::Falling { position } | Self::Even { position } => {
-                let to = V3::splat(*position) - point;
+                let to = Vec3::splat(*position) - point;
                 let distance = to.length2().sqrt();
                 let inverse = L::one() / distance;
                 let irradiance = match self {
@@ -71,7 +71,7 @@ impl<S: Real> Lamp<S> {
                     Self::Falling { .. } => (inverse * inverse).min(L::of(L::MAX)),
                     _ => L::of(PI),
                 };
-                Arrival { towards: to * inverse, distance, irradiance }
+                LightSample { towards: to * inverse, distance, irradiance }
             }
         }
     }

@@ -2,9 +2,9 @@
 
 mod delta;
 
-pub use delta::{Arrival, Lamp};
+pub use delta::{DeltaLight, LightSample};
 
-use crate::value::{Checks, Choice, Color, Fault, Field, Range, Takes};
+use crate::value::{Choice, Color, Field, NumberRange, ValidationError, Validator, ValueType};
 use serde::{Deserialize, Serialize};
 
 /// One light: exactly one of `point` and `directional`, a colour, an intensity.
@@ -73,31 +73,31 @@ impl Default for Light {
 
 /// The keys of `[[light]]`.
 pub const FIELDS: &[Field] = &[
-    Field::without("name", Takes::Text, "", "a number", "Name; no two lights have the same."),
+    Field::without("name", ValueType::Text, "", "a number", "Name; no two lights have the same."),
     Field::without(
         "point",
-        Takes::Table(POINT),
+        ValueType::Table(POINT),
         "",
         "`directional` is needed",
         "Light from one point. Exactly one of `point` and `directional` is given.",
     ),
     Field::without(
         "directional",
-        Takes::Table(DIRECTIONAL),
+        ValueType::Table(DIRECTIONAL),
         "",
         "`point` is needed",
         "Light from infinitely far away.",
     ),
     Field::preset(
         "color",
-        Takes::Color(Range::LIGHT),
+        ValueType::Color(NumberRange::LIGHT),
         "",
         "[1.0, 1.0, 1.0]",
         "Colour; multiplies the intensity.",
     ),
     Field::preset(
         "intensity",
-        Takes::Number(Range::LIGHT),
+        ValueType::Number(NumberRange::LIGHT),
         "W/sr, or irradiance / π",
         "1.0",
         "With falloff `inverse-square` the radiant intensity [W/sr]. With `none`, and for a \
@@ -105,23 +105,27 @@ pub const FIELDS: &[Field] = &[
     ),
     Field::preset(
         "falloff",
-        Takes::Choice(FALLOFFS),
+        ValueType::Choice(FALLOFFS),
         "",
         "\"none\"",
         "How a point light weakens with distance.",
     ),
-    Field::preset("on", Takes::Switch, "", "true", "Whether it shines."),
+    Field::preset("on", ValueType::Switch, "", "true", "Whether it shines."),
 ];
 
 const POINT: &[Field] = &[Field::required(
     "position",
-    Takes::Numbers(3, Range::COORDINATE),
+    ValueType::Numbers(3, NumberRange::COORDINATE),
     "scene units",
     "Where it stands.",
 )];
 
-const DIRECTIONAL: &[Field] =
-    &[Field::required("direction", Takes::Direction, "", "Direction in which the light travels.")];
+const DIRECTIONAL: &[Field] = &[Field::required(
+    "direction",
+    ValueType::Direction,
+    "",
+    "Direction in which the light travels.",
+)];
 
 const FALLOFFS: &[Choice] = &[
     Choice { name: "none", doc: "not at all" },
@@ -130,36 +134,36 @@ const FALLOFFS: &[Choice] = &[
 
 impl Light {
     /// What is wrong with it.
-    pub fn faults(&self) -> Vec<Fault> {
+    pub fn faults(&self) -> Vec<ValidationError> {
         let point = self
             .point
-            .map(|p| Checks::new(POINT).numbers("position", &p.position).faults())
+            .map(|p| Validator::new(POINT).numbers("position", &p.position).faults())
             .unwrap_or_default();
         let directional = self
             .directional
-            .map(|d| Checks::new(DIRECTIONAL).numbers("direction", &d.direction).faults())
+            .map(|d| Validator::new(DIRECTIONAL).numbers("direction", &d.direction).faults())
             .unwrap_or_default();
         let kinds = match (&self.point, &self.directional) {
             (Some(_), None) => None,
-            (None, None) => Some(Fault::new(
+            (None, None) => Some(ValidationError::new(
                 "",
                 "neither point nor directional is given",
                 "exactly one of them, such as point = { position = [2.0, 4.0, 3.0] }",
             )),
-            (Some(_), Some(_)) => Some(Fault::new(
+            (Some(_), Some(_)) => Some(ValidationError::new(
                 "directional",
                 "both point and directional are given",
                 "exactly one of them; a second light needs its own [[light]]",
             )),
             (None, Some(_)) => (self.falloff == Falloff::InverseSquare).then(|| {
-                Fault::new(
+                ValidationError::new(
                     "falloff",
                     "falloff is \"inverse-square\", but a directional light has no distance",
                     "falloff \"none\", or a point light",
                 )
             }),
         };
-        Checks::new(FIELDS)
+        Validator::new(FIELDS)
             .inner("point", point)
             .inner("directional", directional)
             .numbers("color", &self.color.0)

@@ -1,6 +1,6 @@
 //! A material, compiled: only numbers that the kernel needs.
 
-use crate::lanes::Real;
+use crate::lanes::Float;
 use crate::material::fresnel::Reflectance;
 use crate::material::{Fresnel, Highlight, Lobe, Masking, Material};
 
@@ -13,7 +13,7 @@ pub const SHARP_EXPONENT: f64 = 1024.0;
 
 /// A distribution of microfacets.
 #[derive(Clone, Copy, Debug)]
-pub struct Facets<S> {
+pub struct MicrofacetDistribution<S> {
     /// GGX instead of Beckmann.
     pub ggx: bool,
     /// Slope, at least [`SMOOTH_ALPHA`].
@@ -26,7 +26,7 @@ pub struct Facets<S> {
     pub masking: Masking,
 }
 
-impl<S: Real> Facets<S> {
+impl<S: Float> MicrofacetDistribution<S> {
     /// Of slope `alpha`.
     pub fn new(ggx: bool, alpha: f64, masking: Masking) -> Self {
         let alpha2 = alpha * alpha;
@@ -37,7 +37,7 @@ impl<S: Real> Facets<S> {
 
 /// How a light's highlight is computed.
 #[derive(Clone, Copy, Debug)]
-pub enum Shine<S> {
+pub enum SpecularModel<S> {
     /// No highlight.
     None,
     /// k_s (R.V)^alpha.
@@ -50,17 +50,17 @@ pub enum Shine<S> {
         sharp: bool,
     },
     /// k_s D G F / (4 N.L N.V).
-    Facets {
+    MicrofacetDistribution {
         /// k_s.
         strength: S,
         /// D and G.
-        facets: Facets<S>,
+        facets: MicrofacetDistribution<S>,
     },
 }
 
 /// How a reflected ray is spread.
 #[derive(Clone, Copy, Debug)]
-pub enum Spread<S> {
+pub enum ReflectionLobe<S> {
     /// Not at all.
     Mirror,
     /// Uniformly in a cone.
@@ -74,7 +74,7 @@ pub enum Spread<S> {
         side: S,
     },
     /// As microfacets reflect.
-    Facets(Facets<S>),
+    MicrofacetDistribution(MicrofacetDistribution<S>),
 }
 
 /// How a surface lets light through.
@@ -91,15 +91,15 @@ pub struct Transmission<S> {
 
 /// A material, compiled.
 #[derive(Clone, Copy, Debug)]
-pub struct Finish<S> {
+pub struct Bsdf<S> {
     /// k_a x colour.
     pub ambient: [S; 3],
     /// k_d x colour.
     pub diffuse: [S; 3],
     /// The lights' highlights.
-    pub shine: Shine<S>,
+    pub shine: SpecularModel<S>,
     /// k_r and its spread, if it reflects at all.
-    pub reflection: Option<(S, Spread<S>)>,
+    pub reflection: Option<(S, ReflectionLobe<S>)>,
     /// k_t and what bends the light, if it lets any through.
     pub transmission: Option<Transmission<S>>,
     /// F of the highlight.
@@ -118,32 +118,33 @@ pub fn one_minus_cos_of_tan(r: f64) -> f64 {
     if square.is_infinite() { 1.0 } else { square / (1.0 + square + (1.0 + square).sqrt()) }
 }
 
-impl<S: Real> Finish<S> {
+impl<S: Float> Bsdf<S> {
     /// Compiles `material`; `reflects`: the scene traces reflected and transmitted rays at all.
     pub fn new(material: &Material, reflects: bool) -> Self {
         let slope = material.slope().max(SMOOTH_ALPHA);
-        let facets = |ggx| Facets::new(ggx, slope, material.masking);
+        let facets = |ggx| MicrofacetDistribution::new(ggx, slope, material.masking);
         let strength = S::of(material.specular);
         let shine = match material.highlight {
-            _ if material.specular == 0.0 => Shine::None,
-            Highlight::Phong => Shine::Phong {
+            _ if material.specular == 0.0 => SpecularModel::None,
+            Highlight::Phong => SpecularModel::Phong {
                 strength,
                 exponent: S::of(material.exponent),
                 sharp: material.exponent > SHARP_EXPONENT,
             },
-            Highlight::CookTorrance => {
-                Shine::Facets { strength, facets: facets(material.lobe == Lobe::Ggx) }
-            }
+            Highlight::CookTorrance => SpecularModel::MicrofacetDistribution {
+                strength,
+                facets: facets(material.lobe == Lobe::Ggx),
+            },
         };
         let r = material.roughness;
         let spread = match material.lobe {
-            Lobe::Mirror => Spread::Mirror,
-            Lobe::Cone | Lobe::Square if r == 0.0 => Spread::Mirror,
-            Lobe::Cone => Spread::Cone { one_minus_cos: S::of(one_minus_cos_of_tan(r)) },
-            Lobe::Square => Spread::Square { side: S::of(std::f64::consts::PI.sqrt() * r) },
-            Lobe::Beckmann | Lobe::Ggx if material.slope() < SMOOTH_ALPHA => Spread::Mirror,
-            Lobe::Beckmann => Spread::Facets(facets(false)),
-            Lobe::Ggx => Spread::Facets(facets(true)),
+            Lobe::Mirror => ReflectionLobe::Mirror,
+            Lobe::Cone | Lobe::Square if r == 0.0 => ReflectionLobe::Mirror,
+            Lobe::Cone => ReflectionLobe::Cone { one_minus_cos: S::of(one_minus_cos_of_tan(r)) },
+            Lobe::Square => ReflectionLobe::Square { side: S::of(std::f64::consts::PI.sqrt() * r) },
+            Lobe::Beckmann | Lobe::Ggx if material.slope() < SMOOTH_ALPHA => ReflectionLobe::Mirror,
+            Lobe::Beckmann => ReflectionLobe::MicrofacetDistribution(facets(false)),
+            Lobe::Ggx => ReflectionLobe::MicrofacetDistribution(facets(true)),
         };
         let (k_r, k_t) = (material.reflection, material.transmission);
         let dielectric = material.law() == Fresnel::Dielectric;

@@ -1,25 +1,25 @@
 //! What a finish does with light, in lanes: highlights of lights and directions of reflected rays.
 
-use crate::lanes::{Frame, Lanes, Mask, Real, V3};
+use crate::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
 use crate::material::Masking;
-use crate::material::bsdf::{Facets, Finish, Shine, Spread};
+use crate::material::bsdf::{Bsdf, MicrofacetDistribution, ReflectionLobe, SpecularModel};
 use crate::sampling::warp;
 use std::f64::consts::{FRAC_1_PI, PI};
 
 /// A reflected ray's direction and what its radiance counts.
 #[derive(Clone, Copy, Debug)]
-pub struct Reflected<L> {
+pub struct BsdfSample<L> {
     /// Unit direction.
-    pub direction: V3<L>,
+    pub direction: Vec3<L>,
     /// Factor of the radiance that comes from there; zero: the ray is lost.
-    pub weight: V3<L>,
+    pub weight: Vec3<L>,
 }
 
 /// Component along the unit vector `n` of `h`, of any length, and the squared tangent of the angle
 /// between them, from the part of `h` across `n`, so that small angles keep their digits. The tangent
 /// is bounded, so that what is computed from it stays finite.
 #[inline(always)]
-fn along_tan2<L: Lanes>(h: V3<L>, n: V3<L>) -> (L, L) {
+fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     let along = h.dot(n);
     let across = h - n * along;
     (along, (across.length2() / (along * along)).min(L::of(1e15)))
@@ -30,7 +30,7 @@ fn along_tan2<L: Lanes>(h: V3<L>, n: V3<L>) -> (L, L) {
 /// The cosine of two rounded vectors may exceed 1 by a few roundings, and 1.000001^1e6 is 2.7: it is at most 1
 /// here.
 #[inline(always)]
-fn cosine_power<L: Lanes>(cos: L, alpha: L) -> L {
+fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
     let power = (cos.max(L::of(1e-30)).min(L::one()).ln() * alpha).exp();
     power.only(cos.gt(L::zero()))
 }
@@ -43,7 +43,7 @@ fn cosine_power<L: Lanes>(cos: L, alpha: L) -> L {
 /// a relative error of s^8 / 9: below 1e-9 while alpha s < 88, beyond which the power is no normal number of
 /// single precision.
 #[inline(always)]
-fn sharp_cosine_power<L: Lanes>(a: V3<L>, b: V3<L>, alpha: L) -> L {
+fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
     let (along, across2) = (a.dot(b), a.cross(b).length2());
     let s = across2 / (along * along * L::of(2.0) + across2);
     let s2 = s * s;
@@ -54,7 +54,7 @@ fn sharp_cosine_power<L: Lanes>(a: V3<L>, b: V3<L>, alpha: L) -> L {
 }
 
 /// Microfacet terms in a lane type.
-pub trait FacetsOf<L: Lanes> {
+pub trait MicrofacetEval<L: SimdFloat> {
     /// D [1/sr] for a facet normal at `tan2` from the surface normal.
     fn density(&self, tan2: L) -> L;
     /// G, the share of facets with normal h that both directions see, as numerator and denominator.
@@ -73,7 +73,7 @@ const STEEP: f64 = 4.0;
 /// It is exp(-a^2) k(a) / (2 a sqrt(pi) (1 + 2 a^2)) with a smooth k between 0.6 and 1, here the
 /// Chebyshev fit of degree 10 in 2 - 6 / (a + 2). Error below 1e-8 (1 + Lambda).
 #[inline(always)]
-fn beckmann_lambda<L: Lanes>(a: L) -> L {
+fn beckmann_lambda<L: SimdFloat>(a: L) -> L {
     const K: [f64; 11] = [
         0.726_383_531_676_393_2,
         0.221_492_853_638_683_35,
@@ -94,7 +94,7 @@ fn beckmann_lambda<L: Lanes>(a: L) -> L {
     (-a2).exp() * k / below
 }
 
-impl<L: Lanes> FacetsOf<L> for Facets<L::Scalar> {
+impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
     #[inline(always)]
     fn density(&self, tan2: L) -> L {
         let inverse_alpha2 = L::splat(self.inverse_alpha2);
@@ -133,11 +133,11 @@ impl<L: Lanes> FacetsOf<L> for Facets<L::Scalar> {
     }
 }
 
-impl<S: Real> Finish<S> {
+impl<S: Float> Bsdf<S> {
     /// Whether lights leave highlights on it.
     #[inline(always)]
     pub fn shines(&self) -> bool {
-        !matches!(self.shine, Shine::None)
+        !matches!(self.shine, SpecularModel::None)
     }
 
     /// The highlight of a light: radiance towards `view` per irradiance of a surface that faces the
@@ -145,17 +145,17 @@ impl<S: Real> Finish<S> {
     ///
     /// `n`, `view`, `light`: unit vectors away from the surface; `nl`, `nv`: their cosines.
     #[inline(always)]
-    pub fn highlight<L: Lanes<Scalar = S>>(
+    pub fn highlight<L: SimdFloat<Scalar = S>>(
         &self,
-        n: V3<L>,
-        view: V3<L>,
-        light: V3<L>,
+        n: Vec3<L>,
+        view: Vec3<L>,
+        light: Vec3<L>,
         nl: L,
         nv: L,
-    ) -> V3<L> {
+    ) -> Vec3<L> {
         match &self.shine {
-            Shine::None => V3::zero(),
-            Shine::Phong { strength, exponent, sharp } => {
+            SpecularModel::None => Vec3::zero(),
+            SpecularModel::Phong { strength, exponent, sharp } => {
                 let (r, alpha) = (-light.reflect(n), L::splat(*exponent));
                 let power = if *sharp {
                     sharp_cosine_power(r, view, alpha)
@@ -164,9 +164,9 @@ impl<S: Real> Finish<S> {
                     cosine_power(cos, alpha)
                 };
                 let value = L::splat(*strength) * power * L::of(FRAC_1_PI);
-                V3::new(value, value, value)
+                Vec3::new(value, value, value)
             }
-            Shine::Facets { strength, facets } => {
+            SpecularModel::MicrofacetDistribution { strength, facets } => {
                 // The half vector, not of unit length: its square is twice its product with either.
                 let h = view + light;
                 let (nh, tan2) = along_tan2(h, n);
@@ -186,52 +186,54 @@ impl<S: Real> Finish<S> {
     /// `n` on the viewer's side; `u`, `v` uniform in [0, 1). `fold`: lobes that dip under the surface
     /// are mirrored up, otherwise lost there.
     #[inline(always)]
-    pub fn reflect<L: Lanes<Scalar = S>>(
+    pub fn reflect<L: SimdFloat<Scalar = S>>(
         &self,
         strength: S,
-        spread: &Spread<S>,
-        incident: V3<L>,
-        n: V3<L>,
+        spread: &ReflectionLobe<S>,
+        incident: Vec3<L>,
+        n: Vec3<L>,
         (u, v): (L, L),
         fold: bool,
-    ) -> Reflected<L> {
+    ) -> BsdfSample<L> {
         let mirror = incident.reflect(n);
         let k = L::splat(strength);
         let (direction, weight) = match spread {
-            Spread::Mirror => (mirror, k),
-            Spread::Cone { one_minus_cos } => {
+            ReflectionLobe::Mirror => (mirror, k),
+            ReflectionLobe::Cone { one_minus_cos } => {
                 let local = warp::cone(u, v, L::splat(*one_minus_cos));
                 (Frame::around(mirror.renormalize()).to_world(local), k)
             }
-            Spread::Square { side } => {
+            ReflectionLobe::Square { side } => {
                 let local = warp::square(u, v, L::splat(*side));
                 (Frame::around(mirror.renormalize()).to_world(local), k)
             }
-            Spread::Facets(facets) => return self.facet(k, facets, incident, n, (u, v)),
+            ReflectionLobe::MicrofacetDistribution(facets) => {
+                return self.facet(k, facets, incident, n, (u, v));
+            }
         };
         let up = direction.dot(n);
         let below = up.le(L::zero());
         let (direction, weight) = if fold {
-            (V3::select(below, direction.reflect(n), direction), weight)
+            (Vec3::select(below, direction.reflect(n), direction), weight)
         } else {
             (direction, L::select(below, L::zero(), weight))
         };
         // The facet that would send this ray: half-way between view and reflected direction, whose
         // cosine with either is half the length of their sum (without cancellation at grazing angles).
         let cos = || ((direction - incident).length2().sqrt() * L::of(0.5)).min(L::one());
-        Reflected { direction, weight: self.mirrored.times(cos, weight) }
+        BsdfSample { direction, weight: self.mirrored.times(cos, weight) }
     }
 
     /// Reflection at a sampled microfacet. Below the surface G is zero, and so is the weight.
     #[inline(always)]
-    fn facet<L: Lanes<Scalar = S>>(
+    fn facet<L: SimdFloat<Scalar = S>>(
         &self,
         k: L,
-        facets: &Facets<S>,
-        incident: V3<L>,
-        n: V3<L>,
+        facets: &MicrofacetDistribution<S>,
+        incident: Vec3<L>,
+        n: Vec3<L>,
         (u, v): (L, L),
-    ) -> Reflected<L> {
+    ) -> BsdfSample<L> {
         let frame = Frame::around(n);
         let view = frame.to_local(-incident);
         let alpha = L::splat(facets.alpha);
@@ -245,39 +247,43 @@ impl<S: Real> Finish<S> {
         let (seen, all) = facets.masking(h.z, view.z, light.z, vh);
         let weight: L = if facets.ggx {
             // Visible normals: density D G1 V.H / N.V, so that f N.L / density = F G / G1.
-            k * seen * (L::one() + FacetsOf::<L>::lambda(facets, view.z)) / all
+            k * seen * (L::one() + MicrofacetEval::<L>::lambda(facets, view.z)) / all
         } else {
             // Normals by D N.H: f N.L / density = F G V.H / (N.V N.H).
             k * seen * vh / (all * view.z * h.z)
         };
         let valid = vh.gt(L::zero()) & light.z.gt(L::zero()) & view.z.gt(L::zero());
-        Reflected {
+        BsdfSample {
             direction: frame.to_world(light).renormalize(),
             weight: self.mirrored.times(|| vh, weight).only(valid),
         }
     }
 
-    /// Density [1/sr] with which [`Finish::reflect`] draws `direction` before folding, one lane at a
+    /// Density [1/sr] with which [`Bsdf::reflect`] draws `direction` before folding, one lane at a
     /// time, in double precision: what tests integrate. `None` for a mirror.
     pub fn density(
         &self,
-        spread: &Spread<S>,
-        incident: V3<f64>,
-        n: V3<f64>,
-        direction: V3<f64>,
+        spread: &ReflectionLobe<S>,
+        incident: Vec3<f64>,
+        n: Vec3<f64>,
+        direction: Vec3<f64>,
     ) -> Option<f64> {
         let mirror = incident.reflect(n);
         match spread {
-            Spread::Mirror => None,
-            Spread::Cone { one_minus_cos } => {
+            ReflectionLobe::Mirror => None,
+            ReflectionLobe::Cone { one_minus_cos } => {
                 Some(warp::cone_pdf(mirror.dot(direction), one_minus_cos.to_f64()))
             }
-            Spread::Square { side } => {
+            ReflectionLobe::Square { side } => {
                 let local = Frame::around(mirror).to_local(direction);
                 Some(warp::square_pdf([local.x, local.y, local.z], side.to_f64()))
             }
-            Spread::Facets(facets) => {
-                let facets = Facets::<f64>::new(facets.ggx, facets.alpha.to_f64(), facets.masking);
+            ReflectionLobe::MicrofacetDistribution(facets) => {
+                let facets = MicrofacetDistribution::<f64>::new(
+                    facets.ggx,
+                    facets.alpha.to_f64(),
+                    facets.masking,
+                );
                 let view = -incident;
                 let h = (view + direction).normalize();
                 let (nh, tan2) = along_tan2(h, n);
@@ -288,7 +294,7 @@ impl<S: Real> Finish<S> {
                 let d = facets.density(tan2);
                 let nv = view.dot(n);
                 Some(if facets.ggx {
-                    d / ((1.0 + FacetsOf::<f64>::lambda(&facets, nv)) * 4.0 * nv)
+                    d / ((1.0 + MicrofacetEval::<f64>::lambda(&facets, nv)) * 4.0 * nv)
                 } else {
                     d * nh / (4.0 * vh)
                 })

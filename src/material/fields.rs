@@ -1,13 +1,13 @@
 //! What may be written in a material.
 
 use crate::material::texture_fields::{BUMP_KINDS, TEXTURE_KINDS};
-use crate::value::{Choice, Field, Range, Takes};
+use crate::value::{Choice, Field, NumberRange, ValueType};
 
 /// The keys of `[materials.NAME]`.
 pub const FIELDS: &[Field] = &[
     Field::preset(
         "color",
-        Takes::Color(Range::COEFFICIENT),
+        ValueType::Color(NumberRange::COEFFICIENT),
         "",
         "[0.8, 0.8, 0.8]",
         "Body colour: multiplies the ambient and the diffuse part.",
@@ -17,14 +17,14 @@ pub const FIELDS: &[Field] = &[
     Field::preset("specular", COEFFICIENT, "", "0.0", "Highlight coefficient k_s."),
     Field::preset(
         "exponent",
-        Takes::Number(Range::closed(0.0, 1e9)),
+        ValueType::Number(NumberRange::closed(0.0, 1e9)),
         "",
         "32.0",
         "Phong exponent alpha of (R.V)^alpha: the larger, the smaller the highlight.",
     ),
     Field::preset(
         "highlight",
-        Takes::Choice(HIGHLIGHTS),
+        ValueType::Choice(HIGHLIGHTS),
         "",
         "\"phong\"",
         "Formula of a light's highlight.",
@@ -45,63 +45,63 @@ pub const FIELDS: &[Field] = &[
     ),
     Field::preset(
         "index",
-        Takes::Number(Range::closed(0.1, 1e4)),
+        ValueType::Number(NumberRange::closed(0.1, 1e4)),
         "",
         "1.5",
         "Index of refraction n of the inside; outside of everything it is 1.",
     ),
     Field::preset(
         "roughness",
-        Takes::Number(Range::closed(0.0, 1e6)),
+        ValueType::Number(NumberRange::closed(0.0, 1e6)),
         "",
         "0.0",
         "Blur of the reflection: radius of the cone's base at unit distance; 0 is a perfect mirror.",
     ),
     Field::preset(
         "lobe",
-        Takes::Choice(LOBES),
+        ValueType::Choice(LOBES),
         "",
         "\"cone\"",
         "How the reflected ray is spread; the same roughness means a comparable blur in each.",
     ),
     Field::without(
         "alpha",
-        Takes::Number(Range::closed(0.0, 1e6)),
+        ValueType::Number(NumberRange::closed(0.0, 1e6)),
         "",
         "roughness / (2 √2)",
         "Slope parameter of the microfacets.",
     ),
     Field::preset(
         "masking",
-        Takes::Choice(MASKINGS),
+        ValueType::Choice(MASKINGS),
         "",
         "\"v-cavity\"",
         "Masking and shadowing between microfacets.",
     ),
     Field::without(
         "fresnel",
-        Takes::Choice(FRESNELS),
+        ValueType::Choice(FRESNELS),
         "",
         "`exact` for a metal, otherwise `constant`",
         "How the reflectance depends on the angle.",
     ),
     Field::without(
         "reflectance",
-        Takes::Color(Range::SHARE),
+        ValueType::Color(NumberRange::SHARE),
         "",
         "white",
         "Reflectance F0 at normal incidence. Not together with `metal`.",
     ),
     Field::without(
         "metal",
-        Takes::Choice(METALS),
+        ValueType::Choice(METALS),
         "",
         "no metal",
         "A metal, for its reflectance. Not together with `reflectance`.",
     ),
     Field::preset(
         "two_sided",
-        Takes::Switch,
+        ValueType::Switch,
         "",
         "true",
         "Whether the back of a surface is finished like its front; otherwise the back is black: of its \
@@ -110,21 +110,21 @@ pub const FIELDS: &[Field] = &[
     ),
     Field::without(
         "texture",
-        Takes::OneOf(TEXTURE_KINDS),
+        ValueType::OneOf(TEXTURE_KINDS),
         "",
         "one colour all over",
         "What multiplies `color`, from place to place.",
     ),
     Field::without(
         "bump",
-        Takes::OneOf(BUMP_KINDS),
+        ValueType::OneOf(BUMP_KINDS),
         "",
         "as smooth as the shape",
-        "Heights that light sees on the surface; its outline stays as it is.",
+        "BumpMap that light sees on the surface; its outline stays as it is.",
     ),
 ];
 
-const COEFFICIENT: Takes = Takes::Number(Range::COEFFICIENT);
+const COEFFICIENT: ValueType = ValueType::Number(NumberRange::COEFFICIENT);
 
 const HIGHLIGHTS: &[Choice] = &[
     Choice { name: "phong", doc: "k_s (R.V)^alpha" },

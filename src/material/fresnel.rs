@@ -1,6 +1,6 @@
 //! Reflectance against angle, per channel.
 
-use crate::lanes::{Lanes, Real, V3};
+use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::material::{Fresnel, Material};
 
 /// Index of refraction that reflects `f0` of the light at normal incidence: (1 + sqrt F0) /
@@ -29,7 +29,7 @@ pub struct Reflectance<S> {
     total: [bool; 3],
 }
 
-impl<S: Real> Reflectance<S> {
+impl<S: Float> Reflectance<S> {
     /// 1 at every angle.
     pub fn white() -> Self {
         Self::new(&Material::default())
@@ -54,36 +54,36 @@ impl<S: Real> Reflectance<S> {
 
     /// `value` times the share of the light reflected at the cosine that `c` gives, if that matters.
     #[inline(always)]
-    pub fn times<L: Lanes<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> V3<L> {
+    pub fn times<L: SimdFloat<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> Vec3<L> {
         match self.law {
-            Fresnel::Constant => V3::splat(self.f0) * value,
+            Fresnel::Constant => Vec3::splat(self.f0) * value,
             Fresnel::Schlick | Fresnel::Exact | Fresnel::Dielectric => self.at(c()) * value,
         }
     }
 
     /// Share of the light reflected at cosine `c` (0..1) between light and facet normal.
     #[inline(always)]
-    pub fn at<L: Lanes<Scalar = S>>(&self, c: L) -> V3<L> {
-        let f0 = V3::splat(self.f0);
+    pub fn at<L: SimdFloat<Scalar = S>>(&self, c: L) -> Vec3<L> {
+        let f0 = Vec3::splat(self.f0);
         match self.law {
             Fresnel::Constant => f0,
             Fresnel::Schlick => {
                 let k = L::one() - c;
                 let k2 = k * k;
-                let rest = V3::new(L::one() - f0.x, L::one() - f0.y, L::one() - f0.z);
+                let rest = Vec3::new(L::one() - f0.x, L::one() - f0.y, L::one() - f0.z);
                 rest.mul_add(k2 * k2 * k, f0)
             }
-            Fresnel::Exact => V3::new(self.exact(c, 0), self.exact(c, 1), self.exact(c, 2)),
+            Fresnel::Exact => Vec3::new(self.exact(c, 0), self.exact(c, 1), self.exact(c, 2)),
             Fresnel::Dielectric => {
                 let f = self.exact(c, 0);
-                V3::new(f, f, f)
+                Vec3::new(f, f, f)
             }
         }
     }
 
     /// F = 1/2 ((g - c) / (g + c))^2 (1 + ((c (g + c) - 1) / (c (g - c) + 1))^2), g^2 = n^2 + c^2 - 1.
     #[inline(always)]
-    fn exact<L: Lanes<Scalar = S>>(&self, c: L, channel: usize) -> L {
+    fn exact<L: SimdFloat<Scalar = S>>(&self, c: L, channel: usize) -> L {
         if self.total[channel] {
             return L::one();
         }
@@ -99,7 +99,7 @@ impl<S: Real> Reflectance<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::Lanes;
+    use crate::lanes::SimdFloat;
     use crate::value::Color;
 
     fn exact(f0: f64) -> Reflectance<f64> {
@@ -149,7 +149,7 @@ mod tests {
         let s = ((ci - 1.5 * ct) / (ci + 1.5 * ct)).powi(2);
         let p = ((1.5 * ci - ct) / (1.5 * ci + ct)).powi(2);
         assert!((exact(0.04).at(0.5).x - 0.5 * (s + p)).abs() < 1e-12);
-        let lanes: crate::lanes::Double = exact(0.04).at(Lanes::of(0.5)).x;
+        let lanes: crate::lanes::Double = exact(0.04).at(SimdFloat::of(0.5)).x;
         assert_eq!(lanes.lane(2), exact(0.04).at(0.5).x);
     }
 }

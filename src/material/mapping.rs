@@ -5,7 +5,7 @@
 //! surface is what Blinn's partial derivatives of the surface come to (Blinn 1978, *Simulation of
 //! Wrinkled Surfaces*; Mikkelsen 2010, *Bump Mapping Unparametrized Surfaces on the GPU*).
 
-use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::material::texture::{Axis, Mapping, Placement};
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
@@ -35,20 +35,20 @@ const TIE: f64 = 1.001;
 
 /// Coordinates of a texture in repeats, and their gradients in the texture's space.
 #[derive(Clone, Copy, Debug)]
-pub struct Coordinates<L> {
+pub struct TexCoord<L> {
     /// To the right.
     pub u: L,
     /// Up.
     pub v: L,
     /// Gradient of u.
-    pub du: V3<L>,
+    pub du: Vec3<L>,
     /// Gradient of v.
-    pub dv: V3<L>,
+    pub dv: Vec3<L>,
 }
 
 /// A projection onto one thing of the scene.
 #[derive(Clone, Copy, Debug)]
-pub struct Projector<S> {
+pub struct TextureMapping<S> {
     projection: Projection,
     /// Columns of the linear map.
     texture_from_scene: [[S; 3]; 3],
@@ -77,7 +77,7 @@ fn turned(projection: Projection, axis: Option<Axis>) -> DMat3 {
     DMat3::from_cols(rows[0], rows[1], rows[2]).transpose()
 }
 
-impl<S: Real> Projector<S> {
+impl<S: Float> TextureMapping<S> {
     /// By `placement`, whose mapping comes to `projection` here, onto a thing that `low` and `high` are
     /// corners of the box around, in the texture's space.
     pub fn new(
@@ -124,37 +124,41 @@ impl<S: Real> Projector<S> {
 
     /// A normal in one space from one in the other, of any length: by the columns of the map back.
     #[inline(always)]
-    fn normal<L: Lanes<Scalar = S>>(columns: &[[S; 3]; 3], n: V3<L>) -> V3<L> {
-        let [x, y, z] = columns.map(V3::splat);
-        V3::new(x.dot(n), y.dot(n), z.dot(n))
+    fn normal<L: SimdFloat<Scalar = S>>(columns: &[[S; 3]; 3], n: Vec3<L>) -> Vec3<L> {
+        let [x, y, z] = columns.map(Vec3::splat);
+        Vec3::new(x.dot(n), y.dot(n), z.dot(n))
     }
 
     /// The coordinates at `point` of the scene, where the thing's outer normal is `normal`. With
-    /// [`Projector::wants_uv`] these are zero.
-    pub fn coordinates<L: Lanes<Scalar = S>>(&self, point: V3<L>, normal: V3<L>) -> Coordinates<L> {
-        let [x, y, z] = self.texture_from_scene.map(V3::splat);
-        let from_middle = point - V3::splat(self.middle);
+    /// [`TextureMapping::wants_uv`] these are zero.
+    pub fn coordinates<L: SimdFloat<Scalar = S>>(
+        &self,
+        point: Vec3<L>,
+        normal: Vec3<L>,
+    ) -> TexCoord<L> {
+        let [x, y, z] = self.texture_from_scene.map(Vec3::splat);
+        let from_middle = point - Vec3::splat(self.middle);
         let p = x * from_middle.x + y * from_middle.y + z * from_middle.z;
-        let p = p + V3::splat(self.inner_middle);
+        let p = p + Vec3::splat(self.inner_middle);
         let found = match self.projection {
             Projection::Planar => planar(p),
             Projection::Spherical => spherical(p),
             Projection::Cylindrical => cylindrical(p, L::splat(self.extent[1])),
             Projection::Box => {
                 let normal = Self::normal(&self.scene_from_texture, normal);
-                sides(p, normal, V3::splat(self.extent))
+                sides(p, normal, Vec3::splat(self.extent))
             }
             Projection::Uv => {
-                Coordinates { u: L::zero(), v: L::zero(), du: V3::zero(), dv: V3::zero() }
+                TexCoord { u: L::zero(), v: L::zero(), du: Vec3::zero(), dv: Vec3::zero() }
             }
         };
         self.placed(found)
     }
 
     /// Coordinates of the shape itself, scaled and moved.
-    pub fn placed<L: Lanes<Scalar = S>>(&self, found: Coordinates<L>) -> Coordinates<L> {
+    pub fn placed<L: SimdFloat<Scalar = S>>(&self, found: TexCoord<L>) -> TexCoord<L> {
         let ([su, sv], [ou, ov]) = (self.scale.map(L::splat), self.offset.map(L::splat));
-        Coordinates {
+        TexCoord {
             u: found.u.mul_add(su, ou),
             v: found.v.mul_add(sv, ov),
             du: found.du * su,
@@ -168,12 +172,12 @@ impl<S: Real> Projector<S> {
     ///
     /// Heights rise along the normal in the texture's space, so that an object that is transformed
     /// takes its bumps along.
-    pub fn bumped<L: Lanes<Scalar = S>>(
+    pub fn bumped<L: SimdFloat<Scalar = S>>(
         &self,
-        normal: V3<L>,
+        normal: Vec3<L>,
         outward: L,
-        gradient: V3<L>,
-    ) -> V3<L> {
+        gradient: Vec3<L>,
+    ) -> Vec3<L> {
         let inner = Self::normal(&self.scene_from_texture, normal).normalize();
         let along = inner.mul_add(-inner.dot(gradient), gradient);
         let bumped = along.mul_add(-outward, inner);
@@ -182,50 +186,50 @@ impl<S: Real> Projector<S> {
 }
 
 #[inline(always)]
-fn unit<L: Lanes>(axis: usize, length: L) -> V3<L> {
+fn unit<L: SimdFloat>(axis: usize, length: L) -> Vec3<L> {
     let zero = L::zero();
     match axis {
-        0 => V3::new(length, zero, zero),
-        1 => V3::new(zero, length, zero),
-        _ => V3::new(zero, zero, length),
+        0 => Vec3::new(length, zero, zero),
+        1 => Vec3::new(zero, length, zero),
+        _ => Vec3::new(zero, zero, length),
     }
 }
 
-fn planar<L: Lanes>(p: V3<L>) -> Coordinates<L> {
-    Coordinates { u: p.x, v: p.y, du: unit(0, L::one()), dv: unit(1, L::one()) }
+fn planar<L: SimdFloat>(p: Vec3<L>) -> TexCoord<L> {
+    TexCoord { u: p.x, v: p.y, du: unit(0, L::one()), dv: unit(1, L::one()) }
 }
 
 /// The angle around y in turns, its gradient, and the square of the distance from y.
 #[inline(always)]
-fn around<L: Lanes>(p: V3<L>) -> (L, V3<L>, L) {
+fn around<L: SimdFloat>(p: Vec3<L>) -> (L, Vec3<L>, L) {
     let across2 = p.x.mul_add(p.x, p.z * p.z);
     // On the axis there is no angle, and no gradient that were finite.
     let across2 = across2.max(p.length2() * L::of(1e-12)).max(L::of(1e-30));
     let turns = p.x.atan2(p.z).mul_add(L::of(1.0 / TAU), L::of(0.5));
     let per = L::of(1.0 / TAU) / across2;
-    (turns, V3::new(p.z * per, L::zero(), -(p.x * per)), across2)
+    (turns, Vec3::new(p.z * per, L::zero(), -(p.x * per)), across2)
 }
 
-fn spherical<L: Lanes>(p: V3<L>) -> Coordinates<L> {
+fn spherical<L: SimdFloat>(p: Vec3<L>) -> TexCoord<L> {
     let (u, du, across2) = around(p);
     let across = across2.sqrt();
     let v = p.y.atan2(across).mul_add(L::of(FRAC_1_PI), L::of(0.5));
     let per = L::of(FRAC_1_PI) / across2.mul_add(L::one(), p.y * p.y);
     let inward = -(p.y * per) / across;
-    Coordinates { u, v, du, dv: V3::new(p.x * inward, across * per, p.z * inward) }
+    TexCoord { u, v, du, dv: Vec3::new(p.x * inward, across * per, p.z * inward) }
 }
 
-fn cylindrical<L: Lanes>(p: V3<L>, height: L) -> Coordinates<L> {
+fn cylindrical<L: SimdFloat>(p: Vec3<L>, height: L) -> TexCoord<L> {
     let (u, du, _) = around(p);
     let flat = height.le(L::zero());
     let per = (L::one() / L::select(flat, L::one(), height)).only(!flat);
     let (free, low, high) = (p.y * per, L::of(RIM), L::of(1.0 - RIM));
     let inside = free.ge(low) & free.le(high);
-    Coordinates { u, v: free.max(low).min(high), du, dv: unit(1, per.only(inside)) }
+    TexCoord { u, v: free.max(low).min(high), du, dv: unit(1, per.only(inside)) }
 }
 
 /// Sides of a box from its lower corner on: which one, the normal says.
-fn sides<L: Lanes>(p: V3<L>, normal: V3<L>, extent: V3<L>) -> Coordinates<L> {
+fn sides<L: SimdFloat>(p: Vec3<L>, normal: Vec3<L>, extent: Vec3<L>) -> TexCoord<L> {
     let zero = L::zero();
     let [ax, ay, az] = [normal.x, normal.y, normal.z].map(L::abs);
     let on_z = (az * L::of(TIE)).ge(ax.max(ay));
@@ -234,11 +238,11 @@ fn sides<L: Lanes>(p: V3<L>, normal: V3<L>, extent: V3<L>) -> Coordinates<L> {
     let sign = L::one().copysign(pick(normal.x, normal.y, normal.z));
     let front = sign.gt(zero);
     let from = |front, high: L, at: L| L::select(front, at, high - at);
-    Coordinates {
+    TexCoord {
         u: pick(from(!front, extent.z, p.z), p.x, from(front, extent.x, p.x)),
         v: pick(p.y, from(!front, extent.z, p.z), p.y),
-        du: V3::new(pick(zero, L::one(), sign), zero, pick(-sign, zero, zero)),
-        dv: V3::new(zero, pick(L::one(), zero, L::one()), pick(zero, -sign, zero)),
+        du: Vec3::new(pick(zero, L::one(), sign), zero, pick(-sign, zero, zero)),
+        dv: Vec3::new(zero, pick(L::one(), zero, L::one()), pick(zero, -sign, zero)),
     }
 }
 
@@ -250,16 +254,16 @@ mod tests {
         Placement { mapping, axis, scale: [2.0, 3.0], offset: [0.25, -0.5] }
     }
 
-    fn projector(projection: Projection, axis: Option<Axis>) -> Projector<f64> {
+    fn projector(projection: Projection, axis: Option<Axis>) -> TextureMapping<f64> {
         let there = DAffine3::from_translation(DVec3::new(5.0, -3.0, 2.0))
             * DAffine3::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.7)
             * DAffine3::from_scale(DVec3::new(2.0, 0.5, 1.5));
         let corners = [DVec3::new(-1.0, -2.0, -3.0), DVec3::new(2.0, 1.0, 0.5)];
-        Projector::new(&placement(Mapping::Auto, axis), projection, &there, corners)
+        TextureMapping::new(&placement(Mapping::Auto, axis), projection, &there, corners)
     }
 
-    fn at(p: &Projector<f64>, point: DVec3, normal: DVec3) -> Coordinates<f64> {
-        p.coordinates(V3::of(point.to_array()), V3::of(normal.to_array()))
+    fn at(p: &TextureMapping<f64>, point: DVec3, normal: DVec3) -> TexCoord<f64> {
+        p.coordinates(Vec3::of(point.to_array()), Vec3::of(normal.to_array()))
     }
 
     /// Gradients in the texture's space, carried into the scene, against differences.
@@ -276,7 +280,7 @@ mod tests {
                 for (axis, way) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
                     let h = 1e-6;
                     let (a, b) = (at(&p, point - way * h, normal), at(&p, point + way * h, normal));
-                    let column = V3::<f64>::splat(p.texture_from_scene[axis]);
+                    let column = Vec3::<f64>::splat(p.texture_from_scene[axis]);
                     for (a, b, gradient) in [(a.u, b.u, here.du), (a.v, b.v, here.dv)] {
                         let slope = (b - a) / (2.0 * h);
                         let told = gradient.dot(column);
@@ -293,14 +297,14 @@ mod tests {
     #[test]
     fn nothing_is_infinite_on_axes_and_in_the_middle() {
         for projection in [Projection::Spherical, Projection::Cylindrical] {
-            let p = Projector::<f32>::new(
+            let p = TextureMapping::<f32>::new(
                 &placement(Mapping::Auto, None),
                 projection,
                 &DAffine3::IDENTITY,
                 [DVec3::NEG_ONE, DVec3::ONE],
             );
             for point in [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]] {
-                let c = p.coordinates(V3::<f32>::of(point), V3::of([0.0, 1.0, 0.0]));
+                let c = p.coordinates(Vec3::<f32>::of(point), Vec3::of([0.0, 1.0, 0.0]));
                 let numbers = [c.u, c.v, c.du.max_abs(), c.dv.max_abs()];
                 assert!(numbers.iter().all(|x| x.is_finite()), "{projection:?} {point:?} {c:?}");
             }
@@ -309,16 +313,16 @@ mod tests {
 
     #[test]
     fn a_ramp_tilts_the_normal_by_the_angle_of_its_slope() {
-        let p = Projector::<f64>::new(
+        let p = TextureMapping::<f64>::new(
             &placement(Mapping::Auto, None),
             Projection::Planar,
             &DAffine3::from_scale(DVec3::splat(7.0)),
             [DVec3::ZERO, DVec3::ONE],
         );
-        let slope = V3::<f64>::of([0.4, 0.0, 9.0]);
-        let up = p.bumped(V3::of([0.0, 0.0, 1.0]), 1.0, slope);
+        let slope = Vec3::<f64>::of([0.4, 0.0, 9.0]);
+        let up = p.bumped(Vec3::of([0.0, 0.0, 1.0]), 1.0, slope);
         assert!((up.x / up.z + 0.4).abs() < 1e-14 && up.y == 0.0 && up.z > 0.0);
-        let back = p.bumped(V3::of([0.0, 0.0, -1.0]), -1.0, slope);
+        let back = p.bumped(Vec3::of([0.0, 0.0, -1.0]), -1.0, slope);
         assert!((back.x / back.z + 0.4).abs() < 1e-14 && back.z < 0.0, "the same surface");
     }
 }

@@ -11,20 +11,23 @@ mod texture;
 mod texture_eval;
 mod texture_fields;
 
-pub use bsdf::{Facets, Finish, SMOOTH_ALPHA, Shine, Spread, Transmission, one_minus_cos_of_tan};
-pub use bsdf_eval::Reflected;
+pub use bsdf::{
+    Bsdf, MicrofacetDistribution, ReflectionLobe, SMOOTH_ALPHA, SpecularModel, Transmission,
+    one_minus_cos_of_tan,
+};
+pub use bsdf_eval::BsdfSample;
 pub use fields::FIELDS;
 pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
-pub use mapping::{Coordinates, Projection, Projector};
-pub use properties::{Claims, Energy};
-pub use refraction::{Interface, Split};
+pub use mapping::{Projection, TexCoord, TextureMapping};
+pub use properties::{BsdfProperties, Energy};
+pub use refraction::{FresnelSplit, Interface};
 pub use texture::{
     Axis, Bump, Checker, HeightImage, ImageTexture, Mapping, Placement, Texture, TextureFilter,
     Wrap,
 };
-pub use texture_eval::{Heights, Pattern};
+pub use texture_eval::{BumpMap, CompiledTexture};
 
-use crate::value::{Checks, Color, Fault};
+use crate::value::{Color, ValidationError, Validator};
 use serde::{Deserialize, Serialize};
 
 /// A surface's finish. Every key may be left out.
@@ -209,12 +212,12 @@ impl Material {
     }
 
     /// What is wrong with it.
-    pub fn faults(&self) -> Vec<Fault> {
+    pub fn faults(&self) -> Vec<ValidationError> {
         let both = self.reflectance.is_some() && self.metal.is_some();
         let dielectric = self.fresnel == Some(Fresnel::Dielectric);
         let other = if self.metal.is_some() { "metal" } else { "reflectance" };
         let twice = dielectric && (self.metal.is_some() || self.reflectance.is_some());
-        Checks::new(FIELDS)
+        Validator::new(FIELDS)
             .numbers("color", &self.color.0)
             .numbers("ambient", &[self.ambient])
             .numbers("diffuse", &[self.diffuse])
@@ -227,14 +230,14 @@ impl Material {
             .maybe("alpha", self.alpha.as_ref().map(std::slice::from_ref))
             .maybe("reflectance", self.reflectance.as_ref().map(|c| &c.0[..]))
             .and(both.then(|| {
-                Fault::new(
+                ValidationError::new(
                     "metal",
                     "both metal and reflectance are given",
                     "only one of them: a metal stands for its reflectance",
                 )
             }))
             .and(twice.then(|| {
-                Fault::new(
+                ValidationError::new(
                     "fresnel",
                     format!("`dielectric` together with {other}"),
                     format!("no {other}: the index of refraction gives a dielectric's reflectance"),

@@ -6,26 +6,26 @@ use crate::material::{Fresnel, Highlight, Lobe, Masking};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Energy {
     /// All of it, at every angle (with lobes folded at the horizon).
-    Kept,
+    Conserving,
     /// At most all of it: what would bounce between microfacets is lost.
-    AtMost,
+    Losing,
     /// Perhaps more than it gets.
     Unbounded,
 }
 
 /// What a model of reflection promises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Claims {
+pub struct BsdfProperties {
     /// f(light, view) = f(view, light).
     pub reciprocal: bool,
     /// Whether light may be lost or won.
     pub energy: Energy,
 }
 
-impl Claims {
+impl BsdfProperties {
     /// The claims of the diffuse part, Lambert's law f = albedo / pi: the only model without a name
     /// in scene files.
-    pub const LAMBERT: Self = Self { reciprocal: true, energy: Energy::Kept };
+    pub const LAMBERT: Self = Self { reciprocal: true, energy: Energy::Conserving };
 }
 
 impl Lobe {
@@ -36,11 +36,15 @@ impl Lobe {
     ///
     /// Cone and square spread light evenly about the mirror direction: the density is symmetric, so
     /// that f = density / cos of the light is not.
-    pub fn claims(self) -> Claims {
+    pub fn claims(self) -> BsdfProperties {
         match self {
-            Self::Mirror => Claims { reciprocal: true, energy: Energy::Kept },
-            Self::Cone | Self::Square => Claims { reciprocal: false, energy: Energy::Kept },
-            Self::Beckmann | Self::Ggx => Claims { reciprocal: true, energy: Energy::AtMost },
+            Self::Mirror => BsdfProperties { reciprocal: true, energy: Energy::Conserving },
+            Self::Cone | Self::Square => {
+                BsdfProperties { reciprocal: false, energy: Energy::Conserving }
+            }
+            Self::Beckmann | Self::Ggx => {
+                BsdfProperties { reciprocal: true, energy: Energy::Losing }
+            }
         }
     }
 }
@@ -50,10 +54,10 @@ impl Highlight {
     pub const ALL: [Self; 2] = [Self::Phong, Self::CookTorrance];
 
     /// What the formula promises.
-    pub fn claims(self) -> Claims {
+    pub fn claims(self) -> BsdfProperties {
         match self {
-            Self::Phong => Claims { reciprocal: false, energy: Energy::Unbounded },
-            Self::CookTorrance => Claims { reciprocal: true, energy: Energy::AtMost },
+            Self::Phong => BsdfProperties { reciprocal: false, energy: Energy::Unbounded },
+            Self::CookTorrance => BsdfProperties { reciprocal: true, energy: Energy::Losing },
         }
     }
 }
@@ -68,11 +72,11 @@ impl Fresnel {
     pub const ALL: [Self; 4] = [Self::Constant, Self::Schlick, Self::Exact, Self::Dielectric];
 
     /// What a transparent surface with this law promises of what it reflects and transmits together.
-    pub fn claims_of_transmission(self) -> Claims {
+    pub fn claims_of_transmission(self) -> BsdfProperties {
         match self {
-            Self::Dielectric => Claims { reciprocal: true, energy: Energy::Kept },
+            Self::Dielectric => BsdfProperties { reciprocal: true, energy: Energy::Conserving },
             // k_r and k_t are not weighted against each other; inner sides do not reflect.
-            _ => Claims { reciprocal: false, energy: Energy::Unbounded },
+            _ => BsdfProperties { reciprocal: false, energy: Energy::Unbounded },
         }
     }
 }

@@ -2,14 +2,14 @@
 //!
 //! Born and Wolf, *Principles of Optics*, sections 1.5.2 and 1.5.4.
 
-use crate::lanes::{Lanes, Mask, V3};
+use crate::lanes::{Mask, SimdFloat, Vec3};
 use crate::material::bsdf::Transmission;
 
 /// Where rays cross from one medium to another.
 #[derive(Clone, Copy, Debug)]
-pub struct Interface<L: Lanes> {
+pub struct Interface<L: SimdFloat> {
     /// Unit direction of the refracted rays; meaningless where all is reflected.
-    pub refracted: V3<L>,
+    pub refracted: Vec3<L>,
     /// Lanes past the critical angle: nothing gets to the other side.
     pub total: L::Mask,
     /// Cosine of the angle of incidence.
@@ -24,7 +24,7 @@ pub struct Interface<L: Lanes> {
 
 /// What reflected and transmitted rays count.
 #[derive(Clone, Copy, Debug)]
-pub struct Split<L> {
+pub struct FresnelSplit<L> {
     /// Factor of the finish's own reflection.
     pub reflected: L,
     /// Factor of what is seen through the surface.
@@ -33,14 +33,14 @@ pub struct Split<L> {
     pub total: L,
 }
 
-impl<L: Lanes> Interface<L> {
+impl<L: SimdFloat> Interface<L> {
     /// For rays along `incident` (unit) that meet a boundary with unit normal `n` on their side; the
     /// media before and behind it have the indices `n_i` and `n_t`.
     ///
     /// sin t = (n_i / n_t) sin i, from the part of the direction along the boundary, so that grazing
     /// rays keep their digits. Where the indices are equal the direction stays what it is.
     #[inline(always)]
-    pub fn new(incident: V3<L>, n: V3<L>, n_i: L, n_t: L) -> Self {
+    pub fn new(incident: Vec3<L>, n: Vec3<L>, n_i: L, n_t: L) -> Self {
         let cos_i = -incident.dot(n);
         let along = n.mul_add(cos_i, incident);
         let ratio = n_i / n_t;
@@ -50,7 +50,7 @@ impl<L: Lanes> Interface<L> {
         let cos_t = (L::one() - sin2_t).max(L::zero()).sqrt();
         let bent = n.mul_add(-cos_t, along * ratio).renormalize();
         Self {
-            refracted: V3::select(same, incident, bent),
+            refracted: Vec3::select(same, incident, bent),
             total,
             cos_i: cos_i.max(L::zero()),
             cos_t: L::select(same, cos_i.max(L::zero()), cos_t),
@@ -92,17 +92,17 @@ impl<L: Lanes> Interface<L> {
     /// solid. Without Fresnel's equations a solid reflects on its outer side only, so that light cannot
     /// ring for ever between its inner walls; past the critical angle everything is reflected.
     #[inline(always)]
-    pub fn split(&self, by: &Transmission<L::Scalar>, outer: L::Mask) -> Split<L> {
+    pub fn split(&self, by: &Transmission<L::Scalar>, outer: L::Mask) -> FresnelSplit<L> {
         let k_t = L::splat(by.strength);
         if by.dielectric {
             let f = self.reflectance();
-            return Split {
+            return FresnelSplit {
                 reflected: f,
                 transmitted: (k_t * (L::one() - f)).only(!self.total),
                 total: L::zero(),
             };
         }
-        Split {
+        FresnelSplit {
             reflected: L::one().only(outer.and_not(self.total)),
             transmitted: k_t.only(!self.total),
             total: L::one().only(self.total),
@@ -111,13 +111,13 @@ impl<L: Lanes> Interface<L> {
 
     /// What the rays count by a thin pane, which they cross without bending.
     #[inline(always)]
-    pub fn split_by_pane(&self, by: &Transmission<L::Scalar>) -> Split<L> {
+    pub fn split_by_pane(&self, by: &Transmission<L::Scalar>) -> FresnelSplit<L> {
         let k_t = L::splat(by.strength);
         if !by.dielectric {
-            return Split { reflected: L::one(), transmitted: k_t, total: L::zero() };
+            return FresnelSplit { reflected: L::one(), transmitted: k_t, total: L::zero() };
         }
         let f = self.pane_reflectance();
-        Split { reflected: f, transmitted: k_t * (L::one() - f), total: L::zero() }
+        FresnelSplit { reflected: f, transmitted: k_t * (L::one() - f), total: L::zero() }
     }
 }
 
@@ -128,10 +128,10 @@ mod tests {
     use crate::material::f0_from_index;
 
     /// Rays at `degrees` from the normal +z, downwards.
-    fn at<L: Lanes>(degrees: f64, n_i: f64, n_t: f64) -> Interface<L> {
+    fn at<L: SimdFloat>(degrees: f64, n_i: f64, n_t: f64) -> Interface<L> {
         let (sin, cos) = degrees.to_radians().sin_cos();
-        let up = V3::of([0.0, 0.0, 1.0]);
-        Interface::new(V3::of([sin, 0.0, -cos]), up, L::of(n_i), L::of(n_t))
+        let up = Vec3::of([0.0, 0.0, 1.0]);
+        Interface::new(Vec3::of([sin, 0.0, -cos]), up, L::of(n_i), L::of(n_t))
     }
 
     /// Share of the energy that goes on: n_t cos t / (n_i cos i) times the squared amplitudes.
@@ -212,24 +212,24 @@ mod tests {
             let t = there.refracted;
             assert!((t.x - degrees.to_radians().sin() / 1.5).abs() < 1e-15);
             assert!((t.length2() - 1.0).abs() < 1e-14 && t.z < 0.0);
-            let up = V3::of([0.0, 0.0, -1.0]);
+            let up = Vec3::of([0.0, 0.0, -1.0]);
             let back = Interface::<f64>::new(-t, up, 1.5, 1.0).refracted;
             let (sin, cos) = degrees.to_radians().sin_cos();
             assert!((back.x + sin).abs() < 1e-12 && (back.z - cos).abs() < 1e-9, "{degrees}");
         }
         let straight = at::<Single>(50.0, 1.3, 1.3);
         let (sin, _) = 50f64.to_radians().sin_cos();
-        assert_eq!(Lanes::lane(straight.refracted.x, 3), sin as f32);
+        assert_eq!(SimdFloat::lane(straight.refracted.x, 3), sin as f32);
         assert!(straight.total.none());
-        assert_eq!(Lanes::lane(straight.reflectance(), 0), 0.0);
+        assert_eq!(SimdFloat::lane(straight.reflectance(), 0), 0.0);
     }
 
     #[test]
     fn packets_equal_width_1() {
         for degrees in [0.0, 30.0, 41.810_3, 41.810_4, 60.0, 89.9] {
             let (wide, one) = (at::<Double>(degrees, 1.5, 1.0), at::<f64>(degrees, 1.5, 1.0));
-            assert_eq!(Lanes::lane(wide.refracted.x, 1), one.refracted.x);
-            assert_eq!(Lanes::lane(wide.reflectance(), 2), one.reflectance());
+            assert_eq!(SimdFloat::lane(wide.refracted.x, 1), one.refracted.x);
+            assert_eq!(SimdFloat::lane(wide.reflectance(), 2), one.reflectance());
             assert_eq!(Mask::lane(wide.total, 0), one.total);
         }
     }

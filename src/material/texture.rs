@@ -9,7 +9,7 @@
 
 use crate::asset::{AssetError, Image};
 use crate::material::texture_fields::{BUMP_FIELDS, CHECKER_FIELDS, IMAGE_FIELDS};
-use crate::value::{Checks, Color, Fault, Field};
+use crate::value::{Color, Field, ValidationError, Validator};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::sync::Arc;
@@ -193,9 +193,9 @@ impl Loaded {
         self.0.as_ref()?.as_ref().ok()
     }
 
-    fn fault(&self) -> Option<Fault> {
+    fn fault(&self) -> Option<ValidationError> {
         let error = self.0.as_ref()?.as_ref().err()?;
-        Some(Fault::new("file", error.what(), error.expected.clone()))
+        Some(ValidationError::new("file", error.what(), error.expected.clone()))
     }
 }
 
@@ -252,8 +252,8 @@ macro_rules! laid {
                 Placement { mapping, axis, scale, offset }
             }
 
-            fn checks(&self, fields: &'static [Field]) -> Checks {
-                Checks::new(fields).numbers("scale", &self.scale).numbers("offset", &self.offset)
+            fn checks(&self, fields: &'static [Field]) -> Validator {
+                Validator::new(fields).numbers("scale", &self.scale).numbers("offset", &self.offset)
             }
         }
     )+};
@@ -320,7 +320,7 @@ impl Texture {
         }
     }
 
-    pub(super) fn faults(&self) -> Vec<Fault> {
+    pub(super) fn faults(&self) -> Vec<ValidationError> {
         let faults = match self {
             Self::Image(image) => image.checks(IMAGE_FIELDS).and(image.content.fault()).faults(),
             Self::Checker(checker) => checker
@@ -351,7 +351,7 @@ impl Bump {
         image.height != 0.0 && image.image().is_some()
     }
 
-    pub(super) fn faults(&self) -> Vec<Fault> {
+    pub(super) fn faults(&self) -> Vec<ValidationError> {
         let Self::Image(image) = self;
         let checks = image.checks(BUMP_FIELDS).numbers("height", &[image.height]);
         let faults = checks.and(image.content.fault()).faults();

@@ -1,13 +1,13 @@
 //! Textures, compiled: colours and slopes at given coordinates.
 
 use crate::asset::Image;
-use crate::lanes::{Lanes, MAX_WIDTH, Real, V3};
+use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3};
 use crate::material::texture::{Bump, Texture, TextureFilter, Wrap};
 use std::sync::Arc;
 
 /// What multiplies a colour, by coordinates in repeats.
 #[derive(Clone, Debug)]
-pub enum Pattern<S> {
+pub enum CompiledTexture<S> {
     /// Squares, two by two a repeat: the colour of the first and of its neighbours.
     Checker([[S; 3]; 2]),
     /// An image.
@@ -23,7 +23,7 @@ pub enum Pattern<S> {
 
 /// Heights, by coordinates in repeats.
 #[derive(Clone, Debug)]
-pub struct Heights {
+pub struct BumpMap {
     image: Arc<Image>,
     wrap: Wrap,
     /// Of white above black.
@@ -74,7 +74,7 @@ fn color_at(image: &Image, wrap: Wrap, filter: TextureFilter, u: f64, v: f64) ->
 
 /// The lanes of `bits`, each with what `f` gives for it; the others are zero.
 #[inline(always)]
-fn gathered<L: Lanes>(bits: u32, mut f: impl FnMut(usize) -> [f64; 3]) -> V3<L> {
+fn gathered<L: SimdFloat>(bits: u32, mut f: impl FnMut(usize) -> [f64; 3]) -> Vec3<L> {
     let mut all = [[0.0; 3]; MAX_WIDTH];
     let mut left = bits;
     while left != 0 {
@@ -82,10 +82,10 @@ fn gathered<L: Lanes>(bits: u32, mut f: impl FnMut(usize) -> [f64; 3]) -> V3<L> 
         left &= left - 1;
         all[lane] = f(lane);
     }
-    V3::from_fn(|lane| all[lane].map(L::Scalar::of))
+    Vec3::from_fn(|lane| all[lane].map(L::Scalar::of))
 }
 
-impl<S: Real> Pattern<S> {
+impl<S: Float> CompiledTexture<S> {
     /// Of a texture; `None`: it shows nothing.
     pub fn new(texture: &Texture) -> Option<Self> {
         match texture {
@@ -101,7 +101,7 @@ impl<S: Real> Pattern<S> {
     }
 
     /// The colours at (u, v) in the lanes of `bits`.
-    pub fn colors<L: Lanes<Scalar = S>>(&self, (u, v): (L, L), bits: u32) -> V3<L> {
+    pub fn colors<L: SimdFloat<Scalar = S>>(&self, (u, v): (L, L), bits: u32) -> Vec3<L> {
         let at = |lane| (u.lane(lane).to_f64(), v.lane(lane).to_f64());
         match self {
             Self::Checker(colors) => gathered(bits, |lane| {
@@ -117,7 +117,7 @@ impl<S: Real> Pattern<S> {
     }
 }
 
-impl Heights {
+impl BumpMap {
     /// Of a bump; `None`: it turns nothing.
     pub fn new(bump: &Bump) -> Option<Self> {
         let Bump::Image(of) = bump;
@@ -129,8 +129,8 @@ impl Heights {
     ///
     /// The differences of the pixels on both sides of each pixel, bilinear between pixels: so slopes
     /// change evenly, where those of bilinear heights would jump from pixel to pixel.
-    pub fn slopes<L: Lanes>(&self, (u, v): (L, L), bits: u32) -> (L, L) {
-        let slopes: V3<L> = gathered(bits, |lane| {
+    pub fn slopes<L: SimdFloat>(&self, (u, v): (L, L), bits: u32) -> (L, L) {
+        let slopes: Vec3<L> = gathered(bits, |lane| {
             let [du, dv] = self.slope_at(u.lane(lane).to_f64(), v.lane(lane).to_f64());
             [du, dv, 0.0]
         });

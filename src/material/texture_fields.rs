@@ -1,13 +1,13 @@
 //! What may be written in a texture.
 
-use crate::value::{Choice, Field, Range, Takes};
+use crate::value::{Choice, Field, NumberRange, ValueType};
 
 /// The kinds of `texture`.
 pub(super) const TEXTURE_KINDS: &[Field] = &[
-    Field::required("image", Takes::Table(IMAGE_FIELDS), "", "A PNG or JPEG image."),
+    Field::required("image", ValueType::Table(IMAGE_FIELDS), "", "A PNG or JPEG image."),
     Field::required(
         "checker",
-        Takes::Table(CHECKER_FIELDS),
+        ValueType::Table(CHECKER_FIELDS),
         "",
         "Squares of two colours, two by two a repeat.",
     ),
@@ -16,16 +16,16 @@ pub(super) const TEXTURE_KINDS: &[Field] = &[
 /// The kinds of `bump`.
 pub(super) const BUMP_KINDS: &[Field] = &[Field::required(
     "image",
-    Takes::Table(BUMP_FIELDS),
+    ValueType::Table(BUMP_FIELDS),
     "",
-    "Heights from a PNG or JPEG image: black is low, white is high.",
+    "BumpMap from a PNG or JPEG image: black is low, white is high.",
 )];
 
 /// The keys of `texture.image`.
 pub(super) const IMAGE_FIELDS: &[Field] = &[
     Field::preset(
         "file",
-        Takes::Text,
+        ValueType::Text,
         "",
         "\"\"",
         "Name of the file, relative to the folder of the scene file. Empty: white.",
@@ -37,7 +37,7 @@ pub(super) const IMAGE_FIELDS: &[Field] = &[
     WRAP,
     Field::preset(
         "filter",
-        Takes::Choice(FILTERS),
+        ValueType::Choice(FILTERS),
         "",
         "\"bilinear\"",
         "What lies between the middles of the pixels.",
@@ -48,14 +48,14 @@ pub(super) const IMAGE_FIELDS: &[Field] = &[
 pub(super) const CHECKER_FIELDS: &[Field] = &[
     Field::preset(
         "even",
-        Takes::Color(Range::COEFFICIENT),
+        ValueType::Color(NumberRange::COEFFICIENT),
         "",
         "[1.0, 1.0, 1.0]",
         "Colour of the square that begins at u = v = 0.",
     ),
     Field::preset(
         "odd",
-        Takes::Color(Range::COEFFICIENT),
+        ValueType::Color(NumberRange::COEFFICIENT),
         "",
         "[0.1, 0.1, 0.1]",
         "Colour of its neighbours.",
@@ -70,14 +70,14 @@ pub(super) const CHECKER_FIELDS: &[Field] = &[
 pub(super) const BUMP_FIELDS: &[Field] = &[
     Field::preset(
         "file",
-        Takes::Text,
+        ValueType::Text,
         "",
         "\"\"",
         "Name of the file, relative to the folder of the scene file. Empty: flat.",
     ),
     Field::preset(
         "height",
-        Takes::Number(Range::closed(-1e3, 1e3)),
+        ValueType::Number(NumberRange::closed(-1e3, 1e3)),
         "scene units",
         "0.02",
         "How far white rises above black, before the object's transform; negative: how far it sinks.",
@@ -91,7 +91,7 @@ pub(super) const BUMP_FIELDS: &[Field] = &[
 
 const MAPPING: Field = Field::preset(
     "mapping",
-    Takes::Choice(MAPPINGS),
+    ValueType::Choice(MAPPINGS),
     "",
     "\"auto\"",
     "Where the coordinates u (to the right) and v (up) come from.",
@@ -99,7 +99,7 @@ const MAPPING: Field = Field::preset(
 
 const AXIS: Field = Field::without(
     "axis",
-    Takes::Choice(AXES),
+    ValueType::Choice(AXES),
     "",
     "y for `spherical` and `cylindrical`, z for `planar`",
     "What those mappings turn around, or look along.",
@@ -107,7 +107,7 @@ const AXIS: Field = Field::without(
 
 const SCALE: Field = Field::preset(
     "scale",
-    Takes::Numbers(2, Range::above(0.0, 1e6)),
+    ValueType::Numbers(2, NumberRange::above(0.0, 1e6)),
     "",
     "[1.0, 1.0]",
     "Repeats per unit of u and of v: the larger, the smaller the picture.",
@@ -115,7 +115,7 @@ const SCALE: Field = Field::preset(
 
 const OFFSET: Field = Field::preset(
     "offset",
-    Takes::Numbers(2, Range::closed(-1e6, 1e6)),
+    ValueType::Numbers(2, NumberRange::closed(-1e6, 1e6)),
     "",
     "[0.0, 0.0]",
     "Added to the scaled u and v, in repeats: moves the picture to the left and down.",
@@ -123,7 +123,7 @@ const OFFSET: Field = Field::preset(
 
 const WRAP: Field = Field::preset(
     "wrap",
-    Takes::Choice(WRAPS),
+    ValueType::Choice(WRAPS),
     "",
     "\"repeat\"",
     "What lies beyond the edges of the image.",

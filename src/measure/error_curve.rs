@@ -3,7 +3,7 @@
 use crate::measure::contention::Waits;
 use crate::measure::experiment::Variation;
 use crate::measure::reference::{Errors, Reference};
-use crate::render::Course;
+use crate::render::SyncRender;
 use std::io;
 
 /// A place on the way.
@@ -53,7 +53,7 @@ pub fn walk(
     variation: &Variation,
     reference: &Reference,
     end: End,
-) -> io::Result<(Vec<Point>, Option<f64>, Course)> {
+) -> io::Result<(Vec<Point>, Option<f64>, SyncRender)> {
     let mut course = variation.course()?;
     let before = Waits::now();
     let mut points: Vec<Point> = Vec::new();

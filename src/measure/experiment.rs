@@ -3,7 +3,7 @@
 use crate::film::Display;
 use crate::material::Lobe;
 use crate::render::schedule::{Criterion, Settings, Stop};
-use crate::render::{Course, Options};
+use crate::render::{Options, SyncRender};
 use crate::sampling::{SampleSettings, SamplerKind};
 use crate::scene::{Acceleration, Level, Scene};
 use crate::world::{self, AnyWorld, Precision};
@@ -122,14 +122,14 @@ pub struct Variation {
 
 impl Variation {
     /// A render of it, not begun, that ends by itself only when there is nothing left to do.
-    pub fn course(&self) -> io::Result<Course> {
+    pub fn course(&self) -> io::Result<SyncRender> {
         let settings = Settings {
             adaptive: self.adaptive,
             criterion: Criterion::Codes,
             rays_per_pixel: 0,
             stop: Stop::default(),
         };
-        Course::new(&self.scene, &self.options, settings, self.threads)
+        SyncRender::new(&self.scene, &self.options, settings, self.threads)
     }
 }
 

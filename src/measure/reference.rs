@@ -1,6 +1,6 @@
 //! Pictures beside a reference.
 
-use crate::film::{Display, Film, Mix, Part};
+use crate::film::{Display, Film, LightWeights, Replicates};
 
 /// Radiance below which relative errors do not count as larger: relMSE = mean((x - r)^2 / (r^2 + 0.01)).
 const RELATIVE_FLOOR: f64 = 0.01;
@@ -88,8 +88,8 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64
 }
 
 /// Both replicates, row by row.
-fn replicates(film: &Film, mix: &Mix) -> [Vec<[f64; 3]>; 2] {
-    [Part::A, Part::B].map(|part| {
+fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
+    [Replicates::A, Replicates::B].map(|part| {
         let mut all = Vec::with_capacity(film.width() * film.height());
         let mut row = Vec::new();
         for y in 0..film.height() {
@@ -103,7 +103,7 @@ fn replicates(film: &Film, mix: &Mix) -> [Vec<[f64; 3]>; 2] {
 impl Reference {
     /// The film's picture, whose own error is known from its replicates, which hold equally many
     /// samples.
-    pub fn of_film(film: &Film, mix: &Mix, display: &Display) -> Self {
+    pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
         let [a, b] = replicates(film, mix);
         Self::of_replicates([film.width(), film.height()], &a, &b, display)
     }
@@ -154,8 +154,8 @@ impl Reference {
     }
 
     /// The film's errors: its distance from the reference, less what the reference is wrong by itself.
-    pub fn errors(&self, film: &Film, mix: &Mix) -> Errors {
-        self.errors_of(&mut |y, row| film.row(y, Part::Both, mix, row))
+    pub fn errors(&self, film: &Film, mix: &LightWeights) -> Errors {
+        self.errors_of(&mut |y, row| film.row(y, Replicates::Both, mix, row))
     }
 
     /// The same of a picture that `fill` gives row by row.
@@ -191,7 +191,7 @@ impl Reference {
     }
 
     /// How far the film's expectation is from the reference's.
-    pub fn bias(&self, film: &Film, mix: &Mix) -> Bias {
+    pub fn bias(&self, film: &Film, mix: &LightWeights) -> Bias {
         let [a, b] = replicates(film, mix);
         let (own, mean_variance) = own_error(&a, &b, &self.display);
         let (mut sum, mut squares, mut crossed) = (0.0, 0.0, 0.0);

@@ -4,7 +4,7 @@ use crate::measure::error_curve::{End, repeat, walk};
 use crate::measure::experiment::{Plan, Topic, Variation};
 use crate::measure::reference::Reference;
 use crate::measure::result::{Expected, Measured, Measurement, spread};
-use crate::render::Course;
+use crate::render::SyncRender;
 use crate::scene::Scene;
 use std::io;
 use std::sync::Arc;
@@ -133,7 +133,7 @@ pub fn measure(
 }
 
 /// When the noise will have fallen to `codes`.
-fn expect(course: &Course, codes: f64) -> Option<Expected> {
+fn expect(course: &SyncRender, codes: f64) -> Option<Expected> {
     course.seconds_to_noise(codes).map(|seconds| Expected { codes, seconds })
 }
 

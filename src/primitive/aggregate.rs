@@ -1,21 +1,23 @@
 //! All things of a scene, ready for rays: batches, and a tree over them where it pays.
 
 use crate::bvh::{Hit, Ray};
-use crate::lanes::{Lanes, Mask, V3};
-use crate::primitive::batch::{Batch, Compiled, OwnUv, Source, Surface, compile};
+use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::primitive::batch::{
+    LabelledBatch, PrimitiveBatch, PrimitiveId, SurfacePoint, UvGradients, compile,
+};
 use crate::primitive::form::Form;
-use crate::primitive::item_box::{Acceleration, Extent};
+use crate::primitive::item_box::{Acceleration, ItemBox};
 use crate::primitive::mesh_instance::Meshes;
-use crate::primitive::scene_bvh::Tree;
+use crate::primitive::scene_bvh::SceneBvh;
 use std::fmt;
 use std::ops::Range;
 
 /// From this many bounded items there is a tree. With rays in a ball of spheres it is faster than a list
 /// from some 50 where packets stay together, and from some 300 where they do not; whole pictures, of which a
 /// list's tiles leave out what they do not see, gain by the list up to 95 (`benches/acceleration.rs`).
-pub const TREE_FROM: usize = 96;
+pub const BVH_MIN_PRIMITIVES: usize = 96;
 
-impl Selection {
+impl PrimitiveSet {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.runs.is_empty() && !self.tree
@@ -23,36 +25,36 @@ impl Selection {
 }
 
 /// One batch and where its items stand in the numbering of all items.
-struct Part<L: Lanes> {
-    batch: Batch<L>,
+struct BatchRange<L: SimdFloat> {
+    batch: PrimitiveBatch<L>,
     base: u32,
     end: u32,
 }
 
 /// The things of a scene, compiled for one lane type.
-pub struct Geometry<L: Lanes> {
-    parts: Vec<Part<L>>,
-    all: Selection,
-    tree: Option<Tree>,
+pub struct Aggregate<L: SimdFloat> {
+    parts: Vec<BatchRange<L>>,
+    all: PrimitiveSet,
+    tree: Option<SceneBvh>,
     /// `(part, number in the part)` of the tree's items.
     tree_items: Vec<(u32, u32)>,
     /// For each item a box that is asked first, if it has one; empty: none has.
-    extents: Vec<Option<Extent<L::Scalar>>>,
-    /// `source[item]`: which form, in the order given to [`Geometry::new`], and which part of it.
-    source: Vec<Source>,
+    extents: Vec<Option<ItemBox<L::Scalar>>>,
+    /// `source[item]`: which form, in the order given to [`Aggregate::new`], and which part of it.
+    source: Vec<PrimitiveId>,
     counts: Vec<String>,
 }
 
 /// Some items of a geometry.
 #[derive(Clone, Debug, Default)]
-pub struct Selection {
+pub struct PrimitiveSet {
     /// Items that are no tree's, by part and number in the part.
     runs: Vec<(u32, Range<u32>)>,
     /// All items of the tree.
     tree: bool,
 }
 
-impl<L: Lanes> Geometry<L> {
+impl<L: SimdFloat> Aggregate<L> {
     /// Compiles `forms`, as a list or with a tree by their number.
     pub fn new(forms: &[Form]) -> Self {
         Self::accelerated(forms, Acceleration::Auto)
@@ -65,7 +67,7 @@ impl<L: Lanes> Geometry<L> {
 
     /// Compiles `forms` with what `acceleration` says.
     pub fn accelerated(forms: &[Form], acceleration: Acceleration) -> Self {
-        let many = || forms.iter().filter(|f| f.bounds().is_some()).count() >= TREE_FROM;
+        let many = || forms.iter().filter(|f| f.bounds().is_some()).count() >= BVH_MIN_PRIMITIVES;
         let tree = match acceleration {
             Acceleration::Auto => many(),
             Acceleration::Hierarchy => true,
@@ -77,7 +79,7 @@ impl<L: Lanes> Geometry<L> {
     fn compiled(forms: &[Form], acceleration: Acceleration, tree: bool) -> Self {
         let mut out = Self {
             parts: Vec::new(),
-            all: Selection::default(),
+            all: PrimitiveSet::default(),
             tree: None,
             tree_items: Vec::new(),
             extents: Vec::new(),
@@ -92,7 +94,7 @@ impl<L: Lanes> Geometry<L> {
             Acceleration::World => "boxes",
         };
         let mut bounds = Vec::new();
-        for Compiled { batch, sources, noun, detail, infinite } in compile(forms) {
+        for LabelledBatch { batch, sources, noun, detail, infinite } in compile(forms) {
             let base = out.source.len() as u32;
             let in_tree = tree && !infinite;
             let how = match (in_tree, infinite) {
@@ -113,20 +115,20 @@ impl<L: Lanes> Geometry<L> {
                 out.all.runs.push((part, 0..sources.len() as u32));
             }
             out.source.extend(&sources);
-            out.parts.push(Part { batch, base, end: out.source.len() as u32 });
+            out.parts.push(BatchRange { batch, base, end: out.source.len() as u32 });
         }
-        out.tree = (!bounds.is_empty()).then(|| Tree::new(&bounds));
+        out.tree = (!bounds.is_empty()).then(|| SceneBvh::new(&bounds));
         out.all.tree = out.tree.is_some();
         if matches!(acceleration, Acceleration::Object | Acceleration::World) {
             let own = acceleration == Acceleration::Object;
-            let of = |source: &Source| Extent::new(&forms[source.form], own);
+            let of = |source: &PrimitiveId| ItemBox::new(&forms[source.form], own);
             out.extents = out.source.iter().map(of).collect();
         }
         out
     }
 
     /// Those items for which `wanted` is true; all of those in a tree, which knows better.
-    pub fn select(&self, wanted: impl Fn(u32) -> bool) -> Selection {
+    pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
         let mut runs: Vec<(u32, Range<u32>)> = Vec::new();
         for (part, range) in &self.all.runs {
             let base = self.parts[*part as usize].base;
@@ -137,11 +139,11 @@ impl<L: Lanes> Geometry<L> {
                 }
             }
         }
-        Selection { runs, tree: self.all.tree }
+        PrimitiveSet { runs, tree: self.all.tree }
     }
 
     /// Those `items` of a tree, and all that are in none.
-    pub fn select_few(&self, items: &[u32]) -> Selection {
+    pub fn select_few(&self, items: &[u32]) -> PrimitiveSet {
         let mut runs = self.all.runs.clone();
         for item in items {
             let part = self.parts.partition_point(|part| part.end <= *item);
@@ -149,7 +151,7 @@ impl<L: Lanes> Geometry<L> {
             runs.push((part as u32, i..i + 1));
         }
         runs.sort_unstable_by_key(|(part, range)| (*part, range.start));
-        Selection { runs, tree: false }
+        PrimitiveSet { runs, tree: false }
     }
 
     /// The items that stand in a tree, in ascending order.
@@ -169,7 +171,7 @@ impl<L: Lanes> Geometry<L> {
     }
 
     /// All items.
-    pub fn all(&self) -> &Selection {
+    pub fn all(&self) -> &PrimitiveSet {
         &self.all
     }
 
@@ -184,20 +186,20 @@ impl<L: Lanes> Geometry<L> {
     }
 
     /// For each item, which form it came from, and which part of it.
-    pub fn sources(&self) -> &[Source] {
+    pub fn sources(&self) -> &[PrimitiveId] {
         &self.source
     }
 
     /// The nearest of some items in front of each ray; of several at the same distance the one with
     /// the lowest number, so that neither the order in the tree nor the other rays of the packet decide.
     #[inline(always)]
-    pub fn closest(&self, ray: &Ray<L>, of: &Selection) -> Hit<L> {
+    pub fn closest(&self, ray: &Ray<L>, of: &PrimitiveSet) -> Hit<L> {
         self.closest_of(ray, of, L::mask(true))
     }
 
-    /// As [`Geometry::closest`], in those lanes for which `wanted` is true; the others are meaningless.
+    /// As [`Aggregate::closest`], in those lanes for which `wanted` is true; the others are meaningless.
     #[inline(always)]
-    pub fn closest_of(&self, ray: &Ray<L>, of: &Selection, wanted: L::Mask) -> Hit<L> {
+    pub fn closest_of(&self, ray: &Ray<L>, of: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         if !self.extents.is_empty() {
             return self.closest_in_boxes(ray, of, nearest_wanted(wanted));
         }
@@ -208,9 +210,9 @@ impl<L: Lanes> Geometry<L> {
         }
     }
 
-    /// As [`Geometry::closest_of`], of those items that are in no tree; boxes are not asked.
+    /// As [`Aggregate::closest_of`], of those items that are in no tree; boxes are not asked.
     #[inline(always)]
-    pub fn closest_of_listed(&self, ray: &Ray<L>, of: &Selection, wanted: L::Mask) -> Hit<L> {
+    pub fn closest_of_listed(&self, ray: &Ray<L>, of: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         let mut hit = nearest_wanted(wanted);
         for (part, range) in &of.runs {
             let part = &self.parts[*part as usize];
@@ -220,7 +222,7 @@ impl<L: Lanes> Geometry<L> {
     }
 
     #[inline(never)]
-    fn closest_in(&self, tree: &Tree, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
+    fn closest_in(&self, tree: &SceneBvh, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
         tree.walk(ray, hit.t, |item, limit| {
             let (part, i) = self.tree_items[item];
             let part = &self.parts[part as usize];
@@ -239,8 +241,8 @@ impl<L: Lanes> Geometry<L> {
     #[inline(always)]
     fn boxed<'a>(
         &'a self,
-        of: &'a Selection,
-    ) -> impl Iterator<Item = (&'a Part<L>, u32, Option<&'a Extent<L::Scalar>>)> {
+        of: &'a PrimitiveSet,
+    ) -> impl Iterator<Item = (&'a BatchRange<L>, u32, Option<&'a ItemBox<L::Scalar>>)> {
         of.runs.iter().flat_map(move |(part, range)| {
             let part = &self.parts[*part as usize];
             range.clone().map(move |i| (part, i, self.extents[(part.base + i) as usize].as_ref()))
@@ -248,7 +250,7 @@ impl<L: Lanes> Geometry<L> {
     }
 
     #[inline(never)]
-    fn closest_in_boxes(&self, ray: &Ray<L>, of: &Selection, mut hit: Hit<L>) -> Hit<L> {
+    fn closest_in_boxes(&self, ray: &Ray<L>, of: &PrimitiveSet, mut hit: Hit<L>) -> Hit<L> {
         for (part, i, extent) in self.boxed(of) {
             if extent.is_none_or(|extent| extent.meets(ray, hit.t).any()) {
                 part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut hit);
@@ -258,7 +260,13 @@ impl<L: Lanes> Geometry<L> {
     }
 
     #[inline(never)]
-    fn blocked_in_boxes(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, by: &Selection) -> L::Mask {
+    fn blocked_in_boxes(
+        &self,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+        by: &PrimitiveSet,
+    ) -> L::Mask {
         let mut blocked = L::mask(false);
         for (part, i, extent) in self.boxed(by) {
             let open = wanted.and_not(blocked);
@@ -276,7 +284,7 @@ impl<L: Lanes> Geometry<L> {
 
     /// Which lanes of `wanted` meet any of some items at a distance in (0, limit).
     #[inline(always)]
-    pub fn blocked(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, by: &Selection) -> L::Mask {
+    pub fn blocked(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, by: &PrimitiveSet) -> L::Mask {
         if !self.extents.is_empty() {
             return self.blocked_in_boxes(ray, limit, wanted, by);
         }
@@ -289,14 +297,14 @@ impl<L: Lanes> Geometry<L> {
         }
     }
 
-    /// As [`Geometry::blocked`], by those items that are in no tree; boxes are not asked.
+    /// As [`Aggregate::blocked`], by those items that are in no tree; boxes are not asked.
     #[inline(always)]
     pub fn blocked_by_listed(
         &self,
         ray: &Ray<L>,
         limit: L,
         wanted: L::Mask,
-        by: &Selection,
+        by: &PrimitiveSet,
     ) -> L::Mask {
         let mut blocked = L::mask(false);
         for (part, range) in &by.runs {
@@ -310,7 +318,7 @@ impl<L: Lanes> Geometry<L> {
         blocked
     }
 
-    /// As [`Geometry::blocked`], by one item of the tree: `number` in [`Geometry::in_tree`].
+    /// As [`Aggregate::blocked`], by one item of the tree: `number` in [`Aggregate::in_tree`].
     #[inline(always)]
     pub fn blocked_by_one(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (part, i) = self.tree_items[number as usize];
@@ -320,7 +328,7 @@ impl<L: Lanes> Geometry<L> {
     #[inline(never)]
     fn blocked_in(
         &self,
-        tree: &Tree,
+        tree: &SceneBvh,
         ray: &Ray<L>,
         limit: L,
         wanted: L::Mask,
@@ -346,7 +354,7 @@ impl<L: Lanes> Geometry<L> {
 
     /// The surface of `item` near `point`; `facet`: as the hit has it.
     #[inline(always)]
-    pub fn surface(&self, item: u32, facet: L, point: V3<L>) -> Surface<L> {
+    pub fn surface(&self, item: u32, facet: L, point: Vec3<L>) -> SurfacePoint<L> {
         for part in &self.parts {
             if item < part.end {
                 return part.batch.surface((item - part.base) as usize, facet, point);
@@ -358,17 +366,17 @@ impl<L: Lanes> Geometry<L> {
     /// The meshes, and the number of the first; they are the last of all items.
     fn meshes(&self) -> Option<(&Meshes<L::Scalar>, u32)> {
         match self.parts.last()? {
-            Part { batch: Batch::Meshes(meshes), base, .. } => Some((meshes, *base)),
+            BatchRange { batch: PrimitiveBatch::Meshes(meshes), base, .. } => Some((meshes, *base)),
             _ => None,
         }
     }
 
-    /// Whether light sees other normals than the surfaces' own anywhere: [`Geometry::shading_normal`].
+    /// Whether light sees other normals than the surfaces' own anywhere: [`Aggregate::shading_normal`].
     pub fn is_smooth(&self) -> bool {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_smooth())
     }
 
-    /// Whether things have colours of their own: [`Geometry::color`].
+    /// Whether things have colours of their own: [`Aggregate::color`].
     pub fn is_colored(&self) -> bool {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
     }
@@ -378,9 +386,9 @@ impl<L: Lanes> Geometry<L> {
     pub fn shading_normal(
         &self,
         (item, facet): (u32, L),
-        at: (V3<L>, V3<L>),
-        direction: V3<L>,
-    ) -> V3<L> {
+        at: (Vec3<L>, Vec3<L>),
+        direction: Vec3<L>,
+    ) -> Vec3<L> {
         match self.meshes() {
             Some((meshes, base)) if item >= base => {
                 meshes.shading_normal((item - base) as usize, facet, at, direction)
@@ -390,13 +398,13 @@ impl<L: Lanes> Geometry<L> {
     }
 
     /// The colour of its own that `item` has at `facet`, if it has one.
-    pub fn color(&self, item: u32, facet: L) -> Option<V3<L>> {
+    pub fn color(&self, item: u32, facet: L) -> Option<Vec3<L>> {
         let (meshes, base) = self.meshes()?;
         (item >= base).then(|| meshes.color((item - base) as usize, facet))?
     }
 
     /// The texture coordinates of its own that `item` has at `point`, near `facet`, if it has any.
-    pub fn uv(&self, item: u32, facet: L, point: V3<L>) -> Option<OwnUv<L>> {
+    pub fn uv(&self, item: u32, facet: L, point: Vec3<L>) -> Option<UvGradients<L>> {
         let (meshes, base) = self.meshes()?;
         (item >= base).then(|| meshes.uv((item - base) as usize, facet, point))?
     }
@@ -404,7 +412,7 @@ impl<L: Lanes> Geometry<L> {
 
 /// Nothing met yet; what nobody wants goes no way.
 #[inline(always)]
-fn nearest_wanted<L: Lanes>(wanted: L::Mask) -> Hit<L> {
+fn nearest_wanted<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
     Hit::nearer_than(L::select(wanted, L::of(L::MAX), L::of(-1.0)))
 }
 
@@ -412,7 +420,7 @@ fn indices(range: &Range<u32>) -> Range<usize> {
     range.start as usize..range.end as usize
 }
 
-impl<L: Lanes> fmt::Display for Geometry<L> {
+impl<L: SimdFloat> fmt::Display for Aggregate<L> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         if self.counts.is_empty() {
             return f.write_str("no objects");

@@ -2,9 +2,9 @@
 //! not occur costs nothing.
 
 use crate::bvh::{Hit, Ray};
-use crate::lanes::{Lanes, Mask, V3};
-use crate::primitive::conical_frustum::Tapered;
-use crate::primitive::convex_polyhedron::Convex;
+use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::primitive::conical_frustum::ConicalFrustum;
+use crate::primitive::convex_polyhedron::ConvexPolyhedron;
 use crate::primitive::csg::Compounds;
 use crate::primitive::ellipsoid::Ellipsoid;
 use crate::primitive::form::Form;
@@ -15,11 +15,11 @@ use std::ops::Range;
 
 /// Where a ray meets a surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Surface<L> {
+pub struct SurfacePoint<L> {
     /// The point, put back on the surface as exactly as the precision allows.
-    pub point: V3<L>,
+    pub point: Vec3<L>,
     /// Unit geometric normal: outward for solids, on the front for flat shapes.
-    pub normal: V3<L>,
+    pub normal: Vec3<L>,
     /// Largest magnitude of a coordinate that took part in computing the point: its rounding error
     /// is a few units of the last place of this.
     pub reach: L,
@@ -27,14 +27,14 @@ pub struct Surface<L> {
 
 /// Texture coordinates that a shape has of its own, at one point.
 #[derive(Clone, Copy, Debug)]
-pub struct OwnUv<L> {
+pub struct UvGradients<L> {
     /// u to the right, v up.
     pub uv: [L; 2],
     /// Their gradients along the surface, in the shape's own axes.
-    pub gradients: [V3<L>; 2],
+    pub gradients: [Vec3<L>; 2],
 }
 
-impl<L: Lanes> Surface<L> {
+impl<L: SimdFloat> SurfacePoint<L> {
     /// How far from the point rays start that leave the surface: a few roundings of the largest number
     /// involved.
     #[inline(always)]
@@ -44,17 +44,17 @@ impl<L: Lanes> Surface<L> {
 }
 
 /// One thing that rays meet, compiled for the lane type.
-pub trait Item<L: Lanes> {
+pub trait Primitive<L: SimdFloat> {
     /// Distance at which each line through a ray meets the item first in front of the ray's origin, and
     /// where it meets it; there, a distance that is not positive is no hit. `None`: it meets it nowhere.
     fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;
 
     /// The surface at `point` (near it, from `ray.at(t)`).
-    fn surface(&self, point: V3<L>) -> Surface<L>;
+    fn surface(&self, point: Vec3<L>) -> SurfacePoint<L>;
 }
 
 /// All items of one form.
-pub enum Batch<L: Lanes> {
+pub enum PrimitiveBatch<L: SimdFloat> {
     /// Parallelograms.
     Parallelograms(Vec<Parallelogram<L::Scalar>>),
     /// Infinite planes.
@@ -64,9 +64,9 @@ pub enum Batch<L: Lanes> {
     /// Ellipsoids.
     Ellipsoids(Vec<Ellipsoid<L::Scalar>>),
     /// Convex solids.
-    Convex(Vec<Convex<L::Scalar>>),
+    ConvexPolyhedron(Vec<ConvexPolyhedron<L::Scalar>>),
     /// Tapered cylinders.
-    Tapered(Vec<Tapered<L::Scalar>>),
+    ConicalFrustum(Vec<ConicalFrustum<L::Scalar>>),
     /// Compounds, whose items are parts.
     Compounds(Compounds<L::Scalar>),
     /// Meshes.
@@ -78,19 +78,19 @@ macro_rules! each {
     ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
         $meshes:ident => $third:expr) => {
         match $batch {
-            Batch::Parallelograms($items) => $value,
-            Batch::Planes($items) => $value,
-            Batch::Spheres($items) => $value,
-            Batch::Ellipsoids($items) => $value,
-            Batch::Convex($items) => $value,
-            Batch::Tapered($items) => $value,
-            Batch::Compounds($compounds) => $other,
-            Batch::Meshes($meshes) => $third,
+            PrimitiveBatch::Parallelograms($items) => $value,
+            PrimitiveBatch::Planes($items) => $value,
+            PrimitiveBatch::Spheres($items) => $value,
+            PrimitiveBatch::Ellipsoids($items) => $value,
+            PrimitiveBatch::ConvexPolyhedron($items) => $value,
+            PrimitiveBatch::ConicalFrustum($items) => $value,
+            PrimitiveBatch::Compounds($compounds) => $other,
+            PrimitiveBatch::Meshes($meshes) => $third,
         }
     };
 }
 
-impl<L: Lanes> Batch<L> {
+impl<L: SimdFloat> PrimitiveBatch<L> {
     /// Narrows `hit` by the items in `range`; an item's tag is `base` + its number.
     #[inline(always)]
     pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
@@ -112,7 +112,7 @@ impl<L: Lanes> Batch<L> {
 
     /// The surface of `item` at `point` (near it, from `ray.at(t)`); `facet`: tag of a mesh's triangle.
     #[inline(always)]
-    pub fn surface(&self, item: usize, facet: L, point: V3<L>) -> Surface<L> {
+    pub fn surface(&self, item: usize, facet: L, point: Vec3<L>) -> SurfacePoint<L> {
         each!(self,
             items => items[item].surface(point),
             compounds => compounds.surface(item, point),
@@ -121,7 +121,7 @@ impl<L: Lanes> Batch<L> {
 }
 
 #[inline(always)]
-fn closest<L: Lanes>(items: &[impl Item<L>], first: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
+fn closest<L: SimdFloat>(items: &[impl Primitive<L>], first: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
     for (tag, item) in (first..).zip(items) {
         if let Some((t, meets)) = item.crossing(ray) {
             hit.narrow(meets, t, tag);
@@ -130,7 +130,12 @@ fn closest<L: Lanes>(items: &[impl Item<L>], first: u32, ray: &Ray<L>, hit: &mut
 }
 
 #[inline(always)]
-fn blocked<L: Lanes>(items: &[impl Item<L>], ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+fn blocked<L: SimdFloat>(
+    items: &[impl Primitive<L>],
+    ray: &Ray<L>,
+    limit: L,
+    wanted: L::Mask,
+) -> L::Mask {
     let mut blocked = L::mask(false);
     for item in items {
         if let Some((t, meets)) = item.crossing(ray) {
@@ -145,7 +150,7 @@ fn blocked<L: Lanes>(items: &[impl Item<L>], ray: &Ray<L>, limit: L, wanted: L::
 
 /// What an item came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Source {
+pub struct PrimitiveId {
     /// Position in the list given to `compile`.
     pub form: usize,
     /// Which part of a compound; 0 for all other forms. Part 0 stands for the whole compound where
@@ -154,11 +159,11 @@ pub struct Source {
 }
 
 /// A compiled batch and what its items came from.
-pub struct Compiled<L: Lanes> {
+pub struct LabelledBatch<L: SimdFloat> {
     /// The batch.
-    pub batch: Batch<L>,
+    pub batch: PrimitiveBatch<L>,
     /// `sources[item]`: which form, which part of it.
-    pub sources: Vec<Source>,
+    pub sources: Vec<PrimitiveId>,
     /// How the inventory counts the items: singular and plural.
     pub noun: (&'static str, &'static str),
     /// What it says behind that.
@@ -168,7 +173,7 @@ pub struct Compiled<L: Lanes> {
 }
 
 /// One batch per form that occurs in `forms`.
-pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
+pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
     let mut out = Vec::new();
     /// The items that `new` makes of some forms, as one batch.
     macro_rules! add {
@@ -176,12 +181,18 @@ pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
             let made = forms
                 .iter()
                 .enumerate()
-                .filter_map(|(form, f)| Some((Source { form, part: 0 }, $item::new(f)?)));
+                .filter_map(|(form, f)| Some((PrimitiveId { form, part: 0 }, $item::new(f)?)));
             let (sources, items): (Vec<_>, Vec<_>) = made.unzip();
             if !items.is_empty() {
-                let batch = Batch::$batch(items);
+                let batch = PrimitiveBatch::$batch(items);
                 let detail = String::new();
-                out.push(Compiled { batch, sources, noun: $noun, detail, infinite: $infinite });
+                out.push(LabelledBatch {
+                    batch,
+                    sources,
+                    noun: $noun,
+                    detail,
+                    infinite: $infinite,
+                });
             }
         };
     }
@@ -189,29 +200,40 @@ pub fn compile<L: Lanes>(forms: &[Form]) -> Vec<Compiled<L>> {
     add!(Planes, Plane, ("plane", "planes"), true);
     add!(Spheres, Sphere, ("sphere", "spheres"), false);
     add!(Ellipsoids, Ellipsoid, ("ellipsoid", "ellipsoids"), false);
-    add!(Convex, Convex, ("convex solid", "convex solids"), false);
-    add!(Tapered, Tapered, ("tapered cylinder", "tapered cylinders"), false);
-    let compounds = forms.iter().enumerate().filter(|(_, f)| matches!(f, Form::Compound(_)));
+    add!(ConvexPolyhedron, ConvexPolyhedron, ("convex solid", "convex solids"), false);
+    add!(
+        ConicalFrustum,
+        ConicalFrustum,
+        ("conical_frustum cylinder", "conical_frustum cylinders"),
+        false
+    );
+    let compounds = forms.iter().enumerate().filter(|(_, f)| matches!(f, Form::Csg(_)));
     let sources: Vec<_> = compounds
-        .flat_map(|(form, f)| (0..f.parts()).map(move |part| Source { form, part }))
+        .flat_map(|(form, f)| (0..f.parts()).map(move |part| PrimitiveId { form, part }))
         .collect();
     if !sources.is_empty() {
-        let batch = Batch::Compounds(Compounds::new(forms));
+        let batch = PrimitiveBatch::Compounds(Compounds::new(forms));
         let (noun, detail) = (("compound", "compounds"), String::new());
-        out.push(Compiled { batch, sources, noun, detail, infinite: false });
+        out.push(LabelledBatch { batch, sources, noun, detail, infinite: false });
     }
     let mut triangles = 0;
     let mut sources = Vec::new();
     for (form, f) in forms.iter().enumerate() {
         if let Form::Mesh { mesh, .. } = f {
             triangles += mesh.mesh().triangles.len();
-            sources.push(Source { form, part: 0 });
+            sources.push(PrimitiveId { form, part: 0 });
         }
     }
     if !sources.is_empty() {
-        let batch = Batch::Meshes(Meshes::new(forms));
+        let batch = PrimitiveBatch::Meshes(Meshes::new(forms));
         let detail = format!(" of {} triangles", grouped(triangles));
-        out.push(Compiled { batch, sources, noun: ("mesh", "meshes"), detail, infinite: false });
+        out.push(LabelledBatch {
+            batch,
+            sources,
+            noun: ("mesh", "meshes"),
+            detail,
+            infinite: false,
+        });
     }
     out
 }

@@ -5,11 +5,11 @@ use crate::primitive::form::Form;
 use glam::DVec3;
 
 /// Rays in single precision stray by a few times 2^-24 of the largest coordinate; this is more.
-pub const STRAY: f64 = 1e-5;
+pub const F32_RAY_ERROR: f64 = 1e-5;
 
 /// A ball.
 #[derive(Clone, Copy, Debug)]
-pub struct Ball {
+pub struct BoundingSphere {
     /// Centre.
     pub center: DVec3,
     /// Radius; infinite for things without an end.
@@ -18,7 +18,7 @@ pub struct Ball {
 
 /// Where shadow rays lead.
 #[derive(Clone, Copy, Debug)]
-pub enum Towards {
+pub enum LightTarget {
     /// To a point.
     Point(DVec3),
     /// Far away in a direction of unit length.
@@ -27,7 +27,7 @@ pub enum Towards {
 
 /// Straight lines that leave one point through a convex quadrilateral.
 #[derive(Clone, Copy, Debug)]
-pub struct Pencil {
+pub struct Frustum {
     /// The point.
     pub apex: DVec3,
     /// Forward, of unit length.
@@ -36,11 +36,11 @@ pub struct Pencil {
     pub corners: [DVec3; 4],
 }
 
-impl Pencil {
+impl Frustum {
     /// Whether a ball may reach between the lines: into the cone around them, if that is narrower than a half
     /// space; otherwise, as no circular cone is convex then, to the inner side of the four planes through the
     /// apex and neighbouring corners.
-    fn meets(&self, ball: &Ball) -> bool {
+    fn meets(&self, ball: &BoundingSphere) -> bool {
         let Self { apex, forward, corners } = self;
         let axis = corners.iter().sum::<DVec3>().normalize();
         let cos = corners.iter().map(|c| c.normalize().dot(axis)).fold(1.0, f64::min);
@@ -61,8 +61,8 @@ impl Pencil {
 
 /// The surroundings of one thing.
 #[derive(Clone, Copy, Debug)]
-pub struct Bound {
-    ball: Ball,
+pub struct BoundingVolume {
+    ball: BoundingSphere,
     /// Unit normal and offset of the plane that a flat thing lies in.
     plane: Option<(DVec3, f64)>,
     /// It does not see itself from outside.
@@ -71,7 +71,7 @@ pub struct Bound {
     slack: f64,
 }
 
-impl Ball {
+impl BoundingSphere {
     fn around(points: &[DVec3]) -> Self {
         let center = points.iter().sum::<DVec3>() / points.len() as f64;
         let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
@@ -85,35 +85,36 @@ impl Ball {
 
     /// Its radius, with room for the roundings of rays from `apex`.
     fn reach(&self, apex: DVec3) -> f64 {
-        self.radius * (1.0 + STRAY) + stray(self.center) + stray(apex)
+        self.radius * (1.0 + F32_RAY_ERROR) + stray(self.center) + stray(apex)
     }
 }
 
 fn stray(point: DVec3) -> f64 {
-    STRAY * point.abs().max_element()
+    F32_RAY_ERROR * point.abs().max_element()
 }
 
-impl Bound {
+impl BoundingVolume {
     /// Of a form.
     pub fn new(form: &Form) -> Self {
         let ball = match form {
-            Form::Sphere { center, radius } => Ball { center: *center, radius: *radius },
-            Form::Convex { corners, .. } => Ball::around(corners),
+            Form::Sphere { center, radius } => BoundingSphere { center: *center, radius: *radius },
+            Form::ConvexPolyhedron { corners, .. } => BoundingSphere::around(corners),
             Form::Parallelogram { corner, u, v } => {
-                Ball::around(&[*corner, corner + u, corner + v, corner + u + v])
+                BoundingSphere::around(&[*corner, corner + u, corner + v, corner + u + v])
             }
             Form::Ellipsoid { scene_from_unit: map } => {
                 let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis]
                     .map(|a| a.length_squared());
                 // The largest singular value is at most the root of the sum of squares.
-                Ball { center: map.translation, radius: (x + y + z).sqrt() }
+                BoundingSphere { center: map.translation, radius: (x + y + z).sqrt() }
             }
-            Form::Tapered { .. } | Form::Compound(_) | Form::Mesh { .. } | Form::Plane { .. } => {
+            Form::ConicalFrustum { .. } | Form::Csg(_) | Form::Mesh { .. } | Form::Plane { .. } => {
                 match form.bounds() {
-                    Some((low, high)) => {
-                        Ball { center: 0.5 * (low + high), radius: 0.5 * low.distance(high) }
-                    }
-                    None => Ball { center: DVec3::ZERO, radius: f64::INFINITY },
+                    Some((low, high)) => BoundingSphere {
+                        center: 0.5 * (low + high),
+                        radius: 0.5 * low.distance(high),
+                    },
+                    None => BoundingSphere { center: DVec3::ZERO, radius: f64::INFINITY },
                 }
             }
         };
@@ -125,12 +126,12 @@ impl Bound {
             Form::Plane { normal, offset } => Some((*normal, *offset)),
             _ => None,
         };
-        let convex = !matches!(form, Form::Compound(_) | Form::Mesh { .. });
+        let convex = !matches!(form, Form::Csg(_) | Form::Mesh { .. });
         Self { ball, plane, convex, slack: 0.0 }
     }
 
     /// A ball around it.
-    pub fn ball(&self) -> Ball {
+    pub fn ball(&self) -> BoundingSphere {
         self.ball
     }
 
@@ -145,8 +146,8 @@ impl Bound {
     }
 
     /// A ball around all of it that the pencil's lines meet in front of the apex; `None`: nothing.
-    pub fn part_in(&self, pencil: &Pencil) -> Option<Ball> {
-        let Pencil { apex, forward, corners } = pencil;
+    pub fn part_in(&self, pencil: &Frustum) -> Option<BoundingSphere> {
+        let Frustum { apex, forward, corners } = pencil;
         let ball = self.ball;
         if ball.radius.is_finite() && !pencil.meets(&ball) {
             return None;
@@ -162,7 +163,7 @@ impl Bound {
             let height = offset - normal.dot(*apex);
             let (height, toward) = (height.abs(), normal * height.signum());
             let slack = self.stray(*apex);
-            let slopes = corners.map(|c| (toward.dot(c), STRAY * c.length()));
+            let slopes = corners.map(|c| (toward.dot(c), F32_RAY_ERROR * c.length()));
             if height <= slack {
                 // The apex may be on either side.
             } else if slopes.iter().all(|(slope, stray)| slope > stray) {
@@ -181,35 +182,35 @@ impl Bound {
         let far = far.max(near);
         let ends: [DVec3; 8] =
             std::array::from_fn(|i| *apex + corners[i % 4] * if i < 4 { near } else { far });
-        let part = Ball::around(&ends);
-        let part = Ball { radius: part.radius + room, ..part };
+        let part = BoundingSphere::around(&ends);
+        let part = BoundingSphere { radius: part.radius + room, ..part };
         Some(if part.radius < ball.radius { part } else { ball })
     }
 
     /// The same with room around it: for shadow rays that end so far from their lights.
     pub fn grown(self, by: f64) -> Self {
-        let ball = Ball { radius: self.ball.radius + by, ..self.ball };
+        let ball = BoundingSphere { radius: self.ball.radius + by, ..self.ball };
         Self { ball, slack: self.slack + by, ..self }
     }
 
     /// How far off a flat thing's plane rays that lead to `point` meet it.
     fn stray(&self, point: DVec3) -> f64 {
-        let Ball { center, radius } = self.ball;
+        let BoundingSphere { center, radius } = self.ball;
         let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
         let offset = self.plane.map_or(0.0, |(_, offset)| offset.abs());
-        self.slack + stray(point) + STRAY * reach.max(offset)
+        self.slack + stray(point) + F32_RAY_ERROR * reach.max(offset)
     }
 
     /// Whether it may stand between some point of `lit` and the light.
-    pub fn shades(&self, lit: &Ball, towards: &Towards) -> bool {
-        let slack = stray(lit.center) + STRAY * lit.radius;
+    pub fn shades(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
+        let slack = stray(lit.center) + F32_RAY_ERROR * lit.radius;
         let radius = lit.radius + slack;
         if let Some((normal, offset)) = self.plane {
             let height = normal.dot(lit.center) - offset;
             // A light on the plane within rounding may be seen on either side.
             let (beyond, unsure) = match towards {
-                Towards::Point(light) => (normal.dot(*light) - offset, self.stray(*light)),
-                Towards::Direction(direction) => (normal.dot(*direction), STRAY),
+                LightTarget::Point(light) => (normal.dot(*light) - offset, self.stray(*light)),
+                LightTarget::Direction(direction) => (normal.dot(*direction), F32_RAY_ERROR),
             };
             let sure = height.abs() > lit.radius + self.stray(lit.center) && beyond.abs() > unsure;
             // Both on the same side.
@@ -221,14 +222,15 @@ impl Bound {
             return true;
         }
         match towards {
-            Towards::Direction(direction) => {
+            LightTarget::Direction(direction) => {
                 let to = self.ball.center - lit.center;
                 let along = to.dot(*direction);
                 let across = (to - *direction * along).length();
-                let both = (radius + self.ball.radius) * (1.0 + STRAY) + stray(self.ball.center);
+                let both =
+                    (radius + self.ball.radius) * (1.0 + F32_RAY_ERROR) + stray(self.ball.center);
                 across <= both && along >= -both
             }
-            Towards::Point(light) => {
+            LightTarget::Point(light) => {
                 let to = lit.center - *light;
                 let distance = to.length();
                 if distance <= radius {
@@ -255,7 +257,7 @@ struct Cone {
 impl Cone {
     /// Whether a ball may reach into the cone: it is not all behind the apex, and its centre is no
     /// farther from the cone's side than its radius.
-    fn meets(&self, ball: &Ball) -> bool {
+    fn meets(&self, ball: &BoundingSphere) -> bool {
         let to = ball.center - self.apex;
         let along = to.dot(self.axis);
         let across = (to - self.axis * along).length();
@@ -279,9 +281,9 @@ mod tests {
     }
 
     /// Looks from (0, 0, 5) along -z, 0.1 to each side at unit distance.
-    fn pencil() -> Pencil {
+    fn pencil() -> Frustum {
         let corners = [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)];
-        Pencil {
+        Frustum {
             apex: DVec3::Z * 5.0,
             forward: DVec3::NEG_Z,
             corners: corners.map(|(x, y)| DVec3::new(x, y, -1.0)),
@@ -290,7 +292,7 @@ mod tests {
 
     #[test]
     fn a_pencil_meets_what_is_in_front_of_it() {
-        let part = |form: &Form| Bound::new(form).part_in(&pencil());
+        let part = |form: &Form| BoundingVolume::new(form).part_in(&pencil());
         assert!(part(&ball([0.0, 0.0, 0.0], 1.0)).is_some());
         assert!(part(&ball([1.4, 0.0, 0.0], 1.0)).is_some());
         assert!(part(&ball([2.0, 0.0, 0.0], 1.0)).is_none());
@@ -307,9 +309,9 @@ mod tests {
 
     #[test]
     fn only_what_is_between_shades() {
-        let lit = Ball { center: DVec3::ZERO, radius: 0.5 };
-        let lamp = Towards::Point(DVec3::Y * 4.0);
-        let sun = Towards::Direction(DVec3::Y);
+        let lit = BoundingSphere { center: DVec3::ZERO, radius: 0.5 };
+        let lamp = LightTarget::Point(DVec3::Y * 4.0);
+        let sun = LightTarget::Direction(DVec3::Y);
         for (form, by_lamp, by_sun) in [
             (ball([0.0, 2.0, 0.0], 0.1), true, true),
             (ball([0.4, 2.0, 0.0], 0.1), false, true),
@@ -321,7 +323,7 @@ mod tests {
             (tile([0.0, -0.4, 0.0]), true, true),
             (tile([0.0, 6.0, 0.0]), false, true),
         ] {
-            let bound = Bound::new(&form);
+            let bound = BoundingVolume::new(&form);
             assert_eq!(bound.shades(&lit, &lamp), by_lamp, "lamp {form:?}");
             assert_eq!(bound.shades(&lit, &sun), by_sun, "sun {form:?}");
         }
@@ -336,9 +338,9 @@ mod tests {
         let ends =
             [(-edge, edge), (0.6 * edge, edge), (0.6 * edge, -0.6 * edge), (-edge, -0.6 * edge)];
         let corners = ends.map(|(x, y)| DVec3::new(x, y, -1.0));
-        let pencil = Pencil { apex, forward: DVec3::NEG_Z, corners };
+        let pencil = Frustum { apex, forward: DVec3::NEG_Z, corners };
         let meets = |center: DVec3, radius: f64| {
-            Bound::new(&Form::Sphere { center, radius }).part_in(&pencil).is_some()
+            BoundingVolume::new(&Form::Sphere { center, radius }).part_in(&pencil).is_some()
         };
         let (mut outside, mut inside) = (0, 0);
         for i in 0..=40 {
@@ -363,7 +365,7 @@ mod tests {
     #[test]
     fn a_plane_through_the_eye_is_not_ruled_out() {
         for offset in [5.0 - 1e-7, 5.0, 5.0 + 1e-7] {
-            let plane = Bound::new(&Form::Plane { normal: DVec3::Z, offset });
+            let plane = BoundingVolume::new(&Form::Plane { normal: DVec3::Z, offset });
             assert!(plane.part_in(&pencil()).is_some(), "{offset}");
         }
     }
@@ -377,7 +379,7 @@ mod tests {
             (random >> 40) as f64 / 16_777_216.0
         };
         let slanted = Form::Plane { normal: DVec3::new(0.3, 0.4, 0.5).normalize(), offset: 0.2 };
-        let part = Bound::new(&slanted).part_in(&pencil()).unwrap();
+        let part = BoundingVolume::new(&slanted).part_in(&pencil()).unwrap();
         let Form::Plane { normal, offset } = slanted else { unreachable!() };
         for _ in 0..1000 {
             let toward = DVec3::new(0.2 * unit() - 0.1, 0.2 * unit() - 0.1, -1.0);

@@ -3,16 +3,16 @@
 //!   x^2 + y^2 <= (middle + slope z)^2, |z| <= 1/2
 
 use crate::bvh::Ray;
-use crate::lanes::{Lanes, Mask, Real, V3};
-use crate::primitive::batch::{Item, Surface, reach};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::primitive::batch::{Primitive, SurfacePoint, reach};
 use crate::primitive::ellipsoid::{rows, times};
 use crate::primitive::form::Form;
-use crate::primitive::solid::{Span, Spans};
+use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::DVec3;
 
 /// One solid. Matrices by rows.
 #[derive(Clone, Copy)]
-pub struct Tapered<S> {
+pub struct ConicalFrustum<S> {
     /// Image of the middle of the axis.
     center: [S; 3],
     unit_from_scene: [[S; 3]; 3],
@@ -31,10 +31,10 @@ pub struct Tapered<S> {
 /// little more: what is cut off by rounding must not be cut off for good.
 const AROUND2: f64 = 1.26;
 
-impl<S: Real> Tapered<S> {
+impl<S: Float> ConicalFrustum<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
-        let Form::Tapered { scene_from_unit: m, top } = form else { return None };
+        let Form::ConicalFrustum { scene_from_unit: m, top } = form else { return None };
         let inverse = m.matrix3.inverse();
         let up = inverse.transpose() * DVec3::Z;
         let center = m.transform_point3(DVec3::new(0.0, 0.0, 0.5));
@@ -51,11 +51,11 @@ impl<S: Real> Tapered<S> {
 }
 
 /// Where a line crosses a solid.
-struct Chord<L: Lanes> {
+struct Chord<L: SimdFloat> {
     /// The point of the line nearest to the middle of the axis, and its direction, of unit length in
     /// the canonical space.
-    point: V3<L>,
-    direction: V3<L>,
+    point: Vec3<L>,
+    direction: Vec3<L>,
     /// The scene's distance of `point`, and of a step of length 1.
     start: L,
     scale: L,
@@ -68,7 +68,7 @@ struct Chord<L: Lanes> {
     meets: L::Mask,
 }
 
-impl<L: Lanes> Chord<L> {
+impl<L: SimdFloat> Chord<L> {
     fn distances(&self) -> (L, L) {
         let distance = |t: L| self.start + t * self.scale;
         (distance(self.enter), distance(self.leave))
@@ -82,9 +82,9 @@ impl<L: Lanes> Chord<L> {
 /// and does not cancel as b^2 - a c does; its roots as q / a and c / q, so that a = 0, a line parallel
 /// to a generator, leaves one of them finite.
 #[inline(always)]
-fn chord<L: Lanes>(s: &Tapered<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
+fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let (zero, half) = (L::zero(), L::of(0.5));
-    let f = times(&s.unit_from_scene, ray.origin - V3::splat(s.center));
+    let f = times(&s.unit_from_scene, ray.origin - Vec3::splat(s.center));
     let d = times(&s.unit_from_scene, ray.direction);
     let scale = L::one() / d.length2().sqrt();
     let d = d * scale;
@@ -146,17 +146,17 @@ fn chord<L: Lanes>(s: &Tapered<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
 
 /// The side's outward normal at the canonical point (x, y, z), in the scene's space, not normalised.
 #[inline(always)]
-fn side_normal<L: Lanes>(s: &Tapered<L::Scalar>, x: L, y: L) -> (V3<L>, L) {
+fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3<L>, L) {
     let rho = x.mul_add(x, y * y).sqrt();
     // At the apex the axis stands for the normals that meet there.
     let inverse = L::select(rho.gt(L::zero()), L::one() / rho, L::zero());
     let (nx, ny, nz) = (x * inverse, y * inverse, -L::splat(s.slope));
     // The inverse transpose times the normal: columns of the inverse.
     let m = &s.unit_from_scene;
-    (V3::splat(m[0]) * nx + V3::splat(m[1]) * ny + V3::splat(m[2]) * nz, rho)
+    (Vec3::splat(m[0]) * nx + Vec3::splat(m[1]) * ny + Vec3::splat(m[2]) * nz, rho)
 }
 
-impl<L: Lanes> Item<L> for Tapered<L::Scalar> {
+impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
     #[inline(always)]
     fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let chord = chord(self, ray)?;
@@ -166,29 +166,29 @@ impl<L: Lanes> Item<L> for Tapered<L::Scalar> {
 
     /// Side, base or cap: the one that is nearest, outside by most or inside by least.
     #[inline(always)]
-    fn surface(&self, point: V3<L>) -> Surface<L> {
+    fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let s = self;
-        let p = times(&s.unit_from_scene, point - V3::splat(s.center));
+        let p = times(&s.unit_from_scene, point - Vec3::splat(s.center));
         let (side, rho) = side_normal(s, p.x, p.y);
         let steepness = L::one() / side.length2().sqrt();
         let radius = L::splat(s.slope).mul_add(p.z, L::splat(s.middle));
         let beside = (rho - radius) * steepness;
         let above = (p.z.abs() - L::of(0.5)) * L::splat(s.height);
-        let cap = V3::splat(s.cap_normal);
-        let cap = V3::select(p.z.lt(L::zero()), -cap, cap);
+        let cap = Vec3::splat(s.cap_normal);
+        let cap = Vec3::select(p.z.lt(L::zero()), -cap, cap);
         let on_side = beside.ge(above);
-        let normal = V3::select(on_side, side * steepness, cap);
+        let normal = Vec3::select(on_side, side * steepness, cap);
         let outside = L::select(on_side, beside, above);
-        Surface { point: normal.mul_add(-outside, point), normal, reach: L::splat(s.reach) }
+        SurfacePoint { point: normal.mul_add(-outside, point), normal, reach: L::splat(s.reach) }
     }
 }
 
-impl<L: Lanes> Spans<L> for Tapered<L::Scalar> {
+impl<L: SimdFloat> SolidPrimitive<L> for ConicalFrustum<L::Scalar> {
     fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let s = self;
         let chord = chord(s, ray)?;
         let (enter, leave) = chord.distances();
-        let cap = V3::splat(s.cap_normal).dot(ray.direction).abs();
+        let cap = Vec3::splat(s.cap_normal).dot(ray.direction).abs();
         let cosine = |on_side: L::Mask, t: L| {
             let at = chord.direction.mul_add(t, chord.point);
             let (normal, _) = side_normal(s, at.x, at.y);

@@ -1,10 +1,10 @@
 //! Bounded convex solids as intersections of slabs (parallel pairs of faces) and half-spaces.
 
 use crate::bvh::Ray;
-use crate::lanes::{Lanes, Mask, Real, V3};
-use crate::primitive::batch::{Item, Surface, reach};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::primitive::batch::{Primitive, SurfacePoint, reach};
 use crate::primitive::form::Form;
-use crate::primitive::solid::{Span, Spans};
+use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::DVec3;
 
 /// The points p with low <= normal . (p - center) <= high.
@@ -21,7 +21,7 @@ struct Face<S> {
 }
 
 /// One solid: its bounding sphere, slabs and single faces.
-pub struct Convex<S> {
+pub struct ConvexPolyhedron<S> {
     center: [S; 3],
     radius2: S,
     reach: S,
@@ -29,10 +29,10 @@ pub struct Convex<S> {
     faces: Vec<Face<S>>,
 }
 
-impl<S: Real> Convex<S> {
+impl<S: Float> ConvexPolyhedron<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
-        let Form::Convex { faces, corners } = form else { return None };
+        let Form::ConvexPolyhedron { faces, corners } = form else { return None };
         let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         let center = 0.5 * (low + high);
@@ -67,11 +67,11 @@ impl<S: Real> Convex<S> {
     }
 }
 
-impl<S: Real> Convex<S> {
+impl<S: Float> ConvexPolyhedron<S> {
     /// Distances at which the line enters and leaves, and where it meets the solid.
     #[inline(always)]
-    fn chord<L: Lanes<Scalar = S>>(&self, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
-        let from_center = ray.origin - V3::splat(self.center);
+    fn chord<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
+        let from_center = ray.origin - Vec3::splat(self.center);
         let along = from_center.dot(ray.direction);
         let across = ray.direction.mul_add(-along, from_center);
         let near = across.length2().le(L::splat(self.radius2));
@@ -86,7 +86,7 @@ impl<S: Real> Convex<S> {
         let tiny = L::of(1e-30);
         let steep = |speed: L| speed.abs().max(tiny).copysign(speed);
         for slab in &self.slabs {
-            let normal = V3::splat(slab.normal);
+            let normal = Vec3::splat(slab.normal);
             let inverse = L::one() / steep(ray.direction.dot(normal));
             let height = from_center.dot(normal);
             let t0 = (L::splat(slab.low) - height) * inverse;
@@ -95,7 +95,7 @@ impl<S: Real> Convex<S> {
             leave = t0.max(t1).min(leave);
         }
         for face in &self.faces {
-            let normal = V3::splat(face.normal);
+            let normal = Vec3::splat(face.normal);
             let speed = steep(ray.direction.dot(normal));
             let t = (L::splat(face.high) - from_center.dot(normal)) / speed;
             let entering = speed.lt(L::zero());
@@ -107,7 +107,7 @@ impl<S: Real> Convex<S> {
     }
 }
 
-impl<L: Lanes> Item<L> for Convex<L::Scalar> {
+impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
     #[inline(always)]
     fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let (enter, leave, meets) = self.chord(ray)?;
@@ -116,12 +116,12 @@ impl<L: Lanes> Item<L> for Convex<L::Scalar> {
 
     /// The face is the one whose plane is nearest to the point: outside by most, or inside by least.
     #[inline(always)]
-    fn surface(&self, point: V3<L>) -> Surface<L> {
-        let from_center = point - V3::splat(self.center);
+    fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
+        let from_center = point - Vec3::splat(self.center);
         let mut outside = L::of(-L::MAX);
-        let mut normal = V3::zero();
+        let mut normal = Vec3::zero();
         for slab in &self.slabs {
-            let n = V3::splat(slab.normal);
+            let n = Vec3::splat(slab.normal);
             let height = from_center.dot(n);
             let above = height - L::splat(slab.high);
             let below = L::splat(slab.low) - height;
@@ -129,28 +129,28 @@ impl<L: Lanes> Item<L> for Convex<L::Scalar> {
             let distance = L::select(upper, above, below);
             let nearer = distance.gt(outside);
             outside = L::select(nearer, distance, outside);
-            normal = V3::select(nearer, V3::select(upper, n, -n), normal);
+            normal = Vec3::select(nearer, Vec3::select(upper, n, -n), normal);
         }
         for face in &self.faces {
-            let n = V3::splat(face.normal);
+            let n = Vec3::splat(face.normal);
             let distance = from_center.dot(n) - L::splat(face.high);
             let nearer = distance.gt(outside);
             outside = L::select(nearer, distance, outside);
-            normal = V3::select(nearer, n, normal);
+            normal = Vec3::select(nearer, n, normal);
         }
-        Surface { point: normal.mul_add(-outside, point), normal, reach: L::splat(self.reach) }
+        SurfacePoint { point: normal.mul_add(-outside, point), normal, reach: L::splat(self.reach) }
     }
 }
 
-impl<L: Lanes> Spans<L> for Convex<L::Scalar> {
+impl<L: SimdFloat> SolidPrimitive<L> for ConvexPolyhedron<L::Scalar> {
     fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let (enter, leave, meets) = self.chord(ray)?;
-        let from_center = ray.origin - V3::splat(self.center);
+        let from_center = ray.origin - Vec3::splat(self.center);
         // The face at an end is the one that is nearest there, of those that the line crosses in
         // the right sense.
         let mut best = (L::of(-L::MAX), L::of(-L::MAX));
         let mut cosines = (L::one(), L::one());
-        let mut face = |normal: V3<L>, offset: L| {
+        let mut face = |normal: Vec3<L>, offset: L| {
             let speed = normal.dot(ray.direction);
             let height = from_center.dot(normal) - offset;
             let above = |t: L| speed.mul_add(t, height);
@@ -162,12 +162,12 @@ impl<L: Lanes> Spans<L> for Convex<L::Scalar> {
             cosines.1 = L::select(nearer, speed, cosines.1);
         };
         for slab in &self.slabs {
-            let normal = V3::splat(slab.normal);
+            let normal = Vec3::splat(slab.normal);
             face(normal, L::splat(slab.high));
             face(-normal, -L::splat(slab.low));
         }
         for half_space in &self.faces {
-            face(V3::splat(half_space.normal), L::splat(half_space.high));
+            face(Vec3::splat(half_space.normal), L::splat(half_space.high));
         }
         let (enter_cosine, leave_cosine) = cosines;
         Some(Span { enter, leave, enter_cosine, leave_cosine, meets })

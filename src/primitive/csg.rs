@@ -11,16 +11,16 @@
 //! nothing.
 
 use crate::bvh::{Hit, Ray};
-use crate::lanes::{Lanes, Mask, Real, V3};
-use crate::primitive::batch::{Item, Surface, reach};
-use crate::primitive::conical_frustum::Tapered;
-use crate::primitive::convex_polyhedron::Convex;
-use crate::primitive::csg_interval::{Change, End, Inside, both_ends, insert, with_room};
-use crate::primitive::csg_tree::{Compound, Tree};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::primitive::batch::{Primitive, SurfacePoint, reach};
+use crate::primitive::conical_frustum::ConicalFrustum;
+use crate::primitive::convex_polyhedron::ConvexPolyhedron;
+use crate::primitive::csg_interval::{Event, Interval, Transition, both_ends, insert, with_room};
+use crate::primitive::csg_tree::{CsgSolid, CsgTree};
 use crate::primitive::ellipsoid::Ellipsoid;
 use crate::primitive::form::Form;
 use crate::primitive::planar::Plane;
-use crate::primitive::solid::Spans;
+use crate::primitive::solid::SolidPrimitive;
 use crate::primitive::sphere::Sphere;
 use std::ops::Range;
 
@@ -42,11 +42,11 @@ enum Op {
 }
 
 /// What a part is.
-enum Solid<S> {
+enum CsgLeaf<S> {
     Sphere(Sphere<S>),
     Ellipsoid(Ellipsoid<S>),
-    Convex(Convex<S>),
-    Tapered(Tapered<S>),
+    ConvexPolyhedron(ConvexPolyhedron<S>),
+    ConicalFrustum(ConicalFrustum<S>),
     /// The half-space behind it.
     Plane(Plane<S>),
 }
@@ -55,34 +55,34 @@ enum Solid<S> {
 macro_rules! each {
     ($solid:expr, $item:ident => $value:expr) => {
         match $solid {
-            Solid::Sphere($item) => $value,
-            Solid::Ellipsoid($item) => $value,
-            Solid::Convex($item) => $value,
-            Solid::Tapered($item) => $value,
-            Solid::Plane($item) => $value,
+            CsgLeaf::Sphere($item) => $value,
+            CsgLeaf::Ellipsoid($item) => $value,
+            CsgLeaf::ConvexPolyhedron($item) => $value,
+            CsgLeaf::ConicalFrustum($item) => $value,
+            CsgLeaf::Plane($item) => $value,
         }
     };
 }
 
-impl<S: Real> Solid<S> {
+impl<S: Float> CsgLeaf<S> {
     /// `None`: the form is no convex solid.
     fn new(form: &Form) -> Option<Self> {
         (Sphere::new(form).map(Self::Sphere))
             .or_else(|| Ellipsoid::new(form).map(Self::Ellipsoid))
-            .or_else(|| Convex::new(form).map(Self::Convex))
-            .or_else(|| Tapered::new(form).map(Self::Tapered))
+            .or_else(|| ConvexPolyhedron::new(form).map(Self::ConvexPolyhedron))
+            .or_else(|| ConicalFrustum::new(form).map(Self::ConicalFrustum))
             .or_else(|| Plane::new(form).map(Self::Plane))
     }
 }
 
 /// A part: its solid, and whether the whole's outside is on the solid's inside.
 struct Part<S> {
-    solid: Solid<S>,
+    solid: CsgLeaf<S>,
     reversed: bool,
 }
 
 /// One compound: a ball around it and the ranges of its parts and operations.
-struct One<S> {
+struct SolidOperand<S> {
     center: [S; 3],
     radius2: S,
     reach: S,
@@ -95,37 +95,37 @@ struct One<S> {
 /// All compounds of a scene. Every part is an item of its own, so that a hit tells the part; the
 /// first one of a compound stands for it where rays ask for items.
 pub struct Compounds<S> {
-    compounds: Vec<One<S>>,
+    compounds: Vec<SolidOperand<S>>,
     parts: Vec<Part<S>>,
     ops: Vec<Op>,
     /// For each part the compound that begins with it.
     first: Vec<Option<u32>>,
 }
 
-impl<S: Real> Compounds<S> {
+impl<S: Float> Compounds<S> {
     /// Those of `forms` that are compounds, in order.
     pub fn new(forms: &[Form]) -> Self {
         let mut out =
             Self { compounds: Vec::new(), parts: Vec::new(), ops: Vec::new(), first: Vec::new() };
         for form in forms {
-            if let Form::Compound(compound) = form {
+            if let Form::Csg(compound) = form {
                 out.add(compound);
             }
         }
         out
     }
 
-    fn add(&mut self, compound: &Compound) {
+    fn add(&mut self, compound: &CsgSolid) {
         let (first_part, first_op) = (self.parts.len(), self.ops.len());
         for (i, part) in compound.parts.iter().enumerate() {
-            let solid = Solid::new(part).expect("parts are convex solids");
+            let solid = CsgLeaf::new(part).expect("parts are convex solids");
             self.parts.push(Part { solid, reversed: false });
             self.first.push((i == 0).then_some(self.compounds.len() as u32));
         }
         let depth = self.plan(&compound.tree, first_part, false);
         let (low, high) = compound.bounds().unwrap_or_default();
         let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * S::EPSILON);
-        self.compounds.push(One {
+        self.compounds.push(SolidOperand {
             center: (0.5 * (low + high)).to_array().map(S::of),
             radius2: S::of(radius * radius),
             reach: S::of(compound.parts.iter().map(reach).fold(0.0, f64::max)),
@@ -137,16 +137,16 @@ impl<S: Real> Compounds<S> {
 
     /// Appends the operations of `tree` and returns how high the stack grows; `reversed`: its inside
     /// is outside the whole.
-    fn plan(&mut self, tree: &Tree, first_part: usize, reversed: bool) -> usize {
+    fn plan(&mut self, tree: &CsgTree, first_part: usize, reversed: bool) -> usize {
         let (list, op) = match tree {
-            Tree::Part(i) => {
+            CsgTree::Part(i) => {
                 self.parts[first_part + i].reversed = reversed;
                 self.ops.push(Op::Part(*i as u32));
                 return 1;
             }
-            Tree::Union(list) => (list, Op::Or),
-            Tree::Intersection(list) => (list, Op::And),
-            Tree::Difference(list) => (list, Op::Minus),
+            CsgTree::Union(list) => (list, Op::Or),
+            CsgTree::Intersection(list) => (list, Op::And),
+            CsgTree::Difference(list) => (list, Op::Minus),
         };
         let mut depth = 0;
         for (n, inner) in list.iter().enumerate() {
@@ -162,7 +162,12 @@ impl<S: Real> Compounds<S> {
 
     /// Where the point at distance `t` of each line is inside the whole.
     #[inline(always)]
-    fn inside<L: Lanes<Scalar = S>>(&self, one: &One<S>, spans: &[Inside<L>], t: L) -> L::Mask {
+    fn inside<L: SimdFloat<Scalar = S>>(
+        &self,
+        one: &SolidOperand<S>,
+        spans: &[Interval<L>],
+        t: L,
+    ) -> L::Mask {
         with_room(one.depth, L::mask(false), |stack| {
             let mut top = 0;
             for op in &self.ops[one.ops.clone()] {
@@ -184,16 +189,20 @@ impl<S: Real> Compounds<S> {
     }
 
     /// What is to be seen of the surface between the distances `before` and `after`.
-    fn change<L: Lanes<Scalar = S>>(
+    fn change<L: SimdFloat<Scalar = S>>(
         &self,
-        one: &One<S>,
-        spans: &[Inside<L>],
+        one: &SolidOperand<S>,
+        spans: &[Interval<L>],
         base: u32,
         before: L,
         after: L,
-    ) -> Change<L> {
-        let nothing =
-            Change { before: L::mask(false), after: L::mask(false), t: L::zero(), tag: L::tag(0) };
+    ) -> Transition<L> {
+        let nothing = Transition {
+            before: L::mask(false),
+            after: L::mask(false),
+            t: L::zero(),
+            tag: L::tag(0),
+        };
         with_room(one.depth, nothing, |stack| {
             let mut top = 0;
             for op in &self.ops[one.ops.clone()] {
@@ -202,7 +211,7 @@ impl<S: Real> Compounds<S> {
                     let (was, is) = (span.at(before), span.at(after));
                     let t = L::select(is, span.enter, span.leave);
                     let tag = L::tag(base + one.parts.start as u32 + i);
-                    stack[top] = Change { before: was, after: is, t, tag };
+                    stack[top] = Transition { before: was, after: is, t, tag };
                     top += 1;
                     continue;
                 }
@@ -219,15 +228,15 @@ impl<S: Real> Compounds<S> {
     }
 
     /// Narrows `hit` by the lanes of `wanted`.
-    fn meet<L: Lanes<Scalar = S>>(
+    fn meet<L: SimdFloat<Scalar = S>>(
         &self,
-        one: &One<S>,
+        one: &SolidOperand<S>,
         base: u32,
         ray: &Ray<L>,
         wanted: L::Mask,
         hit: &mut Hit<L>,
     ) {
-        let from_center = ray.origin - V3::splat(one.center);
+        let from_center = ray.origin - Vec3::splat(one.center);
         let along = from_center.dot(ray.direction);
         let across = ray.direction.mul_add(-along, from_center);
         let radius2 = L::splat(one.radius2);
@@ -239,8 +248,8 @@ impl<S: Real> Compounds<S> {
         }
         let (never, always) = (L::of(L::MAX), L::of(-L::MAX));
         let parts = &self.parts[one.parts.clone()];
-        let outside = Inside { enter: never, leave: always };
-        let end = End { t: never, tie: L::zero() };
+        let outside = Interval { enter: never, leave: always };
+        let end = Event { t: never, tie: L::zero() };
         with_room(parts.len(), outside, |spans| {
             with_room(2 * parts.len(), end, |ends| {
                 let tie = ray.origin.max_abs().max(L::splat(one.reach)) * L::of(TIE * L::EPSILON);
@@ -248,7 +257,7 @@ impl<S: Real> Compounds<S> {
                 for (span, part) in spans.iter_mut().zip(parts) {
                     let found = each!(&part.solid, solid => solid.span(ray));
                     let Some(found) = found else { continue };
-                    *span = Inside {
+                    *span = Interval {
                         enter: L::select(found.meets, found.enter, never),
                         leave: L::select(found.meets, found.leave, always),
                     };
@@ -267,15 +276,15 @@ impl<S: Real> Compounds<S> {
     /// Faces that lie on each other are met at the same angle, so both ends must be as near as their
     /// ties: a face that is met flatly does not swallow others that are not.
     #[inline(always)]
-    fn sweep<L: Lanes<Scalar = S>>(
+    fn sweep<L: SimdFloat<Scalar = S>>(
         &self,
-        one: &One<S>,
-        (spans, ends): (&[Inside<L>], &[End<L>]),
+        one: &SolidOperand<S>,
+        (spans, ends): (&[Interval<L>], &[Event<L>]),
         base: u32,
         mut open: L::Mask,
         hit: &mut Hit<L>,
     ) {
-        let last = End { t: L::of(L::MAX), tie: L::zero() };
+        let last = Event { t: L::of(L::MAX), tie: L::zero() };
         let mut state = L::mask(false);
         let mut before = L::of(-L::MAX);
         for (i, end) in ends.iter().enumerate() {
@@ -306,10 +315,10 @@ impl<S: Real> Compounds<S> {
     }
 }
 
-impl<S: Real> Compounds<S> {
+impl<S: Float> Compounds<S> {
     /// Narrows `hit` by the compounds that begin in `range`; a part's tag is `base` + its number.
     #[inline(never)]
-    pub fn closest<L: Lanes<Scalar = S>>(
+    pub fn closest<L: SimdFloat<Scalar = S>>(
         &self,
         range: Range<usize>,
         base: u32,
@@ -324,7 +333,7 @@ impl<S: Real> Compounds<S> {
     /// Where a surface of the compounds that begin in `range` lies at a distance in (0, limit) of the
     /// ray, of the lanes in `wanted`.
     #[inline(never)]
-    pub fn blocked<L: Lanes<Scalar = S>>(
+    pub fn blocked<L: SimdFloat<Scalar = S>>(
         &self,
         range: Range<usize>,
         ray: &Ray<L>,
@@ -346,10 +355,14 @@ impl<S: Real> Compounds<S> {
 
     /// The surface of a part at `point`, outward of the whole.
     #[inline(never)]
-    pub fn surface<L: Lanes<Scalar = S>>(&self, part: usize, point: V3<L>) -> Surface<L> {
+    pub fn surface<L: SimdFloat<Scalar = S>>(
+        &self,
+        part: usize,
+        point: Vec3<L>,
+    ) -> SurfacePoint<L> {
         let part = &self.parts[part];
-        let surface: Surface<L> = each!(&part.solid, solid => solid.surface(point));
+        let surface: SurfacePoint<L> = each!(&part.solid, solid => solid.surface(point));
         let normal = if part.reversed { -surface.normal } else { surface.normal };
-        Surface { normal, ..surface }
+        SurfacePoint { normal, ..surface }
     }
 }

@@ -1,7 +1,7 @@
 //! What compounds are computed with: spans' ends in order, parts of lines inside, and what changes
 //! from one to the next.
 
-use crate::lanes::Lanes;
+use crate::lanes::SimdFloat;
 use crate::primitive::solid::Span;
 
 /// The least cosine that a tie is widened for: what a line meets flatter than that is not told apart.
@@ -9,19 +9,19 @@ const FLATTEST: f64 = 1e-9;
 
 /// The end of a span: its distance, and how near another end must be to happen at once.
 #[derive(Clone, Copy)]
-pub struct End<L> {
+pub struct Event<L> {
     pub t: L,
     pub tie: L,
 }
 
 /// The span of a part as far as "inside" needs it.
 #[derive(Clone, Copy)]
-pub struct Inside<L> {
+pub struct Interval<L> {
     pub enter: L,
     pub leave: L,
 }
 
-impl<L: Lanes> Inside<L> {
+impl<L: SimdFloat> Interval<L> {
     #[inline(always)]
     pub fn at(&self, t: L) -> L::Mask {
         self.enter.le(t) & self.leave.ge(t)
@@ -30,7 +30,7 @@ impl<L: Lanes> Inside<L> {
 
 /// What happens to a part of the tree at a surface.
 #[derive(Clone, Copy)]
-pub struct Change<L: Lanes> {
+pub struct Transition<L: SimdFloat> {
     pub before: L::Mask,
     pub after: L::Mask,
     /// Where, and which part is to be seen; if nothing changes it means nothing.
@@ -38,7 +38,7 @@ pub struct Change<L: Lanes> {
     pub tag: L,
 }
 
-impl<L: Lanes> Change<L> {
+impl<L: SimdFloat> Transition<L> {
     pub fn inverted(self) -> Self {
         Self { before: !self.before, after: !self.after, ..self }
     }
@@ -73,11 +73,11 @@ pub fn with_room<T: Copy, R>(n: usize, fill: T, use_it: impl FnOnce(&mut [T]) ->
 
 /// The ends of a span; those of lines that do not meet the solid stand behind all others.
 #[inline(always)]
-pub fn both_ends<L: Lanes>(span: &Span<L>, tie: L) -> [End<L>; 2] {
+pub fn both_ends<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     let never = L::of(L::MAX);
     let end = |t: L, cosine: L| {
         let real = span.meets & t.abs().lt(never);
-        End {
+        Event {
             t: L::select(span.meets, t, never),
             tie: (tie / cosine.max(L::of(FLATTEST))).only(real),
         }
@@ -87,7 +87,7 @@ pub fn both_ends<L: Lanes>(span: &Span<L>, tie: L) -> [End<L>; 2] {
 
 /// Puts `end` into the first `count` of `ends`, which are sorted in every lane.
 #[inline(always)]
-pub fn insert<L: Lanes>(mut end: End<L>, ends: &mut [End<L>], count: usize) {
+pub fn insert<L: SimdFloat>(mut end: Event<L>, ends: &mut [Event<L>], count: usize) {
     for slot in &mut ends[..count] {
         let sooner = end.t.lt(slot.t);
         let old = *slot;

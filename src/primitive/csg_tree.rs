@@ -5,18 +5,18 @@ use glam::{DAffine3, DVec3};
 
 /// How parts are combined.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Tree {
-    /// A part, by its position in [`Compound::parts`].
+pub enum CsgTree {
+    /// A part, by its position in [`CsgSolid::parts`].
     Part(usize),
     /// The points that are in any of these.
-    Union(Vec<Tree>),
+    Union(Vec<CsgTree>),
     /// The points that are in all of these.
-    Intersection(Vec<Tree>),
+    Intersection(Vec<CsgTree>),
     /// The points of the first that are in none of the others.
-    Difference(Vec<Tree>),
+    Difference(Vec<CsgTree>),
 }
 
-impl Tree {
+impl CsgTree {
     /// The same tree over parts that stand `by` places later.
     pub(crate) fn shifted(self, by: usize) -> Self {
         let all = |list: Vec<Self>| list.into_iter().map(|t| t.shifted(by)).collect();
@@ -31,15 +31,15 @@ impl Tree {
 
 /// A solid made of solids.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Compound {
+pub struct CsgSolid {
     /// Convex solids: `Sphere`, `Ellipsoid`, `Convex`, `Tapered`, and `Plane` for the half-space
     /// behind it.
     pub parts: Vec<Form>,
     /// Every part occurs once, in order.
-    pub tree: Tree,
+    pub tree: CsgTree,
 }
 
-impl Compound {
+impl CsgSolid {
     /// After the invertible affine map `map`.
     pub(crate) fn transformed(self, map: &DAffine3) -> Self {
         let parts = self.parts.into_iter().map(|p| p.transformed(map)).collect();
@@ -52,20 +52,20 @@ impl Compound {
         self.bounds_of(&self.tree)
     }
 
-    fn bounds_of(&self, tree: &Tree) -> Option<(DVec3, DVec3)> {
+    fn bounds_of(&self, tree: &CsgTree) -> Option<(DVec3, DVec3)> {
         match tree {
-            Tree::Part(i) => self.parts[*i].bounds(),
-            Tree::Union(list) => {
+            CsgTree::Part(i) => self.parts[*i].bounds(),
+            CsgTree::Union(list) => {
                 let boxes: Option<Vec<_>> = list.iter().map(|t| self.bounds_of(t)).collect();
                 boxes?.into_iter().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
             }
-            Tree::Intersection(list) => {
+            CsgTree::Intersection(list) => {
                 let boxes = list.iter().filter_map(|t| self.bounds_of(t));
                 let (low, high) = boxes.reduce(|a, b| (a.0.max(b.0), a.1.min(b.1)))?;
                 // Boxes that do not overlap leave nothing: a box without extent.
                 Some((low, high.max(low)))
             }
-            Tree::Difference(list) => self.bounds_of(list.first()?),
+            CsgTree::Difference(list) => self.bounds_of(list.first()?),
         }
     }
 }

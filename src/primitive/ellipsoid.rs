@@ -1,10 +1,10 @@
 //! Images of the unit sphere under affine maps: the ray goes back to the unit sphere's space.
 
 use crate::bvh::Ray;
-use crate::lanes::{Lanes, Real, V3};
-use crate::primitive::batch::{Item, Surface, reach};
+use crate::lanes::{Float, SimdFloat, Vec3};
+use crate::primitive::batch::{Primitive, SurfacePoint, reach};
 use crate::primitive::form::Form;
-use crate::primitive::solid::{Span, Spans};
+use crate::primitive::solid::{SolidPrimitive, Span};
 use crate::primitive::sphere::crossings;
 use glam::DMat3;
 
@@ -18,17 +18,17 @@ pub struct Ellipsoid<S> {
 }
 
 /// The rows of a matrix, rounded.
-pub(crate) fn rows<S: Real>(m: DMat3) -> [[S; 3]; 3] {
+pub(crate) fn rows<S: Float>(m: DMat3) -> [[S; 3]; 3] {
     m.transpose().to_cols_array_2d().map(|row| row.map(S::of))
 }
 
 /// A matrix, given by rows, times a vector.
 #[inline(always)]
-pub(crate) fn times<L: Lanes>(m: &[[L::Scalar; 3]; 3], v: V3<L>) -> V3<L> {
-    V3::new(V3::splat(m[0]).dot(v), V3::splat(m[1]).dot(v), V3::splat(m[2]).dot(v))
+pub(crate) fn times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
+    Vec3::new(Vec3::splat(m[0]).dot(v), Vec3::splat(m[1]).dot(v), Vec3::splat(m[2]).dot(v))
 }
 
-impl<S: Real> Ellipsoid<S> {
+impl<S: Float> Ellipsoid<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Ellipsoid { scene_from_unit: m } = form else { return None };
@@ -43,15 +43,15 @@ impl<S: Real> Ellipsoid<S> {
 
 /// Ends of the chord in the scene's distances, and where there is one.
 #[inline(always)]
-fn chord<L: Lanes>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
-    let f = times(&e.unit_from_scene, ray.origin - V3::splat(e.center));
+fn chord<L: SimdFloat>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
+    let f = times(&e.unit_from_scene, ray.origin - Vec3::splat(e.center));
     let d = times(&e.unit_from_scene, ray.direction);
     let scale = L::one() / d.length2().sqrt();
     let (near, far, meets) = crossings(f, d * scale, L::one())?;
     Some((near * scale, far * scale, meets))
 }
 
-impl<L: Lanes> Item<L> for Ellipsoid<L::Scalar> {
+impl<L: SimdFloat> Primitive<L> for Ellipsoid<L::Scalar> {
     #[inline(always)]
     fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let (near, far, meets) = chord(self, ray)?;
@@ -59,14 +59,15 @@ impl<L: Lanes> Item<L> for Ellipsoid<L::Scalar> {
     }
 
     #[inline(always)]
-    fn surface(&self, point: V3<L>) -> Surface<L> {
-        let center = V3::splat(self.center);
+    fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
+        let center = Vec3::splat(self.center);
         let on_unit = times(&self.unit_from_scene, point - center).normalize();
         // The normal of the image is the inverse transpose times the normal: columns of the inverse.
         let m = &self.unit_from_scene;
-        let normal =
-            V3::splat(m[0]) * on_unit.x + V3::splat(m[1]) * on_unit.y + V3::splat(m[2]) * on_unit.z;
-        Surface {
+        let normal = Vec3::splat(m[0]) * on_unit.x
+            + Vec3::splat(m[1]) * on_unit.y
+            + Vec3::splat(m[2]) * on_unit.z;
+        SurfacePoint {
             point: times(&self.scene_from_unit, on_unit) + center,
             normal: normal.normalize(),
             reach: L::splat(self.reach),
@@ -74,7 +75,7 @@ impl<L: Lanes> Item<L> for Ellipsoid<L::Scalar> {
     }
 }
 
-impl<L: Lanes> Spans<L> for Ellipsoid<L::Scalar> {
+impl<L: SimdFloat> SolidPrimitive<L> for Ellipsoid<L::Scalar> {
     fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let (enter, leave, meets) = chord(self, ray)?;
         let cosine = |t: L| self.surface(ray.at(t)).normal.dot(ray.direction).abs();

@@ -2,7 +2,7 @@
 //! which every kind of shape and every transform collapses.
 
 use crate::asset::Mesh;
-use crate::primitive::csg_tree::Compound;
+use crate::primitive::csg_tree::CsgSolid;
 use glam::{DAffine3, DMat3, DVec3};
 use std::sync::Arc;
 
@@ -31,22 +31,22 @@ pub enum Form {
         scene_from_unit: DAffine3,
     },
     /// A bounded convex solid: the intersection of half-spaces, with its corners.
-    Convex {
+    ConvexPolyhedron {
         /// The faces' half-spaces.
         faces: Vec<HalfSpace>,
         /// The corners (for bounds and faces' sanity).
         corners: Vec<DVec3>,
     },
     /// The image under an invertible affine map of the solid with x^2 + y^2 <= (1 + (top - 1) z)^2 and
-    /// 0 <= z <= 1. [`Form::tapered`] makes one of any proportions.
-    Tapered {
+    /// 0 <= z <= 1. [`Form::conical_frustum`] makes one of any proportions.
+    ConicalFrustum {
         /// From that solid's space to the scene's.
         scene_from_unit: DAffine3,
         /// Radius at z = 1 over radius at z = 0: from 0, a cone, to 1, a cylinder.
         top: f64,
     },
     /// Solids joined, intersected, cut out of each other.
-    Compound(Compound),
+    Csg(CsgSolid),
     /// The image of a mesh under an invertible affine map.
     Mesh {
         /// The triangles.
@@ -83,14 +83,14 @@ fn half_space(point: DVec3, normal: DVec3) -> HalfSpace {
 impl Form {
     /// The image under `scene_from_canonical` of the solid with x^2 + y^2 <= (1 + (s - 1) z)^2 and
     /// 0 <= z <= 1, for any s >= 0.
-    pub fn tapered(scene_from_canonical: DAffine3, s: f64) -> Self {
+    pub fn conical_frustum(scene_from_canonical: DAffine3, s: f64) -> Self {
         if s <= 1.0 {
-            return Self::Tapered { scene_from_unit: scene_from_canonical, top: s };
+            return Self::ConicalFrustum { scene_from_unit: scene_from_canonical, top: s };
         }
         // Upside down, with the wider end as the base.
         let flip =
             DAffine3::from_mat3_translation(DMat3::from_diagonal(DVec3::new(s, s, -1.0)), DVec3::Z);
-        Self::Tapered { scene_from_unit: scene_from_canonical * flip, top: 1.0 / s }
+        Self::ConicalFrustum { scene_from_unit: scene_from_canonical * flip, top: 1.0 / s }
     }
 
     /// The form after the invertible affine map `map`. Similarities keep a sphere a sphere; any other
@@ -112,7 +112,7 @@ impl Form {
             Self::Ellipsoid { scene_from_unit } => {
                 Self::Ellipsoid { scene_from_unit: *map * scene_from_unit }
             }
-            Self::Convex { faces, corners } => Self::Convex {
+            Self::ConvexPolyhedron { faces, corners } => Self::ConvexPolyhedron {
                 faces: faces
                     .iter()
                     .map(|f| {
@@ -122,10 +122,10 @@ impl Form {
                     .collect(),
                 corners: corners.iter().map(|c| map.transform_point3(*c)).collect(),
             },
-            Self::Tapered { scene_from_unit, top } => {
-                Self::Tapered { scene_from_unit: *map * scene_from_unit, top }
+            Self::ConicalFrustum { scene_from_unit, top } => {
+                Self::ConicalFrustum { scene_from_unit: *map * scene_from_unit, top }
             }
-            Self::Compound(compound) => Self::Compound(compound.transformed(map)),
+            Self::Csg(compound) => Self::Csg(compound.transformed(map)),
             Self::Mesh { mesh, scene_from_mesh, smooth } => {
                 Self::Mesh { mesh, scene_from_mesh: *map * scene_from_mesh, smooth }
             }
@@ -149,7 +149,7 @@ impl Form {
     /// Number of parts that can have a finish of their own: 1 but for compounds.
     pub fn parts(&self) -> usize {
         match self {
-            Self::Compound(compound) => compound.parts.len(),
+            Self::Csg(compound) => compound.parts.len(),
             _ => 1,
         }
     }
@@ -170,8 +170,8 @@ impl Form {
                     DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
                 Some((m.translation - half, m.translation + half))
             }
-            Self::Convex { corners, .. } => around(corners),
-            Self::Tapered { scene_from_unit: m, top } => {
+            Self::ConvexPolyhedron { corners, .. } => around(corners),
+            Self::ConicalFrustum { scene_from_unit: m, top } => {
                 // Half-widths of the base's disc: lengths of the rows of the first two columns.
                 let rows = m.matrix3.transpose();
                 let half = DVec3::new(
@@ -183,7 +183,7 @@ impl Form {
                 let narrow = half * *top;
                 around(&[base - half, base + half, cap - narrow, cap + narrow])
             }
-            Self::Compound(compound) => compound.bounds(),
+            Self::Csg(compound) => compound.bounds(),
             Self::Mesh { mesh, scene_from_mesh: m, .. } => {
                 let rows = m.matrix3.transpose();
                 let rows = [rows.x_axis, rows.y_axis, rows.z_axis].map(|r| r.to_array());

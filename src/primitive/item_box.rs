@@ -1,8 +1,8 @@
 //! What is asked before a thing is asked whether a ray meets it.
 
 use crate::bvh::Ray;
-use crate::bvh::packet::Beam;
-use crate::lanes::{Lanes, Real, V3};
+use crate::bvh::packet::SlabPacket;
+use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::form::Form;
 use crate::value::Choice;
 use glam::{DAffine3, DVec3};
@@ -50,15 +50,15 @@ impl Acceleration {
 }
 
 /// A box around one thing.
-pub struct Extent<S> {
+pub struct ItemBox<S> {
     low: [S; 3],
     high: [S; 3],
     /// The box's space; `None`: the scene's.
-    space: Option<Space<S>>,
+    space: Option<BoxFrame<S>>,
 }
 
 /// A space of its own: p becomes `rows (p - center)`.
-struct Space<S> {
+struct BoxFrame<S> {
     center: [S; 3],
     rows: [[S; 3]; 3],
     /// For each row the sum of its magnitudes: coordinates grow by so much at most.
@@ -79,7 +79,7 @@ pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
 /// origin of its file both were rounded to what double precision has there.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
-impl<S: Real> Extent<S> {
+impl<S: Float> ItemBox<S> {
     /// Of a form, in its own space if `own` and if it has one; `None`: it has no end.
     pub fn new(form: &Form, own: bool) -> Option<Self> {
         let bounds = form.bounds()?;
@@ -94,7 +94,7 @@ impl<S: Real> Extent<S> {
         let rows = scene_from_own.matrix3.inverse().transpose();
         let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
         let middle = 0.5 * (low + high);
-        let space = Space {
+        let space = BoxFrame {
             center: vector(scene_from_own.transform_point3(middle)),
             rows: rows.map(vector),
             growth: rows.map(|r| S::of(r.abs().element_sum())),
@@ -105,27 +105,27 @@ impl<S: Real> Extent<S> {
 
     /// Which rays may meet the thing no farther than `limit`.
     #[inline(always)]
-    pub fn meets<L: Lanes<Scalar = S>>(&self, ray: &Ray<L>, limit: L) -> L::Mask {
+    pub fn meets<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L) -> L::Mask {
         let far = ray.origin.max_abs();
         let beam = match &self.space {
             None => {
                 let pad = far * L::of(4.0 * L::EPSILON);
-                Beam::new(ray, V3::new(pad, pad, pad))
+                SlabPacket::new(ray, Vec3::new(pad, pad, pad))
             }
             Some(space) => {
                 // What origin, direction and centre lose on their way into the space, at most, by the
                 // time the ray has come to the thing.
                 let lost = (far + L::splat(space.reach)) * L::of(64.0 * L::EPSILON);
-                let rows = space.rows.map(V3::splat);
-                let of = |v: V3<L>| V3::new(rows[0].dot(v), rows[1].dot(v), rows[2].dot(v));
+                let rows = space.rows.map(Vec3::splat);
+                let of = |v: Vec3<L>| Vec3::new(rows[0].dot(v), rows[1].dot(v), rows[2].dot(v));
                 let inner = Ray {
-                    origin: of(ray.origin - V3::splat(space.center)),
+                    origin: of(ray.origin - Vec3::splat(space.center)),
                     direction: of(ray.direction),
                 };
-                Beam::new(&inner, V3::splat(space.growth) * lost)
+                SlabPacket::new(&inner, Vec3::splat(space.growth) * lost)
             }
         };
-        beam.enters(V3::splat(self.low), V3::splat(self.high), limit)
+        beam.enters(Vec3::splat(self.low), Vec3::splat(self.high), limit)
     }
 }
 
@@ -137,7 +137,7 @@ impl Form {
             Self::Ellipsoid { scene_from_unit } => {
                 Some((*scene_from_unit, (DVec3::NEG_ONE, DVec3::ONE)))
             }
-            Self::Tapered { scene_from_unit, .. } => {
+            Self::ConicalFrustum { scene_from_unit, .. } => {
                 Some((*scene_from_unit, (DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE)))
             }
             Self::Mesh { mesh, scene_from_mesh, .. } => {

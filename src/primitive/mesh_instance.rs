@@ -4,21 +4,21 @@
 
 use crate::asset;
 use crate::bvh::{Hit, Ray};
-use crate::lanes::{Lanes, Mask, Real, V3};
-use crate::primitive::batch::{OwnUv, Surface, reach};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::primitive::batch::{SurfacePoint, UvGradients, reach};
 use crate::primitive::facing;
 use crate::primitive::form::Form;
-use crate::primitive::item_box::Extent;
+use crate::primitive::item_box::ItemBox;
 use crate::primitive::triangle_mesh;
 use glam::DVec3;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// One mesh in its place.
-struct Placed<S> {
+struct MeshInstance<S> {
     mesh: Arc<asset::Mesh>,
     /// A box around it in the scene: most rays need not be carried over.
-    extent: Extent<S>,
+    extent: ItemBox<S>,
     /// Columns of the linear part.
     mesh_from_scene: [[S; 3]; 3],
     /// The middle of the mesh's box, in the scene and in the mesh: points are carried over relative to
@@ -31,15 +31,15 @@ struct Placed<S> {
 
 /// All meshes of a scene. Each is one item; the triangle of a hit is its facet.
 pub struct Meshes<S> {
-    items: Vec<Placed<S>>,
+    items: Vec<MeshInstance<S>>,
 }
 
 /// The corners of one triangle per lane, in the mesh's space.
 struct Triangle<L> {
-    corners: [V3<L>; 3],
+    corners: [Vec3<L>; 3],
 }
 
-impl<S: Real> Placed<S> {
+impl<S: Float> MeshInstance<S> {
     fn new(form: &Form) -> Option<Self> {
         let Form::Mesh { mesh, scene_from_mesh, smooth } = form else { return None };
         let [low, high] = mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
@@ -56,7 +56,7 @@ impl<S: Real> Placed<S> {
         let outer = reach(form);
         Some(Self {
             mesh: mesh.clone(),
-            extent: Extent::new(form, false)?,
+            extent: ItemBox::new(form, false)?,
             mesh_from_scene: columns.map(|c| c.to_array().map(S::of)),
             center: scene_from_mesh.transform_point3(middle).to_array().map(S::of),
             mesh_center: middle.to_array().map(S::of),
@@ -66,26 +66,26 @@ impl<S: Real> Placed<S> {
     }
 
     #[inline(always)]
-    fn vector<L: Lanes<Scalar = S>>(&self, v: V3<L>) -> V3<L> {
-        let [x, y, z] = self.mesh_from_scene.map(V3::splat);
+    fn vector<L: SimdFloat<Scalar = S>>(&self, v: Vec3<L>) -> Vec3<L> {
+        let [x, y, z] = self.mesh_from_scene.map(Vec3::splat);
         x * v.x + y * v.y + z * v.z
     }
 
     /// A normal in the scene from one in the mesh, not normalised: by the inverse's transpose.
     #[inline(always)]
-    fn normal<L: Lanes<Scalar = S>>(&self, n: V3<L>) -> V3<L> {
-        let [x, y, z] = self.mesh_from_scene.map(V3::splat);
-        V3::new(x.dot(n), y.dot(n), z.dot(n))
+    fn normal<L: SimdFloat<Scalar = S>>(&self, n: Vec3<L>) -> Vec3<L> {
+        let [x, y, z] = self.mesh_from_scene.map(Vec3::splat);
+        Vec3::new(x.dot(n), y.dot(n), z.dot(n))
     }
 
     #[inline(always)]
-    fn point<L: Lanes<Scalar = S>>(&self, p: V3<L>) -> V3<L> {
-        self.vector(p - V3::splat(self.center)) + V3::splat(self.mesh_center)
+    fn point<L: SimdFloat<Scalar = S>>(&self, p: Vec3<L>) -> Vec3<L> {
+        self.vector(p - Vec3::splat(self.center)) + Vec3::splat(self.mesh_center)
     }
 
     /// The ray in the mesh's space, and how much longer its directions are there.
     #[inline(always)]
-    fn ray<L: Lanes<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
+    fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
         let direction = self.vector(ray.direction);
         let length = direction.length2().sqrt();
         let direction = direction * (L::one() / length);
@@ -94,18 +94,20 @@ impl<S: Real> Placed<S> {
 
     /// Per lane something of the vertices of the triangle tagged `facet`.
     #[inline(always)]
-    fn vertices<L: Lanes<Scalar = S>>(&self, facet: L, of: &[[f32; 3]]) -> [V3<L>; 3] {
+    fn vertices<L: SimdFloat<Scalar = S>>(&self, facet: L, of: &[[f32; 3]]) -> [Vec3<L>; 3] {
         let triangles = &self.mesh.mesh().triangles;
         // Lanes that met something else may hold any tag.
         let number = |lane| (facet.tag_lane(lane) as usize).min(triangles.len() - 1);
         std::array::from_fn(|k| {
-            V3::from_fn(|lane| of[triangles[number(lane)][k] as usize].map(|x| S::of(f64::from(x))))
+            Vec3::from_fn(|lane| {
+                of[triangles[number(lane)][k] as usize].map(|x| S::of(f64::from(x)))
+            })
         })
     }
 
     /// Per lane the pairs of the vertices of the triangle tagged `facet`.
     #[inline(always)]
-    fn pairs<L: Lanes<Scalar = S>>(&self, facet: L, of: &[[f32; 2]]) -> [[L; 2]; 3] {
+    fn pairs<L: SimdFloat<Scalar = S>>(&self, facet: L, of: &[[f32; 2]]) -> [[L; 2]; 3] {
         let triangles = &self.mesh.mesh().triangles;
         let number = |lane| (facet.tag_lane(lane) as usize).min(triangles.len() - 1);
         let one = |vertex: usize, k: usize| {
@@ -116,22 +118,22 @@ impl<S: Real> Placed<S> {
     }
 
     #[inline(always)]
-    fn triangle<L: Lanes<Scalar = S>>(&self, facet: L) -> Triangle<L> {
+    fn triangle<L: SimdFloat<Scalar = S>>(&self, facet: L) -> Triangle<L> {
         Triangle { corners: self.vertices(facet, &self.mesh.mesh().positions) }
     }
 }
 
-impl<L: Lanes> Triangle<L> {
+impl<L: SimdFloat> Triangle<L> {
     /// Twice the area, along the normal of the front.
     #[inline(always)]
-    fn normal(&self) -> V3<L> {
+    fn normal(&self) -> Vec3<L> {
         let [a, b, c] = self.corners;
         (b - a).cross(c - a)
     }
 
     /// The gradients in the triangle's plane of the second and of the third corner's weight.
     #[inline(always)]
-    fn gradients(&self) -> [V3<L>; 2] {
+    fn gradients(&self) -> [Vec3<L>; 2] {
         let [a, b, c] = self.corners;
         let (to_b, to_c) = (b - a, c - a);
         let normal = to_b.cross(to_c);
@@ -141,25 +143,25 @@ impl<L: Lanes> Triangle<L> {
 
     /// Weights of the corners at the point nearest to `p`, about: positive, with the sum 1.
     #[inline(always)]
-    fn weights(&self, p: V3<L>) -> [L; 3] {
+    fn weights(&self, p: Vec3<L>) -> [L; 3] {
         let normal = self.normal();
         let [a, b, c] = self.corners.map(|c| c - p);
-        let part = |a: V3<L>, b| normal.dot(a.cross(b)).max(L::zero());
+        let part = |a: Vec3<L>, b| normal.dot(a.cross(b)).max(L::zero());
         let parts = [part(b, c), part(c, a), part(a, b)];
         let inverse = L::one() / (parts[0] + parts[1] + parts[2]);
         parts.map(|part| part * inverse)
     }
 }
 
-impl<S: Real> Meshes<S> {
+impl<S: Float> Meshes<S> {
     /// Those of `forms` that are meshes, in order.
     pub fn new(forms: &[Form]) -> Self {
-        Self { items: forms.iter().filter_map(Placed::new).collect() }
+        Self { items: forms.iter().filter_map(MeshInstance::new).collect() }
     }
 
     /// Narrows `hit` by the meshes in `range`; a mesh's tag is `base` + its number.
     #[inline(never)]
-    pub fn closest<L: Lanes<Scalar = S>>(
+    pub fn closest<L: SimdFloat<Scalar = S>>(
         &self,
         range: Range<usize>,
         base: u32,
@@ -186,7 +188,7 @@ impl<S: Real> Meshes<S> {
 
     /// Which of the `wanted` lanes meet one of the meshes in `range` at a distance in (0, limit).
     #[inline(never)]
-    pub fn blocked<L: Lanes<Scalar = S>>(
+    pub fn blocked<L: SimdFloat<Scalar = S>>(
         &self,
         range: Range<usize>,
         ray: &Ray<L>,
@@ -212,33 +214,38 @@ impl<S: Real> Meshes<S> {
 
     /// The surface of `item` at `point`, which lies near its triangles tagged `facet`.
     #[inline(never)]
-    pub fn surface<L: Lanes<Scalar = S>>(&self, item: usize, facet: L, point: V3<L>) -> Surface<L> {
+    pub fn surface<L: SimdFloat<Scalar = S>>(
+        &self,
+        item: usize,
+        facet: L,
+        point: Vec3<L>,
+    ) -> SurfacePoint<L> {
         let item = &self.items[item];
         let triangle = item.triangle(facet);
         // Neither the largest nor the smallest triangle may lose its area to the range of numbers.
         let flat = triangle.normal();
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());
-        let flat = V3::select(sound, flat * (L::one() / largest), V3::of([0.0, 0.0, 1.0]));
+        let flat = Vec3::select(sound, flat * (L::one() / largest), Vec3::of([0.0, 0.0, 1.0]));
         let height = flat.dot(item.point(point) - triangle.corners[0]);
         let normal = item.normal(flat);
         let inverse = L::one() / normal.length2().sqrt();
         let normal = normal * inverse;
         let point = normal.mul_add(-height * inverse, point);
-        Surface { point, normal, reach: L::splat(item.reach) }
+        SurfacePoint { point, normal, reach: L::splat(item.reach) }
     }
 
     /// The normal that light is computed with where rays along `direction` meet the triangles tagged
     /// `facet` of `item` at `point`; `normal` is their geometric one on the viewer's side. It stays on
     /// that side, and where it would turn away from the viewer it is bent back to him.
     #[inline(never)]
-    pub fn shading_normal<L: Lanes<Scalar = S>>(
+    pub fn shading_normal<L: SimdFloat<Scalar = S>>(
         &self,
         item: usize,
         facet: L,
-        (point, normal): (V3<L>, V3<L>),
-        direction: V3<L>,
-    ) -> V3<L> {
+        (point, normal): (Vec3<L>, Vec3<L>),
+        direction: Vec3<L>,
+    ) -> Vec3<L> {
         let item = &self.items[item];
         if !item.smooth {
             return normal;
@@ -254,12 +261,12 @@ impl<S: Real> Meshes<S> {
     /// The texture coordinates of `item` at `point`, which lies near its triangles tagged `facet`;
     /// `None`: its file has none.
     #[inline(never)]
-    pub fn uv<L: Lanes<Scalar = S>>(
+    pub fn uv<L: SimdFloat<Scalar = S>>(
         &self,
         item: usize,
         facet: L,
-        point: V3<L>,
-    ) -> Option<OwnUv<L>> {
+        point: Vec3<L>,
+    ) -> Option<UvGradients<L>> {
         let item = &self.items[item];
         let triangle = item.triangle(facet);
         let corners = item.pairs(facet, item.mesh.mesh().uvs.as_deref()?);
@@ -271,17 +278,17 @@ impl<S: Real> Meshes<S> {
             (value, gradient[0] * (b - a) + gradient[1] * (c - a))
         };
         let ((u, du), (v, dv)) = (along(0), along(1));
-        Some(OwnUv { uv: [u, v], gradients: [du, dv] })
+        Some(UvGradients { uv: [u, v], gradients: [du, dv] })
     }
 
     /// Base colour of the triangles tagged `facet` of `item`; `None`: its file names none.
     #[inline(never)]
-    pub fn color<L: Lanes<Scalar = S>>(&self, item: usize, facet: L) -> Option<V3<L>> {
+    pub fn color<L: SimdFloat<Scalar = S>>(&self, item: usize, facet: L) -> Option<Vec3<L>> {
         let mesh = self.items[item].mesh.mesh();
         mesh.color(0)?;
         let number = |lane| (facet.tag_lane(lane) as usize).min(mesh.triangles.len() - 1);
         let white = [1.0; 3];
-        Some(V3::from_fn(|lane| {
+        Some(Vec3::from_fn(|lane| {
             mesh.color(number(lane)).unwrap_or(white).map(|x| S::of(f64::from(x)))
         }))
     }

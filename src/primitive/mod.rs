@@ -21,10 +21,10 @@ pub(crate) mod solid;
 pub(crate) mod sphere;
 pub mod triangle_mesh;
 
-pub use aggregate::{Geometry, Selection, TREE_FROM};
-pub use batch::{OwnUv, Source, Surface};
-pub use bounding::{Ball, Bound, Pencil, STRAY, Towards};
-pub use csg_tree::{Compound, Tree as CompoundTree};
+pub use aggregate::{Aggregate, BVH_MIN_PRIMITIVES, PrimitiveSet};
+pub use batch::{PrimitiveId, SurfacePoint, UvGradients};
+pub use bounding::{BoundingSphere, BoundingVolume, F32_RAY_ERROR, Frustum, LightTarget};
+pub use csg_tree::{CsgSolid, CsgTree};
 pub use form::{Form, HalfSpace};
 pub use item_box::Acceleration;
 pub use shading_normal::facing;

@@ -31,10 +31,10 @@ impl Form {
                 let steepness = unit_from_scene.matrix3.transpose() * (on_unit / distance);
                 solid(vec![((distance - 1.0) / steepness.length(), steepness.normalize())])
             }
-            Self::Convex { faces, .. } => {
+            Self::ConvexPolyhedron { faces, .. } => {
                 solid(faces.iter().map(|f| (f.normal.dot(point) - f.offset, f.normal)).collect())
             }
-            Self::Tapered { scene_from_unit, top } => {
+            Self::ConicalFrustum { scene_from_unit, top } => {
                 let unit_from_scene = scene_from_unit.inverse();
                 let normal_of = |n: DVec3| unit_from_scene.matrix3.transpose() * n;
                 let p = unit_from_scene.transform_point3(point);
@@ -61,7 +61,7 @@ impl Form {
                 }
                 solid(sides)
             }
-            Self::Compound(compound) => {
+            Self::Csg(compound) => {
                 compound.parts.iter().flat_map(|part| part.normals_at(point, slack)).collect()
             }
             Self::Mesh { mesh, scene_from_mesh, .. } => {

@@ -1,10 +1,10 @@
 //! Flat shapes: parallelograms (rectangles, platforms) and infinite planes.
 
 use crate::bvh::Ray;
-use crate::lanes::{Lanes, Real, V3};
-use crate::primitive::batch::{Item, Surface, reach};
+use crate::lanes::{Float, SimdFloat, Vec3};
+use crate::primitive::batch::{Primitive, SurfacePoint, reach};
 use crate::primitive::form::Form;
-use crate::primitive::solid::{Span, Spans};
+use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::DVec3;
 
 /// One parallelogram. A point p of its plane has the coordinates (p - corner) . dual, both in 0..1
@@ -18,7 +18,7 @@ pub struct Parallelogram<S> {
     reach: S,
 }
 
-impl<S: Real> Parallelogram<S> {
+impl<S: Float> Parallelogram<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Parallelogram { corner, u, v } = form else { return None };
@@ -35,25 +35,25 @@ impl<S: Real> Parallelogram<S> {
     }
 }
 
-impl<L: Lanes> Item<L> for Parallelogram<L::Scalar> {
+impl<L: SimdFloat> Primitive<L> for Parallelogram<L::Scalar> {
     #[inline(always)]
     fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
-        let normal = V3::splat(self.normal);
-        let from_corner = ray.origin - V3::splat(self.corner);
+        let normal = Vec3::splat(self.normal);
+        let from_corner = ray.origin - Vec3::splat(self.corner);
         // Parallel rays divide by zero: infinite or NaN distances fail every comparison.
         let t = -from_corner.dot(normal) / ray.direction.dot(normal);
         let at = ray.direction.mul_add(t, from_corner);
-        let a = at.dot(V3::splat(self.dual_u));
-        let b = at.dot(V3::splat(self.dual_v));
+        let a = at.dot(Vec3::splat(self.dual_u));
+        let b = at.dot(Vec3::splat(self.dual_v));
         let inside = a.ge(L::zero()) & a.le(L::one()) & b.ge(L::zero()) & b.le(L::one());
         Some((t, inside))
     }
 
     #[inline(always)]
-    fn surface(&self, point: V3<L>) -> Surface<L> {
-        let normal = V3::splat(self.normal);
-        let above = (point - V3::splat(self.corner)).dot(normal);
-        Surface { point: normal.mul_add(-above, point), normal, reach: L::splat(self.reach) }
+    fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
+        let normal = Vec3::splat(self.normal);
+        let above = (point - Vec3::splat(self.corner)).dot(normal);
+        SurfacePoint { point: normal.mul_add(-above, point), normal, reach: L::splat(self.reach) }
     }
 }
 
@@ -64,7 +64,7 @@ pub struct Plane<S> {
     offset: S,
 }
 
-impl<S: Real> Plane<S> {
+impl<S: Float> Plane<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Plane { normal, offset } = form else { return None };
@@ -72,28 +72,28 @@ impl<S: Real> Plane<S> {
     }
 }
 
-impl<L: Lanes> Item<L> for Plane<L::Scalar> {
+impl<L: SimdFloat> Primitive<L> for Plane<L::Scalar> {
     #[inline(always)]
     fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
-        let normal = V3::splat(self.normal);
+        let normal = Vec3::splat(self.normal);
         // Infinite or NaN for a parallel ray.
         let t = (L::splat(self.offset) - ray.origin.dot(normal)) / ray.direction.dot(normal);
         Some((t, L::mask(true)))
     }
 
     #[inline(always)]
-    fn surface(&self, point: V3<L>) -> Surface<L> {
-        let normal = V3::splat(self.normal);
+    fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
+        let normal = Vec3::splat(self.normal);
         let above = point.dot(normal) - L::splat(self.offset);
         let reach = L::splat(self.offset).abs();
-        Surface { point: normal.mul_add(-above, point), normal, reach }
+        SurfacePoint { point: normal.mul_add(-above, point), normal, reach }
     }
 }
 
 /// The half-spaces behind the planes.
-impl<L: Lanes> Spans<L> for Plane<L::Scalar> {
+impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
     fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
-        let normal = V3::splat(self.normal);
+        let normal = Vec3::splat(self.normal);
         let speed = ray.direction.dot(normal);
         let height = ray.origin.dot(normal) - L::splat(self.offset);
         let (all, none) = (L::of(L::MAX), L::of(-L::MAX));

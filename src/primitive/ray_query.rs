@@ -1,8 +1,8 @@
 //! Single rays against single forms, in double precision: for placing things, not for pictures.
 
 use crate::bvh::Ray;
-use crate::lanes::V3;
-use crate::primitive::{Form, Geometry};
+use crate::lanes::Vec3;
+use crate::primitive::{Aggregate, Form};
 use glam::DVec3;
 
 impl Form {
@@ -20,7 +20,7 @@ impl Form {
                     unit_from_scene.transform_vector3(direction),
                 )
             }
-            Self::Convex { faces, .. } => {
+            Self::ConvexPolyhedron { faces, .. } => {
                 let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
                 for face in faces {
                     let height = face.normal.dot(origin) - face.offset;
@@ -47,11 +47,11 @@ impl Form {
                 let inside = (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b);
                 (t > 0.0 && t.is_finite() && inside).then_some(t)
             }
-            Self::Tapered { .. } | Self::Compound(_) | Self::Mesh { .. } => {
+            Self::ConicalFrustum { .. } | Self::Csg(_) | Self::Mesh { .. } => {
                 let length = direction.length();
-                let vector = |v: DVec3| V3::<f64>::of(v.to_array());
+                let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
                 let ray = Ray { origin: vector(origin), direction: vector(direction / length) };
-                let alone = Geometry::with_tree(std::slice::from_ref(self), false);
+                let alone = Aggregate::with_tree(std::slice::from_ref(self), false);
                 let t = alone.closest(&ray, alone.all()).t;
                 (t < f64::MAX).then_some(t / length)
             }

@@ -2,10 +2,10 @@
 //! others ray by ray.
 
 use crate::bvh::Ray;
-use crate::bvh::packet::{Beam, Sheaf, together, with_stack};
+use crate::bvh::packet::{PacketBounds, SlabPacket, together, with_stack};
 use crate::bvh::single::apart;
-use crate::bvh::{Boxes, Built, WIDE};
-use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Build};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::item_box::padded;
 use glam::DVec3;
 use obvhs::BvhBuildParams;
@@ -18,8 +18,8 @@ use obvhs::BvhBuildParams;
 const TOGETHER: f64 = 1.5;
 
 /// A tree of boxes over items, one item a leaf.
-pub struct Tree {
-    boxes: Boxes,
+pub struct SceneBvh {
+    boxes: Bvh8,
     /// For each leaf its item.
     items: Vec<u32>,
     /// How much the rays of a packet that goes together differ at most for each lane, in direction and in
@@ -28,7 +28,7 @@ pub struct Tree {
     shift: f64,
 }
 
-impl Tree {
+impl SceneBvh {
     /// Over the boxes of all items, at least one, in item order.
     pub fn new(bounds: &[(DVec3, DVec3)]) -> Self {
         // The boxes of the builder are single precision.
@@ -36,8 +36,8 @@ impl Tree {
             let [low, high] = padded(bounds[i], f64::from(f32::EPSILON));
             [low.as_vec3().to_array(), high.as_vec3().to_array()]
         };
-        let Built { boxes, order, leaves } =
-            Boxes::build(bounds.len(), corners, 1, BvhBuildParams::medium_build());
+        let Bvh8Build { boxes, order, leaves } =
+            Bvh8::build(bounds.len(), corners, 1, BvhBuildParams::medium_build());
         let items = leaves.iter().map(|(first, _)| order[*first as usize]).collect();
         let low = bounds.iter().map(|b| b.0).fold(DVec3::INFINITY, DVec3::min);
         let high = bounds.iter().map(|b| b.1).fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -50,7 +50,7 @@ impl Tree {
     /// returns the distances beyond which nothing matters any more. Items at that very distance are
     /// still called for.
     #[inline(always)]
-    pub fn walk<L: Lanes>(&self, ray: &Ray<L>, limit: L, mut leaf: impl FnMut(usize, L) -> L) {
+    pub fn walk<L: SimdFloat>(&self, ray: &Ray<L>, limit: L, mut leaf: impl FnMut(usize, L) -> L) {
         let wanted = limit.gt(L::zero()).bits();
         if wanted == 0 {
             return;
@@ -58,12 +58,12 @@ impl Tree {
         // What an item's own test rounds off of a distant origin must not be cut off by its box: the
         // boxes grow by a few roundings of the origin.
         let pad = ray.origin.max_abs() * L::of(4.0 * L::EPSILON);
-        let beam = Beam::new(ray, V3::new(pad, pad, pad));
+        let beam = SlabPacket::new(ray, Vec3::new(pad, pad, pad));
         let boxes = &self.boxes;
         if self.is_together(ray, wanted) {
-            let bounds = Sheaf::around(&beam, wanted);
+            let bounds = PacketBounds::around(&beam, wanted);
             let leaf = |number: usize, limit| leaf(self.items[number] as usize, limit);
-            return with_stack::<_, _, 128, 512>(WIDE, boxes, |stack| {
+            return with_stack::<_, _, 128, 512>(BVH_WIDTH, boxes, |stack| {
                 together(boxes, (&beam, bounds.as_ref()), limit, stack, leaf)
             });
         }
@@ -81,7 +81,7 @@ impl Tree {
 
     /// Whether the wanted rays of a packet are worth going together.
     #[inline(always)]
-    fn is_together<L: Lanes>(&self, ray: &Ray<L>, wanted: u32) -> bool {
+    fn is_together<L: SimdFloat>(&self, ray: &Ray<L>, wanted: u32) -> bool {
         if L::WIDTH == 1 || wanted.count_ones() < 2 {
             return false;
         }

@@ -1,6 +1,6 @@
 //! Normals that light is computed with, kept where they can be seen.
 
-use crate::lanes::{Lanes, V3};
+use crate::lanes::{SimdFloat, Vec3};
 
 /// Least cosine between a shading normal and the direction to the viewer.
 const LEAST_COSINE: f64 = 0.02;
@@ -9,12 +9,12 @@ const LEAST_COSINE: f64 = 0.02;
 /// looks along `direction`; where it would turn away from the viewer it is bent back to him. Where it is
 /// no direction at all, `normal`.
 #[inline(always)]
-pub fn facing<L: Lanes>(shading: V3<L>, normal: V3<L>, direction: V3<L>) -> V3<L> {
+pub fn facing<L: SimdFloat>(shading: Vec3<L>, normal: Vec3<L>, direction: Vec3<L>) -> Vec3<L> {
     let side = shading.dot(normal);
-    let shading = V3::select(side.lt(L::zero()), -shading, shading);
+    let shading = Vec3::select(side.lt(L::zero()), -shading, shading);
     let short = (L::of(LEAST_COSINE) + shading.dot(direction)).max(L::zero());
     let bent = direction.mul_add(-short, shading);
     let bent = bent * (L::one() / bent.length2().sqrt());
     let sound = bent.dot(normal).gt(L::zero());
-    V3::select(sound, bent, normal)
+    Vec3::select(sound, bent, normal)
 }

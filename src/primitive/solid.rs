@@ -1,12 +1,12 @@
 //! Where lines are inside convex solids: what compounds are computed from.
 
 use crate::bvh::Ray;
-use crate::lanes::Lanes;
-use crate::primitive::batch::Item;
+use crate::lanes::SimdFloat;
+use crate::primitive::batch::Primitive;
 
 /// The part of a packet's lines inside a convex solid.
 #[derive(Clone, Copy, Debug)]
-pub struct Span<L: Lanes> {
+pub struct Span<L: SimdFloat> {
     /// Distance at which the line enters; `-L::MAX`: it comes from inside.
     pub enter: L,
     /// Distance at which it leaves; `L::MAX`: it stays inside.
@@ -20,7 +20,7 @@ pub struct Span<L: Lanes> {
 }
 
 /// A convex solid.
-pub trait Spans<L: Lanes>: Item<L> {
+pub trait SolidPrimitive<L: SimdFloat>: Primitive<L> {
     /// Where lines are inside it; `None`: no line of the packet meets it.
     fn span(&self, ray: &Ray<L>) -> Option<Span<L>>;
 }

@@ -1,10 +1,10 @@
 //! Spheres.
 
 use crate::bvh::Ray;
-use crate::lanes::{Lanes, Mask, Real, V3};
-use crate::primitive::batch::{Item, Surface, reach};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::primitive::batch::{Primitive, SurfacePoint, reach};
 use crate::primitive::form::Form;
-use crate::primitive::solid::{Span, Spans};
+use crate::primitive::solid::{SolidPrimitive, Span};
 
 /// One sphere, rounded to the precision of the kernel.
 #[derive(Clone, Copy)]
@@ -15,7 +15,7 @@ pub struct Sphere<S> {
     reach: S,
 }
 
-impl<S: Real> Sphere<S> {
+impl<S: Float> Sphere<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Sphere { center, radius } = form else { return None };
@@ -36,7 +36,7 @@ impl<S: Real> Sphere<S> {
 /// spheres (Haines, Günther, Akenine-Möller 2019, *Precision Improvements for Ray/Sphere
 /// Intersection*, Ray Tracing Gems, chapter 7).
 #[inline(always)]
-pub fn crossings<L: Lanes>(f: V3<L>, d: V3<L>, radius2: L) -> Option<(L, L, L::Mask)> {
+pub fn crossings<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option<(L, L, L::Mask)> {
     let b = -f.dot(d);
     let across = d.mul_add(b, f);
     let discriminant = radius2 - across.length2();
@@ -54,26 +54,26 @@ pub fn crossings<L: Lanes>(f: V3<L>, d: V3<L>, radius2: L) -> Option<(L, L, L::M
     Some((L::select(behind, q, other), L::select(behind, other, q), meets))
 }
 
-impl<L: Lanes> Item<L> for Sphere<L::Scalar> {
+impl<L: SimdFloat> Primitive<L> for Sphere<L::Scalar> {
     #[inline(always)]
     fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
-        let f = ray.origin - V3::splat(self.center);
+        let f = ray.origin - Vec3::splat(self.center);
         let (near, far, meets) = crossings(f, ray.direction, L::splat(self.radius2))?;
         Some((L::select(near.gt(L::zero()), near, far), meets))
     }
 
     #[inline(always)]
-    fn surface(&self, point: V3<L>) -> Surface<L> {
-        let center = V3::splat(self.center);
+    fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
+        let center = Vec3::splat(self.center);
         let normal = (point - center).normalize();
         let point = normal.mul_add(L::splat(self.radius), center);
-        Surface { point, normal, reach: L::splat(self.reach) }
+        SurfacePoint { point, normal, reach: L::splat(self.reach) }
     }
 }
 
-impl<L: Lanes> Spans<L> for Sphere<L::Scalar> {
+impl<L: SimdFloat> SolidPrimitive<L> for Sphere<L::Scalar> {
     fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
-        let f = ray.origin - V3::splat(self.center);
+        let f = ray.origin - Vec3::splat(self.center);
         let (enter, leave, meets) = crossings(f, ray.direction, L::splat(self.radius2))?;
         // Half the chord over the radius.
         let cosine = (leave - enter) * (L::of(0.5) / L::splat(self.radius));

@@ -4,12 +4,12 @@
 //! triangles at a time. Both compute each triangle by the same operations, so that a ray meets the
 //! same triangle at the same distance either way.
 
-use crate::asset::{Leaf, Mesh};
+use crate::asset::{Mesh, TriangleBlock};
+use crate::bvh::BVH_WIDTH;
 use crate::bvh::Ray;
-use crate::bvh::WIDE;
-use crate::bvh::packet::{Beam, Sheaf, all, fresh, lanes_of, together, with_stack};
+use crate::bvh::packet::{PacketBounds, SlabPacket, all, fresh, lanes_of, together, with_stack};
 use crate::bvh::single::apart;
-use crate::lanes::{Frame, Lanes, MAX_WIDTH, Mask, Real, V3, prefetch};
+use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 
 /// Packets go together whose directions differ by no more than this for each lane over the root of the
 /// number of triangles (length of the difference of unit vectors), and whose origins by no more than that
@@ -23,7 +23,7 @@ const TOGETHER_AT_MOST: f64 = 0.04;
 
 /// The nearest triangle of each lane.
 #[derive(Clone, Copy, Debug)]
-pub struct Facet<L> {
+pub struct TriangleHit<L> {
     /// Distance, in lengths of the ray's direction; the limit where nothing nearer was met.
     pub t: L,
     /// Tag of the triangle's number; meaningless where nothing was met.
@@ -32,22 +32,22 @@ pub struct Facet<L> {
 
 /// Rays as triangles want them: a packet, or one ray in every lane.
 #[derive(Clone, Copy)]
-struct Pierce<L> {
-    origin: V3<L>,
+struct ShearedRay<L> {
+    origin: Vec3<L>,
     frame: Frame<L>,
 }
 
 /// A packet as boxes want it. A ray that passes a box's edge within the rounding of its frame and of the
 /// corners' distances may still meet a triangle there.
 #[inline(always)]
-fn beam<L: Lanes>(ray: &Ray<L>, mesh: &Mesh) -> Beam<L> {
+fn beam<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
     let [low, high] = mesh.mesh().bounds;
     let reach = low.iter().chain(&high).fold(0.0f32, |m, x| m.max(x.abs()));
     let pad = (ray.origin.max_abs() + all(reach)) * L::of(8.0 * L::EPSILON);
-    Beam::new(ray, V3::new(pad, pad, pad))
+    SlabPacket::new(ray, Vec3::new(pad, pad, pad))
 }
 
-impl<L: Lanes> Pierce<L> {
+impl<L: SimdFloat> ShearedRay<L> {
     #[inline(always)]
     fn new(ray: &Ray<L>) -> Self {
         Self { origin: ray.origin, frame: Frame::around(ray.direction) }
@@ -67,7 +67,7 @@ impl<L: Lanes> Pierce<L> {
     /// The ray of one lane in every lane.
     #[inline(always)]
     fn only(one: &[[L::Scalar; 3]; 4]) -> Self {
-        let [origin, t, b, n] = one.map(V3::splat);
+        let [origin, t, b, n] = one.map(Vec3::splat);
         Self { origin, frame: Frame { t, b, n } }
     }
 
@@ -79,10 +79,10 @@ impl<L: Lanes> Pierce<L> {
     /// (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an orthonormal
     /// frame for the shear).
     #[inline(always)]
-    fn meet(&self, corners: [V3<L>; 3]) -> (L, L::Mask) {
+    fn meet(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
         let p = corners.map(|c| self.frame.to_local(c - self.origin));
         // Not fused: products rounded alike cannot change places.
-        let area = |a: V3<L>, b: V3<L>| a.x * b.y - a.y * b.x;
+        let area = |a: Vec3<L>, b: Vec3<L>| a.x * b.y - a.y * b.x;
         let (u, v, w) = (area(p[1], p[2]), area(p[2], p[0]), area(p[0], p[1]));
         let zero = L::zero();
         let left = u.ge(zero) & v.ge(zero) & w.ge(zero);
@@ -94,39 +94,43 @@ impl<L: Lanes> Pierce<L> {
 
     /// The eight corners `k` of a leaf's triangles, a part of them in lanes.
     #[inline(always)]
-    fn corners(leaf: &Leaf, part: usize) -> [V3<L>; 3] {
+    fn corners(leaf: &TriangleBlock, part: usize) -> [Vec3<L>; 3] {
         leaf.corners.each_ref().map(|c| {
             let axis = |a: usize| lanes_of(&c[a], part);
-            V3::new(axis(0), axis(1), axis(2))
+            Vec3::new(axis(0), axis(1), axis(2))
         })
     }
 }
 
 /// A walk of some rays through a mesh. `ANY`: the first triangle ends the walk of a ray.
-struct Walk<'a, const ANY: bool> {
+struct MeshTraversal<'a, const ANY: bool> {
     mesh: &'a Mesh,
 }
 
-impl<const ANY: bool> Walk<'_, ANY> {
+impl<const ANY: bool> MeshTraversal<'_, ANY> {
     /// All lanes together.
     #[inline(always)]
-    fn together<L: Lanes>(&self, (ray, beam): (&Ray<L>, &Beam<L>), limit: L) -> Facet<L> {
-        let pierce = Pierce::new(ray);
+    fn together<L: SimdFloat>(
+        &self,
+        (ray, beam): (&Ray<L>, &SlabPacket<L>),
+        limit: L,
+    ) -> TriangleHit<L> {
+        let pierce = ShearedRay::new(ray);
         let wanted = limit.gt(L::zero()).bits();
-        let mut found = Facet { t: limit, triangle: L::tag(0) };
+        let mut found = TriangleHit { t: limit, triangle: L::tag(0) };
         if wanted == 0 {
             return found;
         }
-        let bounds = Sheaf::around(beam, wanted);
+        let bounds = PacketBounds::around(beam, wanted);
         let boxes = self.mesh.boxes();
         let leaf = |number: usize, _| {
             let leaf = &self.mesh.leaves()[number];
             let first = self.mesh.first(number);
-            for part in 0..WIDE.div_ceil(L::WIDTH) {
-                let [a, b, c] = Pierce::<L>::corners(leaf, part);
+            for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
+                let [a, b, c] = ShearedRay::<L>::corners(leaf, part);
                 // The triangles whose own boxes the packet may meet.
-                let low = V3::new(a.x.min(b.x), a.y.min(b.y), a.z.min(b.z));
-                let high = V3::new(a.x.max(b.x), a.y.max(b.y), a.z.max(b.z));
+                let low = Vec3::new(a.x.min(b.x), a.y.min(b.y), a.z.min(b.z));
+                let high = Vec3::new(a.x.max(b.x), a.y.max(b.y), a.z.max(b.z));
                 let sides = [
                     low.x.min(c.x),
                     low.y.min(c.y),
@@ -143,8 +147,9 @@ impl<const ANY: bool> Walk<'_, ANY> {
                 while bits != 0 {
                     let i = part * L::WIDTH + bits.trailing_zeros() as usize;
                     bits &= bits - 1;
-                    let one =
-                        |c: &[[f32; WIDE]; 3]| V3::new(all(c[0][i]), all(c[1][i]), all(c[2][i]));
+                    let one = |c: &[[f32; BVH_WIDTH]; 3]| {
+                        Vec3::new(all(c[0][i]), all(c[1][i]), all(c[2][i]))
+                    };
                     let (t, met) = pierce.meet(leaf.corners.each_ref().map(one));
                     let tie = met & t.le(found.t);
                     if tie.none() {
@@ -159,14 +164,14 @@ impl<const ANY: bool> Walk<'_, ANY> {
             }
             found.t
         };
-        with_stack::<_, _, 128, 512>(WIDE, boxes, |stack| {
+        with_stack::<_, _, 128, 512>(BVH_WIDTH, boxes, |stack| {
             together(boxes, (beam, bounds.as_ref()), limit, stack, leaf)
         });
         found
     }
 
     #[inline(always)]
-    fn go<L: Lanes>(&self, ray: &Ray<L>, limit: L) -> Facet<L> {
+    fn go<L: SimdFloat>(&self, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
         let beam = beam(ray, self.mesh);
         let wanted = limit.gt(L::zero()).bits();
         if is_together(ray, wanted, self.mesh) {
@@ -177,8 +182,12 @@ impl<const ANY: bool> Walk<'_, ANY> {
 
     /// Each lane by itself.
     #[inline(always)]
-    fn apart<L: Lanes>(&self, (ray, beam): (&Ray<L>, &Beam<L>), limit: L) -> Facet<L> {
-        let rays = Pierce::new(ray).each();
+    fn apart<L: SimdFloat>(
+        &self,
+        (ray, beam): (&Ray<L>, &SlabPacket<L>),
+        limit: L,
+    ) -> TriangleHit<L> {
+        let rays = ShearedRay::new(ray).each();
         let wanted = limit.gt(L::zero()).bits();
         let mut found = [(L::Scalar::default(), 0u32); MAX_WIDTH];
         for (lane, found) in found.iter_mut().enumerate().take(L::WIDTH) {
@@ -186,10 +195,10 @@ impl<const ANY: bool> Walk<'_, ANY> {
         }
         let leaf = |lane: usize, number: usize, limit: L::Scalar| {
             let leaf = &self.mesh.leaves()[number];
-            let pierce = Pierce::<L>::only(&rays[lane]);
+            let pierce = ShearedRay::<L>::only(&rays[lane]);
             let (best, triangle) = &mut found[lane];
-            for part in 0..WIDE.div_ceil(L::WIDTH) {
-                let (t, met) = pierce.meet(Pierce::corners(leaf, part));
+            for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
+                let (t, met) = pierce.meet(ShearedRay::corners(leaf, part));
                 let mut bits = (met & t.le(L::splat(*best))).bits() & fresh();
                 while bits != 0 {
                     let lane = bits.trailing_zeros();
@@ -219,13 +228,13 @@ impl<const ANY: bool> Walk<'_, ANY> {
             let here = lanes.le(L::of(lane as f64)) & lanes.ge(L::of(lane as f64));
             triangle = L::select(here, L::tag(*number), triangle);
         }
-        Facet { t, triangle }
+        TriangleHit { t, triangle }
     }
 }
 
 /// Whether the wanted rays of a packet are worth going together.
 #[inline(always)]
-fn is_together<L: Lanes>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
+fn is_together<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     if L::WIDTH == 1 || wanted.count_ones() < 2 {
         return false;
     }
@@ -239,19 +248,19 @@ fn is_together<L: Lanes>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
 /// The nearest triangle nearer than `limit`; of several at the same distance the one with the lowest
 /// number. Directions have unit length. Lanes whose limit is not positive are left out.
 #[inline(never)]
-pub fn closest<L: Lanes>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> Facet<L> {
-    Walk::<false> { mesh }.go(ray, limit)
+pub fn closest<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
+    MeshTraversal::<false> { mesh }.go(ray, limit)
 }
 
 /// Which lanes meet a triangle nearer than `limit`.
 #[inline(never)]
-pub fn blocked<L: Lanes>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
-    Walk::<true> { mesh }.go(ray, limit).t.lt(limit)
+pub fn blocked<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
+    MeshTraversal::<true> { mesh }.go(ray, limit).t.lt(limit)
 }
 
 /// As [`closest`], all lanes together or each by itself: for tests and benches.
 #[inline(never)]
-pub fn closest_by<L: Lanes>(mesh: &Mesh, ray: &Ray<L>, limit: L, all: bool) -> Facet<L> {
-    let (beam, walk) = (beam(ray, mesh), Walk::<false> { mesh });
+pub fn closest_by<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L, all: bool) -> TriangleHit<L> {
+    let (beam, walk) = (beam(ray, mesh), MeshTraversal::<false> { mesh });
     if all { walk.together((ray, &beam), limit) } else { walk.apart((ray, &beam), limit) }
 }

@@ -1,15 +1,15 @@
 //! Picture files of a rendering, and what they say about how it was made. Equal pictures say the
 //! same: no dates, no times, no threads.
 
-use crate::film::{Depth, Display, Picture, Target, Tone, WriteError};
-use crate::render::render_state::Rendering;
+use crate::film::{Depth, Display, ImageData, ImageOutput, Tone, WriteError};
+use crate::render::render_state::RenderState;
 use crate::render::session::Report;
 use crate::sampling::SamplerKind;
 use crate::value::fnv1a64;
 
 /// How a picture came to be, as far as its rendering does not know.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Origin {
+pub struct Provenance {
     /// The scene file, as the user named it.
     pub source: String,
     /// [`scene_hash`] of its text.
@@ -20,17 +20,17 @@ pub struct Origin {
     pub adaptive: bool,
 }
 
-impl Rendering {
+impl RenderState {
     /// Writes the picture as it stands, with its metadata. `report`: about this very film.
     pub fn write(
         &self,
         report: &Report,
-        origin: &Origin,
+        origin: &Provenance,
         display: Display,
         depth: Depth,
-        target: &Target,
+        target: &ImageOutput,
     ) -> Result<(), WriteError> {
-        target.write(&Picture {
+        target.write(&ImageData {
             film: &self.film,
             mix: &self.mix,
             group_names: &self.group_names(),
@@ -48,9 +48,9 @@ pub fn scene_hash(text: &str) -> String {
 
 /// Keys and values for the file.
 fn metadata(
-    rendering: &Rendering,
+    rendering: &RenderState,
     report: &Report,
-    origin: &Origin,
+    origin: &Provenance,
     display: &Display,
 ) -> Vec<(String, String)> {
     let spp = &report.spp;

@@ -1,6 +1,6 @@
 //! What can be seen in each cell of the guest's raster, besides colours.
 
-use crate::world::Sight;
+use crate::world::FirstHit;
 use rayon::prelude::*;
 
 /// Rays traced by one thread at a time.
@@ -8,25 +8,25 @@ const CHUNK: usize = 512;
 
 /// One camera ray through the centre of each cell of a raster that covers the picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Guide {
+pub struct FeatureBuffer {
     /// Cells in a row.
     pub columns: usize,
     /// Rows of cells.
     pub rows: usize,
     /// `[row][column]`.
-    sights: Vec<Sight>,
+    sights: Vec<FirstHit>,
 }
 
-impl Guide {
+impl FeatureBuffer {
     /// For a film of `size` pixels; `look` tells what is seen through points of the film, in pixels
     /// (see [`AnyWorld::look`](crate::world::AnyWorld::look)).
     pub fn new(
         [width, height]: [usize; 2],
         [columns, rows]: [usize; 2],
-        look: impl Fn(&[[f64; 2]], &mut [Sight]) + Sync,
+        look: impl Fn(&[[f64; 2]], &mut [FirstHit]) + Sync,
         pool: &rayon::ThreadPool,
     ) -> Self {
-        let mut sights = vec![Sight::NOTHING; columns * rows];
+        let mut sights = vec![FirstHit::NOTHING; columns * rows];
         let center = |cell: usize, cells: usize, pixels: usize| {
             (cell as f64 + 0.5) * pixels as f64 / cells as f64
         };
@@ -43,7 +43,7 @@ impl Guide {
     }
 
     /// What is seen in a cell; `None`: there is no such cell.
-    pub fn at(&self, column: usize, row: usize) -> Option<&Sight> {
+    pub fn at(&self, column: usize, row: usize) -> Option<&FirstHit> {
         if column >= self.columns {
             return None;
         }
@@ -51,7 +51,7 @@ impl Guide {
     }
 
     /// All cells, `[row][column]`.
-    pub fn sights(&self) -> &[Sight] {
+    pub fn sights(&self) -> &[FirstHit] {
         &self.sights
     }
 }

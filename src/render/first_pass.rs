@@ -1,11 +1,11 @@
 //! The first sample of every pixel, coarse to fine.
 
-use crate::film::{Film, Slot, TILE, TILE_PIXELS, Tile, lattice_pixels};
-use crate::lanes::Lanes;
-use crate::render::pass::{Tracer, Work};
+use crate::film::{Film, TILE, TILE_PIXELS, Tile, TileHandle, lattice_pixels};
+use crate::lanes::SimdFloat;
+use crate::render::pass::{PacketScratch, TileRenderer};
 use crate::render::wave::{JobReport, Wave, WaveReport};
 use crate::sampling::SampleSettings;
-use crate::world::{AnyWorld, Counts, Outlook, World};
+use crate::world::{AnyWorld, Counts, TileCandidates, World};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -33,7 +33,7 @@ const STRIP_TILES: usize = 8;
 /// They do while the lattice's step is larger than this \[pixels\]; then the tiles' own pixels fill packets.
 const SHARED_ABOVE: usize = 2;
 
-fn first_in<L: Lanes>(
+fn first_in<L: SimdFloat>(
     world: &World<L>,
     film: &mut Film,
     wave: &Wave,
@@ -42,12 +42,12 @@ fn first_in<L: Lanes>(
     abandon: &AtomicBool,
     shown: &mut dyn FnMut(&Film),
 ) -> Option<WaveReport> {
-    let tracer = Tracer::new(world, sampling);
+    let tracer = TileRenderer::new(world, sampling);
     let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
     let mut counts = vec![Counts::default(); tiles.len()];
     let mut before = 0;
     for step in [8, 4, 2, 1] {
-        let mut strips: Vec<(Vec<Slot>, &mut [Counts])> = Vec::new();
+        let mut strips: Vec<(Vec<TileHandle>, &mut [Counts])> = Vec::new();
         let mut slots = film.slots(&tiles).into_iter();
         for counts in counts.chunks_mut(STRIP_TILES) {
             strips.push((slots.by_ref().take(counts.len()).collect(), counts));
@@ -76,10 +76,10 @@ fn first_in<L: Lanes>(
     Some(WaveReport { reports: counts.into_iter().map(report).collect() })
 }
 
-impl<L: Lanes> Tracer<'_, L> {
+impl<L: SimdFloat> TileRenderer<'_, L> {
     /// The first sample of the pixels that a lattice of `step` pixels adds to one of `before` (0:
     /// none) in tiles side by side, whose pixels share packets while they are few.
-    fn lattice(&self, slots: Vec<Slot>, before: usize, step: usize, counts: &mut [Counts]) {
+    fn lattice(&self, slots: Vec<TileHandle>, before: usize, step: usize, counts: &mut [Counts]) {
         let mut tiles: Vec<_> = slots.into_iter().map(|slot| (slot.origin, slot.open())).collect();
         if step > SHARED_ABOVE {
             self.add_pixels(&mut tiles, None, (before, step), counts);
@@ -99,7 +99,7 @@ impl<L: Lanes> Tracer<'_, L> {
     fn add_pixels(
         &self,
         tiles: &mut [([usize; 2], &mut Tile)],
-        outlook: Option<Outlook>,
+        outlook: Option<TileCandidates>,
         (before, step): (usize, usize),
         counts: &mut [Counts],
     ) {
@@ -114,7 +114,7 @@ impl<L: Lanes> Tracer<'_, L> {
         };
         let sites = self.sites(0, pixels.iter().map(place));
         let points = self.sampler.block(0, 1);
-        let mut work = Work::new(0, outlook);
+        let mut work = PacketScratch::new(0, outlook);
         for range in sites.packets(L::WIDTH) {
             let packet = &pixels[range.clone()];
             self.pixels::<1>(&mut work, &points, &sites, range, 0);

@@ -12,7 +12,7 @@ pub mod session;
 mod sync_render;
 pub mod wave;
 
-pub use feature_buffer::Guide;
-pub use relighting::Lighting;
-pub use render_state::{Options, Rendering};
-pub use sync_render::Course;
+pub use feature_buffer::FeatureBuffer;
+pub use relighting::Relighting;
+pub use render_state::{Options, RenderState};
+pub use sync_render::SyncRender;

@@ -1,11 +1,11 @@
 //! The synchronous core: traces the jobs of one wave into the film.
 
-use crate::film::{BadSample, Estimator, Film, Slot, TILE, TILE_PIXELS, Tile};
-use crate::lanes::{Lanes, Mask, Real, V3};
-use crate::render::pixel_block::Sites;
+use crate::film::{Estimator, Film, InvalidSample, TILE, TILE_PIXELS, Tile, TileHandle};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::render::pixel_block::PixelBlock;
 use crate::render::wave::{Job, JobReport, Wave, WaveReport};
-use crate::sampling::{Draws, Points, SampleSettings, Sampler};
-use crate::world::{AnyWorld, Counts, MAX_GROUPS, Outlook, Radiance, World};
+use crate::sampling::{PacketSampler, SampleBlock, SampleSettings, Sampler};
+use crate::world::{AnyWorld, Counts, MAX_GROUPS, Radiance, TileCandidates, World};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,7 +28,7 @@ pub fn run(
 }
 
 /// The same for one lane type.
-pub fn run_in<L: Lanes>(
+pub fn run_in<L: SimdFloat>(
     world: &World<L>,
     film: &mut Film,
     wave: &Wave,
@@ -37,10 +37,10 @@ pub fn run_in<L: Lanes>(
     pool: &rayon::ThreadPool,
     cancel: &AtomicBool,
 ) -> WaveReport {
-    let tracer = Tracer::new(world, sampling);
+    let tracer = TileRenderer::new(world, sampling);
     let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
     let slots = film.slots(&tiles);
-    let trace = |(slot, job): (Slot, &Job)| {
+    let trace = |(slot, job): (TileHandle, &Job)| {
         if cancel.load(Ordering::Relaxed) {
             return None;
         }
@@ -60,7 +60,7 @@ pub fn run_in<L: Lanes>(
 }
 
 /// A world with the sample sequence and what else all jobs share.
-pub(super) struct Tracer<'a, L: Lanes> {
+pub(super) struct TileRenderer<'a, L: SimdFloat> {
     pub(super) world: &'a World<L>,
     pub(super) sampler: Sampler<L>,
     /// The largest radiance that the film holds, per group: 2^49 steps.
@@ -69,7 +69,7 @@ pub(super) struct Tracer<'a, L: Lanes> {
     whole: Vec<u8>,
 }
 
-impl<'a, L: Lanes> Tracer<'a, L> {
+impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     pub(super) fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
         let mut limits = [L::zero(); MAX_GROUPS];
         for (limit, scale) in limits.iter_mut().zip(world.scales()) {
@@ -93,7 +93,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         }
         // Asked for now, they are there once the first samples are traced.
         tile.prefetch(replicate);
-        let mut work = Work::new(replicate, outlook);
+        let mut work = PacketScratch::new(replicate, outlook);
         let part: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
             &self.whole
@@ -138,8 +138,8 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     fn share<const COUNT: usize>(
         &self,
         tile: &mut Tile,
-        work: &mut Work<L>,
-        sites: &Sites<L::Scalar>,
+        work: &mut PacketScratch<L>,
+        sites: &PixelBlock<L::Scalar>,
         pixels: &[u8],
         first: u32,
     ) {
@@ -159,17 +159,17 @@ impl<'a, L: Lanes> Tracer<'a, L> {
         &self,
         replicate: usize,
         pixels: impl Iterator<Item = (u32, u32)>,
-    ) -> Sites<L::Scalar> {
-        Sites::new(self.world.view(), &self.sampler, replicate, pixels)
+    ) -> PixelBlock<L::Scalar> {
+        PixelBlock::new(self.world.view(), &self.sampler, replicate, pixels)
     }
 
     /// The samples `first ..` of the pixel `i` of `sites`, into `work.radiance`.
     #[inline(always)]
     fn pixel(
         &self,
-        work: &mut Work<L>,
-        points: &Points<'_, L>,
-        sites: &Sites<L::Scalar>,
+        work: &mut PacketScratch<L>,
+        points: &SampleBlock<'_, L>,
+        sites: &PixelBlock<L::Scalar>,
         i: usize,
         first: u32,
     ) {
@@ -185,9 +185,9 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     #[inline(always)]
     pub(super) fn pixels<const COUNT: usize>(
         &self,
-        work: &mut Work<L>,
-        points: &Points<'_, L>,
-        sites: &Sites<L::Scalar>,
+        work: &mut PacketScratch<L>,
+        points: &SampleBlock<'_, L>,
+        sites: &PixelBlock<L::Scalar>,
         packet: Range<usize>,
         first: u32,
     ) {
@@ -202,7 +202,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
 
     /// Where in their pixels the samples lie.
     #[inline(always)]
-    fn jitter(&self, draws: &Draws<'_, L>) -> (L, L) {
+    fn jitter(&self, draws: &PacketSampler<'_, L>) -> (L, L) {
         if self.world.jitter() { draws.pixel() } else { (L::of(0.5), L::of(0.5)) }
     }
 
@@ -236,7 +236,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     /// Makes samples what the film can hold, and records those that it cannot; `which` gives pixel and index
     /// of a lane.
     #[inline(always)]
-    fn check(&self, work: &mut Work<L>, which: impl Fn(usize) -> ((u32, u32), u32)) {
+    fn check(&self, work: &mut PacketScratch<L>, which: impl Fn(usize) -> ((u32, u32), u32)) {
         let mut good = L::mask(true);
         for (g, limit) in self.limits.iter().enumerate().take(self.world.groups()) {
             let v = work.radiance.groups[g];
@@ -254,7 +254,7 @@ impl<'a, L: Lanes> Tracer<'a, L> {
     /// In each group, blackens what is NaN or negative in some channel, and takes the largest value that the
     /// film holds for what is brighter or infinite.
     #[cold]
-    fn repair(&self, work: &mut Work<L>, which: impl Fn(usize) -> ((u32, u32), u32)) {
+    fn repair(&self, work: &mut PacketScratch<L>, which: impl Fn(usize) -> ((u32, u32), u32)) {
         let (mut bad, mut saturated) = (L::mask(false), L::mask(false));
         for (group, limit) in
             work.radiance.groups.iter_mut().zip(self.limits).take(self.world.groups())
@@ -263,11 +263,11 @@ impl<'a, L: Lanes> Tracer<'a, L> {
             let light = v.x.ge(zero) & v.y.ge(zero) & v.z.ge(zero);
             bad = bad | !light;
             saturated = saturated | (light & v.max_element().gt(limit));
-            *group = V3::new(v.x.min(limit), v.y.min(limit), v.z.min(limit)).only(light);
+            *group = Vec3::new(v.x.min(limit), v.y.min(limit), v.z.min(limit)).only(light);
         }
         for lane in (0..L::WIDTH).filter(|lane| (bad | saturated).lane(*lane)) {
             let ((x, y), index) = which(lane);
-            let sample = BadSample { index, replicate: work.replicate as u8, y, x };
+            let sample = InvalidSample { index, replicate: work.replicate as u8, y, x };
             work.bad.extend(bad.lane(lane).then_some(sample));
             work.saturated.extend(saturated.lane(lane).then_some(sample));
         }
@@ -275,23 +275,23 @@ impl<'a, L: Lanes> Tracer<'a, L> {
 }
 
 /// What the packets of one job share and fill.
-pub(super) struct Work<L: Lanes> {
+pub(super) struct PacketScratch<L: SimdFloat> {
     replicate: usize,
-    outlook: Option<Outlook>,
+    outlook: Option<TileCandidates>,
     pub(super) radiance: Radiance<L>,
     pub(super) counts: Counts,
     /// Samples that were NaN or negative in some group.
-    pub(super) bad: Vec<BadSample>,
+    pub(super) bad: Vec<InvalidSample>,
     /// Samples that were brighter than the film holds in some group.
-    pub(super) saturated: Vec<BadSample>,
+    pub(super) saturated: Vec<InvalidSample>,
 }
 
-impl<L: Lanes> Work<L> {
-    pub(super) fn new(replicate: usize, outlook: Option<Outlook>) -> Self {
+impl<L: SimdFloat> PacketScratch<L> {
+    pub(super) fn new(replicate: usize, outlook: Option<TileCandidates>) -> Self {
         Self {
             replicate,
             outlook,
-            radiance: Radiance { groups: [V3::zero(); MAX_GROUPS] },
+            radiance: Radiance { groups: [Vec3::zero(); MAX_GROUPS] },
             counts: Counts::default(),
             bad: Vec::new(),
             saturated: Vec::new(),
@@ -302,8 +302,8 @@ impl<L: Lanes> Work<L> {
     fn trace(
         &mut self,
         world: &World<L>,
-        rays: (V3<L>, V3<L>),
-        draws: &Draws<'_, L>,
+        rays: (Vec3<L>, Vec3<L>),
+        draws: &PacketSampler<'_, L>,
         active: L::Mask,
     ) {
         let cost = world.trace(rays, self.outlook.as_ref(), draws, active, &mut self.radiance);
@@ -320,7 +320,7 @@ fn together(first: u32, end: u32, width: usize) -> usize {
 }
 
 /// The first `count` lanes.
-fn first_lanes<L: Lanes>(count: usize) -> L::Mask {
+fn first_lanes<L: SimdFloat>(count: usize) -> L::Mask {
     if count == L::WIDTH {
         return L::mask(true);
     }
@@ -355,8 +355,8 @@ fn pixels_of([width, height]: [usize; 2]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{Header, Mix};
-    use crate::lanes::{Real, Single};
+    use crate::film::{Header, LightWeights};
+    use crate::lanes::{Float, Single};
     use crate::sampling::SamplerKind;
 
     /// Samples that are no light count, add nothing, and leave the pixel finite; those that are too much of it
@@ -372,7 +372,8 @@ mod tests {
         .unwrap_or_else(|e| panic!("{e}"));
         let world = World::<Single>::new(&scene);
         assert_eq!(world.groups(), 2);
-        let tracer = Tracer::new(&world, &SampleSettings { seed: 0, kind: SamplerKind::Sobol });
+        let tracer =
+            TileRenderer::new(&world, &SampleSettings { seed: 0, kind: SamplerKind::Sobol });
         let most = 49f64.exp2() / world.scales()[0];
         for (odd, left) in [
             (f64::NAN, 0.0),
@@ -384,22 +385,22 @@ mod tests {
             let (scales, precision) = (world.scales().to_vec(), "single".to_string());
             let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
             let tile = film.slots(&[0]).remove(0).open();
-            let mut work = Work::<Single>::new(0, None);
+            let mut work = PacketScratch::<Single>::new(0, None);
             work.radiance.groups[0].x =
-                Single::from_fn(|i| Real::of(if i == 3 { odd } else { 0.5 }));
+                Single::from_fn(|i| Float::of(if i == 3 { odd } else { 0.5 }));
             work.radiance.groups[1].y = Single::of(0.25);
             tracer.check(&mut work, |lane| ((lane as u32, 0), 0));
             let pixels = [0, 1, 2, 3, 4, 5, 6, 7];
             tracer.sum_of_each::<1, _>(&work.radiance, &pixels, |pixel, group, sums| {
                 tile.add_group(0, *pixel, group, sums);
             });
-            let here = [BadSample { index: 0, replicate: 0, y: 0, x: 3 }];
+            let here = [InvalidSample { index: 0, replicate: 0, y: 0, x: 3 }];
             let recorded = if left == 0.0 { (&here[..], &[][..]) } else { (&[][..], &here[..]) };
             assert_eq!((&work.bad[..], &work.saturated[..]), recorded, "{odd}");
             work.bad.into_iter().for_each(|bad| tile.record_bad(bad));
             tile.record_saturated(work.saturated.len() as u64);
             tile.advance(0, 1);
-            let of = |group| Mix::only(group, 2);
+            let of = |group| LightWeights::only(group, 2);
             assert_eq!(film.bad_samples().count + film.saturated_samples(), 1);
             assert_eq!(film.pixel(3, 0, &of(0)), [left, 0.0, 0.0], "{odd}");
             assert_eq!(film.pixel(4, 0, &of(0)), [0.5, 0.0, 0.0], "{odd}");

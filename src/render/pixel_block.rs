@@ -1,13 +1,13 @@
 //! Pixels, and what all their samples start from.
 
-use crate::camera::View;
+use crate::camera::PinholeCamera;
 use crate::film::TILE_PIXELS;
-use crate::lanes::{Bits, Lanes, Real, V3};
+use crate::lanes::{Float, SimdFloat, SimdU32, Vec3};
 use crate::sampling::Sampler;
 use std::ops::Range;
 
 /// At most as many pixels as a tile has, in the order in which they share packets.
-pub(super) struct Sites<S> {
+pub(super) struct PixelBlock<S> {
     count: usize,
     /// Columns and rows, in pixels of the picture. Here and below a last packet is filled up with copies of the
     /// last pixel.
@@ -19,10 +19,10 @@ pub(super) struct Sites<S> {
     toward: [[S; TILE_PIXELS]; 3],
 }
 
-impl<S: Real> Sites<S> {
+impl<S: Float> PixelBlock<S> {
     /// Of `pixels`, in one replicate.
-    pub fn new<L: Lanes<Scalar = S>>(
-        view: &View,
+    pub fn new<L: SimdFloat<Scalar = S>>(
+        view: &PinholeCamera,
         sampler: &Sampler<L>,
         replicate: usize,
         mut pixels: impl Iterator<Item = (u32, u32)>,
@@ -62,24 +62,24 @@ impl<S: Real> Sites<S> {
 
     /// The key of pixel `i`, and from the eye to its corner, in all lanes.
     #[inline(always)]
-    pub fn one<L: Lanes<Scalar = S>>(&self, i: usize) -> (u32, V3<L>) {
-        (self.keys[i], V3::splat(self.toward.each_ref().map(|axis| axis[i])))
+    pub fn one<L: SimdFloat<Scalar = S>>(&self, i: usize) -> (u32, Vec3<L>) {
+        (self.keys[i], Vec3::splat(self.toward.each_ref().map(|axis| axis[i])))
     }
 
     /// The same for the pixels `first ..`, each in COUNT lanes side by side; COUNT is a power of two, and
     /// `first` a multiple of WIDTH / COUNT.
     #[inline(always)]
-    pub fn several<L: Lanes<Scalar = S>, const COUNT: usize>(
+    pub fn several<L: SimdFloat<Scalar = S>, const COUNT: usize>(
         &self,
         first: usize,
-    ) -> (L::Bits, V3<L>) {
+    ) -> (L::SimdU32, Vec3<L>) {
         let those = first..first + L::WIDTH / COUNT;
         let keys = &self.keys[those.clone()];
         let [x, y, z] = self.toward.each_ref().map(|axis| {
             let axis = &axis[those.clone()];
             L::from_fn(|lane| axis[lane / COUNT])
         });
-        (L::Bits::from_fn(|lane| keys[lane / COUNT]), V3::new(x, y, z))
+        (L::SimdU32::from_fn(|lane| keys[lane / COUNT]), Vec3::new(x, y, z))
     }
 
     /// The pixels in packets that hold `each` of them.

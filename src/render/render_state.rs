@@ -1,14 +1,14 @@
 //! A scene in work: the compiled world and the film that its samples go to.
 
-use crate::film::{Display, Estimator, Film, Header, Mix, TILE};
-use crate::render::relighting::Lighting;
+use crate::film::{Display, Estimator, Film, Header, LightWeights, TILE};
+use crate::render::relighting::Relighting;
 use crate::render::schedule::{Schedule, Settings};
-use crate::render::session::Traced;
+use crate::render::session::RenderBackend;
 use crate::render::wave::{Wave, WaveReport};
 use crate::render::{first_pass, pass};
 use crate::sampling::SampleSettings;
 use crate::scene::Scene;
-use crate::world::{self, AnyWorld, Sight};
+use crate::world::{self, AnyWorld, FirstHit};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -24,21 +24,21 @@ pub struct Options {
 }
 
 /// A scene in work.
-pub struct Rendering {
+pub struct RenderState {
     /// The compiled scene.
     pub world: AnyWorld,
     /// The samples.
     pub film: Film,
     /// Colour and strength of the light groups, as the scene has them.
-    pub mix: Mix,
+    pub mix: LightWeights,
     scene: Arc<Scene>,
-    lighting: Arc<Lighting>,
+    lighting: Arc<Relighting>,
     sampling: SampleSettings,
     display: Display,
     estimator: Estimator,
 }
 
-impl Rendering {
+impl RenderState {
     /// Compiles `scene` and gives it an empty film, in the memory of that of `before`.
     pub fn new(scene: &Scene, options: &Options, before: Option<Self>) -> Self {
         Self::compiled(Arc::new(scene.clone()), options, before)
@@ -54,13 +54,13 @@ impl Rendering {
             seed: options.sampling.seed,
             precision: world.precision().to_string(),
         };
-        let mix = Mix { weights: world.mix(&scene) };
+        let mix = LightWeights { weights: world.mix(&scene) };
         let estimator = Estimator::new(&header.scales, &mix, &options.display);
         let film = match before {
             Some(before) => before.film.renewed(header),
             None => Film::new(header),
         };
-        let lighting = Lighting::new(Arc::clone(&scene), world.light_groups().clone());
+        let lighting = Relighting::new(Arc::clone(&scene), world.light_groups().clone());
         Self {
             world,
             film,
@@ -89,7 +89,7 @@ impl Rendering {
     }
 }
 
-impl Traced for Rendering {
+impl RenderBackend for RenderState {
     type Options = Options;
 
     fn begin(scene: &Arc<Scene>, options: &Options, before: Option<Self>) -> Result<Self, String> {
@@ -141,7 +141,7 @@ impl Traced for Rendering {
         &self.film
     }
 
-    fn mix(&self) -> &Mix {
+    fn mix(&self) -> &LightWeights {
         &self.mix
     }
 
@@ -153,11 +153,11 @@ impl Traced for Rendering {
         &self.estimator
     }
 
-    fn lighting(&self) -> &Arc<Lighting> {
+    fn lighting(&self) -> &Arc<Relighting> {
         &self.lighting
     }
 
-    fn look(&self, points: &[[f64; 2]], seen: &mut [Sight]) {
+    fn look(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
         self.world.look(points, seen);
     }
 

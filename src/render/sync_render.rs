@@ -2,22 +2,22 @@
 //! where nothing may depend on when somebody looks.
 
 use crate::render::schedule::{Schedule, Settings, Spp, Step, StoppedBy};
-use crate::render::session::Traced;
-use crate::render::{Options, Rendering};
+use crate::render::session::RenderBackend;
+use crate::render::{Options, RenderState};
 use crate::scene::Scene;
 use std::io;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// A render that is taken step by step.
-pub struct Course {
-    rendering: Rendering,
+pub struct SyncRender {
+    rendering: RenderState,
     schedule: Schedule,
     pool: rayon::ThreadPool,
     seconds: f64,
 }
 
-impl Course {
+impl SyncRender {
     /// Compiles `scene`, which has no faults, to be traced by `threads` threads. `Err`: they are not
     /// to be had.
     pub fn new(
@@ -30,7 +30,7 @@ impl Course {
             .num_threads(threads)
             .build()
             .map_err(io::Error::other)?;
-        let rendering = Rendering::new(scene, options, None);
+        let rendering = RenderState::new(scene, options, None);
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
         let schedule = rendering.schedule(settings);
         Ok(Self { rendering, schedule, pool, seconds: 0.0 })
@@ -82,7 +82,7 @@ impl Course {
     }
 
     /// The world and the film.
-    pub fn rendering(&self) -> &Rendering {
+    pub fn rendering(&self) -> &RenderState {
         &self.rendering
     }
 }

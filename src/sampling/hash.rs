@@ -1,11 +1,11 @@
 //! Integer hashes, scalar and in lanes.
 
-use crate::lanes::Bits;
+use crate::lanes::SimdU32;
 
 /// A bijective mixer of 32 bits with low bias (constants: Wellons 2018, *Prospecting for Hash
 /// Functions*, `lowbias32`).
 #[inline(always)]
-pub fn mix<B: Bits>(x: B) -> B {
+pub fn mix<B: SimdU32>(x: B) -> B {
     let x = (x ^ (x >> 16)) * B::splat(0x7feb_352d);
     let x = (x ^ (x >> 15)) * B::splat(0x846c_a68b);
     x ^ (x >> 16)
@@ -30,25 +30,25 @@ pub fn fold(words: &[u32]) -> u32 {
 ///
 /// The Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
 #[inline(always)]
-pub fn owen<B: Bits>(x: B, seed: B) -> B {
+pub fn owen<B: SimdU32>(x: B, seed: B) -> B {
     owen_rest(owen_begin(x), seed, owen_factor(seed))
 }
 
 /// The part of [`owen`] before the seed takes part.
 #[inline(always)]
-pub fn owen_begin<B: Bits>(x: B) -> B {
+pub fn owen_begin<B: SimdU32>(x: B) -> B {
     x ^ (x * B::splat(0x3d20_adea))
 }
 
 /// What [`owen`] multiplies with.
 #[inline(always)]
-pub fn owen_factor<B: Bits>(seed: B) -> B {
+pub fn owen_factor<B: SimdU32>(seed: B) -> B {
     (seed >> 16) | B::splat(1)
 }
 
 /// What is left of [`owen`] after [`owen_begin`].
 #[inline(always)]
-pub fn owen_rest<B: Bits>(begun: B, seed: B, factor: B) -> B {
+pub fn owen_rest<B: SimdU32>(begun: B, seed: B, factor: B) -> B {
     let x = (begun + seed) * factor;
     let x = x ^ (x * B::splat(0x0552_6c56));
     x ^ (x * B::splat(0x53a2_2864))

@@ -6,4 +6,4 @@ mod packet_sampler;
 mod sobol;
 pub mod warp;
 
-pub use packet_sampler::{Draws, Points, SampleSettings, Sampler, SamplerKind};
+pub use packet_sampler::{PacketSampler, SampleBlock, SampleSettings, Sampler, SamplerKind};

@@ -1,6 +1,6 @@
 //! The random numbers of a packet of samples.
 
-use crate::lanes::{Bits, Lanes, MAX_WIDTH};
+use crate::lanes::{MAX_WIDTH, SimdFloat, SimdU32};
 use crate::sampling::hash::{fold, mix, mix1, owen, owen_begin, owen_factor, owen_rest};
 use crate::sampling::sobol;
 use crate::sampling::sobol::DIMENSIONS;
@@ -40,44 +40,45 @@ const CHOICES: u32 = 2;
 const SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
 
 /// The numbers that samples of a lane type start from.
-pub struct Sampler<L: Lanes> {
+pub struct Sampler<L: SimdFloat> {
     settings: SampleSettings,
     /// Two words per replicate, from the seed.
     seeds: [[u32; 2]; 2],
     /// Dimensions of the first lobe: after the two of the pixel, if these are used.
     first_lobe: usize,
     /// `low[k][d]`: Sobol points 0..2^k in dimension d, again and again.
-    low: [[L::Bits; DIMENSIONS]; SHAPES],
+    low: [[L::SimdU32; DIMENSIONS]; SHAPES],
     /// 0, 1, 2, ... in the lanes.
-    ramp: L::Bits,
+    ramp: L::SimdU32,
     /// A constant per dimension that sets its scrambling apart.
     apart: [u32; DIMENSIONS],
 }
 
 /// The part of a packet's numbers that depends on the samples' indices alone.
-pub struct Points<'a, L: Lanes> {
+pub struct SampleBlock<'a, L: SimdFloat> {
     sampler: &'a Sampler<L>,
     /// Index in each lane.
-    index: L::Bits,
+    index: L::SimdU32,
     /// `begun[d]`: the Sobol points of the indices in dimension d, their scrambling begun.
-    begun: [L::Bits; DIMENSIONS],
+    begun: [L::SimdU32; DIMENSIONS],
 }
 
-impl<L: Lanes> Sampler<L> {
+impl<L: SimdFloat> Sampler<L> {
     /// `jitter`: samples move inside their pixel and use the first two dimensions for that;
     /// otherwise the lobes have them.
     pub fn new(settings: SampleSettings, jitter: bool) -> Self {
         let word = |replicate: u32, use_: u32| {
             fold(&[settings.seed as u32, (settings.seed >> 32) as u32, replicate, use_])
         };
-        let low =
-            |k: usize, d| L::Bits::from_fn(|lane| sobol::point(d, lane as u32 & ((1u32 << k) - 1)));
+        let low = |k: usize, d| {
+            L::SimdU32::from_fn(|lane| sobol::point(d, lane as u32 & ((1u32 << k) - 1)))
+        };
         Self {
             settings,
             seeds: [0, 1].map(|replicate| [word(replicate, 0), word(replicate, 1)]),
             first_lobe: if jitter { 2 } else { 0 },
             low: std::array::from_fn(|k| std::array::from_fn(|d| low(k, d))),
-            ramp: L::Bits::from_fn(|lane| lane as u32),
+            ramp: L::SimdU32::from_fn(|lane| lane as u32),
             apart: std::array::from_fn(|d| mix1(d as u32 + 1)),
         }
     }
@@ -85,15 +86,15 @@ impl<L: Lanes> Sampler<L> {
     /// The indices `first..first + count`, in packets that hold as many of each of WIDTH / `count` pixels:
     /// lane i has index `first + i % count`. `count` is a power of two, at most WIDTH, and `first` a multiple
     /// of it.
-    pub fn block(&self, first: u32, count: usize) -> Points<'_, L> {
+    pub fn block(&self, first: u32, count: usize) -> SampleBlock<'_, L> {
         debug_assert!(count.is_power_of_two() && count <= L::WIDTH);
         debug_assert!((first as usize).is_multiple_of(count));
         // Aligned points are one point XOR constants.
         let low = &self.low[count.ilog2() as usize];
-        let point = |d| L::Bits::splat(sobol::point(d, first)) ^ low[d];
+        let point = |d| L::SimdU32::splat(sobol::point(d, first)) ^ low[d];
         let begun = std::array::from_fn(|d| owen_begin(point(d)));
-        let within = self.ramp & L::Bits::splat(count as u32 - 1);
-        Points { sampler: self, index: L::Bits::splat(first) + within, begun }
+        let within = self.ramp & L::SimdU32::splat(count as u32 - 1);
+        SampleBlock { sampler: self, index: L::SimdU32::splat(first) + within, begun }
     }
 
     /// The key of a pixel's samples in one replicate (0: A, 1: B). Distinct for all pixels of a
@@ -105,30 +106,30 @@ impl<L: Lanes> Sampler<L> {
     }
 }
 
-impl<L: Lanes> Points<'_, L> {
+impl<L: SimdFloat> SampleBlock<'_, L> {
     /// Samples of the pixel that [`Sampler::key`] gave a key.
     #[inline(always)]
-    pub fn of_pixel(&self, key: u32) -> Draws<'_, L> {
-        Draws { points: self, key: L::Bits::splat(key), of_one: Some(key) }
+    pub fn of_pixel(&self, key: u32) -> PacketSampler<'_, L> {
+        PacketSampler { points: self, key: L::SimdU32::splat(key), of_one: Some(key) }
     }
 
     /// Samples of several pixels, by the keys of the pixels in the lanes.
     #[inline(always)]
-    pub fn of_pixels(&self, keys: L::Bits) -> Draws<'_, L> {
-        Draws { points: self, key: keys, of_one: None }
+    pub fn of_pixels(&self, keys: L::SimdU32) -> PacketSampler<'_, L> {
+        PacketSampler { points: self, key: keys, of_one: None }
     }
 }
 
 /// The random numbers of one packet.
-pub struct Draws<'a, L: Lanes> {
-    points: &'a Points<'a, L>,
+pub struct PacketSampler<'a, L: SimdFloat> {
+    points: &'a SampleBlock<'a, L>,
     /// Key of the pixel in each lane.
-    key: L::Bits,
+    key: L::SimdU32,
     /// The key, if all lanes have the same pixel.
     of_one: Option<u32>,
 }
 
-impl<L: Lanes> Draws<'_, L> {
+impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Where in its pixel a sample lies, each coordinate in [0, 1).
     #[inline(always)]
     pub fn pixel(&self) -> (L, L) {
@@ -158,8 +159,8 @@ impl<L: Lanes> Draws<'_, L> {
         let points = self.points;
         let apart = points.sampler.apart[d];
         let seed = match self.of_one {
-            Some(key) => L::Bits::splat(mix1(key ^ apart)),
-            None => mix(self.key ^ L::Bits::splat(apart)),
+            Some(key) => L::SimdU32::splat(mix1(key ^ apart)),
+            None => mix(self.key ^ L::SimdU32::splat(apart)),
         };
         match points.sampler.settings.kind {
             SamplerKind::Random => L::unit(mix(mix(points.index ^ seed) + self.key)),
@@ -189,19 +190,19 @@ impl<L: Lanes> Draws<'_, L> {
     /// Some dimensions of the padded set `set`, whose indices are shuffled by a key of its own.
     #[inline(always)]
     fn padded_set<const N: usize>(&self, set: u32, dimensions: [usize; N]) -> [L; N] {
-        let Points { sampler, index, .. } = self.points;
-        let key = mix(self.key + L::Bits::splat(mix1(set)));
+        let SampleBlock { sampler, index, .. } = self.points;
+        let key = mix(self.key + L::SimdU32::splat(mix1(set)));
         let shuffled = owen(index.reverse(), key).reverse();
         let mut at = [0; MAX_WIDTH];
         for (lane, at) in at.iter_mut().enumerate().take(L::WIDTH) {
             *at = shuffled.lane(lane);
         }
         dimensions.map(|d| {
-            let seed = mix(key ^ L::Bits::splat(sampler.apart[d]));
+            let seed = mix(key ^ L::SimdU32::splat(sampler.apart[d]));
             match sampler.settings.kind {
                 SamplerKind::Random => L::unit(mix(mix(*index ^ seed) + key)),
                 SamplerKind::Sobol => {
-                    let x = L::Bits::from_fn(|lane| sobol::point(d, at[lane]));
+                    let x = L::SimdU32::from_fn(|lane| sobol::point(d, at[lane]));
                     L::unit(owen(x, seed).reverse())
                 }
             }

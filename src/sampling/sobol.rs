@@ -150,7 +150,7 @@ mod tests {
     /// where all four first dimensions take part.
     #[test]
     fn scrambled_points_tell_half_spaces_better_than_random_ones() {
-        use crate::lanes::{Bits, Lanes};
+        use crate::lanes::{SimdFloat, SimdU32};
         use crate::sampling::hash::owen;
         type One = f32;
         let unit = |bits: u32| f64::from(bits) / 4_294_967_296.0;
@@ -190,7 +190,8 @@ mod tests {
             assert!(ratio < most, "{name}, {points} points: {ratio} of the error of random ones");
         }
         fn owen_1(x: u32, seed: u32) -> u32 {
-            owen(<One as Lanes>::Bits::splat(x), <One as Lanes>::Bits::splat(seed)).lane(0)
+            owen(<One as SimdFloat>::SimdU32::splat(x), <One as SimdFloat>::SimdU32::splat(seed))
+                .lane(0)
         }
     }
 

@@ -4,7 +4,7 @@
 //! Directions are in the frame of the lobe: z along its axis (the mirror direction for cone and
 //! square, the normal for microfacets).
 
-use crate::lanes::{Lanes, Mask, V3};
+use crate::lanes::{Mask, SimdFloat, Vec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
 /// A uniform point of the unit disk, and the square of its distance from the centre: squares about the
@@ -13,7 +13,7 @@ use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 ///
 /// Shirley and Chiu 1997, *A Low Distortion Map Between Disk and Square*.
 #[inline(always)]
-pub fn disk<L: Lanes>(u: L, v: L) -> (L, L, L) {
+pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
     let centred = |x: L| x + x - L::one();
     let (a, b) = (centred(u), centred(v));
     let wide = a.abs().gt(b.abs());
@@ -41,7 +41,7 @@ const fn series(first: u32) -> [f64; 8] {
 /// Sine and cosine of `x` eighths of a turn, for x in [-1, 1]: the first eight terms of their series,
 /// which leave 1e-15.
 #[inline(always)]
-fn sin_cos_eighth<L: Lanes>(x: L) -> (L, L) {
+fn sin_cos_eighth<L: SimdFloat>(x: L) -> (L, L) {
     const SINE: [f64; 8] = series(1);
     const COSINE: [f64; 8] = series(0);
     let x2 = x * x;
@@ -50,7 +50,7 @@ fn sin_cos_eighth<L: Lanes>(x: L) -> (L, L) {
 
 /// `k[0] + k[1] x + k[2] x^2 + ...`
 #[inline(always)]
-fn polynomial<L: Lanes>(k: &[f64], x: L) -> L {
+fn polynomial<L: SimdFloat>(k: &[f64], x: L) -> L {
     k.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::of(*k)))
 }
 
@@ -58,12 +58,12 @@ fn polynomial<L: Lanes>(k: &[f64], x: L) -> L {
 ///
 /// `one_minus_cos` is 1 - cos(theta), best computed as 2 sin^2(theta / 2); its range is [0, 1].
 #[inline(always)]
-pub fn cone<L: Lanes>(u: L, v: L, one_minus_cos: L) -> V3<L> {
+pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     let (x, y, r2) = disk(u, v);
     let drop = r2 * one_minus_cos;
     // Areas on the sphere are as areas on the disk; sin = r scale.
     let scale = (one_minus_cos * (L::of(2.0) - drop)).max(L::zero()).sqrt();
-    V3::new(x * scale, y * scale, L::one() - drop)
+    Vec3::new(x * scale, y * scale, L::one() - drop)
 }
 
 /// Density of [`cone`] [1/sr]: constant inside, 0 outside.
@@ -74,9 +74,9 @@ pub fn cone_pdf(direction_z: f64, one_minus_cos: f64) -> f64 {
 /// A direction through a uniform point of the square with sides `side` at unit distance,
 /// perpendicular to z and centred on it.
 #[inline(always)]
-pub fn square<L: Lanes>(u: L, v: L, side: L) -> V3<L> {
+pub fn square<L: SimdFloat>(u: L, v: L, side: L) -> Vec3<L> {
     let half = L::of(0.5);
-    V3::new((u - half) * side, (v - half) * side, L::one()).normalize()
+    Vec3::new((u - half) * side, (v - half) * side, L::one()).normalize()
 }
 
 /// Density of [`square`] [1/sr]: 1 / (side^2 cos^3) inside, 0 outside.
@@ -93,8 +93,8 @@ pub fn square_pdf(direction: [f64; 3], side: f64) -> f64 {
 /// Walter et al. 2007, *Microfacet Models for Refraction through Rough Surfaces*, eq. 28, has the same
 /// density by radius and angle.
 #[inline(always)]
-pub fn beckmann<L: Lanes>(u: L, v: L, alpha: L) -> V3<L> {
-    V3::new(alpha * erf_inverse(u), alpha * erf_inverse(v), L::one()).normalize()
+pub fn beckmann<L: SimdFloat>(u: L, v: L, alpha: L) -> Vec3<L> {
+    Vec3::new(alpha * erf_inverse(u), alpha * erf_inverse(v), L::one()).normalize()
 }
 
 /// The inverse of the error function at 2 u - 1, for u in [0, 1), to 4e-7 of its value (in double
@@ -104,7 +104,7 @@ pub fn beckmann<L: Lanes>(u: L, v: L, alpha: L) -> V3<L> {
 /// (2 u - 1) times a function of w = -ln(1 - (2 u - 1)^2); polynomials fitted for the least relative
 /// error with w up to 23.
 #[inline(always)]
-fn erf_inverse<L: Lanes>(u: L) -> L {
+fn erf_inverse<L: SimdFloat>(u: L) -> L {
     const MIDDLE: [f64; 10] = [
         1.501_409_359_28,
         0.246_640_286_155,
@@ -146,27 +146,27 @@ fn erf_inverse<L: Lanes>(u: L) -> L {
 /// Dupuy and Benyoub 2023, *Sampling Visible GGX Normals with Spherical Caps*; the cap is the image of a
 /// disk.
 #[inline(always)]
-pub fn ggx_visible<L: Lanes>(u: L, v: L, alpha: L, view: V3<L>) -> V3<L> {
-    let stretched = V3::new(view.x * alpha, view.y * alpha, view.z).normalize();
+pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
+    let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();
     let (x, y, r2) = disk(u, v);
     let height = L::one() + stretched.z;
     let drop = r2 * height;
     let scale = (height * (L::of(2.0) - drop)).max(L::zero()).sqrt();
-    let h = V3::new(x.mul_add(scale, stretched.x), y.mul_add(scale, stretched.y), height - drop);
-    V3::new(h.x * alpha, h.y * alpha, h.z.max(L::zero())).normalize()
+    let h = Vec3::new(x.mul_add(scale, stretched.x), y.mul_add(scale, stretched.y), height - drop);
+    Vec3::new(h.x * alpha, h.y * alpha, h.z.max(L::zero())).normalize()
 }
 
 /// Beckmann's distribution D [1/sr] of microfacet normals at squared tangent `tan2` from the surface
 /// normal: exp(-tan2 / alpha^2) / (pi alpha^2 cos^4), with 1 / cos^2 = 1 + tan2.
 #[inline(always)]
-pub fn beckmann_d<L: Lanes>(tan2: L, inverse_alpha2: L) -> L {
+pub fn beckmann_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
     let secant2 = tan2 + L::one();
     (-(tan2 * inverse_alpha2)).exp() * (secant2 * secant2) * (inverse_alpha2 * L::of(FRAC_1_PI))
 }
 
 /// The GGX distribution D [1/sr]: 1 / (pi alpha^2 cos^4 (1 + tan2 / alpha^2)^2).
 #[inline(always)]
-pub fn ggx_d<L: Lanes>(tan2: L, inverse_alpha2: L) -> L {
+pub fn ggx_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
     let ratio = (tan2 + L::one()) / (tan2 * inverse_alpha2 + L::one());
     ratio * ratio * (inverse_alpha2 * L::of(FRAC_1_PI))
 }
@@ -174,7 +174,7 @@ pub fn ggx_d<L: Lanes>(tan2: L, inverse_alpha2: L) -> L {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::{Double, Real, Single};
+    use crate::lanes::{Double, Float, Single};
     use std::f64::consts::PI;
 
     /// 1 - erf(x) for x >= 0 by its continued fraction or series.
@@ -194,7 +194,7 @@ mod tests {
     }
 
     /// The error function undoes it, from the middle to the last number in the tails.
-    fn undone<L: Lanes>(numbers: &[f64], most: f64) {
+    fn undone<L: SimdFloat>(numbers: &[f64], most: f64) {
         for u in numbers {
             let x: f64 = erf_inverse(L::of(*u)).lane(0).to_f64();
             // The number that belongs to x, and how far from u, in the slope's own units.
@@ -221,14 +221,14 @@ mod tests {
         ends::<Double>();
     }
 
-    fn ends<L: Lanes>() {
+    fn ends<L: SimdFloat>() {
         let at = |u: f64| erf_inverse(L::of(u)).lane(0).to_f64();
         assert_eq!(at(0.5), 0.0);
         assert!((-5.0..-4.5).contains(&at(0.0)), "{}", at(0.0));
     }
 
     /// Squares about the centre become circles, and areas stay areas.
-    fn round<L: Lanes>(most: f64) {
+    fn round<L: SimdFloat>(most: f64) {
         let at = |u: f64, v: f64| {
             let (x, y, r2) = disk(L::of(u), L::of(v));
             [x, y, r2].map(|x| x.lane(0).to_f64())

@@ -3,7 +3,7 @@
 use crate::camera::Camera;
 use crate::light::Light;
 use crate::material::Material;
-use crate::scene::{Object, Scene, Step};
+use crate::scene::{Object, Scene, TransformOp};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -139,7 +139,7 @@ fn bytes(scene: &Scene) -> usize {
     let objects: usize = scene
         .objects
         .iter()
-        .map(|o| o.name.len() + o.material.len() + o.transform.len() * size_of::<Step>())
+        .map(|o| o.name.len() + o.material.len() + o.transform.len() * size_of::<TransformOp>())
         .sum();
     size_of::<Scene>()
         + objects

@@ -16,7 +16,7 @@ mod validate;
 
 pub use crate::primitive::Acceleration;
 pub use crate::scene::format::schema::FIELDS;
-pub use crate::shape::{Rotate, STEP_FIELDS, Scale, Step};
+pub use crate::shape::{Rotate, Scale, TRANSFORM_OP_FIELDS, TransformOp};
 pub use asset_resolver::Library;
 pub use builtin::{BUILT_IN, built_in, starter};
 pub use diagnostic::{Message, SceneErrors};

@@ -1,8 +1,8 @@
 //! Objects: a shape, where it stands, what it is made of.
 
 use crate::primitive::Form;
-use crate::shape::{KINDS, STEP_FIELDS, Shape, Step, chained, misplaced};
-use crate::value::{Checks, Fault, Field, Takes};
+use crate::shape::{KINDS, Shape, TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
+use crate::value::{Field, ValidationError, Validator, ValueType};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 
@@ -20,23 +20,23 @@ pub struct Object {
     pub shape: Shape,
     /// Steps that move, turn and scale it, the first step first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub transform: Vec<Step>,
+    pub transform: Vec<TransformOp>,
 }
 
 /// The keys of `[[object]]`.
 pub const OBJECT_FIELDS: &[Field] = &[
-    Field::without("name", Takes::Text, "", "a number", "Name; no two objects have the same."),
+    Field::without("name", ValueType::Text, "", "a number", "Name; no two objects have the same."),
     Field::without(
         "material",
-        Takes::Text,
+        ValueType::Text,
         "",
         "a matt light grey, the default of every material key",
         "Name of one of the `[materials.NAME]`.",
     ),
-    Field::required("shape", Takes::OneOf(KINDS), "", "What it looks like: exactly one kind."),
+    Field::required("shape", ValueType::OneOf(KINDS), "", "What it looks like: exactly one kind."),
     Field::without(
         "transform",
-        Takes::ListOf(STEP_FIELDS),
+        ValueType::ListOf(TRANSFORM_OP_FIELDS),
         "",
         "it stays as its shape says",
         "Steps that move, turn and scale it, the first step first.",
@@ -65,7 +65,7 @@ impl Object {
 
     /// The transform's steps in order, as one map.
     pub fn scene_from_object(&self) -> DAffine3 {
-        chained(&self.transform)
+        compose(&self.transform)
     }
 
     /// Its geometry where it stands, in double precision. Of an object without faults.
@@ -77,12 +77,13 @@ impl Object {
     }
 
     /// What is wrong with it (its material's name is the scene's business).
-    pub fn faults(&self) -> Vec<Fault> {
-        let mut checks = Checks::new(OBJECT_FIELDS).inner("shape", self.shape.faults());
+    pub fn faults(&self) -> Vec<ValidationError> {
+        let mut checks = Validator::new(OBJECT_FIELDS).inner("shape", self.shape.faults());
         for (i, step) in self.transform.iter().enumerate() {
             checks = checks.inner(&format!("transform.{i}"), step.faults());
         }
-        let moved = if checks.clean() { misplaced(&self.shape, &self.transform) } else { None };
+        let moved =
+            if checks.clean() { ill_conditioned(&self.shape, &self.transform) } else { None };
         checks.and(moved).faults()
     }
 }

@@ -1,8 +1,8 @@
 //! The reference of the scene file format, generated from the tables of fields.
 
 use crate::scene::format::schema::FIELDS;
-use crate::shape::{EXAMPLES, KINDS, STEP_FIELDS};
-use crate::value::{Field, Preset, Takes};
+use crate::shape::{EXAMPLES, KINDS, TRANSFORM_OP_FIELDS};
+use crate::value::{DefaultValue, Field, ValueType};
 use std::fmt::Write as _;
 
 const INTRODUCTION: &str = "\
@@ -77,13 +77,13 @@ pub fn reference() -> String {
     let mut out = INTRODUCTION.to_string();
     for field in FIELDS {
         let (title, fields): (String, &[Field]) = match field.takes {
-            Takes::Table(fields) => (format!("[{}]", field.name), fields),
-            Takes::Tables(fields) => (format!("[[{}]]", field.name), fields),
-            Takes::Named(fields) => (format!("[{}.NAME]", field.name), fields),
+            ValueType::Table(fields) => (format!("[{}]", field.name), fields),
+            ValueType::Tables(fields) => (format!("[[{}]]", field.name), fields),
+            ValueType::Named(fields) => (format!("[{}.NAME]", field.name), fields),
             _ => continue,
         };
         push(&mut out, &format!("\n## `{title}`\n\n{}", field.doc));
-        if let Preset::Without(instead) = field.preset {
+        if let DefaultValue::Without(instead) = field.preset {
             push(&mut out, &format!(" Without it {instead}."));
         }
         push(&mut out, "\n\n");
@@ -102,7 +102,7 @@ fn push(out: &mut String, text: &str) {
 /// What does not fit into the table's row of `field`: its words, or its own keys.
 fn nested(out: &mut String, field: &Field) {
     match field.takes {
-        Takes::Choice(choices) => {
+        ValueType::Choice(choices) => {
             let mut words = format!("\n`{}`:\n\n", field.name);
             for choice in choices {
                 // Writing into a String cannot fail.
@@ -114,24 +114,24 @@ fn nested(out: &mut String, field: &Field) {
             }
             push(out, &words);
         }
-        Takes::Table(fields) => {
+        ValueType::Table(fields) => {
             push(out, &format!("\n`{}`:\n\n", field.name));
             table(out, fields);
             fields.iter().for_each(|field| nested(out, field));
         }
-        Takes::OneOf(_) if field.name == "shape" => shapes(out),
-        Takes::OneOf(fields) => {
+        ValueType::OneOf(_) if field.name == "shape" => shapes(out),
+        ValueType::OneOf(fields) => {
             push(out, &format!("\n`{}`, exactly one of:\n\n", field.name));
             kinds(out, fields);
             for kind in fields {
-                if let Takes::Table(inner) = kind.takes {
+                if let ValueType::Table(inner) = kind.takes {
                     push(out, &format!("\n`{}.{}`:\n\n", field.name, kind.name));
                     table(out, inner);
                     inner.iter().for_each(|field| nested(out, field));
                 }
             }
         }
-        Takes::ListOf(_) => steps(out),
+        ValueType::ListOf(_) => steps(out),
         _ => {}
     }
 }
@@ -140,7 +140,7 @@ fn shapes(out: &mut String) {
     for (kind, (_, example)) in KINDS.iter().zip(EXAMPLES) {
         push(out, &format!("\n### `shape.{}`\n\n{}\n\n", kind.name, kind.doc));
         push(out, &format!("```toml\n{example}\n```\n\n"));
-        if let Takes::Table(fields) = kind.takes {
+        if let ValueType::Table(fields) = kind.takes {
             table(out, fields);
             fields.iter().for_each(|field| nested(out, field));
         }
@@ -154,8 +154,8 @@ fn steps(out: &mut String) {
         out,
         "```toml\ntransform = [{ rotate_y = 30.0 }, { translate = [0.0, 1.0, 0.0] }]\n```\n\n",
     );
-    kinds(out, STEP_FIELDS);
-    for field in STEP_FIELDS {
+    kinds(out, TRANSFORM_OP_FIELDS);
+    for field in TRANSFORM_OP_FIELDS {
         nested(out, field);
     }
 }
@@ -172,9 +172,9 @@ fn table(out: &mut String, fields: &[Field]) {
     push(out, "| key | value | unit | default | meaning |\n|---|---|---|---|---|\n");
     for field in fields {
         let default = match field.preset {
-            Preset::Required => "needed".to_string(),
-            Preset::Is(text) => code(text),
-            Preset::Without(instead) => format!("none: {instead}"),
+            DefaultValue::Required => "needed".to_string(),
+            DefaultValue::Is(text) => code(text),
+            DefaultValue::Without(instead) => format!("none: {instead}"),
         };
         row(out, &[&code(field.name), &value(field), field.unit, &default, field.doc]);
     }
@@ -186,11 +186,11 @@ fn code(text: &str) -> String {
 
 fn value(field: &Field) -> String {
     match field.takes {
-        Takes::Table(_) => "a table, see below".to_string(),
-        Takes::OneOf(_) => "exactly one kind, see below".to_string(),
-        Takes::ListOf(_) => "a list of steps, see below".to_string(),
-        Takes::Choice(_) => "a word, see below".to_string(),
-        Takes::Tables(_) => "a list of parts".to_string(),
+        ValueType::Table(_) => "a table, see below".to_string(),
+        ValueType::OneOf(_) => "exactly one kind, see below".to_string(),
+        ValueType::ListOf(_) => "a list of steps, see below".to_string(),
+        ValueType::Choice(_) => "a word, see below".to_string(),
+        ValueType::Tables(_) => "a list of parts".to_string(),
         takes => takes.to_string(),
     }
 }

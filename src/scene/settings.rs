@@ -1,7 +1,7 @@
 //! What holds for the whole picture: raster, tracing, background, ambient light.
 
 use crate::primitive::Acceleration;
-use crate::value::{Checks, Choice, Color, Fault, Field, Range, Takes};
+use crate::value::{Choice, Color, Field, NumberRange, ValidationError, Validator, ValueType};
 use serde::{Deserialize, Serialize};
 
 /// The picture's raster.
@@ -117,14 +117,14 @@ pub const MAX_PIXELS: u64 = 1 << 26;
 pub const FILM_FIELDS: &[Field] = &[
     Field::preset(
         "size",
-        Takes::Wholes(2, Range::closed(1.0, 16384.0)),
+        ValueType::Wholes(2, NumberRange::closed(1.0, 16384.0)),
         "pixels",
         "[640, 480]",
         "Width and height of the picture; together at most 67108864 pixels.",
     ),
     Field::preset(
         "filter",
-        Takes::Choice(&[
+        ValueType::Choice(&[
             Choice { name: "box", doc: "evenly over the pixel's square" },
             Choice { name: "center", doc: "all in its centre: no anti-aliasing" },
         ]),
@@ -134,7 +134,7 @@ pub const FILM_FIELDS: &[Field] = &[
     ),
     Field::preset(
         "rays_per_pixel",
-        Takes::Whole(Range::closed(0.0, 1e9)),
+        ValueType::Whole(NumberRange::closed(0.0, 1e9)),
         "samples",
         "0",
         "The most samples that a pixel with a glossy reflection gets; 0: no cap.",
@@ -145,7 +145,7 @@ pub const FILM_FIELDS: &[Field] = &[
 pub const TRACE_FIELDS: &[Field] = &[
     Field::preset(
         "level",
-        Takes::Choice(&[
+        ValueType::Choice(&[
             Choice { name: "primary", doc: "camera rays only: no shadows, no reflections" },
             Choice { name: "shadows", doc: "camera rays and shadow rays" },
             Choice { name: "full", doc: "everything" },
@@ -156,21 +156,21 @@ pub const TRACE_FIELDS: &[Field] = &[
     ),
     Field::preset(
         "depth",
-        Takes::Whole(Range::closed(0.0, 10000.0)),
+        ValueType::Whole(NumberRange::closed(0.0, 10000.0)),
         "surfaces",
         "16",
         "The most surfaces that a path meets after the first; 0: no reflection, no transmission.",
     ),
     Field::preset(
         "min_weight",
-        Takes::Number(Range::SHARE),
+        ValueType::Number(NumberRange::SHARE),
         "",
         "0.0",
         "A path ends when what it could still add is weighted by less than this.",
     ),
     Field::preset(
         "horizon",
-        Takes::Choice(&[
+        ValueType::Choice(&[
             Choice { name: "fold", doc: "it is mirrored at the surface: no light is lost" },
             Choice { name: "absorb", doc: "it is lost" },
         ]),
@@ -180,7 +180,7 @@ pub const TRACE_FIELDS: &[Field] = &[
     ),
     Field::preset(
         "acceleration",
-        Takes::Choice(Acceleration::CHOICES),
+        ValueType::Choice(Acceleration::CHOICES),
         "",
         "\"auto\"",
         "How rays are kept from things that they cannot meet. It changes the time, never the picture.",
@@ -190,7 +190,7 @@ pub const TRACE_FIELDS: &[Field] = &[
 /// The keys of `[background]`.
 pub const BACKGROUND_FIELDS: &[Field] = &[Field::preset(
     "color",
-    Takes::Color(Range::LIGHT),
+    ValueType::Color(NumberRange::LIGHT),
     "radiance",
     "[0.0, 0.0, 0.0]",
     "What a ray sees that meets nothing.",
@@ -199,7 +199,7 @@ pub const BACKGROUND_FIELDS: &[Field] = &[Field::preset(
 /// The keys of `[ambient]`.
 pub const AMBIENT_FIELDS: &[Field] = &[Field::preset(
     "color",
-    Takes::Color(Range::LIGHT),
+    ValueType::Color(NumberRange::LIGHT),
     "radiance",
     "[0.0, 0.0, 0.0]",
     "Light from everywhere, without shadows: i_a of k_a i_a.",
@@ -207,13 +207,13 @@ pub const AMBIENT_FIELDS: &[Field] = &[Field::preset(
 
 impl FilmSettings {
     /// What is wrong with it.
-    pub fn faults(&self) -> Vec<Fault> {
+    pub fn faults(&self) -> Vec<ValidationError> {
         let [width, height] = self.size;
         let checks =
-            Checks::new(FILM_FIELDS).numbers("size", &[f64::from(width), f64::from(height)]);
+            Validator::new(FILM_FIELDS).numbers("size", &[f64::from(width), f64::from(height)]);
         let pixels = u64::from(width) * u64::from(height);
         let too_many = (checks.clean() && pixels > MAX_PIXELS).then(|| {
-            Fault::new(
+            ValidationError::new(
                 "size",
                 format!("size is [{width}, {height}], {pixels} pixels"),
                 format!("at most {MAX_PIXELS} pixels, such as [8192, 8192]"),
@@ -225,8 +225,8 @@ impl FilmSettings {
 
 impl Trace {
     /// What is wrong with it.
-    pub fn faults(&self) -> Vec<Fault> {
-        Checks::new(TRACE_FIELDS)
+    pub fn faults(&self) -> Vec<ValidationError> {
+        Validator::new(TRACE_FIELDS)
             .numbers("depth", &[f64::from(self.depth)])
             .numbers("min_weight", &[self.min_weight])
             .faults()
@@ -235,14 +235,14 @@ impl Trace {
 
 impl Background {
     /// What is wrong with it.
-    pub fn faults(&self) -> Vec<Fault> {
-        Checks::new(BACKGROUND_FIELDS).numbers("color", &self.color.0).faults()
+    pub fn faults(&self) -> Vec<ValidationError> {
+        Validator::new(BACKGROUND_FIELDS).numbers("color", &self.color.0).faults()
     }
 }
 
 impl Ambient {
     /// What is wrong with it.
-    pub fn faults(&self) -> Vec<Fault> {
-        Checks::new(AMBIENT_FIELDS).numbers("color", &self.color.0).faults()
+    pub fn faults(&self) -> Vec<ValidationError> {
+        Validator::new(AMBIENT_FIELDS).numbers("color", &self.color.0).faults()
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::material::{Bump, Checker, HeightImage, ImageTexture, Texture};
 use crate::scene::*;
-use crate::shape::{EXAMPLES, KINDS, MAX_DEPTH, Part, Shape};
-use crate::value::{Field, Preset, Takes};
+use crate::shape::{CsgOperand, EXAMPLES, KINDS, MAX_DEPTH, Shape};
+use crate::value::{DefaultValue, Field, ValueType};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -33,7 +33,7 @@ fn same_defaults<T: DeserializeOwned + Serialize>(what: &str, fields: &[Field], 
     for field in fields {
         let value = written.get(field.name);
         match field.preset {
-            Preset::Required => {
+            DefaultValue::Required => {
                 let mut without = given.clone();
                 assert!(
                     without.remove(field.name).is_some(),
@@ -43,19 +43,19 @@ fn same_defaults<T: DeserializeOwned + Serialize>(what: &str, fields: &[Field], 
                 let text = without.to_string();
                 assert!(toml::from_str::<T>(&text).is_err(), "{what} without {}", field.name);
             }
-            Preset::Is(text) => {
+            DefaultValue::Is(text) => {
                 let line = format!("value = {text}").parse::<toml::Table>().unwrap();
                 assert_eq!(value, line.get("value"), "{what}.{}", field.name);
             }
-            Preset::Without(_) if given.contains_key(field.name) => {}
-            Preset::Without(_) => assert_eq!(value, None, "{what}.{}", field.name),
+            DefaultValue::Without(_) if given.contains_key(field.name) => {}
+            DefaultValue::Without(_) => assert_eq!(value, None, "{what}.{}", field.name),
         }
     }
 }
 
 fn inner(fields: &[Field], name: &str) -> &'static [Field] {
     match fields.iter().find(|f| f.name == name).unwrap().takes {
-        Takes::Table(fields) | Takes::OneOf(fields) | Takes::Tables(fields) => fields,
+        ValueType::Table(fields) | ValueType::OneOf(fields) | ValueType::Tables(fields) => fields,
         other => panic!("{name} takes {other:?}"),
     }
 }
@@ -88,9 +88,9 @@ fn tables_name_the_keys_that_are_read() {
     same_keys::<HeightImage>("bump.image", texture("bump", "image"));
     same_keys::<Object>("object", OBJECT_FIELDS);
     same_keys::<Shape>("shape", KINDS);
-    same_keys::<Part>("part", inner(inner(KINDS, "union"), "of"));
-    same_keys::<Step>("step", STEP_FIELDS);
-    same_keys::<Rotate>("rotate", inner(STEP_FIELDS, "rotate"));
+    same_keys::<CsgOperand>("part", inner(inner(KINDS, "union"), "of"));
+    same_keys::<TransformOp>("step", TRANSFORM_OP_FIELDS);
+    same_keys::<Rotate>("rotate", inner(TRANSFORM_OP_FIELDS, "rotate"));
 }
 
 #[test]
@@ -108,7 +108,7 @@ fn tables_tell_the_defaults_that_hold() {
     same_defaults::<Object>("object", OBJECT_FIELDS, EXAMPLES[0].1);
     same_defaults::<Rotate>(
         "rotate",
-        inner(STEP_FIELDS, "rotate"),
+        inner(TRANSFORM_OP_FIELDS, "rotate"),
         "axis = [0.0, 1.0, 0.0]\ndegrees = 1.0",
     );
 }
@@ -117,7 +117,7 @@ fn tables_tell_the_defaults_that_hold() {
 fn every_word_is_read() {
     fn words<T: DeserializeOwned>(fields: &[Field]) {
         for field in fields {
-            if let Takes::Choice(choices) = field.takes {
+            if let ValueType::Choice(choices) = field.takes {
                 for choice in choices {
                     let line = format!("{} = \"{}\"", field.name, choice.name);
                     assert!(toml::from_str::<T>(&line).is_ok(), "{line}");
@@ -155,7 +155,7 @@ fn read(kind: &Field, values: &toml::Table) -> Result<Shape, toml::de::Error> {
 fn shapes_have_sound_examples_and_honest_tables() {
     for (kind, (key, text)) in KINDS.iter().zip(EXAMPLES) {
         assert_eq!(kind.name, *key);
-        let Takes::Table(fields) = kind.takes else { panic!("{key}") };
+        let ValueType::Table(fields) = kind.takes else { panic!("{key}") };
         let given = example(kind, text);
         let shape = read(kind, &given).unwrap_or_else(|e| panic!("{key}: {e}"));
         assert_eq!(shape.key(), *key);
@@ -174,13 +174,13 @@ fn shapes_have_sound_examples_and_honest_tables() {
             without.remove(field.name);
             let read = read(kind, &without);
             match field.preset {
-                Preset::Required => assert!(read.is_err(), "{key} without {}", field.name),
-                Preset::Is(text) => {
+                DefaultValue::Required => assert!(read.is_err(), "{key} without {}", field.name),
+                DefaultValue::Is(text) => {
                     let line = format!("value = {text}").parse::<toml::Table>().unwrap();
                     let written = toml::Table::try_from(read.unwrap()).unwrap();
                     assert_eq!(written[*key][field.name], line["value"], "{key}.{}", field.name);
                 }
-                Preset::Without(_) => assert!(read.is_ok(), "{key} without {}", field.name),
+                DefaultValue::Without(_) => assert!(read.is_ok(), "{key} without {}", field.name),
             }
         }
     }
@@ -189,13 +189,13 @@ fn shapes_have_sound_examples_and_honest_tables() {
 #[test]
 fn every_number_of_every_shape_is_checked() {
     for (kind, (key, text)) in KINDS.iter().zip(EXAMPLES) {
-        let Takes::Table(fields) = kind.takes else { panic!("{key}") };
+        let ValueType::Table(fields) = kind.takes else { panic!("{key}") };
         for field in fields {
             let bad: Vec<toml::Value> = match field.takes {
-                Takes::Number(range) if range.low == 0.0 && range.low_in => vec![(-1.0).into()],
-                Takes::Number(range) if range.low == 0.0 => vec![0.0.into(), (-1.0).into()],
-                Takes::Number(_) => vec![f64::INFINITY.into()],
-                Takes::Numbers(n, range) => {
+                ValueType::Number(range) if range.low == 0.0 && range.low_in => vec![(-1.0).into()],
+                ValueType::Number(range) if range.low == 0.0 => vec![0.0.into(), (-1.0).into()],
+                ValueType::Number(_) => vec![f64::INFINITY.into()],
+                ValueType::Numbers(n, range) => {
                     let outside = if range.low == 0.0 { 0.0 } else { 1e10 };
                     (0..n)
                         .map(|i| {
@@ -205,10 +205,10 @@ fn every_number_of_every_shape_is_checked() {
                         })
                         .collect()
                 }
-                Takes::Direction => vec![vec![0.0; 3].into()],
+                ValueType::Direction => vec![vec![0.0; 3].into()],
                 // Parts: their faults are tested below.
-                Takes::Tables(_) => continue,
-                Takes::Text | Takes::Choice(_) => continue,
+                ValueType::Tables(_) => continue,
+                ValueType::Text | ValueType::Choice(_) => continue,
                 other => panic!("{key}.{} takes {other:?}: test it", field.name),
             };
             let nan = match bad[0].as_array() {
@@ -279,7 +279,7 @@ fn faults_of_parts_say_which_part() {
 fn compounds_may_be_nested_so_deep_and_no_deeper() {
     let sphere =
         || -> Shape { toml::from_str("sphere = { center = [0, 0, 0], radius = 1 }").unwrap() };
-    let part = |shape| Part { shape, material: String::new(), transform: Vec::new() };
+    let part = |shape| CsgOperand { shape, material: String::new(), transform: Vec::new() };
     let mut shape = sphere();
     for depth in 1..=MAX_DEPTH + 1 {
         shape = Shape::Union(crate::shape::Union { of: vec![part(shape), part(sphere())] });

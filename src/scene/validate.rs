@@ -4,7 +4,7 @@
 use crate::material::Mapping;
 use crate::scene::Scene;
 use crate::scene::format::suggest::nearest;
-use crate::value::{Fault, excerpt};
+use crate::value::{ValidationError, excerpt};
 use std::collections::HashMap;
 use std::fmt;
 
@@ -82,7 +82,7 @@ impl Scene {
     /// Everything wrong with the scene; a scene that was read has nothing wrong, an edited one may.
     pub fn faults(&self) -> Vec<Finding> {
         let mut findings = Vec::new();
-        let mut add = |path: &[&str], faults: Vec<Fault>| {
+        let mut add = |path: &[&str], faults: Vec<ValidationError>| {
             findings.extend(faults.into_iter().map(|fault| {
                 let mut all = path.to_vec();
                 all.extend(fault.key.split('.').filter(|k| !k.is_empty()));

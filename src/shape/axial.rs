@@ -3,7 +3,7 @@
 
 use crate::primitive::Form;
 use crate::shape::texture_space::around_axis;
-use crate::value::{Fault, unit};
+use crate::value::{ValidationError, unit};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// The solid around the axis from `base` to `top`, two different points, with these radii there, both
@@ -19,7 +19,7 @@ pub(super) fn between(base: [f64; 3], top: [f64; 3], base_radius: f64, top_radiu
     let axis = to - from;
     let (u, v) = unit(axis).unwrap_or(DVec3::Y).any_orthonormal_pair();
     let linear = DMat3::from_cols(u * wide, v * wide, axis);
-    Form::tapered(DAffine3::from_mat3_translation(linear, from), narrow / wide)
+    Form::conical_frustum(DAffine3::from_mat3_translation(linear, from), narrow / wide)
 }
 
 /// The axes in which textures lie on it: y from `base` to `top`.
@@ -29,9 +29,13 @@ pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
 }
 
 /// The fault of an axis of length 0, which ends at the key `name`.
-pub(super) fn no_axis(base: [f64; 3], top: [f64; 3], name: &str) -> Option<Fault> {
+pub(super) fn no_axis(base: [f64; 3], top: [f64; 3], name: &str) -> Option<ValidationError> {
     (base == top).then(|| {
-        Fault::new(name, format!("{name} is the same point as base"), "a point away from base")
+        ValidationError::new(
+            name,
+            format!("{name} is the same point as base"),
+            "a point away from base",
+        )
     })
 }
 
@@ -50,7 +54,7 @@ mod tests {
     use super::*;
 
     fn ends(form: &Form) -> (DVec3, DVec3, f64) {
-        let Form::Tapered { scene_from_unit: m, top } = form else { panic!("{form:?}") };
+        let Form::ConicalFrustum { scene_from_unit: m, top } = form else { panic!("{form:?}") };
         (m.translation, m.translation + m.matrix3.z_axis, *top)
     }
 
@@ -70,13 +74,13 @@ mod tests {
     fn the_canonical_form_may_widen() {
         let map = DAffine3::from_translation(DVec3::X);
         for s in [0.0, 0.3, 1.0, 4.0] {
-            let form = Form::tapered(map, s);
+            let form = Form::conical_frustum(map, s);
             let (low, high) = form.bounds().unwrap();
             let r = s.max(1.0);
             assert!((low - DVec3::new(1.0 - r, -r, 0.0)).length() < 1e-15, "{s}: {low}");
             assert!((high - DVec3::new(1.0 + r, r, 1.0)).length() < 1e-15, "{s}: {high}");
             // A point of the rim at z = 1, and whether it is at the same distance from the axis.
-            let Form::Tapered { scene_from_unit: m, top } = form else { panic!("{form:?}") };
+            let Form::ConicalFrustum { scene_from_unit: m, top } = form else { panic!("{form:?}") };
             let at_one = if s > 1.0 { DVec3::X } else { DVec3::new(top, 0.0, 1.0) };
             let rim = m.transform_point3(at_one);
             assert!((rim - DVec3::new(1.0 + s, 0.0, 1.0)).length() < 1e-15, "{s}: {rim}");

@@ -1,10 +1,10 @@
 //! Cone: from a disc to its apex.
 
 use crate::primitive::Form;
-use crate::shape::Kind;
+use crate::shape::ShapeDesc;
 use crate::shape::axial::axes_between;
 use crate::shape::axial::{between, height, is_upright, no_axis};
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -20,28 +20,38 @@ pub struct Cone {
     pub radius: f64,
 }
 
-impl Kind for Cone {
+impl ShapeDesc for Cone {
     const DOC: &'static str = "A right circular cone with a flat base.";
     const EXAMPLE: &'static str =
         "shape.cone = { base = [0.0, 0.0, 0.0], apex = [0.0, 1.0, 0.0], radius = 0.5 }";
     const FIELDS: &'static [Field] = &[
         Field::required(
             "base",
-            Takes::Numbers(3, Range::COORDINATE),
+            ValueType::Numbers(3, NumberRange::COORDINATE),
             "scene units",
             "Centre of the base.",
         ),
-        Field::required("apex", Takes::Numbers(3, Range::COORDINATE), "scene units", "The apex."),
-        Field::required("radius", Takes::Number(Range::SIZE), "scene units", "Radius of the base."),
+        Field::required(
+            "apex",
+            ValueType::Numbers(3, NumberRange::COORDINATE),
+            "scene units",
+            "The apex.",
+        ),
+        Field::required(
+            "radius",
+            ValueType::Number(NumberRange::SIZE),
+            "scene units",
+            "Radius of the base.",
+        ),
     ];
 
     fn form(&self) -> Form {
         between(self.base, self.apex, self.radius, 0.0)
     }
 
-    fn faults(&self) -> Vec<Fault> {
+    fn faults(&self) -> Vec<ValidationError> {
         let sizes = [("radius", self.radius), ("apex", height(self.base, self.apex))];
-        Checks::new(Self::FIELDS)
+        Validator::new(Self::FIELDS)
             .numbers("base", &self.base)
             .numbers("apex", &self.apex)
             .numbers("radius", &[self.radius])

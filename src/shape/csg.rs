@@ -4,11 +4,11 @@
 //! objects and parts can be copied into each other.
 
 use crate::primitive::Form;
-use crate::primitive::csg_tree::{Compound, Tree};
+use crate::primitive::csg_tree::{CsgSolid, CsgTree};
 use crate::shape::registry::KIND_TABLE;
-use crate::shape::transform::{STEP_FIELDS, Step, chained, misplaced};
-use crate::shape::{Cuboid, Kind, Shape, Sphere};
-use crate::value::{Checks, Fault, Field, Takes};
+use crate::shape::transform::{TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
+use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
+use crate::value::{Field, ValidationError, Validator, ValueType};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ pub const MAX_DEPTH: usize = 64;
 /// A part of a compound.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Part {
+pub struct CsgOperand {
     /// What it looks like: a solid, or a plane for the half-space behind it.
     pub shape: Shape,
     /// Key of the scene's `materials`; empty: that of the whole.
@@ -26,26 +26,26 @@ pub struct Part {
     pub material: String,
     /// Steps that move, turn and scale it inside the whole, the first step first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub transform: Vec<Step>,
+    pub transform: Vec<TransformOp>,
 }
 
 static PART_FIELDS: [Field; 3] = [
     Field::required(
         "shape",
-        Takes::OneOf(&KIND_TABLE),
+        ValueType::OneOf(&KIND_TABLE),
         "",
         "What it looks like: a solid, or a plane for the half-space behind it.",
     ),
     Field::without(
         "material",
-        Takes::Text,
+        ValueType::Text,
         "",
         "that of the whole",
         "Name of one of the `[materials.NAME]`.",
     ),
     Field::without(
         "transform",
-        Takes::ListOf(STEP_FIELDS),
+        ValueType::ListOf(TRANSFORM_OP_FIELDS),
         "",
         "it stays as its shape says",
         "Steps that move, turn and scale it, the first step first.",
@@ -55,7 +55,7 @@ static PART_FIELDS: [Field; 3] = [
 /// The keys of a compound kind.
 pub(super) static OF_FIELDS: [Field; 1] = [Field::required(
     "of",
-    Takes::Tables(&PART_FIELDS),
+    ValueType::Tables(&PART_FIELDS),
     "",
     "Two parts or more, each written like an object: `shape`, `material`, `transform`.",
 )];
@@ -67,24 +67,24 @@ macro_rules! compounds {
         #[serde(deny_unknown_fields)]
         pub struct $kind {
             /// The parts.
-            pub of: Vec<Part>,
+            pub of: Vec<CsgOperand>,
         }
 
-        impl Kind for $kind {
+        impl ShapeDesc for $kind {
             const DOC: &'static str = $doc;
             const EXAMPLE: &'static str = $example;
             const FIELDS: &'static [Field] = &OF_FIELDS;
 
             fn form(&self) -> Form {
-                Form::Compound(combined(&self.of, Tree::$kind))
+                Form::Csg(combined(&self.of, CsgTree::$kind))
             }
 
-            fn faults(&self) -> Vec<Fault> {
+            fn faults(&self) -> Vec<ValidationError> {
                 let faults = part_faults(&self.of, 1);
                 if !faults.is_empty() || self.form().bounds().is_some() {
                     return faults;
                 }
-                vec![Fault::new(
+                vec![ValidationError::new(
                     "of",
                     "the parts together have no end",
                     "a solid with an end: planes can be taken from one, or intersected with one",
@@ -92,7 +92,7 @@ macro_rules! compounds {
             }
 
             fn standing(base: DVec3, size: DVec3) -> Self {
-                Self { of: standing(base, size).map(Part::new).into() }
+                Self { of: standing(base, size).map(CsgOperand::new).into() }
             }
 
             fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
@@ -137,7 +137,7 @@ fn standing(base: DVec3, size: DVec3) -> [Shape; 2] {
     [Shape::Cuboid(block), Shape::Sphere(ball)]
 }
 
-impl Part {
+impl CsgOperand {
     /// A shape as it is, of the material of the whole.
     pub fn new(shape: Shape) -> Self {
         Self { shape, material: String::new(), transform: Vec::new() }
@@ -145,7 +145,7 @@ impl Part {
 }
 
 /// The parts of a compound kind; `None`: the shape is a simple one.
-pub(super) fn parts_of(shape: &Shape) -> Option<&[Part]> {
+pub(super) fn parts_of(shape: &Shape) -> Option<&[CsgOperand]> {
     match shape {
         Shape::Union(Union { of })
         | Shape::Intersection(Intersection { of })
@@ -155,7 +155,7 @@ pub(super) fn parts_of(shape: &Shape) -> Option<&[Part]> {
 }
 
 /// [`parts_of`], to be changed.
-fn parts_of_mut(shape: &mut Shape) -> &mut [Part] {
+fn parts_of_mut(shape: &mut Shape) -> &mut [CsgOperand] {
     match shape {
         Shape::Union(Union { of })
         | Shape::Intersection(Intersection { of })
@@ -164,41 +164,43 @@ fn parts_of_mut(shape: &mut Shape) -> &mut [Part] {
     }
 }
 
-fn combined(of: &[Part], join: fn(Vec<Tree>) -> Tree) -> Compound {
+fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     let mut parts = Vec::new();
     let mut trees = Vec::new();
     for part in of {
-        match part.shape.form().transformed(&chained(&part.transform)) {
-            Form::Compound(inner) => {
+        match part.shape.form().transformed(&compose(&part.transform)) {
+            Form::Csg(inner) => {
                 trees.push(inner.tree.shifted(parts.len()));
                 parts.extend(inner.parts);
             }
             simple => {
-                trees.push(Tree::Part(parts.len()));
+                trees.push(CsgTree::Part(parts.len()));
                 parts.push(simple);
             }
         }
     }
-    Compound { parts, tree: join(trees) }
+    CsgSolid { parts, tree: join(trees) }
 }
 
 /// Why the shape cannot be a part, if it cannot.
 fn unfit(shape: &Shape) -> Option<&'static str> {
     match shape {
-        Shape::Rectangle(_) | Shape::Platform(_) => Some("is flat: nothing is inside it"),
-        Shape::MeshFile(_) => Some("cannot be a part of a compound"),
+        Shape::Rectangle(_) | Shape::HorizontalRectangle(_) => {
+            Some("is flat: nothing is inside it")
+        }
+        Shape::MeshDesc(_) => Some("cannot be a part of a compound"),
         _ => None,
     }
 }
 
-fn part_faults(of: &[Part], depth: usize) -> Vec<Fault> {
+fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     let mut faults = Vec::new();
     if of.len() < 2 {
         let found = ["of is an empty list", "of is a list of one part"][of.len()];
-        faults.push(Fault::new("of", found, "at least two parts"));
+        faults.push(ValidationError::new("of", found, "at least two parts"));
     }
     if depth > MAX_DEPTH {
-        faults.push(Fault::new(
+        faults.push(ValidationError::new(
             "of",
             format!("compounds are nested more than {MAX_DEPTH} deep"),
             "a flatter tree: a union, intersection or difference takes any number of parts",
@@ -215,13 +217,14 @@ fn part_faults(of: &[Part], depth: usize) -> Vec<Fault> {
         };
         let open = unfit(&part.shape).map(|why| {
             let found = format!("a {} {why}", part.shape.key());
-            Fault::new("shape", found, "a solid")
+            ValidationError::new("shape", found, "a solid")
         });
-        let mut checks = Checks::new(&PART_FIELDS).inner("shape", inner).and(open);
+        let mut checks = Validator::new(&PART_FIELDS).inner("shape", inner).and(open);
         for (k, step) in part.transform.iter().enumerate() {
             checks = checks.inner(&format!("transform.{k}"), step.faults());
         }
-        let moved = if checks.clean() { misplaced(&part.shape, &part.transform) } else { None };
+        let moved =
+            if checks.clean() { ill_conditioned(&part.shape, &part.transform) } else { None };
         faults.extend(checks.and(moved).faults().into_iter().map(|f| f.under(&format!("of.{i}"))));
     }
     faults

@@ -1,11 +1,11 @@
 //! Cube, standing upright.
 
 use crate::primitive::Form;
-use crate::shape::Kind;
+use crate::shape::ShapeDesc;
 use crate::shape::prismoid::{lower_left, upright};
 use crate::shape::registry::turned_rotation;
 use crate::shape::texture_space::turned_axes;
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -23,21 +23,26 @@ pub struct Cube {
     pub rotation: f64,
 }
 
-impl Kind for Cube {
+impl ShapeDesc for Cube {
     const DOC: &'static str = "A cube that stands upright.";
     const EXAMPLE: &'static str =
         "shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0, rotation = 30.0 }";
     const FIELDS: &'static [Field] = &[
         Field::required(
             "corner",
-            Takes::Numbers(3, Range::COORDINATE),
+            ValueType::Numbers(3, NumberRange::COORDINATE),
             "scene units",
             "Lower left near corner, before the rotation (near is +z).",
         ),
-        Field::required("edge", Takes::Number(Range::SIZE), "scene units", "Length of an edge."),
+        Field::required(
+            "edge",
+            ValueType::Number(NumberRange::SIZE),
+            "scene units",
+            "Length of an edge.",
+        ),
         Field::preset(
             "rotation",
-            Takes::Number(Range::FINITE),
+            ValueType::Number(NumberRange::FINITE),
             "degrees",
             "0.0",
             "Turn about the vertical through the centre, counter-clockwise seen from above.",
@@ -49,8 +54,8 @@ impl Kind for Cube {
         upright(DVec3::from_array(self.corner), &square(e), e, 1.0, self.rotation)
     }
 
-    fn faults(&self) -> Vec<Fault> {
-        Checks::new(Self::FIELDS)
+    fn faults(&self) -> Vec<ValidationError> {
+        Validator::new(Self::FIELDS)
             .numbers("corner", &self.corner)
             .numbers("edge", &[self.edge])
             .numbers("rotation", &[self.rotation])

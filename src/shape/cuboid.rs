@@ -4,9 +4,9 @@
 //! given inside out. A `transform` turns it.
 
 use crate::primitive::Form;
-use crate::shape::Kind;
+use crate::shape::ShapeDesc;
 use crate::shape::prismoid::upright;
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +20,7 @@ pub struct Cuboid {
     pub size: [f64; 3],
 }
 
-impl Kind for Cuboid {
+impl ShapeDesc for Cuboid {
     const DOC: &'static str =
         "A box with sides parallel to the axes; an object's `transform` can turn it.";
     const EXAMPLE: &'static str =
@@ -28,13 +28,13 @@ impl Kind for Cuboid {
     const FIELDS: &'static [Field] = &[
         Field::required(
             "center",
-            Takes::Numbers(3, Range::COORDINATE),
+            ValueType::Numbers(3, NumberRange::COORDINATE),
             "scene units",
             "Centre of the solid.",
         ),
         Field::required(
             "size",
-            Takes::Numbers(3, Range::SIZE),
+            ValueType::Numbers(3, NumberRange::SIZE),
             "scene units",
             "Lengths along x, y and z.",
         ),
@@ -47,8 +47,8 @@ impl Kind for Cuboid {
         upright(corner, &base, y, 1.0, 0.0)
     }
 
-    fn faults(&self) -> Vec<Fault> {
-        Checks::new(Self::FIELDS)
+    fn faults(&self) -> Vec<ValidationError> {
+        Validator::new(Self::FIELDS)
             .numbers("center", &self.center)
             .numbers("size", &self.size)
             .ratio(&self.size.map(|s| ("size", s)), &self.center)

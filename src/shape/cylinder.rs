@@ -1,10 +1,10 @@
 //! Cylinder: the points within `radius` of the axis between two points, with flat ends.
 
 use crate::primitive::Form;
-use crate::shape::Kind;
+use crate::shape::ShapeDesc;
 use crate::shape::axial::axes_between;
 use crate::shape::axial::{between, height, is_upright, no_axis};
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -20,33 +20,33 @@ pub struct Cylinder {
     pub radius: f64,
 }
 
-impl Kind for Cylinder {
+impl ShapeDesc for Cylinder {
     const DOC: &'static str = "A circular cylinder with flat ends.";
     const EXAMPLE: &'static str =
         "shape.cylinder = { base = [0.0, 0.0, 0.0], top = [0.0, 1.0, 0.0], radius = 0.4 }";
     const FIELDS: &'static [Field] = &[
         Field::required(
             "base",
-            Takes::Numbers(3, Range::COORDINATE),
+            ValueType::Numbers(3, NumberRange::COORDINATE),
             "scene units",
             "Centre of one end.",
         ),
         Field::required(
             "top",
-            Takes::Numbers(3, Range::COORDINATE),
+            ValueType::Numbers(3, NumberRange::COORDINATE),
             "scene units",
             "Centre of the other end.",
         ),
-        Field::required("radius", Takes::Number(Range::SIZE), "scene units", "Radius."),
+        Field::required("radius", ValueType::Number(NumberRange::SIZE), "scene units", "Radius."),
     ];
 
     fn form(&self) -> Form {
         between(self.base, self.top, self.radius, self.radius)
     }
 
-    fn faults(&self) -> Vec<Fault> {
+    fn faults(&self) -> Vec<ValidationError> {
         let sizes = [("radius", self.radius), ("top", height(self.base, self.top))];
-        Checks::new(Self::FIELDS)
+        Validator::new(Self::FIELDS)
             .numbers("base", &self.base)
             .numbers("top", &self.top)
             .numbers("radius", &[self.radius])

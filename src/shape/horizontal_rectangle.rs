@@ -1,32 +1,37 @@
 //! Platform: the ground that things stand on.
 
 use crate::primitive::Form;
-use crate::shape::Kind;
+use crate::shape::ShapeDesc;
 use crate::shape::texture_space::on_plane;
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A horizontal rectangle that faces up.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Platform {
+pub struct HorizontalRectangle {
     /// Centre.
     pub center: [f64; 3],
     /// Lengths along x and z.
     pub size: [f64; 2],
 }
 
-impl Kind for Platform {
+impl ShapeDesc for HorizontalRectangle {
     const DOC: &'static str =
         "A horizontal rectangle that faces up: the ground that things stand on.";
     const EXAMPLE: &'static str =
         "shape.platform = { center = [0.0, 0.0, 0.0], size = [8.0, 8.0] }";
     const FIELDS: &'static [Field] = &[
-        Field::required("center", Takes::Numbers(3, Range::COORDINATE), "scene units", "Centre."),
+        Field::required(
+            "center",
+            ValueType::Numbers(3, NumberRange::COORDINATE),
+            "scene units",
+            "Centre.",
+        ),
         Field::required(
             "size",
-            Takes::Numbers(2, Range::SIZE),
+            ValueType::Numbers(2, NumberRange::SIZE),
             "scene units",
             "Lengths along x and z.",
         ),
@@ -41,8 +46,8 @@ impl Kind for Platform {
         }
     }
 
-    fn faults(&self) -> Vec<Fault> {
-        Checks::new(Self::FIELDS)
+    fn faults(&self) -> Vec<ValidationError> {
+        Validator::new(Self::FIELDS)
             .numbers("center", &self.center)
             .numbers("size", &self.size)
             .ratio(&self.size.map(|s| ("size", s)), &self.center)

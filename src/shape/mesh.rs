@@ -2,8 +2,8 @@
 
 use crate::asset::{AssetError, Mesh, TriangleMesh};
 use crate::primitive::Form;
-use crate::shape::{Kind, Shape};
-use crate::value::{Choice, Fault, Field, Takes};
+use crate::shape::{Shape, ShapeDesc};
+use crate::value::{Choice, Field, ValidationError, ValueType};
 use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, LazyLock};
@@ -11,7 +11,7 @@ use std::sync::{Arc, LazyLock};
 /// A mesh of triangles from a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MeshFile {
+pub struct MeshDesc {
     /// Name of the file, as the scene's author wrote it; empty: the stand-in.
     #[serde(default)]
     pub file: String,
@@ -43,7 +43,7 @@ const NORMALS: &[Choice] = &[
 ];
 
 /// An icosahedron that stands on the origin and is 1 high.
-static STAND_IN: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
+static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
     let golden = 0.5 * (1.0 + 5.0f64.sqrt());
     let mut corners = Vec::new();
     for axis in 0..3 {
@@ -88,17 +88,17 @@ static STAND_IN: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
     }))
 });
 
-impl MeshFile {
+impl MeshDesc {
     /// What is drawn: the file's mesh, or the stand-in while there is none.
     fn mesh(&self) -> &Arc<Mesh> {
         match &self.content {
             Some(Ok(mesh)) => mesh,
-            _ => &STAND_IN,
+            _ => &PLACEHOLDER,
         }
     }
 }
 
-impl Kind for MeshFile {
+impl ShapeDesc for MeshDesc {
     const DOC: &'static str = "Triangles from a file: OBJ (with the colours of its MTL), PLY, STL, glTF or GLB. Placed by \
          `transform`. Light falls on the side from which the corners of a triangle turn \
          counter-clockwise, and on the other if its material is two-sided.";
@@ -107,7 +107,7 @@ impl Kind for MeshFile {
     const FIELDS: &'static [Field] = &[
         Field::preset(
             "file",
-            Takes::Text,
+            ValueType::Text,
             "",
             "\"\"",
             "Name of the file, relative to the folder of the scene file. Empty: an icosahedron \
@@ -115,7 +115,7 @@ impl Kind for MeshFile {
         ),
         Field::preset(
             "normals",
-            Takes::Choice(NORMALS),
+            ValueType::Choice(NORMALS),
             "",
             "\"smooth\"",
             "What light sees: curved triangles or flat ones.",
@@ -131,10 +131,10 @@ impl Kind for MeshFile {
         }
     }
 
-    fn faults(&self) -> Vec<Fault> {
+    fn faults(&self) -> Vec<ValidationError> {
         match &self.content {
             Some(Err(error)) => {
-                vec![Fault::new("file", error.what(), error.expected.clone())]
+                vec![ValidationError::new("file", error.what(), error.expected.clone())]
             }
             _ => Vec::new(),
         }
@@ -157,7 +157,7 @@ impl Kind for MeshFile {
 impl Shape {
     /// Takes what `load` finds in the file that the shape names, if it has not been looked for yet.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
-        if let Self::MeshFile(mesh) = self
+        if let Self::MeshDesc(mesh) = self
             && !mesh.file.is_empty()
             && mesh.content.is_none()
         {
@@ -167,7 +167,7 @@ impl Shape {
 
     /// Takes over what `other` found in a file, if this shape names the same.
     pub fn resolve_as(&mut self, other: &Self) {
-        if let (Self::MeshFile(new), Self::MeshFile(old)) = (self, other)
+        if let (Self::MeshDesc(new), Self::MeshDesc(old)) = (self, other)
             && new.file == old.file
         {
             new.content.clone_from(&old.content);
@@ -177,7 +177,7 @@ impl Shape {
     /// The file that the shape names, if it names one.
     pub fn file(&self) -> Option<&str> {
         match self {
-            Self::MeshFile(mesh) if !mesh.file.is_empty() => Some(&mesh.file),
+            Self::MeshDesc(mesh) if !mesh.file.is_empty() => Some(&mesh.file),
             _ => None,
         }
     }
@@ -189,9 +189,9 @@ mod tests {
 
     #[test]
     fn the_stand_in_is_an_icosahedron_on_the_origin() {
-        let mesh = STAND_IN.mesh();
+        let mesh = PLACEHOLDER.mesh();
         assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 20));
-        let form = MeshFile::standing(DVec3::ZERO, DVec3::ONE).form();
+        let form = MeshDesc::standing(DVec3::ZERO, DVec3::ONE).form();
         let (low, high) = form.bounds().unwrap();
         assert!((low - DVec3::new(-0.5, 0.0, -0.5)).length() < 1e-6, "{low}");
         assert!((high - DVec3::new(0.5, 1.0, 0.5)).length() < 1e-6, "{high}");

@@ -20,22 +20,22 @@ mod transform;
 mod unit_frustum;
 
 pub use cone::Cone;
-pub use csg::{Difference, Intersection, MAX_DEPTH, Part, Union};
+pub use csg::{CsgOperand, Difference, Intersection, MAX_DEPTH, Union};
 pub use cube::Cube;
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
-pub use horizontal_rectangle::Platform;
-pub use mesh::{MeshFile, Normals};
+pub use horizontal_rectangle::HorizontalRectangle;
+pub use mesh::{MeshDesc, Normals};
 pub use plane::Plane;
 pub use prism::Prism;
 pub use pyramid::Pyramid;
 pub use rectangle::Rectangle;
-pub use registry::{EXAMPLES, KINDS, Kind, Shape};
+pub use registry::{EXAMPLES, KINDS, Shape, ShapeDesc};
 pub use sphere::Sphere;
 pub use tapered_cylinder::TaperedCylinder;
-pub use texture_space::{TextureSpace, Unwrapped};
-pub use transform::{Rotate, STEP_FIELDS, Scale, Step, chained, misplaced};
-pub use unit_frustum::UnitCylinder;
+pub use texture_space::{DefaultMapping, TextureSpace};
+pub use transform::{Rotate, Scale, TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
+pub use unit_frustum::UnitFrustum;
 
 #[cfg(test)]
 mod normals_at_test;

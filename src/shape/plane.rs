@@ -1,9 +1,9 @@
 //! Infinite plane.
 
 use crate::primitive::Form;
-use crate::shape::Kind;
+use crate::shape::ShapeDesc;
 use crate::shape::texture_space::on_plane;
-use crate::value::{Checks, Fault, Field, Range, Takes, turned, unit};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType, turned, unit};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -17,18 +17,18 @@ pub struct Plane {
     pub normal: [f64; 3],
 }
 
-impl Kind for Plane {
+impl ShapeDesc for Plane {
     const DOC: &'static str = "A plane without end. Its front is the side that `normal` points to.";
     const EXAMPLE: &'static str =
         "shape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }";
     const FIELDS: &'static [Field] = &[
         Field::required(
             "point",
-            Takes::Numbers(3, Range::COORDINATE),
+            ValueType::Numbers(3, NumberRange::COORDINATE),
             "scene units",
             "Any point of the plane.",
         ),
-        Field::required("normal", Takes::Direction, "", "Direction in which the front faces."),
+        Field::required("normal", ValueType::Direction, "", "Direction in which the front faces."),
     ];
 
     fn form(&self) -> Form {
@@ -36,8 +36,8 @@ impl Kind for Plane {
         Form::Plane { normal, offset: normal.dot(DVec3::from_array(self.point)) }
     }
 
-    fn faults(&self) -> Vec<Fault> {
-        Checks::new(Self::FIELDS)
+    fn faults(&self) -> Vec<ValidationError> {
+        Validator::new(Self::FIELDS)
             .numbers("point", &self.point)
             .numbers("normal", &self.normal)
             .faults()

@@ -1,11 +1,11 @@
 //! Right prism over a regular triangle.
 
 use crate::primitive::Form;
-use crate::shape::Kind;
+use crate::shape::ShapeDesc;
 use crate::shape::prismoid::{lower_left, upright};
 use crate::shape::registry::turned_rotation;
 use crate::shape::texture_space::turned_axes;
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -25,7 +25,7 @@ pub struct Prism {
     pub rotation: f64,
 }
 
-impl Kind for Prism {
+impl ShapeDesc for Prism {
     const DOC: &'static str = "A right prism on a base with three equal sides. Unturned, the base has an \
          edge along +x from `corner` and its third vertex towards -z.";
     const EXAMPLE: &'static str =
@@ -33,15 +33,20 @@ impl Kind for Prism {
     const FIELDS: &'static [Field] = &[
         Field::required(
             "corner",
-            Takes::Numbers(3, Range::COORDINATE),
+            ValueType::Numbers(3, NumberRange::COORDINATE),
             "scene units",
             "Lower left near corner of the base, before the rotation (near is +z).",
         ),
-        Field::required("side", Takes::Number(Range::SIZE), "scene units", "Side of the base."),
-        Field::required("height", Takes::Number(Range::SIZE), "scene units", "Height."),
+        Field::required(
+            "side",
+            ValueType::Number(NumberRange::SIZE),
+            "scene units",
+            "Side of the base.",
+        ),
+        Field::required("height", ValueType::Number(NumberRange::SIZE), "scene units", "Height."),
         Field::preset(
             "rotation",
-            Takes::Number(Range::FINITE),
+            ValueType::Number(NumberRange::FINITE),
             "degrees",
             "0.0",
             "Turn about the vertical through the base's centroid, counter-clockwise seen from above.",
@@ -54,8 +59,8 @@ impl Kind for Prism {
         upright(DVec3::from_array(self.corner), &base, self.height, 1.0, self.rotation)
     }
 
-    fn faults(&self) -> Vec<Fault> {
-        Checks::new(Self::FIELDS)
+    fn faults(&self) -> Vec<ValidationError> {
+        Validator::new(Self::FIELDS)
             .numbers("corner", &self.corner)
             .numbers("side", &[self.side])
             .numbers("height", &[self.height])

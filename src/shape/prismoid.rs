@@ -50,7 +50,7 @@ pub(super) fn upright(
         let normal = DVec3::new(outward.x, up, outward.y).normalize();
         faces.push(through(corners[i], normal));
     }
-    Form::Convex { faces, corners }
+    Form::ConvexPolyhedron { faces, corners }
 }
 
 /// The corner of a base whose middle is `base`, `width` wide and `depth` deep: half of both away
@@ -63,12 +63,12 @@ pub(super) fn lower_left(base: DVec3, width: f64, depth: f64) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use crate::primitive::{Form, HalfSpace};
-    use crate::shape::{Cube, Cuboid, Kind, Prism, Pyramid};
+    use crate::shape::{Cube, Cuboid, Prism, Pyramid, ShapeDesc};
     use glam::DVec3;
 
     fn parts(form: Form) -> (Vec<HalfSpace>, Vec<DVec3>) {
         match form {
-            Form::Convex { faces, corners } => (faces, corners),
+            Form::ConvexPolyhedron { faces, corners } => (faces, corners),
             other => panic!("{other:?}"),
         }
     }

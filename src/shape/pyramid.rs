@@ -1,12 +1,12 @@
 //! Regular pyramid with a square base, whole or truncated.
 
 use crate::primitive::Form;
-use crate::shape::Kind;
+use crate::shape::ShapeDesc;
 use crate::shape::cube::square;
 use crate::shape::prismoid::{lower_left, upright};
 use crate::shape::registry::turned_rotation;
 use crate::shape::texture_space::turned_axes;
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +28,7 @@ pub struct Pyramid {
     pub rotation: f64,
 }
 
-impl Kind for Pyramid {
+impl ShapeDesc for Pyramid {
     const DOC: &'static str = "A regular pyramid on a square base, truncated at `height`. \
          If `apex_height` is not larger than `height`, it is an ordinary pyramid whose height is the smaller of the two.";
     const EXAMPLE: &'static str = "shape.pyramid = { corner = [-0.5, 0.0, 0.5], side = 1.0, \
@@ -36,26 +36,31 @@ impl Kind for Pyramid {
     const FIELDS: &'static [Field] = &[
         Field::required(
             "corner",
-            Takes::Numbers(3, Range::COORDINATE),
+            ValueType::Numbers(3, NumberRange::COORDINATE),
             "scene units",
             "Lower left near corner of the base, before the rotation (near is +z).",
         ),
-        Field::required("side", Takes::Number(Range::SIZE), "scene units", "Side of the base."),
+        Field::required(
+            "side",
+            ValueType::Number(NumberRange::SIZE),
+            "scene units",
+            "Side of the base.",
+        ),
         Field::required(
             "apex_height",
-            Takes::Number(Range::SIZE),
+            ValueType::Number(NumberRange::SIZE),
             "scene units",
             "Height of the untruncated pyramid.",
         ),
         Field::required(
             "height",
-            Takes::Number(Range::SIZE),
+            ValueType::Number(NumberRange::SIZE),
             "scene units",
             "Height of the truncated pyramid.",
         ),
         Field::preset(
             "rotation",
-            Takes::Number(Range::FINITE),
+            ValueType::Number(NumberRange::FINITE),
             "degrees",
             "0.0",
             "Turn about the vertical through the base's centre, counter-clockwise seen from above.",
@@ -69,10 +74,10 @@ impl Kind for Pyramid {
         upright(corner, &square(self.side), height, top_over_base, self.rotation)
     }
 
-    fn faults(&self) -> Vec<Fault> {
+    fn faults(&self) -> Vec<ValidationError> {
         let sizes =
             [("side", self.side), ("apex_height", self.apex_height), ("height", self.height)];
-        Checks::new(Self::FIELDS)
+        Validator::new(Self::FIELDS)
             .numbers("corner", &self.corner)
             .numbers("side", &[self.side])
             .numbers("apex_height", &[self.apex_height])

@@ -1,9 +1,9 @@
 //! Rectangle anywhere: the flat mirror.
 
 use crate::primitive::Form;
-use crate::shape::Kind;
+use crate::shape::ShapeDesc;
 
-use crate::value::{Checks, Fault, Field, Range, Takes, turned, unit};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType, turned, unit};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -40,23 +40,28 @@ impl Rectangle {
     }
 }
 
-impl Kind for Rectangle {
+impl ShapeDesc for Rectangle {
     const DOC: &'static str =
         "A flat rectangle, such as a mirror. Its front is the side that `normal` points to.";
     const EXAMPLE: &'static str = "shape.rectangle = { center = [0.0, 1.5, -2.0], size = [4.0, 3.0], \
          normal = [0.0, 0.0, 1.0] }";
     const FIELDS: &'static [Field] = &[
-        Field::required("center", Takes::Numbers(3, Range::COORDINATE), "scene units", "Centre."),
+        Field::required(
+            "center",
+            ValueType::Numbers(3, NumberRange::COORDINATE),
+            "scene units",
+            "Centre.",
+        ),
         Field::required(
             "size",
-            Takes::Numbers(2, Range::SIZE),
+            ValueType::Numbers(2, NumberRange::SIZE),
             "scene units",
             "Width (across) and height (along `up`).",
         ),
-        Field::required("normal", Takes::Direction, "", "Direction in which the front faces."),
+        Field::required("normal", ValueType::Direction, "", "Direction in which the front faces."),
         Field::preset(
             "up",
-            Takes::Direction,
+            ValueType::Direction,
             "",
             "[0.0, 1.0, 0.0]",
             "Direction of the height, made perpendicular to `normal`; not parallel to it.",
@@ -69,8 +74,8 @@ impl Kind for Rectangle {
         Form::Parallelogram { corner: DVec3::from_array(self.center) - (u + v) / 2.0, u, v }
     }
 
-    fn faults(&self) -> Vec<Fault> {
-        let checks = Checks::new(Self::FIELDS)
+    fn faults(&self) -> Vec<ValidationError> {
+        let checks = Validator::new(Self::FIELDS)
             .numbers("center", &self.center)
             .numbers("size", &self.size)
             .numbers("normal", &self.normal)
@@ -79,7 +84,7 @@ impl Kind for Rectangle {
         let parallel = checks.clean() && self.frame().is_none();
         checks
             .and(parallel.then(|| {
-                Fault::new(
+                ValidationError::new(
                     "up",
                     "up is parallel to normal, so that the rectangle could lie any way round",
                     "an `up` across the normal, such as [0.0, 0.0, -1.0] for one that lies flat",
@@ -116,7 +121,7 @@ impl Kind for Rectangle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::Platform;
+    use crate::shape::HorizontalRectangle;
 
     fn sides(form: Form) -> (DVec3, DVec3, DVec3) {
         match form {
@@ -157,7 +162,7 @@ mod tests {
 
     #[test]
     fn platforms_face_up() {
-        let platform = Platform { center: [1.0, 2.0, 3.0], size: [8.0, 6.0] };
+        let platform = HorizontalRectangle { center: [1.0, 2.0, 3.0], size: [8.0, 6.0] };
         let (corner, u, v) = sides(platform.form());
         assert_eq!(u.cross(v), DVec3::new(0.0, 48.0, 0.0));
         assert_eq!(corner, DVec3::new(-3.0, 2.0, 0.0));

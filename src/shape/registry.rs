@@ -3,16 +3,16 @@
 use crate::primitive::Form;
 use crate::shape::csg::OF_FIELDS;
 use crate::shape::{
-    Cone, Cube, Cuboid, Cylinder, Difference, Intersection, MeshFile, Plane, Platform, Prism,
-    Pyramid,
+    Cone, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection, MeshDesc, Plane,
+    Prism, Pyramid,
 };
-use crate::shape::{Rectangle, Sphere, TaperedCylinder, Union, UnitCylinder};
-use crate::value::{Fault, Field, Takes, rounded_to};
+use crate::shape::{Rectangle, Sphere, TaperedCylinder, Union, UnitFrustum};
+use crate::value::{Field, ValidationError, ValueType, rounded_to};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// What every kind's description says of itself.
-pub trait Kind {
+pub trait ShapeDesc {
     /// What it is, in a sentence or two.
     const DOC: &'static str;
     /// A line for a scene file.
@@ -24,7 +24,7 @@ pub trait Kind {
     fn form(&self) -> Form;
 
     /// What is wrong with it.
-    fn faults(&self) -> Vec<Fault>;
+    fn faults(&self) -> Vec<ValidationError>;
 
     /// One of this kind that stands upright on `base`, the middle of its lower side, and fills about
     /// a box with the lengths `size` along x, y and z, all greater than 0.
@@ -76,7 +76,7 @@ macro_rules! kinds {
 
         // A static, since the parts of compounds have shapes, too: the table refers to itself.
         pub(super) static KIND_TABLE: [Field; [$($key),+].len()] = [
-            $(Field::required($key, Takes::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
+            $(Field::required($key, ValueType::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
         ];
 
         /// Every kind: its key, its fields, what it is.
@@ -102,7 +102,7 @@ macro_rules! kinds {
             }
 
             /// What is wrong with it; keys begin with the kind's.
-            pub fn faults(&self) -> Vec<Fault> {
+            pub fn faults(&self) -> Vec<ValidationError> {
                 let faults = match self {
                     $(Self::$kind(kind) => kind.faults(),)+
                 };
@@ -116,7 +116,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// The kind with this key as [`Kind::standing`] makes it; `None`: no kind has it.
+            /// The kind with this key as [`ShapeDesc::standing`] makes it; `None`: no kind has it.
             pub fn standing(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
                 match key {
                     $($key => Some(Self::$kind($kind::standing(base, size))),)+
@@ -152,11 +152,11 @@ kinds! {
     "cylinder" => Cylinder,
     "cone" => Cone,
     "tapered_cylinder" => TaperedCylinder,
-    "unit_cylinder" => UnitCylinder,
-    "platform" => Platform,
+    "unit_cylinder" => UnitFrustum,
+    "platform" => HorizontalRectangle,
     "rectangle" => Rectangle,
     "plane" => Plane,
-    "mesh" => MeshFile,
+    "mesh" => MeshDesc,
     "union" => Union with OF_FIELDS,
     "intersection" => Intersection with OF_FIELDS,
     "difference" => Difference with OF_FIELDS,

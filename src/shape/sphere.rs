@@ -1,8 +1,8 @@
 //! Sphere: the points at distance `radius` from `center`.
 
 use crate::primitive::Form;
-use crate::shape::Kind;
-use crate::value::{Checks, Fault, Field, Range, Takes, clean};
+use crate::shape::ShapeDesc;
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType, clean};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -16,20 +16,25 @@ pub struct Sphere {
     pub radius: f64,
 }
 
-impl Kind for Sphere {
+impl ShapeDesc for Sphere {
     const DOC: &'static str = "A sphere.";
     const EXAMPLE: &'static str = "shape.sphere = { center = [0.0, 1.0, 0.0], radius = 1.0 }";
     const FIELDS: &'static [Field] = &[
-        Field::required("center", Takes::Numbers(3, Range::COORDINATE), "scene units", "Centre."),
-        Field::required("radius", Takes::Number(Range::SIZE), "scene units", "Radius."),
+        Field::required(
+            "center",
+            ValueType::Numbers(3, NumberRange::COORDINATE),
+            "scene units",
+            "Centre.",
+        ),
+        Field::required("radius", ValueType::Number(NumberRange::SIZE), "scene units", "Radius."),
     ];
 
     fn form(&self) -> Form {
         Form::Sphere { center: DVec3::from_array(self.center), radius: self.radius }
     }
 
-    fn faults(&self) -> Vec<Fault> {
-        Checks::new(Self::FIELDS)
+    fn faults(&self) -> Vec<ValidationError> {
+        Validator::new(Self::FIELDS)
             .numbers("center", &self.center)
             .numbers("radius", &[self.radius])
             .ratio(&[("radius", self.radius)], &self.center)

@@ -1,10 +1,10 @@
 //! Tapered cylinder: its radius changes evenly along the axis between two points.
 
 use crate::primitive::Form;
-use crate::shape::Kind;
+use crate::shape::ShapeDesc;
 use crate::shape::axial::axes_between;
 use crate::shape::axial::{between, height, is_upright, no_axis};
-use crate::value::{Checks, Fault, Field, Range, Takes};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -23,9 +23,9 @@ pub struct TaperedCylinder {
 }
 
 /// A radius that may be 0.
-const RADIUS: Takes = Takes::Number(Range::closed(0.0, Range::SIZE.high));
+const RADIUS: ValueType = ValueType::Number(NumberRange::closed(0.0, NumberRange::SIZE.high));
 
-impl Kind for TaperedCylinder {
+impl ShapeDesc for TaperedCylinder {
     const DOC: &'static str =
         "A circular cylinder that narrows or widens evenly, with flat ends: a cone cut off.";
     const EXAMPLE: &'static str = "shape.tapered_cylinder = { base = [0.0, 0.0, 0.0], top = [0.0, 1.0, 0.0], \
@@ -33,13 +33,13 @@ impl Kind for TaperedCylinder {
     const FIELDS: &'static [Field] = &[
         Field::required(
             "base",
-            Takes::Numbers(3, Range::COORDINATE),
+            ValueType::Numbers(3, NumberRange::COORDINATE),
             "scene units",
             "Centre of one end.",
         ),
         Field::required(
             "top",
-            Takes::Numbers(3, Range::COORDINATE),
+            ValueType::Numbers(3, NumberRange::COORDINATE),
             "scene units",
             "Centre of the other end.",
         ),
@@ -51,18 +51,18 @@ impl Kind for TaperedCylinder {
         between(self.base, self.top, self.base_radius, self.top_radius)
     }
 
-    fn faults(&self) -> Vec<Fault> {
+    fn faults(&self) -> Vec<ValidationError> {
         let radii = [("base_radius", self.base_radius), ("top_radius", self.top_radius)];
         let mut sizes: Vec<_> = radii.into_iter().filter(|(_, r)| *r != 0.0).collect();
         let thin = sizes.is_empty().then(|| {
-            Fault::new(
+            ValidationError::new(
                 "top_radius",
                 "both radii are 0",
                 "a radius greater than 0 at one end at least",
             )
         });
         sizes.push(("top", height(self.base, self.top)));
-        Checks::new(Self::FIELDS)
+        Validator::new(Self::FIELDS)
             .numbers("base", &self.base)
             .numbers("top", &self.top)
             .numbers("base_radius", &[self.base_radius])

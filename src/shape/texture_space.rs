@@ -3,12 +3,12 @@
 use crate::primitive::Form;
 use crate::shape::Shape;
 use crate::shape::csg::parts_of;
-use crate::shape::transform::chained;
+use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
 
 /// How a texture lies on a shape if nobody says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unwrapped {
+pub enum DefaultMapping {
     /// It is flat.
     Plane,
     /// It is round on all sides.
@@ -30,7 +30,7 @@ pub struct TextureSpace {
     /// Corners of the box around the shape in it; of a plane both are its point.
     pub corners: [DVec3; 2],
     /// How a texture lies on it if nobody says.
-    pub unwrapped: Unwrapped,
+    pub unwrapped: DefaultMapping,
 }
 
 impl TextureSpace {
@@ -40,11 +40,13 @@ impl TextureSpace {
         let shape_from_texture = DAffine3::from_mat3(shape.texture_axes());
         let texture_from_shape = shape_from_texture.inverse();
         let unwrapped = match &form {
-            Form::Parallelogram { .. } | Form::Plane { .. } => Unwrapped::Plane,
-            Form::Sphere { .. } | Form::Ellipsoid { .. } => Unwrapped::Ball,
-            Form::Tapered { .. } => Unwrapped::Turned,
-            Form::Mesh { mesh, .. } if mesh.mesh().uvs.is_some() => Unwrapped::Uv,
-            Form::Convex { .. } | Form::Compound(_) | Form::Mesh { .. } => Unwrapped::Sides,
+            Form::Parallelogram { .. } | Form::Plane { .. } => DefaultMapping::Plane,
+            Form::Sphere { .. } | Form::Ellipsoid { .. } => DefaultMapping::Ball,
+            Form::ConicalFrustum { .. } => DefaultMapping::Turned,
+            Form::Mesh { mesh, .. } if mesh.mesh().uvs.is_some() => DefaultMapping::Uv,
+            Form::ConvexPolyhedron { .. } | Form::Csg(_) | Form::Mesh { .. } => {
+                DefaultMapping::Sides
+            }
         };
         let point = texture_from_shape.transform_point3(shape.place());
         let corners = form.transformed(&texture_from_shape).bounds().unwrap_or((point, point));
@@ -56,8 +58,8 @@ impl TextureSpace {
     pub fn has_uv(&self) -> bool {
         let [low, high] = self.corners;
         match self.unwrapped {
-            Unwrapped::Uv => true,
-            Unwrapped::Plane => low != high,
+            DefaultMapping::Uv => true,
+            DefaultMapping::Plane => low != high,
             _ => false,
         }
     }
@@ -68,8 +70,8 @@ impl Shape {
     /// without faults.
     pub fn texture_spaces(&self) -> Vec<TextureSpace> {
         let Some(of) = parts_of(self) else { return vec![TextureSpace::new(self)] };
-        let inner = |part: &crate::shape::Part| {
-            let map = chained(&part.transform);
+        let inner = |part: &crate::shape::CsgOperand| {
+            let map = compose(&part.transform);
             let spaces = part.shape.texture_spaces().into_iter();
             spaces.map(move |space| TextureSpace {
                 shape_from_texture: map * space.shape_from_texture,
@@ -148,7 +150,7 @@ mod tests {
         let cube = one("shape.cube = { corner = [4.0, 0.0, 1.0], edge = 1.5, rotation = 33.0 }");
         let size = cube.corners[1] - cube.corners[0];
         assert!((size - DVec3::splat(1.5)).length() < 1e-12, "its own sides: {size}");
-        assert_eq!(cube.unwrapped, Unwrapped::Sides);
+        assert_eq!(cube.unwrapped, DefaultMapping::Sides);
     }
 
     #[test]
@@ -165,7 +167,7 @@ mod tests {
         let spaces = compound.texture_spaces();
         assert_eq!(spaces.len(), compound.form().parts());
         let kinds: Vec<_> = spaces.iter().map(|s| s.unwrapped).collect();
-        assert_eq!(kinds, [Unwrapped::Ball, Unwrapped::Sides, Unwrapped::Turned]);
+        assert_eq!(kinds, [DefaultMapping::Ball, DefaultMapping::Sides, DefaultMapping::Turned]);
         let corner = spaces[1].shape_from_texture.transform_point3(DVec3::ONE);
         assert!((corner - DVec3::new(7.0, 2.0, 2.0)).length() < 1e-12, "{corner}");
     }

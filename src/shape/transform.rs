@@ -2,7 +2,9 @@
 
 use crate::primitive::Form;
 use crate::shape::Shape;
-use crate::value::{Checks, Fault, Field, Range, Takes, sin_cos_degrees, unit};
+use crate::value::{
+    Field, NumberRange, ValidationError, Validator, ValueType, sin_cos_degrees, unit,
+};
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
@@ -10,7 +12,7 @@ use std::fmt;
 /// One step. Angles are in degrees and turn counter-clockwise for one who looks against the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Step {
+pub enum TransformOp {
     /// Moves by this vector.
     Translate([f64; 3]),
     /// Turns about the x axis.
@@ -75,10 +77,10 @@ impl<'de> Deserialize<'de> for Scale {
 }
 
 /// The keys of a step; each step has exactly one.
-pub const STEP_FIELDS: &[Field] = &[
+pub const TRANSFORM_OP_FIELDS: &[Field] = &[
     Field::required(
         "translate",
-        Takes::Numbers(3, Range::COORDINATE),
+        ValueType::Numbers(3, NumberRange::COORDINATE),
         "scene units",
         "Moves by this vector.",
     ),
@@ -92,20 +94,25 @@ pub const STEP_FIELDS: &[Field] = &[
     Field::required("rotate_z", ANGLE, "degrees", "Turns about the z axis."),
     Field::required(
         "rotate",
-        Takes::Table(ROTATE_FIELDS),
+        ValueType::Table(ROTATE_FIELDS),
         "",
         "Turns about any axis through the origin.",
     ),
-    Field::required("scale", Takes::Factor, "", "Scales away from the origin; negative: mirrors."),
+    Field::required(
+        "scale",
+        ValueType::Factor,
+        "",
+        "Scales away from the origin; negative: mirrors.",
+    ),
 ];
 
-const ANGLE: Takes = Takes::Number(Range::FINITE);
+const ANGLE: ValueType = ValueType::Number(NumberRange::FINITE);
 const ROTATE_FIELDS: &[Field] = &[
-    Field::required("axis", Takes::Direction, "", "Direction of the axis."),
+    Field::required("axis", ValueType::Direction, "", "Direction of the axis."),
     Field::required("degrees", ANGLE, "degrees", "Angle, counter-clockwise against the axis."),
 ];
 
-impl Step {
+impl TransformOp {
     /// The step as a map. Of a step without faults.
     pub fn map(&self) -> DAffine3 {
         match *self {
@@ -119,8 +126,8 @@ impl Step {
     }
 
     /// What is wrong with it.
-    pub fn faults(&self) -> Vec<Fault> {
-        let checks = Checks::new(STEP_FIELDS);
+    pub fn faults(&self) -> Vec<ValidationError> {
+        let checks = Validator::new(TRANSFORM_OP_FIELDS);
         match self {
             Self::Translate(by) => checks.numbers("translate", by),
             Self::RotateX(degrees) => checks.numbers("rotate_x", &[*degrees]),
@@ -128,7 +135,7 @@ impl Step {
             Self::RotateZ(degrees) => checks.numbers("rotate_z", &[*degrees]),
             Self::Rotate(Rotate { axis, degrees }) => checks.inner(
                 "rotate",
-                Checks::new(ROTATE_FIELDS)
+                Validator::new(ROTATE_FIELDS)
                     .numbers("axis", axis)
                     .numbers("degrees", &[*degrees])
                     .faults(),
@@ -161,18 +168,18 @@ fn is_sound(map: &DAffine3) -> bool {
 }
 
 /// The steps in order, as one map.
-pub fn chained(steps: &[Step]) -> DAffine3 {
+pub fn compose(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |map, step| step.map() * map)
 }
 
 /// What `steps` as a whole do wrong to `shape`, although each step is right.
-pub fn misplaced(shape: &Shape, steps: &[Step]) -> Option<Fault> {
+pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<ValidationError> {
     if steps.is_empty() {
         return None;
     }
-    let map = chained(steps);
+    let map = compose(steps);
     if !is_sound(&map) {
-        return Some(Fault::new(
+        return Some(ValidationError::new(
             "transform",
             "transform flattens the object or tears it apart",
             "factors within 1e12 of each other and of 1",
@@ -186,15 +193,15 @@ pub fn misplaced(shape: &Shape, steps: &[Step]) -> Option<Fault> {
         (Form::Plane { offset, .. }, None) => (offset.abs(), f64::INFINITY),
         (_, None) => (0.0, f64::INFINITY),
     };
-    if !Range::COORDINATE.holds(reach) {
-        return Some(Fault::new(
+    if !NumberRange::COORDINATE.holds(reach) {
+        return Some(ValidationError::new(
             "transform",
             "transform moves the object to coordinates beyond 1e9",
             "coordinates from -1e9 to 1e9",
         ));
     }
     (extent < 1e-12 * reach).then(|| {
-        Fault::new(
+        ValidationError::new(
             "transform",
             "transform makes the object too small for the place where it stands",
             "sizes and coordinates within a factor of 1e12 of each other",
@@ -212,31 +219,31 @@ mod tests {
 
     #[test]
     fn turns_go_counter_clockwise_against_the_axis() {
-        assert_eq!(Step::RotateX(90.0).map().transform_point3(DVec3::Y), DVec3::Z);
-        assert_eq!(Step::RotateY(90.0).map().transform_point3(DVec3::Z), DVec3::X);
-        assert_eq!(Step::RotateZ(90.0).map().transform_point3(DVec3::X), DVec3::Y);
-        let third = Step::Rotate(Rotate { axis: [2.0; 3], degrees: 120.0 }).map();
+        assert_eq!(TransformOp::RotateX(90.0).map().transform_point3(DVec3::Y), DVec3::Z);
+        assert_eq!(TransformOp::RotateY(90.0).map().transform_point3(DVec3::Z), DVec3::X);
+        assert_eq!(TransformOp::RotateZ(90.0).map().transform_point3(DVec3::X), DVec3::Y);
+        let third = TransformOp::Rotate(Rotate { axis: [2.0; 3], degrees: 120.0 }).map();
         assert!(near(third.transform_point3(DVec3::X), DVec3::Y));
-        let half = Step::RotateY(30.0).map().transform_point3(DVec3::X);
+        let half = TransformOp::RotateY(30.0).map().transform_point3(DVec3::X);
         assert!(near(half, DVec3::new(0.75f64.sqrt(), 0.0, -0.5)), "{half}");
     }
 
     #[test]
     fn zero_factors_and_axes_are_faults() {
         for (step, key) in [
-            (Step::Scale(Scale([0.0; 3])), "scale"),
-            (Step::Scale(Scale([1.0, 0.0, 1.0])), "scale"),
-            (Step::Rotate(Rotate { axis: [0.0; 3], degrees: 1.0 }), "rotate.axis"),
-            (Step::Rotate(Rotate { axis: [1.0; 3], degrees: f64::NAN }), "rotate.degrees"),
-            (Step::Translate([1e10, 0.0, 0.0]), "translate"),
-            (Step::RotateX(f64::INFINITY), "rotate_x"),
-            (Step::RotateY(f64::NAN), "rotate_y"),
-            (Step::RotateZ(f64::NAN), "rotate_z"),
+            (TransformOp::Scale(Scale([0.0; 3])), "scale"),
+            (TransformOp::Scale(Scale([1.0, 0.0, 1.0])), "scale"),
+            (TransformOp::Rotate(Rotate { axis: [0.0; 3], degrees: 1.0 }), "rotate.axis"),
+            (TransformOp::Rotate(Rotate { axis: [1.0; 3], degrees: f64::NAN }), "rotate.degrees"),
+            (TransformOp::Translate([1e10, 0.0, 0.0]), "translate"),
+            (TransformOp::RotateX(f64::INFINITY), "rotate_x"),
+            (TransformOp::RotateY(f64::NAN), "rotate_y"),
+            (TransformOp::RotateZ(f64::NAN), "rotate_z"),
         ] {
             let keys: Vec<_> = step.faults().into_iter().map(|f| f.key).collect();
             assert_eq!(keys, [key], "{step:?}");
         }
-        assert!(Step::Scale(Scale([-1.0, 1.0, 2.0])).faults().is_empty());
+        assert!(TransformOp::Scale(Scale([-1.0, 1.0, 2.0])).faults().is_empty());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Tables of what may be written: one [`Field`] a key. Reading, messages, range checks, the
 //! generated reference and every form that edits a description use the same tables.
 
-use crate::value::Range;
+use crate::value::NumberRange;
 use std::fmt;
 
 /// One key of a description.
@@ -10,18 +10,18 @@ pub struct Field {
     /// The key.
     pub name: &'static str,
     /// What may stand behind it.
-    pub takes: Takes,
+    pub takes: ValueType,
     /// Unit of its numbers; empty: none.
     pub unit: &'static str,
     /// What holds if it is left out.
-    pub preset: Preset,
+    pub preset: DefaultValue,
     /// What it is, in a sentence.
     pub doc: &'static str,
 }
 
 /// What holds if a key is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Preset {
+pub enum DefaultValue {
     /// It must not be left out.
     Required,
     /// This value, as TOML text.
@@ -41,7 +41,7 @@ pub struct Choice {
 
 /// What may stand behind a key.
 #[derive(Clone, Copy, Debug)]
-pub enum Takes {
+pub enum ValueType {
     /// A string.
     Text,
     /// `true` or `false`.
@@ -49,19 +49,19 @@ pub enum Takes {
     /// One of these words.
     Choice(&'static [Choice]),
     /// A whole number.
-    Whole(Range),
+    Whole(NumberRange),
     /// That many whole numbers.
-    Wholes(usize, Range),
+    Wholes(usize, NumberRange),
     /// A number.
-    Number(Range),
+    Number(NumberRange),
     /// That many numbers, each in the range.
-    Numbers(usize, Range),
+    Numbers(usize, NumberRange),
     /// Three numbers that are not all zero; the length does not matter.
     Direction,
     /// A factor other than zero, or three.
     Factor,
     /// A linear colour or `"#rrggbb"`; each channel in the range.
-    Color(Range),
+    Color(NumberRange),
     /// A table with these keys.
     Table(&'static [Field]),
     /// A table with exactly one of these keys.
@@ -78,40 +78,40 @@ impl Field {
     /// A key that must be given.
     pub const fn required(
         name: &'static str,
-        takes: Takes,
+        takes: ValueType,
         unit: &'static str,
         doc: &'static str,
     ) -> Self {
-        Self { name, takes, unit, preset: Preset::Required, doc }
+        Self { name, takes, unit, preset: DefaultValue::Required, doc }
     }
 
     /// A key with a default, given as TOML text.
     pub const fn preset(
         name: &'static str,
-        takes: Takes,
+        takes: ValueType,
         unit: &'static str,
         value: &'static str,
         doc: &'static str,
     ) -> Self {
-        Self { name, takes, unit, preset: Preset::Is(value), doc }
+        Self { name, takes, unit, preset: DefaultValue::Is(value), doc }
     }
 
     /// A key that may be left out and has no value then.
     pub const fn without(
         name: &'static str,
-        takes: Takes,
+        takes: ValueType,
         unit: &'static str,
         instead: &'static str,
         doc: &'static str,
     ) -> Self {
-        Self { name, takes, unit, preset: Preset::Without(instead), doc }
+        Self { name, takes, unit, preset: DefaultValue::Without(instead), doc }
     }
 }
 
 const COUNTS: [&str; 5] = ["no", "one", "two", "three", "four"];
 
 /// As the object of "Expected": `a number from 0 to 1`.
-impl fmt::Display for Takes {
+impl fmt::Display for ValueType {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::Text => f.write_str("a string in quotes"),

@@ -4,7 +4,7 @@ use std::fmt;
 
 /// An interval of finite numbers. Neither NaN nor an infinity lies in any.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
+pub struct NumberRange {
     /// Lower end; negative infinity: none.
     pub low: f64,
     /// Whether `low` itself is in.
@@ -18,7 +18,7 @@ pub struct Range {
 /// Largest coordinate and largest size that geometry is promised to be accurate for.
 const FARTHEST: f64 = 1e9;
 
-impl Range {
+impl NumberRange {
     /// Any finite number.
     pub const FINITE: Self =
         Self { low: f64::NEG_INFINITY, low_in: false, high: f64::INFINITY, high_in: false };
@@ -58,7 +58,7 @@ impl Range {
 }
 
 /// As the end of a phrase: `a number` ... `from 0 to 1`.
-impl fmt::Display for Range {
+impl fmt::Display for NumberRange {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let (low, high) = (number(self.low), number(self.high));
         match (self.low.is_finite(), self.low_in, self.high.is_finite(), self.high_in) {
@@ -87,15 +87,15 @@ pub fn number(x: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Range, number};
+    use super::{NumberRange, number};
 
     #[test]
     fn ends_count_as_told() {
         for (range, inside, outside) in [
-            (Range::SHARE, vec![0.0, 0.5, 1.0], vec![-1e-300, 1.0 + 1e-15]),
-            (Range::SIZE, vec![5e-324, 1e9], vec![0.0, -1.0, 1.1e9]),
-            (Range::between(0.0, 180.0), vec![1e-9, 179.9], vec![0.0, 180.0]),
-            (Range::FINITE, vec![f64::MAX, f64::MIN], vec![]),
+            (NumberRange::SHARE, vec![0.0, 0.5, 1.0], vec![-1e-300, 1.0 + 1e-15]),
+            (NumberRange::SIZE, vec![5e-324, 1e9], vec![0.0, -1.0, 1.1e9]),
+            (NumberRange::between(0.0, 180.0), vec![1e-9, 179.9], vec![0.0, 180.0]),
+            (NumberRange::FINITE, vec![f64::MAX, f64::MIN], vec![]),
         ] {
             assert!(inside.iter().all(|x| range.holds(*x)), "{range}");
             for x in outside.into_iter().chain([f64::NAN, f64::INFINITY, f64::NEG_INFINITY]) {

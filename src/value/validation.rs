@@ -1,10 +1,10 @@
 //! What is wrong with a value, before anybody knows where in the file it stands.
 
-use crate::value::{Field, Range, Takes, number};
+use crate::value::{Field, NumberRange, ValueType, number};
 
 /// One thing wrong in a description. The scene room adds file, line, column and object.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Fault {
+pub struct ValidationError {
     /// The key inside the description, dotted (`center`, `shape.sphere.radius`); empty: the whole.
     pub key: String,
     /// What was found, as a phrase: `radius is -1`.
@@ -13,7 +13,7 @@ pub struct Fault {
     pub expected: String,
 }
 
-impl Fault {
+impl ValidationError {
     /// From its three parts.
     pub fn new(key: &str, found: impl Into<String>, expected: impl Into<String>) -> Self {
         Self { key: key.to_string(), found: found.into(), expected: expected.into() }
@@ -29,12 +29,12 @@ impl Fault {
 
 /// Collects the faults of one description against its table of fields.
 #[derive(Debug)]
-pub struct Checks {
+pub struct Validator {
     fields: &'static [Field],
-    faults: Vec<Fault>,
+    faults: Vec<ValidationError>,
 }
 
-impl Checks {
+impl Validator {
     /// None found yet.
     pub fn new(fields: &'static [Field]) -> Self {
         Self { fields, faults: Vec::new() }
@@ -47,19 +47,19 @@ impl Checks {
     pub fn numbers(mut self, name: &str, values: &[f64]) -> Self {
         let field = self.fields.iter().find(|f| f.name == name);
         let takes = field.unwrap_or_else(|| panic!("no field `{name}` in its table")).takes;
-        let each = |range: Range| values.iter().all(|x| range.holds(*x));
+        let each = |range: NumberRange| values.iter().all(|x| range.holds(*x));
         let right = match takes {
-            Takes::Number(range)
-            | Takes::Numbers(_, range)
-            | Takes::Whole(range)
-            | Takes::Wholes(_, range)
-            | Takes::Color(range) => each(range),
-            Takes::Direction => each(Range::FINITE) && values.iter().any(|x| *x != 0.0),
-            Takes::Factor => each(Range::FINITE) && values.iter().all(|x| *x != 0.0),
+            ValueType::Number(range)
+            | ValueType::Numbers(_, range)
+            | ValueType::Whole(range)
+            | ValueType::Wholes(_, range)
+            | ValueType::Color(range) => each(range),
+            ValueType::Direction => each(NumberRange::FINITE) && values.iter().any(|x| *x != 0.0),
+            ValueType::Factor => each(NumberRange::FINITE) && values.iter().all(|x| *x != 0.0),
             _ => true,
         };
         if !right {
-            self.faults.push(Fault::new(name, is(name, values), takes.to_string()));
+            self.faults.push(ValidationError::new(name, is(name, values), takes.to_string()));
         }
         self
     }
@@ -86,7 +86,7 @@ impl Checks {
             && self.faults.is_empty()
             && largest > 1e12 * smallest
         {
-            self.faults.push(Fault::new(
+            self.faults.push(ValidationError::new(
                 name,
                 format!(
                     "{name} is {}, too small beside {} in the same shape",
@@ -100,13 +100,13 @@ impl Checks {
     }
 
     /// Adds `fault` if there is one.
-    pub fn and(mut self, fault: Option<Fault>) -> Self {
+    pub fn and(mut self, fault: Option<ValidationError>) -> Self {
         self.faults.extend(fault);
         self
     }
 
     /// Adds the faults of a description behind the key `outer`.
-    pub fn inner(mut self, outer: &str, faults: Vec<Fault>) -> Self {
+    pub fn inner(mut self, outer: &str, faults: Vec<ValidationError>) -> Self {
         self.faults.extend(faults.into_iter().map(|f| f.under(outer)));
         self
     }
@@ -117,7 +117,7 @@ impl Checks {
     }
 
     /// What was found.
-    pub fn faults(self) -> Vec<Fault> {
+    pub fn faults(self) -> Vec<ValidationError> {
         self.faults
     }
 }

@@ -1,7 +1,7 @@
 //! How close a point is to the surfaces of things.
 
 use crate::asset::Mesh;
-use crate::bvh::LEAF;
+use crate::bvh::LEAF_FLAG;
 use crate::primitive::Form;
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::TAU;
@@ -15,23 +15,23 @@ pub(super) fn clearance(forms: &[Form], point: DVec3) -> f64 {
 pub(super) fn clearance_of(form: &Form, point: DVec3) -> Option<f64> {
     let inside = || match form {
         Form::Ellipsoid { scene_from_unit } => from_ellipsoid(scene_from_unit, point),
-        Form::Tapered { scene_from_unit, top } => from_tapered(scene_from_unit, *top, point),
+        Form::ConicalFrustum { scene_from_unit, top } => from_tapered(scene_from_unit, *top, point),
         Form::Mesh { mesh, scene_from_mesh, .. } => from_mesh(mesh, scene_from_mesh, point),
         _ => 0.0,
     };
     match form {
         Form::Sphere { center, radius } => Some((point.distance(*center) - radius).abs()),
         Form::Plane { normal, offset } => Some((normal.dot(point) - offset).abs()),
-        Form::Convex { faces, .. } => {
+        Form::ConvexPolyhedron { faces, .. } => {
             let beyond = faces.iter().map(|f| f.normal.dot(point) - f.offset);
             Some(beyond.fold(f64::NEG_INFINITY, f64::max).abs())
         }
         Form::Parallelogram { corner, u, v } => Some(from_parallelogram([*corner, *u, *v], point)),
-        Form::Compound(compound) => {
+        Form::Csg(compound) => {
             let parts = compound.parts.iter().filter_map(|part| clearance_of(part, point));
             parts.reduce(f64::min)
         }
-        Form::Ellipsoid { .. } | Form::Tapered { .. } | Form::Mesh { .. } => {
+        Form::Ellipsoid { .. } | Form::ConicalFrustum { .. } | Form::Mesh { .. } => {
             Some(box_distance(form, point).filter(|d| *d > 0.0).unwrap_or_else(inside))
         }
     }
@@ -162,11 +162,11 @@ fn from_mesh(mesh: &Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
             if bound >= least {
                 continue;
             }
-            if branch.child[i] & LEAF == 0 {
+            if branch.child[i] & LEAF_FLAG == 0 {
                 todo.push((branch.child[i], bound));
                 continue;
             }
-            let leaf = &mesh.leaves()[(branch.child[i] & !LEAF) as usize];
+            let leaf = &mesh.leaves()[(branch.child[i] & !LEAF_FLAG) as usize];
             for place in 0..leaf.corners[0][0].len() {
                 let corners = leaf.corners.map(|corner| {
                     scene_from_mesh
@@ -257,9 +257,11 @@ mod tests {
                             let r = (1.0 - z * z).sqrt();
                             vec![m.transform_point3(DVec3::new(r * cos, r * sin, z))]
                         }
-                        Form::Tapered { scene_from_unit: m, .. } => [(1.0, v), (v, 0.0), (v, 1.0)]
-                            .map(|(r, z)| m.transform_point3(DVec3::new(r * cos, r * sin, z)))
-                            .to_vec(),
+                        Form::ConicalFrustum { scene_from_unit: m, .. } => {
+                            [(1.0, v), (v, 0.0), (v, 1.0)]
+                                .map(|(r, z)| m.transform_point3(DVec3::new(r * cos, r * sin, z)))
+                                .to_vec()
+                        }
                         _ => unreachable!("{form:?}"),
                     }
                 })

@@ -1,19 +1,19 @@
 //! From a scene to a world.
 
-use crate::camera::View;
-use crate::lanes::{Double, Lanes, Real, Single};
-use crate::light::Lamp;
-use crate::material::{Finish, Material, Spread};
-use crate::primitive::{Acceleration, Form, Geometry};
+use crate::camera::PinholeCamera;
+use crate::lanes::{Double, Float, SimdFloat, Single};
+use crate::light::DeltaLight;
+use crate::material::{Bsdf, Material, ReflectionLobe};
+use crate::primitive::{Acceleration, Aggregate, Form};
 use crate::scene::{Filter, Horizon, Level, Scene};
 use crate::world::culling::light_buffer::LightBuffer;
-use crate::world::culling::screen_grid::{Cells, Rectangle};
-use crate::world::culling::tile::{Culling, Outlook, Surroundings};
-use crate::world::integrator::first_hit::Sight;
-use crate::world::integrator::nested_dielectrics::Media;
-use crate::world::integrator::surface_textures::Skins;
+use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
+use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates};
+use crate::world::integrator::first_hit::FirstHit;
+use crate::world::integrator::nested_dielectrics::NestedDielectrics;
+use crate::world::integrator::surface_textures::SurfaceTextures;
 use crate::world::inventory::Inventory;
-use crate::world::light_groups::{Groups, Member};
+use crate::world::light_groups::{LightGroupSource, LightGroups};
 use crate::world::lights_on_surfaces::OnSurface;
 use crate::world::precision;
 use crate::world::radiance_range;
@@ -40,8 +40,8 @@ pub struct Options {
 }
 
 /// A light of the world: the lamp, its group, its weight in the group's samples.
-pub(super) struct Source<S> {
-    pub lamp: Lamp<S>,
+pub(super) struct LightSource<S> {
+    pub lamp: DeltaLight<S>,
     pub group: usize,
     /// `None`: 1 in every channel.
     pub weight: Option<[S; 3]>,
@@ -50,12 +50,12 @@ pub(super) struct Source<S> {
 }
 
 /// A scene, compiled for the lane type `L`.
-pub struct World<L: Lanes> {
-    pub(super) geometry: Geometry<L>,
+pub struct World<L: SimdFloat> {
+    pub(super) geometry: Aggregate<L>,
     /// For each item of the geometry, its finish.
     pub(super) finish_of: Vec<u32>,
-    pub(super) finishes: Vec<Finish<L::Scalar>>,
-    pub(super) sources: Vec<Source<L::Scalar>>,
+    pub(super) finishes: Vec<Bsdf<L::Scalar>>,
+    pub(super) sources: Vec<LightSource<L::Scalar>>,
     pub(super) ambient: Option<usize>,
     pub(super) background: Option<usize>,
     pub(super) shadows: bool,
@@ -66,19 +66,19 @@ pub struct World<L: Lanes> {
     /// Neither smooth nor colored, and all things in lists: no trees, no boxes.
     pub(super) plain: bool,
     /// Textures and bumps; `None`: there are none.
-    pub(super) skins: Option<Skins<L>>,
+    pub(super) skins: Option<SurfaceTextures<L>>,
     /// What lets light through; `None`: nothing does.
-    pub(super) media: Option<Media<L>>,
+    pub(super) media: Option<NestedDielectrics<L>>,
     /// The most surfaces that a path meets after the first.
     pub(super) depth: u32,
     pub(super) min_weight: f64,
     pub(super) fold: bool,
-    pub(super) view: View,
-    pub(super) panorama: Outlook,
+    pub(super) view: PinholeCamera,
+    pub(super) panorama: TileCandidates,
     /// For each light, if the geometry has a tree that may be gone round.
     pub(super) light_buffers: Vec<Option<LightBuffer<L::Scalar>>>,
-    culling: Culling,
-    groups: Groups,
+    culling: CullingMode,
+    groups: LightGroups,
     names: Vec<String>,
     scales: Vec<f64>,
     jitter: bool,
@@ -88,12 +88,12 @@ pub struct World<L: Lanes> {
 }
 
 /// Geometry of every object, in double precision, around the scene's centre.
-struct Placed {
+struct RecenteredGeometry {
     origin: DVec3,
     forms: Vec<Form>,
 }
 
-impl Placed {
+impl RecenteredGeometry {
     fn new(scene: &Scene) -> Self {
         let forms: Vec<Form> = scene
             .objects
@@ -119,13 +119,13 @@ impl Placed {
     }
 }
 
-impl<L: Lanes> World<L> {
+impl<L: SimdFloat> World<L> {
     /// Compiles a scene without faults.
     pub fn new(scene: &Scene) -> Self {
-        Self::compile(scene, Placed::new(scene))
+        Self::compile(scene, RecenteredGeometry::new(scene))
     }
 
-    fn compile(scene: &Scene, placed: Placed) -> Self {
+    fn compile(scene: &Scene, placed: RecenteredGeometry) -> Self {
         let level = scene.trace.level;
         let reflects = level == Level::Full && scene.trace.depth > 0;
         let default = Material::default();
@@ -143,26 +143,25 @@ impl<L: Lanes> World<L> {
             let parts = object.shape.part_materials(&object.material);
             finish_of_object.push(parts.into_iter().map(&mut finish).collect::<Vec<_>>());
         }
-        let finishes: Vec<Finish<L::Scalar>> =
-            used.iter().map(|m| Finish::new(m, reflects)).collect();
+        let finishes: Vec<Bsdf<L::Scalar>> = used.iter().map(|m| Bsdf::new(m, reflects)).collect();
         let acceleration = scene.trace.acceleration;
-        let geometry = Geometry::accelerated(&placed.forms, acceleration);
+        let geometry = Aggregate::accelerated(&placed.forms, acceleration);
         let finish_of: Vec<u32> =
             geometry.sources().iter().map(|item| finish_of_object[item.form][item.part]).collect();
 
         let of_part =
-            |s: &crate::primitive::Source| used[finish_of_object[s.form][s.part] as usize];
-        let skins = Skins::new(scene, geometry.sources(), placed.origin, of_part);
+            |s: &crate::primitive::PrimitiveId| used[finish_of_object[s.form][s.part] as usize];
+        let skins = SurfaceTextures::new(scene, geometry.sources(), placed.origin, of_part);
 
         let lit = finishes.iter().any(|f| f.wants_light);
         let ambient = used.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3]);
-        let groups = Groups::new(scene, lit, ambient);
+        let groups = LightGroups::new(scene, lit, ambient);
         let extent = placed.extent(scene);
-        let view = View::new(&scene.camera, scene.film.size, placed.origin);
+        let view = PinholeCamera::new(&scene.camera, scene.film.size, placed.origin);
         let materials_of = |form: usize| {
             finish_of_object[form].iter().map(|finish| used[*finish as usize]).collect()
         };
-        let surroundings = radiance_range::Surroundings::new(
+        let surroundings = radiance_range::SceneDistances::new(
             scene,
             &placed.forms,
             materials_of,
@@ -174,26 +173,25 @@ impl<L: Lanes> World<L> {
             .lights(scene)
             .into_iter()
             .filter_map(|(light, group, weight)| {
-                let lamp = Lamp::new(&scene.lights[light], placed.origin)?;
+                let lamp = DeltaLight::new(&scene.lights[light], placed.origin)?;
                 let weight = (weight != [1.0; 3]).then(|| weight.map(L::Scalar::of));
                 let position = scene.lights[light].point.map(|p| DVec3::from(p.position));
                 let on_surface = position.and_then(|position| {
                     let origin = placed.origin;
                     OnSurface::new(&placed.forms, position - origin, origin, L::EPSILON)
                 });
-                Some(Source { lamp, group, weight, on_surface })
+                Some(LightSource { lamp, group, weight, on_surface })
             })
             .collect();
         let off_lamps = sources.iter().filter_map(|s| s.on_surface.as_ref());
         let off_lamps = off_lamps.map(OnSurface::farthest).fold(0.0, f64::max);
         let going_on = finishes.iter().any(|f| f.reflection.is_some() || f.transmission.is_some());
-        let glossy =
-            |f: &Finish<_>| matches!(f.reflection, Some((_, s)) if !matches!(s, Spread::Mirror));
+        let glossy = |f: &Bsdf<_>| matches!(f.reflection, Some((_, s)) if !matches!(s, ReflectionLobe::Mirror));
         let precision = if L::EPSILON > 1e-10 { "single" } else { "double" };
         let inventory = Inventory::new(
             scene,
             geometry.to_string(),
-            &skins.as_ref().map(Skins::words).unwrap_or_default(),
+            &skins.as_ref().map(SurfaceTextures::words).unwrap_or_default(),
             &finishes,
             &groups.members,
             sources.len(),
@@ -208,14 +206,21 @@ impl<L: Lanes> World<L> {
             view.corners([0, 0], size).map(DVec3::length).into_iter().fold(0.0, f64::max);
         let begin = (view.eye(), scene.camera.near * farthest);
         let given = f64::EPSILON * placed.origin.abs().max_element();
-        let media =
-            Media::new(&placed.forms, geometry.sources(), &finish_of, &finishes, begin, given);
-        let entered = media.as_ref().map_or(vec![false; finish_of.len()], Media::entered);
-        let mut panorama = Outlook::everything(&geometry, lamps.len());
+        let media = NestedDielectrics::new(
+            &placed.forms,
+            geometry.sources(),
+            &finish_of,
+            &finishes,
+            begin,
+            given,
+        );
+        let entered =
+            media.as_ref().map_or(vec![false; finish_of.len()], NestedDielectrics::entered);
+        let mut panorama = TileCandidates::everything(&geometry, lamps.len());
         let mut light_buffers = Vec::new();
         let culling = match acceleration {
             Acceleration::Auto => {
-                let of = Surroundings::new(forms().collect(), eye, &entered, (&lamps, off_lamps));
+                let of = FrustumCuller::new(forms().collect(), eye, &entered, (&lamps, off_lamps));
                 panorama = of.outlook(&geometry, None);
                 if geometry.has_tree() {
                     if level >= Level::Shadows {
@@ -224,27 +229,28 @@ impl<L: Lanes> World<L> {
                     let things = geometry.in_tree().into_iter();
                     let seen = |item: u32| {
                         let source = geometry.sources()[item as usize];
-                        (item, Rectangle::of(&placed.forms[source.form], &view))
+                        (item, ScreenBounds::of(&placed.forms[source.form], &view))
                     };
-                    Culling::Cells(Cells::new(size, things.map(seen)))
+                    CullingMode::ScreenGrid(ScreenGrid::new(size, things.map(seen)))
                 } else {
-                    Culling::Pencils(of)
+                    CullingMode::Pencils(of)
                 }
             }
             Acceleration::Projected => {
-                Culling::Rectangles(forms().map(|form| Rectangle::of(form, &view)).collect())
+                CullingMode::Rectangles(forms().map(|form| ScreenBounds::of(form, &view)).collect())
             }
-            _ => Culling::Nothing,
+            _ => CullingMode::Nothing,
         };
-        let smooth = geometry.is_smooth() || skins.as_ref().is_some_and(Skins::is_bumped);
-        let colored = geometry.is_colored() || skins.as_ref().is_some_and(Skins::is_colored);
+        let smooth = geometry.is_smooth() || skins.as_ref().is_some_and(SurfaceTextures::is_bumped);
+        let colored =
+            geometry.is_colored() || skins.as_ref().is_some_and(SurfaceTextures::is_colored);
         Self {
             panorama,
             light_buffers,
             culling,
-            ambient: groups.find(&Member::Ambient),
+            ambient: groups.find(&LightGroupSource::Ambient),
             background: (scene.background.color.0 != [0.0; 3])
-                .then(|| groups.find(&Member::Background))
+                .then(|| groups.find(&LightGroupSource::Background))
                 .flatten(),
             smooth,
             colored,
@@ -291,18 +297,18 @@ impl<L: Lanes> World<L> {
     }
 
     /// The camera.
-    pub fn view(&self) -> &View {
+    pub fn view(&self) -> &PinholeCamera {
         &self.view
     }
 
     /// What camera rays through a rectangle of the raster may meet; `None`: that is not ruled out here.
-    pub fn outlook(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Outlook> {
+    pub fn outlook(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<TileCandidates> {
         let lamps = self.sources.len();
         self.culling.outlook(&self.geometry, lamps, &self.view, (origin, extent))
     }
 
     /// Whether all camera rays that have this outlook meet nothing, and nothing is black.
-    pub fn is_black(&self, outlook: &Outlook) -> bool {
+    pub fn is_black(&self, outlook: &TileCandidates) -> bool {
         self.background.is_none() && outlook.seen.is_empty()
     }
 
@@ -333,7 +339,7 @@ macro_rules! either {
 impl AnyWorld {
     /// Compiles a scene without faults.
     pub fn compile(scene: &Scene, options: &Options) -> Self {
-        let placed = Placed::new(scene);
+        let placed = RecenteredGeometry::new(scene);
         let single = match options.precision {
             Precision::Single => true,
             Precision::Double => false,
@@ -371,13 +377,13 @@ impl AnyWorld {
     }
 
     /// The light groups.
-    pub fn light_groups(&self) -> &Groups {
+    pub fn light_groups(&self) -> &LightGroups {
         either!(self, w => &w.groups)
     }
 
     /// What the camera sees through each of `points` of the raster (columns and rows in pixels, with
     /// fractions), into `seen` of the same length.
-    pub fn look(&self, points: &[[f64; 2]], seen: &mut [Sight]) {
+    pub fn look(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
         either!(self, w => w.look(points, seen))
     }
 

@@ -1,8 +1,8 @@
 //! What a world contains, in words.
 
-use crate::material::{Finish, Shine, Spread};
+use crate::material::{Bsdf, ReflectionLobe, SpecularModel};
 use crate::scene::{Filter, Horizon, Level, Scene};
-use crate::world::light_groups::Member;
+use crate::world::light_groups::LightGroupSource;
 use std::fmt;
 
 /// What a world contains; printing it gives one line.
@@ -17,8 +17,8 @@ impl Inventory {
         scene: &Scene,
         geometry: String,
         textures: &[&str],
-        finishes: &[Finish<S>],
-        members: &[Member],
+        finishes: &[Bsdf<S>],
+        members: &[LightGroupSource],
         lamps: usize,
         precision: &str,
     ) -> Self {
@@ -29,34 +29,40 @@ impl Inventory {
                 parts.push(what.to_string());
             }
         };
-        let shine = |test: fn(&Shine<S>) -> bool| finishes.iter().any(|f| test(&f.shine));
-        say(shine(|s| matches!(s, Shine::Phong { .. })), "Phong");
-        say(shine(|s| matches!(s, Shine::Facets { .. })), "Cook-Torrance");
-        let spread = |test: fn(&Spread<S>) -> bool| {
+        let shine = |test: fn(&SpecularModel<S>) -> bool| finishes.iter().any(|f| test(&f.shine));
+        say(shine(|s| matches!(s, SpecularModel::Phong { .. })), "Phong");
+        say(shine(|s| matches!(s, SpecularModel::MicrofacetDistribution { .. })), "Cook-Torrance");
+        let spread = |test: fn(&ReflectionLobe<S>) -> bool| {
             finishes.iter().any(|f| f.reflection.as_ref().is_some_and(|r| test(&r.1)))
         };
-        say(spread(|s| matches!(s, Spread::Mirror)), "perfect mirror");
-        say(spread(|s| matches!(s, Spread::Cone { .. })), "cone lobe");
-        say(spread(|s| matches!(s, Spread::Square { .. })), "square lobe");
-        say(spread(|s| matches!(s, Spread::Facets(f) if !f.ggx)), "Beckmann lobe");
-        say(spread(|s| matches!(s, Spread::Facets(f) if f.ggx)), "GGX lobe");
+        say(spread(|s| matches!(s, ReflectionLobe::Mirror)), "perfect mirror");
+        say(spread(|s| matches!(s, ReflectionLobe::Cone { .. })), "cone lobe");
+        say(spread(|s| matches!(s, ReflectionLobe::Square { .. })), "square lobe");
+        say(
+            spread(|s| matches!(s, ReflectionLobe::MicrofacetDistribution(f) if !f.ggx)),
+            "Beckmann lobe",
+        );
+        say(
+            spread(|s| matches!(s, ReflectionLobe::MicrofacetDistribution(f) if f.ggx)),
+            "GGX lobe",
+        );
         let through = |dielectric: bool| {
-            let test = |f: &Finish<S>| f.transmission.as_ref().map(|t| t.dielectric);
+            let test = |f: &Bsdf<S>| f.transmission.as_ref().map(|t| t.dielectric);
             finishes.iter().any(|f| test(f) == Some(dielectric))
         };
         say(through(false), "transmission");
         say(through(true), "dielectric");
         let absorbs = scene.trace.horizon == Horizon::Absorb;
-        say(absorbs && spread(|s| !matches!(s, Spread::Mirror)), "absorbing horizon");
+        say(absorbs && spread(|s| !matches!(s, ReflectionLobe::Mirror)), "absorbing horizon");
         let count = |n: usize, what: &str| match n {
             0 => None,
             1 => Some(format!("1 {what}")),
             n => Some(format!("{n} {what}s")),
         };
         let kind = |directional: bool| {
-            let shining = |m: &Member| match m {
-                Member::Light(i) => vec![*i],
-                Member::Shared(list) => list.clone(),
+            let shining = |m: &LightGroupSource| match m {
+                LightGroupSource::Light(i) => vec![*i],
+                LightGroupSource::Shared(list) => list.clone(),
                 _ => Vec::new(),
             };
             members
@@ -72,10 +78,10 @@ impl Inventory {
                 parts.push(what.to_string());
             }
         };
-        let shared = members.iter().any(|m| matches!(m, Member::Shared(_)));
+        let shared = members.iter().any(|m| matches!(m, LightGroupSource::Shared(_)));
         say(shared, "shared light group");
-        say(members.contains(&Member::Ambient), "ambient");
-        say(members.contains(&Member::Background), "background");
+        say(members.contains(&LightGroupSource::Ambient), "ambient");
+        say(members.contains(&LightGroupSource::Background), "background");
         say(scene.trace.level == Level::Primary, "no shadows");
         say(scene.trace.level == Level::Shadows && lamps > 0, "shadows only");
         say(scene.film.filter == Filter::Center, "no anti-aliasing");

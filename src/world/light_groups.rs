@@ -1,11 +1,11 @@
 //! Light groups: parts of the picture that are linear in one light's colour and strength, kept apart
 //! so that these can change without new samples.
 
-use crate::lanes::Real;
-use crate::light::{Lamp, Light};
+use crate::lanes::Float;
+use crate::light::{DeltaLight, Light};
 use crate::scene::Scene;
 use crate::value::Color;
-use crate::world::radiance_range::{Brightness, Surroundings};
+use crate::world::radiance_range::{RadianceRange, SceneDistances};
 use glam::DVec3;
 
 /// The most lights with a group of their own; more share the last group.
@@ -22,7 +22,7 @@ const GROUP_BYTES: u64 = 2 * 3 * 8;
 
 /// What one group holds.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Member {
+pub enum LightGroupSource {
     /// Ambient light.
     Ambient,
     /// What rays see that meet nothing.
@@ -35,24 +35,24 @@ pub enum Member {
 
 /// The groups of a scene: those that can be other than black.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Groups {
+pub struct LightGroups {
     /// In the order of the film.
-    pub members: Vec<Member>,
+    pub members: Vec<LightGroupSource>,
     /// Some surface answers lights.
     pub(super) lit: bool,
     /// Some surface answers ambient light.
     pub(super) ambient: bool,
 }
 
-impl Groups {
+impl LightGroups {
     /// The groups of `scene`. `lit`: some surface answers lights.
     pub fn new(scene: &Scene, lit: bool, ambient: bool) -> Self {
         let mut members = Vec::new();
         if ambient && scene.ambient.color != Color::BLACK {
-            members.push(Member::Ambient);
+            members.push(LightGroupSource::Ambient);
         }
         if scene.background.color != Color::BLACK {
-            members.push(Member::Background);
+            members.push(LightGroupSource::Background);
         }
         let shining: Vec<usize> =
             (0..scene.lights.len()).filter(|i| lit && shines(&scene.lights[*i])).collect();
@@ -61,19 +61,19 @@ impl Groups {
         let room = affordable.saturating_sub(members.len()).clamp(1, MAX_LIGHT_GROUPS);
         let (own, shared) =
             shining.split_at(if shining.len() <= room { shining.len() } else { room - 1 });
-        members.extend(own.iter().map(|i| Member::Light(*i)));
+        members.extend(own.iter().map(|i| LightGroupSource::Light(*i)));
         if !shared.is_empty() {
-            members.push(Member::Shared(shared.to_vec()));
+            members.push(LightGroupSource::Shared(shared.to_vec()));
         }
         if members.is_empty() {
             // A black picture is a picture too: it needs one group to hold it.
-            members.push(Member::Background);
+            members.push(LightGroupSource::Background);
         }
         Self { members, lit, ambient }
     }
 
     /// Position of a member, if there is such a group.
-    pub fn find(&self, wanted: &Member) -> Option<usize> {
+    pub fn find(&self, wanted: &LightGroupSource) -> Option<usize> {
         self.members.iter().position(|m| m == wanted)
     }
 
@@ -82,11 +82,11 @@ impl Groups {
         let mut out = Vec::new();
         for (group, member) in self.members.iter().enumerate() {
             match member {
-                Member::Light(i) => out.push((*i, group, [1.0; 3])),
-                Member::Shared(list) => {
+                LightGroupSource::Light(i) => out.push((*i, group, [1.0; 3])),
+                LightGroupSource::Shared(list) => {
                     out.extend(list.iter().map(|i| (*i, group, strength(&scene.lights[*i]))));
                 }
-                Member::Ambient | Member::Background => {}
+                LightGroupSource::Ambient | LightGroupSource::Background => {}
             }
         }
         out
@@ -95,39 +95,39 @@ impl Groups {
     /// Weight of each group in the picture of `scene`, which may differ from the compiled one in the
     /// colours, intensities and switches of lights, ambient and background.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
-        let weight = |member: &Member| match member {
-            Member::Ambient => scene.ambient.color.0,
-            Member::Background => scene.background.color.0,
-            Member::Light(i) => scene.lights.get(*i).map_or([0.0; 3], strength),
-            Member::Shared(_) => [1.0; 3],
+        let weight = |member: &LightGroupSource| match member {
+            LightGroupSource::Ambient => scene.ambient.color.0,
+            LightGroupSource::Background => scene.background.color.0,
+            LightGroupSource::Light(i) => scene.lights.get(*i).map_or([0.0; 3], strength),
+            LightGroupSource::Shared(_) => [1.0; 3],
         };
         self.members.iter().map(weight).collect()
     }
 
     /// A name for each group, for layers of files.
     pub fn names(&self, scene: &Scene) -> Vec<String> {
-        let name = |member: &Member| match member {
-            Member::Ambient => "ambient".to_string(),
-            Member::Background => "background".to_string(),
-            Member::Light(i) => match scene.lights.get(*i) {
+        let name = |member: &LightGroupSource| match member {
+            LightGroupSource::Ambient => "ambient".to_string(),
+            LightGroupSource::Background => "background".to_string(),
+            LightGroupSource::Light(i) => match scene.lights.get(*i) {
                 Some(light) if !light.name.is_empty() => light.name.clone(),
                 _ => format!("light {}", i + 1),
             },
-            Member::Shared(list) => format!("{} lights", list.len()),
+            LightGroupSource::Shared(list) => format!("{} lights", list.len()),
         };
         self.members.iter().map(name).collect()
     }
 
     /// Steps per unit of radiance in the film's integers, a power of two for each group, as
-    /// [`Brightness`] has it.
-    pub(super) fn scales<S: Real>(
+    /// [`RadianceRange`] has it.
+    pub(super) fn scales<S: Float>(
         &self,
         scene: &Scene,
         origin: DVec3,
-        surroundings: &Surroundings,
+        surroundings: &SceneDistances,
     ) -> Vec<f64> {
         let of_light = |i: usize| {
-            let lamp = Lamp::<S>::new(&scene.lights[i], origin)?;
+            let lamp = DeltaLight::<S>::new(&scene.lights[i], origin)?;
             Some(surroundings.lamp(&lamp))
         };
         let of_shared = |i: &usize| {
@@ -135,11 +135,13 @@ impl Groups {
             let (least, most) = (channels.clone().reduce(f64::min)?, channels.reduce(f64::max)?);
             Some(of_light(*i)?.times(least, most))
         };
-        let brightness = |member: &Member| match member {
-            Member::Ambient => Some(surroundings.ambient()),
-            Member::Background => Some(surroundings.background()),
-            Member::Light(i) => of_light(*i),
-            Member::Shared(list) => list.iter().filter_map(of_shared).reduce(Brightness::or),
+        let brightness = |member: &LightGroupSource| match member {
+            LightGroupSource::Ambient => Some(surroundings.ambient()),
+            LightGroupSource::Background => Some(surroundings.background()),
+            LightGroupSource::Light(i) => of_light(*i),
+            LightGroupSource::Shared(list) => {
+                list.iter().filter_map(of_shared).reduce(RadianceRange::or)
+            }
         };
         // The limits of samples and their squares are numbers in the precision of the samples.
         let (least, most) = if S::EPSILON > 1e-10 { (-78.0, 170.0) } else { (-400.0, 900.0) };
@@ -184,7 +186,7 @@ mod tests {
         Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
     }
 
-    fn serves(groups: &Groups, scene: &Scene, change: impl Fn(&mut Scene)) -> bool {
+    fn serves(groups: &LightGroups, scene: &Scene, change: impl Fn(&mut Scene)) -> bool {
         let mut changed = scene.clone();
         change(&mut changed);
         groups.serve(scene, &changed)
@@ -193,7 +195,7 @@ mod tests {
     #[test]
     fn samples_serve_scenes_that_differ_in_the_mix_only() {
         let scene = scene(LIGHTS);
-        let groups = Groups::new(&scene, true, true);
+        let groups = LightGroups::new(&scene, true, true);
         let serves = |change: fn(&mut Scene)| serves(&groups, &scene, change);
         assert!(serves(|_| ()));
         assert!(serves(|s| s.lights[0].intensity = 7.0));
@@ -225,7 +227,7 @@ mod tests {
     #[test]
     fn other_scenes_need_samples_of_their_own() {
         let scene = scene(LIGHTS);
-        let groups = Groups::new(&scene, true, true);
+        let groups = LightGroups::new(&scene, true, true);
         let serves = |change: fn(&mut Scene)| serves(&groups, &scene, change);
         assert!(!serves(|s| s.lights[1].on = true));
         assert!(!serves(|s| s.background.color = Color::WHITE));
@@ -243,12 +245,12 @@ mod tests {
     #[test]
     fn without_surfaces_that_answer_them_lights_do_not_matter() {
         let scene = scene(LIGHTS);
-        let groups = Groups::new(&scene, false, false);
+        let groups = LightGroups::new(&scene, false, false);
         assert!(serves(&groups, &scene, |s| s.lights[1].on = true));
         assert!(serves(&groups, &scene, |s| s.lights.push(s.lights[0].clone())));
         assert!(serves(&groups, &scene, |s| s.ambient.color = Color::WHITE));
         // The group of a black picture stands for no background.
-        assert_eq!(groups.members, [Member::Background]);
+        assert_eq!(groups.members, [LightGroupSource::Background]);
         assert!(!serves(&groups, &scene, |s| s.background.color = Color::WHITE));
     }
 
@@ -256,9 +258,9 @@ mod tests {
     fn lights_that_share_a_group_keep_their_strength() {
         let lamp = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
         let scene = scene(&lamp.repeat(MAX_LIGHT_GROUPS + 2));
-        let groups = Groups::new(&scene, true, false);
+        let groups = LightGroups::new(&scene, true, false);
         let own = MAX_LIGHT_GROUPS - 1;
-        assert_eq!(groups.members[own], Member::Shared((own..own + 3).collect()));
+        assert_eq!(groups.members[own], LightGroupSource::Shared((own..own + 3).collect()));
         assert!(serves(&groups, &scene, |s| s.lights[own - 1].intensity = 3.0));
         assert!(!serves(&groups, &scene, |s| s.lights[own].intensity = 3.0));
         assert!(!serves(&groups, &scene, |s| s.lights[own + 1].on = false));

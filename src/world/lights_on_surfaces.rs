@@ -5,7 +5,7 @@
 //! come to the surface from there. A ray that ended at the lamp would be blocked or not by rounding, and
 //! one that ended before it by a fixed length would be blocked by surfaces that it meets flatly.
 
-use crate::lanes::{Lanes, Real, V3};
+use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::Form;
 use glam::DVec3;
 
@@ -26,7 +26,7 @@ pub(super) struct OnSurface<S> {
     lift: S,
 }
 
-impl<S: Real> OnSurface<S> {
+impl<S: Float> OnSurface<S> {
     /// Of a lamp at `position` among `forms`, both around `origin`, where coordinates are rounded to
     /// `epsilon`; `None`: it lies on none.
     pub fn new(forms: &[Form], position: DVec3, origin: DVec3, epsilon: f64) -> Option<Self> {
@@ -59,22 +59,22 @@ impl<S: Real> OnSurface<S> {
 
     /// Unit directions from `start` to where shadow rays end, and how far that is.
     #[inline(never)]
-    pub fn end<L: Lanes<Scalar = S>>(&self, start: V3<L>) -> (V3<L>, L) {
-        let to = V3::splat(self.position) - start;
+    pub fn end<L: SimdFloat<Scalar = S>>(&self, start: Vec3<L>) -> (Vec3<L>, L) {
+        let to = Vec3::splat(self.position) - start;
         let mut end = to;
         for normals in &self.solids {
             let mut outside = L::mask(false);
-            let (mut out, mut inward) = (V3::zero(), V3::zero());
-            for normal in normals.iter().map(|n| V3::splat(*n)) {
+            let (mut out, mut inward) = (Vec3::zero(), Vec3::zero());
+            for normal in normals.iter().map(|n| Vec3::splat(*n)) {
                 let before = to.dot(normal).lt(L::zero());
                 outside = outside | before;
-                out = V3::select(before, out + normal, out);
+                out = Vec3::select(before, out + normal, out);
                 inward = inward - normal;
             }
-            let lift = V3::select(outside, out, inward);
+            let lift = Vec3::select(outside, out, inward);
             // The least height over the surfaces that the ray ends before.
             let mut least = L::of(L::MAX);
-            for normal in normals.iter().map(|n| V3::splat(*n)) {
+            for normal in normals.iter().map(|n| Vec3::splat(*n)) {
                 let before = to.dot(normal).lt(L::zero()) | !outside;
                 least = L::select(before, least.min(normal.dot(lift).abs()), least);
             }

@@ -13,9 +13,9 @@ mod radiance_range;
 mod reuse;
 mod truncation_bias;
 
-pub use crate::world::culling::tile::Outlook;
-pub use crate::world::integrator::first_hit::Sight;
+pub use crate::world::culling::tile::TileCandidates;
+pub use crate::world::integrator::first_hit::FirstHit;
 pub use crate::world::integrator::opaque::{Counts, Radiance};
 pub use compile::{AnyWorld, Options, Precision, World};
 pub use inventory::Inventory;
-pub use light_groups::{Groups, MAX_GROUPS, Member};
+pub use light_groups::{LightGroupSource, LightGroups, MAX_GROUPS};

@@ -6,7 +6,7 @@
 //! to the eye. Each of them has its ratio here; `tests/extremes/precision.rs` measures what single
 //! precision gets wrong at each.
 
-use crate::camera::View;
+use crate::camera::PinholeCamera;
 use crate::primitive::Form;
 use crate::scene::Scene;
 use crate::world::clearance::{clearance, clearance_of};
@@ -51,7 +51,7 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     if extent > THINNEST * thinnest {
         return false;
     }
-    let view = View::new(&scene.camera, scene.film.size, origin);
+    let view = PinholeCamera::new(&scene.camera, scene.film.size, origin);
     let angle = view.pixel_angle();
     let distance = |form: &Form| {
         let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
@@ -78,7 +78,7 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
 fn thickness(form: &Form) -> f64 {
     match form {
         Form::Parallelogram { u, v, .. } => u.length().min(v.length()),
-        Form::Convex { faces, corners } => faces
+        Form::ConvexPolyhedron { faces, corners } => faces
             .iter()
             .map(|f| {
                 let depths = corners.iter().map(|c| f.offset - f.normal.dot(*c));
@@ -90,7 +90,7 @@ fn thickness(form: &Form) -> f64 {
         Form::Ellipsoid { .. } => {
             form.bounds().map_or(f64::INFINITY, |(l, h)| (h - l).min_element())
         }
-        Form::Tapered { scene_from_unit: m, .. } => {
+        Form::ConicalFrustum { scene_from_unit: m, .. } => {
             // Between the faces of the box around the canonical solid: 2 by 2 by 1.
             let rows = m.matrix3.inverse().transpose();
             let across = rows.x_axis.length().max(rows.y_axis.length());
@@ -107,48 +107,49 @@ fn thickness(form: &Form) -> f64 {
             // Details are taken to be as large as this part of the whole.
             thinnest.min(longest / MESH_DETAILS)
         }
-        Form::Compound(compound) => {
-            compound.parts.iter().map(thickness).fold(f64::INFINITY, f64::min)
-        }
+        Form::Csg(compound) => compound.parts.iter().map(thickness).fold(f64::INFINITY, f64::min),
     }
 }
 
 /// A surface that another may come close to, within a box.
-enum Side {
+enum ProxyFace {
     Flat { normal: DVec3, offset: f64 },
     Round { center: DVec3, radius: f64 },
 }
 
 /// A simple thing: its sides and its box.
-struct Piece {
-    sides: Vec<Side>,
+struct Proxy {
+    sides: Vec<ProxyFace>,
     low: DVec3,
     high: DVec3,
 }
 
-impl Piece {
+impl Proxy {
     fn new(form: &Form) -> Self {
         let (low, high) =
             form.bounds().unwrap_or((DVec3::splat(f64::NEG_INFINITY), DVec3::splat(f64::INFINITY)));
         let sides = match form {
             Form::Sphere { center, radius } => {
-                vec![Side::Round { center: *center, radius: *radius }]
+                vec![ProxyFace::Round { center: *center, radius: *radius }]
             }
-            Form::Plane { normal, offset } => vec![Side::Flat { normal: *normal, offset: *offset }],
-            Form::Convex { faces, .. } => {
-                faces.iter().map(|f| Side::Flat { normal: f.normal, offset: f.offset }).collect()
+            Form::Plane { normal, offset } => {
+                vec![ProxyFace::Flat { normal: *normal, offset: *offset }]
             }
+            Form::ConvexPolyhedron { faces, .. } => faces
+                .iter()
+                .map(|f| ProxyFace::Flat { normal: f.normal, offset: f.offset })
+                .collect(),
             Form::Parallelogram { corner, u, v } => {
                 let normal = u.cross(*v).normalize();
-                vec![Side::Flat { normal, offset: normal.dot(*corner) }]
+                vec![ProxyFace::Flat { normal, offset: normal.dot(*corner) }]
             }
             // Where the box touches it.
-            Form::Ellipsoid { .. } | Form::Tapered { .. } => DVec3::AXES
+            Form::Ellipsoid { .. } | Form::ConicalFrustum { .. } => DVec3::AXES
                 .into_iter()
                 .flat_map(|axis| [(axis, axis.dot(high)), (-axis, -axis.dot(low))])
-                .map(|(normal, offset)| Side::Flat { normal, offset })
+                .map(|(normal, offset)| ProxyFace::Flat { normal, offset })
                 .collect(),
-            Form::Mesh { .. } | Form::Compound(_) => Vec::new(),
+            Form::Mesh { .. } | Form::Csg(_) => Vec::new(),
         };
         Self { sides, low, high }
     }
@@ -160,7 +161,7 @@ impl Piece {
         for form in forms {
             match form {
                 Form::Mesh { .. } => {}
-                Form::Compound(compound) => out.extend(compound.parts.iter().map(Self::new)),
+                Form::Csg(compound) => out.extend(compound.parts.iter().map(Self::new)),
                 simple => out.push(Self::new(simple)),
             }
         }
@@ -173,14 +174,14 @@ impl Piece {
 }
 
 /// Where two sides are closest to each other.
-struct Gap {
+struct Clearance {
     width: f64,
     /// For sides that bend away from each other: the place, and the radius of a ball that would bend away
     /// from a plane as they do.
     round: Option<(DVec3, f64)>,
 }
 
-impl Gap {
+impl Clearance {
     /// Whether it is narrow, and wherever it is narrow so is more than half a pixel around: a ball beside
     /// another, or on a floor, is close to it in a spot too small to see.
     fn is_seen(&self, narrow: &Range<f64>, pixel: &impl Fn(DVec3) -> f64) -> bool {
@@ -191,27 +192,30 @@ impl Gap {
 }
 
 /// The gaps between two sides that run side by side.
-fn gaps(a: &Side, b: &Side) -> [Option<Gap>; 2] {
+fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
     match (a, b) {
-        (Side::Flat { normal: n, offset: o }, Side::Flat { normal: m, offset: p }) => {
+        (ProxyFace::Flat { normal: n, offset: o }, ProxyFace::Flat { normal: m, offset: p }) => {
             let along = n.dot(*m);
             let width = (o - along.signum() * p).abs();
-            [(along.abs() >= 1.0 - 1e-9).then_some(Gap { width, round: None }), None]
+            [(along.abs() >= 1.0 - 1e-9).then_some(Clearance { width, round: None }), None]
         }
-        (Side::Round { center, radius }, Side::Flat { normal, offset })
-        | (Side::Flat { normal, offset }, Side::Round { center, radius }) => {
+        (ProxyFace::Round { center, radius }, ProxyFace::Flat { normal, offset })
+        | (ProxyFace::Flat { normal, offset }, ProxyFace::Round { center, radius }) => {
             let height = normal.dot(*center) - offset;
             let place = center - normal * radius.copysign(height);
             [
-                Some(Gap { width: (height.abs() - radius).abs(), round: Some((place, *radius)) }),
+                Some(Clearance {
+                    width: (height.abs() - radius).abs(),
+                    round: Some((place, *radius)),
+                }),
                 None,
             ]
         }
-        (Side::Round { center: c, radius: r }, Side::Round { center: d, radius: s }) => {
+        (ProxyFace::Round { center: c, radius: r }, ProxyFace::Round { center: d, radius: s }) => {
             let between = c.distance(*d);
             let place = c + (d - c).normalize_or(DVec3::X) * r;
             let gap = |distance: f64, radius: f64| {
-                Some(Gap { width: (between - distance).abs(), round: Some((place, radius)) })
+                Some(Clearance { width: (between - distance).abs(), round: Some((place, radius)) })
             };
             // Beside each other, and one in the other.
             [gap(r + s, r * s / (r + s)), gap((r - s).abs(), r * s / (r - s).abs())]
@@ -222,9 +226,10 @@ fn gaps(a: &Side, b: &Side) -> [Option<Gap>; 2] {
 /// Whether sides of two things run at a distance within `narrow` of each other where that can be seen;
 /// `pixel`: what a pixel shows at a place.
 fn has_gap(forms: &[Form], narrow: Range<f64>, pixel: impl Fn(DVec3) -> f64) -> bool {
-    let seen =
-        |a: &Side, b: &Side| gaps(a, b).iter().flatten().any(|gap| gap.is_seen(&narrow, &pixel));
-    let mut pieces = Piece::all(forms);
+    let seen = |a: &ProxyFace, b: &ProxyFace| {
+        gaps(a, b).iter().flatten().any(|gap| gap.is_seen(&narrow, &pixel))
+    };
+    let mut pieces = Proxy::all(forms);
     pieces.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
     let mut pairs = 0;
     for (i, a) in pieces.iter().enumerate() {

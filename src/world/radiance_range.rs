@@ -1,6 +1,6 @@
 //! How bright and how dim the samples of a light group are, and so how long a step of the film's integers is.
 //!
-//! A pixel's sum has 63 bits, a sample at most 49 of them (`Lanes::fixed_sum`). A sample is rounded to whole steps
+//! A pixel's sum has 63 bits, a sample at most 49 of them (`SimdFloat::fixed_sum`). A sample is rounded to whole steps
 //! by itself; one that is the same each time, as on a matt surface, is wrong by up to half a step however many
 //! there are. So the step has to suit both ends:
 //!
@@ -16,9 +16,9 @@
 //! Two kinds of brightness yield to the dim end: spots smaller than a pixel, and the products of mirrors that
 //! amplify. Such samples may saturate, and are counted then.
 
-use crate::camera::View;
-use crate::lanes::Real;
-use crate::light::Lamp;
+use crate::camera::PinholeCamera;
+use crate::lanes::Float;
+use crate::light::DeltaLight;
 use crate::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
 use crate::primitive::Form;
 use crate::scene::{Level, Scene};
@@ -43,7 +43,7 @@ const SPOT_BITS: f64 = 12.0;
 
 /// Brightness of a group's samples, in radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Brightness {
+pub(super) struct RadianceRange {
     /// In the middle of the scene, on white.
     pub typical: f64,
     /// Where the dimmest surface is brightest.
@@ -56,7 +56,7 @@ pub(super) struct Brightness {
     pub extreme: f64,
 }
 
-impl Brightness {
+impl RadianceRange {
     /// Of light that is `least` to `most` times as strong, depending on the channel.
     pub fn times(self, least: f64, most: f64) -> Self {
         Self {
@@ -145,7 +145,7 @@ fn least_of(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
 }
 
 /// What decides how bright samples are, but for the lights.
-pub(super) struct Surroundings<'a> {
+pub(super) struct SceneDistances<'a> {
     forms: &'a [Form],
     /// For each form, the response of its parts to lights.
     responses: Vec<Option<Response>>,
@@ -163,13 +163,13 @@ pub(super) struct Surroundings<'a> {
     lift: f64,
 }
 
-impl<'a> Surroundings<'a> {
+impl<'a> SceneDistances<'a> {
     /// `materials_of`: those of a form's parts. `extent`: the largest coordinate.
     pub fn new(
         scene: &Scene,
         forms: &'a [Form],
         materials_of: impl Fn(usize) -> Vec<&'a Material>,
-        view: &View,
+        view: &PinholeCamera,
         (extent, rounding): (f64, f64),
     ) -> Self {
         let of_form = |form: usize| {
@@ -208,21 +208,21 @@ impl<'a> Surroundings<'a> {
     }
 
     /// Of ambient light of unit strength.
-    pub fn ambient(&self) -> Brightness {
+    pub fn ambient(&self) -> RadianceRange {
         let least = least_of(self.ambient.iter().copied()).unwrap_or(1.0);
         let most = self.ambient.iter().copied().fold(0.0, f64::max);
         self.of(1.0, (least, most, most))
     }
 
     /// Of a background of unit strength.
-    pub fn background(&self) -> Brightness {
+    pub fn background(&self) -> RadianceRange {
         self.of(1.0, (1.0, 1.0, 1.0))
     }
 
     /// Of a lamp of unit strength.
-    pub fn lamp<S: Real>(&self, lamp: &Lamp<S>) -> Brightness {
+    pub fn lamp<S: Float>(&self, lamp: &DeltaLight<S>) -> RadianceRange {
         let typical = lamp.typical_irradiance(self.radius) * FRAC_1_PI;
-        let Lamp::Falling { position } = lamp else {
+        let DeltaLight::Falling { position } = lamp else {
             let all = self.responses.iter().flatten().copied().reduce(Response::or);
             let Response { least, most, peak } =
                 all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 });
@@ -235,7 +235,7 @@ impl<'a> Surroundings<'a> {
         let least_spot = (0.25 * pixel * eye.distance(position)).max(self.lift);
         let spots = light_at(clearance(self.forms, position));
         let mut out =
-            Brightness { typical, dimmest: f64::INFINITY, brightest: 0.0, spots, extreme: 0.0 };
+            RadianceRange { typical, dimmest: f64::INFINITY, brightest: 0.0, spots, extreme: 0.0 };
         for (form, response) in self.forms.iter().zip(&self.responses) {
             let Some(response) = response else { continue };
             // A lamp in a surface does not light it: rays begin above the lamp.
@@ -256,7 +256,7 @@ impl<'a> Surroundings<'a> {
             out.dimmest = out.dimmest.min(light * response.least * self.faintest);
         }
         let or_typical = |x: f64| if x > 0.0 && x.is_finite() { x } else { typical };
-        Brightness {
+        RadianceRange {
             dimmest: or_typical(out.dimmest),
             brightest: or_typical(out.brightest),
             extreme: or_typical(out.extreme),
@@ -264,8 +264,8 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    fn of(&self, light: f64, (least, most, peak): (f64, f64, f64)) -> Brightness {
-        Brightness {
+    fn of(&self, light: f64, (least, most, peak): (f64, f64, f64)) -> RadianceRange {
+        RadianceRange {
             typical: light,
             dimmest: light * least * self.faintest,
             brightest: light * most,
@@ -279,8 +279,8 @@ impl<'a> Surroundings<'a> {
 mod tests {
     use super::*;
 
-    const ONE: Brightness =
-        Brightness { typical: 1.0, dimmest: 1.0, brightest: 1.0, spots: 1.0, extreme: 1.0 };
+    const ONE: RadianceRange =
+        RadianceRange { typical: 1.0, dimmest: 1.0, brightest: 1.0, spots: 1.0, extreme: 1.0 };
 
     #[test]
     fn exponents_are_those_of_powers_that_hold_a_number() {
@@ -294,7 +294,7 @@ mod tests {
 
     #[test]
     fn steps_suit_both_ends() {
-        let exponent = |change: &dyn Fn(&mut Brightness)| {
+        let exponent = |change: &dyn Fn(&mut RadianceRange)| {
             let mut brightness = ONE;
             change(&mut brightness);
             brightness.scale_exponent()

@@ -9,10 +9,10 @@ use crate::material::Material;
 use crate::scene::{FilmSettings, Object, Scene};
 use crate::shape::Shape;
 use crate::value::Color;
-use crate::world::light_groups::{Groups, Member, shines, strength};
+use crate::world::light_groups::{LightGroupSource, LightGroups, shines, strength};
 use std::borrow::Cow;
 
-impl Groups {
+impl LightGroups {
     /// Whether the samples of the world compiled from `compiled` (whose groups these are) are samples
     /// of `scene` too, mixed otherwise: they differ in nothing but the strength of lights, ambient and
     /// background that have groups, in names, in materials that nothing is made of, and in the cap on
@@ -36,7 +36,7 @@ impl Groups {
             && (background.color == Color::BLACK || compiled.background.color != Color::BLACK)
             && (ambient.color == Color::BLACK
                 || !self.ambient
-                || self.members.contains(&Member::Ambient))
+                || self.members.contains(&LightGroupSource::Ambient))
             && objects.len() == compiled.objects.len()
             && compiled
                 .objects
@@ -46,23 +46,25 @@ impl Groups {
             && self.serve_lights(compiled, scene)
     }
 
-    /// The part of [`Groups::serve`] that is about lights. One that does not shine may stand anywhere.
+    /// The part of [`LightGroups::serve`] that is about lights. One that does not shine may stand anywhere.
     fn serve_lights(&self, compiled: &Scene, scene: &Scene) -> bool {
         let is_compiled = |i: usize| {
-            let of = |m: &Member| match m {
-                Member::Light(own) => *own == i,
-                Member::Shared(list) => list.contains(&i),
-                Member::Ambient | Member::Background => false,
+            let of = |m: &LightGroupSource| match m {
+                LightGroupSource::Light(own) => *own == i,
+                LightGroupSource::Shared(list) => list.contains(&i),
+                LightGroupSource::Ambient | LightGroupSource::Background => false,
             };
             self.members.iter().any(of)
         };
         let same_place = |i: usize, light: &Light| of_unit(&compiled.lights[i]) == of_unit(light);
         let mut shining = scene.lights.iter().enumerate().filter(|(_, light)| shines(light));
-        let shared = |member: &Member| match member {
-            Member::Shared(list) => list.iter().all(|i| {
+        let shared = |member: &LightGroupSource| match member {
+            LightGroupSource::Shared(list) => list.iter().all(|i| {
                 scene.lights.get(*i).is_some_and(|l| strength(l) == strength(&compiled.lights[*i]))
             }),
-            Member::Ambient | Member::Background | Member::Light(_) => true,
+            LightGroupSource::Ambient
+            | LightGroupSource::Background
+            | LightGroupSource::Light(_) => true,
         };
         !self.lit
             || shining.all(|(i, light)| is_compiled(i) && same_place(i, light))

@@ -23,7 +23,7 @@ fn strongest(material: &Material, flat: bool) -> f64 {
 }
 
 /// What matters of an object's geometry.
-struct Place {
+struct ObjectTraits {
     flat: bool,
     /// It may see itself from outside.
     compound: bool,
@@ -34,7 +34,7 @@ struct Place {
 /// How far beside its place rounding to single precision may put the eye, as a share of the scene's extent.
 const ROUNDING: f64 = 1e-6;
 
-impl Place {
+impl ObjectTraits {
     fn new(object: &Object, scene: &Scene) -> Self {
         let form = object.form();
         let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
@@ -46,7 +46,7 @@ impl Place {
         });
         Self {
             flat,
-            compound: matches!(form, Form::Compound(_) | Form::Mesh { .. }),
+            compound: matches!(form, Form::Csg(_) | Form::Mesh { .. }),
             begun_in: !flat && (within || scene.camera.near > 0.0),
         }
     }
@@ -76,7 +76,7 @@ impl Reach {
         let (mut first, mut second, mut pair) = (0.0f64, 0.0f64, 0.0f64);
         let (mut entered, mut through) = (0, false);
         for object in &scene.objects {
-            let place = Place::new(object, scene);
+            let place = ObjectTraits::new(object, scene);
             let mut enters = false;
             for name in object.materials() {
                 let material = scene.materials.get(name).unwrap_or(&default);

@@ -8,7 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::fmt;
 use std::path::PathBuf;
-use zerkalo::film::Part;
+use zerkalo::film::Replicates;
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
@@ -131,7 +131,7 @@ pub fn rendered(scene: &Scene, samples: u32, kind: SamplerKind) -> (Vec<DVec3>, 
     let mut rendering = begin_with(scene, SampleSettings { seed: 1, kind }, Precision::Double);
     uniform(&mut rendering, 0, samples, &pool(2));
     let part = |part| picture(&rendering, part).into_iter().map(DVec3::from).collect::<Vec<_>>();
-    let (a, b) = (part(Part::A), part(Part::B));
+    let (a, b) = (part(Replicates::A), part(Replicates::B));
     let mean = a.iter().zip(&b).map(|(a, b)| 0.5 * (*a + *b)).collect();
     (mean, a.iter().zip(&b).map(|(a, b)| 0.5 * (*a - *b)).collect())
 }

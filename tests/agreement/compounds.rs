@@ -6,7 +6,7 @@ use crate::paint::{Canvas, Spot};
 use crate::surfaces::{Piece, map, pieces};
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo::scene::Object;
-use zerkalo::shape::{Part, Shape};
+use zerkalo::shape::{CsgOperand, Shape};
 
 /// A simple shape: its pieces or its triangles, and the maps between their space and the scene's.
 pub struct Leaf {
@@ -151,7 +151,7 @@ fn grow(
     scene_from_own: DAffine3,
     leaves: &mut Vec<Leaf>,
 ) -> Result<Tree, String> {
-    let mut all = |of: &[Part]| -> Result<Vec<Tree>, String> {
+    let mut all = |of: &[CsgOperand]| -> Result<Vec<Tree>, String> {
         of.iter()
             .map(|part| {
                 let inner =
@@ -167,7 +167,7 @@ fn grow(
         Shape::Difference(d) => Tree::Difference(all(&d.of)?),
         simple => {
             let mesh = match simple {
-                Shape::MeshFile(file) => Some(Triangles::new(file)),
+                Shape::MeshDesc(file) => Some(Triangles::new(file)),
                 _ => None,
             };
             let pieces = if mesh.is_some() { Vec::new() } else { pieces(simple)? };

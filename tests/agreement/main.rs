@@ -22,7 +22,7 @@ use support::{all_shipped, parsed, shipped};
 use tracer::{Mutation, Tracer};
 use zerkalo::material::Lobe;
 use zerkalo::sampling::SamplerKind;
-use zerkalo::scene::{Scale, Scene, Step};
+use zerkalo::scene::{Scale, Scene, TransformOp};
 
 /// Samples of the plain tracer for one pixel.
 const PLAIN: u32 = 96;
@@ -92,7 +92,7 @@ fn shrunk(mut scene: Scene) -> Scene {
     shrink(&mut scene.camera.eye);
     scene.camera.target.as_mut().map(shrink);
     scene.lights.iter_mut().filter_map(|l| l.point.as_mut()).for_each(|p| shrink(&mut p.position));
-    let step = Step::Scale(Scale([FACTOR; 3]));
+    let step = TransformOp::Scale(Scale([FACTOR; 3]));
     scene.objects.iter_mut().for_each(|object| object.transform.push(step));
     scene
 }

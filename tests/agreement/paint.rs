@@ -115,7 +115,7 @@ impl Canvas {
         let (frame, usual) = match shape {
             Shape::Sphere(_) => (DMat3::IDENTITY, Mapping::Spherical),
             Shape::Plane(p) => (flat(v(p.normal)), Mapping::Planar),
-            Shape::Platform(_) => (flat(DVec3::Y), Mapping::Planar),
+            Shape::HorizontalRectangle(_) => (flat(DVec3::Y), Mapping::Planar),
             Shape::Rectangle(r) => {
                 let front = v(r.normal).normalize();
                 let right = v(r.up).cross(front).normalize();
@@ -124,7 +124,7 @@ impl Canvas {
             Shape::Cylinder(c) => (around(v(c.top) - v(c.base)), Mapping::Cylindrical),
             Shape::TaperedCylinder(c) => (around(v(c.top) - v(c.base)), Mapping::Cylindrical),
             Shape::Cone(c) => (around(v(c.apex) - v(c.base)), Mapping::Cylindrical),
-            Shape::UnitCylinder(_) => (around(DVec3::Z), Mapping::Cylindrical),
+            Shape::UnitFrustum(_) => (around(DVec3::Z), Mapping::Cylindrical),
             Shape::Cube(c) => (turned(c.rotation), Mapping::Box),
             Shape::Prism(p) => (turned(p.rotation), Mapping::Box),
             Shape::Pyramid(p) => (turned(p.rotation), Mapping::Box),

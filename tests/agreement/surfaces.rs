@@ -2,7 +2,7 @@
 //! sides of cones, each in the space that its description uses. Nothing here is fast, and nothing is shared with the program.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
-use zerkalo::scene::Step;
+use zerkalo::scene::TransformOp;
 use zerkalo::shape::Shape;
 
 /// What a ray can meet, before the object's transform.
@@ -100,17 +100,17 @@ fn flat(point: DVec3, normal: DVec3, origin: DVec3, direction: DVec3) -> Meeting
 }
 
 /// A step of a transform.
-pub fn map(step: &Step) -> DAffine3 {
+pub fn map(step: &TransformOp) -> DAffine3 {
     let turn = |axis: DVec3, degrees: f64| {
         DAffine3::from_axis_angle(axis.normalize(), degrees.to_radians())
     };
     match step {
-        Step::Translate(by) => DAffine3::from_translation(DVec3::from(*by)),
-        Step::RotateX(degrees) => turn(DVec3::X, *degrees),
-        Step::RotateY(degrees) => turn(DVec3::Y, *degrees),
-        Step::RotateZ(degrees) => turn(DVec3::Z, *degrees),
-        Step::Rotate(r) => turn(DVec3::from(r.axis), r.degrees),
-        Step::Scale(s) => DAffine3::from_mat3(DMat3::from_diagonal(DVec3::from(s.0))),
+        TransformOp::Translate(by) => DAffine3::from_translation(DVec3::from(*by)),
+        TransformOp::RotateX(degrees) => turn(DVec3::X, *degrees),
+        TransformOp::RotateY(degrees) => turn(DVec3::Y, *degrees),
+        TransformOp::RotateZ(degrees) => turn(DVec3::Z, *degrees),
+        TransformOp::Rotate(r) => turn(DVec3::from(r.axis), r.degrees),
+        TransformOp::Scale(s) => DAffine3::from_mat3(DMat3::from_diagonal(DVec3::from(s.0))),
     }
 }
 
@@ -122,7 +122,7 @@ pub fn pieces(shape: &Shape) -> Result<Vec<Piece>, String> {
     Ok(match shape {
         Shape::Sphere(s) => vec![Piece::Sphere(v(s.center), s.radius)],
         Shape::Plane(p) => vec![Piece::Plane(v(p.point), v(p.normal).normalize())],
-        Shape::Platform(p) => {
+        Shape::HorizontalRectangle(p) => {
             let half = DVec3::new(0.5 * p.size[0], 0.0, 0.5 * p.size[1]);
             let corner = |x: f64, z: f64| v(p.center) + half * DVec3::new(x, 0.0, z);
             let corners =
@@ -143,7 +143,7 @@ pub fn pieces(shape: &Shape) -> Result<Vec<Piece>, String> {
         Shape::Cylinder(c) => round(v(c.base), v(c.top), [c.radius; 2]),
         Shape::Cone(c) => round(v(c.base), v(c.apex), [c.radius, 0.0]),
         Shape::TaperedCylinder(c) => round(v(c.base), v(c.top), [c.base_radius, c.top_radius]),
-        Shape::UnitCylinder(c) => round(DVec3::ZERO, DVec3::Z, [1.0, c.s]),
+        Shape::UnitFrustum(c) => round(DVec3::ZERO, DVec3::Z, [1.0, c.s]),
         Shape::Cuboid(b) => {
             let [x, y, z] = b.size;
             let base = vec![[0.0, 0.0], [x, 0.0], [x, -z], [0.0, -z]];

@@ -5,8 +5,8 @@
 use crate::common::Numbers;
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::bvh::{Hit, Ray};
-use zerkalo::lanes::{Lanes, Mask, Real, V3};
-use zerkalo::primitive::{Form, Geometry, Surface};
+use zerkalo::lanes::{Float, Mask, SimdFloat, Vec3};
+use zerkalo::primitive::{Aggregate, Form, SurfacePoint};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::shape::EXAMPLES;
@@ -26,30 +26,34 @@ pub struct Met {
 }
 
 /// Packets of `lines`, the last one filled up with its last ray, and the range each is for.
-pub fn packets<L: Lanes>(lines: &[Line]) -> impl Iterator<Item = (Ray<L>, usize)> + '_ {
+pub fn packets<L: SimdFloat>(lines: &[Line]) -> impl Iterator<Item = (Ray<L>, usize)> + '_ {
     lines.chunks(L::WIDTH).map(|lines| {
         let at = |i: usize| lines[i.min(lines.len() - 1)];
         let real = |v: DVec3| v.to_array().map(L::Scalar::of);
-        let origin = V3::from_fn(|i| real(at(i).0));
-        let direction = V3::from_fn(|i| real(at(i).1));
+        let origin = Vec3::from_fn(|i| real(at(i).0));
+        let direction = Vec3::from_fn(|i| real(at(i).1));
         (Ray { origin, direction }, lines.len())
     })
 }
 
-pub fn to_dvec3<L: Lanes>(v: V3<L>, lane: usize) -> DVec3 {
-    DVec3::from(v.lane(lane).map(Real::to_f64))
+pub fn to_dvec3<L: SimdFloat>(v: Vec3<L>, lane: usize) -> DVec3 {
+    DVec3::from(v.lane(lane).map(Float::to_f64))
 }
 
 /// The surfaces of all lanes, item by item.
-pub fn surface<L: Lanes>(geometry: &Geometry<L>, ray: &Ray<L>, hit: &Hit<L>) -> Surface<L> {
-    let mut all = Surface { point: ray.at(hit.t), normal: V3::zero(), reach: L::zero() };
+pub fn surface<L: SimdFloat>(
+    geometry: &Aggregate<L>,
+    ray: &Ray<L>,
+    hit: &Hit<L>,
+) -> SurfacePoint<L> {
+    let mut all = SurfacePoint { point: ray.at(hit.t), normal: Vec3::zero(), reach: L::zero() };
     let mut left = hit.t.lt(L::of(L::MAX));
     while left.any() {
         let item = hit.item.tag_lane(left.bits().trailing_zeros() as usize);
         let here = left & hit.item.has_tag(item);
         let one = geometry.surface(item, hit.facet, ray.at(hit.t));
-        all.point = V3::select(here, one.point, all.point);
-        all.normal = V3::select(here, one.normal, all.normal);
+        all.point = Vec3::select(here, one.point, all.point);
+        all.normal = Vec3::select(here, one.normal, all.normal);
         all.reach = L::select(here, one.reach, all.reach);
         left = left.and_not(here);
     }
@@ -57,7 +61,7 @@ pub fn surface<L: Lanes>(geometry: &Geometry<L>, ray: &Ray<L>, hit: &Hit<L>) -> 
 }
 
 /// The nearest things, ray by ray.
-pub fn closest<L: Lanes>(geometry: &Geometry<L>, lines: &[Line]) -> Vec<Option<Met>> {
+pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Option<Met>> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
         let hit = geometry.closest(&ray, geometry.all());
@@ -76,7 +80,7 @@ pub fn closest<L: Lanes>(geometry: &Geometry<L>, lines: &[Line]) -> Vec<Option<M
 }
 
 /// Whether anything lies nearer than `limit`, ray by ray.
-pub fn blocked<L: Lanes>(geometry: &Geometry<L>, lines: &[Line], limit: f64) -> Vec<bool> {
+pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64) -> Vec<bool> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
         let blocked = geometry.blocked(&ray, L::of(limit), L::mask(true), geometry.all());
@@ -139,12 +143,12 @@ impl Traced {
         self.origin
     }
 
-    fn of<L: Lanes>(&self, world: &World<L>, lines: &[Line]) -> Vec<[f64; 3]> {
+    fn of<L: SimdFloat>(&self, world: &World<L>, lines: &[Line]) -> Vec<[f64; 3]> {
         let settings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
         let sampler = Sampler::new(settings, world.jitter());
         let mut out = Vec::with_capacity(lines.len());
         let points = sampler.block(0, L::WIDTH);
-        let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
+        let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
         for (ray, count) in packets::<L>(lines) {
             let draws = points.of_pixel(sampler.key((0, 0), 0));
             world.trace((ray.origin, ray.direction), None, &draws, L::mask(true), &mut radiance);

@@ -3,13 +3,13 @@
 
 use toml::{Table, Value};
 use zerkalo::scene::{FIELDS, Library, Scene};
-use zerkalo::value::{Field, Takes};
+use zerkalo::value::{Field, ValueType};
 
 /// A key of a scene: the keys that lead to it, positions in lists as numbers, and what it takes.
 #[derive(Clone, Debug)]
 pub struct Key {
     pub path: Vec<String>,
-    pub takes: Takes,
+    pub takes: ValueType,
 }
 
 /// The scene as a table.
@@ -48,12 +48,12 @@ fn walk(fields: &[Field], table: &Table, path: &[String], out: &mut Vec<Key>) {
             }
         };
         match (field.takes, value) {
-            (Takes::Table(fields), value) => inner(fields, value, &path),
-            (Takes::OneOf(kinds), Value::Table(given)) => {
+            (ValueType::Table(fields), value) => inner(fields, value, &path),
+            (ValueType::OneOf(kinds), Value::Table(given)) => {
                 let given = kinds.iter().filter(|kind| given.contains_key(kind.name)).copied();
                 inner(&given.collect::<Vec<_>>(), value, &path);
             }
-            (Takes::ListOf(kinds), Value::Array(list)) => {
+            (ValueType::ListOf(kinds), Value::Array(list)) => {
                 for (i, step) in list.iter().enumerate() {
                     let given = step.as_table().into_iter().flat_map(|step| {
                         kinds.iter().filter(|kind| step.contains_key(kind.name)).copied()
@@ -61,12 +61,12 @@ fn walk(fields: &[Field], table: &Table, path: &[String], out: &mut Vec<Key>) {
                     inner(&given.collect::<Vec<_>>(), step, &joined(&path, &i.to_string()));
                 }
             }
-            (Takes::Tables(fields), Value::Array(list)) => {
+            (ValueType::Tables(fields), Value::Array(list)) => {
                 for (i, value) in list.iter().enumerate() {
                     inner(fields, value, &joined(&path, &i.to_string()));
                 }
             }
-            (Takes::Named(fields), Value::Table(named)) => {
+            (ValueType::Named(fields), Value::Table(named)) => {
                 for (name, value) in named {
                     inner(fields, value, &joined(&path, name));
                 }

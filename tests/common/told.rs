@@ -2,7 +2,7 @@
 //! A test tells what came out once it has passed.
 #![allow(dead_code, reason = "each test file uses its part")]
 
-use zerkalo::lanes::Lanes;
+use zerkalo::lanes::SimdFloat;
 
 /// For the column `what` (`single`, `double`, `both`, `auto`, `about`, `criterion`) of an extreme's row.
 pub fn told(number: usize, what: &str, words: &str) {
@@ -10,7 +10,7 @@ pub fn told(number: usize, what: &str, words: &str) {
 }
 
 /// `single` or `double`.
-pub fn precision<L: Lanes>() -> &'static str {
+pub fn precision<L: SimdFloat>() -> &'static str {
     if L::EPSILON < 1e-10 { "double" } else { "single" }
 }
 

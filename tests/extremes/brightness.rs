@@ -3,15 +3,15 @@
 use crate::support::{begin, parsed, picture, pool, rendered, uniform};
 use crate::told::told;
 use std::fs;
-use zerkalo::film::{Display, Part};
-use zerkalo::render::Rendering;
+use zerkalo::film::{Display, Replicates};
+use zerkalo::render::RenderState;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
 const PRECISIONS: [Precision; 2] = [Precision::Auto, Precision::Double];
 
 /// Nothing was left out or made darker.
-fn is_whole(rendering: &Rendering, name: &str) {
+fn is_whole(rendering: &RenderState, name: &str) {
     let film = &rendering.film;
     let bad = film.bad_samples();
     assert_eq!(
@@ -22,8 +22,8 @@ fn is_whole(rendering: &Rendering, name: &str) {
 }
 
 /// The mean of all pixels in green.
-fn mean(rendering: &Rendering) -> f64 {
-    let pixels = picture(rendering, Part::Both);
+fn mean(rendering: &RenderState) -> f64 {
+    let pixels = picture(rendering, Replicates::Both);
     pixels.iter().map(|p| p[1]).sum::<f64>() / pixels.len() as f64
 }
 
@@ -188,7 +188,7 @@ fn mirrors_that_amplify_are_white() {
             let rendering = rendered(&parsed(&text(k, depth)), 1, precision, 8);
             assert_eq!(rendering.film.bad_samples().count, 0, "{name}");
             assert_eq!(rendering.film.saturated_samples() > 0, saturates, "{name}");
-            let pixels = picture(&rendering, Part::Both);
+            let pixels = picture(&rendering, Replicates::Both);
             assert!(pixels.iter().all(|p| p[0] > 1.0 && p[0].is_finite()), "{name}: {pixels:?}");
             // What is too bright poisons no estimate.
             let noise = rendering.film.noise(&rendering.mix, &Display::default()).unwrap();
@@ -224,7 +224,7 @@ fn strength_in_powers_of_two_does_not_matter() {
         ),
     ];
     for scene in scenes {
-        let of = |scene: &Scene| picture(&rendered(scene, 1, Precision::Auto, 8), Part::Both);
+        let of = |scene: &Scene| picture(&rendered(scene, 1, Precision::Auto, 8), Replicates::Both);
         let expected = of(&scene);
         for ev in [-40, 40] {
             let factor = f64::from(ev).exp2();

@@ -4,12 +4,12 @@ use crate::common::Numbers;
 use crate::rays::to_dvec3;
 use crate::told::{precision, told};
 use glam::DVec3;
-use zerkalo::camera::{Camera, View, ViewAngle};
-use zerkalo::lanes::{Double, Frame, Lanes, Single, V3};
+use zerkalo::camera::{Camera, PinholeCamera, ViewAngle};
+use zerkalo::lanes::{Double, Frame, SimdFloat, Single, Vec3};
 use zerkalo::scene::Scene;
 
-fn check_finite<L: Lanes>(camera: &Camera, size: [u32; 2], name: &str) {
-    let view = View::new(camera, size, DVec3::ZERO);
+fn check_finite<L: SimdFloat>(camera: &Camera, size: [u32; 2], name: &str) {
+    let view = PinholeCamera::new(camera, size, DVec3::ZERO);
     let [u, v, w] = view.frame();
     for (a, b, expected) in
         [(u, u, 1.0), (v, v, 1.0), (w, w, 1.0), (u, v, 0.0), (v, w, 0.0), (w, u, 0.0)]
@@ -20,7 +20,8 @@ fn check_finite<L: Lanes>(camera: &Camera, size: [u32; 2], name: &str) {
     let ys = [0, size[1] / 2, size[1] - 1];
     for at in xs.into_iter().flat_map(|x| ys.map(|y| (x, y))) {
         for offset in [0.0, 0.5, 1.0] {
-            let (o, d) = view.rays(V3::<L>::splat(view.toward(at)), (L::of(offset), L::of(offset)));
+            let (o, d) =
+                view.rays(Vec3::<L>::splat(view.toward(at)), (L::of(offset), L::of(offset)));
             for lane in 0..L::WIDTH {
                 let (o, d) = (to_dvec3(o, lane), to_dvec3(d, lane));
                 assert!(o.is_finite() && d.is_finite(), "{name}: pixel {at:?}: {o} {d}");
@@ -61,10 +62,10 @@ fn extreme_17_narrow_and_wide_angles_are_right() {
     let mut worst = 0f64;
     for degrees in [1e-3f64, 1.0, 90.0, 179.9] {
         let camera = Camera { view_angle: ViewAngle::Horizontal(degrees), ..Camera::default() };
-        let view = View::new(&camera, [1000, 1], DVec3::ZERO);
+        let view = PinholeCamera::new(&camera, [1000, 1], DVec3::ZERO);
         let angle = |y: f64| {
-            let (_, left) = view.rays(V3::<f64>::splat(view.toward((0, 0))), (0.0, y));
-            let (_, right) = view.rays(V3::<f64>::splat(view.toward((999, 0))), (1.0, y));
+            let (_, left) = view.rays(Vec3::<f64>::splat(view.toward((0, 0))), (0.0, y));
+            let (_, right) = view.rays(Vec3::<f64>::splat(view.toward((999, 0))), (1.0, y));
             let (a, b) =
                 (DVec3::new(left.x, left.y, left.z), DVec3::new(right.x, right.y, right.z));
             a.cross(b).length().atan2(a.dot(b)).to_degrees()
@@ -97,7 +98,7 @@ fn extreme_17_impossible_views_are_located_errors() {
     told(17, "both", "errors located");
 }
 
-fn check_frames<L: Lanes>(bound: f64) {
+fn check_frames<L: SimdFloat>(bound: f64) {
     let mut numbers = Numbers::new(18);
     let mut worst: f64 = 0.0;
     for round in 0..1_000_000 / L::WIDTH {
@@ -131,7 +132,7 @@ fn check_frames<L: Lanes>(bound: f64) {
             normals[2 % L::WIDTH] = [0.0, 0.0, -1.0 - e];
             normals[3 % L::WIDTH] = [0.0, -0.0, 1.0];
         }
-        let n = V3::<L>::from_fn(|i| normals[i].map(zerkalo::lanes::Real::of));
+        let n = Vec3::<L>::from_fn(|i| normals[i].map(zerkalo::lanes::Float::of));
         let frame = Frame::around(n);
         for i in 0..L::WIDTH {
             let [t, b, n] = [frame.t, frame.b, frame.n].map(|v| to_dvec3(v, i));

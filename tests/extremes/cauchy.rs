@@ -7,9 +7,9 @@ use crate::rays::{Line, ball, closest, every_kind};
 use crate::told::{LEFT, told};
 use glam::{DMat3, DVec3};
 use std::f64::consts::{PI, TAU};
-use zerkalo::lanes::{Double, Lanes, Single};
-use zerkalo::primitive::{Form, Geometry, HalfSpace};
-use zerkalo::shape::{Cuboid, Kind, Prism, Pyramid};
+use zerkalo::lanes::{Double, SimdFloat, Single};
+use zerkalo::primitive::{Aggregate, Form, HalfSpace};
+use zerkalo::shape::{Cuboid, Prism, Pyramid, ShapeDesc};
 
 /// Area of one face: the corners on it, sorted around their middle.
 fn face_area(face: &HalfSpace, corners: &[DVec3], size: f64) -> f64 {
@@ -68,7 +68,7 @@ fn surface_and_volume(form: &Form) -> Option<(f64, f64)> {
             let volume = 4.0 / 3.0 * PI * m.matrix3.determinant().abs();
             Some((ellipsoid_surface(m.matrix3), volume))
         }
-        Form::Convex { faces, corners } => {
+        Form::ConvexPolyhedron { faces, corners } => {
             let inside = corners.iter().sum::<DVec3>() / corners.len() as f64;
             let size = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
             let mut sums = (0.0, 0.0);
@@ -79,9 +79,9 @@ fn surface_and_volume(form: &Form) -> Option<(f64, f64)> {
             }
             Some(sums)
         }
-        Form::Tapered { scene_from_unit: m, top } => Some(tapered(m.matrix3, *top)),
+        Form::ConicalFrustum { scene_from_unit: m, top } => Some(tapered(m.matrix3, *top)),
         // Not convex: measured by their chords in `compound.rs`.
-        Form::Compound(_) => None,
+        Form::Csg(_) => None,
         // Not convex in general.
         Form::Mesh { .. } => None,
         Form::Parallelogram { u, v, .. } => Some((2.0 * u.cross(*v).length(), 0.0)),
@@ -102,7 +102,7 @@ struct Tally {
 
 impl Tally {
     /// Each line from both of its ends: `(middle, direction)`, `far` away from the middle.
-    fn add<L: Lanes>(&mut self, geometry: &Geometry<L>, lines: &[Line], far: f64, flat: bool) {
+    fn add<L: SimdFloat>(&mut self, geometry: &Aggregate<L>, lines: &[Line], far: f64, flat: bool) {
         let ends = |sign: f64| -> Vec<Line> {
             lines.iter().map(|(p, d)| (*p - *d * (sign * far), *d * sign)).collect()
         };
@@ -177,14 +177,14 @@ fn through_box(numbers: &mut Numbers, center: DVec3, half: DVec3) -> Line {
 const LINES: usize = 1_000_000;
 const BLOCK: usize = 1 << 14;
 
-fn tally<L: Lanes>(
+fn tally<L: SimdFloat>(
     form: &Form,
     far: f64,
     seed: u64,
     lines: usize,
     mut line: impl FnMut(&mut Numbers) -> Line,
 ) -> Tally {
-    let geometry = Geometry::<L>::new(std::slice::from_ref(form));
+    let geometry = Aggregate::<L>::new(std::slice::from_ref(form));
     let flat = matches!(form, Form::Parallelogram { .. });
     let mut numbers = Numbers::new(seed);
     let mut tally = Tally::default();
@@ -260,7 +260,7 @@ fn an_endless_plane_is_met_by_one_half_of_every_line() {
     for (name, form) in every_kind() {
         let Form::Plane { normal, offset } = form else { continue };
         planes += 1;
-        let geometry = Geometry::<Double>::new(std::slice::from_ref(&form));
+        let geometry = Aggregate::<Double>::new(std::slice::from_ref(&form));
         let mut numbers = Numbers::new(8);
         for _ in 0..50_000 {
             let (p, d) = (numbers.in_cube(10.0), numbers.direction());

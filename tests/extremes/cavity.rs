@@ -4,9 +4,9 @@ use crate::common::Numbers;
 use crate::compound::{block, difference, geometry};
 use crate::rays::{Line, closest};
 use glam::DVec3;
-use zerkalo::lanes::{Double, Lanes, Single};
+use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::primitive::Form;
-use zerkalo::shape::{Cylinder, Kind};
+use zerkalo::shape::{Cylinder, ShapeDesc};
 
 fn ball(radius: f64) -> Form {
     Form::Sphere { center: DVec3::ZERO, radius }
@@ -14,7 +14,7 @@ fn ball(radius: f64) -> Form {
 
 /// From inside the hollow of a solid whose walls are at least 0.2 thick: the wall is met where it
 /// begins, then where it ends, and beyond there is nothing.
-fn check_hollow<L: Lanes>(name: &str, form: &Form, seed: u64) {
+fn check_hollow<L: SimdFloat>(name: &str, form: &Form, seed: u64) {
     let geometry = geometry::<L>(form);
     let mut numbers = Numbers::new(seed);
     let mut lines: Vec<Line> =

@@ -6,7 +6,7 @@ use crate::rays::{Line, Traced, blocked, closest, scene};
 use crate::told::told;
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::lanes::{Double, Lanes, Single};
+use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::world::Precision;
 
 /// `x` moved by so many units of the last place of the precision's numbers near 1.
@@ -16,7 +16,7 @@ fn nudged(x: f64, units: i32, epsilon: f64) -> f64 {
 
 /// A box with a hole from its top: the cutter's top lies on the box's, or some ulps beside it. Seen
 /// from above no ray may meet the opening.
-fn check_flush<L: Lanes>(units: i32, rays: usize) {
+fn check_flush<L: SimdFloat>(units: i32, rays: usize) {
     let top = nudged(1.0, units, L::EPSILON);
     let cutter = block([0.0, (top + 0.3) / 2.0, 0.0], [1.0, top - 0.3, 1.0]);
     let pot = difference(vec![block([0.0, 0.5, 0.0], [2.0, 1.0, 2.0]), cutter]);
@@ -68,7 +68,7 @@ fn extreme_10_coincident_faces() {
 }
 
 /// Two boxes side by side are one: no crack lets a ray in between, and no wall stands inside.
-fn check_fused<L: Lanes>(units: i32) {
+fn check_fused<L: SimdFloat>(units: i32) {
     let seam = nudged(0.3, units, L::EPSILON);
     let right = block([(seam + 1.0) / 2.0, 0.0, 0.0], [1.0 - seam, 1.0, 1.0]);
     let left = block([-0.35, 0.0, 0.0], [1.3, 1.0, 1.0]);

@@ -4,9 +4,9 @@ use crate::common::Numbers;
 use crate::rays::{Line, Met, blocked, closest};
 use crate::told::told;
 use glam::{DAffine3, DQuat, DVec3};
-use zerkalo::lanes::{Double, Lanes, Single};
-use zerkalo::primitive::{Compound, CompoundTree as Tree, Form, Geometry};
-use zerkalo::shape::{Cuboid, Kind};
+use zerkalo::lanes::{Double, SimdFloat, Single};
+use zerkalo::primitive::{Aggregate, CsgSolid, CsgTree as Tree, Form};
+use zerkalo::shape::{Cuboid, ShapeDesc};
 
 pub fn ball(x: f64, y: f64, z: f64, radius: f64) -> Form {
     Form::Sphere { center: DVec3::new(x, y, z), radius }
@@ -19,7 +19,7 @@ pub fn block(center: [f64; 3], size: [f64; 3]) -> Form {
 /// All parts joined in one way.
 fn joined(join: fn(Vec<Tree>) -> Tree, parts: Vec<Form>) -> Form {
     let tree = join((0..parts.len()).map(Tree::Part).collect());
-    Form::Compound(Compound { parts, tree })
+    Form::Csg(CsgSolid { parts, tree })
 }
 
 pub fn union(parts: Vec<Form>) -> Form {
@@ -34,8 +34,8 @@ pub fn difference(parts: Vec<Form>) -> Form {
     joined(Tree::Difference, parts)
 }
 
-pub fn geometry<L: Lanes>(form: &Form) -> Geometry<L> {
-    Geometry::new(std::slice::from_ref(form))
+pub fn geometry<L: SimdFloat>(form: &Form) -> Aggregate<L> {
+    Aggregate::new(std::slice::from_ref(form))
 }
 
 /// A line from outside the ball of radius 4 through a random point near the origin.
@@ -50,7 +50,7 @@ pub fn lines(seed: u64, count: usize) -> Vec<Line> {
 }
 
 /// Every surface along each line, by going on from one to the next.
-fn surfaces<L: Lanes>(geometry: &Geometry<L>, lines: &[Line]) -> Vec<Vec<Met>> {
+fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<Met>> {
     let mut out = vec![Vec::new(); lines.len()];
     let mut open: Vec<(usize, f64)> = (0..lines.len()).map(|i| (i, 0.0)).collect();
     while !open.is_empty() {
@@ -83,7 +83,7 @@ fn chord(name: &str, line: &Line, met: &[Met]) -> f64 {
 }
 
 /// The lengths of lines inside.
-pub fn chords<L: Lanes>(name: &str, form: &Form, lines: &[Line]) -> Vec<f64> {
+pub fn chords<L: SimdFloat>(name: &str, form: &Form, lines: &[Line]) -> Vec<f64> {
     let all = surfaces(&geometry::<L>(form), lines);
     lines.iter().zip(all).map(|(line, met)| chord(name, line, &met)).collect()
 }
@@ -94,9 +94,9 @@ fn random_solid(numbers: &mut Numbers) -> Form {
     let form = match numbers.below(5) {
         0 => return Form::Sphere { center: place, radius: size },
         1 => block([0.0; 3], [1.3, 0.9, 1.1]),
-        2 => Form::tapered(DAffine3::IDENTITY, numbers.between(0.0, 2.0)),
+        2 => Form::conical_frustum(DAffine3::IDENTITY, numbers.between(0.0, 2.0)),
         3 => ball(0.0, 0.0, 0.0, 1.0),
-        _ => Form::tapered(DAffine3::IDENTITY, [0.0, 1.0][numbers.below(2)]),
+        _ => Form::conical_frustum(DAffine3::IDENTITY, [0.0, 1.0][numbers.below(2)]),
     };
     let turn = DQuat::from_axis_angle(numbers.direction(), numbers.between(0.0, 3.0));
     let scale = size * DVec3::new(1.0, numbers.between(0.5, 1.5), numbers.between(0.5, 1.5));
@@ -128,8 +128,8 @@ fn contains(part: &Form, p: DVec3) -> bool {
         Form::Ellipsoid { scene_from_unit } => {
             scene_from_unit.inverse().transform_point3(p).length() <= 1.0
         }
-        Form::Convex { faces, .. } => faces.iter().all(|f| f.normal.dot(p) <= f.offset),
-        Form::Tapered { scene_from_unit, top } => {
+        Form::ConvexPolyhedron { faces, .. } => faces.iter().all(|f| f.normal.dot(p) <= f.offset),
+        Form::ConicalFrustum { scene_from_unit, top } => {
             let q = scene_from_unit.inverse().transform_point3(p);
             (0.0..=1.0).contains(&q.z) && q.truncate().length() <= 1.0 + (top - 1.0) * q.z
         }
@@ -157,7 +157,7 @@ fn extreme_08_parity() {
         let mut numbers = Numbers::new(800 + seed);
         let mut parts = Vec::new();
         let tree = random_tree(&mut numbers, 1 + (seed as usize) % 8, &mut parts);
-        let form = Form::Compound(Compound { parts: parts.clone(), tree: tree.clone() });
+        let form = Form::Csg(CsgSolid { parts: parts.clone(), tree: tree.clone() });
         if form.bounds().is_none() {
             continue;
         }
@@ -256,7 +256,7 @@ fn extreme_09_csg_algebra() {
         let all = block([0.0; 3], [20.0; 3]);
         let not_b = Tree::Difference(vec![Tree::Part(1), Tree::Part(2)]);
         let tree = Tree::Intersection(vec![Tree::Part(0), not_b]);
-        let and_not = Form::Compound(Compound { parts: vec![a(), all, b()], tree });
+        let and_not = Form::Csg(CsgSolid { parts: vec![a(), all, b()], tree });
         same_surfaces(&named("A - B = A and not B"), &difference(vec![a(), b()]), &and_not, &lines);
         let single = [
             differing(&union(vec![a(), a()]), &a(), &lines),
@@ -273,7 +273,7 @@ fn extreme_09_csg_algebra() {
             Tree::Difference(vec![Tree::Part(0), Tree::Part(1)]),
             Tree::Part(2),
         ]);
-        let steps = Form::Compound(Compound { parts: vec![a(), b(), c.clone()], tree });
+        let steps = Form::Csg(CsgSolid { parts: vec![a(), b(), c.clone()], tree });
         let at_once = difference(vec![a(), b(), c]);
         same_surfaces(&named("(A - B) - C"), &steps, &at_once, &lines);
     }

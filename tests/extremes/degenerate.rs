@@ -4,15 +4,15 @@ use crate::common::Numbers;
 use crate::rays::{Line, any_line, ball, blocked, closest, every_kind, forms};
 use crate::told::{precision, told};
 use glam::DVec3;
-use zerkalo::lanes::{Double, Lanes, Single};
-use zerkalo::primitive::{Form, Geometry};
-use zerkalo::shape::{Cuboid, Kind};
+use zerkalo::lanes::{Double, SimdFloat, Single};
+use zerkalo::primitive::{Aggregate, Form};
+use zerkalo::shape::{Cuboid, ShapeDesc};
 
 /// Convex solids: compounds and meshes have tests of their own.
 fn is_solid(form: &Form) -> bool {
     !matches!(
         form,
-        Form::Parallelogram { .. } | Form::Plane { .. } | Form::Compound(_) | Form::Mesh { .. }
+        Form::Parallelogram { .. } | Form::Plane { .. } | Form::Csg(_) | Form::Mesh { .. }
     )
 }
 
@@ -25,13 +25,13 @@ fn inside(numbers: &mut Numbers, form: &Form) -> DVec3 {
         Form::Ellipsoid { scene_from_unit } => {
             scene_from_unit.transform_point3(numbers.direction() * (0.99 * numbers.unit().cbrt()))
         }
-        Form::Tapered { scene_from_unit, top } => {
+        Form::ConicalFrustum { scene_from_unit, top } => {
             let z = numbers.between(0.01, 0.99);
             let r = 0.99 * (1.0 + (top - 1.0) * z) * numbers.unit().sqrt();
             let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();
             scene_from_unit.transform_point3(DVec3::new(r * cos, r * sin, z))
         }
-        Form::Convex { corners, .. } => {
+        Form::ConvexPolyhedron { corners, .. } => {
             let weights: Vec<f64> =
                 corners.iter().map(|_| 1e-3 - (1.0 - numbers.unit()).ln()).collect();
             let sum: f64 = weights.iter().sum();
@@ -41,8 +41,8 @@ fn inside(numbers: &mut Numbers, form: &Form) -> DVec3 {
     }
 }
 
-fn check_inside<L: Lanes>(name: &str, form: &Form, seed: u64, rays: usize) {
-    let geometry = Geometry::<L>::new(std::slice::from_ref(form));
+fn check_inside<L: SimdFloat>(name: &str, form: &Form, seed: u64, rays: usize) {
+    let geometry = Aggregate::<L>::new(std::slice::from_ref(form));
     let mut numbers = Numbers::new(seed);
     let (_, radius) = ball(form).unwrap();
     let lines: Vec<Line> =
@@ -115,9 +115,9 @@ fn slabs(origin: [i64; 3], d: [i64; 3]) -> Option<[(i64, i64); 2]> {
 /// Steps of the lattice that ray origins lie on, per half side of the box.
 const UNIT: i64 = 2;
 
-fn check_lattice<L: Lanes>() -> [usize; 3] {
+fn check_lattice<L: SimdFloat>() -> [usize; 3] {
     let form = Cuboid { center: [0.0; 3], size: [2.0; 3] }.form();
-    let geometry = Geometry::<L>::new(&[form]);
+    let geometry = Aggregate::<L>::new(&[form]);
     let mut counts = [0; 3];
     let places: Vec<i64> = (-3 * UNIT..=3 * UNIT).collect();
     for n in 0..13 * 13 * 13 {
@@ -188,8 +188,8 @@ fn extreme_06_ray_in_a_face() {
     assert!(counts.iter().all(|c| *c > 1000), "misses, touches, hits: {counts:?}");
 }
 
-fn check_finite<L: Lanes>(name: &str, form: &Form, seed: u64) {
-    let geometry = Geometry::<L>::new(std::slice::from_ref(form));
+fn check_finite<L: SimdFloat>(name: &str, form: &Form, seed: u64) {
+    let geometry = Aggregate::<L>::new(std::slice::from_ref(form));
     let mut numbers = Numbers::new(seed);
     let (center, radius) = ball(form).unwrap_or((DVec3::ZERO, f64::INFINITY));
     let lines: Vec<Line> = (0..40_000).map(|_| any_line(&mut numbers, form)).collect();
@@ -233,8 +233,8 @@ fn extreme_06_zeros_of_either_sign_beside_every_solid() {
                 lines.push((o, d));
             }
         }
-        let double = closest(&Geometry::<Double>::new(std::slice::from_ref(&form)), &lines);
-        let single = closest(&Geometry::<Single>::new(std::slice::from_ref(&form)), &lines);
+        let double = closest(&Aggregate::<Double>::new(std::slice::from_ref(&form)), &lines);
+        let single = closest(&Aggregate::<Single>::new(std::slice::from_ref(&form)), &lines);
         for (line, met) in lines.iter().zip(double).chain(lines.iter().zip(single)) {
             assert!(met.is_none(), "{name}: {line:?} passes beside, but meets {met:?}");
         }

@@ -5,7 +5,7 @@ use crate::tables::{at, keys, scene, table};
 use std::collections::BTreeSet;
 use toml::Value;
 use zerkalo::scene::{FIELDS, Scene};
-use zerkalo::value::{Field, Takes};
+use zerkalo::value::{Field, ValueType};
 use zerkalo::world::Precision;
 
 /// Every key that takes a direction, with a value.
@@ -39,14 +39,14 @@ const TEXT: &str = "
 fn directions(fields: &[Field], depth: usize, out: &mut BTreeSet<&'static str>) {
     for field in fields.iter().filter(|_| depth < 8) {
         match field.takes {
-            Takes::Direction => {
+            ValueType::Direction => {
                 out.insert(field.name);
             }
-            Takes::Table(inner)
-            | Takes::OneOf(inner)
-            | Takes::ListOf(inner)
-            | Takes::Tables(inner)
-            | Takes::Named(inner) => directions(inner, depth + 1, out),
+            ValueType::Table(inner)
+            | ValueType::OneOf(inner)
+            | ValueType::ListOf(inner)
+            | ValueType::Tables(inner)
+            | ValueType::Named(inner) => directions(inner, depth + 1, out),
             _ => {}
         }
     }
@@ -56,7 +56,7 @@ fn directions(fields: &[Field], depth: usize, out: &mut BTreeSet<&'static str>) 
 fn stretched(base: &Scene, factor: f64) -> Scene {
     let mut changed = table(base);
     let mut met = BTreeSet::new();
-    for key in keys(&changed).iter().filter(|key| matches!(key.takes, Takes::Direction)) {
+    for key in keys(&changed).iter().filter(|key| matches!(key.takes, ValueType::Direction)) {
         let Some(Value::Array(numbers)) = at(&mut changed, &key.path) else { continue };
         for number in numbers {
             *number = Value::Float(number.as_float().unwrap() * factor);
@@ -84,7 +84,7 @@ fn only_where_a_direction_points_matters() {
     // Others change the last digits, which a picture in codes does not show.
     let codes = |scene: &Scene| {
         let rendering = rendered(scene, 1, Precision::Single, 4);
-        let picture = crate::support::picture(&rendering, zerkalo::film::Part::Both);
+        let picture = crate::support::picture(&rendering, zerkalo::film::Replicates::Both);
         picture.into_iter().map(|p| p[1]).collect::<Vec<f64>>()
     };
     let expected = codes(&base);

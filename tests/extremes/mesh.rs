@@ -10,8 +10,8 @@ use std::collections::HashMap;
 use std::fmt::Write;
 use std::sync::Arc;
 use zerkalo::asset::{Assets, Mesh};
-use zerkalo::lanes::{Double, Lanes, Mask, Single};
-use zerkalo::primitive::{Form, Geometry};
+use zerkalo::lanes::{Double, Mask, SimdFloat, Single};
+use zerkalo::primitive::{Aggregate, Form};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options};
 
@@ -78,10 +78,10 @@ fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
 
 /// How many of `rays` rays from inside the mesh to its corners, its edges and into its triangles do not
 /// meet it, as a camera or as a shadow asks.
-fn missed<L: Lanes>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: usize) -> usize {
+fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: usize) -> usize {
     const BLOCK: usize = 1 << 14;
     let form = Form::Mesh { mesh: mesh.clone(), scene_from_mesh: place, smooth: false };
-    let geometry = Geometry::<L>::new(&[form]);
+    let geometry = Aggregate::<L>::new(&[form]);
     let triangles = &mesh.mesh().triangles;
     let corner = |i: u32| DVec3::from(mesh.mesh().positions[i as usize].map(f64::from));
     let block = |block: usize| {

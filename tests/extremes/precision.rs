@@ -5,7 +5,7 @@
 use crate::support::{all_shipped, parsed, picture, rendered, shipped, sized};
 use crate::told::told;
 use std::collections::BTreeMap;
-use zerkalo::film::{Display, Part};
+use zerkalo::film::{Display, Replicates};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
@@ -27,7 +27,7 @@ fn error(scene: &Scene) -> f64 {
     let codes = |precision| -> Vec<f64> {
         let rendering = rendered(scene, 3, precision, SAMPLES);
         assert_eq!(rendering.film.bad_samples().count, 0);
-        picture(&rendering, Part::Both).iter().flat_map(|p| display.codes(*p)).collect()
+        picture(&rendering, Replicates::Both).iter().flat_map(|p| display.codes(*p)).collect()
     };
     let (single, double) = (codes(Precision::Single), codes(Precision::Double));
     let sum: f64 = single.iter().zip(&double).map(|(a, b)| (a - b).powi(2)).sum();

@@ -2,9 +2,9 @@
 
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
-use zerkalo::film::{Display, Part};
+use zerkalo::film::{Display, Replicates};
 use zerkalo::light::Falloff;
-use zerkalo::scene::{Scale, Scene, Step};
+use zerkalo::scene::{Scale, Scene, TransformOp};
 use zerkalo::world::Precision;
 
 const SIZE: [u32; 2] = [64, 48];
@@ -37,10 +37,10 @@ fn changed(mut scene: Scene, s: f64, by: DVec3) -> Scene {
     }
     for object in &mut scene.objects {
         if s != 1.0 {
-            object.transform.push(Step::Scale(Scale([s; 3])));
+            object.transform.push(TransformOp::Scale(Scale([s; 3])));
         }
         if by != DVec3::ZERO {
-            object.transform.push(Step::Translate(by.to_array()));
+            object.transform.push(TransformOp::Translate(by.to_array()));
         }
     }
     assert!(scene.faults().is_empty(), "{:?}", scene.faults());
@@ -54,7 +54,7 @@ fn apart(a: &Scene, b: &Scene, precision: Precision, left_out: usize) -> f64 {
     let codes = |scene: &Scene| -> Vec<[f64; 3]> {
         let rendering = rendered(scene, 5, precision, SAMPLES);
         assert_eq!(rendering.film.bad_samples().count, 0);
-        picture(&rendering, Part::Both).iter().map(|p| display.codes(*p)).collect()
+        picture(&rendering, Replicates::Both).iter().map(|p| display.codes(*p)).collect()
     };
     let (a, b) = (codes(a), codes(b));
     let of_pixel =

@@ -10,7 +10,7 @@ use zerkalo::world::Precision;
 #[derive(Clone, Copy, Debug)]
 enum Thing {
     Plane,
-    Platform,
+    HorizontalRectangle,
     Sphere,
     Cube,
     Pyramid,
@@ -26,7 +26,7 @@ impl Thing {
             Self::Plane => {
                 format!("plane = {{ point = [{x:?}, {y:?}, {z:?}], normal = [0, 1, 0] }}")
             }
-            Self::Platform => {
+            Self::HorizontalRectangle => {
                 let size = 2.0 * scale;
                 format!(
                     "platform = {{ center = [{x:?}, {y:?}, {z:?}], size = [{size:?}, {size:?}] }}"
@@ -69,7 +69,7 @@ impl Thing {
     fn point(self, numbers: &mut Numbers) -> (DVec3, DVec3) {
         let square = |n: &mut Numbers| [n.between(-1.0, 1.0), n.between(-1.0, 1.0)];
         match self {
-            Self::Plane | Self::Platform => {
+            Self::Plane | Self::HorizontalRectangle => {
                 let [x, z] = square(numbers);
                 (DVec3::new(x, 0.0, z), DVec3::Y)
             }
@@ -160,7 +160,7 @@ fn falsely_dark(
 const SCALES: [f64; 7] = [1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4, 1e6];
 const THINGS: [Thing; 7] = [
     Thing::Plane,
-    Thing::Platform,
+    Thing::HorizontalRectangle,
     Thing::Sphere,
     Thing::Cube,
     Thing::Pyramid,

@@ -5,9 +5,9 @@ use crate::rays::{Line, Traced, closest, scene};
 use crate::told::{LEFT, precision, told};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::camera::{Camera, View, ViewAngle};
-use zerkalo::lanes::{Double, Lanes, Single, V3};
-use zerkalo::primitive::{Form, Geometry};
+use zerkalo::camera::{Camera, PinholeCamera, ViewAngle};
+use zerkalo::lanes::{Double, SimdFloat, Single, Vec3};
+use zerkalo::primitive::{Aggregate, Form};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 /// An unevaluated sum of two doubles: about 106 bits (Dekker 1971, Knuth).
@@ -62,7 +62,7 @@ fn exact((origin, d): Line, center: DVec3, radius: f64) -> (f64, DVec3) {
 
 /// Rays at a unit sphere from the distance `far`: within 0.7 of the radius, and near the limb. How far
 /// their meeting points are off the surface at most.
-fn check_far<L: Lanes>(far: f64, seed: u64) -> f64 {
+fn check_far<L: SimdFloat>(far: f64, seed: u64) -> f64 {
     let mut worst = 0f64;
     let mut numbers = Numbers::new(seed);
     let rounded = |v: DVec3| if L::EPSILON > 1e-10 { v.as_vec3().as_dvec3() } else { v };
@@ -71,7 +71,7 @@ fn check_far<L: Lanes>(far: f64, seed: u64) -> f64 {
     for _ in 0..20 {
         let center = rounded(numbers.in_cube(1.0));
         let form = Form::Sphere { center, radius: 1.0 };
-        let geometry = Geometry::<L>::new(&[form]);
+        let geometry = Aggregate::<L>::new(&[form]);
         let lines: Vec<Line> = (0..5000)
             .map(|i| {
                 let eye = rounded(numbers.direction() * far);
@@ -139,7 +139,7 @@ fn extreme_02_sphere_as_ground() {
     let dip = (height * (2.0 * radius + height)).sqrt() / radius;
     let plane_height = 2.0 * 20f64.to_radians().tan();
     let row = 240.0 + dip / plane_height * 480.0;
-    let ground = Geometry::<Double>::new(&[Form::Sphere {
+    let ground = Aggregate::<Double>::new(&[Form::Sphere {
         center: DVec3::new(0.0, -radius, 0.0) + DVec3::Y * radius,
         radius,
     }]);
@@ -162,13 +162,13 @@ fn extreme_02_sphere_as_ground() {
         let auto = AnyWorld::compile(&scene, &Options::default());
         assert!(matches!(auto, AnyWorld::Double(_)));
         let traced = Traced::new(&scene, Precision::Double);
-        let view = View::new(&scene.camera, scene.film.size, DVec3::ZERO);
+        let view = PinholeCamera::new(&scene.camera, scene.film.size, DVec3::ZERO);
         let pixels: Vec<(u32, u32)> =
             (242..480).flat_map(|y| (0..64).map(move |x| (x, y))).collect();
         let lines: Vec<Line> = pixels
             .iter()
             .map(|at| {
-                let (o, d) = view.rays(V3::<f64>::splat(view.toward(*at)), (0.5, 0.5));
+                let (o, d) = view.rays(Vec3::<f64>::splat(view.toward(*at)), (0.5, 0.5));
                 (DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z))
             })
             .collect();
@@ -183,7 +183,7 @@ fn extreme_02_sphere_as_ground() {
 /// the sphere, against pi r^2 sqrt(D^2 - r^2) / (c_z^2 - r^2)^(3/2); and the exact mask
 /// (v.c)^2 >= (c^2 - r^2) v^2.
 fn check_silhouette(center: DVec3, radius: f64, rays: usize, seed: u64) -> f64 {
-    let geometry = Geometry::<Double>::new(&[Form::Sphere { center, radius }]);
+    let geometry = Aggregate::<Double>::new(&[Form::Sphere { center, radius }]);
     let distance = center.length();
     let image = DVec3::new(center.x, center.y, 0.0) / -center.z;
     let near = (center.z * center.z - radius * radius).sqrt();
@@ -249,8 +249,8 @@ fn closed_form_10_every_pixel_of_a_sphere() {
         ..Camera::default()
     };
     let (center, radius) = (DVec3::new(0.4, 0.1, -0.5), 1.3);
-    let view = View::new(&camera, [320, 200], DVec3::ZERO);
-    let geometry = Geometry::<Double>::new(&[Form::Sphere { center, radius }]);
+    let view = PinholeCamera::new(&camera, [320, 200], DVec3::ZERO);
+    let geometry = Aggregate::<Double>::new(&[Form::Sphere { center, radius }]);
     let eye = DVec3::from(camera.eye);
     let [u, v, w] = view.frame();
     let c = center - eye;
@@ -258,7 +258,7 @@ fn closed_form_10_every_pixel_of_a_sphere() {
     let mut covered = 0;
     for y in 0..200 {
         for x in 0..320 {
-            let (o, d) = view.rays(V3::<f64>::splat(view.toward((x, y))), (0.5, 0.5));
+            let (o, d) = view.rays(Vec3::<f64>::splat(view.toward((x, y))), (0.5, 0.5));
             let line = (DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z));
             let met = closest(&geometry, &[line])[0].is_some();
             let step = 2.0 * half / 320.0;
@@ -277,15 +277,15 @@ fn closed_form_10_every_pixel_of_a_sphere() {
 }
 
 /// A line 8 away is known to 4 x 8 roundings across; as much under the surface, a chord is this long.
-fn longest_touch<L: Lanes>() -> f64 {
+fn longest_touch<L: SimdFloat>() -> f64 {
     2.0 * (2.0 * 32.0 * L::EPSILON).sqrt()
 }
 
 /// Lines that touch: either a miss or a chord no longer than rounding makes it.
-fn check_tangents<L: Lanes>() {
+fn check_tangents<L: SimdFloat>() {
     let mut numbers = Numbers::new(5);
     let (limit, mut longest) = (longest_touch::<L>(), 0f64);
-    let geometry = Geometry::<L>::new(&[Form::Sphere { center: DVec3::ZERO, radius: 1.0 }]);
+    let geometry = Aggregate::<L>::new(&[Form::Sphere { center: DVec3::ZERO, radius: 1.0 }]);
     let signs = |bits: u64| {
         DVec3::new(
             if bits & 1 == 0 { 1.0 } else { -1.0 },

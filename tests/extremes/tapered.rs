@@ -4,16 +4,16 @@ use crate::common::Numbers;
 use crate::rays::{Line, Met, closest};
 use crate::told::{LEFT, precision, told};
 use glam::{DAffine3, DQuat, DVec3};
-use zerkalo::lanes::{Double, Lanes, Single};
-use zerkalo::primitive::{Form, Geometry};
-use zerkalo::shape::{Cone, Cylinder, Kind, TaperedCylinder, UnitCylinder};
+use zerkalo::lanes::{Double, SimdFloat, Single};
+use zerkalo::primitive::{Aggregate, Form};
+use zerkalo::shape::{Cone, Cylinder, ShapeDesc, TaperedCylinder, UnitFrustum};
 
 fn canonical(s: f64) -> Form {
-    Form::tapered(DAffine3::IDENTITY, s)
+    Form::conical_frustum(DAffine3::IDENTITY, s)
 }
 
-fn meet<L: Lanes>(form: &Form, lines: &[Line]) -> Vec<Option<Met>> {
-    closest(&Geometry::<L>::new(std::slice::from_ref(form)), lines)
+fn meet<L: SimdFloat>(form: &Form, lines: &[Line]) -> Vec<Option<Met>> {
+    closest(&Aggregate::<L>::new(std::slice::from_ref(form)), lines)
 }
 
 /// Entry and exit, by a ray from each side.
@@ -116,7 +116,7 @@ fn extreme_11_without_taper_it_is_the_cylinder() {
     };
     let cylinder = Cylinder { base, top: end, radius: 0.7 }.form();
     let cone = Cone { base, apex: end, radius: 0.7 }.form();
-    let unit = UnitCylinder { s: 1.0 }.form();
+    let unit = UnitFrustum { s: 1.0 }.form();
     for (name, a, b) in [
         ("cylinder", tapered(0.7, 0.7), cylinder),
         ("cone", tapered(0.7, 0.0), cone),
@@ -138,7 +138,7 @@ fn extreme_11_flat_and_tall_solids() {
     let mut numbers = Numbers::new(13);
     for height in [1e-9, 1e-6, 1e6, 1e9] {
         for s in [0.0, 0.5, 1.0, 3.0] {
-            let form = Form::tapered(DAffine3::from_scale(DVec3::new(1.0, 1.0, height)), s);
+            let form = Form::conical_frustum(DAffine3::from_scale(DVec3::new(1.0, 1.0, height)), s);
             for n in 0..4000 {
                 // Through the axis somewhere, across it and aslant.
                 let at = DVec3::Z * (height * numbers.between(0.1, 0.7));
@@ -165,7 +165,7 @@ fn extreme_12_along_a_generator() {
     let mut numbers = Numbers::new(14);
     for place in [DAffine3::IDENTITY, DAffine3::from_quat(turn)] {
         for s in [0.0, 0.25, 0.5, 1.0, 2.0] {
-            let form = Form::tapered(place, s);
+            let form = Form::conical_frustum(place, s);
             let own = |p: DVec3| place.transform_point3(p);
             // The axis.
             let axis = (own(DVec3::new(0.0, 0.0, 0.5)), place.matrix3 * DVec3::Z);
@@ -208,7 +208,7 @@ fn extreme_12_along_a_generator() {
 }
 
 /// Lines that touch: no NaN, and no more than `limit` of their length inside.
-fn check_tangents<L: Lanes>(limit: f64) {
+fn check_tangents<L: SimdFloat>(limit: f64) {
     let mut longest = 0.0f64;
     let mut numbers = Numbers::new(15);
     for s in [0.0f64, 0.6, 1.0, 1.5] {

@@ -8,7 +8,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::PI;
 use zerkalo::lanes::Double;
 use zerkalo::primitive::Form;
-use zerkalo::shape::{Cylinder, Kind};
+use zerkalo::shape::{Cylinder, ShapeDesc};
 
 /// The volume of what stands in the cube from -half to half, by the chords of parallel lines, one in
 /// each cell of a lattice, and its standard error.
@@ -52,7 +52,7 @@ fn extreme_09_volumes() {
     // A ball pierced by a rod so that a ring of height 1.2 is left.
     let ring: f64 = 1.2;
     let hole = (1.0 - ring * ring / 4.0).sqrt();
-    let cone = Form::tapered(DAffine3::from_translation(DVec3::new(0.0, 0.0, -0.5)), 0.0);
+    let cone = Form::conical_frustum(DAffine3::from_translation(DVec3::new(0.0, 0.0, -0.5)), 0.0);
     let half_space = |normal: DVec3, offset| Form::Plane { normal, offset };
     for (n, (name, form, expected)) in [
         (
@@ -131,7 +131,7 @@ fn extreme_09_inclusion_and_exclusion() {
         ball(0.2, -0.1, 0.0, 0.9),
         block([-0.3, 0.2, 0.1], [1.1, 0.9, 1.5]),
         Cylinder { base: [-0.8, -0.9, 0.3], top: [0.7, 0.8, -0.2], radius: 0.5 }.form(),
-        Form::tapered(DAffine3::from_scale(DVec3::new(0.7, 0.9, 1.1)), 0.2),
+        Form::conical_frustum(DAffine3::from_scale(DVec3::new(0.7, 0.9, 1.1)), 0.2),
         ball(0.0, 0.0, 0.0, 0.8).transformed(&DAffine3::from_scale(DVec3::new(1.0, 0.5, 1.6))),
     ];
     let lines = lines(91, 40_000);

@@ -7,7 +7,7 @@ use crate::sight::RASTER;
 use crate::support::{picture, rendered, sized};
 use crate::tracer::{Mutation, Tracer};
 use glam::DVec3;
-use zerkalo::film::Part;
+use zerkalo::film::Replicates;
 use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::Precision;
 
@@ -28,7 +28,7 @@ pub fn without_chance(scene: &Scene) -> Vec<DVec3> {
     let mut scene = sized(scene.clone(), RASTER);
     scene.film.filter = Filter::Center;
     let rendering = rendered(&scene, 1, Precision::Double, 1);
-    picture(&rendering, Part::Both).into_iter().map(DVec3::from).collect()
+    picture(&rendering, Replicates::Both).into_iter().map(DVec3::from).collect()
 }
 
 /// Whether both programs agree on every pixel of scenes in which nothing is left to chance.

@@ -6,9 +6,9 @@ use crate::sight::{RASTER, centers, sighting, sights};
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::film::Part;
+use zerkalo::film::Replicates;
 use zerkalo::material::Lobe;
-use zerkalo::scene::{Filter, Scale, Scene, Step};
+use zerkalo::scene::{Filter, Scale, Scene, TransformOp};
 use zerkalo::shape::Shape;
 use zerkalo::world::Precision;
 
@@ -30,8 +30,8 @@ fn behind_the_mirror(scene: &Scene) -> Scene {
     let mut scene = stripped(scene);
     scene.objects.retain(|o| o.material != "mirror");
     for object in &mut scene.objects {
-        object.transform.push(Step::Scale(Scale([1.0, 1.0, -1.0])));
-        object.transform.push(Step::Translate([0.0, 0.0, -4.0]));
+        object.transform.push(TransformOp::Scale(Scale([1.0, 1.0, -1.0])));
+        object.transform.push(TransformOp::Translate([0.0, 0.0, -4.0]));
     }
     for point in scene.lights.iter_mut().filter_map(|l| l.point.as_mut()) {
         point.position[2] = -4.0 - point.position[2];
@@ -62,7 +62,7 @@ fn contrast(scene: &Scene) -> f64 {
     let mirror = number(scene, "mirror") as u32;
     let scene = sized(stripped(scene), RASTER);
     let seen = sights(&scene);
-    let shown = picture(&rendered(&scene, 1, Precision::Double, 128), Part::Both);
+    let shown = picture(&rendered(&scene, 1, Precision::Double, 128), Replicates::Both);
     let of_mirror = seen.iter().zip(&shown).filter(|(s, _)| s.object == Some(mirror));
     let values: Vec<f64> = of_mirror.map(|(_, rgb)| rgb.iter().sum::<f64>() / 3.0).collect();
     let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -132,7 +132,7 @@ fn footprints(meant: &Scene, shown: &Scene) -> Vec<Footprint> {
     let mut shown = sized(shown.clone(), FINE);
     shown.film.filter = Filter::Center;
     let rendering = rendered(&shown, 1, Precision::Double, 512);
-    let [a, b] = [Part::A, Part::B].map(|part| picture(&rendering, part));
+    let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
     let seen = sights(&meant);
     let mirrors = (0..a.len()).filter(|i| seen[*i].object == Some(0));
     let pixel = |i: usize| {

@@ -5,7 +5,7 @@ use crate::row::{Verdict, ensure, material, row};
 use crate::sight::{RASTER, centers, sees, sighting};
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
-use zerkalo::film::Part;
+use zerkalo::film::Replicates;
 use zerkalo::material::Fresnel;
 use zerkalo::scene::{Filter, Level, Scene};
 use zerkalo::shape::Shape;
@@ -79,7 +79,7 @@ fn grows_the_whole_tree(meant: &Scene, shown: &Scene) -> Verdict {
     let mut shown = sized(shown.clone(), RASTER);
     shown.film.filter = Filter::Center;
     let rendering = rendered(&shown, 1, Precision::Double, 256);
-    let [a, b] = [Part::A, Part::B].map(|part| picture(&rendering, part));
+    let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
     // By bands of rows, so that errors of both signs do not cancel.
     for (band, centers) in centers(RASTER).chunks(6 * RASTER[0] as usize).enumerate() {
         let (mut sum, mut variance) = (DVec3::ZERO, DVec3::ZERO);

@@ -6,11 +6,11 @@ use crate::sight::{RASTER, sees, sights};
 use crate::support::{begin, follow, picture, pool, settings, shipped, sized};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use zerkalo::film::{Display, Film, Part, TILE};
+use zerkalo::film::{Display, Film, Replicates, TILE};
 use zerkalo::material::Material;
 use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo::render::session::{Session, State};
-use zerkalo::render::{Course, Options, Rendering};
+use zerkalo::render::{Options, RenderState, SyncRender};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::edit::{self, Edit, Refusal, Subject};
 use zerkalo::scene::{Document, History, Scene};
@@ -46,7 +46,7 @@ fn caps_rays(shown: &Scene, cap: u32, codes: f64) -> Verdict {
     let scene = sized(shown.clone(), [96, 72]);
     let stop = Stop { noise_codes: Some(codes), ..Stop::default() };
     let asked = Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
-    let mut course = Course::new(&scene, &options(), asked, 2).map_err(|e| e.to_string())?;
+    let mut course = SyncRender::new(&scene, &options(), asked, 2).map_err(|e| e.to_string())?;
     let reason = loop {
         if let Some(reason) = course.step() {
             break reason;
@@ -140,7 +140,7 @@ const SPP: Stop = Stop { spp: Some(8), noise_codes: None, rmse_linear: None, sec
 
 /// A session that shows scenes while they are edited.
 struct Desk {
-    session: Session<Rendering>,
+    session: Session<RenderState>,
 }
 
 impl Desk {
@@ -157,7 +157,7 @@ impl Desk {
             let Some(snapshot) = self.session.wait(Duration::from_millis(100)) else { continue };
             let report = &snapshot.report;
             if matches!(report.state, State::Resting(_)) && report.generation == generation {
-                return self.session.with(|r, _| picture(r, Part::Both)).expect("a film");
+                return self.session.with(|r, _| picture(r, Replicates::Both)).expect("a film");
             }
         }
         panic!("the session does not come to rest")
@@ -170,7 +170,7 @@ fn saved_and_rendered(scene: &Scene) -> Vec<[f64; 3]> {
     let read = Scene::parse(&text, "room.toml").unwrap_or_else(|e| panic!("{e}"));
     let mut rendering = begin(&read, 1, Precision::Auto);
     follow(&mut rendering, settings(false, 0, SPP), &pool(2));
-    picture(&rendering, Part::Both)
+    picture(&rendering, Replicates::Both)
 }
 
 /// One edit of a scene, by a name.
@@ -241,7 +241,7 @@ fn a15_user_edits() {
     let mut capped = Arc::new(capped);
     let course = |scene: &Scene| {
         let asked = settings(false, 0, SPP);
-        let mut course = Course::new(scene, &options(), asked, 2).unwrap();
+        let mut course = SyncRender::new(scene, &options(), asked, 2).unwrap();
         while course.step().is_none() {}
         course.samples()
     };

@@ -201,7 +201,7 @@ fn as_difference(scene: &mut Scene) {
     combined_otherwise(scene, |of| Shape::Difference(Difference { of }));
 }
 
-fn combined_otherwise(scene: &mut Scene, into: impl Fn(Vec<zerkalo::shape::Part>) -> Shape) {
+fn combined_otherwise(scene: &mut Scene, into: impl Fn(Vec<zerkalo::shape::CsgOperand>) -> Shape) {
     for object in &mut scene.objects {
         let of = match &object.shape {
             Shape::Union(u) => u.of.clone(),

@@ -7,7 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use zerkalo::camera::{Camera, ViewAngle};
 use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, Options, Precision, Sight};
+use zerkalo::world::{AnyWorld, FirstHit, Options, Precision};
 
 /// Raster of the comparison.
 pub const RASTER: [u32; 2] = [48, 36];
@@ -46,9 +46,9 @@ pub fn sighting(camera: &Camera, [width, height]: [u32; 2], [x, y]: [f64; 2]) ->
 }
 
 /// What the program sees through the centres of the pixels.
-pub fn sights(scene: &Scene) -> Vec<Sight> {
+pub fn sights(scene: &Scene) -> Vec<FirstHit> {
     let centers = centers(scene.film.size);
-    let mut seen = vec![Sight::NOTHING; centers.len()];
+    let mut seen = vec![FirstHit::NOTHING; centers.len()];
     let world = AnyWorld::compile(scene, &Options { precision: Precision::Double });
     world.look(&centers, &mut seen);
     seen
@@ -91,7 +91,7 @@ pub fn sees_things(meant: &Scene, things: &[Thing], shown: &Scene) -> Verdict {
     }
 }
 
-fn ends_rightly(ray: &Sighting, near: f64, things: &[Thing], sight: &Sight) -> Verdict {
+fn ends_rightly(ray: &Sighting, near: f64, things: &[Thing], sight: &FirstHit) -> Verdict {
     let from = near / ray.cos;
     let at = |t: f64| ray.origin + ray.direction * t;
     let depth = f64::from(sight.depth);

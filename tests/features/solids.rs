@@ -3,8 +3,8 @@
 
 use crate::surfaces::map;
 use glam::{DAffine3, DVec3};
-use zerkalo::scene::{Object, Step};
-use zerkalo::shape::{Part, Shape};
+use zerkalo::scene::{Object, TransformOp};
+use zerkalo::shape::{CsgOperand, Shape};
 
 /// Below zero inside, zero on the surface, above zero outside.
 pub type Inside = Box<dyn Fn(DVec3) -> f64 + Sync>;
@@ -22,7 +22,7 @@ impl Thing {
     pub fn new(object: &Object) -> Self {
         let v = |a: [f64; 3]| DVec3::from(a);
         match &object.shape {
-            Shape::Platform(p) => {
+            Shape::HorizontalRectangle(p) => {
                 let [x, z] = p.size;
                 Self::Thin(flat(v(p.center), DVec3::X * (0.5 * x), DVec3::NEG_Z * (0.5 * z)))
             }
@@ -68,7 +68,7 @@ pub fn triangles(list: Vec<[DVec3; 3]>, scene_from_mesh: DAffine3) -> Crossings 
     })
 }
 
-fn placed(inside: Inside, steps: &[Step]) -> Inside {
+fn placed(inside: Inside, steps: &[TransformOp]) -> Inside {
     if steps.is_empty() {
         return inside;
     }
@@ -77,7 +77,7 @@ fn placed(inside: Inside, steps: &[Step]) -> Inside {
 }
 
 /// The steps, the first one first.
-pub fn placement(steps: &[Step]) -> DAffine3 {
+pub fn placement(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all)
 }
 
@@ -121,7 +121,7 @@ fn inside(shape: &Shape) -> Inside {
         Shape::Cone(c) => round(v(c.base), v(c.apex), [c.radius, 0.0]),
         Shape::TaperedCylinder(c) => round(v(c.base), v(c.top), [c.base_radius, c.top_radius]),
         // Its canonical form: x^2 + y^2 = (1 + (s - 1) z)^2 between z = 0 and z = 1.
-        Shape::UnitCylinder(c) => {
+        Shape::UnitFrustum(c) => {
             Box::new(move |p| (p.x.hypot(p.y) - (1.0 + (c.s - 1.0) * p.z)).max(-p.z).max(p.z - 1.0))
         }
         Shape::Union(u) => {
@@ -140,7 +140,7 @@ fn inside(shape: &Shape) -> Inside {
     }
 }
 
-fn parts(of: &[Part]) -> Vec<Inside> {
+fn parts(of: &[CsgOperand]) -> Vec<Inside> {
     of.iter().map(|part| placed(inside(&part.shape), &part.transform)).collect()
 }
 

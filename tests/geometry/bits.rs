@@ -4,32 +4,35 @@ use crate::common::Numbers;
 use crate::rays::{Line, packets, surface};
 pub use crate::rays::{any_line, forms};
 use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
-use zerkalo::primitive::{Form, Geometry};
+use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
+use zerkalo::primitive::{Aggregate, Form};
 
-fn lane_of<L: Lanes<Scalar = S>, S: Real + Lanes<Scalar = S>>(v: V3<L>, i: usize) -> V3<S> {
+fn lane_of<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
+    v: Vec3<L>,
+    i: usize,
+) -> Vec3<S> {
     let [x, y, z] = v.lane(i);
-    V3::new(x, y, z)
+    Vec3::new(x, y, z)
 }
 
 fn same(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits()
 }
 
-fn same3<A: Lanes, B: Lanes>(a: V3<A>, b: V3<B>, lane: usize) -> bool {
-    let (a, b) = (a.lane(lane).map(Real::to_f64), b.lane(0).map(Real::to_f64));
+fn same3<A: SimdFloat, B: SimdFloat>(a: Vec3<A>, b: Vec3<B>, lane: usize) -> bool {
+    let (a, b) = (a.lane(lane).map(Float::to_f64), b.lane(0).map(Float::to_f64));
     (0..3).all(|i| same(a[i], b[i]))
 }
 
 /// Packets of `L` against rays of its scalar, in one geometry of all `forms`.
-fn compare<L: Lanes<Scalar = S>, S: Real + Lanes<Scalar = S>>(
+fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
     name: &str,
     forms: &[Form],
     tree: bool,
     lines: &[Line],
 ) {
-    let wide = Geometry::<L>::with_tree(forms, tree);
-    let narrow = Geometry::<S>::with_tree(forms, tree);
+    let wide = Aggregate::<L>::with_tree(forms, tree);
+    let narrow = Aggregate::<S>::with_tree(forms, tree);
     for (n, (packet, count)) in packets::<L>(lines).enumerate() {
         let hit = wide.closest(&packet, wide.all());
         let met = hit.t.lt(L::of(L::MAX));
@@ -51,7 +54,7 @@ fn compare<L: Lanes<Scalar = S>, S: Real + Lanes<Scalar = S>>(
                 )
             };
             assert!(same(hit.t.lane(i).to_f64(), one.t.lane(0).to_f64()), "{}", told());
-            let limit = <S as Lanes>::of(limit);
+            let limit = <S as SimdFloat>::of(limit);
             let b = narrow.blocked(&ray, limit, S::mask(true), narrow.all()).any();
             assert!(blocked.lane(i) == b, "blocked: {}", told());
             if !met.lane(i) {

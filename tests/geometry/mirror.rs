@@ -4,7 +4,7 @@ use crate::common::Numbers;
 use crate::rays::{Line, Traced, closest, scene};
 use glam::DVec3;
 use zerkalo::lanes::Double;
-use zerkalo::primitive::Geometry;
+use zerkalo::primitive::Aggregate;
 use zerkalo::world::Precision;
 
 const THINGS: &str = r#"
@@ -57,7 +57,7 @@ fn closed_form_02_a_mirror_shows_the_mirrored_view() {
     let with = scene(&format!("{THINGS}{mirror}"));
     let without = scene(THINGS);
     let forms: Vec<_> = with.objects.iter().map(|o| o.shape.form()).collect();
-    let geometry = Geometry::<Double>::new(&forms);
+    let geometry = Aggregate::<Double>::new(&forms);
     let mut numbers = Numbers::new(2);
     let eye = DVec3::from(with.camera.eye);
     let lines: Vec<Line> = (0..100_000)

@@ -5,7 +5,7 @@ use crate::common::Numbers;
 use crate::rays::{Line, ball, closest, every_kind, scene};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use zerkalo::lanes::Double;
-use zerkalo::primitive::{Form, Geometry};
+use zerkalo::primitive::{Aggregate, Form};
 
 fn random_map(numbers: &mut Numbers) -> DAffine3 {
     let mut factor = || {
@@ -26,12 +26,12 @@ fn objects_under_affine_maps_are_met_where_their_originals_are() {
     for (i, (name, form)) in every_kind().into_iter().enumerate() {
         let mut numbers = Numbers::new(400 + i as u64);
         let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
-        let original = Geometry::<f64>::new(std::slice::from_ref(&form));
+        let original = Aggregate::<f64>::new(std::slice::from_ref(&form));
         for round in 0..20 {
             let map = random_map(&mut numbers);
             let back = map.inverse();
             let image = form.clone().transformed(&map);
-            let geometry = Geometry::<Double>::new(std::slice::from_ref(&image));
+            let geometry = Aggregate::<Double>::new(std::slice::from_ref(&image));
             let (center, radius) = ball(&image).unwrap_or((map.translation, 3.0));
             let lines: Vec<Line> = (0..2000)
                 .map(|_| {
@@ -79,7 +79,7 @@ fn a_stretched_sphere_solves_its_equation() {
     let scene = scene(text);
     let object = &scene.objects[0];
     let form = object.shape.form().transformed(&object.scene_from_object());
-    let geometry = Geometry::<Double>::new(&[form]);
+    let geometry = Aggregate::<Double>::new(&[form]);
     let center = DVec3::new(1.0, 2.0, 3.0);
     let weights = DVec3::new(4.0, 0.25, 1.0);
     let mut numbers = Numbers::new(6);

@@ -4,8 +4,8 @@ use crate::bits::{any_line, forms};
 use crate::common::Numbers;
 use crate::rays::{Line, packets};
 use glam::{DAffine3, DQuat, DVec3};
-use zerkalo::lanes::{Double, Lanes, Mask, Real, Single};
-use zerkalo::primitive::{Acceleration, Form, Geometry};
+use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single};
+use zerkalo::primitive::{Acceleration, Aggregate, Form};
 
 /// A random scene of `count` items of every kind, crowded in the ball of radius 10 or lined up on a
 /// lattice, where many faces lie in common planes.
@@ -34,18 +34,18 @@ fn crowd(numbers: &mut Numbers, count: usize) -> Vec<Form> {
         .collect()
 }
 
-fn compare<L: Lanes>(seed: u64, count: usize, forms: &[Form], lines: &[Line]) {
-    let list = Geometry::<L>::with_tree(forms, false);
+fn compare<L: SimdFloat>(seed: u64, count: usize, forms: &[Form], lines: &[Line]) {
+    let list = Aggregate::<L>::with_tree(forms, false);
     for how in [Acceleration::Hierarchy, Acceleration::Object, Acceleration::World] {
-        let other = Geometry::<L>::accelerated(forms, how);
+        let other = Aggregate::<L>::accelerated(forms, how);
         compare_with(seed, (how.name(), count), (&list, &other), lines);
     }
 }
 
-fn compare_with<L: Lanes>(
+fn compare_with<L: SimdFloat>(
     seed: u64,
     (how, count): (&str, usize),
-    (list, tree): (&Geometry<L>, &Geometry<L>),
+    (list, tree): (&Aggregate<L>, &Aggregate<L>),
     lines: &[Line],
 ) {
     let mut numbers = Numbers::new(seed);

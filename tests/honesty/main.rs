@@ -10,8 +10,8 @@ mod told;
 
 use std::f64::consts::PI;
 use support::{begin, follow, parsed, picture, pool, rendered, settings, shipped, sized};
-use zerkalo::film::{Display, Estimator, Part, TILE};
-use zerkalo::render::Rendering;
+use zerkalo::film::{Display, Estimator, Replicates, TILE};
+use zerkalo::render::RenderState;
 use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::Precision;
@@ -160,7 +160,7 @@ fn the_closed_form_describes_the_scene() {
         let truth = truth(filter);
         let rendering = rendered(&closed_form(filter), 7, Precision::Double, 1024);
         assert_eq!(rendering.film.bad_samples().count, 0);
-        let got = picture(&rendering, Part::Both);
+        let got = picture(&rendering, Replicates::Both);
         let worst = got
             .iter()
             .zip(&truth)
@@ -198,10 +198,10 @@ struct Outcome {
     mean_error: [f64; 3],
 }
 
-fn judge(rendering: &Rendering, truth: &[[f64; 3]]) -> Outcome {
+fn judge(rendering: &RenderState, truth: &[[f64; 3]]) -> Outcome {
     let (film, display) = (&rendering.film, Display::default());
     assert_eq!(film.bad_samples().count, 0);
-    let got = picture(rendering, Part::Both);
+    let got = picture(rendering, Replicates::Both);
     let noise = film.noise(&rendering.mix, &display).expect("equal counts");
     let estimator = Estimator::new(film.scales(), &rendering.mix, &display);
     let [width, values] = [film.width(), 3 * got.len()];
@@ -334,8 +334,8 @@ fn noise_half_a_code_is_half_a_code_in_the_mirror_room() {
     let scene = sized(shipped("mirror-room.toml"), [320, 240]);
     let display = Display::default();
     let pool = pool(2);
-    let codes = |rendering: &Rendering| -> Vec<f64> {
-        picture(rendering, Part::Both).iter().flat_map(|rgb| display.codes(*rgb)).collect()
+    let codes = |rendering: &RenderState| -> Vec<f64> {
+        picture(rendering, Replicates::Both).iter().flat_map(|rgb| display.codes(*rgb)).collect()
     };
     let mut reference = begin(&scene, 1000, Precision::Auto);
     let reference_spp = 1280;
@@ -364,7 +364,7 @@ fn noise_half_a_code_is_half_a_code_in_the_mirror_room() {
 fn linear_target_is_met(size: [u32; 2], seeds: u64) {
     let scene = sized(shipped("mirror-room-physical.toml"), size);
     let pool = pool(2);
-    let values = |rendering: &Rendering| picture(rendering, Part::Both).concat();
+    let values = |rendering: &RenderState| picture(rendering, Replicates::Both).concat();
     let mut reference = begin(&scene, 1000, Precision::Auto);
     let stop = Stop { spp: Some(3072), ..Stop::default() };
     let linear = |stop| Settings { criterion: Criterion::Linear, ..settings(true, 0, stop) };

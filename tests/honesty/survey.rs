@@ -6,18 +6,18 @@
 
 use crate::scenes::{Sample, scene};
 use crate::support::{begin, picture, pool, rendered, settings, trace};
-use zerkalo::film::{Display, Part};
-use zerkalo::render::Rendering;
+use zerkalo::film::{Display, Replicates};
+use zerkalo::render::RenderState;
 use zerkalo::render::schedule::{Schedule, Step, Stop, StoppedBy};
-use zerkalo::render::session::Traced;
+use zerkalo::render::session::RenderBackend;
 use zerkalo::world::Precision;
 
 /// Samples per pixel at which the survey ends a picture that has not reached its target.
 const LIMIT_SPP: u32 = 1024;
 
-fn codes(rendering: &Rendering) -> Vec<f64> {
+fn codes(rendering: &RenderState) -> Vec<f64> {
     let display = Display::default();
-    let radiance = picture(rendering, Part::Both);
+    let radiance = picture(rendering, Replicates::Both);
     radiance.iter().flat_map(|rgb| display.codes(*rgb)).collect()
 }
 
@@ -35,7 +35,7 @@ impl Reference {
     }
 
     /// True RMSE of a picture in 8-bit levels, without the error of the reference.
-    fn error(&self, rendering: &Rendering) -> f64 {
+    fn error(&self, rendering: &RenderState) -> f64 {
         let got = codes(rendering);
         let sum: f64 = got.iter().zip(&self.codes).map(|(g, r)| (g - r).powi(2)).sum();
         (sum / got.len() as f64 - self.own * self.own).max(0.0).sqrt()
@@ -48,8 +48,8 @@ fn run(
     seed: u64,
     adaptive: bool,
     stop: Stop,
-    mut each: impl FnMut(&Rendering, &Schedule) -> bool,
-) -> (Rendering, Schedule, Option<StoppedBy>) {
+    mut each: impl FnMut(&RenderState, &Schedule) -> bool,
+) -> (RenderState, Schedule, Option<StoppedBy>) {
     let pool = pool(2);
     let mut rendering = begin(&sample.scene, seed, Precision::Auto);
     let mut schedule = rendering.schedule(settings(adaptive, 0, stop));
@@ -200,7 +200,7 @@ fn adaptive_mean_of_a_closed_room_is_unbiased() {
         let mean_of = |seed: u64| {
             let stop = Stop { spp: Some(spp), ..Stop::default() };
             let (rendering, ..) = run(&sample, first + seed, adaptive, stop, |_, _| false);
-            let all = picture(&rendering, Part::Both);
+            let all = picture(&rendering, Replicates::Both);
             all.iter().flatten().sum::<f64>() / (3 * all.len()) as f64
         };
         let means: Vec<f64> = (0..seeds).map(mean_of).collect();

@@ -4,10 +4,10 @@ use crate::support;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
-use zerkalo::film::{Display, Part};
-use zerkalo::render::Rendering;
+use zerkalo::film::{Display, Replicates};
+use zerkalo::render::RenderState;
 use zerkalo::render::schedule::{Schedule, Step, Stop};
-use zerkalo::render::session::Traced;
+use zerkalo::render::session::RenderBackend;
 use zerkalo::scene::Scene;
 use zerkalo::terminal::cells::{Colors, Ink, Oklab, PictureCells, Raster};
 use zerkalo::terminal::diff::Wanted;
@@ -19,7 +19,7 @@ const PICTURE: Rect = Rect { x: 0, y: 0, width: SCREEN[0], height: SCREEN[1] - 1
 
 /// A picture at work: a sample per half cell at first.
 pub struct Work {
-    rendering: Rendering,
+    rendering: RenderState,
     schedule: Schedule,
     pool: rayon::ThreadPool,
     cells: Buffer,
@@ -65,7 +65,7 @@ impl Work {
         let counts = film.tile(0).map_or([0, 0], |tile| tile.counts());
         self.samples = f64::from(counts[0] + counts[1]);
         self.version += 1;
-        let radiance = support::picture(&self.rendering, Part::Both);
+        let radiance = support::picture(&self.rendering, Replicates::Both);
         let to_8 = Display::default().to_8();
         let [width, height] = [PICTURE.width, 2 * PICTURE.height].map(usize::from);
         let raster = Raster::from_fn(width, height, |i| to_8(radiance[i]));

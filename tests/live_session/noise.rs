@@ -1,23 +1,23 @@
 //! Whether the error that is told for a new mix of lights is the true one.
 
 use super::{finish, scene, session_of, spp};
-use zerkalo::film::{Display, Part};
-use zerkalo::render::Rendering;
+use zerkalo::film::{Display, Replicates};
+use zerkalo::render::RenderState;
 use zerkalo::render::session::Session;
 use zerkalo::value::Color;
 
 /// The codes of a session's picture, not rounded, and the noise that it tells.
-fn codes(session: &Session<Rendering>) -> (Vec<[f64; 3]>, f64) {
-    let read = |r: &Rendering| {
+fn codes(session: &Session<RenderState>) -> (Vec<[f64; 3]>, f64) {
+    let read = |r: &RenderState| {
         let mut all = Vec::new();
         let mut row = Vec::new();
         for y in 0..r.film.height() {
-            r.film.row(y, Part::Both, &r.mix, &mut row);
+            r.film.row(y, Replicates::Both, &r.mix, &mut row);
             all.extend(row.iter().map(|x| Display::default().codes(*x)));
         }
         all
     };
-    let noise = |r: &Rendering| r.film.noise(&r.mix, &Display::default()).unwrap().rmse_codes;
+    let noise = |r: &RenderState| r.film.noise(&r.mix, &Display::default()).unwrap().rmse_codes;
     session.with(move |r, _| (read(r), noise(r))).unwrap()
 }
 

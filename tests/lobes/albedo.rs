@@ -2,7 +2,7 @@
 
 use crate::setup::*;
 use crate::told::{precision, told};
-use zerkalo::lanes::{Double, Lanes, Single};
+use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::material::{Lobe, Masking};
 
 const DEGREES: [f64; 5] = [0.0, 45.0, 75.0, 85.0, 89.0];
@@ -19,7 +19,7 @@ const KNOWN: [(Masking, f64, [f64; 5]); 7] = [
     (Masking::Smith, 1.0, [0.462, 0.651, 0.881, 0.959, 0.991]),
 ];
 
-fn albedo<L: Lanes>(lobe: Lobe, masking: Masking, alpha: f64, degrees: f64) -> f64 {
+fn albedo<L: SimdFloat>(lobe: Lobe, masking: Masking, alpha: f64, degrees: f64) -> f64 {
     let n = tilted_normal();
     let incident = combine(&[(-1.0, at_angle(n, degrees.to_radians(), 1.0))]);
     let mut material = reflector(lobe, masking, 0.0);
@@ -32,7 +32,7 @@ fn albedo<L: Lanes>(lobe: Lobe, masking: Masking, alpha: f64, degrees: f64) -> f
     sum / f64::from(count)
 }
 
-fn compare<L: Lanes>() {
+fn compare<L: SimdFloat>() {
     let mut worst = 0f64;
     for (masking, alpha, known) in KNOWN {
         for (degrees, known) in DEGREES.into_iter().zip(known) {

@@ -4,8 +4,8 @@ use crate::setup::*;
 use crate::stats::chi_square_p;
 use crate::told::{precision, told};
 use std::f64::consts::{PI, TAU};
-use zerkalo::lanes::{Double, Frame, Lanes, Single, V3};
-use zerkalo::material::{Finish, Lobe, Masking, Material, Spread};
+use zerkalo::lanes::{Double, Frame, SimdFloat, Single, Vec3};
+use zerkalo::material::{Bsdf, Lobe, Masking, Material, ReflectionLobe};
 
 const ALPHAS: [f64; 5] = [1e-3, 0.05, 0.3, 1.0, 2.0];
 const DEGREES: [f64; 4] = [0.0, 60.0, 85.0, 89.9];
@@ -20,7 +20,7 @@ const COUNT: u32 = 100_000;
 struct Chart {
     view: Vector,
     n: Vector,
-    spread: Spread<f64>,
+    spread: ReflectionLobe<f64>,
 }
 
 impl Chart {
@@ -30,26 +30,26 @@ impl Chart {
 
     /// The frame in which the square lies.
     fn square_frame(&self) -> [Vector; 3] {
-        let frame = Frame::around(V3::<f64>::of(self.mirror()));
+        let frame = Frame::around(Vec3::<f64>::of(self.mirror()));
         [vector(frame.t), vector(frame.b), vector(frame.n)]
     }
 
     fn coordinates(&self, d: Vector) -> [f64; 2] {
         let turn = |x: f64, y: f64| (y.atan2(x) / TAU).rem_euclid(1.0);
         match self.spread {
-            Spread::Mirror => unreachable!(),
-            Spread::Cone { one_minus_cos } => {
+            ReflectionLobe::Mirror => unreachable!(),
+            ReflectionLobe::Cone { one_minus_cos } => {
                 let m = self.mirror();
                 let off = combine(&[(1.0, d), (-1.0, m)]);
                 let [t, b] = across(m);
                 [0.5 * dot(off, off) / one_minus_cos, turn(dot(d, t), dot(d, b))]
             }
-            Spread::Square { side } => {
+            ReflectionLobe::Square { side } => {
                 let [t, b, m] = self.square_frame();
                 let z = dot(d, m);
                 [dot(d, t) / (z * side) + 0.5, dot(d, b) / (z * side) + 0.5]
             }
-            Spread::Facets(facets) => {
+            ReflectionLobe::MicrofacetDistribution(facets) => {
                 let h = unit(combine(&[(1.0, self.view), (1.0, d)]));
                 let [t, b] = across(self.n);
                 let z = dot(h, self.n);
@@ -66,8 +66,8 @@ impl Chart {
     fn direction(&self, [p, q]: [f64; 2]) -> (Vector, f64) {
         let (sin, cos) = (TAU * q).sin_cos();
         match self.spread {
-            Spread::Mirror => unreachable!(),
-            Spread::Cone { one_minus_cos } => {
+            ReflectionLobe::Mirror => unreachable!(),
+            ReflectionLobe::Cone { one_minus_cos } => {
                 let m = self.mirror();
                 let [t, b] = across(m);
                 let drop = p * one_minus_cos;
@@ -75,12 +75,12 @@ impl Chart {
                 let d = combine(&[(1.0 - drop, m), (s * cos, t), (s * sin, b)]);
                 (d, TAU * one_minus_cos)
             }
-            Spread::Square { side } => {
+            ReflectionLobe::Square { side } => {
                 let [t, b, m] = self.square_frame();
                 let d = unit(combine(&[(1.0, m), ((p - 0.5) * side, t), ((q - 0.5) * side, b)]));
                 (d, side * side * dot(d, m).powi(3))
             }
-            Spread::Facets(facets) => {
+            ReflectionLobe::MicrofacetDistribution(facets) => {
                 let [t, b] = across(self.n);
                 let r = facets.alpha * ((1.0 / (1.0 - p)).powi(2) - 1.0).sqrt();
                 let h = unit(combine(&[(1.0, self.n), (r * cos, t), (r * sin, b)]));
@@ -97,10 +97,10 @@ impl Chart {
 
 /// Expected share of each bin, by the density of `material`, and of what is outside them.
 fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
-    let finish = Finish::<f64>::new(material, true);
+    let finish = Bsdf::<f64>::new(material, true);
     let (_, spread) = finish.reflection.unwrap();
-    let incident = V3::of(combine(&[(-1.0, chart.view)]));
-    let n = V3::of(chart.n);
+    let incident = Vec3::of(combine(&[(-1.0, chart.view)]));
+    let n = Vec3::of(chart.n);
     let [w, h] = GRID.map(|g| g * FINE);
     let mut shares = vec![0.0; GRID[0] * GRID[1] + 1];
     let flow = |p: f64, q: f64| {
@@ -108,7 +108,7 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
         if solid_angle <= 0.0 {
             return 0.0;
         }
-        finish.density(&spread, incident, n, V3::of(d)).unwrap() * solid_angle / (w * h) as f64
+        finish.density(&spread, incident, n, Vec3::of(d)).unwrap() * solid_angle / (w * h) as f64
     };
     // Facets that turn away from the viewer reflect nothing: the density ends there, at a step.
     let visible = |i: usize, j: usize| {
@@ -139,14 +139,14 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
 fn claim(material: &Material, degrees: f64) -> (Chart, Vec<f64>) {
     let n = tilted_normal();
     let view = at_angle(n, degrees.to_radians(), 0.7);
-    let (_, spread) = Finish::<f64>::new(material, true).reflection.unwrap();
+    let (_, spread) = Bsdf::<f64>::new(material, true).reflection.unwrap();
     let chart = Chart { view, n, spread };
     let shares = expected(&chart, material);
     (chart, shares)
 }
 
 /// Samples of `drawn` against a claim.
-fn p_value<L: Lanes>(drawn: &Material, (chart, shares): &(Chart, Vec<f64>), seed: u64) -> f64 {
+fn p_value<L: SimdFloat>(drawn: &Material, (chart, shares): &(Chart, Vec<f64>), seed: u64) -> f64 {
     let (view, n) = (chart.view, chart.n);
     let mut counts = vec![0u64; shares.len()];
     let incident = combine(&[(-1.0, view)]);
@@ -184,7 +184,7 @@ fn cases() -> Vec<(Material, f64)> {
     cases
 }
 
-fn walk<A: Lanes, B: Lanes>(cases: &[(Material, f64)]) {
+fn walk<A: SimdFloat, B: SimdFloat>(cases: &[(Material, f64)]) {
     let (mut wrong, mut least) = (Vec::new(), 1f64);
     let level = 0.01 / (2 * cases.len()) as f64;
     for (i, (material, degrees)) in cases.iter().enumerate() {

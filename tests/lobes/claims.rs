@@ -2,12 +2,13 @@
 
 use crate::setup::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use zerkalo::lanes::{Double, Frame, V3};
+use zerkalo::lanes::{Double, Frame, Vec3};
 use zerkalo::material::{
-    Claims, Energy, FIELDS, Finish, Fresnel, Highlight, Interface, Lobe, Masking, Material, Spread,
+    Bsdf, BsdfProperties, Energy, FIELDS, Fresnel, Highlight, Interface, Lobe, Masking, Material,
+    ReflectionLobe,
 };
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
-use zerkalo::value::{Color, Takes};
+use zerkalo::value::{Color, ValueType};
 use zerkalo::world::World;
 
 /// The words of the field table and the lists of variants name the same things in the same order, so
@@ -16,7 +17,7 @@ use zerkalo::world::World;
 fn every_word_is_walked() {
     let words = |key: &str| -> Vec<&str> {
         let field = FIELDS.iter().find(|f| f.name == key).unwrap();
-        let Takes::Choice(choices) = field.takes else { panic!("{key}") };
+        let ValueType::Choice(choices) = field.takes else { panic!("{key}") };
         choices.iter().map(|c| c.name).collect()
     };
     let read = |key: &str| -> Vec<Material> {
@@ -40,13 +41,13 @@ fn transparent_surfaces_keep_what_they_claim() {
             fresnel: Some(law),
             ..Material::default()
         };
-        let transmission = Finish::<f64>::new(&material, true).transmission.unwrap();
-        let n = V3::new(0.0, 0.0, 1.0);
+        let transmission = Bsdf::<f64>::new(&material, true).transmission.unwrap();
+        let n = Vec3::new(0.0, 0.0, 1.0);
         let (mut lost, mut lopsided) = (0f64, 0f64);
         for i in 0..900 {
             let (sin, cos) = (0.1 * f64::from(i)).to_radians().sin_cos();
             for (n_i, n_t) in [(1.0, material.index), (material.index, 1.0)] {
-                let incident = V3::new(sin, 0.0, -cos);
+                let incident = Vec3::new(sin, 0.0, -cos);
                 let there = Interface::new(incident, n, n_i, n_t);
                 let split = there.split(&transmission, n_i == 1.0);
                 lost = lost.max((split.reflected + split.transmitted + split.total - 1.0).abs());
@@ -58,7 +59,7 @@ fn transparent_surfaces_keep_what_they_claim() {
             }
         }
         let claims = law.claims_of_transmission();
-        assert_eq!(lost < 1e-12, claims.energy == Energy::Kept, "{law:?}: {lost}");
+        assert_eq!(lost < 1e-12, claims.energy == Energy::Conserving, "{law:?}: {lost}");
         assert_eq!(lopsided < 1e-9, claims.reciprocal, "{law:?}: {lopsided}");
     }
 }
@@ -81,23 +82,23 @@ fn pairs() -> Vec<(Vector, Vector)> {
 /// f of the highlight for light from `l` seen from `v`.
 fn highlight_f(material: &Material, v: Vector, l: Vector) -> f64 {
     let n = tilted_normal();
-    let finish = Finish::<f64>::new(material, true);
+    let finish = Bsdf::<f64>::new(material, true);
     let (nl, nv) = (dot(n, l), dot(n, v));
-    finish.highlight(V3::of(n), V3::of(v), V3::of(l), nl, nv).x / nl
+    finish.highlight(Vec3::of(n), Vec3::of(v), Vec3::of(l), nl, nv).x / nl
 }
 
 /// f of the reflected ray: weight x density / cos of the light.
 fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
     let n = tilted_normal();
-    let finish = Finish::<f64>::new(material, true);
+    let finish = Bsdf::<f64>::new(material, true);
     let (strength, spread) = finish.reflection.unwrap();
     match spread {
-        Spread::Mirror => unreachable!(),
+        ReflectionLobe::Mirror => unreachable!(),
         // That weight x density is this, is tested pointwise below.
-        Spread::Facets(_) => highlight_f(material, v, l),
+        ReflectionLobe::MicrofacetDistribution(_) => highlight_f(material, v, l),
         _ => {
-            let incident = V3::of(combine(&[(-1.0, v)]));
-            let density = finish.density(&spread, incident, V3::of(n), V3::of(l)).unwrap();
+            let incident = Vec3::of(combine(&[(-1.0, v)]));
+            let density = finish.density(&spread, incident, Vec3::of(n), Vec3::of(l)).unwrap();
             strength * density / dot(n, l)
         }
     }
@@ -112,7 +113,7 @@ fn asymmetry(f: impl Fn(Vector, Vector) -> f64) -> f64 {
     pairs().iter().map(of).fold(0.0, f64::max)
 }
 
-fn check_reciprocity(name: &str, claims: Claims, asymmetry: f64) {
+fn check_reciprocity(name: &str, claims: BsdfProperties, asymmetry: f64) {
     if claims.reciprocal {
         assert!(asymmetry < 1e-10, "{name} is not reciprocal: {asymmetry:.1e}");
     } else {
@@ -174,7 +175,10 @@ fn mirror_is_reciprocal(material: &Material) {
 /// the light.
 #[test]
 fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
-    assert_eq!(Claims::LAMBERT, Claims { reciprocal: true, energy: Energy::Kept });
+    assert_eq!(
+        BsdfProperties::LAMBERT,
+        BsdfProperties { reciprocal: true, energy: Energy::Conserving }
+    );
     let n = tilted_normal();
     let radiance = |v: Vector, l: Vector| {
         let eye = combine(&[(5.0, v)]);
@@ -222,8 +226,8 @@ fn closed_form_7_energy_is_as_claimed() {
                 let mean = mean_weight(&material, degrees);
                 let name = format!("{lobe:?} {masking:?} alpha {alpha} at {degrees}: {mean}");
                 match lobe.claims().energy {
-                    Energy::Kept => assert!(mean == 1.0, "{name}"),
-                    Energy::AtMost => assert!(mean <= 1.0 + 1e-3, "{name}"),
+                    Energy::Conserving => assert!(mean == 1.0, "{name}"),
+                    Energy::Losing => assert!(mean <= 1.0 + 1e-3, "{name}"),
                     Energy::Unbounded => unreachable!("no lobe is"),
                 }
             }
@@ -260,9 +264,9 @@ fn closed_form_7_energy_of_highlights_is_as_claimed() {
             }
         }
         match highlight.claims().energy {
-            Energy::AtMost => assert!(largest <= 1.0 + 1e-3, "{highlight:?}: {largest}"),
+            Energy::Losing => assert!(largest <= 1.0 + 1e-3, "{highlight:?}: {largest}"),
             Energy::Unbounded => assert!(largest > 1.2, "{highlight:?} is bounded: {largest}"),
-            Energy::Kept => unreachable!("no highlight is"),
+            Energy::Conserving => unreachable!("no highlight is"),
         }
     }
 }
@@ -281,7 +285,7 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
                 material.alpha = Some(alpha);
                 material.fresnel = Some(Fresnel::Exact);
                 material.reflectance = Some(Color([0.9, 0.5, 0.04]));
-                let finish = Finish::<f64>::new(&material, true);
+                let finish = Bsdf::<f64>::new(&material, true);
                 let (_, spread) = finish.reflection.unwrap();
                 let v = at_angle(n, degrees.to_radians(), 2.0);
                 let incident = combine(&[(-1.0, v)]);
@@ -290,9 +294,9 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
                     if weight == [0.0; 3] {
                         return;
                     }
-                    let (vn, vd) = (V3::<f64>::of(n), V3::of(d));
-                    let density = finish.density(&spread, V3::of(incident), vn, vd).unwrap();
-                    let shine = finish.highlight(vn, V3::of(v), vd, dot(n, d), dot(n, v));
+                    let (vn, vd) = (Vec3::<f64>::of(n), Vec3::of(d));
+                    let density = finish.density(&spread, Vec3::of(incident), vn, vd).unwrap();
+                    let shine = finish.highlight(vn, Vec3::of(v), vd, dot(n, d), dot(n, v));
                     for (w, f_cos) in weight.into_iter().zip(vector(shine)) {
                         // exp(-tan^2 / alpha^2) of a slope recovered from rounded directions, and
                         // the light's cosine, which is tiny when it is grazing.
@@ -309,5 +313,5 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
     }
     assert!(compared > 50_000, "{compared}");
     // The square's frame is the one in which densities are stated.
-    assert!(vector(Frame::around(V3::<f64>::of(n)).n) == n);
+    assert!(vector(Frame::around(Vec3::<f64>::of(n)).n) == n);
 }

@@ -4,8 +4,8 @@ use crate::setup::*;
 use crate::stats::slope;
 use crate::told::{precision, told};
 use std::f64::consts::{FRAC_PI_2, PI};
-use zerkalo::lanes::{Double, Frame, Lanes, Real, Single, V3};
-use zerkalo::material::{Finish, Lobe, Masking, Spread};
+use zerkalo::lanes::{Double, Float, Frame, SimdFloat, Single, Vec3};
+use zerkalo::material::{Bsdf, Lobe, Masking, ReflectionLobe};
 use zerkalo::sampling::warp;
 
 /// Share of the uniform cone of half-angle `theta` in a half-space whose boundary contains the apex,
@@ -56,10 +56,10 @@ struct Edge {
     share: f64,
 }
 
-fn edge(spread: &Spread<f64>, n: Vector, theta: f64, delta: f64, phi: f64) -> Edge {
+fn edge(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, delta: f64, phi: f64) -> Edge {
     let (frame, share) = match spread {
-        Spread::Square { side } => {
-            let frame = Frame::around(V3::<f64>::of(n));
+        ReflectionLobe::Square { side } => {
+            let frame = Frame::around(Vec3::<f64>::of(n));
             ([vector(frame.t), vector(frame.b)], square_share(*side, delta.tan(), phi))
         }
         _ => (across(n), cone_share(theta, delta)),
@@ -70,7 +70,7 @@ fn edge(spread: &Spread<f64>, n: Vector, theta: f64, delta: f64, phi: f64) -> Ed
 
 /// Edges at all angles: `count` of them, by the golden ratio in two dimensions. `reach`: as far as
 /// the lobe goes [radians].
-fn edges(spread: &Spread<f64>, n: Vector, theta: f64, reach: f64, count: u32) -> Vec<Edge> {
+fn edges(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, reach: f64, count: u32) -> Vec<Edge> {
     (0..count)
         .map(|i| {
             let (a, b) = (f64::from(i) * 0.754_877_666 % 1.0, f64::from(i) * 0.569_840_29 % 1.0);
@@ -86,7 +86,7 @@ fn half_angles() -> [f64; 7] {
 
 /// Shares counted among `count` directions against closed forms: the worst deviation in standard
 /// deviations of the count.
-fn worst_z<L: Lanes>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) -> f64 {
+fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
     let count = 40_000;
     let mut inside = vec![0u32; edges.len()];
@@ -129,9 +129,9 @@ fn rmse_slope(lobe: Lobe, roughness: f64, edges: &[Edge]) -> f64 {
     slope(&(4..=10).map(point).collect::<Vec<_>>())
 }
 
-fn spread_of(lobe: Lobe, roughness: f64) -> Spread<f64> {
+fn spread_of(lobe: Lobe, roughness: f64) -> ReflectionLobe<f64> {
     let material = reflector(lobe, Masking::VCavity, roughness);
-    Finish::new(&material, true).reflection.unwrap().1
+    Bsdf::new(&material, true).reflection.unwrap().1
 }
 
 /// Closed form 3 and its limit 4, over all half-angles, in both precisions. Single precision turns a
@@ -268,7 +268,7 @@ fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
         let found = largest_difference(side);
         assert!((found - known).abs() < 2.5e-3, "{name}: {found}");
     }
-    let Spread::Square { side } = spread_of(Lobe::Square, r) else { panic!() };
+    let ReflectionLobe::Square { side } = spread_of(Lobe::Square, r) else { panic!() };
     assert!((side - PI.sqrt() * r).abs() < 1e-15);
 }
 
@@ -317,7 +317,7 @@ fn extreme_21_lobe_at_the_horizon() {
     horizon::<Single>(1e-6);
 }
 
-fn horizon<L: Lanes>(tolerance: f64) {
+fn horizon<L: SimdFloat>(tolerance: f64) {
     let (rho, degrees) = (0.7, 89.999f64);
     let (mut worst, mut worst_z) = (0f64, 0f64);
     let delta = (90.0 - degrees).to_radians();
@@ -332,11 +332,11 @@ fn horizon<L: Lanes>(tolerance: f64) {
             let mut material = reflector(lobe, Masking::VCavity, roughness);
             material.reflection = rho;
             let share = match spread_of(lobe, roughness) {
-                Spread::Square { side } => {
+                ReflectionLobe::Square { side } => {
                     // The square lies as the frame about the kernel's own mirror direction does.
-                    let kernel = V3::<L>::of(incident).reflect(V3::of(n)).normalize();
+                    let kernel = Vec3::<L>::of(incident).reflect(Vec3::of(n)).normalize();
                     let frame = Frame::around(kernel);
-                    let up = [frame.t, frame.b].map(|v| dot(v.lane(0).map(Real::to_f64), n));
+                    let up = [frame.t, frame.b].map(|v| dot(v.lane(0).map(Float::to_f64), n));
                     square_share(side, delta.tan(), up[1].atan2(up[0]))
                 }
                 _ => cone_share(roughness.atan(), delta),

@@ -1,8 +1,8 @@
 //! Phong's highlights, from wide ones to those of a single pixel.
 
 use crate::setup::{across, combine, dot, tilted_normal, unit};
-use zerkalo::lanes::{Double, Lanes, Real, Single, V3};
-use zerkalo::material::{Finish, Material};
+use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
+use zerkalo::material::{Bsdf, Material};
 
 /// A material that shines and does nothing else.
 fn shiny(exponent: f64) -> Material {
@@ -10,9 +10,9 @@ fn shiny(exponent: f64) -> Material {
 }
 
 /// A unit vector as a kernel has it, and the same numbers in double precision.
-fn rounded<L: Lanes>(v: [f64; 3]) -> (V3<L>, [f64; 3]) {
-    let v = V3::<L>::of(v).normalize();
-    (v, v.lane(0).map(Real::to_f64))
+fn rounded<L: SimdFloat>(v: [f64; 3]) -> (Vec3<L>, [f64; 3]) {
+    let v = Vec3::<L>::of(v).normalize();
+    (v, v.lane(0).map(Float::to_f64))
 }
 
 /// (R.V)^alpha from the tangent of the angle between R and V, which keeps its digits.
@@ -31,12 +31,12 @@ fn power(n: [f64; 3], view: [f64; 3], light: [f64; 3], alpha: f64) -> f64 {
 
 /// Highlights around their middle, for every exponent that a scene may have: at most k_s, and as bright as they
 /// should be.
-fn check<L: Lanes>(rounding: f64) {
+fn check<L: SimdFloat>(rounding: f64) {
     let most = L::of(0.7) * L::of(std::f64::consts::FRAC_1_PI);
     let most = most.lane(0).to_f64();
     for tenth in 0..=90 {
         let alpha = 10f64.powf(f64::from(tenth) / 10.0);
-        let finish = Finish::<L::Scalar>::new(&shiny(alpha), false);
+        let finish = Bsdf::<L::Scalar>::new(&shiny(alpha), false);
         let mut worst = 0f64;
         for step in 0..600 {
             let (theta, turn) = (f64::from(step % 30) * 0.05, f64::from(step) * 0.7);

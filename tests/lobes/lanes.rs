@@ -1,6 +1,6 @@
 //! The lane types: what they promise beyond the operations that IEEE defines.
 
-use zerkalo::lanes::{Bits, Double, Frame, Lanes, MAX_WIDTH, Mask, Real, Single, V3};
+use zerkalo::lanes::{Double, Float, Frame, MAX_WIDTH, Mask, SimdFloat, SimdU32, Single, Vec3};
 
 /// A sequence of 32-bit numbers with nothing in common.
 fn noise(i: u32) -> u32 {
@@ -26,7 +26,7 @@ macro_rules! for_every_instance {
 
 /// The worst error of `f` against `exact` over `inputs`, in roundings of the result of this
 /// precision (of 1, if `of_one`). `exact` sees the input as rounded to this precision.
-fn worst_ulps<L: Lanes>(
+fn worst_ulps<L: SimdFloat>(
     inputs: impl Fn(u32) -> f64,
     f: impl Fn(L) -> L,
     exact: impl Fn(f64) -> f64,
@@ -47,7 +47,7 @@ fn worst_ulps<L: Lanes>(
 
 /// Sine and cosine of what lobes ask for, 2 pi u with u in [0, 1): within 1.5 roundings of 1, which
 /// is what a direction needs (near a multiple of pi / 2 the smaller of the two is not better known).
-fn sine_and_cosine<L: Lanes>() {
+fn sine_and_cosine<L: SimdFloat>() {
     let angle = |i: u32| std::f64::consts::TAU * uniform(i);
     let sin = worst_ulps::<L>(angle, |x| x.sin_cos().0, f64::sin, true);
     let cos = worst_ulps::<L>(angle, |x| x.sin_cos().1, f64::cos, true);
@@ -56,7 +56,7 @@ fn sine_and_cosine<L: Lanes>() {
 }
 
 /// Angles of points in all directions: within 3 roundings of 1, of angles up to pi. An axis gives no NaN.
-fn arc_tangent<L: Lanes>() {
+fn arc_tangent<L: SimdFloat>() {
     let angle = |i: u32| std::f64::consts::PI * (2.0 * uniform(i) - 1.0);
     let rounded = |x: f64| L::of(x).lane(0).to_f64();
     let mut worst: f64 = 0.0;
@@ -74,7 +74,7 @@ fn arc_tangent<L: Lanes>() {
 
 /// Logarithms of what Beckmann's lobe (1 - u) and Phong's highlight (a cosine, at least 1e-30) ask
 /// for, exponentials of what both highlights ask for.
-fn logarithm_and_exponential<L: Lanes>() {
+fn logarithm_and_exponential<L: SimdFloat>() {
     let small = |i: u32| 10f64.powf(-30.0 * uniform(i));
     let share = |i: u32| 1.0 - f64::from(noise(i) >> 8) / 16_777_216.0;
     let low = if L::EPSILON > 1e-10 { -87.0 } else { -700.0 };
@@ -103,7 +103,7 @@ fn elementary_functions_are_good_to_stated_ulps() {
 }
 
 /// Sums of rounded lanes are exact: those of the lanes one by one, to nearest even.
-fn fixed_point<L: Lanes>() {
+fn fixed_point<L: SimdFloat>() {
     let halves = [0.5, 1.5, 2.5, -0.5, -1.5, -2.5, 0.0, -0.0];
     for i in 0..20_000u32 {
         // Powers of two as scales, as films have them, up to results of 2^50.
@@ -132,9 +132,9 @@ fn fixed_point_sums_are_exact() {
     for_every_instance!(fixed_point);
 }
 
-fn integers<L: Lanes>() {
+fn integers<L: SimdFloat>() {
     for i in 0..10_000 {
-        let x = L::Bits::from_fn(|lane| noise(i * 16 + lane as u32));
+        let x = L::SimdU32::from_fn(|lane| noise(i * 16 + lane as u32));
         for lane in 0..L::WIDTH {
             let one = noise(i * 16 + lane as u32);
             assert_eq!(x.lane(lane), one);
@@ -149,8 +149,8 @@ fn integers<L: Lanes>() {
             assert_eq!((unit * 16_777_216.0) as u32, one >> 8);
         }
     }
-    assert!(L::unit(L::Bits::splat(u32::MAX)).lane(0).to_f64() < 1.0);
-    assert!(L::unit(L::Bits::splat(0)).lane(0).to_f64() >= 0.0);
+    assert!(L::unit(L::SimdU32::splat(u32::MAX)).lane(0).to_f64() < 1.0);
+    assert!(L::unit(L::SimdU32::splat(0)).lane(0).to_f64() >= 0.0);
 }
 
 #[test]
@@ -159,7 +159,7 @@ fn integers_are_those_of_the_processor() {
 }
 
 /// Every pattern of truth values.
-fn masks<L: Lanes>() {
+fn masks<L: SimdFloat>() {
     let lane_of = |bits: u32| L::from_fn(|i| L::Scalar::of(f64::from(bits >> i & 1)));
     for bits in 0..1u32 << L::WIDTH {
         let mask = lane_of(bits).gt(L::zero());
@@ -189,7 +189,7 @@ fn masks<L: Lanes>() {
 }
 
 /// Labels pass through `select` unchanged, whatever number their bits would be.
-fn tags<L: Lanes>() {
+fn tags<L: SimdFloat>() {
     let labels = [0, 1, 2, 0x7f80_0000, 0x7fa0_0001, 0x7fc0_0000, 0xff80_0001, u32::MAX];
     for a in labels {
         for b in labels {
@@ -215,7 +215,7 @@ fn masks_select_and_labels_survive() {
 }
 
 /// NaN on the left loses; comparisons with NaN are false.
-fn not_a_number<L: Lanes>() {
+fn not_a_number<L: SimdFloat>() {
     let nan = L::of(f64::NAN);
     for x in [-1.0, 0.0, 2.5, f64::INFINITY, f64::NEG_INFINITY] {
         let x = L::of(x);
@@ -241,7 +241,7 @@ fn nan_follows_the_stated_rule() {
 }
 
 /// The smallest and the largest lane, wherever they are and whichever lanes are NaN.
-fn ends_of_lanes<L: Lanes>() {
+fn ends_of_lanes<L: SimdFloat>() {
     for i in 0..2000u32 {
         let numbers: Vec<f64> = (0..L::WIDTH as u32)
             .map(|lane| match i.wrapping_mul(0x9e37_79b9) >> lane & 3 {
@@ -250,7 +250,7 @@ fn ends_of_lanes<L: Lanes>() {
             })
             .collect();
         let known = || numbers.iter().copied().filter(|x| !x.is_nan());
-        let (low, high) = L::from_fn(|lane| Real::of(numbers[lane])).extremes();
+        let (low, high) = L::from_fn(|lane| Float::of(numbers[lane])).extremes();
         assert_eq!(low.to_f64(), known().fold(L::MAX, f64::min), "{}: {numbers:?}", L::NAME);
         assert_eq!(high.to_f64(), known().fold(-L::MAX, f64::max), "{}: {numbers:?}", L::NAME);
     }
@@ -262,7 +262,7 @@ fn the_ends_of_lanes_are_found() {
 }
 
 /// Arithmetic up to the square root and the fused product are the same bits at every width.
-fn same_bits<One: Lanes, Many: Lanes<Scalar = One::Scalar>>() {
+fn same_bits<One: SimdFloat, Many: SimdFloat<Scalar = One::Scalar>>() {
     let value = |i: u32| One::Scalar::of((uniform(i) - 0.5) * (60.0 * uniform(!i) - 30.0).exp2());
     let bits = |x: One::Scalar| x.to_f64().to_bits();
     for i in 0..20_000u32 {
@@ -291,7 +291,7 @@ fn ieee_operations_are_the_same_bits_at_every_width() {
 fn frames_around_level_vectors_stand_upright() {
     for i in 0..360 {
         let angle = f64::from(i).to_radians();
-        let frame = Frame::around(V3::<f64>::of([angle.sin(), 0.0, angle.cos()]));
+        let frame = Frame::around(Vec3::<f64>::of([angle.sin(), 0.0, angle.cos()]));
         assert!(frame.b.x.abs() < 1e-15 && frame.b.z.abs() < 1e-15, "{i} degrees: {frame:?}");
         assert!((frame.b.y.abs() - 1.0).abs() < 1e-15 && frame.t.y.abs() < 1e-15, "{i}: {frame:?}");
     }

@@ -2,15 +2,15 @@
 
 use crate::stats::slope;
 use std::f64::consts::PI;
-use zerkalo::lanes::{Bits, Double, Lanes, Real, Single};
+use zerkalo::lanes::{Double, Float, SimdFloat, SimdU32, Single};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 
-fn sampler<L: Lanes>(kind: SamplerKind, seed: u64, jitter: bool) -> Sampler<L> {
+fn sampler<L: SimdFloat>(kind: SamplerKind, seed: u64, jitter: bool) -> Sampler<L> {
     Sampler::new(SampleSettings { seed, kind }, jitter)
 }
 
 /// Pairs of numbers of `count` samples of a pixel: the pixel's place for `None`, else a bounce's.
-fn pairs<L: Lanes>(
+fn pairs<L: SimdFloat>(
     sampler: &Sampler<L>,
     (x, y): (u32, u32),
     replicate: usize,
@@ -46,7 +46,7 @@ fn assert_net(points: &[[f64; 2]], name: &str) {
 
 /// Scrambling keeps the nets of all pairs, in the joint set and in the padded ones, whose indices are
 /// shuffled besides.
-fn nets<L: Lanes>() {
+fn nets<L: SimdFloat>() {
     for seed in [0, 1, u64::MAX] {
         for replicate in 0..2 {
             for pixel in [(0, 0), (639, 479), (u32::MAX, 7)] {
@@ -75,7 +75,7 @@ fn scrambled_sets_remain_nets() {
 }
 
 /// Bit by bit the same numbers, whatever the width, and however many pixels share a packet.
-fn packets_equal_singles<One: Lanes, Many: Lanes>() {
+fn packets_equal_singles<One: SimdFloat, Many: SimdFloat>() {
     let bits = |x: f64| x.to_bits();
     for kind in [SamplerKind::Sobol, SamplerKind::Random] {
         for (jitter, seed) in [(true, 7), (false, u64::MAX)] {
@@ -84,10 +84,10 @@ fn packets_equal_singles<One: Lanes, Many: Lanes>() {
             for replicate in 0..2 {
                 for first in [0u32, 16, 256, 65_536, 0x00ff_fff0, u32::MAX - 15] {
                     for bounce in (0..10).map(Some).chain([None]) {
-                        let pair = |d: &zerkalo::sampling::Draws<'_, Many>| {
+                        let pair = |d: &zerkalo::sampling::PacketSampler<'_, Many>| {
                             bounce.map_or_else(|| d.pixel(), |b| d.lobe(b))
                         };
-                        let single = |d: &zerkalo::sampling::Draws<'_, One>| {
+                        let single = |d: &zerkalo::sampling::PacketSampler<'_, One>| {
                             let (u, v) = bounce.map_or_else(|| d.pixel(), |b| d.lobe(b));
                             (bits(u.lane(0).to_f64()), bits(v.lane(0).to_f64()))
                         };
@@ -100,7 +100,7 @@ fn packets_equal_singles<One: Lanes, Many: Lanes>() {
                             let at =
                                 |lane| ((lane / count) as u32 * 77, 1000 - (lane / count) as u32);
                             let key = |lane| many.key(at(lane), replicate);
-                            let field = pair(&points.of_pixels(Many::Bits::from_fn(key)));
+                            let field = pair(&points.of_pixels(Many::SimdU32::from_fn(key)));
                             let row = pair(&points.of_pixel(key(0)));
                             for lane in 0..Many::WIDTH {
                                 let index = first + (lane % count) as u32;

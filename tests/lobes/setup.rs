@@ -1,7 +1,7 @@
 //! What the tests share: materials, vectors, reflections drawn, samples traced.
 
-use zerkalo::lanes::{Lanes, Mask, Real, V3};
-use zerkalo::material::{Finish, Lobe, Masking, Material, Spread};
+use zerkalo::lanes::{Float, Mask, SimdFloat, Vec3};
+use zerkalo::material::{Bsdf, Lobe, Masking, Material, ReflectionLobe};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::world::{MAX_GROUPS, Radiance, World};
@@ -40,7 +40,7 @@ pub fn at_angle(n: Vector, theta: f64, phi: f64) -> Vector {
     unit(combine(&[(theta.cos(), n), (theta.sin() * phi.cos(), t), (theta.sin() * phi.sin(), b)]))
 }
 
-pub fn vector(v: V3<f64>) -> Vector {
+pub fn vector(v: Vec3<f64>) -> Vector {
     [v.x, v.y, v.z]
 }
 
@@ -61,8 +61,8 @@ pub fn reflector(lobe: Lobe, masking: Masking, roughness: f64) -> Material {
 
 /// Whether the lobe is one of microfacets, for which masking matters.
 pub fn has_facets(lobe: Lobe) -> bool {
-    let finish = Finish::<f64>::new(&reflector(lobe, Masking::Smith, 1.0), true);
-    matches!(finish.reflection, Some((_, Spread::Facets(_))))
+    let finish = Bsdf::<f64>::new(&reflector(lobe, Masking::Smith, 1.0), true);
+    matches!(finish.reflection, Some((_, ReflectionLobe::MicrofacetDistribution(_))))
 }
 
 /// Every lobe with every masking that makes a difference to it.
@@ -91,7 +91,7 @@ impl Numbers {
 
 /// Draws `count` reflections of light seen along `incident` (towards the surface), as the kernel does
 /// in the lane type `L`; gives each direction and weight to `take`.
-pub fn each_reflection<L: Lanes>(
+pub fn each_reflection<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
     fold: bool,
@@ -99,9 +99,9 @@ pub fn each_reflection<L: Lanes>(
     count: u32,
     mut take: impl FnMut(Vector, Vector),
 ) {
-    let finish = Finish::<L::Scalar>::new(material, true);
+    let finish = Bsdf::<L::Scalar>::new(material, true);
     let (strength, spread) = finish.reflection.unwrap();
-    let (incident, n) = (V3::<L>::of(incident), V3::<L>::of(n));
+    let (incident, n) = (Vec3::<L>::of(incident), Vec3::<L>::of(n));
     let settings = SampleSettings { seed: numbers.seed, kind: numbers.kind };
     let sampler = Sampler::<L>::new(settings, false);
     for first in (0..count).step_by(L::WIDTH) {
@@ -109,13 +109,13 @@ pub fn each_reflection<L: Lanes>(
         let uv = sampler.block(first, L::WIDTH).of_pixel(key).lobe(0);
         let r = finish.reflect(strength, &spread, incident, n, uv, fold);
         for lane in 0..L::WIDTH {
-            take(r.direction.lane(lane).map(Real::to_f64), r.weight.lane(lane).map(Real::to_f64));
+            take(r.direction.lane(lane).map(Float::to_f64), r.weight.lane(lane).map(Float::to_f64));
         }
     }
 }
 
 /// The radiance of the sample `index` of a pixel in every group and channel, WIDTH samples at once.
-pub fn trace<L: Lanes>(
+pub fn trace<L: SimdFloat>(
     world: &World<L>,
     sampler: &Sampler<L>,
     pixel: (u32, u32),
@@ -126,13 +126,13 @@ pub fn trace<L: Lanes>(
     let draws = points.of_pixel(sampler.key(pixel, replicate));
     let half = L::of(0.5);
     let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
-    let rays = world.view().rays(V3::splat(world.view().toward(pixel)), jitter);
-    let mut radiance = Radiance { groups: [V3::zero(); MAX_GROUPS] };
+    let rays = world.view().rays(Vec3::splat(world.view().toward(pixel)), jitter);
+    let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
     let all = L::mask(true);
     assert!(all.all());
     world.trace(rays, None, &draws, all, &mut radiance);
     let groups = &radiance.groups[..world.groups()];
-    let of_lane = |lane| groups.iter().map(|g| g.lane(lane).map(Real::to_f64)).collect();
+    let of_lane = |lane| groups.iter().map(|g| g.lane(lane).map(Float::to_f64)).collect();
     (0..L::WIDTH).map(of_lane).collect()
 }
 
@@ -143,7 +143,7 @@ pub fn scene(text: &str) -> Scene {
 const SETTINGS: SampleSettings = SampleSettings { seed: 3, kind: SamplerKind::Sobol };
 
 /// Sums over groups of the samples `0..count` of every pixel, white lights.
-pub fn samples<L: Lanes>(scene: &Scene, count: u32) -> Vec<Vector> {
+pub fn samples<L: SimdFloat>(scene: &Scene, count: u32) -> Vec<Vector> {
     let world = World::<L>::new(scene);
     let sampler = Sampler::<L>::new(SETTINGS, world.jitter());
     let [width, height] = scene.film.size;

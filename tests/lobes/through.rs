@@ -3,9 +3,9 @@
 use crate::setup::*;
 use crate::told::told;
 use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Lanes, Mask, Real, Single, V3};
+use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
 use zerkalo::material::Interface;
-use zerkalo::primitive::Geometry;
+use zerkalo::primitive::Aggregate;
 use zerkalo::scene::Scene;
 
 fn mean(samples: &[Vector]) -> Vector {
@@ -20,7 +20,7 @@ const GLASS: &str = "ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmissio
 /// the old direction. How far off the shift is at most, as a share of t, while it is no more than
 /// rounding makes it: a direction's last digit over the way through the slab, which at 89.9 degrees is up
 /// to 430 long, and the two starts behind surfaces, 8 roundings of the slab's half width off them.
-fn check_slab<L: Lanes>() -> f64 {
+fn check_slab<L: SimdFloat>() -> f64 {
     /// The least that holds a ray at 89.9 degrees in a slab that does not bend it.
     const HALF_WIDTH: f64 = 450.0;
     let t = 0.75;
@@ -30,14 +30,14 @@ fn check_slab<L: Lanes>() -> f64 {
         2.0 * HALF_WIDTH
     ));
     let form = slab.objects[0].shape.form();
-    let geometry = Geometry::<L>::with_tree(&[form], false);
+    let geometry = Aggregate::<L>::with_tree(&[form], false);
     let number = |x: L| x.lane(0).to_f64();
     let mut worst = 0f64;
     for n in [1.0, 1.33, 1.5, 2.4, 1e3] {
         for i in 0..=899 {
             let (sin, cos) = (f64::from(i) * 0.1).to_radians().sin_cos();
-            let direction = V3::<L>::of([sin, 0.0, -cos]);
-            let mut ray = Ray { origin: V3::of([-sin, 0.0, cos]), direction };
+            let direction = Vec3::<L>::of([sin, 0.0, -cos]);
+            let mut ray = Ray { origin: Vec3::of([-sin, 0.0, cos]), direction };
             let from = ray.origin;
             for (n_i, n_t) in [(1.0, n), (n, 1.0)] {
                 let hit = geometry.closest(&ray, geometry.all());

@@ -2,14 +2,14 @@
 
 use crate::setup::*;
 use crate::told::told;
-use zerkalo::lanes::{Double, Lanes, Single};
+use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::material::{Lobe, Masking};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 /// A ball in a white furnace returns exactly rho, in every sample, by every lobe that claims to keep
 /// energy; at its silhouette lobes dip under the surface and are folded up.
-fn furnace<L: Lanes>() {
+fn furnace<L: SimdFloat>() {
     use zerkalo::material::Energy;
     let rho = 0.75;
     let text = "film = { size = [24, 24] }
@@ -20,7 +20,7 @@ fn furnace<L: Lanes>() {
         shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
         [materials.m]";
     let mut scene = scene(text);
-    for lobe in Lobe::ALL.into_iter().filter(|l| l.claims().energy == Energy::Kept) {
+    for lobe in Lobe::ALL.into_iter().filter(|l| l.claims().energy == Energy::Conserving) {
         for roughness in [0.0, 1e-3, 0.3, 3.0, 1e4] {
             let mut material = reflector(lobe, Masking::VCavity, roughness);
             material.reflection = rho;
@@ -130,7 +130,7 @@ const DIM: f64 = 1e-4;
 
 /// Samples of the width-1 instance and of the packets, side by side: shares that differ at all and
 /// by more than 1e-3, largest difference of the others (both relative), relative difference of the means.
-fn compare<One: Lanes, Many: Lanes>(scene: &Scene) -> [f64; 4] {
+fn compare<One: SimdFloat, Many: SimdFloat>(scene: &Scene) -> [f64; 4] {
     let (one, many) = (samples::<One>(scene, 16), samples::<Many>(scene, 16));
     assert_eq!(one.len(), many.len());
     let (mut any, mut far, mut near) = (0.0, 0.0, 0.0f64);

@@ -2,7 +2,7 @@
 
 use crate::driver::{Verdict, compare, compare_many};
 use crate::support::{accelerated, picture};
-use zerkalo::film::Part;
+use zerkalo::film::Replicates;
 use zerkalo::scene::{Acceleration, Scene};
 use zerkalo::world::Precision;
 
@@ -18,7 +18,7 @@ fn same_bytes(scene: &Scene) -> Verdict {
             if found.film.bytes() == wanted.film.bytes() {
                 continue;
             }
-            let [wanted, found] = [&wanted, &found].map(|r| picture(r, Part::Both));
+            let [wanted, found] = [&wanted, &found].map(|r| picture(r, Replicates::Both));
             let differ: Vec<usize> =
                 (0..wanted.len()).filter(|i| wanted[*i] != found[*i]).collect();
             let width = scene.film.size[0] as usize;

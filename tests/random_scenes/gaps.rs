@@ -7,7 +7,7 @@ use crate::precisions::{codes, paired};
 use crate::scene::of;
 use crate::words::log;
 use glam::DVec3;
-use zerkalo::scene::{Filter, Scale, Scene, Step};
+use zerkalo::scene::{Filter, Scale, Scene, TransformOp};
 use zerkalo::world::Precision;
 
 /// The gap beside the size of a thing.
@@ -34,9 +34,9 @@ fn apart(mut scene: Scene, numbers: &mut Numbers, aside: DVec3) -> Option<Scene>
         widest = widest.max(5.0 * GAP * size.max_element());
         least = least.min(size.min_element());
         object.transform.extend([
-            Step::Translate((-middle).to_array()),
-            Step::Scale(Scale([1.0 - gap; 3])),
-            Step::Translate(middle.to_array()),
+            TransformOp::Translate((-middle).to_array()),
+            TransformOp::Scale(Scale([1.0 - gap; 3])),
+            TransformOp::Translate(middle.to_array()),
         ]);
     }
     // An eye on a surface is on one side of it or the other.

@@ -4,7 +4,7 @@ use crate::common::Numbers;
 use crate::things::{Finish, Stock, combined, named, object, resolved};
 use crate::words::{chance, log, pick};
 use glam::DVec3;
-use zerkalo::scene::{Object, Scale, Step};
+use zerkalo::scene::{Object, Scale, TransformOp};
 use zerkalo::shape::Shape;
 
 /// What a random scene is about.
@@ -201,7 +201,7 @@ fn flat(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
         let below = if key == "platform" { base - DVec3::Y * size.y } else { base };
         let mut object = named(numbers, stock, key, below, size);
         if chance(numbers, 1, 4) {
-            object.transform.push(Step::Scale(Scale([1.0, -1.0, 1.0])));
+            object.transform.push(TransformOp::Scale(Scale([1.0, -1.0, 1.0])));
         }
         object
     };

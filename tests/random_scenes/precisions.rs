@@ -3,7 +3,7 @@
 use crate::driver::{Verdict, compare, compare_many};
 use crate::statistics::{Worst, blocks, mean_and_error, mean_of};
 use crate::support::{picture, rendered};
-use zerkalo::film::{Display, Part};
+use zerkalo::film::{Display, Replicates};
 use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
@@ -20,7 +20,10 @@ pub fn codes(scene: &Scene, precision: Precision, samples: u32) -> Vec<Vec<[f64;
     (0..SEEDS)
         .map(|seed| {
             let rendering = rendered(scene, seed, precision, samples);
-            picture(&rendering, Part::Both).into_iter().map(|rgb| display.codes(rgb)).collect()
+            picture(&rendering, Replicates::Both)
+                .into_iter()
+                .map(|rgb| display.codes(rgb))
+                .collect()
         })
         .collect()
 }

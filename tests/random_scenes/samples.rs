@@ -6,10 +6,10 @@ use crate::layouts::Layout;
 use crate::scene::of;
 use crate::statistics::{BLOCK, Worst, blocks, mean_and_error, mean_of};
 use crate::support::{begin, picture, pool, rendered, settings, trace};
-use zerkalo::film::{Display, Part, TILE};
-use zerkalo::render::Rendering;
+use zerkalo::film::{Display, Replicates, TILE};
+use zerkalo::render::RenderState;
 use zerkalo::render::schedule::{Step, Stop};
-use zerkalo::render::session::Traced;
+use zerkalo::render::session::RenderBackend;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
@@ -41,7 +41,7 @@ struct Shot {
     ended: bool,
 }
 
-fn counts(rendering: &Rendering) -> Vec<f64> {
+fn counts(rendering: &RenderState) -> Vec<f64> {
     let film = &rendering.film;
     let tile = |x: usize, y: usize| y / TILE * film.tile_columns() + x / TILE;
     let of = |i: usize| {
@@ -67,7 +67,7 @@ fn shot(scene: &Scene, seed: u64, adaptive: bool, stop: Stop, most: u64) -> Shot
     };
     let noise = rendering.film.noise(&rendering.mix, &Display::default());
     Shot {
-        picture: picture(&rendering, Part::Both),
+        picture: picture(&rendering, Replicates::Both),
         counts: counts(&rendering),
         rays: schedule.rays() as f64,
         reported: noise.map_or(0.0, |n| n.rmse_codes.powi(2)),
@@ -87,7 +87,7 @@ impl Reference {
     fn new(scene: &Scene) -> Self {
         let render = |seed| {
             let rendering = rendered(scene, seed, Precision::Auto, REFERENCE / 2);
-            picture(&rendering, Part::Both)
+            picture(&rendering, Replicates::Both)
         };
         let pictures: Vec<_> = (1000..1000 + SEEDS).map(render).collect();
         let display = Display::default();

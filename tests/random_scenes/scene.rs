@@ -12,7 +12,7 @@ use zerkalo::camera::{Camera, ViewAngle};
 use zerkalo::light::{Directional, Falloff, Light, Point};
 use zerkalo::primitive::Form;
 use zerkalo::scene::{
-    Acceleration, Document, FilmSettings, Object, Scale, Scene, Step, TRACE_FIELDS, Trace,
+    Acceleration, Document, FilmSettings, Object, Scale, Scene, TRACE_FIELDS, Trace, TransformOp,
 };
 use zerkalo::value::{Color, Field};
 
@@ -59,7 +59,7 @@ fn on_surface(numbers: &mut Numbers, form: &Form) -> DVec3 {
             *normal * *offset + across
         }
         Form::Parallelogram { corner, u, v } => *corner + (*u + *v) * pick(numbers, &[0.5, 0.0]),
-        Form::Convex { faces, corners } => {
+        Form::ConvexPolyhedron { faces, corners } => {
             let face = &faces[numbers.below(faces.len())];
             let near = |c: &&DVec3| (face.normal.dot(**c) - face.offset).abs() < 1e-9 * c.length();
             let of_face: Vec<_> = corners.iter().filter(near).collect();
@@ -242,10 +242,10 @@ fn displace(numbers: &mut Numbers, scene: &mut Scene) {
     let moved = |at: [f64; 3]| (DVec3::from_array(at) * scale + shift).to_array();
     let mut extra = Vec::new();
     if scale != 1.0 {
-        extra.push(Step::Scale(Scale([scale; 3])));
+        extra.push(TransformOp::Scale(Scale([scale; 3])));
     }
     if shift != DVec3::ZERO {
-        extra.push(Step::Translate(shift.to_array()));
+        extra.push(TransformOp::Translate(shift.to_array()));
     }
     scene.objects.iter_mut().for_each(|object| object.transform.extend(extra.iter().copied()));
     scene.camera.eye = moved(scene.camera.eye);

@@ -5,7 +5,7 @@ use crate::driver::{Verdict, compare, compare_many};
 use crate::layouts::Layout;
 use crate::scene::of;
 use crate::support::{parsed, picture, pool, rendered, uniform, without_chance};
-use zerkalo::film::{Display, Part};
+use zerkalo::film::{Display, Replicates};
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
@@ -23,7 +23,8 @@ fn sound(scene: &Scene) -> Verdict {
                 bad.count, bad.first[0]
             ));
         }
-        let parts = [Part::A, Part::B, Part::Both].map(|part| picture(&rendering, part));
+        let parts =
+            [Replicates::A, Replicates::B, Replicates::Both].map(|part| picture(&rendering, part));
         let light = |p: &[f64; 3]| p.iter().all(|c| c.is_finite() && *c >= 0.0);
         if let Some(i) = parts.iter().flatten().position(|p| !light(p)) {
             return Verdict::Different(format!("{precision:?}: pixel {i} is no light"));
@@ -42,7 +43,7 @@ fn alike(scene: &Scene) -> Verdict {
     without_chance(&mut scene);
     for precision in [Precision::Auto, Precision::Double] {
         let rendering = rendered(&scene, 1, precision, SAMPLES);
-        let [a, b] = [Part::A, Part::B].map(|part| picture(&rendering, part));
+        let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
         if let Some(i) = (0..a.len()).find(|i| a[*i] != b[*i]) {
             return Verdict::Different(format!(
                 "{precision:?}: without chance pixel {i} is {:?} and {:?}",
@@ -97,7 +98,8 @@ fn a_lamp_close_to_the_floor_has_no_bad_sample() {
     for precision in [Precision::Auto, Precision::Double] {
         let rendering = rendered(&scene, 2, precision, 16);
         assert_eq!(rendering.film.bad_samples().count, 0);
-        let brightest = picture(&rendering, Part::Both).iter().map(|p| p[0]).fold(0.0, f64::max);
+        let brightest =
+            picture(&rendering, Replicates::Both).iter().map(|p| p[0]).fold(0.0, f64::max);
         assert!(brightest > 1e8, "{brightest}");
     }
 }

@@ -8,9 +8,9 @@ use std::sync::{Arc, OnceLock};
 use toml::{Table, Value};
 use zerkalo::asset::Assets;
 use zerkalo::material::{self, Material};
-use zerkalo::scene::{Library, Object, Rotate, Scale, Scene, Step};
-use zerkalo::shape::{KINDS, Part, Shape};
-use zerkalo::value::{Field, Takes};
+use zerkalo::scene::{Library, Object, Rotate, Scale, Scene, TransformOp};
+use zerkalo::shape::{CsgOperand, KINDS, Shape};
+use zerkalo::value::{Field, ValueType};
 
 /// Files with triangles; the empty name stands for an icosahedron.
 const MESHES: &[&str] = &[
@@ -119,14 +119,14 @@ pub fn material(numbers: &mut Numbers, finish: Finish) -> Material {
 
 fn keys_of(kind: &Field) -> &'static [Field] {
     match kind.takes {
-        Takes::Table(fields) => fields,
+        ValueType::Table(fields) => fields,
         _ => &[],
     }
 }
 
 /// Whether a kind is made of parts.
 fn has_parts(kind: &Field) -> bool {
-    keys_of(kind).iter().any(|f| matches!(f.takes, Takes::Tables(_)))
+    keys_of(kind).iter().any(|f| matches!(f.takes, ValueType::Tables(_)))
 }
 
 /// The kinds that can be parts of a compound, and the compounds.
@@ -136,7 +136,7 @@ fn solids() -> &'static (Vec<&'static Field>, Vec<&'static Field>) {
         let (compounds, simple) = KINDS.iter().partition::<Vec<&Field>, _>(|kind| has_parts(kind));
         let fits = |kind: &&Field| {
             let [first, second] = ["sphere", kind.name]
-                .map(|key| Part::new(Shape::standing(key, DVec3::ZERO, DVec3::ONE).unwrap()));
+                .map(|key| CsgOperand::new(Shape::standing(key, DVec3::ZERO, DVec3::ONE).unwrap()));
             compound(compounds[0].name, vec![first, second]).is_some()
         };
         (simple.into_iter().filter(fits).collect(), compounds)
@@ -144,7 +144,7 @@ fn solids() -> &'static (Vec<&'static Field>, Vec<&'static Field>) {
 }
 
 /// A compound without faults.
-fn compound(key: &str, of: Vec<Part>) -> Option<Shape> {
+fn compound(key: &str, of: Vec<CsgOperand>) -> Option<Shape> {
     let parts = Table::from_iter([("of".to_string(), Value::try_from(of).ok()?)]);
     let whole = Table::from_iter([(key.to_string(), Value::Table(parts))]);
     whole.try_into::<Shape>().ok().filter(|shape| shape.faults().is_empty())
@@ -155,21 +155,21 @@ fn by_keys(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Opt
     let own = |numbers: &mut Numbers, field: &Field| {
         let least = size.min_element();
         Some(match field.takes {
-            Takes::Numbers(3, range) if range.low < 0.0 => {
+            ValueType::Numbers(3, range) if range.low < 0.0 => {
                 let up = DVec3::new(0.0, 0.5 * size.y, 0.0);
                 let spread = DVec3::from_array([(); 3].map(|()| numbers.between(-0.5, 0.5)));
                 list((base + up + spread * size).to_array())
             }
-            Takes::Number(range) if range.low.is_finite() => {
+            ValueType::Number(range) if range.low.is_finite() => {
                 let zero = range.holds(0.0) && chance(numbers, 1, 6);
                 Value::Float(if zero { 0.0 } else { least * log(numbers, 0.03, 0.6) })
             }
-            Takes::Number(_) => Value::Float(match numbers.below(3) {
+            ValueType::Number(_) => Value::Float(match numbers.below(3) {
                 0 => pick(numbers, &[0.0, 45.0, 90.0]),
                 _ => numbers.between(-180.0, 180.0),
             }),
-            Takes::Numbers(n, _) => list((0..n).map(|_| least * log(numbers, 0.1, 1.0))),
-            Takes::Text => Value::String(pick(numbers, MESHES).to_string()),
+            ValueType::Numbers(n, _) => list((0..n).map(|_| least * log(numbers, 0.1, 1.0))),
+            ValueType::Text => Value::String(pick(numbers, MESHES).to_string()),
             _ => return None,
         })
     };
@@ -201,7 +201,7 @@ pub fn combined(
                 let kind = simple[numbers.below(simple.len())];
                 of_kind(numbers, kind, at, part)
             };
-            let mut part = Part::new(shape);
+            let mut part = CsgOperand::new(shape);
             if chance(numbers, 1, 2) {
                 part.material = materials[numbers.below(materials.len())].clone();
             }
@@ -226,32 +226,32 @@ fn of_kind(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Sha
 }
 
 /// Steps that turn, stretch, shear or mirror what stands on `base`, which stays where it is; mostly none.
-fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<Step> {
+fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<TransformOp> {
     let turn = |numbers: &mut Numbers| {
         let any = 180.0 * numbers.unit();
         let degrees = pick(numbers, &[90.0, 45.0, any]);
-        Step::Rotate(Rotate { axis: direction(numbers).to_array(), degrees })
+        TransformOp::Rotate(Rotate { axis: direction(numbers).to_array(), degrees })
     };
     let stretch = |numbers: &mut Numbers| {
         let factors = [(); 3].map(|()| {
             let any = log(numbers, 0.05, 3.0);
             pick(numbers, &[1.0, 0.5, 2.0, any])
         });
-        Step::Scale(Scale(factors))
+        TransformOp::Scale(Scale(factors))
     };
     let inner = match numbers.below(12) {
-        0 => vec![Step::RotateY(numbers.between(-180.0, 180.0))],
+        0 => vec![TransformOp::RotateY(numbers.between(-180.0, 180.0))],
         1 => vec![turn(numbers)],
         2 => vec![stretch(numbers)],
         // Shear.
         3 => vec![turn(numbers), stretch(numbers), turn(numbers)],
         // A mirror image.
-        4 => vec![Step::Scale(Scale([-1.0, 1.0, 1.0])), turn(numbers)],
-        5 => vec![turn(numbers), Step::Scale(Scale([0.7, 1.3, -0.6])), turn(numbers)],
+        4 => vec![TransformOp::Scale(Scale([-1.0, 1.0, 1.0])), turn(numbers)],
+        5 => vec![turn(numbers), TransformOp::Scale(Scale([0.7, 1.3, -0.6])), turn(numbers)],
         _ => return Vec::new(),
     };
-    let there = Step::Translate((-base).to_array());
-    let back = Step::Translate(base.to_array());
+    let there = TransformOp::Translate((-base).to_array());
+    let back = TransformOp::Translate(base.to_array());
     std::iter::once(there).chain(inner).chain([back]).collect()
 }
 
@@ -317,8 +317,8 @@ fn fit(object: &mut Object, base: DVec3, size: DVec3) {
     let factor = (size / (high - low).max(DVec3::splat(1e-9))).min_element();
     let foot = DVec3::new(0.5 * (low.x + high.x), low.y, 0.5 * (low.z + high.z));
     object.transform = vec![
-        Step::Translate((-foot).to_array()),
-        Step::Scale(Scale([factor; 3])),
-        Step::Translate(base.to_array()),
+        TransformOp::Translate((-foot).to_array()),
+        TransformOp::Scale(Scale([factor; 3])),
+        TransformOp::Translate(base.to_array()),
     ];
 }

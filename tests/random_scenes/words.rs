@@ -3,7 +3,7 @@
 use crate::common::Numbers;
 use glam::DVec3;
 use toml::{Table, Value};
-use zerkalo::value::{Field, Preset, Range, Takes};
+use zerkalo::value::{DefaultValue, Field, NumberRange, ValueType};
 
 /// A value for a key; `None`: any that the table allows.
 pub type Own<'a> = &'a dyn Fn(&mut Numbers, &Field) -> Option<Value>;
@@ -37,7 +37,7 @@ pub fn list(numbers: impl IntoIterator<Item = f64>) -> Value {
 }
 
 /// A number in `range`, of the middle of which most are.
-fn number(numbers: &mut Numbers, range: Range) -> f64 {
+fn number(numbers: &mut Numbers, range: NumberRange) -> f64 {
     let ends: Vec<f64> =
         [range.low, range.high].into_iter().filter(|x| x.abs() <= 1.0 && range.holds(*x)).collect();
     let x = match numbers.below(4) {
@@ -50,31 +50,35 @@ fn number(numbers: &mut Numbers, range: Range) -> f64 {
 }
 
 /// A value of this type.
-fn value(numbers: &mut Numbers, takes: Takes, odds: f64, own: Own) -> Value {
+fn value(numbers: &mut Numbers, takes: ValueType, odds: f64, own: Own) -> Value {
     match takes {
-        Takes::Text => Value::String(String::new()),
-        Takes::Switch => Value::Boolean(chance(numbers, 1, 2)),
-        Takes::Choice(words) => Value::String(words[numbers.below(words.len())].name.to_string()),
-        Takes::Whole(range) => Value::Integer(number(numbers, range).round() as i64),
-        Takes::Wholes(n, range) => {
+        ValueType::Text => Value::String(String::new()),
+        ValueType::Switch => Value::Boolean(chance(numbers, 1, 2)),
+        ValueType::Choice(words) => {
+            Value::String(words[numbers.below(words.len())].name.to_string())
+        }
+        ValueType::Whole(range) => Value::Integer(number(numbers, range).round() as i64),
+        ValueType::Wholes(n, range) => {
             Value::Array((0..n).map(|_| Value::Integer(number(numbers, range) as i64)).collect())
         }
-        Takes::Number(range) => Value::Float(number(numbers, range)),
-        Takes::Numbers(n, range) => list((0..n).map(|_| number(numbers, range))),
-        Takes::Direction => list(direction(numbers).to_array()),
-        Takes::Factor => list((0..3).map(|_| log(numbers, 0.3, 3.0) * pick(numbers, &[1.0, -1.0]))),
-        Takes::Color(_) => list((0..3).map(|_| numbers.unit())),
-        Takes::Table(fields) => Value::Table(table(numbers, fields, odds, own)),
-        Takes::OneOf(fields) => Value::Table(one_of(numbers, fields, odds, own)),
-        Takes::ListOf(fields) => {
+        ValueType::Number(range) => Value::Float(number(numbers, range)),
+        ValueType::Numbers(n, range) => list((0..n).map(|_| number(numbers, range))),
+        ValueType::Direction => list(direction(numbers).to_array()),
+        ValueType::Factor => {
+            list((0..3).map(|_| log(numbers, 0.3, 3.0) * pick(numbers, &[1.0, -1.0])))
+        }
+        ValueType::Color(_) => list((0..3).map(|_| numbers.unit())),
+        ValueType::Table(fields) => Value::Table(table(numbers, fields, odds, own)),
+        ValueType::OneOf(fields) => Value::Table(one_of(numbers, fields, odds, own)),
+        ValueType::ListOf(fields) => {
             let steps = (0..numbers.below(3)).map(|_| one_of(numbers, fields, odds, own));
             Value::Array(steps.map(Value::Table).collect())
         }
-        Takes::Tables(fields) => {
+        ValueType::Tables(fields) => {
             let tables = (0..2 + numbers.below(2)).map(|_| table(numbers, fields, odds, own));
             Value::Array(tables.map(Value::Table).collect())
         }
-        Takes::Named(_) => Value::Table(Table::new()),
+        ValueType::Named(_) => Value::Table(Table::new()),
     }
 }
 
@@ -88,7 +92,7 @@ fn one_of(numbers: &mut Numbers, fields: &[Field], odds: f64, own: Own) -> Table
 pub fn table(numbers: &mut Numbers, fields: &[Field], odds: f64, own: Own) -> Table {
     let mut out = Table::new();
     for field in fields {
-        if field.preset == Preset::Required || numbers.unit() < odds {
+        if field.preset == DefaultValue::Required || numbers.unit() < odds {
             let value =
                 own(numbers, field).unwrap_or_else(|| value(numbers, field.takes, odds, own));
             out.insert(field.name.to_string(), value);

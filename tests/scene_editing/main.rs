@@ -9,7 +9,7 @@ use layouts::LAYOUTS;
 use proptest::prelude::*;
 use zerkalo::camera::ViewAngle;
 use zerkalo::scene::edit::{Subject, rename, store_view};
-use zerkalo::scene::{Document, Object, Scale, Scene, Step};
+use zerkalo::scene::{Document, Object, Scale, Scene, TransformOp};
 use zerkalo::shape::{Plane, Shape, Sphere};
 use zerkalo::value::Color;
 
@@ -128,7 +128,7 @@ fn added_objects_come_last_in_the_style_of_the_reference() {
         name: "new".into(),
         material: "red".into(),
         shape: Shape::Sphere(Sphere { center: [1.0, 2.0, 3.0], radius: 0.25 }),
-        transform: vec![Step::RotateY(10.0), Step::Scale(Scale([1.0, 2.0, 1.0]))],
+        transform: vec![TransformOp::RotateY(10.0), TransformOp::Scale(Scale([1.0, 2.0, 1.0]))],
     };
     let written = "\n[[object]]\nname = \"new\"\nmaterial = \"red\"\n\
         shape.sphere = { center = [1.0, 2.0, 3.0], radius = 0.25 }\n\

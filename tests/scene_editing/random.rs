@@ -4,10 +4,10 @@ use proptest::prelude::*;
 use zerkalo::camera::{Camera, ViewAngle};
 use zerkalo::light::{Directional, Falloff, Light, Point};
 use zerkalo::material::{Fresnel, Highlight, Lobe, Material, Metal};
-use zerkalo::scene::{Filter, Object, Rotate, Scale, Scene, Step};
+use zerkalo::scene::{Filter, Object, Rotate, Scale, Scene, TransformOp};
 use zerkalo::shape::{
-    Cone, Cube, Cuboid, Cylinder, Difference, Intersection, Part, Plane, Platform, Prism, Pyramid,
-    Rectangle, Shape, Sphere, TaperedCylinder, Union, UnitCylinder,
+    Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection, Plane,
+    Prism, Pyramid, Rectangle, Shape, Sphere, TaperedCylinder, Union, UnitFrustum,
 };
 use zerkalo::value::Color;
 
@@ -47,7 +47,7 @@ fn shape() -> impl Strategy<Value = Shape> {
 fn compound(levels: u32) -> BoxedStrategy<Shape> {
     let solid = || {
         simple().prop_filter("flat", |shape| {
-            !matches!(shape, Shape::Platform(_) | Shape::Rectangle(_) | Shape::Plane(_))
+            !matches!(shape, Shape::HorizontalRectangle(_) | Shape::Rectangle(_) | Shape::Plane(_))
         })
     };
     let inner = if levels > 1 {
@@ -57,7 +57,7 @@ fn compound(levels: u32) -> BoxedStrategy<Shape> {
     };
     let transform =
         prop_oneof![2 => Just(Vec::new()), 1 => proptest::collection::vec(step(), 1..3)];
-    let part = (inner, transform).prop_map(|(shape, transform)| Part {
+    let part = (inner, transform).prop_map(|(shape, transform)| CsgOperand {
         shape,
         material: String::new(),
         transform,
@@ -91,8 +91,9 @@ fn simple() -> impl Strategy<Value = Shape> {
         (point(), size(), size(), angle()).prop_map(|(corner, side, height, rotation)| {
             Shape::Prism(Prism { corner, side, height, rotation })
         }),
-        (point(), [size(), size()])
-            .prop_map(|(center, size)| Shape::Platform(Platform { center, size })),
+        (point(), [size(), size()]).prop_map(|(center, size)| Shape::HorizontalRectangle(
+            HorizontalRectangle { center, size }
+        )),
         (point(), [size(), size()], direction())
             .prop_map(|(center, size, normal)| {
                 Shape::Rectangle(Rectangle { center, size, normal, up: [0.0, 0.0, 1.0] })
@@ -124,21 +125,21 @@ fn round() -> impl Strategy<Value = Shape> {
         (axis(), size(), size()).prop_map(|((base, top), base_radius, top_radius)| {
             Shape::TaperedCylinder(TaperedCylinder { base, top, base_radius, top_radius })
         }),
-        (0.0..3.0f64).prop_map(|s| Shape::UnitCylinder(UnitCylinder { s })),
+        (0.0..3.0f64).prop_map(|s| Shape::UnitFrustum(UnitFrustum { s })),
     ]
 }
 
-fn step() -> impl Strategy<Value = Step> {
+fn step() -> impl Strategy<Value = TransformOp> {
     let factor = || prop_oneof![0.1..10.0f64, -10.0..-0.1f64];
     prop_oneof![
-        point().prop_map(Step::Translate),
-        coordinate().prop_map(Step::RotateX),
-        coordinate().prop_map(Step::RotateY),
-        coordinate().prop_map(Step::RotateZ),
+        point().prop_map(TransformOp::Translate),
+        coordinate().prop_map(TransformOp::RotateX),
+        coordinate().prop_map(TransformOp::RotateY),
+        coordinate().prop_map(TransformOp::RotateZ),
         (direction(), coordinate())
-            .prop_map(|(axis, degrees)| Step::Rotate(Rotate { axis, degrees })),
-        factor().prop_map(|f| Step::Scale(Scale([f; 3]))),
-        [factor(), factor(), factor()].prop_map(|f| Step::Scale(Scale(f))),
+            .prop_map(|(axis, degrees)| TransformOp::Rotate(Rotate { axis, degrees })),
+        factor().prop_map(|f| TransformOp::Scale(Scale([f; 3]))),
+        [factor(), factor(), factor()].prop_map(|f| TransformOp::Scale(Scale(f))),
     ]
 }
 

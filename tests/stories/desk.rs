@@ -11,7 +11,7 @@ use zerkalo::dashboard::message::{Effect, Exported, Message};
 use zerkalo::dashboard::model::{Colors, Model, Start};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::{begin, update};
-use zerkalo::film::{Film, Header, Mix};
+use zerkalo::film::{Film, Header, LightWeights};
 use zerkalo::render::schedule::Stop;
 use zerkalo::scene::edit::Subject;
 use zerkalo::scene::{Document, SaveError, Scene};
@@ -182,7 +182,7 @@ impl Desk {
                     seed: 0,
                     precision: "f32".into(),
                 };
-                let mix = Mix { weights: vec![[1.0; 3]] };
+                let mix = LightWeights { weights: vec![[1.0; 3]] };
                 Message::Kept(Arc::new(Film::new(header).linear(&mix)), 16.0)
             }
             _ => return None,

@@ -2,28 +2,28 @@
 
 use crate::desk::Desk;
 use crate::support::{pool, rendered, sized};
-use zerkalo::render::{Guide, Rendering};
+use zerkalo::render::{FeatureBuffer, RenderState};
 use zerkalo::scene::{BUILT_IN, Scene};
 use zerkalo::value::Color;
-use zerkalo::world::{Precision, Sight};
+use zerkalo::world::{FirstHit, Precision};
 
 const SIZE: [u32; 2] = [96, 72];
 const SAMPLES: u32 = 16;
 
 /// The picture of a scene, uniform, always the same samples.
-fn picture(scene: &Scene) -> Rendering {
+fn picture(scene: &Scene) -> RenderState {
     rendered(&sized(scene.clone(), SIZE), 0, Precision::Auto, SAMPLES)
 }
 
 /// Which pixels of two pictures differ in any bit.
-fn changed(a: &Rendering, b: &Rendering) -> Vec<bool> {
+fn changed(a: &RenderState, b: &RenderState) -> Vec<bool> {
     let [width, height] = SIZE.map(|n| n as usize);
-    let pixel = |r: &Rendering, i: usize| r.film.pixel(i % width, i / width, &r.mix);
+    let pixel = |r: &RenderState, i: usize| r.film.pixel(i % width, i / width, &r.mix);
     (0..width * height).map(|i| pixel(a, i) != pixel(b, i)).collect()
 }
 
 /// With the ambient part of the materials that `of` names another: the paths that meet them see it.
-fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> Rendering {
+fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> RenderState {
     let mut scene = scene.clone();
     for (_, material) in scene.materials.iter_mut().filter(|(name, _)| of(name)) {
         material.color = Color([0.9, 0.8, 0.7]);
@@ -56,8 +56,8 @@ fn roughness_changes_what_the_mirror_shows_and_not_a_bit_elsewhere() {
     // Pixels that show the mirror, and in it an object rather than the background.
     let [width, height] = SIZE.map(|n| n as usize);
     let size = [width, height];
-    let look = |points: &[[f64; 2]], seen: &mut [Sight]| before.world.look(points, seen);
-    let seen = Guide::new(size, size, look, &pool(2));
+    let look = |points: &[[f64; 2]], seen: &mut [FirstHit]| before.world.look(points, seen);
+    let seen = FeatureBuffer::new(size, size, look, &pool(2));
     let mirror = smooth.objects.iter().position(|o| o.name == "mirror").unwrap() as u32;
     let others = changed(&before, &marked(&smooth, |name| name != "mirror"));
     let shows = |i: &usize| seen.sights()[*i].object == Some(mirror) && others[*i];

@@ -4,11 +4,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
-use zerkalo::film::{Display, Film, Part};
+use zerkalo::film::{Display, Film, Replicates};
 use zerkalo::render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
-use zerkalo::render::session::Traced;
+use zerkalo::render::session::RenderBackend;
 use zerkalo::render::wave::{Job, Wave, WaveReport};
-use zerkalo::render::{Options, Rendering};
+use zerkalo::render::{Options, RenderState};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Acceleration, Filter, Scene};
 use zerkalo::world::{self, Precision};
@@ -43,14 +43,14 @@ pub fn parsed(text: &str) -> Scene {
 }
 
 /// A rendering without samples.
-pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> Rendering {
+pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> RenderState {
     begin_with(scene, SampleSettings { seed, kind: SamplerKind::Sobol }, precision)
 }
 
 /// A rendering without samples, with a sampler of its own.
-pub fn begin_with(scene: &Scene, sampling: SampleSettings, precision: Precision) -> Rendering {
+pub fn begin_with(scene: &Scene, sampling: SampleSettings, precision: Precision) -> RenderState {
     let world = world::Options { precision };
-    Rendering::new(scene, &Options { world, sampling, display: Display::default() }, None)
+    RenderState::new(scene, &Options { world, sampling, display: Display::default() }, None)
 }
 
 /// A pool of `threads` threads.
@@ -65,12 +65,12 @@ pub fn wave(film: &Film, replicate: usize, first: u32, count: u32) -> Wave {
 }
 
 /// Traces a wave to its end.
-pub fn trace(rendering: &mut Rendering, wave: &Wave, pool: &rayon::ThreadPool) -> WaveReport {
+pub fn trace(rendering: &mut RenderState, wave: &Wave, pool: &rayon::ThreadPool) -> WaveReport {
     rendering.run(wave, pool, &AtomicBool::new(false))
 }
 
 /// Samples `first .. first + count` of both replicates in every pixel.
-pub fn uniform(rendering: &mut Rendering, first: u32, count: u32, pool: &rayon::ThreadPool) {
+pub fn uniform(rendering: &mut RenderState, first: u32, count: u32, pool: &rayon::ThreadPool) {
     for replicate in [0, 1] {
         let wave = wave(&rendering.film, replicate, first, count);
         trace(rendering, &wave, pool);
@@ -78,14 +78,19 @@ pub fn uniform(rendering: &mut Rendering, first: u32, count: u32, pool: &rayon::
 }
 
 /// Both replicates of `scene`, `count` samples each.
-pub fn rendered(scene: &Scene, seed: u64, precision: Precision, count: u32) -> Rendering {
+pub fn rendered(scene: &Scene, seed: u64, precision: Precision, count: u32) -> RenderState {
     let mut rendering = begin(scene, seed, precision);
     uniform(&mut rendering, 0, count, &pool(2));
     rendering
 }
 
 /// Both replicates of `scene` by one thread, accelerated in one of the ways.
-pub fn accelerated(scene: &Scene, by: Acceleration, precision: Precision, count: u32) -> Rendering {
+pub fn accelerated(
+    scene: &Scene,
+    by: Acceleration,
+    precision: Precision,
+    count: u32,
+) -> RenderState {
     let mut scene = scene.clone();
     scene.trace.acceleration = by;
     let mut rendering = begin(&scene, 5, precision);
@@ -107,7 +112,7 @@ pub fn without_chance(scene: &mut Scene) {
 
 /// Follows a schedule that stops for anything but time.
 pub fn follow(
-    rendering: &mut Rendering,
+    rendering: &mut RenderState,
     settings: Settings,
     pool: &rayon::ThreadPool,
 ) -> StoppedBy {
@@ -129,7 +134,7 @@ pub fn settings(adaptive: bool, rays_per_pixel: u32, stop: Stop) -> Settings {
 }
 
 /// The radiance of every pixel, row by row.
-pub fn picture(rendering: &Rendering, part: Part) -> Vec<[f64; 3]> {
+pub fn picture(rendering: &RenderState, part: Replicates) -> Vec<[f64; 3]> {
     let mut row = Vec::new();
     let mut all = Vec::new();
     for y in 0..rendering.film.height() {

@@ -8,7 +8,7 @@ use image::RgbImage;
 use std::f64::consts::PI;
 use std::fmt::Write;
 use tempfile::TempDir;
-use zerkalo::film::Part;
+use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
@@ -161,7 +161,7 @@ impl Case {
 
     pub fn shown(&self, desk: &Desk, precision: Precision) -> Vec<DVec3> {
         let rendering = rendered(&desk.scene(&self.text()), 1, precision, 1);
-        picture(&rendering, Part::Both).into_iter().map(DVec3::from).collect()
+        picture(&rendering, Replicates::Both).into_iter().map(DVec3::from).collect()
     }
 }
 

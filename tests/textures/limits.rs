@@ -6,15 +6,15 @@ use image::{ImageBuffer, Luma};
 use std::fs;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use zerkalo::asset::{Assets, Stage};
-use zerkalo::film::Part;
+use zerkalo::asset::{Assets, LoadProgress};
+use zerkalo::film::Replicates;
 use zerkalo::material::Fresnel;
 use zerkalo::scene::edit::{Entry, Subject, rows, set, step, toggle};
 use zerkalo::scene::{Document, Scene, SceneFile};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 fn shown(scene: &Scene, precision: Precision) -> Vec<[f64; 3]> {
-    picture(&rendered(scene, 1, precision, 4), Part::Both)
+    picture(&rendered(scene, 1, precision, 4), Replicates::Both)
 }
 
 /// Heights of nothing, or an even image, change no bit; one texel higher does.
@@ -63,7 +63,7 @@ fn a_ramp_leans_by_the_angle_of_its_slope() {
         );
         let name = folder.path().join("s.toml");
         let scene = Scene::parse(&text, name.to_str().unwrap()).unwrap();
-        picture(&rendered(&scene, 1, Precision::Double, 1), Part::Both)
+        picture(&rendered(&scene, 1, Precision::Double, 1), Replicates::Both)
     };
     for light in [leaning, DVec3::Z, DVec3::new(0.3, 0.5, 0.8).normalize()] {
         let expected = light.dot(leaning);
@@ -122,7 +122,7 @@ fn the_dashboard_edits_textures_and_reads_no_file_twice() {
     let reads = Arc::new(AtomicUsize::new(0));
     let counter = reads.clone();
     let assets = Arc::new(Assets::new(move |stage| {
-        if matches!(stage, Stage::Reading { .. }) {
+        if matches!(stage, LoadProgress::Reading { .. }) {
             counter.fetch_add(1, Ordering::SeqCst);
         }
     }));
@@ -212,7 +212,10 @@ fn textures_do_not_depend_on_packets() {
             for first in 0..16 {
                 crate::support::uniform(&mut single, first, 1, &pool);
             }
-            assert!(picture(&whole, Part::Both) == picture(&single, Part::Both), "{name}");
+            assert!(
+                picture(&whole, Replicates::Both) == picture(&single, Replicates::Both),
+                "{name}"
+            );
             assert_eq!(whole.film.bad_samples().count, 0, "{name}");
         }
     }

@@ -9,7 +9,7 @@ use crate::support::{picture, rendered};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
-use zerkalo::film::Part;
+use zerkalo::film::Replicates;
 use zerkalo::world::Precision;
 
 #[test]
@@ -101,8 +101,9 @@ fn the_coordinates_of_a_mesh() {
         check(&case, &desk);
         check(&moved(case.clone()), &desk);
         let text = case.text().replace("mapping = \"uv\"", &format!("mapping = \"{mapping}\""));
-        let one =
-            |text: &str| picture(&rendered(&desk.scene(text), 1, Precision::Double, 1), Part::Both);
+        let one = |text: &str| {
+            picture(&rendered(&desk.scene(text), 1, Precision::Double, 1), Replicates::Both)
+        };
         assert!(one(&text) == one(&case.text()), "{name}");
     }
 }
@@ -169,7 +170,7 @@ fn parts_of_compounds() {
         let text = part.text() + "[materials.other]\n";
         let shown = [Precision::Double, Precision::Single].map(|p| {
             let rendering = rendered(&desk.scene(&text), 1, p, 1);
-            picture(&rendering, Part::Both).into_iter().map(DVec3::from).collect::<Vec<_>>()
+            picture(&rendering, Replicates::Both).into_iter().map(DVec3::from).collect::<Vec<_>>()
         });
         let found = differences(&part, &shown, &desk);
         assert!(found[0] <= ALLOWED[0] && found[1] <= ALLOWED[1], "{found:?}");

@@ -1,7 +1,7 @@
 //! Collects the parts of a mesh as a reader finds them, then checks and compacts them.
 
-use crate::asset::error::{AssetError, Place};
-use crate::asset::file::Source;
+use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::file::FileContents;
 use crate::asset::mesh::normals::smooth;
 use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, TriangleMesh};
 use std::collections::HashMap;
@@ -17,7 +17,7 @@ const FAR_OFF: f64 = 16.0;
 
 /// A mesh under construction.
 pub struct Builder<'a> {
-    source: &'a Source,
+    source: &'a FileContents,
     positions: Vec<[f64; 3]>,
     /// As long as `positions`, or shorter where the rest has none; zero: none.
     normals: Vec<[f32; 3]>,
@@ -32,7 +32,7 @@ pub struct Builder<'a> {
 
 impl<'a> Builder<'a> {
     /// With nothing yet.
-    pub fn new(source: &'a Source) -> Self {
+    pub fn new(source: &'a FileContents) -> Self {
         Self {
             source,
             positions: Vec::new(),
@@ -64,7 +64,7 @@ impl<'a> Builder<'a> {
             if count > most {
                 let found = format!("the mesh has {count} {what}");
                 let expected = format!("at most {most}");
-                return Err(self.source.error(Place::Whole, found, &expected));
+                return Err(self.source.error(FileLocation::Whole, found, &expected));
             }
         }
         Ok(())
@@ -117,7 +117,7 @@ impl<'a> Builder<'a> {
         let index = found.unwrap_or(self.colors.len());
         self.color = u16::try_from(index).map_err(|_| {
             let found = "the mesh has more than 65536 different colours";
-            self.source.error(Place::Whole, found, "at most 65536")
+            self.source.error(FileLocation::Whole, found, "at most 65536")
         })?;
         if found.is_none() {
             self.colors.push(color);
@@ -132,7 +132,7 @@ impl<'a> Builder<'a> {
     pub fn triangle(
         &mut self,
         corners: [u32; 3],
-        place: impl Fn() -> Place,
+        place: impl Fn() -> FileLocation,
     ) -> Result<(), AssetError> {
         let vertices = self.positions.len();
         if let Some(beyond) = corners.iter().find(|i| **i as usize >= vertices) {
@@ -154,7 +154,7 @@ impl<'a> Builder<'a> {
     pub fn polygon(
         &mut self,
         corners: &[u32],
-        place: impl Fn() -> Place,
+        place: impl Fn() -> FileLocation,
     ) -> Result<(), AssetError> {
         for pair in corners.get(1..).unwrap_or_default().windows(2) {
             self.triangle([corners[0], pair[0], pair[1]], &place)?;
@@ -170,7 +170,11 @@ impl<'a> Builder<'a> {
         self.limits(0, 0)?;
         let source = self.source;
         if self.triangles.is_empty() {
-            return Err(source.error(Place::Whole, "the mesh has no triangles", "at least one"));
+            return Err(source.error(
+                FileLocation::Whole,
+                "the mesh has no triangles",
+                "at least one",
+            ));
         }
         self.coordinates()?;
         let center = self.center()?;
@@ -192,7 +196,7 @@ impl<'a> Builder<'a> {
         let extent = extent.fold(0.0, f64::max);
         if extent < SMALLEST {
             let found = format!("the mesh is {extent:e} large");
-            return Err(source.error(Place::Whole, found, "a size from 1e-9 to 1e9"));
+            return Err(source.error(FileLocation::Whole, found, "a size from 1e-9 to 1e9"));
         }
         let normals = self.unit_normals(&positions);
         let uvs = self.checked_uvs(positions.len())?;
@@ -223,7 +227,7 @@ impl<'a> Builder<'a> {
             None => Ok(()),
             Some(i) => {
                 let [x, y, z] = self.positions[i];
-                let place = Place::Part(format!("vertex {i} (from 0)"));
+                let place = FileLocation::Part(format!("vertex {i} (from 0)"));
                 let found = format!("a vertex lies at [{x}, {y}, {z}]");
                 Err(self.source.error(place, found, "coordinates from -1e9 to 1e9"))
             }
@@ -266,7 +270,7 @@ impl<'a> Builder<'a> {
         let dropped = before - self.triangles.len();
         if self.triangles.is_empty() {
             let found = format!("none of the {before} triangles has an area");
-            return Err(self.source.error(Place::Whole, found, "at least one that has"));
+            return Err(self.source.error(FileLocation::Whole, found, "at least one that has"));
         }
         match dropped {
             0 => {}
@@ -314,7 +318,7 @@ impl<'a> Builder<'a> {
             return Ok(None);
         }
         if let Some(i) = uvs.iter().position(|uv| uv.iter().any(|x| !x.is_finite())) {
-            let place = Place::Part(format!("vertex {i} (from 0)"));
+            let place = FileLocation::Part(format!("vertex {i} (from 0)"));
             let found = format!("texture coordinates are [{}, {}]", uvs[i][0], uvs[i][1]);
             return Err(self.source.error(place, found, "finite numbers"));
         }

@@ -4,7 +4,7 @@
 
 use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::normals::smooth;
-use crate::bvh::build::{Boxes, Built, LEAF, WIDE};
+use crate::bvh::build::{BVH_WIDTH, Bvh8, Bvh8Build, LEAF_FLAG};
 use obvhs::BvhBuildParams;
 use std::fmt;
 use std::sync::OnceLock;
@@ -12,17 +12,17 @@ use std::sync::OnceLock;
 /// Up to eight triangles. The places without one hold NaN.
 #[derive(Clone, Debug)]
 #[repr(align(32))]
-pub struct Leaf {
+pub struct TriangleBlock {
     /// Corners, by number in the triangle and axis.
-    pub corners: [[[f32; WIDE]; 3]; 3],
+    pub corners: [[[f32; BVH_WIDTH]; 3]; 3],
 }
 
 /// A mesh with the tree over it: about 58 bytes a triangle for the tree, 12 for its indices, and 12
 /// to 32 for each vertex.
 pub struct Mesh {
     mesh: TriangleMesh,
-    boxes: Boxes,
-    leaves: Vec<Leaf>,
+    boxes: Bvh8,
+    leaves: Vec<TriangleBlock>,
     /// Number of the first triangle in each leaf; the others follow it.
     firsts: Vec<u32>,
     smooth: OnceLock<Vec<[f32; 3]>>,
@@ -44,9 +44,9 @@ impl fmt::Debug for Mesh {
     }
 }
 
-impl Leaf {
+impl TriangleBlock {
     fn new(mesh: &TriangleMesh, first: u32, count: u32) -> Self {
-        let mut leaf = Self { corners: [[[f32::NAN; WIDE]; 3]; 3] };
+        let mut leaf = Self { corners: [[[f32::NAN; BVH_WIDTH]; 3]; 3] };
         let triangles = &mesh.triangles[first as usize..][..count as usize];
         for (i, triangle) in triangles.iter().enumerate() {
             for (corner, vertex) in leaf.corners.iter_mut().zip(triangle) {
@@ -71,14 +71,15 @@ impl Mesh {
         // Large leaves: a ray meets all of one at the price of one.
         let quality =
             BvhBuildParams { collapse_traversal_cost: 8.0, ..BvhBuildParams::fast_build() };
-        let Built { boxes, order, leaves } =
-            Boxes::build(mesh.triangles.len(), corners, WIDE, quality);
+        let Bvh8Build { boxes, order, leaves } =
+            Bvh8::build(mesh.triangles.len(), corners, BVH_WIDTH, quality);
         mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();
         if !mesh.color_of.is_empty() {
             mesh.color_of = order.iter().map(|i| mesh.color_of[*i as usize]).collect();
         }
         let firsts = leaves.iter().map(|(first, _)| *first).collect();
-        let leaves = leaves.iter().map(|(first, count)| Leaf::new(&mesh, *first, *count)).collect();
+        let leaves =
+            leaves.iter().map(|(first, count)| TriangleBlock::new(&mesh, *first, *count)).collect();
         Self { mesh, boxes, leaves, firsts, smooth: OnceLock::new() }
     }
 
@@ -88,12 +89,12 @@ impl Mesh {
     }
 
     /// The tree over the leaves.
-    pub fn boxes(&self) -> &Boxes {
+    pub fn boxes(&self) -> &Bvh8 {
         &self.boxes
     }
 
     /// The leaves.
-    pub fn leaves(&self) -> &[Leaf] {
+    pub fn leaves(&self) -> &[TriangleBlock] {
         &self.leaves
     }
 
@@ -128,11 +129,11 @@ impl Mesh {
                 if bound <= best {
                     continue;
                 }
-                if branch.child[i] & LEAF == 0 {
+                if branch.child[i] & LEAF_FLAG == 0 {
                     todo.push((branch.child[i], bound));
                     continue;
                 }
-                let leaf = &self.leaves[(branch.child[i] & !LEAF) as usize];
+                let leaf = &self.leaves[(branch.child[i] & !LEAF_FLAG) as usize];
                 for [x, y, z] in &leaf.corners {
                     for ((x, y), z) in x.iter().zip(y).zip(z) {
                         // Of NaN and a number the number.
@@ -149,7 +150,7 @@ impl Mesh {
     pub fn bytes(&self) -> usize {
         self.mesh.bytes()
             + self.boxes.bytes()
-            + (size_of::<Leaf>() + size_of::<u32>()) * self.leaves.len()
+            + (size_of::<TriangleBlock>() + size_of::<u32>()) * self.leaves.len()
             + self.smooth.get().map_or(0, |n| 12 * n.len())
     }
 }

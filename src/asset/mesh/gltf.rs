@@ -5,8 +5,8 @@
 //! The library reads and validates the description. The numbers are read here: its own iterators
 //! trust offsets and types, and panic or wrap where a file lies about them.
 
-use crate::asset::error::{AssetError, Place};
-use crate::asset::file::{MAX_BYTES, Source};
+use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::file::{FileContents, MAX_BYTES};
 use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::Builder;
 use crate::value::excerpt;
@@ -18,7 +18,7 @@ use gltf::{Accessor, Document, Gltf, Node, Primitive, Semantic};
 use std::borrow::Cow;
 
 /// Reads a mesh.
-pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
+pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let (document, blob) = description(source)?;
     let buffers = buffers(source, &document, blob.as_deref())?;
     let mut builder = Builder::new(source);
@@ -27,7 +27,7 @@ pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
         roots(&document).into_iter().map(|node| (node, DAffine3::IDENTITY)).collect();
     stack.reverse();
     while let Some((node, outer)) = stack.pop() {
-        let place = || Place::Part(format!("nodes[{}]", node.index()));
+        let place = || FileLocation::Part(format!("nodes[{}]", node.index()));
         if std::mem::replace(&mut met[node.index()], true) {
             let found = "the node has two parents";
             return Err(source.error(place(), found, "a tree of nodes"));
@@ -47,11 +47,15 @@ pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
 }
 
 /// The description, validated, and the data behind it in a binary file.
-fn description(source: &Source) -> Result<(Document, Option<Vec<u8>>), AssetError> {
+fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), AssetError> {
     // The library subtracts the header's size from this length, whatever it is.
     let length = source.bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     if source.bytes.starts_with(b"glTF") && length.is_none_or(|length| length < 12) {
-        return Err(source.error(Place::Byte(8), "the length is below 12", "the file's length"));
+        return Err(source.error(
+            FileLocation::Byte(8),
+            "the length is below 12",
+            "the file's length",
+        ));
     }
     let gltf = Gltf::from_slice_without_validation(&source.bytes);
     let gltf = gltf.map_err(|error| refused(source, &error))?;
@@ -62,7 +66,7 @@ fn description(source: &Source) -> Result<(Document, Option<Vec<u8>>), AssetErro
             if index.value() >= json.accessors.len() {
                 let found = format!("an attribute names accessor {}", index.value());
                 let expected = format!("an accessor below {}, their number", json.accessors.len());
-                let place = Place::Part(format!("meshes[{m}]"));
+                let place = FileLocation::Part(format!("meshes[{m}]"));
                 return Err(source.error(place, found, &expected));
             }
         }
@@ -82,36 +86,36 @@ fn roots(document: &Document) -> Vec<Node<'_>> {
 }
 
 /// What the library says of a file.
-fn refused(source: &Source, error: &gltf::Error) -> AssetError {
+fn refused(source: &FileContents, error: &gltf::Error) -> AssetError {
     let (place, found) = match error {
         gltf::Error::Deserialize(json) => {
             let text = json.to_string();
             let place = if source.bytes.starts_with(b"glTF") {
-                Place::Part("the description".to_string())
+                FileLocation::Part("the description".to_string())
             } else {
-                Place::Line(json.line())
+                FileLocation::Line(json.line())
             };
             (place, text)
         }
         gltf::Error::Validation(faults) => match faults.first() {
-            Some((path, fault)) => (Place::Part(path.to_string()), fault.to_string()),
-            None => (Place::Whole, "the description is not valid".to_string()),
+            Some((path, fault)) => (FileLocation::Part(path.to_string()), fault.to_string()),
+            None => (FileLocation::Whole, "the description is not valid".to_string()),
         },
-        other => (Place::Whole, other.to_string()),
+        other => (FileLocation::Whole, other.to_string()),
     };
     source.error(place, found, "a glTF 2.0 file")
 }
 
 /// The bytes of all buffers.
 fn buffers<'a>(
-    source: &Source,
+    source: &FileContents,
     document: &Document,
     blob: Option<&'a [u8]>,
 ) -> Result<Vec<Cow<'a, [u8]>>, AssetError> {
     let mut all = Vec::new();
     let mut total = 0;
     for buffer in document.buffers() {
-        let place = || Place::Part(format!("buffers[{}]", buffer.index()));
+        let place = || FileLocation::Part(format!("buffers[{}]", buffer.index()));
         let wrong = |found: String, expected: &str| Err(source.error(place(), found, expected));
         let bytes: Cow<[u8]> = match buffer.source() {
             gltf::buffer::Source::Bin => match blob {
@@ -129,13 +133,13 @@ fn buffers<'a>(
                 }
                 None => {
                     // Spaces are the only escapes that writers commonly use.
-                    let Some(path) = source.beside(&uri.replace("%20", " ")) else {
+                    let Some(path) = source.resolve_relative(&uri.replace("%20", " ")) else {
                         return wrong(
                             format!("uri is \"{}\"", excerpt(uri)),
                             "a relative path without \"..\", to a file in the same folder or below",
                         );
                     };
-                    Cow::Owned(Source::read(&path, MAX_BYTES - total)?.bytes)
+                    Cow::Owned(FileContents::read(&path, MAX_BYTES - total)?.bytes)
                 }
             },
         };
@@ -153,7 +157,7 @@ fn buffers<'a>(
 
 /// A primitive where its node puts it.
 struct Part<'a> {
-    source: &'a Source,
+    source: &'a FileContents,
     buffers: &'a [Cow<'a, [u8]>],
     primitive: Primitive<'a>,
     map: DAffine3,
@@ -180,7 +184,7 @@ impl<'a> Part<'a> {
         let color = [r, g, b];
         if !color.iter().all(|x| (0.0..=1e6).contains(x)) {
             let found = "a base colour is not a colour";
-            return Err(self.source.error(Place::Whole, found, "numbers of at least 0"));
+            return Err(self.source.error(FileLocation::Whole, found, "numbers of at least 0"));
         }
         // White is what a file without colours has.
         if color != [1.0; 3] || builder.has_colors() {
@@ -211,7 +215,8 @@ impl<'a> Part<'a> {
                 builder.uv([u, 1.0 - v]);
             }
         }
-        let place = || Place::Part(format!("meshes[..].primitives[{}]", self.primitive.index()));
+        let place =
+            || FileLocation::Part(format!("meshes[..].primitives[{}]", self.primitive.index()));
         let corner = |i: usize| match &indices {
             Some(slice) => slice.index(i),
             None => i as u32,
@@ -268,7 +273,7 @@ impl<'a> Part<'a> {
         dimensions: Dimensions,
         kind: DataType,
     ) -> Result<Slice<'a>, AssetError> {
-        let place = || Place::Part(format!("accessors[{}]", accessor.index()));
+        let place = || FileLocation::Part(format!("accessors[{}]", accessor.index()));
         let wrong =
             |found: String, expected: &str| Err(self.source.error(place(), found, expected));
         let (found, found_kind) = (accessor.dimensions(), accessor.data_type());

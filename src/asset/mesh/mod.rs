@@ -8,10 +8,10 @@ mod obj;
 mod ply;
 mod stl;
 
-pub use bvh::{Leaf, Mesh};
+pub use bvh::{Mesh, TriangleBlock};
 
-use crate::asset::error::{AssetError, Place};
-use crate::asset::file::Source;
+use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::file::FileContents;
 
 /// The most triangles of a mesh: 64 Mi.
 pub const MAX_TRIANGLES: usize = 1 << 26;
@@ -47,7 +47,7 @@ pub struct TriangleMesh {
 
 impl TriangleMesh {
     /// From a file in memory; its name's extension says what it is.
-    pub(super) fn parse(source: Source) -> Result<Self, AssetError> {
+    pub(super) fn parse(source: FileContents) -> Result<Self, AssetError> {
         let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("");
         match extension.to_ascii_lowercase().as_str() {
             "obj" => obj::parse(&source),
@@ -57,7 +57,7 @@ impl TriangleMesh {
             _ => {
                 let found = format!("\"{extension}\" is not a kind of mesh file");
                 Err(source.error(
-                    Place::Whole,
+                    FileLocation::Whole,
                     found,
                     "a name that ends in .obj, .ply, .stl, .gltf or .glb",
                 ))

@@ -3,8 +3,8 @@
 //! The library reads; a pass before it counts and checks the indices of faces, because the library
 //! tells no lines and computes with indices before it checks them.
 
-use crate::asset::error::{AssetError, Place};
-use crate::asset::file::Source;
+use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::file::FileContents;
 use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::Builder;
 use crate::value::excerpt;
@@ -23,7 +23,7 @@ const MAX_MTL_FILES: usize = 64;
 const UNCOLORED: [f32; 3] = [1.0; 3];
 
 /// Reads a mesh.
-pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
+pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let mut builder = Builder::new(source);
     let counts = check_faces(source)?;
     builder.limits(counts[0], 0)?;
@@ -37,7 +37,7 @@ pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
     let mut lines = Lines { rest: &source.bytes, line: 0, current: b"" };
     let loaded = tobj::load_obj_buf(&mut lines, &options, |path| libraries.load(path));
     let (models, materials) = loaded.map_err(|error| {
-        let place = Place::Line(lines.line);
+        let place = FileLocation::Line(lines.line);
         source.error(place, describe(error), "a line as the OBJ format has it")
     })?;
     let libraries = libraries.found.into_inner();
@@ -70,7 +70,7 @@ pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
         }
         for t in mesh.indices.chunks_exact(3) {
             let corners = [t[0], t[1], t[2]].map(|i| i + base as u32);
-            builder.triangle(corners, || Place::Part(excerpt(&model.name)))?;
+            builder.triangle(corners, || FileLocation::Part(excerpt(&model.name)))?;
         }
     }
     builder.finish().map_err(|error| locate_vertex(source, error))
@@ -108,7 +108,7 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 /// Counts vertices, texture coordinates and normals, then checks that every index of a face leads to
 /// one of them, and that the triangles are not too many.
-fn check_faces(source: &Source) -> Result<[usize; 3], AssetError> {
+fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
     let list = |line: &[u8]| match words(line).next() {
         Some(b"v") => Some(0),
         Some(b"vt") => Some(1),
@@ -149,7 +149,7 @@ fn check_faces(source: &Source) -> Result<[usize; 3], AssetError> {
                             "a {what} from 1 to {to}, or from {from} to -1 counted backwards"
                         ),
                     };
-                    return Err(source.error(Place::Line(n), found, &expected));
+                    return Err(source.error(FileLocation::Line(n), found, &expected));
                 }
             }
         }
@@ -160,7 +160,7 @@ fn check_faces(source: &Source) -> Result<[usize; 3], AssetError> {
 }
 
 /// An error about a vertex, with the line where such a vertex stands.
-fn locate_vertex(source: &Source, error: AssetError) -> AssetError {
+fn locate_vertex(source: &FileContents, error: AssetError) -> AssetError {
     let bad = |line: &[u8]| {
         let mut words = words(line);
         words.next() == Some(b"v")
@@ -169,9 +169,9 @@ fn locate_vertex(source: &Source, error: AssetError) -> AssetError {
                 x.is_some_and(|x| !(-1e9..=1e9).contains(&x))
             })
     };
-    let part = matches!(error.place, Place::Part(_));
+    let part = matches!(error.place, FileLocation::Part(_));
     match numbered(&source.bytes).find(|(_, line)| part && bad(line)) {
-        Some((n, _)) => AssetError { place: Place::Line(n), ..error },
+        Some((n, _)) => AssetError { place: FileLocation::Line(n), ..error },
         None => error,
     }
 }
@@ -233,12 +233,12 @@ struct Found {
 
 /// The MTL files that an OBJ names.
 struct Libraries<'a> {
-    source: &'a Source,
+    source: &'a FileContents,
     found: RefCell<Found>,
 }
 
 impl<'a> Libraries<'a> {
-    fn new(source: &'a Source) -> Self {
+    fn new(source: &'a FileContents) -> Self {
         Self { source, found: RefCell::default() }
     }
 
@@ -247,10 +247,10 @@ impl<'a> Libraries<'a> {
         let nothing = || tobj::load_mtl_buf(&mut &b""[..]);
         let mut found = self.found.borrow_mut();
         let name = name.to_string_lossy();
-        let Some(path) = self.source.beside(&name) else {
+        let Some(path) = self.source.resolve_relative(&name) else {
             let what = format!("mtllib names \"{}\"", excerpt(&name));
             let error = self.source.error(
-                Place::Whole,
+                FileLocation::Whole,
                 what,
                 "a relative path without \"..\", to a file in the same folder or below",
             );
@@ -261,7 +261,7 @@ impl<'a> Libraries<'a> {
             return nothing();
         }
         found.seen.push(path.clone());
-        match Source::read(&path, MAX_MTL_BYTES) {
+        match FileContents::read(&path, MAX_MTL_BYTES) {
             Ok(library) => tobj::load_mtl_buf(&mut diffuse_colors(&library.bytes).as_bytes()),
             Err(error) => {
                 found.notes.push(format!("no colours: {}", error.what()));
@@ -307,7 +307,10 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<TriangleMesh, AssetError> {
-        parse(&Source { path: PathBuf::from("/nowhere/a.obj"), bytes: text.as_bytes().to_vec() })
+        parse(&FileContents {
+            path: PathBuf::from("/nowhere/a.obj"),
+            bytes: text.as_bytes().to_vec(),
+        })
     }
 
     #[test]
@@ -336,7 +339,7 @@ mod tests {
             ("v 1 1e300 3\nf 1 2 3 4\n", 4, "a vertex lies at"),
         ] {
             let error = read(&format!("{v}{text}")).unwrap_err();
-            assert_eq!(error.place, Place::Line(line), "{text} {error}");
+            assert_eq!(error.place, FileLocation::Line(line), "{text} {error}");
             assert!(error.found.contains(words), "{text} {error}");
         }
         for (text, words) in [
@@ -359,7 +362,7 @@ mod tests {
         let text = "mtllib c.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red thing\nf 1 2 3\n\
                     usemtl grey\nf 1 3 2\nusemtl odd\nf 2 3 1\nusemtl none\nf 2 1 3\n";
         let path = folder.path().join("a.obj");
-        let mesh = parse(&Source { path, bytes: text.into() }).unwrap();
+        let mesh = parse(&FileContents { path, bytes: text.into() }).unwrap();
         let colors: Vec<_> = (0..4).map(|i| mesh.color(i).unwrap()).collect();
         assert_eq!(colors, [[1.0, 0.0, 0.0], [0.5; 3], UNCOLORED, UNCOLORED]);
         assert_eq!(mesh.notes, [] as [String; 0]);

@@ -1,7 +1,7 @@
 //! PLY, ASCII and binary of both byte orders: positions, normals, texture coordinates, polygons.
 
-use crate::asset::error::{AssetError, Place};
-use crate::asset::file::Source;
+use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::file::FileContents;
 use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::Builder;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
@@ -88,7 +88,7 @@ impl Record {
 }
 
 /// Reads a mesh.
-pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
+pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let parser = Parser::<Record>::new();
     let mut reader = Reader::new(&source.bytes[..]);
     let header = parser.read_header(&mut reader).map_err(|e| wrong(source, &e, None))?;
@@ -125,7 +125,7 @@ pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
                         }
                     }
                     "face" => {
-                        let place = || Place::Part(format!("face {} (from 0)", done + i));
+                        let place = || FileLocation::Part(format!("face {} (from 0)", done + i));
                         builder.polygon(&record.corners, place)?;
                     }
                     _ => {}
@@ -138,11 +138,11 @@ pub fn parse(source: &Source) -> Result<TriangleMesh, AssetError> {
 }
 
 /// What the library says of a file.
-fn wrong(source: &Source, error: &ParseError, byte: Option<usize>) -> AssetError {
+fn wrong(source: &FileContents, error: &ParseError, byte: Option<usize>) -> AssetError {
     let place = match (byte, error.line()) {
-        (Some(byte), _) => Place::Byte(byte),
-        (None, Some(line)) => Place::Line(line),
-        (None, None) => Place::Whole,
+        (Some(byte), _) => FileLocation::Byte(byte),
+        (None, Some(line)) => FileLocation::Line(line),
+        (None, None) => FileLocation::Whole,
     };
     let message = error.to_string();
     // The first line says what, the rest repeats the input.
@@ -153,9 +153,9 @@ fn wrong(source: &Source, error: &ParseError, byte: Option<usize>) -> AssetError
 }
 
 /// Checks what the header announces against what there is: `left` bytes.
-fn check_header(source: &Source, header: &Header, left: usize) -> Result<(), AssetError> {
+fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(), AssetError> {
     let missing = |what: &str| {
-        Err(source.error(Place::Whole, format!("the header names no {what}"), "a mesh"))
+        Err(source.error(FileLocation::Whole, format!("the header names no {what}"), "a mesh"))
     };
     let Some(vertex) = header.elements.get("vertex") else { return missing("element vertex") };
     for names in &NUMBERS[..3] {
@@ -170,14 +170,14 @@ fn check_header(source: &Source, header: &Header, left: usize) -> Result<(), Ass
     let order = |name| header.elements.get_index_of(name);
     if order("face") < order("vertex") {
         let found = "the faces stand before the vertices";
-        return Err(source.error(Place::Whole, found, "vertices first"));
+        return Err(source.error(FileLocation::Whole, found, "vertices first"));
     }
     let mut least = 0u128;
     for element in header.elements.values() {
         let bytes = least_bytes(element, header.encoding);
         if bytes == 0 && element.count > 0 {
             let found = format!("the element {} has no properties", element.name);
-            return Err(source.error(Place::Whole, found, "at least one"));
+            return Err(source.error(FileLocation::Whole, found, "at least one"));
         }
         least += bytes as u128 * element.count as u128;
         if least > left as u128 + 1 {
@@ -185,7 +185,7 @@ fn check_header(source: &Source, header: &Header, left: usize) -> Result<(), Ass
                 "the header announces {} times {}, more than the file holds",
                 element.count, element.name
             );
-            return Err(source.error(Place::Whole, found, "as many as there are"));
+            return Err(source.error(FileLocation::Whole, found, "as many as there are"));
         }
     }
     Ok(())
@@ -212,7 +212,7 @@ mod tests {
     use std::path::PathBuf;
 
     fn read(bytes: &[u8]) -> Result<TriangleMesh, AssetError> {
-        parse(&Source { path: PathBuf::from("a.ply"), bytes: bytes.to_vec() })
+        parse(&FileContents { path: PathBuf::from("a.ply"), bytes: bytes.to_vec() })
     }
 
     fn header(format: &str, vertices: &str, faces: &str) -> String {
@@ -253,47 +253,51 @@ mod tests {
             assert_eq!(read(&bytes).unwrap(), text, "{format}");
             bytes.truncate(bytes.len() - 3);
             let error = read(&bytes).unwrap_err();
-            assert!(matches!(error.place, Place::Byte(_)), "{error}");
+            assert!(matches!(error.place, FileLocation::Byte(_)), "{error}");
         }
     }
 
     #[test]
     fn what_is_wrong_is_told() {
         for (text, place, words) in [
-            (header("ascii", "9999999999", "1") + TEXT, Place::Whole, "9999999999 times vertex"),
+            (
+                header("ascii", "9999999999", "1") + TEXT,
+                FileLocation::Whole,
+                "9999999999 times vertex",
+            ),
             (
                 header("ascii", "4", "1") + &TEXT.replace("4 0 1 2 3", "4 0 1 2 4"),
-                Place::Part("face 0 (from 0)".into()),
+                FileLocation::Part("face 0 (from 0)".into()),
                 "vertex 4",
             ),
             (
                 header("ascii", "4", "1") + &TEXT.replace("4 0 1 2 3", "4 0 1 2 -3"),
-                Place::Part("face 0 (from 0)".into()),
+                FileLocation::Part("face 0 (from 0)".into()),
                 "vertex 4294967295",
             ),
             (
                 header("ascii", "4", "1") + &TEXT.replace("1 1 0 1 1", "1 x 0 1 1"),
-                Place::Line(16),
+                FileLocation::Line(16),
                 "Couldn't",
             ),
-            (header("ascii", "4", "0") + TEXT, Place::Whole, "no triangles"),
+            (header("ascii", "4", "0") + TEXT, FileLocation::Whole, "no triangles"),
             (
                 header("ascii", "4", "1").replace("float z", "float w") + TEXT,
-                Place::Whole,
+                FileLocation::Whole,
                 "property z",
             ),
             (
                 "ply\nformat ascii 1.0\nelement nothing 4000000000\nend_header\n".into(),
-                Place::Whole,
+                FileLocation::Whole,
                 "no element vertex",
             ),
             (
                 header("ascii", "4", "1").replace("end_header", "element n 4000000000\nend_header")
                     + TEXT,
-                Place::Whole,
+                FileLocation::Whole,
                 "no properties",
             ),
-            ("plx\n".into(), Place::Line(1), "magic"),
+            ("plx\n".into(), FileLocation::Line(1), "magic"),
         ] {
             let error = read(text.as_bytes()).unwrap_err();
             assert!(error.found.contains(words), "{error}");

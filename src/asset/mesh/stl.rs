@@ -1,8 +1,8 @@
 //! STL, ASCII and binary. Its triangles have no vertices in common: those at the same place are
 //! joined here, so that normals can be smooth. Its normals say nothing that the corners do not.
 
-use crate::asset::error::{AssetError, Place};
-use crate::asset::file::Source;
+use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::file::FileContents;
 use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::{Builder, Welder};
 use std::io::{Cursor, Read, Seek, SeekFrom};
@@ -12,7 +12,7 @@ const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
 /// Reads a mesh.
-pub fn parse(mut source: Source) -> Result<TriangleMesh, AssetError> {
+pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     let bytes = &mut source.bytes;
     let announced = bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let fits = announced
@@ -29,13 +29,13 @@ pub fn parse(mut source: Source) -> Result<TriangleMesh, AssetError> {
         let Some(announced) = announced else {
             let found =
                 format!("the file has {} bytes and does not begin with \"solid\"", bytes.len());
-            return Err(source.error(Place::Whole, found, "an STL file"));
+            return Err(source.error(FileLocation::Whole, found, "an STL file"));
         };
         if !fits {
             let found =
                 format!("the header announces {announced} triangles, more than the file holds");
             let expected = format!("at most {}", (bytes.len() - HEADER) / TRIANGLE);
-            return Err(source.error(Place::Byte(80), found, &expected));
+            return Err(source.error(FileLocation::Byte(80), found, &expected));
         }
         // Some writers begin the binary header like a text.
         bytes[0] = b' ';
@@ -49,7 +49,7 @@ pub fn parse(mut source: Source) -> Result<TriangleMesh, AssetError> {
     };
     let mut failure = None;
     match stl_io::create_stl_reader(&mut reader) {
-        Err(error) => return Err(wrong(error, Place::Whole)),
+        Err(error) => return Err(wrong(error, FileLocation::Whole)),
         Ok(triangles) => {
             for (n, triangle) in triangles.enumerate() {
                 let triangle = match triangle {
@@ -59,7 +59,7 @@ pub fn parse(mut source: Source) -> Result<TriangleMesh, AssetError> {
                         break;
                     }
                 };
-                let place = || Place::Part(format!("triangle {n} (from 0)"));
+                let place = || FileLocation::Part(format!("triangle {n} (from 0)"));
                 let corners = triangle.vertices.map(|v| v.0);
                 if corners.iter().flatten().any(|x| !x.is_finite()) {
                     let found = "a corner is not finite";
@@ -72,8 +72,11 @@ pub fn parse(mut source: Source) -> Result<TriangleMesh, AssetError> {
         }
     }
     if let Some((error, n)) = failure {
-        let line = Place::Line(reader.line);
-        return Err(wrong(error, if text { line } else { Place::Byte(HEADER + TRIANGLE * n) }));
+        let line = FileLocation::Line(reader.line);
+        return Err(wrong(
+            error,
+            if text { line } else { FileLocation::Byte(HEADER + TRIANGLE * n) },
+        ));
     }
     drop(welder);
     builder.finish()
@@ -113,7 +116,7 @@ mod tests {
     use std::path::PathBuf;
 
     fn read(bytes: &[u8]) -> Result<TriangleMesh, AssetError> {
-        parse(Source { path: PathBuf::from("a.stl"), bytes: bytes.to_vec() })
+        parse(FileContents { path: PathBuf::from("a.stl"), bytes: bytes.to_vec() })
     }
 
     const FACET: &str = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
@@ -149,7 +152,7 @@ mod tests {
     fn what_is_wrong_is_told() {
         let cut = FACET.replace("vertex 0 1 0", "vertex 0 x 0");
         let error = read(format!("solid a\n{FACET}{cut}").as_bytes()).unwrap_err();
-        assert_eq!(error.place, Place::Line(13), "{error}");
+        assert_eq!(error.place, FileLocation::Line(13), "{error}");
         let error = read(&binary(&[[0.0; 12]], 4_000_000_000)).unwrap_err();
         assert!(error.found.contains("4000000000 triangles"), "{error}");
         let error = read(&binary(&[[f32::NAN; 12]], 1)).unwrap_err();

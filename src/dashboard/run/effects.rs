@@ -5,7 +5,7 @@ use crate::dashboard::run::exporter::{Order, Sized, Studio, stem};
 use crate::dashboard::run::file_worker::Files;
 use crate::render::schedule::Settings;
 use crate::render::session::{Session, View};
-use crate::render::{Options, Rendering};
+use crate::render::{Options, RenderState};
 use crate::scene::{Scene, SceneFile};
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::io;
@@ -32,7 +32,7 @@ pub struct Tools {
 
 /// The renderer, the files, and what is being written.
 pub struct Hands {
-    session: Session<Rendering>,
+    session: Session<RenderState>,
     files: Files,
     studio: Studio,
     sized: Option<Sized>,
@@ -79,7 +79,7 @@ impl Hands {
     }
 
     /// The renderer.
-    pub fn session(&self) -> &Session<Rendering> {
+    pub fn session(&self) -> &Session<RenderState> {
         &self.session
     }
 

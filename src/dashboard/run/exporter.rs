@@ -3,11 +3,11 @@
 use crate::dashboard::message::{Exported, Format, Message};
 use crate::dashboard::run::file_worker::Paper;
 use crate::dashboard::run::paths;
-use crate::film::{Depth, Display, Target};
-use crate::render::export::{Origin, scene_hash};
+use crate::film::{Depth, Display, ImageOutput};
+use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Settings, Stop};
-use crate::render::session::{Report, Session, State, Traced};
-use crate::render::{Options, Rendering};
+use crate::render::session::{RenderBackend, Report, Session, State};
+use crate::render::{Options, RenderState};
 use crate::sampling::SamplerKind;
 use crate::scene::{Document, Scene};
 use crossbeam_channel::Sender;
@@ -40,12 +40,12 @@ impl Studio {
     /// Writes the picture of `rendering` under the next free name.
     pub fn write(
         &self,
-        rendering: &Rendering,
+        rendering: &RenderState,
         report: &Report,
         format: Format,
     ) -> Result<Exported, String> {
         let (source, text) = self.source(rendering.scene());
-        let origin = Origin {
+        let origin = Provenance {
             source,
             scene_hash: scene_hash(&text),
             sampler: self.sampler,
@@ -53,7 +53,7 @@ impl Studio {
         };
         let display = rendering.display();
         let write = |path: &Path| {
-            let target = Target::from_path(path)?.fresh();
+            let target = ImageOutput::from_path(path)?.fresh();
             rendering.write(report, &origin, display, Depth::Eight, &target)
         };
         let path = paths::numbered(&self.folder, &self.stem, format.extension(), write)
@@ -145,7 +145,7 @@ fn render(
 ) -> Option<Result<Exported, String>> {
     let options = Options { display: order.display, ..order.options };
     let settings = Settings { stop: order.stop, ..order.settings };
-    let mut session: Session<Rendering> = match Session::new(order.threads, options, settings) {
+    let mut session: Session<RenderState> = match Session::new(order.threads, options, settings) {
         Ok(session) => session,
         Err(error) => return Some(Err(format!("no threads to render with: {error}"))),
     };

@@ -60,7 +60,7 @@ pub enum Drawn {
     /// Nothing may be sent now; nothing was drawn.
     Nothing,
     /// Only the picture differs, and has to wait.
-    Waiting,
+    BranchStack,
     /// The screen is as it ought to be, in what matters.
     Same,
     /// A slice of a still was sent; nothing was drawn.
@@ -285,7 +285,7 @@ impl Frames {
             if !rest.text && self.sending.as_ref().is_some_and(follows) {
                 return self.slice(now, whole);
             }
-            return if self.pacing.rest().visible { Drawn::Waiting } else { Drawn::Same };
+            return if self.pacing.rest().visible { Drawn::BranchStack } else { Drawn::Same };
         }
         if self.synchronised {
             bytes.extend(SYNCHRONISED[1]);

@@ -385,7 +385,7 @@ impl Dashboard {
                 self.trace.line(now, waits, sent);
                 self.changed &= matches!(drawn, Drawn::Nothing | Drawn::Slice);
                 match drawn {
-                    Drawn::Nothing | Drawn::Waiting | Drawn::Slice => {}
+                    Drawn::Nothing | Drawn::BranchStack | Drawn::Slice => {}
                     Drawn::Same => {
                         // The screen was the answer already.
                         self.trace.sent(self.shown);

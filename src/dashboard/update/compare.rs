@@ -4,7 +4,7 @@ use crate::dashboard::action::{Pace, Way};
 use crate::dashboard::message::{Channel, Effect};
 use crate::dashboard::model::{Compared, Mode};
 use crate::dashboard::update::Turn;
-use crate::film::{Linear, Tone};
+use crate::film::{LinearImage, Tone};
 use std::sync::Arc;
 
 /// Stops of a step.
@@ -94,7 +94,7 @@ impl Turn<'_> {
         self.emit(Effect::Keep);
     }
 
-    pub(super) fn kept(&mut self, picture: Arc<Linear>, spp: f64) {
+    pub(super) fn kept(&mut self, picture: Arc<LinearImage>, spp: f64) {
         self.model.comparison.kept = Some((picture, spp));
         self.repaint();
         self.say(format!("kept at {spp:.0} spp · c flips · C shows the difference"));

@@ -4,7 +4,7 @@ use crate::dashboard::message::Channel;
 use crate::dashboard::model::{Compared, Model};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::view::legend::Legend;
-use crate::film::{Display, Linear, TILE};
+use crate::film::{Display, LinearImage, TILE};
 use crate::render::session::{Snapshot, State};
 use crate::terminal::Area;
 use crate::terminal::cells::{
@@ -25,7 +25,7 @@ pub struct Imager {
 /// A kept picture of the size of the screen.
 #[derive(Debug)]
 struct Kept {
-    of: Arc<Linear>,
+    of: Arc<LinearImage>,
     size: [usize; 2],
     radiance: Vec<[f32; 3]>,
 }

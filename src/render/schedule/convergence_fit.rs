@@ -12,12 +12,12 @@ const SPREAD: f64 = 0.15;
 
 /// Noise against work, the last three doublings of the work.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Trend {
+pub(super) struct ConvergenceFit {
     /// Rays and RMSE, oldest first.
     points: Vec<(f64, f64)>,
 }
 
-impl Trend {
+impl ConvergenceFit {
     /// Notes that `rays` rays brought the picture's RMSE to `noise`.
     pub fn note(&mut self, rays: f64, noise: f64) {
         if !(rays > 0.0 && noise > 0.0) {

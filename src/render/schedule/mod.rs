@@ -17,7 +17,7 @@ mod tile;
 
 use crate::film::Noise;
 use crate::render::wave::{Job, Wave, WaveReport};
-use convergence_fit::Trend;
+use convergence_fit::ConvergenceFit;
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
 
@@ -73,7 +73,7 @@ pub struct Schedule {
     replicate: usize,
     /// What is left of `decided` in the current replicate.
     left: Vec<Job>,
-    trend: Trend,
+    trend: ConvergenceFit,
     /// Samples traced, all pixels and both replicates.
     samples: u64,
     rays: u64,
@@ -92,7 +92,7 @@ impl Schedule {
             estimate: false,
             replicate: 1,
             left: Vec::new(),
-            trend: Trend::default(),
+            trend: ConvergenceFit::default(),
             samples: 0,
             rays: 0,
             noise: None,

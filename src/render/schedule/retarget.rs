@@ -2,7 +2,7 @@
 
 use crate::film::TileNoise;
 use crate::render::schedule::tile::Tile;
-use crate::render::schedule::{Schedule, Stop, Trend};
+use crate::render::schedule::{ConvergenceFit, Schedule, Stop};
 
 impl Schedule {
     /// When to stop from now on. Work that was done goes on if that is not reached.
@@ -22,7 +22,7 @@ impl Schedule {
         self.tiles.iter_mut().for_each(Tile::forget_estimates);
         self.noise = None;
         // How the noise fell in the old picture says nothing about this one.
-        self.trend = Trend::default();
+        self.trend = ConvergenceFit::default();
     }
 
     /// Takes in estimates of all tiles, row by row, made anew between two waves: `(count, error)` for

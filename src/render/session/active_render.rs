@@ -1,12 +1,12 @@
 //! A scene in work: tracing it piece by piece, judging it, showing it.
 
-use crate::film::{Raster, TileNoise};
-use crate::render::feature_buffer::Guide;
+use crate::film::{IncrementalDownsample, TileNoise};
+use crate::render::feature_buffer::FeatureBuffer;
 use crate::render::schedule::{PACKET, Schedule, Settings};
 use crate::render::session::report::{QUALITIES, Report, State};
 use crate::render::session::snapshot::{Frame, Snapshot, View};
-use crate::render::session::throughput::Pace;
-use crate::render::session::{Shared, Traced};
+use crate::render::session::throughput::Throughput;
+use crate::render::session::{RenderBackend, Shared};
 use crate::render::wave::Wave;
 use crate::scene::Scene;
 use crossbeam_channel::Sender;
@@ -27,7 +27,7 @@ const GUIDE_SECONDS: f64 = 0.002;
 const GUIDE_RAY_SECONDS: f64 = 5e-8;
 
 /// What the work is done with, and where snapshots go.
-pub(super) struct Site<'a> {
+pub(super) struct WorkContext<'a> {
     pub pool: &'a rayon::ThreadPool,
     pub shared: &'a Shared,
     pub ring: &'a Sender<()>,
@@ -35,7 +35,7 @@ pub(super) struct Site<'a> {
     pub generation: u64,
 }
 
-impl Site<'_> {
+impl WorkContext<'_> {
     /// Whether a snapshot is wanted. Between waves (`newest`: false) the guest first has to take the
     /// last picture: the new one would only be replaced before it is seen, and making it costs time.
     fn wants(&self, newest: bool) -> bool {
@@ -50,7 +50,7 @@ impl Site<'_> {
 }
 
 /// A scene in work.
-pub(super) struct Work<T> {
+pub(super) struct ActiveRender<T> {
     pub traced: T,
     pub schedule: Schedule,
     /// When the scene was taken up.
@@ -61,15 +61,15 @@ pub(super) struct Work<T> {
     pub first_picture: Option<Duration>,
     /// The tiles' errors have to be estimated anew.
     pub misjudged: bool,
-    pace: Pace,
+    pace: Throughput,
     inventory: Arc<str>,
-    raster: Option<Raster>,
-    guide: Option<Arc<Guide>>,
+    raster: Option<IncrementalDownsample>,
+    guide: Option<Arc<FeatureBuffer>>,
     /// Seconds per ray of the latest guide.
     guide_ray_seconds: f64,
 }
 
-impl<T: Traced> Work<T> {
+impl<T: RenderBackend> ActiveRender<T> {
     /// Takes up a scene after another one. `Err`: why it cannot be rendered.
     pub fn begin(
         scene: &Arc<Scene>,
@@ -88,7 +88,7 @@ impl<T: Traced> Work<T> {
             traced_for: Duration::ZERO,
             first_picture: None,
             misjudged: false,
-            pace: Pace::default(),
+            pace: Throughput::default(),
             inventory: Arc::from(traced.inventory()),
             raster: None,
             guide: None,
@@ -123,7 +123,7 @@ impl<T: Traced> Work<T> {
 
     /// The speed so far says nothing any more.
     pub fn forget_pace(&mut self) {
-        self.pace = Pace::default();
+        self.pace = Throughput::default();
     }
 
     /// Estimates the errors of all tiles. False: it was interrupted, and nothing has changed.
@@ -146,7 +146,7 @@ impl<T: Traced> Work<T> {
     }
 
     /// Traces `wave` or a piece of it.
-    pub fn trace(&mut self, wave: Wave, site: &Site) {
+    pub fn trace(&mut self, wave: Wave, site: &WorkContext) {
         let marks = site.shared;
         if self.first_picture.is_some() {
             let wave = self.piece(wave, site);
@@ -181,7 +181,7 @@ impl<T: Traced> Work<T> {
     }
 
     /// As much of `wave` as takes a short time, in jobs that take a very short one.
-    fn piece(&self, wave: Wave, site: &Site) -> Wave {
+    fn piece(&self, wave: Wave, site: &WorkContext) -> Wave {
         let seconds = PIECE_SECONDS[usize::from(site.view == View::default())];
         let Some(speed) = self.pace.samples_per_second().or_else(|| self.mean_speed()) else {
             return wave;
@@ -198,7 +198,7 @@ impl<T: Traced> Work<T> {
 
     /// Makes the guide for the guest's raster if there is none yet and it will take at most `limit`
     /// seconds.
-    fn look(&mut self, site: &Site, limit: f64) {
+    fn look(&mut self, site: &WorkContext, limit: f64) {
         let Some([columns, rows]) = site.view.raster else { return };
         if self.guide.as_ref().is_some_and(|g| [g.columns, g.rows] == [columns, rows]) {
             return;
@@ -212,11 +212,11 @@ impl<T: Traced> Work<T> {
         let film = self.traced.film();
         let size = [film.width(), film.height()];
         let look = |points: &[[f64; 2]], seen: &mut [_]| self.traced.look(points, seen);
-        self.guide = Some(Arc::new(Guide::new(size, [columns, rows], look, site.pool)));
+        self.guide = Some(Arc::new(FeatureBuffer::new(size, [columns, rows], look, site.pool)));
         self.guide_ray_seconds = start.elapsed().as_secs_f64() / rays.max(1.0);
     }
 
-    fn frame(&self, site: &Site) -> Frame {
+    fn frame(&self, site: &WorkContext) -> Frame {
         Frame {
             view: site.view,
             mix: self.traced.mix().clone(),
@@ -226,8 +226,8 @@ impl<T: Traced> Work<T> {
         }
     }
 
-    /// Shows where the work stands; see [`Site::wants`].
-    pub fn publish(&mut self, site: &Site, state: State, newest: bool) {
+    /// Shows where the work stands; see [`WorkContext::wants`].
+    pub fn publish(&mut self, site: &WorkContext, state: State, newest: bool) {
         // A film that was emptied for another start has nothing to show; its first picture was shown.
         if !site.wants(newest) || self.first_picture.is_none() {
             return;
@@ -242,7 +242,7 @@ impl<T: Traced> Work<T> {
         site.put(frame.snapshot(self.traced.film(), noise, report, raster, site.pool));
     }
 
-    pub fn report(&self, site: &Site, state: State) -> Report {
+    pub fn report(&self, site: &WorkContext, state: State) -> Report {
         let seconds = self.seconds();
         Report {
             generation: site.generation,

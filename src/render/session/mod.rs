@@ -6,7 +6,7 @@
 //! An interrupted wave loses nothing: what was not traced is traced when the work goes on.
 
 //!
-//! A scene that differs from the one in work only in what a [`Lighting`] can mix keeps the film, its
+//! A scene that differs from the one in work only in what a [`Relighting`] can mix keeps the film, its
 //! samples and the schedule; only the noise is judged anew. Long waves are traced in pieces, so that
 //! guests see the film grow; what is traced does not depend on where they were cut.
 //!
@@ -21,12 +21,12 @@ mod threads;
 mod throughput;
 mod worker;
 
-use crate::film::{Display, Estimator, Film, Mix};
-use crate::render::relighting::Lighting;
+use crate::film::{Display, Estimator, Film, LightWeights};
+use crate::render::relighting::Relighting;
 use crate::render::schedule::{Schedule, Settings, Stop};
 use crate::render::wave::{Wave, WaveReport};
 use crate::scene::Scene;
-use crate::world::Sight;
+use crate::world::FirstHit;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 pub use report::{QUALITIES, Report, State};
 use snapshot::Slot;
@@ -39,7 +39,7 @@ use std::time::Duration;
 use worker::Worker;
 
 /// A scene that is being traced: what a session drives.
-pub trait Traced: Sized + Send + Sync + 'static {
+pub trait RenderBackend: Sized + Send + Sync + 'static {
     /// How scenes are compiled and sampled.
     type Options: Send + 'static;
 
@@ -82,7 +82,7 @@ pub trait Traced: Sized + Send + Sync + 'static {
     fn film(&self) -> &Film;
 
     /// The mix of lights that the scene has.
-    fn mix(&self) -> &Mix;
+    fn mix(&self) -> &LightWeights;
 
     /// The display on which the noise is judged.
     fn display(&self) -> Display;
@@ -91,10 +91,10 @@ pub trait Traced: Sized + Send + Sync + 'static {
     fn estimator(&self) -> &Estimator;
 
     /// Which scenes the samples serve.
-    fn lighting(&self) -> &Arc<Lighting>;
+    fn lighting(&self) -> &Arc<Relighting>;
 
     /// What the camera sees through `points` of the film, in pixels; `seen` is as long.
-    fn look(&self, points: &[[f64; 2]], seen: &mut [Sight]);
+    fn look(&self, points: &[[f64; 2]], seen: &mut [FirstHit]);
 
     /// Name of the lane type.
     fn lanes(&self) -> &'static str;
@@ -131,7 +131,7 @@ struct Shared {
 }
 
 /// A rendering thread with its own pool of workers. Dropping it ends the work.
-pub struct Session<T: Traced> {
+pub struct Session<T: RenderBackend> {
     commands: Sender<Command<T>>,
     shared: Arc<Shared>,
     bell: Receiver<()>,
@@ -139,7 +139,7 @@ pub struct Session<T: Traced> {
     thread: Option<JoinHandle<()>>,
 }
 
-impl<T: Traced> Session<T> {
+impl<T: RenderBackend> Session<T> {
     /// Starts a session that traces with `threads` threads. `Err`: no threads are to be had.
     pub fn new(threads: usize, options: T::Options, settings: Settings) -> io::Result<Self> {
         let pool = threads::pool(threads, 0)?;
@@ -154,7 +154,7 @@ impl<T: Traced> Session<T> {
 
     /// Renders `scene` from now on, whatever was rendered before. The number returned comes back in
     /// the reports about it; later scenes have larger numbers. Samples that serve the new scene, too,
-    /// are kept (see [`Lighting::mix`]).
+    /// are kept (see [`Relighting::mix`]).
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> u64 {
         self.generations += 1;
         self.send(Command::Scene(self.generations, scene));
@@ -256,7 +256,7 @@ impl<T: Traced> Session<T> {
     }
 }
 
-impl<T: Traced> Drop for Session<T> {
+impl<T: RenderBackend> Drop for Session<T> {
     fn drop(&mut self) {
         self.send(Command::Quit);
         self.shared.abandon.store(true, Ordering::Release);

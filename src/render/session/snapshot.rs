@@ -1,8 +1,10 @@
 //! What a session shows its guests.
 
-use crate::film::{Display, Film, Mix, Probe, Raster, Stale, Thumbnail};
-use crate::render::feature_buffer::Guide;
-use crate::render::relighting::Lighting;
+use crate::film::{
+    DirtyTile, Display, Film, IncrementalDownsample, LightWeights, Probe, Thumbnail,
+};
+use crate::render::feature_buffer::FeatureBuffer;
+use crate::render::relighting::Relighting;
 use crate::render::session::report::Report;
 use crate::scene::Scene;
 use rayon::prelude::*;
@@ -27,12 +29,12 @@ pub struct Snapshot {
     /// not asked for, or there is no film.
     pub picture: Option<Thumbnail>,
     /// The mix of the scene; empty without a film.
-    pub mix: Mix,
+    pub mix: LightWeights,
     /// How the picture is mixed for other scenes; `None`: there is no film.
-    pub lighting: Option<Arc<Lighting>>,
+    pub lighting: Option<Arc<Relighting>>,
     /// What is seen in each cell of the guest's raster. May come a snapshot later than the first
     /// picture, if it takes long.
-    pub guide: Option<Arc<Guide>>,
+    pub guide: Option<Arc<FeatureBuffer>>,
     /// Error and samples of each tile.
     pub tiles: Arc<TileMaps>,
     /// The pixel that the guest asked for; `None` also if it lies outside of the film.
@@ -45,7 +47,7 @@ impl Snapshot {
         Self {
             report,
             picture: None,
-            mix: Mix { weights: Vec::new() },
+            mix: LightWeights { weights: Vec::new() },
             lighting: None,
             guide: None,
             tiles: Arc::default(),
@@ -55,7 +57,7 @@ impl Snapshot {
 
     /// The mix in which this picture shows `scene`, which may be newer than the snapshot; `None`: it
     /// needs samples of its own, and this picture can only be shown in its own [`Snapshot::mix`].
-    pub fn mix_for(&self, scene: &Scene) -> Option<Mix> {
+    pub fn mix_for(&self, scene: &Scene) -> Option<LightWeights> {
         self.lighting.as_ref()?.mix(scene)
     }
 }
@@ -88,10 +90,10 @@ impl TileMaps {
 /// What snapshots of one film share.
 pub(super) struct Frame {
     pub view: View,
-    pub mix: Mix,
+    pub mix: LightWeights,
     pub display: Display,
-    pub lighting: Arc<Lighting>,
-    pub guide: Option<Arc<Guide>>,
+    pub lighting: Arc<Relighting>,
+    pub guide: Option<Arc<FeatureBuffer>>,
 }
 
 impl Frame {
@@ -101,15 +103,16 @@ impl Frame {
         film: &Film,
         noise_codes: Vec<f32>,
         report: Report,
-        raster: &mut Option<Raster>,
+        raster: &mut Option<IncrementalDownsample>,
         pool: &rayon::ThreadPool,
     ) -> Snapshot {
         let picture = self.view.raster.map(|[columns, rows]| {
             let known = raster.take().filter(|raster| raster.is_for(film, columns, rows));
-            let raster = raster.insert(known.unwrap_or_else(|| Raster::new(film, columns, rows)));
+            let raster = raster
+                .insert(known.unwrap_or_else(|| IncrementalDownsample::new(film, columns, rows)));
             let stale = raster.stale(film);
             if !stale.is_empty() {
-                pool.install(|| stale.into_par_iter().for_each(Stale::refresh));
+                pool.install(|| stale.into_par_iter().for_each(DirtyTile::refresh));
             }
             raster.thumbnail()
         });

@@ -5,7 +5,7 @@ use crate::film::{Header, Mse, Noise, TILE, TileNoise};
 use crate::render::schedule::{Criterion, Spp, Stop, StoppedBy};
 use crate::render::session::*;
 use crate::render::wave::JobReport;
-use crate::world::Groups;
+use crate::world::LightGroups;
 use std::sync::atomic::AtomicUsize;
 use std::time::{Duration, Instant};
 
@@ -27,8 +27,8 @@ struct Options {
 
 struct Double {
     film: Film,
-    lighting: Arc<Lighting>,
-    mix: Mix,
+    lighting: Arc<Relighting>,
+    mix: LightWeights,
     display: Display,
     estimator: Estimator,
     log: Log,
@@ -50,7 +50,7 @@ impl Double {
     }
 }
 
-impl Traced for Double {
+impl RenderBackend for Double {
     type Options = Options;
 
     fn begin(scene: &Arc<Scene>, options: &Options, before: Option<Self>) -> Result<Self, String> {
@@ -69,8 +69,8 @@ impl Traced for Double {
             }
             None => Film::new(header),
         };
-        let groups = Groups::new(scene, false, false);
-        let lighting = Arc::new(Lighting::new(Arc::clone(scene), groups));
+        let groups = LightGroups::new(scene, false, false);
+        let lighting = Arc::new(Relighting::new(Arc::clone(scene), groups));
         let mix = lighting.mix(scene).unwrap();
         let estimator = Estimator::new(film.scales(), &mix, &options.display);
         let Options { log, job, display, .. } = options;
@@ -91,7 +91,7 @@ impl Traced for Double {
         self.display = display;
     }
 
-    fn mix(&self) -> &Mix {
+    fn mix(&self) -> &LightWeights {
         &self.mix
     }
 
@@ -103,11 +103,11 @@ impl Traced for Double {
         &self.estimator
     }
 
-    fn lighting(&self) -> &Arc<Lighting> {
+    fn lighting(&self) -> &Arc<Relighting> {
         &self.lighting
     }
 
-    fn look(&self, points: &[[f64; 2]], seen: &mut [Sight]) {
+    fn look(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
         for (point, sight) in points.iter().zip(seen) {
             sight.depth = (point[0] + 1000.0 * point[1]) as f32;
         }

@@ -7,12 +7,12 @@ const WINDOW_SECONDS: f64 = 1.0;
 
 /// Samples against seconds of tracing, over the last second.
 #[derive(Debug, Default)]
-pub(super) struct Pace {
+pub(super) struct Throughput {
     /// Seconds and samples since the beginning, oldest first.
     marks: VecDeque<(f64, u64)>,
 }
 
-impl Pace {
+impl Throughput {
     /// Notes that `samples` samples have been traced in the first `seconds` seconds.
     pub fn note(&mut self, seconds: f64, samples: u64) {
         self.marks.push_back((seconds, samples));
@@ -34,7 +34,7 @@ mod tests {
 
     #[test]
     fn the_last_second_counts() {
-        let mut pace = Pace::default();
+        let mut pace = Throughput::default();
         assert_eq!(pace.samples_per_second(), None);
         pace.note(0.0, 0);
         assert_eq!(pace.samples_per_second(), None);

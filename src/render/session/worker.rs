@@ -2,17 +2,17 @@
 
 use crate::film::Display;
 use crate::render::schedule::{Settings, Step, Stop};
-use crate::render::session::active_render::{Site, Work};
+use crate::render::session::active_render::{ActiveRender, WorkContext};
 use crate::render::session::report::{Report, State};
 use crate::render::session::snapshot::{Snapshot, View};
-use crate::render::session::{Command, Shared, Task, Traced};
+use crate::render::session::{Command, RenderBackend, Shared, Task};
 use crate::scene::Scene;
 use crossbeam_channel::{Receiver, Sender};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-pub(super) struct Worker<T: Traced> {
+pub(super) struct Worker<T: RenderBackend> {
     inbox: Receiver<Command<T>>,
     ring: Sender<()>,
     shared: Arc<Shared>,
@@ -28,14 +28,14 @@ pub(super) struct Worker<T: Traced> {
     tasks: Vec<Task<T>>,
     paused: bool,
     view: View,
-    work: Result<Option<Work<T>>, String>,
+    work: Result<Option<ActiveRender<T>>, String>,
     /// What is going on, as far as the last step told.
     state: State,
     /// There is nothing to do before the next command.
     idle: bool,
 }
 
-impl<T: Traced> Worker<T> {
+impl<T: RenderBackend> Worker<T> {
     pub fn new(
         inbox: Receiver<Command<T>>,
         ring: Sender<()>,
@@ -145,7 +145,7 @@ impl<T: Traced> Worker<T> {
             return;
         }
         let before = std::mem::replace(&mut self.work, Ok(None)).ok().flatten();
-        self.work = Work::begin(scene, &self.options, self.settings, before).map(Some);
+        self.work = ActiveRender::begin(scene, &self.options, self.settings, before).map(Some);
     }
 
     fn run_tasks(&mut self) {
@@ -166,8 +166,8 @@ impl<T: Traced> Worker<T> {
         self.newest.as_ref().map_or(0, |(generation, _)| *generation)
     }
 
-    fn site(&self) -> Site<'_> {
-        Site {
+    fn site(&self) -> WorkContext<'_> {
+        WorkContext {
             pool: &self.pool,
             shared: &self.shared,
             ring: &self.ring,
@@ -179,7 +179,7 @@ impl<T: Traced> Worker<T> {
     /// One piece of work, or none if there is nothing to do.
     fn advance(&mut self) {
         let generation = self.generation();
-        let site = Site {
+        let site = WorkContext {
             pool: &self.pool,
             shared: &self.shared,
             ring: &self.ring,

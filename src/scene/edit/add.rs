@@ -8,8 +8,8 @@ use crate::scene::edit::placement::place_for;
 use crate::scene::edit::properties::Word;
 use crate::scene::edit::unique_name::{free_light, free_material, free_object};
 use crate::scene::edit::{Edit, Refusal, Subject};
-use crate::scene::{Object, Scale, Scene, Step};
-use crate::shape::{KINDS, Shape, chained};
+use crate::scene::{Object, Scale, Scene, TransformOp};
+use crate::shape::{KINDS, Shape, compose};
 use crate::value::{Color, clean, number, rounded_to, significant, unit};
 use glam::DVec3;
 
@@ -87,19 +87,19 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
 }
 
 /// Steps that put a shape which has no place of its own upright on `base`, `size` large.
-fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<Step> {
+fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     // The canonical cylinder stands along z; meshes and compounds have y upwards as scenes have.
     let mut steps = match shape {
-        Shape::UnitCylinder(_) => vec![Step::RotateX(-90.0)],
+        Shape::UnitFrustum(_) => vec![TransformOp::RotateX(-90.0)],
         _ => Vec::new(),
     };
-    let Some((low, high)) = shape.form().transformed(&chained(&steps)).bounds() else {
+    let Some((low, high)) = shape.form().transformed(&compose(&steps)).bounds() else {
         return Vec::new();
     };
     let factor = size / (high - low).max_element();
     let foot = DVec3::new(0.5 * (low.x + high.x), low.y, 0.5 * (low.z + high.z));
     let by = base - factor * foot;
-    steps.extend([Step::Scale(Scale([factor; 3])), Step::Translate(by.to_array())]);
+    steps.extend([TransformOp::Scale(Scale([factor; 3])), TransformOp::Translate(by.to_array())]);
     steps
 }
 

@@ -9,16 +9,16 @@ use crate::scene::edit::set::{finish, replace};
 use crate::scene::edit::toml_view::{put, read};
 use crate::scene::edit::{Edit, Refusal, Subject};
 use crate::shape::Shape;
-use crate::value::{Field, Range, Takes, clean, number, rounded_to, significant, unit};
+use crate::value::{Field, NumberRange, ValueType, clean, number, rounded_to, significant, unit};
 use glam::DVec3;
 use toml::{Table, Value};
 
 /// The choice between a light's kinds, a row that only an inspector has.
 pub(super) const KIND: Field = Field::required(
     "kind",
-    Takes::OneOf(&[
-        Field::required("point", Takes::Text, "", "Light from one point."),
-        Field::required("directional", Takes::Text, "", "Light from infinitely far away."),
+    ValueType::OneOf(&[
+        Field::required("point", ValueType::Text, "", "Light from one point."),
+        Field::required("directional", ValueType::Text, "", "Light from infinitely far away."),
     ]),
     "",
     "Where the light comes from.",
@@ -27,9 +27,9 @@ pub(super) const KIND: Field = Field::required(
 /// The choice between a camera's target and direction, a row that only an inspector has.
 pub(super) const AIM: Field = Field::required(
     "aim",
-    Takes::OneOf(&[
-        Field::required("target", Takes::Text, "", "It looks at a point."),
-        Field::required("direction", Takes::Text, "", "It looks in a direction."),
+    ValueType::OneOf(&[
+        Field::required("target", ValueType::Text, "", "It looks at a point."),
+        Field::required("direction", ValueType::Text, "", "It looks in a direction."),
     ]),
     "",
     "Whether the camera looks at a point or in a direction.",
@@ -176,7 +176,7 @@ pub(super) fn switch_falloff(
 fn refit(light: &mut Light, factor: f64) -> String {
     let fitted = significant(light.intensity * factor, 3);
     let old = light.intensity;
-    if Range::LIGHT.holds(fitted) {
+    if NumberRange::LIGHT.holds(fitted) {
         light.intensity = fitted;
     }
     let (old, new) = (number(old), number(light.intensity));

@@ -9,7 +9,7 @@ use crate::scene::edit::properties::is_material;
 use crate::scene::edit::set::{label, lookup, replace};
 use crate::scene::edit::toml_view::{get, read};
 use crate::scene::edit::{Edit, Refusal, Subject};
-use crate::value::{Field, Preset, Range, Takes, decade, rounded_to};
+use crate::value::{DefaultValue, Field, NumberRange, ValueType, decade, rounded_to};
 use toml::Value;
 
 /// Moves the numbers behind `key` by `steps`: a whole number of coarse steps, or otherwise of fine ones
@@ -44,8 +44,8 @@ pub fn step(
     }
     let count = Count::of(steps);
     let next = match (component, field.takes) {
-        (None, Takes::Color(range)) => brightened(&numbers, range, count),
-        (None, Takes::Wholes(_, range)) => resized(&numbers, range, count),
+        (None, ValueType::Color(range)) => brightened(&numbers, range, count),
+        (None, ValueType::Wholes(_, range)) => resized(&numbers, range, count),
         _ => {
             let moved = |(i, x): (usize, &f64)| match component {
                 Some(c) if c != i => *x,
@@ -55,9 +55,9 @@ pub fn step(
         }
     };
     // A direction of zeros would be a fault: such a step is left out.
-    let lost = matches!(field.takes, Takes::Direction) && next.iter().all(|x| *x == 0.0);
+    let lost = matches!(field.takes, ValueType::Direction) && next.iter().all(|x| *x == 0.0);
     let next = if lost { numbers.clone() } else { next };
-    let whole = matches!(field.takes, Takes::Whole(_) | Takes::Wholes(..));
+    let whole = matches!(field.takes, ValueType::Whole(_) | ValueType::Wholes(..));
     let one = |x: f64| if whole { Value::Integer(x as i64) } else { Value::Float(x) };
     let value = match given {
         Some(Value::Array(_)) => Value::Array(next.into_iter().map(one).collect()),
@@ -81,13 +81,13 @@ pub fn toggle(scene: &Scene, subject: &Subject, key: &str, forward: bool) -> Res
         return Err(Refusal::new(&format!("there is no key {key} here"), ""));
     };
     let value = get(&values, key);
-    let optional = matches!(field.preset, Preset::Without(_));
+    let optional = matches!(field.preset, DefaultValue::Without(_));
     let (words, at): (Vec<&str>, Option<usize>) = match field.takes {
-        Takes::Switch => {
+        ValueType::Switch => {
             let on = value.and_then(Value::as_bool).unwrap_or(false);
             return crate::scene::edit::set(scene, subject, key, if on { "false" } else { "true" });
         }
-        Takes::OneOf(kinds) => {
+        ValueType::OneOf(kinds) => {
             let now = match get(&values, key).and_then(Value::as_table) {
                 Some(inner) => kinds.iter().find(|k| inner.contains_key(k.name)).map(|k| k.name),
                 None => chosen(subject, &values),
@@ -99,7 +99,7 @@ pub fn toggle(scene: &Scene, subject: &Subject, key: &str, forward: bool) -> Res
                 None => crate::scene::edit::set(scene, subject, key, ""),
             };
         }
-        Takes::Choice(choices) => {
+        ValueType::Choice(choices) => {
             let words: Vec<_> = choices.iter().map(|c| c.name).collect();
             let now = value.and_then(Value::as_str);
             let at = words.iter().position(|w| Some(*w) == now);
@@ -171,31 +171,31 @@ impl Count {
 #[derive(Clone, Copy)]
 enum Rule {
     /// By rungs of about a tenth. Below `floor` the next rung is 0, and from 0 it is `floor`.
-    Rungs { floor: f64, range: Range },
+    Rungs { floor: f64, range: NumberRange },
     /// By `unit` (fine: a tenth of it).
-    Units { unit: f64, range: Range },
+    Units { unit: f64, range: NumberRange },
     /// By 5 degrees (fine: 0.5).
-    Degrees { range: Range },
+    Degrees { range: NumberRange },
     /// By a twentieth of the largest number of the direction.
     Direction,
     /// By rungs, the sign kept.
     Factor,
     /// By tens (fine: ones).
-    Tens { range: Range },
+    Tens { range: NumberRange },
     /// By doubling and halving (fine: ones). From 0 to 1.
-    Doubles { range: Range },
+    Doubles { range: NumberRange },
 }
 
 impl Rule {
     /// `None`: no numbers.
     fn of(field: &Field, scene: &Scene) -> Option<Self> {
         Some(match field.takes {
-            Takes::Number(range) | Takes::Numbers(_, range) => {
+            ValueType::Number(range) | ValueType::Numbers(_, range) => {
                 if field.unit == "degrees" {
                     Self::Degrees { range }
-                } else if range == Range::SIZE {
+                } else if range == NumberRange::SIZE {
                     Self::Rungs { floor: 0.0, range }
-                } else if range == Range::COORDINATE {
+                } else if range == NumberRange::COORDINATE {
                     Self::Units { unit: step_length(scene), range }
                 } else if field.name == "scale" {
                     // Of a texture.
@@ -208,23 +208,23 @@ impl Rule {
                 } else if matches!(field.name, "roughness" | "alpha") {
                     // From 0 to what can just be told from it at the far end of a room.
                     Self::Rungs { floor: 0.001, range }
-                } else if range == Range::SHARE || range == Range::COEFFICIENT {
+                } else if range == NumberRange::SHARE || range == NumberRange::COEFFICIENT {
                     Self::Units { unit: 0.05, range }
                 } else if field.unit == "scene units" {
                     Self::Rungs { floor: step_length(scene) / 10.0, range }
-                } else if range == Range::LIGHT {
+                } else if range == NumberRange::LIGHT {
                     Self::Rungs { floor: 0.01, range }
                 } else {
                     // An exponent.
                     Self::Rungs { floor: 1.0, range }
                 }
             }
-            Takes::Direction => Self::Direction,
-            Takes::Factor => Self::Factor,
-            Takes::Color(range) => Self::Units { unit: 0.05, range },
-            Takes::Whole(range) if field.name == "rays_per_pixel" => Self::Doubles { range },
-            Takes::Wholes(_, range) => Self::Doubles { range },
-            Takes::Whole(range) => Self::Tens { range },
+            ValueType::Direction => Self::Direction,
+            ValueType::Factor => Self::Factor,
+            ValueType::Color(range) => Self::Units { unit: 0.05, range },
+            ValueType::Whole(range) if field.name == "rays_per_pixel" => Self::Doubles { range },
+            ValueType::Wholes(_, range) => Self::Doubles { range },
+            ValueType::Whole(range) => Self::Tens { range },
             _ => return None,
         })
     }
@@ -234,14 +234,14 @@ impl Rule {
         let Count { steps, fine } = count;
         match self {
             Self::Rungs { floor, range } => climb(x, floor, range, count),
-            Self::Units { unit, range } if range == Range::COEFFICIENT && x > 2.0 => {
+            Self::Units { unit, range } if range == NumberRange::COEFFICIENT && x > 2.0 => {
                 climb(x, unit, range, count)
             }
             Self::Units { unit, range } => within(added(x, unit, count), range, x),
             Self::Degrees { range } => {
                 let moved = added(x, 5.0, count);
                 // An opening angle has no room for its last 5 degrees.
-                let ends = Range::closed(range.low + 0.5, range.high - 0.5);
+                let ends = NumberRange::closed(range.low + 0.5, range.high - 0.5);
                 if range.low.is_finite() { within(moved, ends, x) } else { moved }
             }
             Self::Direction => {
@@ -251,7 +251,7 @@ impl Rule {
                 if moved.is_finite() { moved } else { x }
             }
             Self::Factor => {
-                let range = Range::closed(1e-6, 1e6);
+                let range = NumberRange::closed(1e-6, 1e6);
                 climb(x.abs(), 0.0, range, count) * x.signum()
             }
             Self::Tens { range } => {
@@ -269,7 +269,7 @@ fn added(x: f64, unit: f64, Count { steps, fine }: Count) -> f64 {
 }
 
 /// `x` brought into the range; if that has no end there, `old`.
-fn within(x: f64, range: Range, old: f64) -> f64 {
+fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     if range.holds(x) {
         x
     } else if x >= range.high && range.high_in {
@@ -282,7 +282,7 @@ fn within(x: f64, range: Range, old: f64) -> f64 {
 }
 
 /// Twice or half as much per step, or one more or less.
-fn doubled(x: f64, range: Range, Count { steps, fine }: Count) -> f64 {
+fn doubled(x: f64, range: NumberRange, Count { steps, fine }: Count) -> f64 {
     let moved = match steps {
         _ if fine => x + steps as f64,
         0.. if x == 0.0 && steps > 0 => 2f64.powi((steps.min(40) - 1) as i32),
@@ -307,7 +307,7 @@ fn fine_width(hundredths: i64) -> i64 {
 }
 
 /// `x` > 0 (or 0) after that many rungs: always on the ladder, so that up and down lead back.
-fn climb(x: f64, floor: f64, range: Range, Count { steps, fine }: Count) -> f64 {
+fn climb(x: f64, floor: f64, range: NumberRange, Count { steps, fine }: Count) -> f64 {
     let up = steps > 0;
     let mut x = x;
     for _ in 0..steps.unsigned_abs() {
@@ -356,7 +356,7 @@ fn rung(x: f64, up: bool, fine: bool) -> f64 {
 }
 
 /// A colour brighter or darker as a whole; black becomes a dark grey.
-fn brightened(channels: &[f64], range: Range, count: Count) -> Vec<f64> {
+fn brightened(channels: &[f64], range: NumberRange, count: Count) -> Vec<f64> {
     let largest = channels.iter().fold(0.0f64, |m, x| m.max(*x));
     let rule = Rule::Units { unit: 0.05, range };
     let next = match largest > 2.0 {
@@ -373,7 +373,7 @@ fn brightened(channels: &[f64], range: Range, count: Count) -> Vec<f64> {
 
 /// Width and height together, the ratio kept as far as whole numbers can; fine: by 16 pixels of the
 /// width.
-fn resized(sides: &[f64], range: Range, count: Count) -> Vec<f64> {
+fn resized(sides: &[f64], range: NumberRange, count: Count) -> Vec<f64> {
     let width = sides[0];
     let next = match count.fine {
         true => ((width / 16.0).round() + count.steps as f64) * 16.0,

@@ -2,7 +2,7 @@
 
 use crate::scene::edit::Refusal;
 use crate::scene::format::suggest::nearest;
-use crate::value::{Color, Field, Takes, excerpt, number, printable};
+use crate::value::{Color, Field, ValueType, excerpt, number, printable};
 use toml::Value;
 
 /// The value that `text` stands for behind the key `field`. Says nothing about ranges, except where
@@ -22,44 +22,44 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, Refusal> {
         None => Err(wrong()),
     };
     let floats = |list: Vec<f64>| Value::Array(list.into_iter().map(Value::Float).collect());
-    let whole = |x: f64, range: crate::value::Range| {
+    let whole = |x: f64, range: crate::value::NumberRange| {
         let fits = x.fract() == 0.0 && range.holds(x);
         if fits { Ok(Value::Integer(x as i64)) } else { Err(wrong()) }
     };
     match field.takes {
-        Takes::Text => name(field.name, unquoted(text)).map(Value::String),
-        Takes::Switch => {
+        ValueType::Text => name(field.name, unquoted(text)).map(Value::String),
+        ValueType::Switch => {
             let words = ["true", "on", "yes", "1", "false", "off", "no", "0"];
             let at = choose(text, &words).ok_or_else(wrong)?;
             Ok(Value::Boolean(at < 4))
         }
-        Takes::Choice(choices) => {
+        ValueType::Choice(choices) => {
             let words: Vec<_> = choices.iter().map(|c| c.name).collect();
             word(field, unquoted(text), &words).map(|at| Value::String(words[at].to_string()))
         }
-        Takes::Whole(range) => list(1).and_then(|list| whole(list[0], range)),
-        Takes::Wholes(n, range) => {
+        ValueType::Whole(range) => list(1).and_then(|list| whole(list[0], range)),
+        ValueType::Wholes(n, range) => {
             let wholes = list(n)?.into_iter().map(|x| whole(x, range));
             wholes.collect::<Result<_, _>>().map(Value::Array)
         }
-        Takes::Number(_) => list(1).map(|list| Value::Float(list[0])),
-        Takes::Numbers(n, _) => list(n).map(floats),
-        Takes::Direction => list(3).map(floats),
-        Takes::Factor => match numbers(text).as_deref() {
+        ValueType::Number(_) => list(1).map(|list| Value::Float(list[0])),
+        ValueType::Numbers(n, _) => list(n).map(floats),
+        ValueType::Direction => list(3).map(floats),
+        ValueType::Factor => match numbers(text).as_deref() {
             Some([factor]) => Ok(Value::Float(*factor)),
             Some(list @ [_, _, _]) => Ok(floats(list.to_vec())),
             _ => Err(wrong()),
         },
-        Takes::Color(_) => match Color::from_hex(unquoted(text)) {
+        ValueType::Color(_) => match Color::from_hex(unquoted(text)) {
             Some(color) => Ok(floats(color.0.to_vec())),
             None if text.contains('#') => Err(wrong()),
             None => list(3).map(floats),
         },
-        Takes::Table(_)
-        | Takes::OneOf(_)
-        | Takes::ListOf(_)
-        | Takes::Tables(_)
-        | Takes::Named(_) => Err(wrong()),
+        ValueType::Table(_)
+        | ValueType::OneOf(_)
+        | ValueType::ListOf(_)
+        | ValueType::Tables(_)
+        | ValueType::Named(_) => Err(wrong()),
     }
 }
 
@@ -131,13 +131,15 @@ fn digits(part: &str) -> bool {
 
 /// A value as it is shown: shortest digits, lists without brackets, colours as `#rrggbb` where that
 /// is exact and shorter.
-pub(super) fn show(takes: Takes, value: &Value) -> String {
-    if let (Takes::Color(_), Some(color)) = (takes, color(value)) {
+pub(super) fn show(takes: ValueType, value: &Value) -> String {
+    if let (ValueType::Color(_), Some(color)) = (takes, color(value)) {
         let channels = join(&color.0.map(number));
         return color.to_hex().filter(|hex| hex.len() < channels.len()).unwrap_or(channels);
     }
     match value {
-        Value::Array(list) => join(&list.iter().map(|v| show(Takes::Text, v)).collect::<Vec<_>>()),
+        Value::Array(list) => {
+            join(&list.iter().map(|v| show(ValueType::Text, v)).collect::<Vec<_>>())
+        }
         Value::Float(x) => number(*x),
         Value::Integer(i) => i.to_string(),
         Value::Boolean(yes) => yes.to_string(),
@@ -171,15 +173,15 @@ pub(super) fn color(value: &Value) -> Option<Color> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::value::{Choice, Range};
+    use crate::value::{Choice, NumberRange};
 
-    fn field(takes: Takes) -> Field {
+    fn field(takes: ValueType) -> Field {
         Field::required("it", takes, "", "")
     }
 
     #[test]
     fn numbers_are_read_as_people_type_them() {
-        let one = field(Takes::Number(Range::FINITE));
+        let one = field(ValueType::Number(NumberRange::FINITE));
         for (text, expected) in
             [("0.5", 0.5), (".5", 0.5), (" 5. ", 5.0), ("1e-3", 1e-3), ("+2", 2.0), ("[3]", 3.0)]
         {
@@ -191,13 +193,13 @@ mod tests {
         ] {
             assert!(parse(&one, text).is_err(), "{text}");
         }
-        let three = field(Takes::Numbers(3, Range::FINITE));
+        let three = field(ValueType::Numbers(3, NumberRange::FINITE));
         for text in ["1, 2, 3", "1 2 3", "[1,2,3]", "1;2 ;3", " [ 1 2 3 ] "] {
             assert_eq!(floats(&parse(&three, text).unwrap()), Some(vec![1.0, 2.0, 3.0]), "{text}");
         }
         let refusal = parse(&three, "1 2").unwrap_err();
         assert_eq!(refusal.found, "it needs 3 numbers, not 2");
-        let size = field(Takes::Wholes(2, Range::closed(1.0, 100.0)));
+        let size = field(ValueType::Wholes(2, NumberRange::closed(1.0, 100.0)));
         for text in ["64x48", "64 x 48", "64×48", "64 48"] {
             assert_eq!(floats(&parse(&size, text).unwrap()), Some(vec![64.0, 48.0]), "{text}");
         }
@@ -206,18 +208,18 @@ mod tests {
         {
             assert!(parse(&size, text).is_err(), "{text}");
         }
-        let factor = field(Takes::Factor);
+        let factor = field(ValueType::Factor);
         assert!(parse(&factor, "2").is_ok() && parse(&factor, "1 2 3").is_ok());
         assert!(parse(&factor, "1 2").is_err());
     }
 
     #[test]
     fn colours_and_words() {
-        let color = field(Takes::Color(Range::SHARE));
+        let color = field(ValueType::Color(NumberRange::SHARE));
         assert_eq!(floats(&parse(&color, "#ff0000").unwrap()), Some(vec![1.0, 0.0, 0.0]));
         assert_eq!(floats(&parse(&color, ".5 0 1").unwrap()), Some(vec![0.5, 0.0, 1.0]));
         assert!(parse(&color, "#ff00").is_err() && parse(&color, "red").is_err());
-        let switch = field(Takes::Switch);
+        let switch = field(ValueType::Switch);
         for (text, expected) in
             [("true", true), ("ON", true), ("y", true), ("of", false), ("n", false), ("f", false)]
         {
@@ -226,7 +228,7 @@ mod tests {
         assert!(parse(&switch, "o").is_err(), "on or off");
         let lobes: &[Choice] =
             &[Choice { name: "mirror", doc: "" }, Choice { name: "monkey", doc: "" }];
-        let lobe = field(Takes::Choice(lobes));
+        let lobe = field(ValueType::Choice(lobes));
         assert_eq!(parse(&lobe, "mi"), Ok(Value::String("mirror".into())));
         let refusal = parse(&lobe, "miror").unwrap_err().to_string();
         assert!(refusal.ends_with("Did you mean \"mirror\"?"), "{refusal}");
@@ -236,11 +238,11 @@ mod tests {
     #[test]
     fn values_are_shown_short() {
         let list = |list: &[f64]| Value::Array(list.iter().map(|x| Value::Float(*x)).collect());
-        let color = Takes::Color(Range::LIGHT);
-        assert_eq!(show(Takes::Direction, &list(&[0.1, -3.0, 1e9])), "0.1, -3, 1e9");
+        let color = ValueType::Color(NumberRange::LIGHT);
+        assert_eq!(show(ValueType::Direction, &list(&[0.1, -3.0, 1e9])), "0.1, -3, 1e9");
         assert_eq!(show(color, &list(&[1.0, 0.0, 0.5])), "1, 0, 0.5");
         assert_eq!(show(color, &list(&Color::from_hex("#80ff01").unwrap().0)), "#80ff01");
-        assert_eq!(show(Takes::Switch, &Value::Boolean(true)), "true");
+        assert_eq!(show(ValueType::Switch, &Value::Boolean(true)), "true");
     }
 
     #[test]

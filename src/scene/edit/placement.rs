@@ -4,7 +4,7 @@ use crate::camera::Camera;
 use crate::primitive::Form;
 use crate::scene::edit::bounds::{Ball, Extent, is_solid, scene_bounds};
 use crate::scene::edit::{Edit, Refusal, Subject};
-use crate::scene::{Object, Scene, Step};
+use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{decade, rounded_to, significant};
 use glam::{DVec2, DVec3};
 
@@ -70,8 +70,8 @@ fn lift(object: &mut Object, by: f64) {
         None if !object.shape.anchors().is_empty() => {
             object.shape.anchors().into_iter().for_each(|anchor| anchor[1] += by);
         }
-        Some(Step::Translate(last)) => last[1] += by,
-        _ => object.transform.push(Step::Translate([0.0, by, 0.0])),
+        Some(TransformOp::Translate(last)) => last[1] += by,
+        _ => object.transform.push(TransformOp::Translate([0.0, by, 0.0])),
     }
 }
 
@@ -81,7 +81,7 @@ fn feet(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let middle = flat(low + (high - low) / 2.0);
     let mut feet = vec![middle];
     let corners = match form {
-        Form::Convex { corners, .. } => corners.clone(),
+        Form::ConvexPolyhedron { corners, .. } => corners.clone(),
         Form::Parallelogram { corner, u, v } => {
             vec![*corner, corner + u, corner + v, corner + u + v]
         }

@@ -5,7 +5,7 @@ use crate::scene::edit::convert::{AIM, KIND, chosen};
 use crate::scene::edit::parse_value::{color, floats, show};
 use crate::scene::edit::toml_view::{fields, get, read, rivals};
 use crate::scene::edit::{Refusal, Subject};
-use crate::value::{Field, Preset, Range, Takes, number};
+use crate::value::{DefaultValue, Field, NumberRange, ValueType, number};
 use toml::{Table, Value};
 
 /// A word that may stand in a row.
@@ -109,26 +109,26 @@ impl Walk<'_> {
     fn field(&mut self, field: &'static Field, values: &Table, key: String, depth: usize) {
         let value = get(values, field.name);
         match (field.takes, value) {
-            (Takes::Table(inner), Some(Value::Table(values))) => {
+            (ValueType::Table(inner), Some(Value::Table(values))) => {
                 for field in inner {
                     self.field(field, values, format!("{key}.{}", field.name), depth);
                 }
             }
-            (Takes::OneOf(_), None) => self.kind(field, None, key, depth),
-            (Takes::OneOf(kinds), Some(Value::Table(values))) => {
+            (ValueType::OneOf(_), None) => self.kind(field, None, key, depth),
+            (ValueType::OneOf(kinds), Some(Value::Table(values))) => {
                 let given = kinds.iter().find(|k| values.contains_key(k.name));
                 self.kind(field, given.map(|k| k.name), key.clone(), depth);
                 if let Some(kind) = given {
                     self.field(kind, values, format!("{key}.{}", kind.name), depth + 1);
                 }
             }
-            (Takes::ListOf(_), value) => self.steps(field, value, &key, depth),
+            (ValueType::ListOf(_), value) => self.steps(field, value, &key, depth),
             _ => self.leaf(field, value, key, depth),
         }
     }
 
     fn steps(&mut self, field: &'static Field, value: Option<&Value>, key: &str, depth: usize) {
-        let Takes::ListOf(kinds) = field.takes else { return };
+        let ValueType::ListOf(kinds) = field.takes else { return };
         let list = value.and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
         let mut row = self.row(field, key.to_string(), depth);
         row.entry = Entry::List;
@@ -154,12 +154,12 @@ impl Walk<'_> {
 
     fn kind(&mut self, field: &'static Field, given: Option<&str>, key: String, depth: usize) {
         let mut row = self.row(field, key, depth);
-        if let Takes::OneOf(kinds) = field.takes {
+        if let ValueType::OneOf(kinds) = field.takes {
             row.words = words(kinds);
         }
         row.entry = Entry::Kind;
         row.value = given.unwrap_or_default().to_string();
-        let optional = matches!(field.preset, Preset::Without(_));
+        let optional = matches!(field.preset, DefaultValue::Without(_));
         row.default = row.default.filter(|_| optional);
         row.is_default = optional && given.is_none();
         self.rows.push(row);
@@ -169,15 +169,15 @@ impl Walk<'_> {
         let mut row = self.row(field, key, depth);
         row.value = value.map_or(String::new(), |value| show(field.takes, value));
         match field.takes {
-            Takes::Text => row.entry = Entry::Text,
-            Takes::Switch => row.entry = Entry::Switch,
-            Takes::Choice(choices) => {
+            ValueType::Text => row.entry = Entry::Text,
+            ValueType::Switch => row.entry = Entry::Switch,
+            ValueType::Choice(choices) => {
                 row.entry = Entry::Choice;
                 let word =
                     |c: &crate::value::Choice| Word { name: c.name.into(), doc: c.doc.into() };
                 row.words = choices.iter().map(word).collect();
             }
-            Takes::Color(_) => {
+            ValueType::Color(_) => {
                 row.entry = Entry::Color;
                 row.color = value.and_then(color).map(|c| c.0);
             }
@@ -193,9 +193,9 @@ impl Walk<'_> {
             row.words = self.scene.materials.keys().map(name).collect();
         }
         row.is_default = match field.preset {
-            Preset::Required => false,
-            Preset::Without(_) => value.is_none(),
-            Preset::Is(text) => value == preset(text).as_ref(),
+            DefaultValue::Required => false,
+            DefaultValue::Without(_) => value.is_none(),
+            DefaultValue::Is(text) => value == preset(text).as_ref(),
         };
         self.rows.push(row);
     }
@@ -215,9 +215,9 @@ impl Walk<'_> {
             doc: field.doc,
             is_default: false,
             default: match field.preset {
-                Preset::Required => None,
-                Preset::Is(text) => Some(text.trim_matches('"').to_string()),
-                Preset::Without(instead) => Some(instead.to_string()),
+                DefaultValue::Required => None,
+                DefaultValue::Is(text) => Some(text.trim_matches('"').to_string()),
+                DefaultValue::Without(instead) => Some(instead.to_string()),
             },
         }
     }
@@ -238,21 +238,21 @@ fn words(kinds: &[Field]) -> Vec<Word> {
 }
 
 /// As the reference says it, without what belongs to files only.
-fn expected(takes: Takes) -> String {
+fn expected(takes: ValueType) -> String {
     match takes {
-        Takes::Text => "text".to_string(),
-        Takes::Numbers(n, range) => format!("{n} numbers, each {range}"),
-        Takes::Wholes(n, range) => format!("{n} whole numbers, each {range}"),
-        Takes::Direction => "3 numbers, not all zero".to_string(),
-        Takes::Factor => "a number other than 0, or 3 of them".to_string(),
-        Takes::Color(Range { high, .. }) => {
+        ValueType::Text => "text".to_string(),
+        ValueType::Numbers(n, range) => format!("{n} numbers, each {range}"),
+        ValueType::Wholes(n, range) => format!("{n} whole numbers, each {range}"),
+        ValueType::Direction => "3 numbers, not all zero".to_string(),
+        ValueType::Factor => "a number other than 0, or 3 of them".to_string(),
+        ValueType::Color(NumberRange { high, .. }) => {
             format!("red, green, blue (linear, 0 to {}) or #rrggbb", number(high))
         }
-        Takes::OneOf(kinds) | Takes::ListOf(kinds) => {
+        ValueType::OneOf(kinds) | ValueType::ListOf(kinds) => {
             let names: Vec<_> = kinds.iter().map(|k| k.name).collect();
             format!("one of {}", names.join(", "))
         }
-        Takes::Choice(choices) => {
+        ValueType::Choice(choices) => {
             let names: Vec<_> = choices.iter().map(|c| c.name).collect();
             format!("one of {}", names.join(", "))
         }

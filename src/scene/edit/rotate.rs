@@ -2,7 +2,7 @@
 
 use crate::scene::edit::bounds::scene_bounds;
 use crate::scene::edit::{Edit, Refusal, Subject};
-use crate::scene::{Object, Scene, Step};
+use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{decade, rounded_to, sin_cos_degrees, turned};
 use glam::DVec3;
 
@@ -52,8 +52,8 @@ pub fn turn(scene: &Scene, subject: &Subject, degrees: f64) -> Result<Edit, Refu
 /// turned about the vertical through its middle.
 fn turn_by_steps(object: &mut Object, degrees: f64) {
     let (angle, shift, own) = match object.transform[..] {
-        [.., Step::RotateY(angle), Step::Translate(shift)] => (angle, shift, 2),
-        [.., Step::RotateY(angle)] => (angle, [0.0; 3], 1),
+        [.., TransformOp::RotateY(angle), TransformOp::Translate(shift)] => (angle, shift, 2),
+        [.., TransformOp::RotateY(angle)] => (angle, [0.0; 3], 1),
         _ => (0.0, [0.0; 3], 0),
     };
     let kept = object.transform.len() - own;
@@ -77,10 +77,10 @@ fn turn_by_steps(object: &mut Object, degrees: f64) {
     let digits = decade(scale.max(middle.x.hypot(middle.z))) - 6;
     let shift = shift.map(|x| rounded_to(x, digits)).to_array();
     if angle != 0.0 {
-        object.transform.push(Step::RotateY(angle));
+        object.transform.push(TransformOp::RotateY(angle));
     }
     if shift != [0.0; 3] {
-        object.transform.push(Step::Translate(shift));
+        object.transform.push(TransformOp::Translate(shift));
     }
 }
 
@@ -113,7 +113,9 @@ mod tests {
         for kind in KINDS {
             let base = DVec3::new(3.0, 0.0, -2.0);
             let shape = Shape::standing(kind.name, base, DVec3::new(1.0, 0.5, 2.0)).unwrap();
-            for transform in [vec![], vec![Step::RotateX(20.0)], vec![Step::RotateY(7.0)]] {
+            for transform in
+                [vec![], vec![TransformOp::RotateX(20.0)], vec![TransformOp::RotateY(7.0)]]
+            {
                 let object = Object {
                     name: String::new(),
                     material: String::new(),

@@ -7,7 +7,7 @@ use crate::scene::edit::parse_value::{floats, parse, word};
 use crate::scene::edit::properties::is_material;
 use crate::scene::edit::toml_view::{field, fields, get, put, read, rivals, write};
 use crate::scene::edit::{Edit, Refusal, Subject};
-use crate::value::{Field, Preset, Takes};
+use crate::value::{DefaultValue, Field, ValueType};
 use toml::{Table, Value};
 
 /// Sets what stands behind `key` (of a [`Row`](crate::scene::edit::Row)) to what `text` says. Empty text takes the
@@ -21,14 +21,14 @@ pub fn set(scene: &Scene, subject: &Subject, key: &str, text: &str) -> Result<Ed
     let Some(field) = lookup(subject, key) else {
         return Err(Refusal::new(&format!("there is no key {key} here"), ""));
     };
-    let optional = matches!(field.preset, Preset::Without(_));
+    let optional = matches!(field.preset, DefaultValue::Without(_));
     match field.takes {
-        Takes::OneOf(kinds) if !(text.is_empty() && optional) => {
+        ValueType::OneOf(kinds) if !(text.is_empty() && optional) => {
             let names: Vec<_> = kinds.iter().map(|k| k.name).collect();
             let name = names[word(field, text, &names)?];
             return convert::switch(scene, subject, key, name);
         }
-        Takes::ListOf(steps) => {
+        ValueType::ListOf(steps) => {
             let mut object = values;
             match text {
                 "" => drop(object.remove(key)),
@@ -136,7 +136,7 @@ fn clear(
             (Some(list), Ok(i)) if i < list.len() => drop(list.remove(i)),
             _ => return Err(Refusal::new(&format!("there is no step {key}"), "")),
         }
-    } else if field.preset == Preset::Required {
+    } else if field.preset == DefaultValue::Required {
         let found = format!("{} must not be left out", field.name);
         return Err(Refusal::new(&found, &format!("Expected {}.", field.takes)));
     } else {

@@ -4,7 +4,7 @@
 use crate::scene::Scene;
 use crate::scene::edit::{Refusal, Subject};
 use crate::scene::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, OBJECT_FIELDS, TRACE_FIELDS};
-use crate::value::{Field, Takes};
+use crate::value::{Field, ValueType};
 use crate::{camera, light, material};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -98,8 +98,8 @@ pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Fiel
     let found = fields.iter().find(|f| f.name == first)?;
     match (rest, found.takes) {
         (None, _) => Some(found),
-        (Some(rest), Takes::Table(inner) | Takes::OneOf(inner)) => field(inner, rest),
-        (Some(rest), Takes::ListOf(inner)) => {
+        (Some(rest), ValueType::Table(inner) | ValueType::OneOf(inner)) => field(inner, rest),
+        (Some(rest), ValueType::ListOf(inner)) => {
             let (index, rest) = rest.split_once('.')?;
             index.parse::<usize>().ok()?;
             field(inner, rest)

@@ -3,7 +3,7 @@
 use crate::light::{Directional, Light};
 use crate::scene::edit::bounds::scene_bounds;
 use crate::scene::edit::{Edit, Refusal, Subject};
-use crate::scene::{Object, Scene, Step};
+use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{decade, rounded_to, unit};
 use glam::DVec3;
 
@@ -60,14 +60,14 @@ pub(super) fn move_object(object: &mut Object, by: [f64; 3]) {
                 *anchor = moved(*anchor, by);
             }
         }
-        Some(Step::Translate(last)) => {
+        Some(TransformOp::Translate(last)) => {
             *last = moved(*last, by);
             if *last == [0.0; 3] {
                 object.transform.pop();
             }
         }
         _ if by == [0.0; 3] => {}
-        _ => object.transform.push(Step::Translate(moved([0.0; 3], by))),
+        _ => object.transform.push(TransformOp::Translate(moved([0.0; 3], by))),
     }
 }
 
@@ -101,10 +101,10 @@ mod tests {
         let Shape::Sphere(sphere) = &edit.scene.objects[2].shape else { panic!() };
         assert_eq!(sphere.center, [-0.8, 0.5, -0.2]);
         let mut turned = scene.clone();
-        turned.objects[2].transform = vec![Step::RotateY(30.0)];
+        turned.objects[2].transform = vec![TransformOp::RotateY(30.0)];
         let once = move_by(&turned, &ball, [0.1, 0.2, 0.0]).unwrap().scene;
         let twice = move_by(&once, &ball, [0.1, 0.2, 0.0]).unwrap().scene;
-        let steps = [Step::RotateY(30.0), Step::Translate([0.2, 0.4, 0.0])];
+        let steps = [TransformOp::RotateY(30.0), TransformOp::Translate([0.2, 0.4, 0.0])];
         assert_eq!(twice.objects[2].transform, steps);
         let back = move_by(&twice, &ball, [-0.2, -0.4, 0.0]).unwrap().scene;
         assert_eq!(back, turned);

@@ -1,50 +1,50 @@
 //! New pieces of a scene file: only what differs from the defaults, in the layout of the reference.
 
-use crate::value::{Color, Field, Preset, Takes};
+use crate::value::{Color, DefaultValue, Field, ValueType};
 use toml::Value;
 use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table};
 
 /// What is written for `value`. `headers`: whether tables may have `[headers]`.
-pub(crate) fn fresh(takes: Takes, value: &Value, headers: bool) -> Item {
+pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
     match (takes, value) {
-        (Takes::Table(fields), Value::Table(table)) if headers => {
+        (ValueType::Table(fields), Value::Table(table)) if headers => {
             Item::Table(fresh_table(fields, table))
         }
-        (Takes::Named(fields), Value::Table(named)) if headers => {
+        (ValueType::Named(fields), Value::Table(named)) if headers => {
             let mut outer = Table::new();
             outer.set_implicit(true);
             for (name, value) in named {
-                outer.insert(name, fresh(Takes::Table(fields), value, true));
+                outer.insert(name, fresh(ValueType::Table(fields), value, true));
             }
             Item::Table(outer)
         }
-        (Takes::Tables(_), Value::Array(list)) if headers => {
+        (ValueType::Tables(_), Value::Array(list)) if headers => {
             let tables: ArrayOfTables = list.iter().map(|v| fresh_entry(takes, v)).collect();
             Item::ArrayOfTables(tables)
         }
-        (Takes::OneOf(fields), Value::Table(table)) if headers => {
+        (ValueType::OneOf(fields), Value::Table(table)) if headers => {
             let mut dotted = fresh_table(fields, table);
             dotted.set_dotted(true);
             Item::Table(dotted)
         }
-        (Takes::Table(fields) | Takes::OneOf(fields), Value::Table(table)) => {
+        (ValueType::Table(fields) | ValueType::OneOf(fields), Value::Table(table)) => {
             let table = fresh_table(fields, table).into_inline_table();
             Item::Value(toml_edit::Value::InlineTable(table))
         }
-        (Takes::Named(fields), Value::Table(named)) => {
+        (ValueType::Named(fields), Value::Table(named)) => {
             let mut outer = InlineTable::new();
             for (name, value) in named {
-                if let Ok(entry) = fresh(Takes::Table(fields), value, false).into_value() {
+                if let Ok(entry) = fresh(ValueType::Table(fields), value, false).into_value() {
                     outer.insert(name, entry);
                 }
             }
             Item::Value(toml_edit::Value::InlineTable(outer))
         }
-        (Takes::Tables(_) | Takes::ListOf(_), Value::Array(list)) => {
+        (ValueType::Tables(_) | ValueType::ListOf(_), Value::Array(list)) => {
             let entries = list.iter().map(|v| fresh_entry(takes, v).into_inline_table());
             Item::Value(toml_edit::Value::Array(entries.collect::<Array>()))
         }
-        (Takes::Color(_), value) => Item::Value(color_leaf(value)),
+        (ValueType::Color(_), value) => Item::Value(color_leaf(value)),
         _ => Item::Value(leaf(value)),
     }
 }
@@ -62,9 +62,9 @@ pub(crate) fn color(value: &Value) -> Option<Color> {
 }
 
 /// An entry of a list that takes `list`, as a table that can become an inline one.
-pub(crate) fn fresh_entry(list: Takes, value: &Value) -> Table {
+pub(crate) fn fresh_entry(list: ValueType, value: &Value) -> Table {
     match (list, value) {
-        (Takes::Tables(fields) | Takes::ListOf(fields), Value::Table(table)) => {
+        (ValueType::Tables(fields) | ValueType::ListOf(fields), Value::Table(table)) => {
             fresh_table(fields, table)
         }
         _ => Table::new(),
@@ -79,7 +79,7 @@ pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Tab
         let Some(value) = values.get(field.name).filter(|v| !is_default(field, v)) else {
             continue;
         };
-        let dotted = matches!(field.takes, Takes::OneOf(_));
+        let dotted = matches!(field.takes, ValueType::OneOf(_));
         table.insert(field.name, fresh(field.takes, value, dotted));
     }
     table
@@ -88,11 +88,11 @@ pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Tab
 /// Whether `value` is what holds without the key.
 fn is_default(field: &Field, value: &Value) -> bool {
     match field.preset {
-        Preset::Is(text) => {
+        DefaultValue::Is(text) => {
             let line = format!("value = {text}");
             line.parse::<toml::Table>().is_ok_and(|table| table.get("value") == Some(value))
         }
-        Preset::Required | Preset::Without(_) => false,
+        DefaultValue::Required | DefaultValue::Without(_) => false,
     }
 }
 

@@ -8,7 +8,7 @@ use crate::scene::format::comments::Keeper;
 use crate::scene::format::emit::{color, fresh, fresh_entry, leaf};
 use crate::scene::format::list_diff::align;
 use crate::scene::format::schema;
-use crate::value::{Color, Field, Takes};
+use crate::value::{Color, Field, ValueType};
 use toml::Value;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike};
 
@@ -47,12 +47,12 @@ enum Keys {
 
 impl Keys {
     /// The keys of `old` and `new` in the order in which new ones are written.
-    fn of(&self, old: &toml::Table, new: &toml::Table) -> Vec<(String, Takes)> {
+    fn of(&self, old: &toml::Table, new: &toml::Table) -> Vec<(String, ValueType)> {
         match self {
             Self::These(fields) => fields.iter().map(|f| (f.name.to_string(), f.takes)).collect(),
             Self::Any(fields) => {
                 let gone = old.keys().filter(|k| !new.contains_key(*k));
-                gone.chain(new.keys()).map(|k| (k.clone(), Takes::Table(fields))).collect()
+                gone.chain(new.keys()).map(|k| (k.clone(), ValueType::Table(fields))).collect()
             }
         }
     }
@@ -126,13 +126,13 @@ impl Rewriter {
         headers: bool,
         old: Option<&Value>,
         new: &Value,
-        takes: Takes,
+        takes: ValueType,
     ) {
         let headers = headers && !item.as_table().is_some_and(|t| t.is_dotted());
         let headers_inside = headers && (item.is_table() || item.is_array_of_tables());
         match (takes, old, new) {
             (
-                Takes::Table(fields) | Takes::OneOf(fields),
+                ValueType::Table(fields) | ValueType::OneOf(fields),
                 Some(Value::Table(a)),
                 Value::Table(b),
             ) => {
@@ -140,13 +140,13 @@ impl Rewriter {
                     self.table(table, headers_inside, a, b, &Keys::These(fields));
                 }
             }
-            (Takes::Named(fields), Some(Value::Table(a)), Value::Table(b)) => {
+            (ValueType::Named(fields), Some(Value::Table(a)), Value::Table(b)) => {
                 if let Some(table) = item.as_table_like_mut() {
                     self.table(table, headers_inside, a, b, &Keys::Any(fields));
                 }
             }
             (
-                Takes::Tables(fields) | Takes::ListOf(fields),
+                ValueType::Tables(fields) | ValueType::ListOf(fields),
                 Some(Value::Array(a)),
                 Value::Array(b),
             ) => self.list(item, a, b, takes, fields),
@@ -159,7 +159,7 @@ impl Rewriter {
         item: &mut Item,
         old: &[Value],
         new: &[Value],
-        takes: Takes,
+        takes: ValueType,
         fields: &'static [Field],
     ) {
         let from = align(old, new);

@@ -7,7 +7,7 @@ use crate::scene::format::source_map::place;
 use crate::scene::format::suggest::nearest;
 use crate::scene::settings::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, TRACE_FIELDS};
 use crate::scene::validate::subject;
-use crate::value::{Color, Field, Preset, Range, Takes, excerpt};
+use crate::value::{Color, DefaultValue, Field, NumberRange, ValueType, excerpt};
 use crate::{camera, light, material};
 use std::ops;
 use toml::Spanned;
@@ -19,33 +19,39 @@ pub const FIELDS: &[Field] = &[
     table("trace", TRACE_FIELDS, "How far paths are followed."),
     Field::without(
         "camera",
-        Takes::Table(camera::FIELDS),
+        ValueType::Table(camera::FIELDS),
         "",
         "it stands at [0.0, 1.0, 5.0] and looks at the origin",
         "The view: a pinhole camera.",
     ),
     Field::without(
         "views",
-        Takes::Named(camera::FIELDS),
+        ValueType::Named(camera::FIELDS),
         "",
         "there are none",
         "Other viewpoints by name, to come back to. The picture is taken from `[camera]`.",
     ),
     table("background", BACKGROUND_FIELDS, "What a ray sees that meets nothing."),
     table("ambient", AMBIENT_FIELDS, "Light from everywhere, without shadows."),
-    Field::without("light", Takes::Tables(light::FIELDS), "", "there are none", "The lights."),
+    Field::without("light", ValueType::Tables(light::FIELDS), "", "there are none", "The lights."),
     Field::without(
         "materials",
-        Takes::Named(material::FIELDS),
+        ValueType::Named(material::FIELDS),
         "",
         "there are none",
         "Finishes by name, for the key `material` of objects.",
     ),
-    Field::without("object", Takes::Tables(OBJECT_FIELDS), "", "there are none", "The objects."),
+    Field::without(
+        "object",
+        ValueType::Tables(OBJECT_FIELDS),
+        "",
+        "there are none",
+        "The objects.",
+    ),
 ];
 
 const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) -> Field {
-    Field::without(name, Takes::Table(fields), "", "its keys have their defaults", doc)
+    Field::without(name, ValueType::Table(fields), "", "its keys have their defaults", doc)
 }
 
 /// Everything wrong with the form of the scene file `file`, whose `text` is TOML.
@@ -140,7 +146,7 @@ impl Walk<'_> {
                 None => meant.extend(self.unknown(key, fields)),
             }
         }
-        for field in fields.iter().filter(|f| f.preset == Preset::Required) {
+        for field in fields.iter().filter(|f| f.preset == DefaultValue::Required) {
             if !table.contains_key(field.name) && !meant.contains(&field.name) {
                 let place = match self.inner() {
                     inner if inner.is_empty() => String::new(),
@@ -170,7 +176,7 @@ impl Walk<'_> {
             self.field(field, value);
         }
         let expected =
-            || format!("Expected {}.", Takes::OneOf(fields)).replace("a table with ", "");
+            || format!("Expected {}.", ValueType::OneOf(fields)).replace("a table with ", "");
         if let [_, second, ..] = known.as_slice() {
             let found =
                 format!("{} has both {} and {}", self.inner(), known[0].2.name, second.2.name);
@@ -206,16 +212,16 @@ impl Walk<'_> {
     fn value(&mut self, field: &'static Field, spanned: &Spanned<DeValue>) {
         let (value, span) = (spanned.get_ref(), spanned.span());
         match (field.takes, value) {
-            (Takes::Table(fields), DeValue::Table(table)) => self.table(table, span, fields),
-            (Takes::OneOf(fields), DeValue::Table(table)) => self.one_of(table, span, fields),
-            (Takes::ListOf(fields), DeValue::Array(list)) => {
-                let expected = Takes::OneOf(fields).to_string();
+            (ValueType::Table(fields), DeValue::Table(table)) => self.table(table, span, fields),
+            (ValueType::OneOf(fields), DeValue::Table(table)) => self.one_of(table, span, fields),
+            (ValueType::ListOf(fields), DeValue::Array(list)) => {
+                let expected = ValueType::OneOf(fields).to_string();
                 self.entries(list, &expected, |w, t, s| w.one_of(t, s, fields));
             }
-            (Takes::Tables(fields), DeValue::Array(list)) => {
+            (ValueType::Tables(fields), DeValue::Array(list)) => {
                 self.entries(list, "a table", |w, t, s| w.table(t, s, fields));
             }
-            (Takes::Named(fields), DeValue::Table(named)) => {
+            (ValueType::Named(fields), DeValue::Table(named)) => {
                 for (name, entry) in named {
                     self.path.push(name.get_ref().to_string());
                     match entry.get_ref() {
@@ -226,18 +232,18 @@ impl Walk<'_> {
                 }
             }
             (takes, value) if fits(takes, value) => {}
-            (Takes::Choice(choices), DeValue::String(word)) => {
+            (ValueType::Choice(choices), DeValue::String(word)) => {
                 let mut help = format!("Expected {}.", field.takes);
                 if let Some(meant) = nearest(word, choices.iter().map(|c| c.name)) {
                     help += &format!(" Did you mean {meant:?}?");
                 }
                 self.add(span, format!("{} is {}", self.inner(), describe(value)), help);
             }
-            (Takes::Tables(_), _) if self.path.len() == 1 => {
+            (ValueType::Tables(_), _) if self.path.len() == 1 => {
                 let expected = format!("tables that begin with [[{}]]", field.name);
                 self.wrong(span, value, &expected);
             }
-            (Takes::Named(_), _) => {
+            (ValueType::Named(_), _) => {
                 let expected = format!("tables that begin with [{}.NAME]", field.name);
                 self.wrong(span, value, &expected);
             }
@@ -248,32 +254,32 @@ impl Walk<'_> {
 
 /// Whether a value that is no table has the right type. Ranges of whole numbers are checked here,
 /// since what lies outside has no place in an unsigned integer; all other ranges in `faults`.
-fn fits(takes: Takes, value: &DeValue) -> bool {
+fn fits(takes: ValueType, value: &DeValue) -> bool {
     let list = |n: usize, each: &dyn Fn(&DeValue) -> bool| match value {
         DeValue::Array(list) => list.len() == n && list.iter().all(|v| each(v.get_ref())),
         _ => false,
     };
     match takes {
-        Takes::Text => value.is_str(),
-        Takes::Switch => value.is_bool(),
-        Takes::Choice(choices) => {
+        ValueType::Text => value.is_str(),
+        ValueType::Switch => value.is_bool(),
+        ValueType::Choice(choices) => {
             value.as_str().is_some_and(|word| choices.iter().any(|c| c.name == word))
         }
-        Takes::Whole(range) => is_whole(value, range),
-        Takes::Wholes(n, range) => list(n, &|v| is_whole(v, range)),
-        Takes::Number(_) => is_number(value),
-        Takes::Numbers(n, _) => list(n, &is_number),
-        Takes::Direction => list(3, &is_number),
-        Takes::Factor => is_number(value) || list(3, &is_number),
-        Takes::Color(_) => match value {
+        ValueType::Whole(range) => is_whole(value, range),
+        ValueType::Wholes(n, range) => list(n, &|v| is_whole(v, range)),
+        ValueType::Number(_) => is_number(value),
+        ValueType::Numbers(n, _) => list(n, &is_number),
+        ValueType::Direction => list(3, &is_number),
+        ValueType::Factor => is_number(value) || list(3, &is_number),
+        ValueType::Color(_) => match value {
             DeValue::String(text) => Color::from_hex(text).is_some(),
             _ => list(3, &is_number),
         },
-        Takes::Table(_)
-        | Takes::OneOf(_)
-        | Takes::ListOf(_)
-        | Takes::Tables(_)
-        | Takes::Named(_) => false,
+        ValueType::Table(_)
+        | ValueType::OneOf(_)
+        | ValueType::ListOf(_)
+        | ValueType::Tables(_)
+        | ValueType::Named(_) => false,
     }
 }
 
@@ -281,7 +287,7 @@ fn integer(digits: &DeInteger) -> Option<i64> {
     i64::from_str_radix(digits.as_str(), digits.radix()).ok()
 }
 
-fn is_whole(value: &DeValue, range: Range) -> bool {
+fn is_whole(value: &DeValue, range: NumberRange) -> bool {
     value.as_integer().and_then(integer).is_some_and(|i| range.holds(i as f64))
 }
 

@@ -2,9 +2,9 @@
 //! instead of the tree (Haines and Greenberg 1986, *The Light Buffer: A Shadow-Testing Accelerator*).
 
 use crate::bvh::Ray;
-use crate::lanes::{Lanes, Mask, Real};
-use crate::primitive::{Ball, Geometry, STRAY, Selection, Towards};
-use crate::world::culling::light_projection::{Chart, Charted};
+use crate::lanes::{Float, Mask, SimdFloat};
+use crate::primitive::{Aggregate, BoundingSphere, F32_RAY_ERROR, LightTarget, PrimitiveSet};
+use crate::world::culling::light_projection::{LightProjection, ProjectedBounds};
 use crate::world::integrator::opaque::first_tag;
 
 /// So many things are kept for a cell, the nearest to the light.
@@ -15,7 +15,7 @@ const NONE: u32 = u32::MAX;
 
 /// What stands in the way of one light.
 pub(crate) struct LightBuffer<S> {
-    chart: Chart<S>,
+    chart: LightProjection<S>,
     /// Cells in a row of the chart, and rows.
     side: usize,
     /// The largest coordinate of the things and the light: from farther off, rays stray too far.
@@ -23,7 +23,7 @@ pub(crate) struct LightBuffer<S> {
     /// Row by row, face by face.
     cells: Vec<Cell<S>>,
     /// Of one cell after the other, those nearer to the light first.
-    things: Vec<Thing<S>>,
+    things: Vec<Entry<S>>,
 }
 
 #[derive(Clone, Copy)]
@@ -38,14 +38,14 @@ struct Cell<S> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Occluder {
     /// Around it.
-    pub ball: Ball,
+    pub ball: BoundingSphere,
     /// The number of the item whose surface it does not shade, because that is its own; `None`: it may
     /// shade itself.
     pub own: Option<u32>,
 }
 
 #[derive(Clone, Copy)]
-struct Thing<S> {
+struct Entry<S> {
     /// Number in the geometry's tree.
     number: u32,
     /// As in [`Occluder`]; [`NONE`] stands for `None`.
@@ -55,35 +55,35 @@ struct Thing<S> {
     near: S,
 }
 
-impl<S: Real> LightBuffer<S> {
+impl<S: Float> LightBuffer<S> {
     /// Of the things of a tree; `None`: of half of them or more, most of the cells would have no room.
-    pub fn new(towards: &Towards, occluders: &[Occluder]) -> Option<Self> {
-        let reach = |ball: &Ball| ball.center.abs().max_element() + ball.radius;
+    pub fn new(towards: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
+        let reach = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match towards {
-            Towards::Point(light) => light.abs().max_element(),
-            Towards::Direction(_) => 0.0,
+            LightTarget::Point(light) => light.abs().max_element(),
+            LightTarget::Direction(_) => 0.0,
         };
         let scale = occluders.iter().map(|s| reach(&s.ball)).fold(light, f64::max);
         // As the light sees them.
         let seen = |s: &Occluder| {
             let center = match towards {
-                Towards::Point(light) => s.ball.center - light,
-                Towards::Direction(_) => s.ball.center,
+                LightTarget::Point(light) => s.ball.center - light,
+                LightTarget::Direction(_) => s.ball.center,
             };
-            Ball { center, radius: s.ball.radius + STRAY * scale }
+            BoundingSphere { center, radius: s.ball.radius + F32_RAY_ERROR * scale }
         };
-        let balls: Vec<Ball> = occluders.iter().map(seen).collect();
-        let begin = |ball: &Ball| match towards {
-            Towards::Point(_) => ball.center.length() - ball.radius,
-            Towards::Direction(direction) => -ball.center.dot(*direction) - ball.radius,
+        let balls: Vec<BoundingSphere> = occluders.iter().map(seen).collect();
+        let begin = |ball: &BoundingSphere| match towards {
+            LightTarget::Point(_) => ball.center.length() - ball.radius,
+            LightTarget::Direction(direction) => -ball.center.dot(*direction) - ball.radius,
         };
         let mut order: Vec<(f64, u32)> = balls.iter().map(begin).zip(0..).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
 
-        let Charted { chart, places, side } = Charted::new(towards, &balls);
+        let ProjectedBounds { chart, places, side } = ProjectedBounds::new(towards, &balls);
         let count = chart.faces() * side * side;
         let (mut counts, mut until) = (vec![0; count], vec![S::of(f64::INFINITY); count]);
-        let mut entries: Vec<(usize, Thing<S>)> = Vec::new();
+        let mut entries: Vec<(usize, Entry<S>)> = Vec::new();
         let mut crowded_out = 0;
         for (near, number) in order {
             let (near, own) = (S::of(near), occluders[number as usize].own.unwrap_or(NONE));
@@ -91,7 +91,7 @@ impl<S: Real> LightBuffer<S> {
             for cell in places[number as usize].iter().flat_map(|place| place.cells(side)) {
                 if counts[cell] < FEW {
                     counts[cell] += 1;
-                    entries.push((cell, Thing { number, own, near }));
+                    entries.push((cell, Entry { number, own, near }));
                     balance += 1;
                 } else {
                     until[cell] = if until[cell] < near { until[cell] } else { near };
@@ -111,7 +111,7 @@ impl<S: Real> LightBuffer<S> {
             cell
         };
         let mut cells: Vec<Cell<S>> = counts.iter().zip(&until).map(cell).collect();
-        let nothing = Thing { number: 0, own: NONE, near: S::default() };
+        let nothing = Entry { number: 0, own: NONE, near: S::default() };
         let mut things = vec![nothing; entries.len()];
         for (cell, thing) in entries {
             things[cells[cell].end as usize] = thing;
@@ -120,17 +120,17 @@ impl<S: Real> LightBuffer<S> {
         Some(Self { chart, side, scale: S::of(scale), cells, things })
     }
 
-    /// [`Geometry::blocked`] for rays to this light, which end after `limit`. `on`: tags of the items that the
+    /// [`Aggregate::blocked`] for rays to this light, which end after `limit`. `on`: tags of the items that the
     /// rays begin on, and where that is on their outsides.
     #[inline(never)]
-    pub fn blocked<L: Lanes<Scalar = S>>(
+    pub fn blocked<L: SimdFloat<Scalar = S>>(
         &self,
-        geometry: &Geometry<L>,
+        geometry: &Aggregate<L>,
         ray: &Ray<L>,
         on: (L, L::Mask),
         limit: L,
         wanted: L::Mask,
-        by: &Selection,
+        by: &PrimitiveSet,
     ) -> L::Mask {
         let mut blocked = geometry.blocked_by_listed(ray, limit, wanted, by);
         let mut beyond = wanted.and_not(blocked) & ray.origin.max_abs().gt(L::splat(self.scale));
@@ -181,25 +181,29 @@ impl<S: Real> LightBuffer<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::{Double, Single, V3};
+    use crate::lanes::{Double, Single, Vec3};
     use crate::primitive::Form;
     use crate::world::culling::light_projection::tests::Random;
     use glam::DVec3;
 
-    fn balls(random: &mut Random, count: usize, radius: f64) -> Vec<Ball> {
-        let ball = |_| Ball { center: random.point(5.0), radius: radius * random.unit() };
+    fn balls(random: &mut Random, count: usize, radius: f64) -> Vec<BoundingSphere> {
+        let ball = |_| BoundingSphere { center: random.point(5.0), radius: radius * random.unit() };
         (0..count).map(ball).collect()
     }
 
-    fn occluders(balls: &[Ball]) -> Vec<Occluder> {
+    fn occluders(balls: &[BoundingSphere]) -> Vec<Occluder> {
         (0..).zip(balls).map(|(i, ball)| Occluder { ball: *ball, own: Some(i) }).collect()
     }
 
     /// Asks for shadows of rays from many places and compares with the tree; how many were blocked.
-    fn compare<L: Lanes>(towards: &Towards, balls: &[Ball], random: &mut Random) -> usize {
-        let form = |b: &Ball| Form::Sphere { center: b.center, radius: b.radius };
+    fn compare<L: SimdFloat>(
+        towards: &LightTarget,
+        balls: &[BoundingSphere],
+        random: &mut Random,
+    ) -> usize {
+        let form = |b: &BoundingSphere| Form::Sphere { center: b.center, radius: b.radius };
         let forms: Vec<Form> = balls.iter().map(form).collect();
-        let geometry = Geometry::<L>::with_tree(&forms, true);
+        let geometry = Aggregate::<L>::with_tree(&forms, true);
         let Some(buffer) = LightBuffer::<L::Scalar>::new(towards, &occluders(balls)) else {
             panic!("no buffer for {} balls", balls.len());
         };
@@ -212,25 +216,25 @@ mod tests {
             let normals: Vec<DVec3> =
                 (0..L::WIDTH).map(|_| random.point(1.0).normalize()).collect();
             let point = |lane: usize| {
-                let Ball { center, radius } = balls[ball_of(lane)];
+                let BoundingSphere { center, radius } = balls[ball_of(lane)];
                 match round % 6 {
                     4 | 5 => center + normals[lane] * (radius + 1e-4),
                     _ => middle + normals[lane] * apart,
                 }
             };
             let axis = |a: usize| L::from_fn(|i| L::Scalar::of(point(i)[a]));
-            let origin = V3::new(axis(0), axis(1), axis(2));
+            let origin = Vec3::new(axis(0), axis(1), axis(2));
             let (direction, limit) = match towards {
-                Towards::Direction(d) => (V3::of(d.to_array()), L::of(L::MAX)),
-                Towards::Point(light) => {
-                    let to = V3::of(light.to_array()) - origin;
+                LightTarget::Direction(d) => (Vec3::of(d.to_array()), L::of(L::MAX)),
+                LightTarget::Point(light) => {
+                    let to = Vec3::of(light.to_array()) - origin;
                     let distance = to.length2().sqrt();
                     (to * (L::one() / distance), distance)
                 }
             };
             let ray = Ray { origin, direction };
             let normal = |a: usize| L::from_fn(|i| L::Scalar::of(normals[i][a]));
-            let facing = V3::new(normal(0), normal(1), normal(2)).dot(direction);
+            let facing = Vec3::new(normal(0), normal(1), normal(2)).dot(direction);
             let wanted = facing.gt(L::zero());
             let (first, second) = (L::tag(ball_of(0) as u32), L::tag(ball_of(1) as u32));
             let odd = L::from_fn(|i| L::Scalar::of((i % 2) as f64)).gt(L::zero());
@@ -248,10 +252,10 @@ mod tests {
     fn shadows_are_those_of_the_tree() {
         let mut random = Random(1);
         let lights = [
-            Towards::Point(DVec3::new(1.0, 2.0, -0.5)),
-            Towards::Point(DVec3::new(0.0, 19.0, 0.0)),
-            Towards::Direction(DVec3::new(0.2, -0.9, 0.4).normalize()),
-            Towards::Direction(DVec3::Z),
+            LightTarget::Point(DVec3::new(1.0, 2.0, -0.5)),
+            LightTarget::Point(DVec3::new(0.0, 19.0, 0.0)),
+            LightTarget::Direction(DVec3::new(0.2, -0.9, 0.4).normalize()),
+            LightTarget::Direction(DVec3::Z),
         ];
         for towards in &lights {
             for (count, radius) in [(3, 8.0), (100, 0.5), (400, 0.3), (60, 1.5)] {
@@ -269,9 +273,12 @@ mod tests {
     fn what_has_no_room_is_found_in_the_tree() {
         let mut random = Random(4);
         let mut balls = balls(&mut random, 100, 0.5);
-        let crowd = |_| Ball { center: random.point(0.3), radius: 0.05 + 0.2 * random.unit() };
+        let crowd =
+            |_| BoundingSphere { center: random.point(0.3), radius: 0.05 + 0.2 * random.unit() };
         balls.extend((0..70).map(crowd));
-        for towards in [Towards::Point(DVec3::new(0.0, 4.0, 4.0)), Towards::Direction(DVec3::X)] {
+        for towards in
+            [LightTarget::Point(DVec3::new(0.0, 4.0, 4.0)), LightTarget::Direction(DVec3::X)]
+        {
             let buffer = LightBuffer::<f32>::new(&towards, &occluders(&balls)).expect("a buffer");
             assert!(buffer.cells.iter().any(|cell| cell.until < f32::INFINITY), "{towards:?}");
             let mut random = Random(5);
@@ -284,14 +291,14 @@ mod tests {
     #[test]
     fn what_begins_inside_is_blocked_by_the_thing_itself() {
         let balls = [
-            Ball { center: DVec3::ZERO, radius: 1.0 },
-            Ball { center: DVec3::X * 5.0, radius: 1.0 },
+            BoundingSphere { center: DVec3::ZERO, radius: 1.0 },
+            BoundingSphere { center: DVec3::X * 5.0, radius: 1.0 },
         ];
         let forms = balls.map(|b| Form::Sphere { center: b.center, radius: b.radius });
-        let geometry = Geometry::<Single>::with_tree(&forms, true);
-        let towards = Towards::Point(DVec3::Y * 9.0);
+        let geometry = Aggregate::<Single>::with_tree(&forms, true);
+        let towards = LightTarget::Point(DVec3::Y * 9.0);
         let buffer = LightBuffer::<f32>::new(&towards, &occluders(&balls)).expect("a buffer");
-        let ray = Ray { origin: V3::<Single>::zero(), direction: V3::of([0.0, 1.0, 0.0]) };
+        let ray = Ray { origin: Vec3::<Single>::zero(), direction: Vec3::of([0.0, 1.0, 0.0]) };
         let ask = |outside| {
             let on = (Single::tag(0), Single::mask(outside));
             let wanted = Single::mask(true);
@@ -305,7 +312,7 @@ mod tests {
     #[test]
     fn few_things_are_asked() {
         let mut random = Random(3);
-        let light = Towards::Point(DVec3::ZERO);
+        let light = LightTarget::Point(DVec3::ZERO);
         let few =
             LightBuffer::<f32>::new(&light, &occluders(&balls(&mut random, 400, 0.3))).unwrap();
         let mean = few.things.len() as f64 / few.cells.len() as f64;

@@ -1,8 +1,8 @@
 //! How a light sees things: from a point among them or before them, or from far away.
 
 use crate::bvh::Ray;
-use crate::lanes::{Lanes, Mask, Real, V3};
-use crate::primitive::{Ball, Towards};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::primitive::{BoundingSphere, LightTarget};
 use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
@@ -11,25 +11,25 @@ use std::ops::Range;
 const WIDEST: f64 = 3.0;
 
 /// Where the light sees a point: on a face, at two coordinates from 0 to 1.
-pub(crate) enum Chart<S> {
+pub(crate) enum LightProjection<S> {
     /// From a point among the things, on six faces of a cube around it.
-    Cube,
+    CubeMap,
     /// From a point before the things, in a window in front of them; the third axis leads through it.
-    Window { axes: [[S; 3]; 3], low: [S; 2], scale: [S; 2] },
+    Perspective { axes: [[S; 3]; 3], low: [S; 2], scale: [S; 2] },
     /// From far away, along two axes.
-    Far { axes: [[S; 3]; 2], low: [S; 2], scale: [S; 2] },
+    Orthographic { axes: [[S; 3]; 2], low: [S; 2], scale: [S; 2] },
 }
 
-impl<S: Real> Chart<S> {
+impl<S: Float> LightProjection<S> {
     /// How many faces it has.
     pub fn faces(&self) -> usize {
-        if matches!(self, Self::Cube) { 6 } else { 1 }
+        if matches!(self, Self::CubeMap) { 6 } else { 1 }
     }
 
     /// In which cell the light sees where rays begin, and at which depth. What is seen nowhere gets some
     /// cell.
     #[inline(always)]
-    pub fn place<L: Lanes<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
+    pub fn place<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
         let side = L::of(side as f64);
         // A number below 2^22 plus this has no fraction bits left in single precision; in double one
         // below 2^51.
@@ -41,8 +41,8 @@ impl<S: Real> Chart<S> {
         };
         let d = -ray.direction;
         match self {
-            Self::Cube => {
-                let size = V3::new(d.x.abs(), d.y.abs(), d.z.abs());
+            Self::CubeMap => {
+                let size = Vec3::new(d.x.abs(), d.y.abs(), d.z.abs());
                 let x = size.x.ge(size.y) & size.x.ge(size.z);
                 let y = size.y.ge(size.z).and_not(x);
                 let pick = |of_x, of_y, of_z| L::select(x, of_x, L::select(y, of_y, of_z));
@@ -54,17 +54,17 @@ impl<S: Real> Chart<S> {
                 let (u, v) = (number(u.mul_add(scale, half)), number(v.mul_add(scale, half)));
                 (face.mul_add(side, v).mul_add(side, u), limit)
             }
-            Self::Window { axes, low, scale } => {
-                let [a, b, c] = axes.map(|axis| d.dot(V3::splat(axis)));
+            Self::Perspective { axes, low, scale } => {
+                let [a, b, c] = axes.map(|axis| d.dot(Vec3::splat(axis)));
                 let inverse = L::one() / c;
                 let along = |x: L, i: usize| {
                     number(x.mul_add(inverse, -L::splat(low[i])) * L::splat(scale[i]))
                 };
                 (along(b, 1).mul_add(side, along(a, 0)), limit)
             }
-            Self::Far { axes, low, scale } => {
+            Self::Orthographic { axes, low, scale } => {
                 let along = |i: usize| {
-                    let x = ray.origin.dot(V3::splat(axes[i]));
+                    let x = ray.origin.dot(Vec3::splat(axes[i]));
                     number((x - L::splat(low[i])) * L::splat(scale[i]))
                 };
                 (along(1).mul_add(side, along(0)), -ray.origin.dot(ray.direction))
@@ -75,13 +75,13 @@ impl<S: Real> Chart<S> {
 
 /// Where a ball is seen: on a face, between two corners with coordinates from 0 to 1.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct FaceRect {
     face: usize,
     low: DVec2,
     high: DVec2,
 }
 
-impl Place {
+impl FaceRect {
     /// The cells that it reaches into.
     pub fn cells(&self, side: usize) -> impl Iterator<Item = usize> + use<> {
         // The conversion to integers saturates.
@@ -94,23 +94,23 @@ impl Place {
 }
 
 /// A chart and what is seen on it.
-pub(crate) struct Charted<S> {
+pub(crate) struct ProjectedBounds<S> {
     /// The chart.
-    pub chart: Chart<S>,
+    pub chart: LightProjection<S>,
     /// Of each ball.
-    pub places: Vec<Vec<Place>>,
+    pub places: Vec<Vec<FaceRect>>,
     /// So many cells are good in a row.
     pub side: usize,
 }
 
-impl<S: Real> Charted<S> {
+impl<S: Float> ProjectedBounds<S> {
     /// Of balls, whose places are relative to a light that stands somewhere.
-    pub fn new(towards: &Towards, balls: &[Ball]) -> Self {
+    pub fn new(towards: &LightTarget, balls: &[BoundingSphere]) -> Self {
         let (chart, places) = match towards {
-            Towards::Direction(direction) => far(*direction, balls),
-            Towards::Point(_) => window(balls).unwrap_or_else(|| cube(balls)),
+            LightTarget::Direction(direction) => far(*direction, balls),
+            LightTarget::Point(_) => window(balls).unwrap_or_else(|| cube(balls)),
         };
-        let finest = if matches!(chart, Chart::Cube) { 2.0 } else { 4.0 };
+        let finest = if matches!(chart, LightProjection::CubeMap) { 2.0 } else { 4.0 };
         let side = (finest * (balls.len() as f64).sqrt()).clamp(8.0, 128.0) as usize;
         Self { chart, places, side }
     }
@@ -132,26 +132,26 @@ fn slopes(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
 }
 
 /// Balls around a light.
-fn cube<S: Real>(balls: &[Ball]) -> (Chart<S>, Vec<Vec<Place>>) {
-    let on = |ball: &Ball, face: usize| {
+fn cube<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
+    let on = |ball: &BoundingSphere, face: usize| {
         let axis = |i: usize| ball.center[(face / 2 + i) % 3];
         let z = if face.is_multiple_of(2) { axis(0) } else { -axis(0) };
         let (x, y) = (slopes(axis(1), z, ball.radius)?, slopes(axis(2), z, ball.radius)?);
         let (low, high) = (DVec2::new(x.0, y.0), DVec2::new(x.1, y.1));
         let half = |v: DVec2| 0.5 * v.clamp(DVec2::NEG_ONE, DVec2::ONE) + 0.5;
         let is_seen = low.max_element() <= 1.0 && high.min_element() >= -1.0;
-        is_seen.then(|| Place { face, low: half(low), high: half(high) })
+        is_seen.then(|| FaceRect { face, low: half(low), high: half(high) })
     };
-    let places = |ball: &Ball| (0..6).filter_map(|face| on(ball, face)).collect();
-    (Chart::Cube, balls.iter().map(places).collect())
+    let places = |ball: &BoundingSphere| (0..6).filter_map(|face| on(ball, face)).collect();
+    (LightProjection::CubeMap, balls.iter().map(places).collect())
 }
 
 /// Balls on one side of a light; `None`: they are not.
-fn window<S: Real>(balls: &[Ball]) -> Option<(Chart<S>, Vec<Vec<Place>>)> {
+fn window<S: Float>(balls: &[BoundingSphere]) -> Option<(LightProjection<S>, Vec<Vec<FaceRect>>)> {
     let forward = balls.iter().map(|b| b.center).sum::<DVec3>().try_normalize()?;
     let (right, up) = forward.any_orthonormal_pair();
     let axes = [right, up, forward];
-    let seen = |ball: &Ball| {
+    let seen = |ball: &BoundingSphere| {
         let [x, y, z] = axes.map(|axis| ball.center.dot(axis));
         let (x, y) = (slopes(x, z, ball.radius)?, slopes(y, z, ball.radius)?);
         let seen = (DVec2::new(x.0, y.0), DVec2::new(x.1, y.1));
@@ -161,30 +161,33 @@ fn window<S: Real>(balls: &[Ball]) -> Option<(Chart<S>, Vec<Vec<Place>>)> {
     let seen: Vec<_> = balls.iter().map(seen).collect::<Option<_>>()?;
     let (low, scale, places) = fitted(&seen);
     let axes = axes.map(|axis| axis.to_array().map(S::of));
-    Some((Chart::Window { axes, low, scale }, places))
+    Some((LightProjection::Perspective { axes, low, scale }, places))
 }
 
 /// Balls seen against `direction`.
-fn far<S: Real>(direction: DVec3, balls: &[Ball]) -> (Chart<S>, Vec<Vec<Place>>) {
+fn far<S: Float>(
+    direction: DVec3,
+    balls: &[BoundingSphere],
+) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
     let (right, up) = direction.any_orthonormal_pair();
-    let seen = |ball: &Ball| {
+    let seen = |ball: &BoundingSphere| {
         let at = DVec2::new(ball.center.dot(right), ball.center.dot(up));
         (at - ball.radius, at + ball.radius)
     };
     let seen: Vec<_> = balls.iter().map(seen).collect();
     let (low, scale, places) = fitted(&seen);
     let axes = [right, up].map(|axis| axis.to_array().map(S::of));
-    (Chart::Far { axes, low, scale }, places)
+    (LightProjection::Orthographic { axes, low, scale }, places)
 }
 
 /// What has to be taken from coordinates and what they are multiplied with so that all that is seen, between
 /// two corners each, lies from 0 to 1; and where it lies then.
-fn fitted<S: Real>(seen: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<Place>>) {
+fn fitted<S: Float>(seen: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<FaceRect>>) {
     let low = seen.iter().map(|s| s.0).fold(DVec2::INFINITY, DVec2::min);
     let high = seen.iter().map(|s| s.1).fold(DVec2::NEG_INFINITY, DVec2::max);
     let scale = (high - low).recip();
     let at = |v: DVec2| (v - low) * scale;
-    let place = |s: &(DVec2, DVec2)| vec![Place { face: 0, low: at(s.0), high: at(s.1) }];
+    let place = |s: &(DVec2, DVec2)| vec![FaceRect { face: 0, low: at(s.0), high: at(s.1) }];
     let reals = |v: DVec2| v.to_array().map(S::of);
     (reals(low), reals(scale), seen.iter().map(place).collect())
 }
@@ -207,15 +210,16 @@ pub(crate) mod tests {
         }
     }
 
-    fn points_are_in_the_cells_of_their_ball<L: Lanes>(slack: f64) {
+    fn points_are_in_the_cells_of_their_ball<L: SimdFloat>(slack: f64) {
         let mut random = Random(2);
         let side = 64;
         for round in 0..600 {
             let away = [DVec3::ZERO, DVec3::new(30.0, -9.0, 4.0), DVec3::Y * 20.0][round % 3];
             let center = random.point(5.0) + away;
-            let ball = Ball { center, radius: 0.2 + 2.0 * random.unit() };
+            let ball = BoundingSphere { center, radius: 0.2 + 2.0 * random.unit() };
             // With another one, so that the ball is not all of the chart.
-            let balls = [ball, Ball { center: center + DVec3::new(0.5, 1.0, 0.7), radius: 0.1 }];
+            let balls =
+                [ball, BoundingSphere { center: center + DVec3::new(0.5, 1.0, 0.7), radius: 0.1 }];
             let (chart, places) = match round / 3 % 3 {
                 0 => cube::<L::Scalar>(&balls),
                 1 => match window(&balls) {
@@ -230,8 +234,8 @@ pub(crate) mod tests {
                 let to =
                     [random.point(1.0), DVec3::X, DVec3::ONE, DVec3::NEG_Z][round % 4].normalize();
                 let point = center + to * ball.radius * (1.0 - slack);
-                let origin = V3::of(point.to_array());
-                let direction = V3::of((-point.normalize()).to_array());
+                let origin = Vec3::of(point.to_array());
+                let direction = Vec3::of((-point.normalize()).to_array());
                 let (cell, _) = chart.place(&Ray { origin, direction }, L::one(), side);
                 let cell = cell.lane(0).to_f64();
                 assert!(cells.contains(&(cell as usize)), "{round}: {ball:?}, {point}: {cell}");
@@ -248,11 +252,11 @@ pub(crate) mod tests {
     /// Directions along which charts divide by zero get some cell.
     #[test]
     fn every_direction_has_a_cell() {
-        let balls = [Ball { center: DVec3::NEG_Y * 5.0, radius: 1.0 }];
+        let balls = [BoundingSphere { center: DVec3::NEG_Y * 5.0, radius: 1.0 }];
         let (window, _) = window::<f32>(&balls).expect("it is on one side");
         for chart in [cube(&balls).0, window, far(DVec3::Y, &balls).0] {
             for to in [[1.0, 0.0, 0.0], [0.0, 1.0, -0.0], [-0.0, 0.0, -1.0], [f64::NAN; 3]] {
-                let ray = Ray { origin: V3::of(to), direction: V3::<Single>::of(to) };
+                let ray = Ray { origin: Vec3::of(to), direction: Vec3::<Single>::of(to) };
                 let cell = chart.place(&ray, Single::one(), 8).0.as_array()[0];
                 assert!(cell >= 0.0 && cell < (chart.faces() * 64) as f32, "{to:?}: {cell}");
             }

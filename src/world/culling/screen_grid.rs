@@ -1,12 +1,12 @@
 //! Where on the raster things are seen.
 
-use crate::camera::View;
-use crate::primitive::{Form, STRAY};
+use crate::camera::PinholeCamera;
+use crate::primitive::{F32_RAY_ERROR, Form};
 use glam::DVec3;
 
 /// The part of the raster that a thing may be seen on \[pixels\]: smallest and largest coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rectangle {
+pub(crate) struct ScreenBounds {
     low: [f64; 2],
     high: [f64; 2],
 }
@@ -18,9 +18,9 @@ const MARGIN_PX: f64 = 0.25;
 /// precision.
 const ASLANT: f64 = 5e-7;
 
-impl Rectangle {
+impl ScreenBounds {
     /// Of a form: around the corners of its box, if all are in front of the eye.
-    pub fn of(form: &Form, view: &View) -> Self {
+    pub fn of(form: &Form, view: &PinholeCamera) -> Self {
         let everywhere = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
         let Some((low, high)) = form.bounds() else { return everywhere };
         let [_, _, forward] = view.frame();
@@ -31,7 +31,7 @@ impl Rectangle {
             let point = DVec3::new(pick(0), pick(1), pick(2));
             let to = point - view.eye();
             let depth = to.dot(forward);
-            let stray = STRAY * reach;
+            let stray = F32_RAY_ERROR * reach;
             if depth <= 2.0 * stray {
                 return everywhere;
             }
@@ -61,19 +61,19 @@ const CELL_PX: usize = 16;
 const FEW: usize = 16;
 
 /// For each cell of the raster the things that may be seen there, if they are few.
-pub(crate) struct Cells {
+pub(crate) struct ScreenGrid {
     columns: usize,
     rows: usize,
     /// Row by row; the numbers ascend. `None`: too many.
     seen: Vec<Option<Vec<u32>>>,
 }
 
-impl Cells {
+impl ScreenGrid {
     /// Of a raster of `size` pixels, from things' numbers, ascending, and where they are seen.
-    pub fn new(size: [usize; 2], things: impl IntoIterator<Item = (u32, Rectangle)>) -> Self {
+    pub fn new(size: [usize; 2], things: impl IntoIterator<Item = (u32, ScreenBounds)>) -> Self {
         let [columns, rows] = size.map(|n| n.div_ceil(CELL_PX));
         let mut seen = vec![Some(Vec::new()); columns * rows];
-        for (thing, Rectangle { low, high }) in things {
+        for (thing, ScreenBounds { low, high }) in things {
             // The conversion to integers saturates: what is seen nowhere spans no cell.
             let cell = |x: f64| (x / CELL_PX as f64).floor().max(-1.0) + 1.0;
             let span = |axis: usize, count: usize| {
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn cells_name_the_few_things_that_reach_into_them() {
-        let at = |low: [f64; 2], high: [f64; 2]| Rectangle { low, high };
+        let at = |low: [f64; 2], high: [f64; 2]| ScreenBounds { low, high };
         let endless = at([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
         let things = [
             (0, endless),
@@ -126,7 +126,7 @@ mod tests {
             (5, at([-9.0, -9.0], [-1.0, 40.0])),
             (6, at([20.0, -1e300], [21.0, -3.0])),
         ];
-        let cells = Cells::new([40, 33], things);
+        let cells = ScreenGrid::new([40, 33], things);
         let seen = |x, y| cells.seen([x, y], [16, 16]).unwrap();
         assert_eq!(seen(0, 0), [0, 2]);
         assert_eq!(seen(16, 0), [0, 2]);
@@ -137,7 +137,7 @@ mod tests {
         assert_eq!(cells.seen([8, 24], [100, 100]).unwrap(), [0, 3]);
         assert_eq!(cells.seen([0, 0], [100, 100]).unwrap(), [0, 2, 3]);
         let crowd = (0..=FEW as u32).map(|i| (i, at([0.0; 2], [1.0; 2])));
-        let cells = Cells::new([40, 33], crowd);
+        let cells = ScreenGrid::new([40, 33], crowd);
         assert_eq!(cells.seen([0, 0], [16, 16]), None);
         assert_eq!(cells.seen([16, 0], [16, 16]), Some(vec![]));
     }

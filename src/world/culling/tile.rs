@@ -2,66 +2,68 @@
 //! that may stand between what they see and a light. Most parts see one or two things, and nothing
 //! shades them: the others are never asked.
 
-use crate::camera::View;
-use crate::lanes::{Lanes, Real};
-use crate::light::Lamp;
-use crate::primitive::{Ball, Bound, Form, Geometry, Pencil, Selection, Towards};
+use crate::camera::PinholeCamera;
+use crate::lanes::{Float, SimdFloat};
+use crate::light::DeltaLight;
+use crate::primitive::{
+    Aggregate, BoundingSphere, BoundingVolume, Form, Frustum, LightTarget, PrimitiveSet,
+};
 use crate::world::culling::light_buffer::{LightBuffer, Occluder};
-use crate::world::culling::screen_grid::{Cells, Rectangle};
+use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use glam::DVec3;
 
 /// The things that some camera rays and the shadow rays from where they end may meet.
 #[derive(Clone, Debug)]
-pub struct Outlook {
+pub struct TileCandidates {
     /// What the camera rays may meet.
-    pub(crate) seen: Selection,
+    pub(crate) seen: PrimitiveSet,
     /// For each light of the world, what shadow rays may meet.
-    pub(crate) shading: Vec<Selection>,
+    pub(crate) shading: Vec<PrimitiveSet>,
 }
 
-impl Outlook {
+impl TileCandidates {
     /// Everything, for `lamps` lights.
-    pub(crate) fn everything<L: Lanes>(geometry: &Geometry<L>, lamps: usize) -> Self {
+    pub(crate) fn everything<L: SimdFloat>(geometry: &Aggregate<L>, lamps: usize) -> Self {
         Self { seen: geometry.all().clone(), shading: vec![geometry.all().clone(); lamps] }
     }
 }
 
 /// How the rays of a part of the picture are kept from things that they cannot meet.
-pub(crate) enum Culling {
+pub(crate) enum CullingMode {
     /// By a pencil of lines from the eye, and what stands between it and the lights.
-    Pencils(Surroundings),
+    Pencils(FrustumCuller),
     /// By rectangles on the screen.
-    Rectangles(Vec<Rectangle>),
+    Rectangles(Vec<ScreenBounds>),
     /// By lists of the few things of a tree that are seen in each part of the screen.
-    Cells(Cells),
+    ScreenGrid(ScreenGrid),
     /// Not at all, or by the geometry itself.
     Nothing,
 }
 
-impl Culling {
+impl CullingMode {
     /// What camera rays through a rectangle of the raster may meet, and the shadow rays from where they
     /// end, to `lamps` lights; `None`: nothing is ruled out.
-    pub fn outlook<L: Lanes>(
+    pub fn outlook<L: SimdFloat>(
         &self,
-        geometry: &Geometry<L>,
+        geometry: &Aggregate<L>,
         lamps: usize,
-        view: &View,
+        view: &PinholeCamera,
         (origin, extent): ([usize; 2], [usize; 2]),
-    ) -> Option<Outlook> {
+    ) -> Option<TileCandidates> {
         match self {
             Self::Pencils(surroundings) => {
                 let [_, _, forward] = view.frame();
                 let corners = view.corners(origin, extent);
-                let pencil = Pencil { apex: view.eye(), forward, corners };
+                let pencil = Frustum { apex: view.eye(), forward, corners };
                 Some(surroundings.outlook(geometry, Some(&pencil)))
             }
             Self::Rectangles(of) => {
                 let seen = geometry.select(|item| of[item as usize].overlaps(origin, extent));
-                Some(Outlook { seen, ..Outlook::everything(geometry, lamps) })
+                Some(TileCandidates { seen, ..TileCandidates::everything(geometry, lamps) })
             }
-            Self::Cells(cells) => {
+            Self::ScreenGrid(cells) => {
                 let seen = geometry.select_few(&cells.seen(origin, extent)?);
-                Some(Outlook { seen, ..Outlook::everything(geometry, lamps) })
+                Some(TileCandidates { seen, ..TileCandidates::everything(geometry, lamps) })
             }
             Self::Nothing => None,
         }
@@ -69,36 +71,36 @@ impl Culling {
 }
 
 /// What outlooks are found from.
-pub(crate) struct Surroundings {
+pub(crate) struct FrustumCuller {
     /// For each item of the geometry.
-    bounds: Vec<Bound>,
+    bounds: Vec<BoundingVolume>,
     /// For each item: paths may be inside it, so that it may shade itself.
     hollow: Vec<bool>,
     /// For each light.
-    towards: Vec<Towards>,
+    towards: Vec<LightTarget>,
 }
 
-impl Surroundings {
+impl FrustumCuller {
     /// `eye`: where paths begin; `None`: not known. `entered`: for each item, whether paths get inside
     /// it. `off_lamps`: how far from the lamps shadow rays end at most.
-    pub fn new<S: Real>(
+    pub fn new<S: Float>(
         forms: Vec<&Form>,
         eye: Option<DVec3>,
         entered: &[bool],
-        (lamps, off_lamps): (&[Lamp<S>], f64),
+        (lamps, off_lamps): (&[DeltaLight<S>], f64),
     ) -> Self {
-        let bound = |form: &Form| Bound::new(form).grown(off_lamps);
-        let bounds: Vec<Bound> = forms.into_iter().map(bound).collect();
+        let bound = |form: &Form| BoundingVolume::new(form).grown(off_lamps);
+        let bounds: Vec<BoundingVolume> = forms.into_iter().map(bound).collect();
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let towards = lamps.iter().map(|lamp| match lamp {
-            Lamp::Falling { position } | Lamp::Even { position } => {
-                Towards::Point(vector(position))
+            DeltaLight::Falling { position } | DeltaLight::Even { position } => {
+                LightTarget::Point(vector(position))
             }
-            Lamp::Directional { towards } => Towards::Direction(vector(towards)),
+            DeltaLight::Directional { towards } => LightTarget::Direction(vector(towards)),
         });
         // The outside of a convex thing does not see itself, and only paths that begin inside, or are
         // let in, get inside.
-        let hollow = |(b, entered): (&Bound, &bool)| {
+        let hollow = |(b, entered): (&BoundingVolume, &bool)| {
             let holds_eye = || eye.is_none_or(|eye| b.ball().holds(eye));
             !b.is_convex() || !b.is_flat() && (*entered || holds_eye())
         };
@@ -107,9 +109,9 @@ impl Surroundings {
     }
 
     /// For each light what shadow rays to it meet of the things in the geometry's tree.
-    pub fn light_buffers<L: Lanes>(
+    pub fn light_buffers<L: SimdFloat>(
         &self,
-        geometry: &Geometry<L>,
+        geometry: &Aggregate<L>,
     ) -> Vec<Option<LightBuffer<L::Scalar>>> {
         let occluder = |item: u32| Occluder {
             ball: self.bounds[item as usize].ball(),
@@ -120,15 +122,19 @@ impl Surroundings {
     }
 
     /// The outlook of camera rays inside `pencil`; `None`: of any rays.
-    pub fn outlook<L: Lanes>(&self, geometry: &Geometry<L>, pencil: Option<&Pencil>) -> Outlook {
-        let part = |bound: &Bound| match pencil {
+    pub fn outlook<L: SimdFloat>(
+        &self,
+        geometry: &Aggregate<L>,
+        pencil: Option<&Frustum>,
+    ) -> TileCandidates {
+        let part = |bound: &BoundingVolume| match pencil {
             Some(pencil) => bound.part_in(pencil),
             None => Some(bound.ball()),
         };
-        let parts: Vec<Option<Ball>> = self.bounds.iter().map(part).collect();
+        let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(part).collect();
         let seen = geometry.select(|item| parts[item as usize].is_some());
-        let shades = |item: usize, towards: &Towards| {
-            let lit = |(other, part): (usize, &Option<Ball>)| {
+        let shades = |item: usize, towards: &LightTarget| {
+            let lit = |(other, part): (usize, &Option<BoundingSphere>)| {
                 part.is_some_and(|part| {
                     (other != item || self.hollow[item]) && self.bounds[item].shades(&part, towards)
                 })
@@ -136,6 +142,6 @@ impl Surroundings {
             parts.iter().enumerate().any(lit)
         };
         let of_light = |towards| geometry.select(|item| shades(item as usize, towards));
-        Outlook { seen, shading: self.towards.iter().map(of_light).collect() }
+        TileCandidates { seen, shading: self.towards.iter().map(of_light).collect() }
     }
 }

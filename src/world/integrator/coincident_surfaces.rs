@@ -12,9 +12,9 @@
 //! is known before any ray: nothing is asked where a path meets others.
 
 use crate::bvh::Ray;
-use crate::lanes::{Lanes, Mask, Real, V3};
-use crate::primitive::{Form, Geometry, Source};
-use crate::world::integrator::nested_dielectrics::Inside;
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::primitive::{Aggregate, Form, PrimitiveId};
+use crate::world::integrator::nested_dielectrics::MediumStack;
 use crate::world::integrator::opaque::first_tag;
 use glam::DVec3;
 
@@ -30,7 +30,7 @@ const PARALLEL: f64 = 0.5;
 
 /// How an item lies among others.
 #[derive(Clone, Copy, Debug)]
-enum Kind {
+enum SurfaceKind {
     /// The surface of a transparent solid of this rank.
     Transparent(u32),
     /// The surface of an opaque solid.
@@ -55,26 +55,26 @@ pub(crate) struct Contacts<S> {
     /// For each item.
     of: Vec<Vec<Contact<S>>>,
     /// For each item its kind and the distance of its layer from zero.
-    kinds: Vec<(Kind, S)>,
+    kinds: Vec<(SurfaceKind, S)>,
 }
 
 /// Where rays begin on surfaces that lie on others.
 #[derive(Clone, Copy)]
-pub(crate) struct Seam<L: Lanes> {
+pub(crate) struct Seam<L: SimdFloat> {
     /// Lanes where they do.
     pub lanes: L::Mask,
     /// Tag of the item.
     pub item: L,
     /// A point of it.
-    pub point: V3<L>,
+    pub point: Vec3<L>,
     /// Unit normal on the side to which the rays go.
-    pub axis: V3<L>,
+    pub axis: Vec3<L>,
     /// Its layer.
     pub layer: L,
 }
 
 /// Surfaces in a layer.
-pub(crate) struct Layer<L: Lanes> {
+pub(crate) struct Layer<L: SimdFloat> {
     /// Lanes where there is one.
     pub lanes: L::Mask,
     /// Lanes where something lies on the surface at hand.
@@ -86,10 +86,10 @@ pub(crate) struct Layer<L: Lanes> {
     pub lift: L,
 }
 
-impl<L: Lanes> Seam<L> {
+impl<L: SimdFloat> Seam<L> {
     /// Nowhere.
     pub fn none() -> Self {
-        let zero = V3::zero();
+        let zero = Vec3::zero();
         let item = L::tag(0);
         Self { lanes: L::mask(false), item, point: zero, axis: zero, layer: L::zero() }
     }
@@ -104,20 +104,20 @@ impl<L: Lanes> Seam<L> {
         Self {
             lanes: no.lanes,
             item: L::select(mask, yes.item, no.item),
-            point: V3::select(mask, yes.point, no.point),
-            axis: V3::select(mask, yes.axis, no.axis),
+            point: Vec3::select(mask, yes.point, no.point),
+            axis: Vec3::select(mask, yes.axis, no.axis),
             layer: L::select(mask, yes.layer, no.layer),
         }
     }
 }
 
-impl<S: Real> Contacts<S> {
+impl<S: Float> Contacts<S> {
     /// Of `forms`, whose coordinates are rounded to `epsilon` and were given with the error `given`.
     /// `transparent`: for each of the items that `sources` lists, whether it lets light through; `rank_of`:
     /// the rank of the transparent solid that it bounds. `None`: nothing touches anything transparent.
     pub fn new(
         forms: &[Form],
-        sources: &[Source],
+        sources: &[PrimitiveId],
         (transparent, rank_of): (&[bool], &[u32]),
         (epsilon, given): (f64, f64),
     ) -> Option<Self> {
@@ -142,15 +142,15 @@ impl<S: Real> Contacts<S> {
             return None;
         }
         let count = forms.len() as f64;
-        let kind = |(item, source): (usize, &Source)| {
+        let kind = |(item, source): (usize, &PrimitiveId)| {
             let flat =
                 matches!(forms[source.form], Form::Parallelogram { .. } | Form::Plane { .. });
             let number = source.form as f64;
             let (kind, layer) = match (rank_of[item], flat, transparent[item]) {
-                (0, true, true) => (Kind::Pane, 1.0 + number),
-                (0, true, false) => (Kind::Sheet, 0.0),
-                (0, false, _) => (Kind::Opaque, 4.0 * count + number),
-                (rank, ..) => (Kind::Transparent(rank), 3.0 * count - f64::from(rank)),
+                (0, true, true) => (SurfaceKind::Pane, 1.0 + number),
+                (0, true, false) => (SurfaceKind::Sheet, 0.0),
+                (0, false, _) => (SurfaceKind::Opaque, 4.0 * count + number),
+                (rank, ..) => (SurfaceKind::Transparent(rank), 3.0 * count - f64::from(rank)),
             };
             (kind, S::of(layer))
         };
@@ -167,24 +167,24 @@ impl<S: Real> Contacts<S> {
 
     /// The layer of `item` for rays that come to it from `before`; `leaves`: those that go where its
     /// normal points to.
-    fn layer<L: Lanes<Scalar = S>>(&self, item: u32, leaves: L::Mask, before: L) -> L {
+    fn layer<L: SimdFloat<Scalar = S>>(&self, item: u32, leaves: L::Mask, before: L) -> L {
         let (kind, layer) = &self.kinds[item as usize];
         let layer = L::splat(*layer);
         let below = match kind {
-            Kind::Pane => before.lt(L::zero()),
-            Kind::Sheet => return L::zero(),
-            Kind::Transparent(_) | Kind::Opaque => leaves,
+            SurfaceKind::Pane => before.lt(L::zero()),
+            SurfaceKind::Sheet => return L::zero(),
+            SurfaceKind::Transparent(_) | SurfaceKind::Opaque => leaves,
         };
         L::select(below, -layer, layer)
     }
 
     /// The first surface behind the one that rays begin on, of those that lie on it. `inside`: what the
     /// rays are inside.
-    pub fn next<L: Lanes<Scalar = S>>(
+    pub fn next<L: SimdFloat<Scalar = S>>(
         &self,
-        geometry: &Geometry<L>,
+        geometry: &Aggregate<L>,
         seam: &Seam<L>,
-        inside: &Inside<L>,
+        inside: &MediumStack<L>,
     ) -> Layer<L> {
         let mut out = Layer {
             lanes: L::mask(false),
@@ -200,12 +200,12 @@ impl<S: Real> Contacts<S> {
 
     /// The surface that rays meet first of the one that `seam` says and those that lie on it; the seam's
     /// layer means nothing. `leaves`: lanes that go where the normal of the seam's item points to.
-    pub fn first<L: Lanes<Scalar = S>>(
+    pub fn first<L: SimdFloat<Scalar = S>>(
         &self,
-        geometry: &Geometry<L>,
+        geometry: &Aggregate<L>,
         seam: &Seam<L>,
         leaves: L::Mask,
-        inside: &Inside<L>,
+        inside: &MediumStack<L>,
     ) -> Layer<L> {
         let before = L::of(-L::MAX);
         let mut layer = L::zero();
@@ -228,11 +228,11 @@ impl<S: Real> Contacts<S> {
 
     /// Puts into `out` what comes before its layer and behind that of `seam`.
     #[inline(never)]
-    fn search<L: Lanes<Scalar = S>>(
+    fn search<L: SimdFloat<Scalar = S>>(
         &self,
-        geometry: &Geometry<L>,
+        geometry: &Aggregate<L>,
         seam: &Seam<L>,
-        inside: &Inside<L>,
+        inside: &MediumStack<L>,
         out: &mut Layer<L>,
     ) {
         let rounding = seam.point.max_abs() * L::of(TIE * L::EPSILON);
@@ -253,7 +253,7 @@ impl<S: Real> Contacts<S> {
                     let cosine = normal.dot(seam.axis);
                     let leaves = cosine.gt(L::zero());
                     let mut these = these & cosine.abs().gt(L::of(PARALLEL));
-                    if let (Kind::Transparent(rank), _) = &self.kinds[other as usize] {
+                    if let (SurfaceKind::Transparent(rank), _) = &self.kinds[other as usize] {
                         // What a path is not inside of it cannot leave.
                         let within = inside.holds(L::of(f64::from(*rank)));
                         these = these & ((within & leaves) | (!within & !leaves));
@@ -318,7 +318,7 @@ fn span(form: &Form, axis: DVec3) -> Option<(f64, f64)> {
         Form::Sphere { center, radius } => {
             Some((axis.dot(*center) - radius, axis.dot(*center) + radius))
         }
-        Form::Convex { corners, .. } => Some(around(corners)),
+        Form::ConvexPolyhedron { corners, .. } => Some(around(corners)),
         Form::Parallelogram { corner, u, v } => {
             Some(around(&[*corner, corner + u, corner + v, corner + u + v]))
         }

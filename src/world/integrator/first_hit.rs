@@ -1,12 +1,12 @@
 //! What the camera sees in one direction: for picking, and for views other than the picture.
 
 use crate::bvh::Ray;
-use crate::lanes::{Lanes, Mask, Real, V3};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::world::compile::World;
 
 /// The first thing on a camera ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sight {
+pub struct FirstHit {
     /// Number in the scene's list of objects; `None`: the background.
     pub object: Option<u32>,
     /// Distance from the eye to the point seen, in scene units; infinite for the background.
@@ -17,25 +17,25 @@ pub struct Sight {
     pub reflects: bool,
 }
 
-impl Sight {
+impl FirstHit {
     /// Nothing but background.
     pub const NOTHING: Self =
         Self { object: None, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
 }
 
-impl<L: Lanes> World<L> {
+impl<L: SimdFloat> World<L> {
     /// What the camera sees through each of `points` of the raster (columns and rows in pixels, with
     /// fractions), into `seen` of the same length.
-    pub fn look(&self, points: &[[f64; 2]], seen: &mut [Sight]) {
+    pub fn look(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
         for (points, seen) in points.chunks(L::WIDTH).zip(seen.chunks_mut(L::WIDTH)) {
             self.look_at(points, seen);
         }
     }
 
     /// At most one packet of it.
-    fn look_at(&self, points: &[[f64; 2]], seen: &mut [Sight]) {
+    fn look_at(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
         let point = |lane: usize| points[lane.min(points.len() - 1)];
-        let base = V3::from_fn(|lane| self.view.toward(point(lane).map(|c| c as u32).into()));
+        let base = Vec3::from_fn(|lane| self.view.toward(point(lane).map(|c| c as u32).into()));
         let within = |axis: usize| {
             L::from_fn(|lane| L::Scalar::of(point(lane)[axis] - point(lane)[axis].floor()))
         };
@@ -43,10 +43,10 @@ impl<L: Lanes> World<L> {
         let ray = Ray { origin, direction };
         let hit = self.geometry.closest(&ray, self.geometry.all());
         let at = ray.at(hit.t);
-        let eye = V3::of(self.view.eye().to_array());
+        let eye = Vec3::of(self.view.eye().to_array());
         let from_eye = at - eye;
         let depth = from_eye.dot(from_eye).sqrt();
-        seen.fill(Sight::NOTHING);
+        seen.fill(FirstHit::NOTHING);
         let mut left = hit.t.lt(L::of(L::MAX)).bits() & lanes_below(points.len());
         while left != 0 {
             let item = hit.item.tag_lane(left.trailing_zeros() as usize);
@@ -59,7 +59,7 @@ impl<L: Lanes> World<L> {
                 let front = facing.lane(lane).to_f64() < 0.0;
                 let side = if front { 1.0 } else { -1.0 };
                 let axis = |c: L| (side * c.lane(lane).to_f64()) as f32;
-                *sight = Sight {
+                *sight = FirstHit {
                     object: Some(self.geometry.sources()[item as usize].form as u32),
                     depth: depth.lane(lane).to_f64() as f32,
                     normal: [axis(normal.x), axis(normal.y), axis(normal.z)],
@@ -106,9 +106,9 @@ mod tests {
         shape.rectangle = { center = [97.0, 1.0, 0.0], size = [2.0, 20.0], normal = [0.0, 0.0, -1.0] }
     "#;
 
-    fn look<L: Lanes>(points: &[[f64; 2]]) -> Vec<Sight> {
+    fn look<L: SimdFloat>(points: &[[f64; 2]]) -> Vec<FirstHit> {
         let world = World::<L>::new(&Scene::parse(SCENE, "test").unwrap());
-        let mut seen = vec![Sight::NOTHING; points.len()];
+        let mut seen = vec![FirstHit::NOTHING; points.len()];
         world.look(points, &mut seen);
         seen
     }
@@ -120,7 +120,7 @@ mod tests {
         for seen in [look::<Single>(&points), look::<Double>(&points), look::<f64>(&points)] {
             let objects: Vec<_> = seen.iter().map(|s| s.object).collect();
             assert_eq!(objects, [Some(0), Some(1), Some(2), None, Some(1)]);
-            assert_eq!(seen[3], Sight::NOTHING);
+            assert_eq!(seen[3], FirstHit::NOTHING);
             assert_eq!(
                 seen.iter().map(|s| s.reflects).collect::<Vec<_>>(),
                 [false, true, false, false, true]

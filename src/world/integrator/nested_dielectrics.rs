@@ -6,11 +6,11 @@
 //! refraction is 1.
 
 use crate::bvh::Ray;
-use crate::lanes::{Lanes, Mask, Real};
-use crate::material::Finish;
-use crate::primitive::{Form, Geometry, Source};
+use crate::lanes::{Float, Mask, SimdFloat};
+use crate::material::Bsdf;
+use crate::primitive::{Aggregate, Form, PrimitiveId};
 use crate::world::integrator::coincident_surfaces::Contacts;
-use crate::world::integrator::opaque::{Met, first_tag};
+use crate::world::integrator::opaque::{SurfaceInteraction, first_tag};
 use glam::DVec3;
 
 /// So many solids around one point are told apart; of more, those that are listed last.
@@ -19,11 +19,11 @@ const NESTED: usize = 4;
 /// The solids that paths are inside, by rank: 0 is none; of two the one with the higher rank fills the
 /// space. From the highest down.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Inside<L> {
+pub(crate) struct MediumStack<L> {
     ranks: [L; NESTED],
 }
 
-impl<L: Lanes> Inside<L> {
+impl<L: SimdFloat> MediumStack<L> {
     /// Outside of everything.
     #[inline(always)]
     pub fn nothing() -> Self {
@@ -74,25 +74,25 @@ impl<L: Lanes> Inside<L> {
 }
 
 #[inline(always)]
-fn equal<L: Lanes>(a: L, b: L) -> L::Mask {
+fn equal<L: SimdFloat>(a: L, b: L) -> L::Mask {
     a.le(b) & b.le(a)
 }
 
 /// The transparent solids of a world.
-pub(crate) struct Media<L: Lanes> {
+pub(crate) struct NestedDielectrics<L: SimdFloat> {
     /// For each item of the geometry, the rank of the transparent solid that it bounds; 0: it bounds
     /// none.
     rank_of: Vec<u32>,
     /// By rank, the index of refraction; that of rank 0 is 1.
     indices: Vec<L::Scalar>,
     /// The solids that camera rays may begin in, each alone.
-    around_eye: Vec<(u32, Geometry<L>)>,
+    around_eye: Vec<(u32, Aggregate<L>)>,
     /// What touches something that lets light through; `None`: nothing does.
     pub contacts: Option<Contacts<L::Scalar>>,
 }
 
 /// Where rays meet surfaces that let light through.
-pub(crate) struct Crossing<L: Lanes> {
+pub(crate) struct InterfaceHit<L: SimdFloat> {
     /// Lanes that do.
     pub lanes: L::Mask,
     /// Of these, those that meet a solid's surface from outside.
@@ -106,20 +106,20 @@ pub(crate) struct Crossing<L: Lanes> {
     /// Index of refraction behind it; for a pane, of what it is made of.
     pub n_t: L,
     /// What reflected rays are inside.
-    pub before: Inside<L>,
+    pub before: MediumStack<L>,
     /// What transmitted rays are inside.
-    pub behind: Inside<L>,
+    pub behind: MediumStack<L>,
 }
 
-impl<L: Lanes> Media<L> {
+impl<L: SimdFloat> NestedDielectrics<L> {
     /// `finish_of`: for each of the items that `sources` lists, its finish; `None`: nothing lets light
     /// through. `nearest`: how far from the eye the camera's rays begin, at most. `given`: how exactly
     /// coordinates were given.
     pub fn new(
         forms: &[Form],
-        sources: &[Source],
+        sources: &[PrimitiveId],
         finish_of: &[u32],
-        finishes: &[Finish<L::Scalar>],
+        finishes: &[Bsdf<L::Scalar>],
         (eye, nearest): (DVec3, f64),
         given: f64,
     ) -> Option<Self> {
@@ -150,7 +150,7 @@ impl<L: Lanes> Media<L> {
         };
         let around = |(form, index): (usize, &Option<_>)| {
             let around = index.is_some() && near(&forms[form]);
-            around.then(|| (form as u32 + 1, Geometry::with_tree(&forms[form..=form], false)))
+            around.then(|| (form as u32 + 1, Aggregate::with_tree(&forms[form..=form], false)))
         };
         let around_eye = indices[1..].iter().enumerate().filter_map(around).collect();
         let indices = indices.into_iter().map(|n| n.unwrap_or(L::Scalar::of(1.0))).collect();
@@ -163,8 +163,8 @@ impl<L: Lanes> Media<L> {
     }
 
     /// What rays begin inside of: the solids that they meet from inside first.
-    pub fn at_start(&self, ray: &Ray<L>) -> Inside<L> {
-        let mut inside = Inside::nothing();
+    pub fn at_start(&self, ray: &Ray<L>) -> MediumStack<L> {
+        let mut inside = MediumStack::nothing();
         for (rank, solid) in &self.around_eye {
             let hit = solid.closest(ray, solid.all());
             let mut left = hit.t.lt(L::of(L::MAX));
@@ -175,7 +175,7 @@ impl<L: Lanes> Media<L> {
                 left = left.and_not(here);
             }
             let entered = inside.with(L::of(f64::from(*rank)));
-            inside = Inside::select(within, &entered, &inside);
+            inside = MediumStack::select(within, &entered, &inside);
         }
         inside
     }
@@ -194,11 +194,11 @@ impl<L: Lanes> Media<L> {
     /// `index_of_pane`: what those are made of that are open.
     pub fn cross(
         &self,
-        met: &Met<L>,
+        met: &SurfaceInteraction<L>,
         lanes: L::Mask,
-        inside: &Inside<L>,
+        inside: &MediumStack<L>,
         index_of_pane: L,
-    ) -> Crossing<L> {
+    ) -> InterfaceHit<L> {
         let outer = lanes & met.front;
         let mut rank = L::zero();
         let mut left = lanes;
@@ -208,10 +208,11 @@ impl<L: Lanes> Media<L> {
         }
         let solid = rank.gt(L::zero());
         let (outside, within) = (inside.without(rank), inside.with(rank));
-        let pick = |yes, no| Inside::select(solid, &Inside::select(outer, yes, no), inside);
+        let pick =
+            |yes, no| MediumStack::select(solid, &MediumStack::select(outer, yes, no), inside);
         let (before, behind) = (pick(&outside, &within), pick(&within, &outside));
         let n_i = self.index(before.top());
-        Crossing {
+        InterfaceHit {
             lanes,
             outer,
             pane: lanes.and_not(solid),
@@ -228,13 +229,13 @@ impl<L: Lanes> Media<L> {
 mod tests {
     use super::*;
 
-    fn ranks(inside: &Inside<f64>) -> [f64; NESTED] {
+    fn ranks(inside: &MediumStack<f64>) -> [f64; NESTED] {
         inside.ranks
     }
 
     #[test]
     fn the_solid_listed_last_fills_the_space() {
-        let mut inside = Inside::<f64>::nothing();
+        let mut inside = MediumStack::<f64>::nothing();
         for rank in [2.0, 5.0, 1.0, 5.0] {
             inside = inside.with(rank);
         }

@@ -1,19 +1,19 @@
 //! The paths: camera rays, the light that surfaces return, reflections.
 
 use crate::bvh::{Hit, Ray};
-use crate::lanes::{Lanes, Mask, V3};
-use crate::material::Spread;
-use crate::sampling::Draws;
+use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::material::ReflectionLobe;
+use crate::sampling::PacketSampler;
 use crate::world::compile::World;
-use crate::world::culling::tile::Outlook;
-use crate::world::integrator::surface_textures::Patch;
+use crate::world::culling::tile::TileCandidates;
+use crate::world::integrator::surface_textures::ShadingPoints;
 use crate::world::light_groups::MAX_GROUPS;
 use std::f64::consts::FRAC_1_PI;
 
 /// The radiance of a packet's samples, per light group, for unit white light.
 pub struct Radiance<L> {
     /// The first [`World::groups`] are used.
-    pub groups: [V3<L>; MAX_GROUPS],
+    pub groups: [Vec3<L>; MAX_GROUPS],
 }
 
 /// What a packet cost.
@@ -30,29 +30,29 @@ pub struct Counts {
 pub(crate) struct Path<L> {
     pub ray: Ray<L>,
     /// What radiance from along the ray counts.
-    pub weight: V3<L>,
+    pub weight: Vec3<L>,
 }
 
-impl<L: Lanes> Path<L> {
+impl<L: SimdFloat> Path<L> {
     /// Weights above this saturate the film; infinity times black would be no number.
     const HEAVIEST: f64 = (1u64 << 60) as f64;
 
     /// `weight`, finite where mirrors amplify without end.
     #[inline(always)]
-    pub fn bounded(weight: V3<L>) -> V3<L> {
+    pub fn bounded(weight: Vec3<L>) -> Vec3<L> {
         let most = L::of(Self::HEAVIEST);
-        V3::new(most.min(weight.x), most.min(weight.y), most.min(weight.z))
+        Vec3::new(most.min(weight.x), most.min(weight.y), most.min(weight.z))
     }
 }
 
 /// The surfaces that a packet met.
-pub(crate) struct Met<L: Lanes> {
+pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     /// Normal on the viewer's side that light is computed with.
-    pub normal: V3<L>,
+    pub normal: Vec3<L>,
     /// The surface's own, on the viewer's side: the same but on smooth meshes and bumps. Light comes from that side.
-    pub geometric: V3<L>,
+    pub geometric: Vec3<L>,
     /// Where the rays end, on the surface.
-    pub point: V3<L>,
+    pub point: Vec3<L>,
     /// How far from there rays start that leave the surface.
     pub lift: L,
     /// Lanes that met the side that the surface's own normal points to.
@@ -62,9 +62,9 @@ pub(crate) struct Met<L: Lanes> {
     /// Tag of the finish.
     finish: L,
     /// Colour of the thing itself, which multiplies its finish's.
-    tint: V3<L>,
+    tint: Vec3<L>,
     /// k_d x colour.
-    diffuse: V3<L>,
+    diffuse: Vec3<L>,
     /// Lanes with a finish: all but those that met the back of a one-sided one.
     finished: L::Mask,
     /// Lanes whose finish answers lights.
@@ -77,7 +77,7 @@ pub(crate) struct Met<L: Lanes> {
 
 /// The first lane's tag, and the lanes of `mask` that share it; `None`: the mask is empty.
 #[inline(always)]
-pub(crate) fn first_tag<L: Lanes>(tags: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
+pub(crate) fn first_tag<L: SimdFloat>(tags: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
     let bits = mask.bits();
     if bits == 0 {
         return None;
@@ -86,7 +86,7 @@ pub(crate) fn first_tag<L: Lanes>(tags: L, mask: L::Mask) -> Option<(u32, L::Mas
     Some((tag, mask & tags.has_tag(tag)))
 }
 
-impl<L: Lanes> Met<L> {
+impl<L: SimdFloat> SurfaceInteraction<L> {
     /// Each finish that occurs among `lanes`, with its lanes.
     #[inline(always)]
     pub fn finishes(&self, lanes: L::Mask) -> impl Iterator<Item = (usize, L::Mask)> {
@@ -100,13 +100,13 @@ impl<L: Lanes> Met<L> {
 
     /// Origin of rays that leave on the viewer's side.
     #[inline(always)]
-    pub fn start(&self) -> V3<L> {
+    pub fn start(&self) -> Vec3<L> {
         self.geometric.mul_add(self.lift, self.point)
     }
 
     /// Origin of rays that leave on the other side.
     #[inline(always)]
-    pub fn beyond(&self) -> V3<L> {
+    pub fn beyond(&self) -> Vec3<L> {
         self.geometric.mul_add(-self.lift, self.point)
     }
 
@@ -127,7 +127,7 @@ impl<L: Lanes> Met<L> {
 
     /// What would go into the surface goes as steeply out of it.
     #[inline(always)]
-    pub fn outward(&self, direction: V3<L>) -> V3<L> {
+    pub fn outward(&self, direction: Vec3<L>) -> Vec3<L> {
         let height = direction.dot(self.geometric).min(L::zero());
         self.geometric.mul_add(height * L::of(-2.0), direction)
     }
@@ -135,14 +135,14 @@ impl<L: Lanes> Met<L> {
     /// Takes what is `other`'s in `lanes`, which have nothing yet.
     #[inline(always)]
     fn take(&mut self, lanes: L::Mask, other: &Self) {
-        self.normal = V3::select(lanes, other.normal, self.normal);
-        self.geometric = V3::select(lanes, other.geometric, self.geometric);
-        self.tint = V3::select(lanes, other.tint, self.tint);
-        self.point = V3::select(lanes, other.point, self.point);
+        self.normal = Vec3::select(lanes, other.normal, self.normal);
+        self.geometric = Vec3::select(lanes, other.geometric, self.geometric);
+        self.tint = Vec3::select(lanes, other.tint, self.tint);
+        self.point = Vec3::select(lanes, other.point, self.point);
         self.lift = L::select(lanes, other.lift, self.lift);
         self.front = self.front | other.front;
         self.finish = L::select(lanes, other.finish, self.finish);
-        self.diffuse = V3::select(lanes, other.diffuse, self.diffuse);
+        self.diffuse = Vec3::select(lanes, other.diffuse, self.diffuse);
         self.finished = self.finished | other.finished;
         self.lit = self.lit | other.lit;
         self.shining = self.shining | other.shining;
@@ -150,21 +150,21 @@ impl<L: Lanes> Met<L> {
     }
 }
 
-impl<L: Lanes> World<L> {
-    /// Traces one packet of camera samples: `origin` and `direction` as [`crate::camera::View`] makes
+impl<L: SimdFloat> World<L> {
+    /// Traces one packet of camera samples: `origin` and `direction` as [`crate::camera::PinholeCamera`] makes
     /// them. Lanes outside `active` stay black. `outlook`: what these rays and the shadow rays from
     /// where they end may meet, if that is known.
     #[inline(always)]
     pub fn trace(
         &self,
-        (origin, direction): (V3<L>, V3<L>),
-        outlook: Option<&Outlook>,
-        draws: &Draws<'_, L>,
+        (origin, direction): (Vec3<L>, Vec3<L>),
+        outlook: Option<&TileCandidates>,
+        draws: &PacketSampler<'_, L>,
         active: L::Mask,
         out: &mut Radiance<L>,
     ) -> Counts {
         for group in &mut out.groups[..self.groups()] {
-            *group = V3::zero();
+            *group = Vec3::zero();
         }
         let ray = Ray { origin, direction };
         let outlook = outlook.unwrap_or(&self.panorama);
@@ -183,13 +183,13 @@ impl<L: Lanes> World<L> {
     fn trace_opaque<'a, const PLAIN: bool>(
         &'a self,
         ray: Ray<L>,
-        mut outlook: &'a Outlook,
-        draws: &Draws<'_, L>,
+        mut outlook: &'a TileCandidates,
+        draws: &PacketSampler<'_, L>,
         mut active: L::Mask,
         out: &mut Radiance<L>,
     ) -> Counts {
         let mut counts = Counts::default();
-        let mut path = Path { ray, weight: V3::of([1.0; 3]) };
+        let mut path = Path { ray, weight: Vec3::of([1.0; 3]) };
         let mut bounce = 0;
         loop {
             counts.rays += u64::from(active.bits().count_ones());
@@ -224,7 +224,7 @@ impl<L: Lanes> World<L> {
         ray: &Ray<L>,
         hit: &Hit<L>,
         active: L::Mask,
-    ) -> Option<Met<L>> {
+    ) -> Option<SurfaceInteraction<L>> {
         let (item, here) = first_tag(hit.item, active)?;
         let others = active.and_not(here);
         Some(if others.none() {
@@ -242,7 +242,7 @@ impl<L: Lanes> World<L> {
         hit: &Hit<L>,
         (first, here): (u32, L::Mask),
         mut left: L::Mask,
-    ) -> Met<L> {
+    ) -> SurfaceInteraction<L> {
         let mut met = self.face::<PLAIN>(ray, hit, first, here);
         while let Some((item, here)) = first_tag(hit.item, left) {
             met.take(here, &self.face::<PLAIN>(ray, hit, item, here));
@@ -259,19 +259,19 @@ impl<L: Lanes> World<L> {
         hit: &Hit<L>,
         item: u32,
         lanes: L::Mask,
-    ) -> Met<L> {
+    ) -> SurfaceInteraction<L> {
         let surface = self.geometry.surface(item, hit.facet, ray.at(hit.t));
         let front = surface.normal.dot(ray.direction).lt(L::zero());
-        let geometric = V3::select(front, surface.normal, -surface.normal);
+        let geometric = Vec3::select(front, surface.normal, -surface.normal);
         let number = self.finish_of[item as usize];
         let finish = &self.finishes[number as usize];
         let mut normal = geometric;
-        let patch = || Patch { item, facet: hit.facet, surface, lanes };
+        let patch = || ShadingPoints { item, facet: hit.facet, surface, lanes };
         if !PLAIN && self.smooth {
             normal = self.shading_normal(&patch(), (front, geometric), ray.direction);
         }
-        let mut tint = V3::of([1.0; 3]);
-        let mut diffuse = V3::splat(finish.diffuse);
+        let mut tint = Vec3::of([1.0; 3]);
+        let mut diffuse = Vec3::splat(finish.diffuse);
         if !PLAIN
             && self.colored
             && let Some(color) = self.own_color(&patch())
@@ -280,7 +280,7 @@ impl<L: Lanes> World<L> {
         }
         let finished = if finish.two_sided { lanes } else { lanes & front };
         let those = |having: bool| if having { finished } else { L::mask(false) };
-        Met {
+        SurfaceInteraction {
             normal,
             geometric,
             tint,
@@ -302,14 +302,14 @@ impl<L: Lanes> World<L> {
     pub(crate) fn light<const PLAIN: bool>(
         &self,
         path: &Path<L>,
-        met: &Met<L>,
-        outlook: &Outlook,
+        met: &SurfaceInteraction<L>,
+        outlook: &TileCandidates,
         out: &mut Radiance<L>,
         counts: &mut Counts,
     ) {
         if let Some(group) = self.ambient {
             for (finish, lanes) in met.finishes(met.finished) {
-                let mut ambient = V3::splat(self.finishes[finish].ambient);
+                let mut ambient = Vec3::splat(self.finishes[finish].ambient);
                 if !PLAIN && self.colored {
                     ambient = ambient.times(met.tint);
                 }
@@ -359,7 +359,7 @@ impl<L: Lanes> World<L> {
             }
             let mut value = path.weight.times(value) * arrival.irradiance;
             if let Some(strength) = source.weight {
-                value = value.times(V3::splat(strength));
+                value = value.times(Vec3::splat(strength));
             }
             out.groups[source.group] += value.only(lit);
         }
@@ -370,8 +370,8 @@ impl<L: Lanes> World<L> {
     pub(crate) fn bounce<const PLAIN: bool>(
         &self,
         path: &mut Path<L>,
-        met: &Met<L>,
-        draws: &Draws<'_, L>,
+        met: &SurfaceInteraction<L>,
+        draws: &PacketSampler<'_, L>,
         bounce: u32,
         counts: &mut Counts,
     ) -> L::Mask {
@@ -380,7 +380,7 @@ impl<L: Lanes> World<L> {
         for (finish, lanes) in met.finishes(met.reflecting) {
             let finish = &self.finishes[finish];
             let Some((strength, spread)) = &finish.reflection else { continue };
-            let uv = if matches!(spread, Spread::Mirror) {
+            let uv = if matches!(spread, ReflectionLobe::Mirror) {
                 (L::zero(), L::zero())
             } else {
                 counts.glossy = true;
@@ -391,9 +391,9 @@ impl<L: Lanes> World<L> {
             if !PLAIN && self.smooth {
                 out = met.outward(out);
             }
-            path.ray.direction = V3::select(lanes, out, path.ray.direction);
+            path.ray.direction = Vec3::select(lanes, out, path.ray.direction);
             let weight = Path::bounded(weight.times(r.weight));
-            path.weight = V3::select(lanes, weight, path.weight);
+            path.weight = Vec3::select(lanes, weight, path.weight);
         }
         path.ray.origin = met.start();
         let strongest = path.weight.max_element();

@@ -1,36 +1,36 @@
 //! Textures and bumps on the things of a world: what materials say, laid on shapes where they stand.
 
-use crate::lanes::{Lanes, Mask, V3};
+use crate::lanes::{Mask, SimdFloat, Vec3};
 use crate::material::{
-    Bump, Coordinates, Heights, Mapping, Material, Pattern, Placement, Projection, Projector,
-    Texture,
+    Bump, BumpMap, CompiledTexture, Mapping, Material, Placement, Projection, TexCoord, Texture,
+    TextureMapping,
 };
-use crate::primitive::{Geometry, Source, Surface, facing};
+use crate::primitive::{Aggregate, PrimitiveId, SurfacePoint, facing};
 use crate::scene::Scene;
-use crate::shape::{TextureSpace, Unwrapped};
+use crate::shape::{DefaultMapping, TextureSpace};
 use crate::world::compile::World;
 use glam::{DAffine3, DVec3};
 
 /// What one item wears.
-struct Skin<S> {
-    pattern: Option<(Projector<S>, Pattern<S>)>,
-    heights: Option<(Projector<S>, Heights)>,
+struct SurfaceTexture<S> {
+    pattern: Option<(TextureMapping<S>, CompiledTexture<S>)>,
+    heights: Option<(TextureMapping<S>, BumpMap)>,
 }
 
 /// What the items of a world wear.
-pub(crate) struct Skins<L: Lanes> {
-    of_item: Vec<Option<Skin<L::Scalar>>>,
+pub(crate) struct SurfaceTextures<L: SimdFloat> {
+    of_item: Vec<Option<SurfaceTexture<L::Scalar>>>,
 }
 
 /// A packet's points on the surface of one item. Made only where it is asked for, so that elsewhere
 /// nothing of it leaves the registers.
-pub(crate) struct Patch<L: Lanes> {
+pub(crate) struct ShadingPoints<L: SimdFloat> {
     /// Tag of the item.
     pub item: u32,
     /// Tags of the triangles, on a mesh.
     pub facet: L,
     /// The points, with the normals that point outwards.
-    pub surface: Surface<L>,
+    pub surface: SurfacePoint<L>,
     /// The lanes that are there.
     pub lanes: L::Mask,
 }
@@ -38,24 +38,26 @@ pub(crate) struct Patch<L: Lanes> {
 /// The formula that a mapping comes to on a shape.
 fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
     match (mapping, space.unwrapped) {
-        (Mapping::Planar, _) | (Mapping::Uv | Mapping::Auto, Unwrapped::Plane) => {
+        (Mapping::Planar, _) | (Mapping::Uv | Mapping::Auto, DefaultMapping::Plane) => {
             Projection::Planar
         }
-        (Mapping::Spherical, _) | (Mapping::Auto, Unwrapped::Ball) => Projection::Spherical,
-        (Mapping::Cylindrical, _) | (Mapping::Auto, Unwrapped::Turned) => Projection::Cylindrical,
-        (Mapping::Box, _) | (Mapping::Auto, Unwrapped::Sides) => Projection::Box,
-        (Mapping::Uv, _) | (Mapping::Auto, Unwrapped::Uv) => Projection::Uv,
+        (Mapping::Spherical, _) | (Mapping::Auto, DefaultMapping::Ball) => Projection::Spherical,
+        (Mapping::Cylindrical, _) | (Mapping::Auto, DefaultMapping::Turned) => {
+            Projection::Cylindrical
+        }
+        (Mapping::Box, _) | (Mapping::Auto, DefaultMapping::Sides) => Projection::Box,
+        (Mapping::Uv, _) | (Mapping::Auto, DefaultMapping::Uv) => Projection::Uv,
     }
 }
 
-impl<L: Lanes> Skins<L> {
+impl<L: SimdFloat> SurfaceTextures<L> {
     /// For each of the items that `sources` lists what its material says, which `material` finds by
     /// object and part; `None`: nothing is worn. `origin`: what was subtracted from the scene.
     pub fn new<'a>(
         scene: &Scene,
-        sources: &[Source],
+        sources: &[PrimitiveId],
         origin: DVec3,
-        material: impl Fn(&Source) -> &'a Material,
+        material: impl Fn(&PrimitiveId) -> &'a Material,
     ) -> Option<Self> {
         let worn = |m: &Material| {
             m.texture.as_ref().is_some_and(Texture::shows)
@@ -79,19 +81,20 @@ impl<L: Lanes> Skins<L> {
             let there = back * object.scene_from_object() * space.shape_from_texture;
             let projector = |placement: &Placement| {
                 let projection = projection(placement.mapping, space);
-                Projector::new(placement, projection, &there, space.corners)
+                TextureMapping::new(placement, projection, &there, space.corners)
             };
             let texture = material.texture.as_ref();
             let bump = material.bump.as_ref();
-            Some(Skin {
-                pattern: texture.and_then(|t| Some((projector(&t.placement()), Pattern::new(t)?))),
-                heights: bump.and_then(|b| Some((projector(&b.placement()), Heights::new(b)?))),
+            Some(SurfaceTexture {
+                pattern: texture
+                    .and_then(|t| Some((projector(&t.placement()), CompiledTexture::new(t)?))),
+                heights: bump.and_then(|b| Some((projector(&b.placement()), BumpMap::new(b)?))),
             })
         });
         Some(Self { of_item: of_item.collect() })
     }
 
-    fn skins(&self) -> impl Iterator<Item = &Skin<L::Scalar>> {
+    fn skins(&self) -> impl Iterator<Item = &SurfaceTexture<L::Scalar>> {
         self.of_item.iter().flatten()
     }
 
@@ -108,7 +111,7 @@ impl<L: Lanes> Skins<L> {
     /// What occurs, in words.
     pub fn words(&self) -> Vec<&'static str> {
         let patterns = || self.skins().filter_map(|skin| skin.pattern.as_ref());
-        let image = |pattern: &Pattern<_>| matches!(pattern, Pattern::Image { .. });
+        let image = |pattern: &CompiledTexture<_>| matches!(pattern, CompiledTexture::Image { .. });
         let mut words = Vec::new();
         words.extend(patterns().any(|(_, p)| image(p)).then_some("image texture"));
         words.extend(patterns().any(|(_, p)| !image(p)).then_some("checker"));
@@ -118,30 +121,30 @@ impl<L: Lanes> Skins<L> {
 }
 
 /// Coordinates by a projection, or by what the mesh says.
-fn coordinates<L: Lanes>(
-    geometry: &Geometry<L>,
-    projector: &Projector<L::Scalar>,
-    patch: &Patch<L>,
-) -> Coordinates<L> {
+fn coordinates<L: SimdFloat>(
+    geometry: &Aggregate<L>,
+    projector: &TextureMapping<L::Scalar>,
+    patch: &ShadingPoints<L>,
+) -> TexCoord<L> {
     let surface = &patch.surface;
     if projector.wants_uv()
         && let Some(own) = geometry.uv(patch.item, patch.facet, surface.point)
     {
         let [u, v] = own.uv;
         let [du, dv] = own.gradients;
-        return projector.placed(Coordinates { u, v, du, dv });
+        return projector.placed(TexCoord { u, v, du, dv });
     }
     projector.coordinates(surface.point, surface.normal)
 }
 
-impl<L: Lanes> World<L> {
-    fn skin(&self, item: u32) -> Option<&Skin<L::Scalar>> {
+impl<L: SimdFloat> World<L> {
+    fn skin(&self, item: u32) -> Option<&SurfaceTexture<L::Scalar>> {
         self.skins.as_ref()?.of_item[item as usize].as_ref()
     }
 
     /// The colour of its own that a thing has, if it has one: that in its mesh's file, and its texture.
     #[inline(never)]
-    pub(crate) fn own_color(&self, patch: &Patch<L>) -> Option<V3<L>> {
+    pub(crate) fn own_color(&self, patch: &ShadingPoints<L>) -> Option<Vec3<L>> {
         let painted = self.geometry.color(patch.item, patch.facet);
         let Some((projector, pattern)) = self.skin(patch.item).and_then(|s| s.pattern.as_ref())
         else {
@@ -158,10 +161,10 @@ impl<L: Lanes> World<L> {
     #[inline(never)]
     pub(crate) fn shading_normal(
         &self,
-        patch: &Patch<L>,
-        (front, geometric): (L::Mask, V3<L>),
-        direction: V3<L>,
-    ) -> V3<L> {
+        patch: &ShadingPoints<L>,
+        (front, geometric): (L::Mask, Vec3<L>),
+        direction: Vec3<L>,
+    ) -> Vec3<L> {
         let at = (patch.surface.point, geometric);
         let normal = self.geometry.shading_normal((patch.item, patch.facet), at, direction);
         let Some((projector, heights)) = self.skin(patch.item).and_then(|s| s.heights.as_ref())

@@ -1,14 +1,14 @@
 //! The paths of worlds with surfaces that let light through: trees of reflected and transmitted rays.
 
 use crate::bvh::{Hit, Ray};
-use crate::lanes::{Lanes, Mask, V3};
-use crate::material::{Interface, Spread};
-use crate::sampling::Draws;
+use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::material::{Interface, ReflectionLobe};
+use crate::sampling::PacketSampler;
 use crate::world::compile::World;
-use crate::world::culling::tile::Outlook;
+use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::coincident_surfaces::{Contacts, Layer, Seam};
-use crate::world::integrator::nested_dielectrics::{Crossing, Inside, Media};
-use crate::world::integrator::opaque::{Counts, Met, Path, Radiance, first_tag};
+use crate::world::integrator::nested_dielectrics::{InterfaceHit, MediumStack, NestedDielectrics};
+use crate::world::integrator::opaque::{Counts, Path, Radiance, SurfaceInteraction, first_tag};
 
 /// At so many surfaces, counted from the eye, a path follows both the reflected and the transmitted ray;
 /// from then on one of them, by chance.
@@ -16,11 +16,11 @@ const BOTH: usize = 2;
 
 /// A packet of paths on their way.
 #[derive(Clone, Copy)]
-struct Arm<L: Lanes> {
+struct Branch<L: SimdFloat> {
     path: Path<L>,
     lanes: L::Mask,
     /// What the rays are inside.
-    inside: Inside<L>,
+    inside: MediumStack<L>,
     /// Surfaces met before.
     bounce: u32,
     /// Where the rays begin on surfaces that lie on others.
@@ -28,52 +28,52 @@ struct Arm<L: Lanes> {
 }
 
 /// Arms that wait until those that left the same surfaces are done.
-struct Waiting<L: Lanes> {
-    arms: [Option<Arm<L>>; BOTH],
+struct BranchStack<L: SimdFloat> {
+    arms: [Option<Branch<L>>; BOTH],
 }
 
-impl<L: Lanes> Waiting<L> {
+impl<L: SimdFloat> BranchStack<L> {
     /// `arm` left a surface that is no farther from the eye than `BOTH`, and every arm left another.
-    fn push(&mut self, arm: Arm<L>) {
+    fn push(&mut self, arm: Branch<L>) {
         self.arms[arm.bounce as usize - 1] = Some(arm);
     }
 
     /// The one that left the surface farthest from the eye.
-    fn pop(&mut self) -> Option<Arm<L>> {
+    fn pop(&mut self) -> Option<Branch<L>> {
         self.arms.iter_mut().rev().find_map(Option::take)
     }
 }
 
 /// Two ways to go on from a surface.
-struct Ways<L> {
+struct SplitDirections<L> {
     /// Direction of the reflected rays.
-    mirrored: V3<L>,
+    mirrored: Vec3<L>,
     /// What they count.
-    mirrored_weight: V3<L>,
+    mirrored_weight: Vec3<L>,
     /// Direction of the transmitted rays.
-    passed: V3<L>,
+    passed: Vec3<L>,
     /// What they count.
-    passed_weight: V3<L>,
+    passed_weight: Vec3<L>,
 }
 
-impl<L: Lanes> World<L> {
+impl<L: SimdFloat> World<L> {
     /// [`World::trace`] for a world with `media`. In every lane what a surface transmits is traced
     /// before what it reflects, whatever the other lanes do.
     #[inline(never)]
     pub(crate) fn trace_through(
         &self,
-        media: &Media<L>,
+        media: &NestedDielectrics<L>,
         ray: Ray<L>,
-        outlook: &Outlook,
-        draws: &Draws<'_, L>,
+        outlook: &TileCandidates,
+        draws: &PacketSampler<'_, L>,
         lanes: L::Mask,
         out: &mut Radiance<L>,
     ) -> Counts {
         let mut counts = Counts::default();
         let inside = media.at_start(&ray);
-        let path = Path { ray, weight: V3::of([1.0; 3]) };
-        let mut waiting = Waiting { arms: [None; BOTH] };
-        let mut arm = Arm { path, lanes, inside, bounce: 0, seam: Seam::none() };
+        let path = Path { ray, weight: Vec3::of([1.0; 3]) };
+        let mut waiting = BranchStack { arms: [None; BOTH] };
+        let mut arm = Branch { path, lanes, inside, bounce: 0, seam: Seam::none() };
         loop {
             let outlook = if arm.bounce == 0 { outlook } else { &self.panorama };
             if !self.follow(media, &mut arm, outlook, draws, &mut waiting, out, &mut counts) {
@@ -90,15 +90,15 @@ impl<L: Lanes> World<L> {
     #[allow(clippy::too_many_arguments, reason = "what a path's step reads and what it writes")]
     fn follow(
         &self,
-        media: &Media<L>,
-        arm: &mut Arm<L>,
-        outlook: &Outlook,
-        draws: &Draws<'_, L>,
-        waiting: &mut Waiting<L>,
+        media: &NestedDielectrics<L>,
+        arm: &mut Branch<L>,
+        outlook: &TileCandidates,
+        draws: &PacketSampler<'_, L>,
+        waiting: &mut BranchStack<L>,
         out: &mut Radiance<L>,
         counts: &mut Counts,
     ) -> bool {
-        let Arm { mut path, inside, bounce, seam, .. } = *arm;
+        let Branch { mut path, inside, bounce, seam, .. } = *arm;
         counts.rays += u64::from(arm.lanes.bits().count_ones());
         let mut hit = self.geometry.closest_of(&path.ray, &outlook.seen, arm.lanes);
         let mut behind = None;
@@ -107,7 +107,7 @@ impl<L: Lanes> World<L> {
         {
             let seam = Seam { lanes: seam.lanes & arm.lanes, ..seam };
             let next = contacts.next(&self.geometry, &seam, &inside);
-            let origin = V3::select(next.lanes, seam.point, path.ray.origin);
+            let origin = Vec3::select(next.lanes, seam.point, path.ray.origin);
             path.ray.origin = origin;
             hit.take_in(next.lanes, L::zero(), (next.item, next.facet));
             behind = Some(next);
@@ -139,20 +139,20 @@ impl<L: Lanes> World<L> {
             return arm.lanes.any();
         };
         let ways = self.ways(&path, &met, &crossing, draws, bounce - 1, counts);
-        let worth = |weight: V3<L>| {
+        let worth = |weight: Vec3<L>| {
             let strongest = weight.max_element();
             strongest.gt(L::zero()) & strongest.ge(L::of(self.min_weight))
         };
         let mirrors = (met.reflecting | crossing.lanes) & worth(ways.mirrored_weight);
         let passes = crossing.lanes & worth(ways.passed_weight);
         let both = mirrors & passes;
-        let mirrored = Arm {
+        let mirrored = Branch {
             path: Path {
                 ray: Ray { origin: met.start(), direction: ways.mirrored },
                 weight: ways.mirrored_weight,
             },
             lanes: both,
-            inside: Inside::select(crossing.lanes, &crossing.before, &inside),
+            inside: MediumStack::select(crossing.lanes, &crossing.before, &inside),
             bounce,
             seam: seam.reversed(),
         };
@@ -167,7 +167,7 @@ impl<L: Lanes> World<L> {
                 let (r, t) = (mirrored_weight.max_element(), passed_weight.max_element());
                 let back = both & (draws.choice(bounce - 1 - BOTH as u32) * (r + t)).lt(r);
                 through = through.and_not(back);
-                let scaled = |v: V3<L>, k: L| V3::select(both, v * ((r + t) / k), v);
+                let scaled = |v: Vec3<L>, k: L| Vec3::select(both, v * ((r + t) / k), v);
                 mirrored_weight = scaled(mirrored_weight, r);
                 passed_weight = scaled(passed_weight, t);
             }
@@ -175,14 +175,14 @@ impl<L: Lanes> World<L> {
         let lanes = mirrors | passes;
         let path = Path {
             ray: Ray {
-                origin: V3::select(through, met.beyond(), met.start()),
-                direction: V3::select(through, ways.passed, ways.mirrored),
+                origin: Vec3::select(through, met.beyond(), met.start()),
+                direction: Vec3::select(through, ways.passed, ways.mirrored),
             },
-            weight: V3::select(through, passed_weight, mirrored_weight),
+            weight: Vec3::select(through, passed_weight, mirrored_weight),
         };
-        let inside = Inside::select(through, &crossing.behind, &mirrored.inside);
+        let inside = MediumStack::select(through, &crossing.behind, &mirrored.inside);
         let seam = Seam::select(through, &seam, &mirrored.seam);
-        *arm = Arm { path, lanes, inside, bounce, seam };
+        *arm = Branch { path, lanes, inside, bounce, seam };
         lanes.any()
     }
 
@@ -193,10 +193,10 @@ impl<L: Lanes> World<L> {
         &self,
         contacts: &Contacts<L::Scalar>,
         path: &Path<L>,
-        (hit, met): (&mut Hit<L>, &mut Met<L>),
+        (hit, met): (&mut Hit<L>, &mut SurfaceInteraction<L>),
         lanes: L::Mask,
         behind: Option<&Layer<L>>,
-        inside: &Inside<L>,
+        inside: &MediumStack<L>,
     ) -> Seam<L> {
         let (mut layer, mut lift, mut among) = (L::zero(), met.lift, L::mask(false));
         if let Some(next) = behind {
@@ -240,11 +240,11 @@ impl<L: Lanes> World<L> {
     /// Where the rays of `lanes` meet surfaces that let light through; `None`: none of them does.
     fn crossing(
         &self,
-        media: &Media<L>,
-        met: &Met<L>,
+        media: &NestedDielectrics<L>,
+        met: &SurfaceInteraction<L>,
         lanes: L::Mask,
-        inside: &Inside<L>,
-    ) -> Option<Crossing<L>> {
+        inside: &MediumStack<L>,
+    ) -> Option<InterfaceHit<L>> {
         let mut through = L::mask(false);
         let mut index = L::one();
         for (finish, here) in met.finishes(lanes) {
@@ -260,20 +260,20 @@ impl<L: Lanes> World<L> {
     fn ways(
         &self,
         path: &Path<L>,
-        met: &Met<L>,
-        crossing: &Crossing<L>,
-        draws: &Draws<'_, L>,
+        met: &SurfaceInteraction<L>,
+        crossing: &InterfaceHit<L>,
+        draws: &PacketSampler<'_, L>,
         bounce: u32,
         counts: &mut Counts,
-    ) -> Ways<L> {
+    ) -> SplitDirections<L> {
         let incident = path.ray.direction;
         let interface = Interface::new(incident, met.normal, crossing.n_i, crossing.n_t);
         let straight = crossing.pane | crossing.hidden;
-        let mut ways = Ways {
+        let mut ways = SplitDirections {
             mirrored: incident.reflect(met.normal),
-            mirrored_weight: V3::zero(),
-            passed: V3::select(straight, incident, interface.refracted),
-            passed_weight: V3::zero(),
+            mirrored_weight: Vec3::zero(),
+            passed: Vec3::select(straight, incident, interface.refracted),
+            passed_weight: Vec3::zero(),
         };
         let mut numbers = None;
         for (finish, lanes) in met.finishes(met.reflecting | crossing.lanes) {
@@ -290,9 +290,9 @@ impl<L: Lanes> World<L> {
                 }
                 own = split.reflected.only(!crossing.hidden);
                 let passed = L::select(crossing.hidden, L::one(), split.transmitted);
-                ways.passed_weight = V3::select(lanes, path.weight * passed, ways.passed_weight);
+                ways.passed_weight = Vec3::select(lanes, path.weight * passed, ways.passed_weight);
                 let total = path.weight * split.total.only(!crossing.hidden);
-                ways.mirrored_weight = V3::select(lanes, total, ways.mirrored_weight);
+                ways.mirrored_weight = Vec3::select(lanes, total, ways.mirrored_weight);
             }
             let Some((strength, spread)) = &finish.reflection else { continue };
             // Not on backs without a finish.
@@ -300,7 +300,7 @@ impl<L: Lanes> World<L> {
             if lanes.none() {
                 continue;
             }
-            let uv = if matches!(spread, Spread::Mirror) {
+            let uv = if matches!(spread, ReflectionLobe::Mirror) {
                 (L::zero(), L::zero())
             } else {
                 counts.glossy = true;
@@ -308,8 +308,8 @@ impl<L: Lanes> World<L> {
             };
             let r = finish.reflect(*strength, spread, incident, met.normal, uv, self.fold);
             let weight = path.weight.times(r.weight) * own;
-            ways.mirrored = V3::select(lanes, r.direction, ways.mirrored);
-            ways.mirrored_weight = V3::select(lanes, weight, ways.mirrored_weight);
+            ways.mirrored = Vec3::select(lanes, r.direction, ways.mirrored);
+            ways.mirrored_weight = Vec3::select(lanes, weight, ways.mirrored_weight);
         }
         if self.smooth {
             ways.mirrored = met.outward(ways.mirrored);

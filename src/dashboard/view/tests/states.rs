@@ -13,7 +13,7 @@ use crate::dashboard::overlay::{
 use crate::dashboard::panel_lines::{Line, scrolled};
 use crate::dashboard::testing::report;
 use crate::dashboard::update::update;
-use crate::film::{Mix, Probe};
+use crate::film::{LightWeights, Probe};
 use crate::render::schedule::{Spp, Stop, StoppedBy};
 use crate::render::session::{Report, Snapshot, State, TileMaps};
 use crate::scene::edit::{self, Subject};
@@ -68,7 +68,7 @@ pub fn snapshot(report: Report) -> Snapshot {
     Snapshot {
         report,
         picture: None,
-        mix: Mix { weights: Vec::new() },
+        mix: LightWeights { weights: Vec::new() },
         lighting: None,
         guide: None,
         tiles: Arc::new(TileMaps {
