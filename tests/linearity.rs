@@ -8,7 +8,7 @@ use support::{
 };
 use zerkalo::film::{Display, LightWeights, Replicates};
 use zerkalo::render::schedule::{Stop, StoppedBy};
-use zerkalo::scene::{Horizon, Level, Scene, TransformOp};
+use zerkalo::scene::{BelowHorizon, RayTypes, Scene, TransformOp};
 use zerkalo::value::Color;
 use zerkalo::world::{self, AnyWorld, Precision};
 
@@ -219,7 +219,7 @@ fn levels_add_shadows_and_reflections() {
             ["primary", "shadows", "full"].map(|l| small(&format!("level-{l}.toml")));
         let mut unreflected = full.clone();
         unreflected.trace.depth = 0;
-        assert_eq!(primary.trace.level, Level::Primary);
+        assert_eq!(primary.trace.level, RayTypes::Primary);
         let [lit, shadowed, reflected] = [&primary, &shadows, &full].map(|s| values(s, precision));
         // Shadows only take light away, reflections only add it.
         assert!(shadowed.iter().zip(&lit).all(|(s, l)| s <= l));
@@ -293,7 +293,10 @@ fn the_horizon_folds_or_absorbs() {
     for precision in PRECISIONS {
         let (fold, absorb) = (small("horizon-fold.toml"), small("horizon-absorb.toml"));
         assert!(has(&absorb, "absorbing horizon") && !has(&fold, "absorbing horizon"));
-        assert_eq!(fold.trace, zerkalo::scene::Trace { horizon: Horizon::Fold, ..absorb.trace });
+        assert_eq!(
+            fold.trace,
+            zerkalo::scene::IntegratorSettings { horizon: BelowHorizon::Fold, ..absorb.trace }
+        );
         // The rays that do not dip are the same: absorbing only takes light away.
         let [kept, lost] = [&fold, &absorb].map(|s| values(s, precision));
         assert!(lost.iter().zip(&kept).all(|(lost, kept)| lost <= kept));

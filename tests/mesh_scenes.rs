@@ -12,7 +12,7 @@ use support::{picture, rendered};
 use zerkalo::asset::Assets;
 use zerkalo::film::Replicates;
 use zerkalo::primitive::Form;
-use zerkalo::scene::edit::{Subject, add_object, set};
+use zerkalo::scene::edit::{Target, add_object, set};
 use zerkalo::scene::{Scene, SceneFile};
 use zerkalo::world::{AnyWorld, FirstHit, Options, Precision};
 
@@ -377,7 +377,7 @@ fn a_wrong_name_is_refused_where_it_is_typed_and_a_right_one_read_once() {
     fs::remove_file(ball_file).unwrap();
     let flat = set(&named, &subject, "shape.mesh.normals", "flat").unwrap().scene;
     let turned = set(&flat, &subject, "transform", "rotate_y").unwrap().scene;
-    let lit = set(&turned, &Subject::Ambient, "color", "0.5 0.5 0.5").unwrap().scene;
+    let lit = set(&turned, &Target::Ambient, "color", "0.5 0.5 0.5").unwrap().scene;
     assert_eq!(mesh(&lit), mesh(&named));
     assert!(typed(&lit, "other.obj").is_err());
     assert!(lit.faults().is_empty());

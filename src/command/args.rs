@@ -1,7 +1,7 @@
 //! The command line.
 
 use crate::film::Tone;
-use crate::measure::Topic;
+use crate::measure::Experiment;
 use crate::sampling::SamplerKind;
 use crate::scene::Acceleration;
 use crate::world::Precision;
@@ -138,7 +138,7 @@ pub struct MeasureArgs {
     pub noise: Vec<f64>,
     /// Compare only these settings, such as: adaptivity,precision,threads,sampler,lobe,level,depth,min-weight,rays-per-pixel,acceleration
     #[arg(long, value_name = "SETTING,..", value_delimiter = ',', conflicts_with = "full")]
-    pub only: Vec<Topic>,
+    pub only: Vec<Experiment>,
     /// Compare all settings, which takes about five minutes
     #[arg(long)]
     pub full: bool,

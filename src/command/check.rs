@@ -1,14 +1,14 @@
 //! `zerkalo check`: is a scene valid, and what is in it?
 
 use crate::command::args::CheckArgs;
-use crate::command::load_progress::Told;
+use crate::command::load_progress::LoadReporter;
 use crate::command::{Failure, say, warn};
 use crate::film::{TILE, TILE_PIXELS};
 use crate::scene::Document;
 use crate::world::{self, AnyWorld};
 
 pub fn run(args: &CheckArgs) -> Result<(), Failure> {
-    let document = Document::read_with(&args.scene, Told::new().assets)
+    let document = Document::read_with(&args.scene, LoadReporter::new().assets)
         .map_err(|e| Failure::Failed(e.to_string()))?;
     for warning in document.warnings() {
         warn(&format!("warning: {warning}"));

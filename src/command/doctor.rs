@@ -4,11 +4,11 @@
 use crate::command::args::DoctorArgs;
 use crate::command::{Failure, say};
 use crate::dashboard::overlay_layout::wrapped;
-use crate::dashboard::run::{Colors, Examined, examine};
+use crate::dashboard::run::{Colors, TerminalReport, examine};
 use crate::scene::{kept_in, state_folder};
-use crate::terminal::flow::{DEFAULT_RATE, Mode};
+use crate::terminal::flow::{DEFAULT_RATE, PacingMode};
 use crate::terminal::image::Protocol;
-use crate::terminal::{Capabilities, Multiplexer, Surroundings};
+use crate::terminal::{Capabilities, Environment, Multiplexer};
 use crate::value::printable;
 use std::env;
 use std::io::{self, IsTerminal};
@@ -21,7 +21,7 @@ const NAME: usize = 17;
 
 pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
-    let surroundings = Surroundings::of(variable);
+    let surroundings = Environment::of(variable);
     let why_not = if surroundings.term == "dumb" {
         Some("it understands nothing, and the dashboard does not open in it")
     } else if !io::stdin().is_terminal() || !io::stdout().is_terminal() {
@@ -35,7 +35,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
             .map_err(|error| Failure::Failed(format!("the terminal cannot be used: {error}")))?),
     };
     let state = state_folder(|name| env::var_os(name));
-    let found = Found {
+    let found = DoctorReport {
         surroundings,
         examined,
         asked_for_rate: args.rate,
@@ -50,10 +50,10 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
 }
 
 /// Everything that is reported.
-struct Found {
-    surroundings: Surroundings,
+struct DoctorReport {
+    surroundings: Environment,
     /// What the terminal answered, or why it was not asked.
-    examined: Result<Examined, &'static str>,
+    examined: Result<TerminalReport, &'static str>,
     asked_for_rate: bool,
     /// The variable that tells the character encoding, and its value.
     locale: Option<(&'static str, String)>,
@@ -62,14 +62,14 @@ struct Found {
     kept: Vec<PathBuf>,
 }
 
-impl Found {
+impl DoctorReport {
     fn report(&self) -> String {
         let mut lines = vec![format!("zerkalo {}", env!("CARGO_PKG_VERSION")), String::new()];
         let row = |name: &str, what: String| indented(&format!("{name:<NAME$}"), &what);
         lines.push(row("terminal", self.terminal()));
         lines.push(row("between", self.between()));
         lines.push(row("colours", self.colors()));
-        if let Ok(Examined { terminal, mode, cells, pixels, rate }) = &self.examined {
+        if let Ok(TerminalReport { terminal, mode, cells, pixels, rate }) = &self.examined {
             lines.push(row("background", background(terminal)));
             lines.push(row("size", size(*cells, *pixels)));
             lines.push(row("whole frames", whole_frames(terminal)));
@@ -138,7 +138,7 @@ impl Found {
 
     /// The level, and why: the first that says so of NO_COLOR, COLORTERM, TERM, the terminal.
     fn colors(&self) -> String {
-        let Surroundings { term, color_term, no_color, .. } = &self.surroundings;
+        let Environment { term, color_term, no_color, .. } = &self.surroundings;
         let level = self.level();
         let promised = self.surroundings.colors();
         let why = if *no_color {
@@ -175,12 +175,12 @@ impl Found {
         }
     }
 
-    fn rate(&self, mode: Mode, rate: Option<f64>) -> String {
+    fn rate(&self, mode: PacingMode, rate: Option<f64>) -> String {
         let kilobytes = |rate: f64| format!("{:.0} KB/s", 1e-3 * rate);
         match (rate, self.asked_for_rate) {
             (Some(rate), _) => format!("{}, measured", kilobytes(rate)),
             (None, true) => "cannot be measured: the terminal itself does not answer".to_string(),
-            (None, false) if mode == Mode::Fixed => {
+            (None, false) if mode == PacingMode::FixedRate => {
                 format!("{}, fixed; doctor --rate measures", kilobytes(DEFAULT_RATE))
             }
             (None, false) => "not measured; doctor --rate does".to_string(),
@@ -196,7 +196,7 @@ impl Found {
     }
 
     fn hints(&self) -> Vec<String> {
-        let Surroundings { color_term, no_color, ssh, multiplexer, .. } = &self.surroundings;
+        let Environment { color_term, no_color, ssh, multiplexer, .. } = &self.surroundings;
         let asked = self.asked();
         let few_colors = self.level() != Colors::True && !no_color;
         let tmux = *multiplexer == Some(Multiplexer::Tmux);
@@ -273,13 +273,13 @@ fn stills(terminal: &Capabilities) -> String {
     format!("in half blocks: {missing}")
 }
 
-fn arrival(mode: Mode) -> String {
+fn arrival(mode: PacingMode) -> String {
     let how = match mode {
-        Mode::Local => "being written: whoever reads is here",
-        Mode::Answers(None) => "answers of the terminal",
-        Mode::Answers(Some(_)) => "answers of the terminal, through what is between",
-        Mode::Queue => "what the kernel has not sent yet (/proc/net/tcp)",
-        Mode::Fixed => "nothing: a fixed rate is sent; --bandwidth sets it",
+        PacingMode::Unlimited => "being written: whoever reads is here",
+        PacingMode::AckClocked(None) => "answers of the terminal",
+        PacingMode::AckClocked(Some(_)) => "answers of the terminal, through what is between",
+        PacingMode::SendQueue => "what the kernel has not sent yet (/proc/net/tcp)",
+        PacingMode::FixedRate => "nothing: a fixed rate is sent; --bandwidth sets it",
     };
     how.to_string()
 }
@@ -301,15 +301,20 @@ fn shown(path: &Path) -> String {
 mod tests {
     use super::*;
 
-    fn found(variables: &[(&str, &str)], asked: bool) -> Found {
-        let surroundings = Surroundings::of(|name| {
+    fn found(variables: &[(&str, &str)], asked: bool) -> DoctorReport {
+        let surroundings = Environment::of(|name| {
             let found = variables.iter().find(|(known, _)| *known == name);
             found.map(|(_, value)| value.to_string())
         });
         let terminal = Capabilities::unasked(surroundings.clone());
-        let examined =
-            Examined { terminal, mode: Mode::Local, cells: [120, 36], pixels: None, rate: None };
-        Found {
+        let examined = TerminalReport {
+            terminal,
+            mode: PacingMode::Unlimited,
+            cells: [120, 36],
+            pixels: None,
+            rate: None,
+        };
+        DoctorReport {
             surroundings,
             examined: if asked { Ok(examined) } else { Err("stdin or stdout is no terminal") },
             asked_for_rate: false,
@@ -319,11 +324,11 @@ mod tests {
         }
     }
 
-    fn examined(found: &mut Found) -> &mut Examined {
+    fn examined(found: &mut DoctorReport) -> &mut TerminalReport {
         found.examined.as_mut().unwrap_or_else(|why| panic!("{why}"))
     }
 
-    fn check(found: &Found, present: &[&str], absent: &[&str]) {
+    fn check(found: &DoctorReport, present: &[&str], absent: &[&str]) {
         let report = found.report();
         for part in present {
             assert!(report.contains(part), "no {part:?} in\n{report}");
@@ -370,7 +375,7 @@ mod tests {
         let mut found = found(&variables, true);
         found.locale = Some(("LC_ALL", "C".into()));
         let examined = examined(&mut found);
-        examined.mode = Mode::Fixed;
+        examined.mode = PacingMode::FixedRate;
         examined.terminal.round_trip = Some(Duration::from_micros(900));
         let present = [
             "SSH from 192.0.2.7",
@@ -387,7 +392,7 @@ mod tests {
         let examined = self::examined(&mut found);
         examined.terminal.colors = Colors::True;
         examined.terminal.passthrough = Some(Duration::from_millis(110));
-        examined.mode = Mode::Answers(Some(Multiplexer::Tmux));
+        examined.mode = PacingMode::AckClocked(Some(Multiplexer::Tmux));
         let present = ["took a 24-bit colour", "110.0 ms; to what is between 0.9 ms"];
         check(&found, &present, &["allow-passthrough", "terminal-features", "SendEnv"]);
     }

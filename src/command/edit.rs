@@ -2,7 +2,7 @@
 
 use crate::asset::Assets;
 use crate::command::args::{ColorArg, EditArgs};
-use crate::command::load_progress::Told;
+use crate::command::load_progress::LoadReporter;
 use crate::command::{Failure, all_threads, say, warn};
 use crate::dashboard::message::Exported;
 use crate::dashboard::run::{Colors, DEFAULT_STOP, Setup, run as run_dashboard};
@@ -11,7 +11,7 @@ use crate::render::Options;
 use crate::render::schedule::{Criterion, Settings};
 use crate::sampling::{SampleSettings, SamplerKind};
 use crate::scene::{BUILT_IN, Recovery, SceneErrors, SceneFile, state_folder};
-use crate::terminal::Surroundings;
+use crate::terminal::Environment;
 use crate::value::printable;
 use crate::world;
 use std::env;
@@ -24,7 +24,7 @@ use std::sync::Arc;
 const BUILT_IN_NAME: &str = "mirror-room.toml";
 
 pub fn run(args: &EditArgs) -> Result<(), Failure> {
-    let surroundings = Surroundings::of(|name| env::var(name).ok());
+    let surroundings = Environment::of(|name| env::var(name).ok());
     let terminals = io::stdin().is_terminal() && io::stdout().is_terminal();
     if !terminals || surroundings.term == "dumb" {
         let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
@@ -37,7 +37,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
              one"
         )));
     }
-    let reading = Told::new();
+    let reading = LoadReporter::new();
     let state = state_folder(|name| env::var_os(name));
     let file = match &args.scene {
         Some(path) => opened(path, reading.assets.clone(), state.as_deref())?,

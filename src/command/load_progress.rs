@@ -10,13 +10,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const LARGE: (u64, usize) = (8 << 20, 200_000);
 
 /// Where files are remembered, and who tells of large ones on a terminal's stderr.
-pub struct Told {
+pub struct LoadReporter {
     /// To be shared by all that read scenes.
     pub assets: Arc<Assets>,
     aloud: Arc<AtomicBool>,
 }
 
-impl Told {
+impl LoadReporter {
     /// Aloud if somebody looks on.
     pub fn new() -> Self {
         let aloud = Arc::new(AtomicBool::new(std::io::stderr().is_terminal()));

@@ -1,7 +1,7 @@
 //! `zerkalo render`: a scene file to a picture file.
 
 use crate::command::args::RenderArgs;
-use crate::command::load_progress::Told;
+use crate::command::load_progress::LoadReporter;
 use crate::command::progress::Progress;
 use crate::command::signals::Signals;
 use crate::command::stats::{Stats, peak_rss_bytes};
@@ -27,7 +27,7 @@ const POLL: Duration = Duration::from_millis(50);
 pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let target =
         ImageOutput::from_path(&args.output).map_err(|error| Failure::Usage(error.to_string()))?;
-    let document = Document::read_with(&args.scene, Told::new().assets)
+    let document = Document::read_with(&args.scene, LoadReporter::new().assets)
         .map_err(|e| Failure::Failed(e.to_string()))?;
     let scene = sized(document.scene(), args)?;
     // What cannot be written had better be known before the work than after it.

@@ -2,7 +2,7 @@
 
 /// A direction on the screen, or along the view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Way {
+pub enum Direction {
     /// To the left.
     Left,
     /// To the right.
@@ -19,7 +19,7 @@ pub enum Way {
 
 /// How far one step goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Pace {
+pub enum StepSize {
     /// A step that is seen at once.
     Coarse,
     /// A tenth of it.
@@ -28,7 +28,7 @@ pub enum Pace {
 
 /// More or less.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Change {
+pub enum Delta {
     /// More.
     Up,
     /// Less.
@@ -40,19 +40,19 @@ pub enum Change {
 pub enum Action {
     // Camera
     /// Turns the eye about the target.
-    Orbit(Way),
+    Orbit(Direction),
     /// Shifts eye and target in the plane of the picture.
-    Pan(Way),
+    Pan(Direction),
     /// Moves the eye towards the target, or away.
-    Dolly(Way, Pace),
+    Dolly(Direction, StepSize),
     /// Turns the view where the eye stands.
-    Look(Way),
+    Look(Direction),
     /// Moves eye and target together, along the view's own axes.
-    Fly(Way),
+    Fly(Direction),
     /// Turns the picture about its centre.
-    Roll(Way),
+    Roll(Direction),
     /// Widens or narrows the view angle.
-    ViewAngle(Change),
+    ViewAngle(Delta),
     /// Fills the picture with the selection.
     Frame,
     /// The camera as the file has it.
@@ -71,9 +71,9 @@ pub enum Action {
     FlyMode,
     /// Moves the selection as the camera sees it: `Left`, `Right`, `In` (away) and `Out` (nearer) in
     /// the ground plane, `Up` and `Down` in height.
-    Move(Way, Pace),
+    Move(Direction, StepSize),
     /// Turns the selection about the vertical.
-    Turn(Way, Pace),
+    Rotate(Direction, StepSize),
     /// Ends the mode.
     Leave,
 
@@ -81,7 +81,7 @@ pub enum Action {
     /// Selects the next light.
     NextLight,
     /// The selected light, else the first one, brighter or darker.
-    Intensity(Change, Pace),
+    Intensity(Delta, StepSize),
     /// Switches the selected light, else the first one.
     SwitchLight,
     /// A form for a new light.
@@ -89,9 +89,9 @@ pub enum Action {
 
     // Mirror
     /// Roughness of the selected reflecting object, else of the scene's mirror.
-    Roughness(Change, Pace),
+    Roughness(Delta, StepSize),
     /// Reflection coefficient of the same.
-    Reflection(Change),
+    Reflection(Delta),
     /// The next lobe of the same.
     NextLobe,
 
@@ -117,17 +117,17 @@ pub enum Action {
     /// Shows or hides everything but the picture.
     OnlyPicture,
     /// Moves the cursor of a panel, list or form.
-    Cursor(Way),
+    Cursor(Direction),
     /// The first line of a panel, list or form.
     First,
     /// The last line.
     Last,
     /// A page up or down.
-    Page(Way),
+    Page(Direction),
     /// Opens what is under the cursor: types into the field, chooses the entry, confirms.
     Open,
     /// Changes the field under the cursor by a step.
-    Step(Change, Pace),
+    Step(Delta, StepSize),
     /// The field under the cursor as it is when the file does not give it.
     ClearField,
 
@@ -171,7 +171,7 @@ pub enum Action {
     /// Ends a running export of another size.
     CancelExport,
     /// Exposure by a quarter of a stop.
-    Exposure(Change),
+    Exposure(Delta),
     /// Exposure 0.
     ResetExposure,
     /// The next tone curve.
@@ -183,7 +183,7 @@ pub enum Action {
     /// Shows a pixel in numbers, or ends that.
     Probe,
     /// Moves the probe over the picture: by a cell, or by a pixel of the film.
-    MoveProbe(Way, Pace),
+    MoveProbe(Direction, StepSize),
     /// Keeps the picture for comparison.
     Keep,
     /// Flips between the kept and the live picture.
@@ -191,7 +191,7 @@ pub enum Action {
     /// Shows the difference between the kept and the live picture.
     Difference,
     /// More or fewer threads.
-    Threads(Change),
+    Threads(Delta),
     /// Lower or normal priority of the tracing threads.
     Priority,
     /// The next of the terminal's colour modes.

@@ -110,7 +110,7 @@ pub fn hints(model: &Model) -> &'static [Hint] {
             Overlay::Palette(_) | Overlay::Pick(_) | Overlay::Quality { .. } | Overlay::Question(_),
         ) => return LIST,
         // It tells by itself.
-        Some(Overlay::Still(_)) => return &[],
+        Some(Overlay::ViewerImage(_)) => return &[],
         Some(Overlay::Form(form)) if form.editor.is_none() => return FORM,
         Some(Overlay::Form(_) | Overlay::Prompt(_)) => return TYPING,
         None if model.inspector.editor.is_some() => return TYPING,

@@ -2,9 +2,9 @@
 
 use crate::dashboard::action::Action;
 use crate::dashboard::action::Action::*;
-use crate::dashboard::action::Change::{Down as Less, Up as More};
-use crate::dashboard::action::Pace::{Coarse, Fine};
-use crate::dashboard::action::Way::{Down, In, Left, Out, Right, Up};
+use crate::dashboard::action::Delta::{Down as Less, Up as More};
+use crate::dashboard::action::Direction::{Down, In, Left, Out, Right, Up};
+use crate::dashboard::action::StepSize::{Coarse, Fine};
 use crate::terminal::event::Key;
 use std::collections::HashMap;
 use std::sync::OnceLock;
@@ -158,10 +158,10 @@ pub const KEYMAP: &[Row] = &[
     row(C::Objects, Move(Up, Fine), &[(Moving, &["Shift-PageUp"])], "raise, fine"),
     row(C::Objects, Move(Down, Fine), &[(Moving, &["Shift-PageDown"])], "lower, fine"),
     row(C::Objects, TurnMode, &[(Anywhere, &["r"])], "turn the selection"),
-    row(C::Objects, Turn(Left, Coarse), &[(Turning, &["Left"])], "turn left"),
-    row(C::Objects, Turn(Right, Coarse), &[(Turning, &["Right"])], "turn right"),
-    row(C::Objects, Turn(Left, Fine), &[(Turning, &["Shift-Left"])], "turn left, fine"),
-    row(C::Objects, Turn(Right, Fine), &[(Turning, &["Shift-Right"])], "turn right, fine"),
+    row(C::Objects, Rotate(Left, Coarse), &[(Turning, &["Left"])], "turn left"),
+    row(C::Objects, Rotate(Right, Coarse), &[(Turning, &["Right"])], "turn right"),
+    row(C::Objects, Rotate(Left, Fine), &[(Turning, &["Shift-Left"])], "turn left, fine"),
+    row(C::Objects, Rotate(Right, Fine), &[(Turning, &["Shift-Right"])], "turn right, fine"),
     row(C::Objects, Drop, &[(Anywhere, &["g"])], "put the selection down"),
     row(C::Objects, OwnMaterial, &[(Anywhere, &["M"])], "give it a material of its own"),
 

@@ -5,8 +5,8 @@ use crate::render::schedule::Stop;
 use crate::render::session::Snapshot;
 use crate::scene::{SaveError, Scene, SceneErrors};
 use crate::terminal::event::{Key, Mouse};
-use crate::terminal::flow::Reading;
-use crate::terminal::image::Still;
+use crate::terminal::flow::LinkStatus;
+use crate::terminal::image::ViewerImage;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -33,7 +33,7 @@ pub enum Message {
     /// Somebody else has written the file since it was last read or written.
     ChangedOnDisk,
     /// A program that did not end by itself has left unsaved edits of this scene.
-    LeftBehind(LeftBehind),
+    OrphanedEdits(OrphanedEdits),
     /// Something about unsaved edits that the user ought to know.
     Trouble(String),
     /// A picture was written, or not, and why.
@@ -41,11 +41,11 @@ pub enum Message {
     /// How far the render of [`Effect::ExportSized`] is, 0..=1.
     ExportProgress(f64),
     /// The picture at this path was made ready to be looked at, or not, and why. After [`Effect::Look`].
-    Still(PathBuf, Result<Arc<Still>, String>),
+    ViewerImage(PathBuf, Result<Arc<ViewerImage>, String>),
     /// How much of a picture that is looked at has been sent, 0..=1.
     StillSent(f64),
     /// What is known of the line to the terminal.
-    Line(Option<Reading>),
+    LinkStatus(Option<LinkStatus>),
     /// Time has passed. At least once a second while something on the screen depends on it
     /// ([`Model::wakes_at`](crate::dashboard::model::Model::wakes_at)).
     Tick,
@@ -53,7 +53,7 @@ pub enum Message {
 
 /// Unsaved edits of a program that did not end by itself.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LeftBehind {
+pub struct OrphanedEdits {
     /// The scene with the edits.
     pub scene: Arc<Scene>,
     /// How long ago they were kept.
@@ -98,7 +98,7 @@ impl Format {
 
 /// What the picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Channel {
+pub enum DisplayChannel {
     /// The picture.
     Beauty,
     /// Estimated error of the tiles, false colour.
@@ -113,7 +113,7 @@ pub enum Channel {
     Depth,
 }
 
-impl Channel {
+impl DisplayChannel {
     /// Every channel, in the order of the key that walks them.
     pub const ALL: [Self; 6] =
         [Self::Beauty, Self::Noise, Self::Samples, Self::Objects, Self::Normals, Self::Depth];
@@ -184,7 +184,7 @@ pub enum Effect {
     /// End the render of `ExportSized`; nothing is written.
     CancelExport,
     /// Keep these unsaved edits where the next start finds them; `None`: there are none any more.
-    Journal(Option<Arc<Scene>>),
+    KeepEdits(Option<Arc<Scene>>),
     /// The edits that were left behind are the unsaved ones of this program now.
     TakeUp,
     /// The edits that were left behind are not wanted.

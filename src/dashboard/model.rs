@@ -4,17 +4,17 @@ use crate::dashboard::convergence::Convergence;
 use crate::dashboard::editor::Editor;
 use crate::dashboard::keymap::Context;
 use crate::dashboard::layout::{Focus, Layout, Request, layout};
-use crate::dashboard::message::{Channel, Format, LeftBehind};
+use crate::dashboard::message::{DisplayChannel, Format, OrphanedEdits};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::overlay_layout::wrapped;
 use crate::film::{Display, LinearImage, Probe};
 use crate::render::schedule::Stop;
 use crate::render::session::Snapshot;
-use crate::scene::edit::Subject;
+use crate::scene::edit::Target;
 use crate::scene::{History, Scene, SceneErrors};
 pub use crate::terminal::cells::Colors;
 use crate::terminal::event::Button;
-use crate::terminal::flow::Reading;
+use crate::terminal::flow::LinkStatus;
 use crate::value::printable;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub enum Mode {
     /// The selection moves.
     Move,
     /// The selection turns.
-    Turn,
+    Rotate,
     /// The camera flies.
     Fly,
     /// The probe moves.
@@ -67,17 +67,17 @@ pub struct Comparison {
     /// The kept picture and its mean samples per pixel.
     pub kept: Option<(Arc<LinearImage>, f64)>,
     /// What is shown.
-    pub shown: Compared,
+    pub shown: CompareView,
 }
 
 /// What is shown of two pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Compared {
+pub enum CompareView {
     /// The live one.
     #[default]
     Live,
     /// The kept one.
-    Kept,
+    Pinned,
     /// Their difference.
     Difference,
 }
@@ -142,7 +142,7 @@ pub struct Model {
     /// The scene and its edits.
     pub history: History,
     /// What is selected; always something that the scene has.
-    pub selection: Subject,
+    pub selection: Target,
     /// Which panel has the focus.
     pub focus: Focus,
     /// What the keys do in the picture.
@@ -158,7 +158,7 @@ pub struct Model {
     /// Exposure and tone curve.
     pub display: Display,
     /// What the picture shows.
-    pub channel: Channel,
+    pub channel: DisplayChannel,
     /// Kept and live.
     pub comparison: Comparison,
     /// The probed pixel of the film (column, row).
@@ -178,7 +178,7 @@ pub struct Model {
     /// The tracing threads have low priority.
     pub low_priority: bool,
     /// What is known of the line to the terminal, if that is not here.
-    pub line: Option<Reading>,
+    pub line: Option<LinkStatus>,
     /// A notice instead of the hints.
     pub notice: Option<Notice>,
     /// A render at another size.
@@ -194,7 +194,7 @@ pub struct Model {
     /// A save that was asked for so as to quit afterwards.
     pub quit_when_saved: bool,
     /// Unsaved edits of a session that broke off, about which is not decided.
-    pub left_behind: Option<LeftBehind>,
+    pub left_behind: Option<OrphanedEdits>,
     /// The unsaved edits that were last asked to be kept.
     pub journaled: Option<Arc<Scene>>,
     /// The raster that snapshots were last asked for.
@@ -240,7 +240,7 @@ impl Model {
         };
         let name = start.path.as_deref().map_or(printable(&start.name), short_name);
         let blank = broken.is_some();
-        let selection = Subject::Camera;
+        let selection = Target::Camera;
         Self {
             screen: start.screen,
             colors: start.colors,
@@ -254,7 +254,7 @@ impl Model {
             inspector: Inspector::default(),
             overlay: None,
             display: Display::default(),
-            channel: Channel::Beauty,
+            channel: DisplayChannel::Beauty,
             comparison: Comparison::default(),
             probe: None,
             snapshot: None,
@@ -311,7 +311,7 @@ impl Model {
             (None, Focus::Picture, mode) => match mode {
                 Mode::Orbit => Context::Picture,
                 Mode::Move => Context::Moving,
-                Mode::Turn => Context::Turning,
+                Mode::Rotate => Context::Turning,
                 Mode::Fly => Context::Flying,
                 Mode::Probe => Context::Probing,
             },

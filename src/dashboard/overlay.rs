@@ -2,8 +2,8 @@
 
 use crate::dashboard::editor::Editor;
 use crate::scene::Scene;
-use crate::scene::edit::Subject;
-use crate::terminal::image::Still;
+use crate::scene::edit::Target;
+use crate::terminal::image::ViewerImage;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -36,16 +36,16 @@ pub enum Overlay {
     /// A question with a few answers.
     Question(Question),
     /// A picture that was written, on the whole screen.
-    Still(Looked),
+    ViewerImage(ViewedImage),
 }
 
 /// A picture that was written, being looked at.
 #[derive(Clone, Debug)]
-pub struct Looked {
+pub struct ViewedImage {
     /// Its file.
     pub path: PathBuf,
     /// The picture; `None`: it is being read.
-    pub still: Option<Arc<Still>>,
+    pub still: Option<Arc<ViewerImage>>,
     /// How much of its transfer the terminal has been sent, 0..=1.
     pub sent: f64,
 }
@@ -86,7 +86,7 @@ pub enum PickFor {
     /// The kind of a new light.
     Light,
     /// The word behind a key of a subject.
-    Word(Subject, String),
+    Word(Target, String),
 }
 
 /// A new object or light. The picture shows the scene with it while the form is open.
@@ -97,11 +97,11 @@ pub struct Form {
     /// The scene with the new thing as filled in so far; without faults.
     pub scene: Arc<Scene>,
     /// The new thing, in `scene`.
-    pub subject: Subject,
+    pub subject: Target,
     /// What undoing it will be called.
     pub label: String,
     /// What was selected before.
-    pub before: Subject,
+    pub before: Target,
     /// Position in the lines of the form (`panels::form`).
     pub cursor: usize,
     /// First line shown.
@@ -131,7 +131,7 @@ pub enum PromptFor {
     /// A path to save to.
     SaveAs,
     /// A new name.
-    Rename(Subject),
+    Rename(Target),
     /// A name for the viewpoint.
     StoreView,
     /// When to stop.

@@ -9,7 +9,7 @@ use crate::terminal::Area;
 
 /// Where an overlay lies. Parts without rows are not there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Place {
+pub struct OverlayLayout {
     /// The box with its border.
     pub frame: Area,
     /// Where text is typed: one row.
@@ -22,7 +22,7 @@ pub struct Place {
 
 impl Model {
     /// Where the overlay lies; `None`: there is none, or the terminal is too small.
-    pub fn place(&self) -> Option<Place> {
+    pub fn place(&self) -> Option<OverlayLayout> {
         let layout = self.layout()?;
         let [width, height] = self.screen;
         let centred = |columns: u16, rows: u16| {
@@ -36,9 +36,10 @@ impl Model {
             Area { y, ..centred(columns, rows) }
         };
         Some(match self.overlay.as_ref()? {
-            Overlay::Still(_) => {
-                Place { frame: Area { x: 0, y: 0, width, height }, ..Place::default() }
-            }
+            Overlay::ViewerImage(_) => OverlayLayout {
+                frame: Area { x: 0, y: 0, width, height },
+                ..OverlayLayout::default()
+            },
             Overlay::Help { .. } => whole(centred(84, height - 2)),
             Overlay::Inventory { .. } => {
                 let columns = 84.min(width - 2);
@@ -56,14 +57,14 @@ impl Model {
                     width: inner.width - 3,
                     height: inner.height - list.height,
                 };
-                Place { frame, input: Area::default(), list, help }
+                OverlayLayout { frame, input: Area::default(), list, help }
             }
             Overlay::Palette(_) => {
                 let frame = centred(72, height.min(26) - 2);
                 let inner = frame.inner();
                 let input = Area { height: 1, ..inner };
                 let list = Area { y: inner.y + 1, height: inner.height - 1, ..inner };
-                Place { frame, input, list, help: Area::default() }
+                OverlayLayout { frame, input, list, help: Area::default() }
             }
             Overlay::Pick(pick) => {
                 whole(centred(76, (pick.entries.len() as u16).saturating_add(2)))
@@ -77,7 +78,7 @@ impl Model {
                 let problem = form.problem.is_some()
                     || form.editor.as_ref().is_some_and(|editor| editor.problem.is_some());
                 let (list, help) = split(frame.inner(), problem);
-                Place { frame, input: Area::default(), list, help }
+                OverlayLayout { frame, input: Area::default(), list, help }
             }
             Overlay::Prompt(prompt) => {
                 let columns = 64.min(width - 2);
@@ -87,7 +88,7 @@ impl Model {
                 let inner = frame.inner();
                 let input = Area { height: 1, ..inner };
                 let help = Area { y: inner.y + 1, height: inner.height - 1, ..inner };
-                Place { frame, input, list: Area::default(), help }
+                OverlayLayout { frame, input, list: Area::default(), help }
             }
             Overlay::Question(question) => {
                 let columns = 64.min(width - 2);
@@ -100,7 +101,7 @@ impl Model {
                 let height = inner.height - answers;
                 let help = Area { x: inner.x + 1, width: inner.width - 2, height, ..inner };
                 let list = Area { y: inner.y + height, height: answers, ..inner };
-                Place { frame, input: Area::default(), list, help }
+                OverlayLayout { frame, input: Area::default(), list, help }
             }
         })
     }
@@ -119,8 +120,8 @@ impl Model {
 }
 
 /// A box full of rows.
-fn whole(frame: Area) -> Place {
-    Place { frame, list: frame.inner(), ..Place::default() }
+fn whole(frame: Area) -> OverlayLayout {
+    OverlayLayout { frame, list: frame.inner(), ..OverlayLayout::default() }
 }
 
 /// Rows for lines, and below them rows for what is to be said: more of them if there is a problem.

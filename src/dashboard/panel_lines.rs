@@ -3,7 +3,7 @@
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::{Form, Overlay};
 use crate::scene::Scene;
-use crate::scene::edit::{Entry, Row, Subject, outline as subjects, rows};
+use crate::scene::edit::{Property, Target, Widget, outline as subjects, rows};
 use crate::value::excerpt;
 
 /// A line of the outline.
@@ -14,7 +14,7 @@ pub enum OutlineLine {
     /// Something that can be selected.
     Entry {
         /// What it is.
-        subject: Subject,
+        subject: Target,
         /// Its name, printable.
         label: String,
         /// What else there is to say: an object's material, `off`, a view's key; may be empty.
@@ -24,7 +24,7 @@ pub enum OutlineLine {
 
 /// A line of the inspector or of a form.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Line {
+pub enum PanelLine {
     /// A heading: what the fields below belong to.
     Heading(String),
     /// A value.
@@ -35,7 +35,7 @@ pub enum Line {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldLine {
     /// Whose value.
-    pub subject: Subject,
+    pub subject: Target,
     /// Its key, dotted.
     pub key: String,
     /// Which of the numbers behind the key, if it has several.
@@ -45,7 +45,7 @@ pub struct FieldLine {
     /// How deep it stands below others: 0, 1, 2.
     pub depth: usize,
     /// What kind of value.
-    pub entry: Entry,
+    pub entry: Widget,
     /// The value as it can be typed, printable; empty: none is given.
     pub value: String,
     /// The colour that the value belongs to, linear, on the first line of a colour.
@@ -62,7 +62,7 @@ pub struct FieldLine {
     pub doc: &'static str,
 }
 
-impl Line {
+impl PanelLine {
     /// The field, if it is one.
     pub fn field(&self) -> Option<&FieldLine> {
         match self {
@@ -83,12 +83,12 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
             last = Some(section);
         }
         let note = match &subject {
-            Subject::View(_) => {
+            Target::View(_) => {
                 views += 1;
                 if views <= 9 { format!("key {views}") } else { String::new() }
             }
-            Subject::Light(i) if !scene.lights[*i].on => "off".to_string(),
-            Subject::Object(i) => excerpt(&scene.objects[*i].material),
+            Target::Light(i) if !scene.lights[*i].on => "off".to_string(),
+            Target::Object(i) => excerpt(&scene.objects[*i].material),
             _ => String::new(),
         };
         lines.push(OutlineLine::Entry { label: subject.label(scene), subject, note });
@@ -97,30 +97,30 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
 }
 
 /// Where `subject` stands in the outline.
-pub fn outline_position(lines: &[OutlineLine], subject: &Subject) -> Option<usize> {
+pub fn outline_position(lines: &[OutlineLine], subject: &Target) -> Option<usize> {
     lines
         .iter()
         .position(|line| matches!(line, OutlineLine::Entry { subject: s, .. } if s == subject))
 }
 
 /// The fields of `subject`; below those of an object the ones of its material.
-pub fn inspector(scene: &Scene, subject: &Subject) -> Vec<Line> {
+pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     let mut lines = fields(scene, subject);
     let material = subject.material(scene).filter(|material| material != subject);
-    if let Some(Subject::Material(name)) = &material {
+    if let Some(Target::Material(name)) = &material {
         let users = scene.objects.iter().filter(|o| o.names_material(name)).count();
         let shared = if users > 1 { format!(" · shared by {users}") } else { String::new() };
-        lines.push(Line::Heading(format!("material {}{shared}", excerpt(name))));
-        lines.extend(fields(scene, &Subject::Material(name.clone())));
+        lines.push(PanelLine::Heading(format!("material {}{shared}", excerpt(name))));
+        lines.extend(fields(scene, &Target::Material(name.clone())));
     }
     lines
 }
 
 /// The fields of a form: those of the new thing and of a material that is new with it. `base` is the
 /// scene without both.
-pub fn form(form: &Form, base: &Scene) -> Vec<Line> {
+pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
     let own = match form.subject.material(&form.scene) {
-        Some(Subject::Material(name)) => !base.materials.contains_key(&name),
+        Some(Target::Material(name)) => !base.materials.contains_key(&name),
         _ => false,
     };
     match own {
@@ -129,14 +129,17 @@ pub fn form(form: &Form, base: &Scene) -> Vec<Line> {
     }
 }
 
-fn fields(scene: &Scene, subject: &Subject) -> Vec<Line> {
+fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     // Something that is not there has no fields.
     let rows = rows(scene, subject).unwrap_or_default();
-    rows.iter().flat_map(|row| lines_of(subject, row)).map(|f| Line::Field(Box::new(f))).collect()
+    rows.iter()
+        .flat_map(|row| lines_of(subject, row))
+        .map(|f| PanelLine::Field(Box::new(f)))
+        .collect()
 }
 
 /// One line for each number of a list, otherwise one line.
-fn lines_of(subject: &Subject, row: &Row) -> Vec<FieldLine> {
+fn lines_of(subject: &Target, row: &Property) -> Vec<FieldLine> {
     let line = |component: Option<usize>, label: String, value: String| FieldLine {
         subject: subject.clone(),
         key: row.key.clone(),
@@ -156,7 +159,7 @@ fn lines_of(subject: &Subject, row: &Row) -> Vec<FieldLine> {
         return vec![line(None, row.label.clone(), row.value.clone())];
     }
     let names: &[&str] = match (row.entry, row.components.len()) {
-        (Entry::Color, _) => &["red", "green", "blue"],
+        (Widget::Color, _) => &["red", "green", "blue"],
         (_, 2) => &["width", "height"],
         _ => &["x", "y", "z"],
     };
@@ -169,7 +172,7 @@ fn lines_of(subject: &Subject, row: &Row) -> Vec<FieldLine> {
 
 impl Model {
     /// The lines of the inspector, or of the form that is open.
-    pub fn field_lines(&self) -> Vec<Line> {
+    pub fn field_lines(&self) -> Vec<PanelLine> {
         match &self.overlay {
             Some(Overlay::Form(open)) => form(open, self.history.scene()),
             _ => inspector(self.scene(), &self.selection),
@@ -178,7 +181,7 @@ impl Model {
 }
 
 /// The position of the field nearest to `wanted`: it, or the next one below, or the last.
-pub fn nearest_field(lines: &[Line], wanted: usize) -> usize {
+pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
     let field = |i: &usize| lines[*i].field().is_some();
     (wanted..lines.len())
         .find(field)
@@ -187,7 +190,7 @@ pub fn nearest_field(lines: &[Line], wanted: usize) -> usize {
 }
 
 /// The position `steps` fields below (negative: above) the one at `cursor`; stops at the ends.
-pub fn walk_fields(lines: &[Line], cursor: usize, steps: isize) -> usize {
+pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].field().is_some()).collect();
     let at = fields.iter().position(|i| *i >= cursor).unwrap_or(fields.len().saturating_sub(1));
     let to = at.saturating_add_signed(steps).min(fields.len().saturating_sub(1));
@@ -226,18 +229,18 @@ mod tests {
             })
             .collect();
         assert!(notes.contains(&"lamp/off".to_string()) && notes.contains(&"left/key 1".into()));
-        let ball = inspector(&scene, &Subject::Object(2));
+        let ball = inspector(&scene, &Target::Object(2));
         let labels: Vec<_> = ball.iter().filter_map(|l| Some(l.field()?.label.clone())).collect();
         for label in ["center x", "center z", "radius", "color green", "roughness"] {
             assert!(labels.contains(&label.to_string()), "{labels:?}");
         }
-        assert!(ball.contains(&Line::Heading("material red".into())));
+        assert!(ball.contains(&PanelLine::Heading("material red".into())));
     }
 
     #[test]
     fn the_cursor_walks_over_headings() {
         let scene = built_in();
-        let lines = inspector(&scene, &Subject::Object(2));
+        let lines = inspector(&scene, &Target::Object(2));
         let heading = lines.iter().position(|l| l.field().is_none()).unwrap();
         assert_eq!(walk_fields(&lines, heading - 1, 1), heading + 1);
         assert_eq!(walk_fields(&lines, heading + 1, -1), heading - 1);

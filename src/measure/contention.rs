@@ -8,9 +8,9 @@ use std::time::Duration;
 
 /// How long each thread of this program has waited for a processor since it began.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Waits(HashMap<String, Duration>);
+pub struct RunQueueDelay(HashMap<String, Duration>);
 
-impl Waits {
+impl RunQueueDelay {
     /// Until now; `None`: the system does not tell.
     pub fn now() -> Option<Self> {
         let mut all = HashMap::new();
@@ -40,8 +40,8 @@ fn waited(schedstat: &str) -> Option<Duration> {
 mod tests {
     use super::*;
 
-    fn waits(of: &[(&str, u64)]) -> Waits {
-        Waits(of.iter().map(|(t, s)| (t.to_string(), Duration::from_secs(*s))).collect())
+    fn waits(of: &[(&str, u64)]) -> RunQueueDelay {
+        RunQueueDelay(of.iter().map(|(t, s)| (t.to_string(), Duration::from_secs(*s))).collect())
     }
 
     #[test]
@@ -62,7 +62,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn this_program_has_threads() {
-        if let Some(now) = Waits::now() {
+        if let Some(now) = RunQueueDelay::now() {
             assert!(now.0.len() >= 2, "the test's own thread and the first one: {now:?}");
         }
     }

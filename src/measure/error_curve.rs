@@ -1,7 +1,7 @@
 //! One setting's way from the first samples to a quiet picture.
 
-use crate::measure::contention::Waits;
-use crate::measure::experiment::Variation;
+use crate::measure::contention::RunQueueDelay;
+use crate::measure::experiment::Variant;
 use crate::measure::reference::{Errors, Reference};
 use crate::render::SyncRender;
 use std::io;
@@ -39,23 +39,23 @@ const EVERY: f64 = 0.84;
 
 /// The share of the processors' time that others took while so many threads wanted them for so many
 /// seconds since `before`; `None`: nobody knows, or these threads wait for each other.
-fn taken(before: Option<&Waits>, threads: usize, seconds: f64) -> Option<f64> {
+fn taken(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) -> Option<f64> {
     if seconds <= 0.0 || threads > std::thread::available_parallelism().map_or(1, usize::from) {
         return None;
     }
-    let waited = Waits::now()?.seconds_since(before?);
+    let waited = RunQueueDelay::now()?.seconds_since(before?);
     Some((waited / (threads as f64 * seconds)).min(1.0))
 }
 
 /// The way of `variation`, with errors, the share of the processors that others took meanwhile, and the
 /// picture at its end.
 pub fn walk(
-    variation: &Variation,
+    variation: &Variant,
     reference: &Reference,
     end: End,
 ) -> io::Result<(Vec<Point>, Option<f64>, SyncRender)> {
     let mut course = variation.course()?;
-    let before = Waits::now();
+    let before = RunQueueDelay::now();
     let mut points: Vec<Point> = Vec::new();
     let mut looked_at = f64::INFINITY;
     for step in 1.. {
@@ -90,9 +90,9 @@ pub fn walk(
 }
 
 /// Goes the same way again and notes the seconds; the share of the processors that others took meanwhile.
-pub fn repeat(variation: &Variation, points: &mut [Point]) -> io::Result<Option<f64>> {
+pub fn repeat(variation: &Variant, points: &mut [Point]) -> io::Result<Option<f64>> {
     let mut course = variation.course()?;
-    let before = Waits::now();
+    let before = RunQueueDelay::now();
     let mut step = 0;
     for point in points {
         while step < point.step {

@@ -5,7 +5,7 @@ use crate::material::Lobe;
 use crate::render::schedule::{Criterion, Settings, Stop};
 use crate::render::{Options, SyncRender};
 use crate::sampling::{SampleSettings, SamplerKind};
-use crate::scene::{Acceleration, Level, Scene};
+use crate::scene::{Acceleration, RayTypes, Scene};
 use crate::world::{self, AnyWorld, Precision};
 use std::io;
 use std::str::FromStr;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// A setting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Topic {
+pub enum Experiment {
     /// All settings as the program has them unless told otherwise.
     Default,
     /// Samples where they help most, or the same number everywhere.
@@ -38,7 +38,7 @@ pub enum Topic {
     Acceleration,
 }
 
-impl Topic {
+impl Experiment {
     /// Every setting, its name on the command line, and the question that it answers.
     pub const ALL: &'static [(Self, &'static str, &'static str)] = &[
         (Self::Default, "default", "As the program is set"),
@@ -91,7 +91,7 @@ impl Topic {
     }
 }
 
-impl FromStr for Topic {
+impl FromStr for Experiment {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -105,9 +105,9 @@ impl FromStr for Topic {
 
 /// One way to render the scene.
 #[derive(Clone)]
-pub struct Variation {
+pub struct Variant {
     /// Which setting differs from the default.
-    pub topic: Topic,
+    pub topic: Experiment,
     /// How: `uniform`, `depth 4`.
     pub name: String,
     /// The scene, with the settings that it holds.
@@ -120,7 +120,7 @@ pub struct Variation {
     pub threads: usize,
 }
 
-impl Variation {
+impl Variant {
     /// A render of it, not begun, that ends by itself only when there is nothing left to do.
     pub fn course(&self) -> io::Result<SyncRender> {
         let settings = Settings {
@@ -139,7 +139,7 @@ pub struct Plan {
     /// Noise to reach, in codes, falling.
     pub targets: Vec<f64>,
     /// The settings to compare, beside the default.
-    pub topics: Vec<Topic>,
+    pub topics: Vec<Experiment>,
     /// How often each way is timed, at least.
     pub repetitions: usize,
     /// About so many seconds in all.
@@ -154,7 +154,7 @@ pub struct Plan {
 
 impl Plan {
     /// The default, then the variations of each topic that make a difference in this scene.
-    pub fn variations(&self, scene: &Arc<Scene>) -> Vec<Variation> {
+    pub fn variations(&self, scene: &Arc<Scene>) -> Vec<Variant> {
         let mut all = vec![self.default_of(scene)];
         for topic in &self.topics {
             all.extend(self.of_topic(*topic, scene));
@@ -163,9 +163,9 @@ impl Plan {
     }
 
     /// All settings as the program has them.
-    pub fn default_of(&self, scene: &Arc<Scene>) -> Variation {
-        Variation {
-            topic: Topic::Default,
+    pub fn default_of(&self, scene: &Arc<Scene>) -> Variant {
+        Variant {
+            topic: Experiment::Default,
             name: "default".to_string(),
             scene: Arc::clone(scene),
             options: Options {
@@ -178,15 +178,15 @@ impl Plan {
         }
     }
 
-    fn of_topic(&self, topic: Topic, scene: &Arc<Scene>) -> Vec<Variation> {
+    fn of_topic(&self, topic: Experiment, scene: &Arc<Scene>) -> Vec<Variant> {
         let base = self.default_of(scene);
-        let named = |name: &str| Variation { topic, name: name.to_string(), ..base.clone() };
+        let named = |name: &str| Variant { topic, name: name.to_string(), ..base.clone() };
         let edited = |name: String, edit: &dyn Fn(&mut Scene)| {
             let mut scene = Scene::clone(scene);
             edit(&mut scene);
-            Variation { topic, name, scene: Arc::new(scene), ..base.clone() }
+            Variant { topic, name, scene: Arc::new(scene), ..base.clone() }
         };
-        let reflects = scene.trace.level == Level::Full
+        let reflects = scene.trace.level == RayTypes::Full
             && scene.trace.depth > 0
             && scene
                 .objects
@@ -194,9 +194,9 @@ impl Plan {
                 .flat_map(|object| object.materials())
                 .any(|name| scene.materials.get(name).is_some_and(|m| m.reflection > 0.0));
         match topic {
-            Topic::Default => Vec::new(),
-            Topic::Adaptivity => vec![Variation { adaptive: false, ..named("uniform") }],
-            Topic::Precision => {
+            Experiment::Default => Vec::new(),
+            Experiment::Adaptivity => vec![Variant { adaptive: false, ..named("uniform") }],
+            Experiment::Precision => {
                 // The other one than the scene asks for.
                 let (name, precision) = match AnyWorld::compile(scene, &base.options.world) {
                     AnyWorld::Single(_) => ("double", Precision::Double),
@@ -206,21 +206,21 @@ impl Plan {
                 variation.options.world.precision = precision;
                 vec![variation]
             }
-            Topic::Threads => {
+            Experiment::Threads => {
                 // As many as there are is the default.
                 let counts = (0..).map(|k| 1 << k).take_while(|n| *n < self.threads);
                 let of = |n: usize| {
                     let name = if n == 1 { "1 thread".to_string() } else { format!("{n} threads") };
-                    Variation { threads: n, ..named(&name) }
+                    Variant { threads: n, ..named(&name) }
                 };
                 counts.map(of).collect()
             }
-            Topic::Sampler => {
+            Experiment::Sampler => {
                 let mut random = named("random");
                 random.options.sampling.kind = SamplerKind::Random;
                 vec![random]
             }
-            Topic::Lobe => {
+            Experiment::Lobe => {
                 let has =
                     |lobe| scene.materials.values().any(|m| m.lobe == lobe && m.roughness > 0.0);
                 let swap = |from: Lobe, to: Lobe, name: &str| {
@@ -235,27 +235,27 @@ impl Plan {
                 let cone = swap(Lobe::Square, Lobe::Cone, "cone for square");
                 square.into_iter().chain(cone).filter(|_| reflects).collect()
             }
-            Topic::Level => [("primary", Level::Primary), ("shadows", Level::Shadows)]
+            Experiment::Level => [("primary", RayTypes::Primary), ("shadows", RayTypes::Shadows)]
                 .into_iter()
                 .filter(|(_, level)| *level < scene.trace.level)
                 .map(|(name, level)| edited(name.to_string(), &|s| s.trace.level = level))
                 .collect(),
-            Topic::Depth => [0, 1, 2, 4, 8]
+            Experiment::Depth => [0, 1, 2, 4, 8]
                 .into_iter()
                 .filter(|depth| reflects && *depth < scene.trace.depth)
                 .map(|depth| edited(format!("depth {depth}"), &|s| s.trace.depth = depth))
                 .collect(),
-            Topic::MinWeight => [0.001, 0.01, 0.1]
+            Experiment::MinWeight => [0.001, 0.01, 0.1]
                 .into_iter()
                 .filter(|weight| reflects && *weight > scene.trace.min_weight)
                 .map(|weight| edited(format!("weight {weight}"), &|s| s.trace.min_weight = weight))
                 .collect(),
-            Topic::RaysPerPixel => [64, 256, 1024]
+            Experiment::RaysPerPixel => [64, 256, 1024]
                 .into_iter()
                 .filter(|_| reflects)
                 .map(|cap| edited(format!("{cap} samples"), &|s| s.film.rays_per_pixel = cap))
                 .collect(),
-            Topic::Acceleration => Acceleration::ALL
+            Experiment::Acceleration => Acceleration::ALL
                 .into_iter()
                 .filter(|by| *by != scene.trace.acceleration)
                 .map(|by| edited(by.name().to_string(), &|s| s.trace.acceleration = by))
@@ -269,7 +269,7 @@ mod tests {
     use super::*;
     use crate::scene::built_in;
 
-    fn names(topic: Topic, threads: usize) -> Vec<String> {
+    fn names(topic: Experiment, threads: usize) -> Vec<String> {
         let plan = Plan {
             targets: vec![0.5],
             topics: vec![topic],
@@ -280,20 +280,20 @@ mod tests {
             display: Display::default(),
         };
         let all = plan.variations(&Arc::new(built_in()));
-        assert_eq!((all[0].topic, all[0].threads), (Topic::Default, threads));
+        assert_eq!((all[0].topic, all[0].threads), (Experiment::Default, threads));
         all[1..].iter().map(|v| v.name.clone()).collect()
     }
 
     /// What would be the default again is left out.
     #[test]
     fn variations_differ_from_the_default() {
-        assert_eq!(names(Topic::Precision, 2), ["double"]);
-        assert_eq!(names(Topic::Threads, 1), [""; 0]);
-        assert_eq!(names(Topic::Threads, 2), ["1 thread"]);
-        assert_eq!(names(Topic::Threads, 6), ["1 thread", "2 threads", "4 threads"]);
-        assert_eq!(names(Topic::Adaptivity, 2), ["uniform"]);
-        assert_eq!(Topic::Threads.of_default(true, 6), "6 threads, default");
-        assert_eq!(Topic::Precision.of_default(true, 6), "single, default");
-        assert_eq!(Topic::Depth.of_default(true, 6), "default");
+        assert_eq!(names(Experiment::Precision, 2), ["double"]);
+        assert_eq!(names(Experiment::Threads, 1), [""; 0]);
+        assert_eq!(names(Experiment::Threads, 2), ["1 thread"]);
+        assert_eq!(names(Experiment::Threads, 6), ["1 thread", "2 threads", "4 threads"]);
+        assert_eq!(names(Experiment::Adaptivity, 2), ["uniform"]);
+        assert_eq!(Experiment::Threads.of_default(true, 6), "6 threads, default");
+        assert_eq!(Experiment::Precision.of_default(true, 6), "single, default");
+        assert_eq!(Experiment::Depth.of_default(true, 6), "default");
     }
 }

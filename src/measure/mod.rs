@@ -16,7 +16,7 @@ mod run;
 
 pub use convergence_order::Slope;
 pub use error_curve::Point;
-pub use experiment::{Plan, Topic, Variation};
+pub use experiment::{Experiment, Plan, Variant};
 pub use reference::{Bias, Errors, Reference};
-pub use result::{Crossing, Expected, Measured, Measurement, Steadiness, median, spread};
+pub use result::{Expected, Measured, Measurement, Steadiness, TimeToTarget, median, spread};
 pub use run::{Progress, measure};

@@ -1,6 +1,6 @@
 //! Error against time, drawn: a panel for each setting, log-log, the default beside its variations.
 
-use crate::measure::experiment::Topic;
+use crate::measure::experiment::Experiment;
 use crate::measure::result::{Measured, Measurement, median};
 use epaint_default_fonts::UBUNTU_LIGHT;
 use plotters::coord::Shift;
@@ -73,8 +73,8 @@ pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn
 }
 
 /// A setting's variations. The default has a panel only if there is nothing else.
-fn panels(measurement: &Measurement) -> Vec<(Topic, Vec<&Measured>)> {
-    let mut panels: Vec<(Topic, Vec<&Measured>)> = Vec::new();
+fn panels(measurement: &Measurement) -> Vec<(Experiment, Vec<&Measured>)> {
+    let mut panels: Vec<(Experiment, Vec<&Measured>)> = Vec::new();
     for measured in measurement.measured.iter().skip(1) {
         match panels.last_mut() {
             Some((topic, of)) if *topic == measured.topic => of.push(measured),
@@ -82,7 +82,7 @@ fn panels(measurement: &Measurement) -> Vec<(Topic, Vec<&Measured>)> {
         }
     }
     if panels.is_empty() {
-        panels.push((Topic::Default, Vec::new()));
+        panels.push((Experiment::Default, Vec::new()));
     }
     panels
 }
@@ -172,7 +172,7 @@ fn panel<'a, B: DrawingBackend>(
     root: &Canvas<B>,
     corner: (i32, i32),
     measurement: &'a Measurement,
-    topic: Topic,
+    topic: Experiment,
     variations: &[&'a Measured],
 ) -> Drawn
 where

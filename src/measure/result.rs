@@ -2,12 +2,12 @@
 
 use crate::measure::convergence_order::Slope;
 use crate::measure::error_curve::Point;
-use crate::measure::experiment::{Topic, Variation};
+use crate::measure::experiment::{Experiment, Variant};
 use crate::measure::reference::Bias;
 
 /// When a way reached a given noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crossing {
+pub struct TimeToTarget {
     /// The true error, in codes.
     pub codes: f64,
     /// Seconds of tracing, median of the repetitions.
@@ -33,7 +33,7 @@ pub struct Expected {
 #[derive(Clone, Debug)]
 pub struct Measured {
     /// Which setting.
-    pub topic: Topic,
+    pub topic: Experiment,
     /// How it differs.
     pub name: String,
     /// Threads that traced.
@@ -66,7 +66,7 @@ pub struct Measurement {
     /// Those of them that the default did not reach in its time.
     pub expected: Vec<Expected>,
     /// Settings that were asked for and have nothing to compare in this scene.
-    pub idle: Vec<Topic>,
+    pub idle: Vec<Experiment>,
     /// The default first.
     pub measured: Vec<Measured>,
 }
@@ -130,7 +130,7 @@ fn quantile(values: &[f64], q: f64) -> f64 {
 impl Measured {
     /// An empty record of a variation whose way is `points`.
     pub fn new(
-        variation: &Variation,
+        variation: &Variant,
         points: Vec<Point>,
         taken: Option<f64>,
         bias: Option<Bias>,
@@ -167,7 +167,7 @@ impl Measured {
     }
 
     /// Where the true error came down to `codes`, between points on straight lines of the logarithms.
-    pub fn crossing(&self, codes: f64) -> Option<Crossing> {
+    pub fn crossing(&self, codes: f64) -> Option<TimeToTarget> {
         self.crossing_of(codes, |p| {
             let certain = p.errors.spread <= DOUBTFUL;
             if certain { p.errors.rmse_codes } else { f64::INFINITY }
@@ -175,16 +175,16 @@ impl Measured {
     }
 
     /// The same of the error that the program told, for what is never right.
-    pub fn told_crossing(&self, codes: f64) -> Option<Crossing> {
+    pub fn told_crossing(&self, codes: f64) -> Option<TimeToTarget> {
         self.crossing_of(codes, |p| p.told_codes.unwrap_or(f64::INFINITY))
     }
 
     /// The one of them that says when it is as quiet as it gets: of what is never right, what it told.
-    pub fn own_crossing(&self, codes: f64) -> Option<Crossing> {
+    pub fn own_crossing(&self, codes: f64) -> Option<TimeToTarget> {
         if self.bias.is_some() { self.told_crossing(codes) } else { self.crossing(codes) }
     }
 
-    fn crossing_of(&self, codes: f64, of: impl Fn(&Point) -> f64) -> Option<Crossing> {
+    fn crossing_of(&self, codes: f64, of: impl Fn(&Point) -> f64) -> Option<TimeToTarget> {
         let after = self.points.iter().position(|p| of(p) <= codes)?;
         let to = &self.points[after];
         let from = after.checked_sub(1).map(|i| &self.points[i]);
@@ -199,7 +199,7 @@ impl Measured {
         let (before, after_it) = (self.seconds(from), self.seconds(to));
         let seconds: Vec<f64> =
             before.iter().zip(&after_it).map(|(a, b)| between(*a, *b)).collect();
-        Some(Crossing {
+        Some(TimeToTarget {
             codes,
             seconds: median(&seconds),
             spread: spread(&seconds),
@@ -279,7 +279,7 @@ mod tests {
             },
         };
         Measured {
-            topic: Topic::Default,
+            topic: Experiment::Default,
             name: String::new(),
             threads: 1,
             points: points.iter().enumerate().map(point).collect(),

@@ -1,7 +1,7 @@
 //! The measurement itself.
 
 use crate::measure::error_curve::{End, repeat, walk};
-use crate::measure::experiment::{Plan, Topic, Variation};
+use crate::measure::experiment::{Experiment, Plan, Variant};
 use crate::measure::reference::Reference;
 use crate::measure::result::{Expected, Measured, Measurement, spread};
 use crate::render::SyncRender;
@@ -54,7 +54,7 @@ pub fn measure(
     let begun = Instant::now();
     let variations = plan.variations(scene);
     let default = &variations[0];
-    let idle = |topic: &Topic| !variations.iter().any(|v| v.topic == *topic);
+    let idle = |topic: &Experiment| !variations.iter().any(|v| v.topic == *topic);
     let of = 1 + variations.len() * plan.repetitions.max(1);
     let mut go_on = tell(Progress { what: "reference", done: 0, of });
 
@@ -157,7 +157,7 @@ fn is_steady(measured: &Measured, codes: f64) -> bool {
     measured.own_crossing(codes).map_or_else(end, |c| c.spread) <= STEADY
 }
 
-fn warm_up(variation: &Variation) -> io::Result<()> {
+fn warm_up(variation: &Variant) -> io::Result<()> {
     let mut course = variation.course()?;
     while course.seconds() < WARM_UP_SECONDS && course.step().is_none() {}
     Ok(())
@@ -170,7 +170,7 @@ struct Made {
 }
 
 /// A picture far quieter than what is compared with it, by another seed.
-fn make_reference(default: &Variation, codes: f64, seconds: f64) -> io::Result<Made> {
+fn make_reference(default: &Variant, codes: f64, seconds: f64) -> io::Result<Made> {
     let mut other = default.clone();
     other.options.sampling.seed = other.options.sampling.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut course = other.course()?;
@@ -205,7 +205,7 @@ mod tests {
             errors: Errors { rmse_linear: 0.0, rmse_codes: *codes, rel_mse: 0.0, spread: 0.0 },
         };
         Measured {
-            topic: Topic::Default,
+            topic: Experiment::Default,
             name: String::new(),
             threads: 1,
             points: points.iter().map(point).collect(),

@@ -8,19 +8,19 @@ use std::sync::{Arc, PoisonError, RwLock};
 /// The folder that a scene's names of files start from, and the files that were read. All scenes that
 /// come from one another by edits share it, so that a file is read once.
 #[derive(Clone, Debug, Default)]
-pub struct Library {
+pub struct AssetResolver {
     folder: Arc<RwLock<PathBuf>>,
     assets: Arc<Assets>,
 }
 
 /// It is no part of what a scene says.
-impl PartialEq for Library {
+impl PartialEq for AssetResolver {
     fn eq(&self, _: &Self) -> bool {
         true
     }
 }
 
-impl Library {
+impl AssetResolver {
     /// Of a scene that is kept in the file `scene`; what is read is remembered in `assets`.
     pub fn of(scene: &Path, assets: Arc<Assets>) -> Self {
         let out = Self { folder: Arc::default(), assets };

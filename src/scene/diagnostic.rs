@@ -5,7 +5,7 @@ use std::fmt;
 
 /// One message: where, about what, what was found, what would be right.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Message {
+pub struct Diagnostic {
     /// The file, as the user named it.
     pub file: String,
     /// Line and column, from 1; columns count characters. `None`: the file as a whole.
@@ -21,7 +21,7 @@ pub struct Message {
 /// Widest indentation of the second line.
 const MAX_INDENT: usize = 24;
 
-impl fmt::Display for Message {
+impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let mut head = printable(&self.file);
         if let Some((line, column)) = self.place {
@@ -44,7 +44,7 @@ impl fmt::Display for Message {
 /// Everything wrong with a scene file: one message at least, in the order of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneErrors {
-    messages: Vec<Message>,
+    messages: Vec<Diagnostic>,
 }
 
 /// More messages than this help nobody at once.
@@ -52,7 +52,7 @@ const MAX_SHOWN: usize = 20;
 
 impl SceneErrors {
     /// Sorts `messages` by place; there is at least one.
-    pub(super) fn new(mut messages: Vec<Message>) -> Self {
+    pub(super) fn new(mut messages: Vec<Diagnostic>) -> Self {
         debug_assert!(!messages.is_empty(), "errors without a message");
         messages.sort_by_key(|m| m.place);
         messages.dedup();
@@ -67,11 +67,11 @@ impl SceneErrors {
     /// About one place in the file.
     pub(super) fn at(file: &str, place: Option<(usize, usize)>, found: String, help: &str) -> Self {
         let (file, help) = (file.to_string(), help.to_string());
-        Self { messages: vec![Message { file, place, subject: String::new(), found, help }] }
+        Self { messages: vec![Diagnostic { file, place, subject: String::new(), found, help }] }
     }
 
     /// The messages, in the order of the file.
-    pub fn messages(&self) -> &[Message] {
+    pub fn messages(&self) -> &[Diagnostic] {
         &self.messages
     }
 }

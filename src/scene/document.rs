@@ -1,11 +1,11 @@
 //! A scene file as text with its comments, beside the scene that it describes.
 
 use crate::asset::Assets;
-use crate::scene::diagnostic::{Message, SceneErrors};
+use crate::scene::diagnostic::{Diagnostic, SceneErrors};
 use crate::scene::format::patch::rewrite;
 use crate::scene::format::read::read_text;
 use crate::scene::format::source_map::located;
-use crate::scene::{Library, Scene};
+use crate::scene::{AssetResolver, Scene};
 use std::path::Path;
 use std::sync::Arc;
 use toml_edit::DocumentMut;
@@ -36,7 +36,8 @@ impl Document {
     /// As [`Scene::read`].
     pub fn read_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         let name = path.display().to_string();
-        read_text(path).and_then(|text| Self::parse_in(text, &name, Library::of(path, assets)))
+        read_text(path)
+            .and_then(|text| Self::parse_in(text, &name, AssetResolver::of(path, assets)))
     }
 
     /// Reads and checks a scene from `text`; messages call it `name`.
@@ -44,10 +45,10 @@ impl Document {
     /// # Errors
     /// As [`Scene::read`].
     pub fn parse(text: String, name: &str) -> Result<Self, SceneErrors> {
-        Self::parse_in(text, name, Library::of(Path::new(name), Arc::default()))
+        Self::parse_in(text, name, AssetResolver::of(Path::new(name), Arc::default()))
     }
 
-    fn parse_in(text: String, name: &str, library: Library) -> Result<Self, SceneErrors> {
+    fn parse_in(text: String, name: &str, library: AssetResolver) -> Result<Self, SceneErrors> {
         let scene = Scene::parse_in(&text, name, library)?;
         Ok(Self { name: name.to_string(), origin: (text.clone(), scene.clone()), text, scene })
     }
@@ -92,7 +93,7 @@ impl Document {
     }
 
     /// [`Scene::warnings`] with file, line and column, in the order of the file.
-    pub fn warnings(&self) -> Vec<Message> {
+    pub fn warnings(&self) -> Vec<Diagnostic> {
         located(&self.name, &self.text, self.scene.warnings())
     }
 }

@@ -23,11 +23,11 @@ pub struct SceneFile {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DiskState {
     /// The same; or there is no file yet to differ.
-    Same,
+    Unchanged,
     /// Somebody else has written it, or it cannot be read any more.
     Changed,
     /// It is not there.
-    Gone,
+    Missing,
 }
 
 /// Why a scene was not saved.
@@ -150,9 +150,9 @@ impl SceneFile {
     /// Reads the file and compares it with what this program last read or wrote.
     pub fn on_disk(&self) -> DiskState {
         match self.path.as_deref().map(content) {
-            None => DiskState::Same,
-            Some(Ok(Some(found))) if found == self.fingerprint => DiskState::Same,
-            Some(Ok(None)) => DiskState::Gone,
+            None => DiskState::Unchanged,
+            Some(Ok(Some(found))) if found == self.fingerprint => DiskState::Unchanged,
+            Some(Ok(None)) => DiskState::Missing,
             Some(_) => DiskState::Changed,
         }
     }

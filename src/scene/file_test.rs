@@ -31,7 +31,7 @@ fn saving_there_and_back_gives_the_same_bytes() {
     file.save(&edited(&file, 3), false).unwrap();
     let text = fs::read_to_string(&path).unwrap();
     assert_eq!(text, BUILT_IN.to_string() + "\n[trace]\ndepth = 3\n");
-    assert_eq!(file.on_disk(), DiskState::Same);
+    assert_eq!(file.on_disk(), DiskState::Unchanged);
     file.save(&start, false).unwrap();
     assert_eq!(fs::read_to_string(&path).unwrap(), BUILT_IN);
     assert_eq!(count(directory.path()), 1, "no temporary file is left");
@@ -52,11 +52,11 @@ fn another_writer_is_noticed() {
     fs::write(&path, &theirs).unwrap();
     file.reload().unwrap();
     assert_eq!(file.document().scene().film.size, [320, 240]);
-    assert_eq!(file.on_disk(), DiskState::Same);
+    assert_eq!(file.on_disk(), DiskState::Unchanged);
     fs::remove_file(&path).unwrap();
-    assert_eq!(file.on_disk(), DiskState::Gone);
+    assert_eq!(file.on_disk(), DiskState::Missing);
     file.save(&scene, false).unwrap();
-    assert_eq!(file.on_disk(), DiskState::Same);
+    assert_eq!(file.on_disk(), DiskState::Unchanged);
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn a_broken_file_is_told_once_and_harms_nothing() {
     let errors = file.reload().unwrap_err();
     assert_eq!(errors.messages()[0].subject, "object \"ball\"");
     assert_eq!(file.document().text(), BUILT_IN);
-    assert_eq!(file.on_disk(), DiskState::Same);
+    assert_eq!(file.on_disk(), DiskState::Unchanged);
     fs::write(&path, BUILT_IN).unwrap();
     assert_eq!(file.on_disk(), DiskState::Changed);
     file.reload().unwrap();
@@ -79,7 +79,7 @@ fn saving_under_another_name_overwrites_nothing_unasked() {
     let mut file = SceneFile::untitled(BUILT_IN.to_string(), "mirror-room.toml").unwrap();
     let scene = edited(&file, 3);
     assert_eq!(file.save(&scene, true), Err(SaveError::Untitled));
-    assert_eq!(file.on_disk(), DiskState::Same);
+    assert_eq!(file.on_disk(), DiskState::Unchanged);
     let other = directory.path().join("other.toml");
     fs::write(&other, "theirs").unwrap();
     assert_eq!(file.save_as(&other, &scene, false), Err(SaveError::Exists(other.clone())));

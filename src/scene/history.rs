@@ -17,23 +17,23 @@ const MAX_STEPS: usize = 10_000;
 #[derive(Clone, Debug)]
 pub struct History {
     /// What was before each step that can be undone, the oldest first.
-    past: VecDeque<Entry>,
+    past: VecDeque<HistoryEntry>,
     now: Arc<Scene>,
     /// What was after each step that can be done again, the next one last.
-    future: Vec<Entry>,
+    future: Vec<HistoryEntry>,
     /// Whether the last step may still grow.
     open: bool,
     saved: Arc<Scene>,
 }
 
 #[derive(Clone, Debug)]
-struct Entry {
+struct HistoryEntry {
     scene: Arc<Scene>,
     label: String,
     bytes: usize,
 }
 
-impl Entry {
+impl HistoryEntry {
     fn new(scene: Arc<Scene>, label: String) -> Self {
         let bytes = bytes(&scene);
         Self { scene, label, bytes }
@@ -70,7 +70,7 @@ impl History {
                 self.open = false;
             }
         } else {
-            self.past.push_back(Entry::new(before, label.to_string()));
+            self.past.push_back(HistoryEntry::new(before, label.to_string()));
             self.forget();
         }
         true
@@ -84,18 +84,18 @@ impl History {
     /// Goes back one step and returns its label; `None`: there is none.
     pub fn undo(&mut self) -> Option<String> {
         self.open = false;
-        let Entry { scene, label, .. } = self.past.pop_back()?;
+        let HistoryEntry { scene, label, .. } = self.past.pop_back()?;
         let after = std::mem::replace(&mut self.now, scene);
-        self.future.push(Entry::new(after, label.clone()));
+        self.future.push(HistoryEntry::new(after, label.clone()));
         Some(label)
     }
 
     /// Goes forward one step that was undone and returns its label; `None`: there is none.
     pub fn redo(&mut self) -> Option<String> {
         self.open = false;
-        let Entry { scene, label, .. } = self.future.pop()?;
+        let HistoryEntry { scene, label, .. } = self.future.pop()?;
         let before = std::mem::replace(&mut self.now, scene);
-        self.past.push_back(Entry::new(before, label.clone()));
+        self.past.push_back(HistoryEntry::new(before, label.clone()));
         Some(label)
     }
 

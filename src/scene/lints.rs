@@ -2,13 +2,13 @@
 
 use crate::material::{Fresnel, Highlight, Material};
 use crate::scene::Scene;
-use crate::scene::validate::Finding;
+use crate::scene::validate::Problem;
 use crate::value::{Color, number};
 
 impl Scene {
     /// What is legal but dubious, one finding per kind of doubt: the first case, and how many more.
     /// [`Document::warnings`](crate::scene::Document::warnings) adds file, line and column.
-    pub fn warnings(&self) -> Vec<Finding> {
+    pub fn warnings(&self) -> Vec<Problem> {
         let materials = |dubious: &dyn Fn(&Material) -> Option<(&'static str, String)>| {
             let mut cases = self.materials.iter().filter_map(|(n, m)| Some((n, dubious(m)?)));
             let (name, (key, found)) = cases.next()?;

@@ -17,20 +17,20 @@ mod validate;
 pub use crate::primitive::Acceleration;
 pub use crate::scene::format::schema::FIELDS;
 pub use crate::shape::{Rotate, Scale, TRANSFORM_OP_FIELDS, TransformOp};
-pub use asset_resolver::Library;
+pub use asset_resolver::AssetResolver;
 pub use builtin::{BUILT_IN, built_in, starter};
-pub use diagnostic::{Message, SceneErrors};
+pub use diagnostic::{Diagnostic, SceneErrors};
 pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};
 pub use history::History;
 pub use object::{OBJECT_FIELDS, Object};
-pub use recovery::{Found, Lost, Recovery, kept_in, state_folder, sweep};
+pub use recovery::{Orphan, Recovery, RecoveryFile, kept_in, state_folder, sweep};
 pub use reference::reference;
 pub use settings::{
-    AMBIENT_FIELDS, Ambient, BACKGROUND_FIELDS, Background, FILM_FIELDS, FilmSettings, Filter,
-    Horizon, Level, MAX_PIXELS, TRACE_FIELDS, Trace,
+    AMBIENT_FIELDS, Ambient, BACKGROUND_FIELDS, Background, BelowHorizon, FILM_FIELDS,
+    FilmSettings, Filter, IntegratorSettings, MAX_PIXELS, RayTypes, TRACE_FIELDS,
 };
-pub use validate::Finding;
+pub use validate::Problem;
 
 use crate::camera::Camera;
 use crate::light::Light;
@@ -45,7 +45,7 @@ pub struct Scene {
     /// The picture's raster.
     pub film: FilmSettings,
     /// How far paths are followed.
-    pub trace: Trace,
+    pub trace: IntegratorSettings,
     /// The view.
     pub camera: Camera,
     /// Other viewpoints by name, to come back to. The picture is taken from `camera`.
@@ -64,7 +64,7 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// Where the files are that it names.
     #[serde(skip)]
-    pub library: Library,
+    pub library: AssetResolver,
 }
 
 #[cfg(test)]

@@ -33,21 +33,21 @@ const SWEPT_AFTER: Duration = Duration::from_secs(60);
 pub struct Recovery {
     /// Folder and first name, in the order in which they are tried.
     homes: Vec<(PathBuf, OsString)>,
-    own: Option<Kept>,
+    own: Option<Saved>,
 }
 
 /// A file with a lock on it.
 #[derive(Debug)]
-struct Kept {
+struct Saved {
     path: PathBuf,
     file: File,
 }
 
 /// What was found at the start.
 #[derive(Debug, Default)]
-pub struct Found {
+pub struct RecoveryFile {
     /// Edits that were left behind, the newest first.
-    pub lost: Vec<Lost>,
+    pub lost: Vec<Orphan>,
     /// Files that cannot be read, and why. They stay.
     pub unreadable: Vec<(PathBuf, String)>,
     /// Somebody who is alive has unsaved edits.
@@ -56,8 +56,8 @@ pub struct Found {
 
 /// Edits that were left behind. Nobody else finds them while this exists.
 #[derive(Debug)]
-pub struct Lost {
-    kept: Kept,
+pub struct Orphan {
+    kept: Saved,
     /// The scene's file as it would have been saved.
     pub text: String,
     /// [`crate::scene::SceneFile::fingerprint`] of what was edited; `None`: it was in no file, or it is not
@@ -142,8 +142,8 @@ impl Recovery {
     }
 
     /// Looks for what was left behind. What is empty is removed.
-    pub fn find(&self) -> Found {
-        let mut found = Found::default();
+    pub fn find(&self) -> RecoveryFile {
+        let mut found = RecoveryFile::default();
         for (folder, name) in &self.homes {
             for number in 1..=MOST {
                 let path = folder.join(numbered(name, number));
@@ -164,13 +164,13 @@ impl Recovery {
     }
 
     /// These edits are the ones of this session from now on.
-    pub fn take_up(&mut self, lost: Lost) {
+    pub fn take_up(&mut self, lost: Orphan) {
         self.forget();
         self.own = Some(lost.kept);
     }
 }
 
-impl Lost {
+impl Orphan {
     /// The file that holds them.
     pub fn path(&self) -> &Path {
         &self.kept.path
@@ -182,7 +182,7 @@ impl Lost {
     }
 }
 
-impl Kept {
+impl Saved {
     /// Whether the file still has its name.
     fn is_there(&self) -> bool {
         let named = fs::symlink_metadata(&self.path);
@@ -234,7 +234,7 @@ fn filled(folder: &Path, text: &str) -> io::Result<NamedTempFile> {
 }
 
 /// Puts `text` into a new file under the first name that is free.
-fn begun(folder: &Path, name: &OsStr, text: &str) -> io::Result<Kept> {
+fn begun(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved> {
     let mut folders = DirBuilder::new();
     folders.recursive(true);
     #[cfg(unix)]
@@ -244,7 +244,7 @@ fn begun(folder: &Path, name: &OsStr, text: &str) -> io::Result<Kept> {
     for number in 1..=MOST {
         let path = folder.join(numbered(name, number));
         match file.persist_noclobber(&path) {
-            Ok(file) => return Ok(Kept { path, file }),
+            Ok(file) => return Ok(Saved { path, file }),
             Err(taken) if taken.error.kind() == ErrorKind::AlreadyExists => file = taken.file,
             Err(failed) => return Err(failed.error),
         }
@@ -262,7 +262,7 @@ fn open(path: &Path) -> io::Result<File> {
 ///
 /// # Errors
 /// [`ErrorKind::WouldBlock`] if somebody alive has it; or if it cannot be read.
-fn left_behind(path: &Path) -> io::Result<Option<Lost>> {
+fn left_behind(path: &Path) -> io::Result<Option<Orphan>> {
     // In a moment somebody may replace the file that was opened: then there is another one to look at.
     for _ in 0..5 {
         // Looked at before it is opened: to open a pipe, say, could take for ever.
@@ -273,7 +273,7 @@ fn left_behind(path: &Path) -> io::Result<Option<Lost>> {
             Err(error) => return Err(error),
         }
         let kept = match open(path) {
-            Ok(file) => Kept { path: path.to_path_buf(), file },
+            Ok(file) => Saved { path: path.to_path_buf(), file },
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(error),
         };
@@ -289,7 +289,7 @@ fn left_behind(path: &Path) -> io::Result<Option<Lost>> {
     Err(ErrorKind::WouldBlock.into())
 }
 
-fn read(kept: Kept) -> io::Result<Lost> {
+fn read(kept: Saved) -> io::Result<Orphan> {
     let mut bytes = Vec::new();
     (&kept.file).take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > MAX_BYTES {
@@ -302,7 +302,7 @@ fn read(kept: Kept) -> io::Result<Lost> {
         Some((base, text)) => (u64::from_str_radix(base, 16).ok(), text.to_string()),
         None => (None, text),
     };
-    Ok(Lost { kept, text, base, written })
+    Ok(Orphan { kept, text, base, written })
 }
 
 /// Files in `folder` that hold unsaved edits.

@@ -1,7 +1,7 @@
 //! Unsaved edits on a real file system. Two of these in one process are to each other what two
 //! processes are: a lock belongs to an open file.
 
-use crate::scene::{Found, Recovery, state_folder, sweep};
+use crate::scene::{Recovery, RecoveryFile, state_folder, sweep};
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ fn of(path: &Path) -> Recovery {
     Recovery::of(Some(path), "", None)
 }
 
-fn texts(found: &Found) -> Vec<&str> {
+fn texts(found: &RecoveryFile) -> Vec<&str> {
     found.lost.iter().map(|lost| lost.text.as_str()).collect()
 }
 
@@ -74,7 +74,7 @@ fn sessions_side_by_side_have_files_of_their_own() {
     assert!(found.elsewhere);
     assert_eq!(found.lost.len(), 6);
     assert!(found.lost.windows(2).all(|pair| pair[0].written >= pair[1].written));
-    found.lost.into_iter().for_each(crate::scene::Lost::discard);
+    found.lost.into_iter().for_each(crate::scene::Orphan::discard);
     assert_eq!(names(folder.path()), [".a.toml.unsaved", ".a.toml.unsaved-2", ".a.toml.unsaved-5"]);
 }
 

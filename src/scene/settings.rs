@@ -29,15 +29,15 @@ pub enum Filter {
 /// How far paths are followed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Trace {
+pub struct IntegratorSettings {
     /// What is traced at all.
-    pub level: Level,
+    pub level: RayTypes,
     /// The most surfaces that a path meets after the first: 0 is no reflection and no transmission.
     pub depth: u32,
     /// A path ends when what it could still add is weighted by less than this.
     pub min_weight: f64,
     /// What becomes of a reflected ray that would dip under the surface.
-    pub horizon: Horizon,
+    pub horizon: BelowHorizon,
     /// How rays are kept from things that they cannot meet.
     pub acceleration: Acceleration,
 }
@@ -45,7 +45,7 @@ pub struct Trace {
 /// What is traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Level {
+pub enum RayTypes {
     /// Camera rays only: no shadows, no reflections.
     Primary,
     /// Camera rays and shadow rays.
@@ -57,7 +57,7 @@ pub enum Level {
 /// What becomes of a reflected ray that would dip under the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Horizon {
+pub enum BelowHorizon {
     /// It is mirrored at the surface: no light is lost.
     Fold,
     /// It is lost.
@@ -86,13 +86,13 @@ impl Default for FilmSettings {
     }
 }
 
-impl Default for Trace {
+impl Default for IntegratorSettings {
     fn default() -> Self {
         Self {
-            level: Level::Full,
+            level: RayTypes::Full,
             depth: 16,
             min_weight: 0.0,
-            horizon: Horizon::Fold,
+            horizon: BelowHorizon::Fold,
             acceleration: Acceleration::Auto,
         }
     }
@@ -223,7 +223,7 @@ impl FilmSettings {
     }
 }
 
-impl Trace {
+impl IntegratorSettings {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
         Validator::new(TRACE_FIELDS)

@@ -69,7 +69,7 @@ fn texture(key: &str, kind: &str) -> &'static [Field] {
 fn tables_name_the_keys_that_are_read() {
     same_keys::<Scene>("scene", FIELDS);
     same_keys::<FilmSettings>("film", FILM_FIELDS);
-    same_keys::<Trace>("trace", TRACE_FIELDS);
+    same_keys::<IntegratorSettings>("trace", TRACE_FIELDS);
     same_keys::<Background>("background", BACKGROUND_FIELDS);
     same_keys::<Ambient>("ambient", AMBIENT_FIELDS);
     same_keys::<Camera>("camera", crate::camera::FIELDS);
@@ -96,7 +96,7 @@ fn tables_name_the_keys_that_are_read() {
 #[test]
 fn tables_tell_the_defaults_that_hold() {
     same_defaults::<FilmSettings>("film", FILM_FIELDS, "");
-    same_defaults::<Trace>("trace", TRACE_FIELDS, "");
+    same_defaults::<IntegratorSettings>("trace", TRACE_FIELDS, "");
     same_defaults::<Background>("background", BACKGROUND_FIELDS, "");
     same_defaults::<Ambient>("ambient", AMBIENT_FIELDS, "");
     same_defaults::<Camera>("camera", crate::camera::FIELDS, "");
@@ -132,7 +132,7 @@ fn every_word_is_read() {
         }
     }
     words::<FilmSettings>(FILM_FIELDS);
-    words::<Trace>(TRACE_FIELDS);
+    words::<IntegratorSettings>(TRACE_FIELDS);
     words::<Light>(crate::light::FIELDS);
     words::<Material>(crate::material::FIELDS);
     words::<ImageTexture>(texture("texture", "image"));

@@ -10,7 +10,7 @@ use std::fmt;
 
 /// Something wrong or dubious in a scene, without file and line.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
+pub struct Problem {
     /// The keys (and positions in lists, from 0) that lead to it: `object`, `3`, `shape`, `sphere`.
     pub path: Vec<String>,
     /// What it is about: `object "queen"`; empty: the scene.
@@ -21,7 +21,7 @@ pub struct Finding {
     pub help: String,
 }
 
-impl fmt::Display for Finding {
+impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         use crate::value::printable;
         if !self.subject.is_empty() {
@@ -62,9 +62,9 @@ impl Scene {
         })
     }
 
-    pub(super) fn finding(&self, path: &[&str], found: String, help: String) -> Finding {
+    pub(super) fn finding(&self, path: &[&str], found: String, help: String) -> Problem {
         let path = keys(path);
-        Finding { subject: self.subject(&path), path, found, help }
+        Problem { subject: self.subject(&path), path, found, help }
     }
 
     /// Looks for the files that it names, those that have not been looked for yet. What is wrong with
@@ -80,7 +80,7 @@ impl Scene {
     }
 
     /// Everything wrong with the scene; a scene that was read has nothing wrong, an edited one may.
-    pub fn faults(&self) -> Vec<Finding> {
+    pub fn faults(&self) -> Vec<Problem> {
         let mut findings = Vec::new();
         let mut add = |path: &[&str], faults: Vec<ValidationError>| {
             findings.extend(faults.into_iter().map(|fault| {
@@ -117,7 +117,7 @@ impl Scene {
 
     /// Materials whose textures ask for coordinates that the object's shape does not have. Shapes have no
     /// faults.
-    fn missing_coordinates(&self, findings: &mut Vec<Finding>) {
+    fn missing_coordinates(&self, findings: &mut Vec<Problem>) {
         let asks = |name: &str| {
             let material = self.materials.get(name)?;
             let texture = material.texture.as_ref().map(|t| t.placement().mapping);
@@ -153,7 +153,7 @@ impl Scene {
         }
     }
 
-    fn missing_materials(&self, findings: &mut Vec<Finding>) {
+    fn missing_materials(&self, findings: &mut Vec<Problem>) {
         let mut named = Vec::new();
         for (i, object) in self.objects.iter().enumerate() {
             named.push((format!("object.{i}.material"), object.material.as_str()));
@@ -186,7 +186,7 @@ impl Scene {
         &self,
         list: &str,
         names: impl Iterator<Item = &'a String>,
-        findings: &mut Vec<Finding>,
+        findings: &mut Vec<Problem>,
     ) {
         let mut first = HashMap::new();
         for (i, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {

@@ -14,7 +14,7 @@ pub enum Multiplexer {
 
 /// What the environment tells about the terminal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Surroundings {
+pub struct Environment {
     /// `TERM`.
     pub term: String,
     /// `COLORTERM`.
@@ -31,7 +31,7 @@ pub struct Surroundings {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capabilities {
     /// What the environment tells.
-    pub surroundings: Surroundings,
+    pub surroundings: Environment,
     /// How many colours it has, by environment and answers.
     pub colors: Colors,
     /// A frame can be shown at once (mode 2026).
@@ -58,7 +58,7 @@ pub struct Capabilities {
     pub passthrough: Option<Duration>,
 }
 
-impl Surroundings {
+impl Environment {
     /// As the `variable`s of the environment have it.
     pub fn of(variable: impl Fn(&str) -> Option<String>) -> Self {
         let variable = |name: &str| variable(name).filter(|value| !value.is_empty());
@@ -110,7 +110,7 @@ impl Surroundings {
 
 impl Capabilities {
     /// Of a terminal that has not been asked.
-    pub fn unasked(surroundings: Surroundings) -> Self {
+    pub fn unasked(surroundings: Environment) -> Self {
         Self {
             colors: surroundings.colors(),
             surroundings,
@@ -133,8 +133,8 @@ impl Capabilities {
 mod tests {
     use super::*;
 
-    fn surroundings(variables: &[(&str, &str)]) -> Surroundings {
-        Surroundings::of(|name| {
+    fn surroundings(variables: &[(&str, &str)]) -> Environment {
+        Environment::of(|name| {
             let found = variables.iter().find(|(known, _)| *known == name);
             found.map(|(_, value)| value.to_string())
         })

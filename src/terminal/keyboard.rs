@@ -1,7 +1,7 @@
 //! What the terminal sends, as it comes.
 
 use crate::terminal::decode::Decoder;
-use crate::terminal::{Event, Surroundings};
+use crate::terminal::{Environment, Event};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::{self, Stdin};
 use std::time::{Duration, Instant};
@@ -30,7 +30,7 @@ pub struct Keyboard {
 
 impl Keyboard {
     /// Of a terminal in such surroundings.
-    pub fn new(surroundings: &Surroundings) -> Self {
+    pub fn new(surroundings: &Environment) -> Self {
         let wait = if surroundings.ssh.is_some() { ESCAPE_WAIT_OVER_SSH } else { ESCAPE_WAIT };
         Self {
             stdin: io::stdin(),

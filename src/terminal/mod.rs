@@ -19,7 +19,7 @@ mod tty;
 
 use crate::terminal::event::{Key, Mouse};
 pub use area::Area;
-pub use capabilities::{Capabilities, Multiplexer, Surroundings};
+pub use capabilities::{Capabilities, Environment, Multiplexer};
 pub(crate) use clipboard::copied;
 pub use decode::Decoder;
 pub use keyboard::{Keyboard, Timed};

@@ -4,7 +4,7 @@
 //! terminal, and terminals answer in order: its answer says that nothing more will come. What comes
 //! later than anybody waits for is passed over by whoever reads then.
 
-use crate::terminal::capabilities::{Capabilities, Multiplexer, Surroundings};
+use crate::terminal::capabilities::{Capabilities, Environment, Multiplexer};
 use crate::terminal::cells::Colors;
 use crate::terminal::keyboard::{Keyboard, Timed};
 use crate::terminal::tty::Tty;
@@ -56,7 +56,7 @@ pub(crate) fn cursor_question(through: Option<Multiplexer>) -> &'static str {
 pub fn probe(
     tty: &Tty,
     keyboard: &mut Keyboard,
-    surroundings: Surroundings,
+    surroundings: Environment,
     ending: &dyn Fn() -> bool,
 ) -> io::Result<Capabilities> {
     let patience = if surroundings.ssh.is_some() { PATIENCE_OVER_SSH } else { PATIENCE };

@@ -5,7 +5,7 @@ use crate::lanes::{Double, Float, SimdFloat, Single};
 use crate::light::DeltaLight;
 use crate::material::{Bsdf, Material, ReflectionLobe};
 use crate::primitive::{Acceleration, Aggregate, Form};
-use crate::scene::{Filter, Horizon, Level, Scene};
+use crate::scene::{BelowHorizon, Filter, RayTypes, Scene};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates};
@@ -127,7 +127,7 @@ impl<L: SimdFloat> World<L> {
 
     fn compile(scene: &Scene, placed: RecenteredGeometry) -> Self {
         let level = scene.trace.level;
-        let reflects = level == Level::Full && scene.trace.depth > 0;
+        let reflects = level == RayTypes::Full && scene.trace.depth > 0;
         let default = Material::default();
         let mut used: Vec<&Material> = Vec::new();
         let mut finish_of_object = Vec::new();
@@ -223,7 +223,7 @@ impl<L: SimdFloat> World<L> {
                 let of = FrustumCuller::new(forms().collect(), eye, &entered, (&lamps, off_lamps));
                 panorama = of.outlook(&geometry, None);
                 if geometry.has_tree() {
-                    if level >= Level::Shadows {
+                    if level >= RayTypes::Shadows {
                         light_buffers = of.light_buffers(&geometry);
                     }
                     let things = geometry.in_tree().into_iter();
@@ -256,10 +256,10 @@ impl<L: SimdFloat> World<L> {
             colored,
             plain: !smooth && !colored && geometry.is_listed(),
             skins,
-            shadows: level >= Level::Shadows && !geometry.is_empty(),
+            shadows: level >= RayTypes::Shadows && !geometry.is_empty(),
             depth: if going_on { scene.trace.depth } else { 0 },
             min_weight: scene.trace.min_weight,
-            fold: scene.trace.horizon == Horizon::Fold,
+            fold: scene.trace.horizon == BelowHorizon::Fold,
             view,
             names: groups.names(scene),
             jitter: scene.film.filter == Filter::Box,

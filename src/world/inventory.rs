@@ -1,7 +1,7 @@
 //! What a world contains, in words.
 
 use crate::material::{Bsdf, ReflectionLobe, SpecularModel};
-use crate::scene::{Filter, Horizon, Level, Scene};
+use crate::scene::{BelowHorizon, Filter, RayTypes, Scene};
 use crate::world::light_groups::LightGroupSource;
 use std::fmt;
 
@@ -52,7 +52,7 @@ impl Inventory {
         };
         say(through(false), "transmission");
         say(through(true), "dielectric");
-        let absorbs = scene.trace.horizon == Horizon::Absorb;
+        let absorbs = scene.trace.horizon == BelowHorizon::Absorb;
         say(absorbs && spread(|s| !matches!(s, ReflectionLobe::Mirror)), "absorbing horizon");
         let count = |n: usize, what: &str| match n {
             0 => None,
@@ -82,8 +82,8 @@ impl Inventory {
         say(shared, "shared light group");
         say(members.contains(&LightGroupSource::Ambient), "ambient");
         say(members.contains(&LightGroupSource::Background), "background");
-        say(scene.trace.level == Level::Primary, "no shadows");
-        say(scene.trace.level == Level::Shadows && lamps > 0, "shadows only");
+        say(scene.trace.level == RayTypes::Primary, "no shadows");
+        say(scene.trace.level == RayTypes::Shadows && lamps > 0, "shadows only");
         say(scene.film.filter == Filter::Center, "no anti-aliasing");
         parts.push(format!("{precision} precision"));
         Self { parts }

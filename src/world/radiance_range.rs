@@ -21,7 +21,7 @@ use crate::lanes::Float;
 use crate::light::DeltaLight;
 use crate::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
 use crate::primitive::Form;
-use crate::scene::{Level, Scene};
+use crate::scene::{RayTypes, Scene};
 use crate::world::clearance::{box_distance, clearance, clearance_of};
 use glam::DVec3;
 use std::f64::consts::{FRAC_1_PI, PI};
@@ -179,7 +179,7 @@ impl<'a> SceneDistances<'a> {
         let responses = (0..forms.len()).map(of_form).collect();
         let materials: Vec<&Material> = (0..forms.len()).flat_map(&materials_of).collect();
         let ambient = materials.iter().flat_map(|m| m.color.0.map(|c| c * m.ambient)).collect();
-        let reflects = scene.trace.level == Level::Full && scene.trace.depth > 0;
+        let reflects = scene.trace.level == RayTypes::Full && scene.trace.depth > 0;
         let passed_on = |m: &Material| {
             let mirrored = m.f0().0.map(|f0| f0 * m.reflection);
             reflects.then_some(mirrored.into_iter().chain([m.transmission]))

@@ -2,7 +2,7 @@
 
 use crate::material::{Fresnel, Material};
 use crate::primitive::Form;
-use crate::scene::{Level, Object, Scene};
+use crate::scene::{Object, RayTypes, Scene};
 use glam::DVec3;
 
 /// Largest share of light that a material sends on, reflected and transmitted together, of any channel.
@@ -135,7 +135,7 @@ impl Reach {
 /// equal there, but at the rim rounding decides whether the critical angle is passed, and bumps change them.
 pub fn biases(scene: &Scene) -> Vec<String> {
     let reach = Reach::new(scene);
-    if scene.trace.level < Level::Full || reach.first == 0.0 {
+    if scene.trace.level < RayTypes::Full || reach.first == 0.0 {
         return Vec::new();
     }
     let bound = |sum: f64| {

@@ -5,7 +5,7 @@ use crate::tracer::Mutation;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Material};
-use zerkalo::scene::Horizon;
+use zerkalo::scene::BelowHorizon;
 
 /// Slopes below this reflect like mirrors, and highlights are no smaller.
 const SMOOTHEST: f64 = 1e-3;
@@ -121,7 +121,7 @@ pub fn reflect(
     material: &Material,
     n: DVec3,
     v: DVec3,
-    horizon: Horizon,
+    horizon: BelowHorizon,
     mutation: Mutation,
     numbers: &mut Numbers,
 ) -> Option<(DVec3, DVec3)> {
@@ -152,7 +152,7 @@ pub fn reflect(
     };
     let mut direction = a * local.x + b * local.y + mirror * local.z;
     if direction.dot(n) <= 0.0 {
-        if horizon == Horizon::Absorb || mutation == Mutation::Absorb {
+        if horizon == BelowHorizon::Absorb || mutation == Mutation::Absorb {
             return None;
         }
         direction -= 2.0 * direction.dot(n) * n;

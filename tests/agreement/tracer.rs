@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 use zerkalo::camera::ViewAngle;
 use zerkalo::light::{Falloff, Light};
 use zerkalo::material::Material;
-use zerkalo::scene::{Filter, Level, Scene};
+use zerkalo::scene::{Filter, RayTypes, Scene};
 
 /// A deliberate error, to see that the comparison finds it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,7 +121,7 @@ impl<'a> Tracer<'a> {
             let Some(hit) = self.meet(origin, direction) else {
                 return radiance + weight * DVec3::from(self.scene.background.color.0);
             };
-            let through = trace.level == Level::Full && hit.material.transmission > 0.0;
+            let through = trace.level == RayTypes::Full && hit.material.transmission > 0.0;
             if through && trace.depth > 0 {
                 let way = self.through(&hit, direction, numbers);
                 if matches!(way, Way::On(_)) && !hit.bare {
@@ -142,7 +142,7 @@ impl<'a> Tracer<'a> {
                 return radiance;
             }
             radiance += weight * self.shade(&hit, -direction);
-            let reflects = hit.material.reflection > 0.0 && trace.level == Level::Full;
+            let reflects = hit.material.reflection > 0.0 && trace.level == RayTypes::Full;
             if !reflects || bounce == trace.depth {
                 return radiance;
             }
@@ -243,7 +243,7 @@ impl<'a> Tracer<'a> {
     }
 
     fn in_shadow(&self, point: DVec3, towards: DVec3, distance: f64) -> bool {
-        if self.scene.trace.level == Level::Primary {
+        if self.scene.trace.level == RayTypes::Primary {
             return false;
         }
         let offset = if self.mutation == Mutation::ShadowOffset { 1e-3 } else { 0.0 };

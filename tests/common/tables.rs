@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use toml::{Table, Value};
-use zerkalo::scene::{FIELDS, Library, Scene};
+use zerkalo::scene::{AssetResolver, FIELDS, Scene};
 use zerkalo::value::{Field, ValueType};
 
 /// A key of a scene: the keys that lead to it, positions in lists as numbers, and what it takes.
@@ -18,7 +18,7 @@ pub fn table(scene: &Scene) -> Table {
 }
 
 /// The scene in `table`, with the files of `library`; `None`: it has faults.
-pub fn scene(table: &Table, library: &Library) -> Option<Scene> {
+pub fn scene(table: &Table, library: &AssetResolver) -> Option<Scene> {
     let mut scene: Scene = table.clone().try_into().ok()?;
     scene.library = library.clone();
     scene.resolve();

@@ -8,7 +8,7 @@ use glam::DVec3;
 use zerkalo::camera::ViewAngle;
 use zerkalo::light::{Directional, Falloff, Light, Point};
 use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Metal};
-use zerkalo::scene::{Level, Scene};
+use zerkalo::scene::{RayTypes, Scene};
 use zerkalo::value::Color;
 
 /// `file` is exactly what the plain tracer makes of it.
@@ -110,7 +110,7 @@ fn a8_point_light() {
             ("another place", &|s| warm(s).point = Some(Point { position: [-2.2, 2.1, 1.2] })),
             ("half the intensity", &|s| warm(s).intensity *= 0.5),
             ("white", &|s| warm(s).color = Color::WHITE),
-            ("without shadows", &|s| s.trace.level = Level::Primary),
+            ("without shadows", &|s| s.trace.level = RayTypes::Primary),
         ],
     );
 }
@@ -124,7 +124,7 @@ fn a10_phong_lighting() {
             ("no diffuse part", &|s| material(s, "wide").diffuse = 0.0),
             ("no highlight", &|s| material(s, "narrow").specular = 0.0),
             ("another exponent", &|s| material(s, "middle").exponent = 21.0),
-            ("no shadow rays", &|s| s.trace.level = Level::Primary),
+            ("no shadow rays", &|s| s.trace.level = RayTypes::Primary),
             ("one of two lights", &|s| s.lights[1].on = false),
             ("Cook-Torrance", &|s| material(s, "narrow").highlight = Highlight::CookTorrance),
         ],
@@ -270,7 +270,7 @@ fn a18_background() {
             ("as ambient light", &|s| {
                 s.ambient.color = std::mem::replace(&mut s.background.color, Color::BLACK);
             }),
-            ("not in mirrors", &|s| s.trace.level = Level::Shadows),
+            ("not in mirrors", &|s| s.trace.level = RayTypes::Shadows),
         ],
     );
 }

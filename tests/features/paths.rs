@@ -7,7 +7,7 @@ use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
 use zerkalo::film::Replicates;
 use zerkalo::material::Fresnel;
-use zerkalo::scene::{Filter, Level, Scene};
+use zerkalo::scene::{Filter, RayTypes, Scene};
 use zerkalo::shape::Shape;
 use zerkalo::value::Color;
 use zerkalo::world::Precision;
@@ -15,9 +15,9 @@ use zerkalo::world::Precision;
 #[test]
 fn b1_tracing_depth() {
     let levels: [(&str, crate::row::Change); 3] = [
-        ("camera rays only", &|s| s.trace.level = Level::Primary),
-        ("shadows", &|s| s.trace.level = Level::Shadows),
-        ("everything", &|s| s.trace.level = Level::Full),
+        ("camera rays only", &|s| s.trace.level = RayTypes::Primary),
+        ("shadows", &|s| s.trace.level = RayTypes::Shadows),
+        ("everything", &|s| s.trace.level = RayTypes::Full),
     ];
     let [primary, shadows, full] = levels;
     for (file, others) in
@@ -138,7 +138,7 @@ fn b2_ray_tree() {
             ("one surface more", &|s| s.trace.depth += 1),
             ("no reflected arm", &|s| material(s, "middle").reflection = 0.0),
             ("no transmitted arm", &|s| material(s, "middle").transmission = 0.0),
-            ("no tree", &|s| s.trace.level = Level::Shadows),
+            ("no tree", &|s| s.trace.level = RayTypes::Shadows),
         ],
     );
     // 0.9^28 is the last power above 0.05; after 40 reflections depth would end it.

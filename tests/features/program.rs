@@ -12,7 +12,7 @@ use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo::render::session::{Session, State};
 use zerkalo::render::{Options, RenderState, SyncRender};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::edit::{self, Edit, Refusal, Subject};
+use zerkalo::scene::edit::{self, Edit, EditError, Target};
 use zerkalo::scene::{Document, History, Scene};
 use zerkalo::shape::Shape;
 use zerkalo::world::{self, Precision};
@@ -174,14 +174,14 @@ fn saved_and_rendered(scene: &Scene) -> Vec<[f64; 3]> {
 }
 
 /// One edit of a scene, by a name.
-type Act<'a> = (&'a str, Box<dyn Fn(&Scene) -> Result<Edit, Refusal> + 'a>);
+type Act<'a> = (&'a str, Box<dyn Fn(&Scene) -> Result<Edit, EditError> + 'a>);
 
 /// Sets `key` of what is called by `label` in the outline.
 fn set<'a>(label: &'a str, key: &'a str, text: &'a str) -> Act<'a> {
     let act = move |scene: &Scene| {
         let subject = edit::outline(scene).into_iter().map(|(_, s)| s).find(|s| {
             // The mirror's material is called as the mirror is.
-            s.label(scene) == label && !(label == "mirror" && matches!(s, Subject::Object(_)))
+            s.label(scene) == label && !(label == "mirror" && matches!(s, Target::Object(_)))
         });
         edit::set(scene, &subject.unwrap_or_else(|| panic!("no {label}")), key, text)
     };
@@ -208,9 +208,9 @@ fn a15_user_edits() {
         acts.push(("add", Box::new(move |s| edit::add_object(s, &name, None))));
         acts.push((
             "move",
-            Box::new(|s| edit::move_by(s, &Subject::Object(s.objects.len() - 1), [-0.3, 0.2, 0.3])),
+            Box::new(|s| edit::move_by(s, &Target::Object(s.objects.len() - 1), [-0.3, 0.2, 0.3])),
         ));
-        acts.push(("remove", Box::new(|s| edit::delete(s, &Subject::Object(s.objects.len() - 1)))));
+        acts.push(("remove", Box::new(|s| edit::delete(s, &Target::Object(s.objects.len() - 1)))));
     }
     acts.push(("add light", Box::new(|s| edit::add_light(s, "directional"))));
 

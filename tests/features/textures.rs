@@ -8,8 +8,8 @@ use crate::support::{shipped, sized};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 use zerkalo::material::{TextureFilter, Wrap};
-use zerkalo::scene::edit::{self, Subject};
-use zerkalo::scene::{Level, Scene};
+use zerkalo::scene::edit::{self, Target};
+use zerkalo::scene::{RayTypes, Scene};
 use zerkalo::shape::Shape;
 
 /// An image of `scenes/textures`.
@@ -20,7 +20,7 @@ fn image(name: &str) -> Pixels {
 /// Only camera rays, and no highlights.
 fn plain(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
-    scene.trace.level = Level::Primary;
+    scene.trace.level = RayTypes::Primary;
     scene.materials.values_mut().for_each(|m| m.specular = 0.0);
     scene
 }
@@ -85,7 +85,7 @@ fn wears_images(meant: &Scene, shown: &Scene) -> Verdict {
 
 /// Writes `text` behind `key` of a material.
 fn set(scene: &mut Scene, material: &str, key: &str, text: &str) {
-    let subject = Subject::Material(material.into());
+    let subject = Target::Material(material.into());
     let edit = edit::set(scene, &subject, key, text);
     *scene = edit.unwrap_or_else(|refusal| panic!("{key} {text}: {refusal:?}")).scene;
 }

@@ -5,7 +5,7 @@ use crate::row::{ensure, row, shape};
 use crate::sight::sees;
 use crate::support::parsed;
 use std::fmt::Write;
-use zerkalo::scene::{Level, Scene};
+use zerkalo::scene::{RayTypes, Scene};
 use zerkalo::value::Color;
 
 /// The scene by its formula.
@@ -41,7 +41,7 @@ fn c1_reflecting_tracks() {
     assert_eq!(meant.objects.len(), 401);
     let without_rays_by_chance = |scene: &Scene| {
         let mut scene = scene.clone();
-        scene.trace.level = Level::Shadows;
+        scene.trace.level = RayTypes::Shadows;
         scene
     };
     let check = |shown: &Scene| {

@@ -3,13 +3,13 @@
 use std::collections::VecDeque;
 use std::num::NonZeroU16;
 use std::time::Duration;
-use zerkalo::terminal::diff::{Pacing, Wanted};
-use zerkalo::terminal::flow::{FRAME_INTERVAL, Link, Mode, Start};
+use zerkalo::terminal::diff::{FrameDiff, TargetFrame};
+use zerkalo::terminal::flow::{FRAME_INTERVAL, FlowControl, InitialLink, PacingMode};
 
 /// The line, the terminal, and the program's idea of both.
 pub struct Line {
-    pub link: Link,
-    pub pacing: Pacing,
+    pub link: FlowControl,
+    pub pacing: FrameDiff,
     pub parser: vt100::Parser,
     pub now: Duration,
     /// Bytes a second.
@@ -42,16 +42,16 @@ const STEP: Duration = Duration::from_millis(1);
 impl Line {
     /// `round_trip`: of an empty line.
     pub fn new([columns, rows]: [u16; 2], rate: f64, round_trip: Duration) -> Self {
-        let start = Start {
-            mode: Mode::Answers(None),
+        let start = InitialLink {
+            mode: PacingMode::AckClocked(None),
             round_trip: Some(round_trip),
             queue: false,
             fixed_rate: 30e3,
         };
         let [columns, rows] = [columns, rows].map(|n| NonZeroU16::new(n).unwrap());
         Self {
-            link: Link::new(start),
-            pacing: Pacing::new(),
+            link: FlowControl::new(start),
+            pacing: FrameDiff::new(),
             parser: vt100::Parser::new(rows, columns, 0),
             now: Duration::ZERO,
             rate,
@@ -67,7 +67,7 @@ impl Line {
     }
 
     /// Lets so much time pass while `wanted` is to be shown.
-    pub fn pass(&mut self, wanted: &Wanted, time: Duration) {
+    pub fn pass(&mut self, wanted: &TargetFrame, time: Duration) {
         let end = self.now + time;
         // Nothing becomes different without an answer, or in less time.
         let mut next = self.now;

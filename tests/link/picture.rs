@@ -9,8 +9,8 @@ use zerkalo::render::RenderState;
 use zerkalo::render::schedule::{Schedule, Step, Stop};
 use zerkalo::render::session::RenderBackend;
 use zerkalo::scene::Scene;
-use zerkalo::terminal::cells::{Colors, Ink, Oklab, PictureCells, Raster};
-use zerkalo::terminal::diff::Wanted;
+use zerkalo::terminal::cells::{CellColor, Colors, Oklab, PictureCells, Raster};
+use zerkalo::terminal::diff::TargetFrame;
 use zerkalo::world::Precision;
 
 pub const SCREEN: [u16; 2] = [160, 45];
@@ -73,7 +73,7 @@ impl Work {
         let picture = PictureCells::new(&raster, Colors::True, self.done);
         for (cell, at) in picture.cells.iter().zip(PICTURE.positions()) {
             let [fg, bg] = [cell.fg, cell.bg].map(|ink| match ink {
-                Ink::Rgb([r, g, b]) => Color::Rgb(r, g, b),
+                CellColor::Rgb([r, g, b]) => Color::Rgb(r, g, b),
                 _ => Color::Reset,
             });
             self.cells[at].set_char(cell.glyph).set_style(Style::new().fg(fg).bg(bg));
@@ -88,8 +88,8 @@ impl Work {
         *self = Self { subject: subject + 1, version, ..Self::new(scene, spp) };
     }
 
-    pub fn wanted(&self) -> Wanted<'_> {
-        Wanted {
+    pub fn wanted(&self) -> TargetFrame<'_> {
+        TargetFrame {
             cells: &self.cells,
             cursor: None,
             picture: PICTURE,

@@ -12,7 +12,8 @@ use zerkalo::camera::{Camera, ViewAngle};
 use zerkalo::light::{Directional, Falloff, Light, Point};
 use zerkalo::primitive::Form;
 use zerkalo::scene::{
-    Acceleration, Document, FilmSettings, Object, Scale, Scene, TRACE_FIELDS, Trace, TransformOp,
+    Acceleration, Document, FilmSettings, IntegratorSettings, Object, Scale, Scene, TRACE_FIELDS,
+    TransformOp,
 };
 use zerkalo::value::{Color, Field};
 
@@ -125,7 +126,7 @@ fn film_size(numbers: &mut Numbers, layout: Layout) -> [u32; 2] {
     }
 }
 
-fn trace(numbers: &mut Numbers) -> Trace {
+fn trace(numbers: &mut Numbers) -> IntegratorSettings {
     let own: Own = &|numbers: &mut Numbers, field: &Field| match field.name {
         "level" => Some(Value::String(
             pick(numbers, &["full", "full", "full", "full", "shadows", "primary"]).to_string(),
@@ -135,7 +136,7 @@ fn trace(numbers: &mut Numbers) -> Trace {
         _ => None,
     };
     let keys: Table = table(numbers, TRACE_FIELDS, 0.5, own);
-    let mut trace: Trace = keys.try_into().expect("keys of the table");
+    let mut trace: IntegratorSettings = keys.try_into().expect("keys of the table");
     trace.acceleration = Acceleration::Auto;
     trace
 }

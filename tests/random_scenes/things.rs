@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use toml::{Table, Value};
 use zerkalo::asset::Assets;
 use zerkalo::material::{self, Material};
-use zerkalo::scene::{Library, Object, Rotate, Scale, Scene, TransformOp};
+use zerkalo::scene::{AssetResolver, Object, Rotate, Scale, Scene, TransformOp};
 use zerkalo::shape::{CsgOperand, KINDS, Shape};
 use zerkalo::value::{Field, ValueType};
 
@@ -31,9 +31,9 @@ const IMAGES: &[&str] = &[
 ];
 
 /// The files that were read, shared by all scenes.
-pub fn library() -> Library {
+pub fn library() -> AssetResolver {
     static ASSETS: OnceLock<Arc<Assets>> = OnceLock::new();
-    Library::of(Path::new("test"), ASSETS.get_or_init(Arc::default).clone())
+    AssetResolver::of(Path::new("test"), ASSETS.get_or_init(Arc::default).clone())
 }
 
 /// A coefficient: zero, one, between, and rarely above.

@@ -8,7 +8,7 @@ mod random;
 use layouts::LAYOUTS;
 use proptest::prelude::*;
 use zerkalo::camera::ViewAngle;
-use zerkalo::scene::edit::{Subject, rename, store_view};
+use zerkalo::scene::edit::{Target, rename, store_view};
 use zerkalo::scene::{Document, Object, Scale, Scene, TransformOp};
 use zerkalo::shape::{Plane, Shape, Sphere};
 use zerkalo::value::Color;
@@ -165,14 +165,14 @@ fn renamed_materials_and_views_keep_their_comments_and_their_place() {
     let text = LAYOUTS[0].replace("color = \"#ff0000\" # pure", "# Of fire.\ncolor = \"#ff0000\"");
     let text = text.replace("[materials.red]", "# Red.\n[materials.red] # bright");
     let after = edited(&text, |s| {
-        *s = rename(s, &Subject::Material("red".into()), "fire red").unwrap().scene
+        *s = rename(s, &Target::Material("red".into()), "fire red").unwrap().scene
     });
     let expected = text
         .replace("[materials.red]", "[materials.\"fire red\"]")
         .replace("material = \"red\"", "material = \"fire red\"");
     assert_eq!(after, expected);
     for layout in &LAYOUTS[1..] {
-        let red = Subject::Material("red".into());
+        let red = Target::Material("red".into());
         let after = edited(layout, |s| *s = rename(s, &red, "fire").unwrap().scene);
         for comment in layout.lines().filter_map(|line| line.split_once('#')).map(|(_, c)| c) {
             assert!(after.contains(comment), "{comment}\n{after}");

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use zerkalo::scene::edit::{self, Edit, Entry, Refusal, Subject};
+use zerkalo::scene::edit::{self, Edit, EditError, Target, Widget};
 use zerkalo::scene::{BUILT_IN, Document, History, Scene};
 
 const TRANSFORMS: &str = include_str!("../../scenes/transform.toml");
@@ -27,9 +27,12 @@ fn pick<T: Clone>(list: &[T], at: usize) -> Option<T> {
 }
 
 /// One operation; its name, for the tally, and what came of it.
-fn perform(scene: &Scene, (what, at, other, amount): Act) -> (&'static str, Result<Edit, Refusal>) {
+fn perform(
+    scene: &Scene,
+    (what, at, other, amount): Act,
+) -> (&'static str, Result<Edit, EditError>) {
     let subjects: Vec<_> = edit::outline(scene).into_iter().map(|(_, s)| s).collect();
-    let subject = pick(&subjects, at).unwrap_or(Subject::Camera);
+    let subject = pick(&subjects, at).unwrap_or(Target::Camera);
     let row = pick(&edit::rows(scene, &subject).expect("it is in the outline"), other);
     let row = row.expect("every subject has rows");
     let kinds = edit::object_kinds();
@@ -42,7 +45,7 @@ fn perform(scene: &Scene, (what, at, other, amount): Act) -> (&'static str, Resu
         3 => ("set", edit::set(scene, &subject, &row.key, text)),
         4 => ("set number", edit::set_component(scene, &subject, &row.key, at % 3, text)),
         5 => match row.entry {
-            Entry::Switch | Entry::Choice | Entry::Kind => {
+            Widget::Switch | Widget::Choice | Widget::Kind => {
                 ("toggle", edit::toggle(scene, &subject, &row.key, amount > 0.0))
             }
             _ => ("toggle refused", edit::toggle(scene, &subject, &row.key, amount > 0.0)),

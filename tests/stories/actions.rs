@@ -4,21 +4,21 @@ use crate::desk::{Desk, FILE, ROOM};
 use std::collections::HashSet;
 use std::path::Path;
 use zerkalo::camera::Camera;
-use zerkalo::dashboard::action::{Action, Action::*, Change, Pace, Way};
+use zerkalo::dashboard::action::{Action, Action::*, Delta, Direction, StepSize};
 use zerkalo::dashboard::keymap::{KEYMAP, Row};
 use zerkalo::dashboard::layout::Focus;
-use zerkalo::dashboard::message::{Channel, Effect, Format};
-use zerkalo::dashboard::model::{Colors, Compared, Mode};
+use zerkalo::dashboard::message::{DisplayChannel, Effect, Format};
+use zerkalo::dashboard::model::{Colors, CompareView, Mode};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::film::Tone;
 use zerkalo::light::Light;
 use zerkalo::material::{Lobe, Material};
 use zerkalo::scene::Scene;
-use zerkalo::scene::edit::Subject;
+use zerkalo::scene::edit::Target;
 use zerkalo::shape::Shape;
 
-const BALL: Subject = Subject::Object(1);
-const GLASS: Subject = Subject::Object(2);
+const BALL: Target = Target::Object(1);
+const GLASS: Target = Target::Object(2);
 
 /// The scene before, the desk afterwards.
 type Expect = dyn Fn(&Scene, &Desk) -> bool;
@@ -26,7 +26,7 @@ type Expect = dyn Fn(&Scene, &Desk) -> bool;
 /// What was pressed with what selected, and what must be so afterwards.
 struct Story {
     action: Action,
-    select: Subject,
+    select: Target,
     /// Keys; `:` alone: the action is found in the palette.
     keys: String,
     expect: Box<Expect>,
@@ -34,7 +34,7 @@ struct Story {
 
 fn story(
     action: Action,
-    select: Subject,
+    select: Target,
     keys: &str,
     expect: impl Fn(&Scene, &Desk) -> bool + 'static,
 ) -> Story {
@@ -83,63 +83,69 @@ fn normal(scene: &Scene) -> [f64; 3] {
 }
 
 fn camera_stories() -> Vec<Story> {
-    let c = || Subject::Camera;
+    let c = || Target::Camera;
     let mut stories = vec![
-        story(Orbit(Way::Left), c(), "Left", |a, d| {
+        story(Orbit(Direction::Left), c(), "Left", |a, d| {
             eye(d.scene())[0] < 0.0 && target(a) == target(d.scene())
         }),
-        story(Orbit(Way::Right), c(), "Right", |_, d| eye(d.scene())[0] > 0.0),
-        story(Orbit(Way::Up), c(), "Up", |_, d| eye(d.scene())[1] > 1.0),
-        story(Orbit(Way::Down), c(), "Down", |_, d| eye(d.scene())[1] < 1.0),
-        story(Pan(Way::Left), c(), "Shift-Left", |_, d| {
+        story(Orbit(Direction::Right), c(), "Right", |_, d| eye(d.scene())[0] > 0.0),
+        story(Orbit(Direction::Up), c(), "Up", |_, d| eye(d.scene())[1] > 1.0),
+        story(Orbit(Direction::Down), c(), "Down", |_, d| eye(d.scene())[1] < 1.0),
+        story(Pan(Direction::Left), c(), "Shift-Left", |_, d| {
             eye(d.scene())[0] < 0.0 && target(d.scene())[0] < 0.0
         }),
-        story(Pan(Way::Right), c(), "Shift-Right", |_, d| {
+        story(Pan(Direction::Right), c(), "Shift-Right", |_, d| {
             eye(d.scene())[0] > 0.0 && target(d.scene())[0] > 0.0
         }),
-        story(Pan(Way::Up), c(), "Shift-Up", |_, d| {
+        story(Pan(Direction::Up), c(), "Shift-Up", |_, d| {
             eye(d.scene())[1] > 1.0 && target(d.scene())[1] > 1.0
         }),
-        story(Pan(Way::Down), c(), "Shift-Down", |_, d| {
+        story(Pan(Direction::Down), c(), "Shift-Down", |_, d| {
             eye(d.scene())[1] < 1.0 && target(d.scene())[1] < 1.0
         }),
-        story(Dolly(Way::In, Pace::Coarse), c(), "PageUp", |_, d| eye(d.scene())[2] < 4.9),
-        story(Dolly(Way::Out, Pace::Coarse), c(), "PageDown", |_, d| eye(d.scene())[2] > 5.1),
-        story(Dolly(Way::In, Pace::Fine), c(), "Shift-PageUp", |_, d| {
+        story(Dolly(Direction::In, StepSize::Coarse), c(), "PageUp", |_, d| {
+            eye(d.scene())[2] < 4.9
+        }),
+        story(Dolly(Direction::Out, StepSize::Coarse), c(), "PageDown", |_, d| {
+            eye(d.scene())[2] > 5.1
+        }),
+        story(Dolly(Direction::In, StepSize::Fine), c(), "Shift-PageUp", |_, d| {
             (4.9..5.0).contains(&eye(d.scene())[2])
         }),
-        story(Dolly(Way::Out, Pace::Fine), c(), "Shift-PageDown", |_, d| {
+        story(Dolly(Direction::Out, StepSize::Fine), c(), "Shift-PageDown", |_, d| {
             eye(d.scene())[2] > 5.0 && eye(d.scene())[2] < 5.1
         }),
-        story(Look(Way::Left), c(), "Ctrl-Left", |a, d| {
+        story(Look(Direction::Left), c(), "Ctrl-Left", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[0] < 0.0
         }),
-        story(Look(Way::Right), c(), "w Right", |a, d| {
+        story(Look(Direction::Right), c(), "w Right", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[0] > 0.0
         }),
-        story(Look(Way::Up), c(), "Ctrl-Up", |a, d| {
+        story(Look(Direction::Up), c(), "Ctrl-Up", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[1] > 1.0
         }),
-        story(Look(Way::Down), c(), "w Down", |a, d| {
+        story(Look(Direction::Down), c(), "w Down", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[1] < 1.0
         }),
-        story(Roll(Way::Left), c(), "Alt-Left", |_, d| camera(d.scene()).up[0] != 0.0),
-        story(Roll(Way::Right), c(), "Alt-Right Alt-Left", |a, d| camera(a) == camera(d.scene())),
-        story(ViewAngle(Change::Down), c(), "Alt-Up", |_, d| {
+        story(Roll(Direction::Left), c(), "Alt-Left", |_, d| camera(d.scene()).up[0] != 0.0),
+        story(Roll(Direction::Right), c(), "Alt-Right Alt-Left", |a, d| {
+            camera(a) == camera(d.scene())
+        }),
+        story(ViewAngle(Delta::Down), c(), "Alt-Up", |_, d| {
             camera(d.scene()).view_angle.key_degrees().1 < 40.0
         }),
-        story(ViewAngle(Change::Up), c(), "Alt-Down", |_, d| {
+        story(ViewAngle(Delta::Up), c(), "Alt-Down", |_, d| {
             camera(d.scene()).view_angle.key_degrees().1 > 40.0
         }),
         story(FlyMode, c(), "w", |_, d| d.model.mode == Mode::Fly),
-        story(Fly(Way::In), c(), "w w", |_, d| {
+        story(Fly(Direction::In), c(), "w w", |_, d| {
             eye(d.scene())[2] < 5.0 && target(d.scene())[2] < 0.0
         }),
-        story(Fly(Way::Out), c(), "w s", |_, d| eye(d.scene())[2] > 5.0),
-        story(Fly(Way::Left), c(), "w a", |_, d| eye(d.scene())[0] < 0.0),
-        story(Fly(Way::Right), c(), "w d", |_, d| eye(d.scene())[0] > 0.0),
-        story(Fly(Way::Up), c(), "w r", |_, d| eye(d.scene())[1] > 1.0),
-        story(Fly(Way::Down), c(), "w f", |_, d| eye(d.scene())[1] < 1.0),
+        story(Fly(Direction::Out), c(), "w s", |_, d| eye(d.scene())[2] > 5.0),
+        story(Fly(Direction::Left), c(), "w a", |_, d| eye(d.scene())[0] < 0.0),
+        story(Fly(Direction::Right), c(), "w d", |_, d| eye(d.scene())[0] > 0.0),
+        story(Fly(Direction::Up), c(), "w r", |_, d| eye(d.scene())[1] > 1.0),
+        story(Fly(Direction::Down), c(), "w f", |_, d| eye(d.scene())[1] < 1.0),
         story(Frame, BALL, "f", |_, d| {
             target(d.scene()) == [0.0, 1.0, 0.0] && eye(d.scene())[2] < 3.0
         }),
@@ -155,48 +161,48 @@ fn camera_stories() -> Vec<Story> {
 }
 
 fn light_and_mirror_stories() -> Vec<Story> {
-    let c = || Subject::Camera;
+    let c = || Target::Camera;
     vec![
-        story(NextLight, c(), "l", |_, d| d.model.selection == Subject::Light(0)),
-        story(Intensity(Change::Up, Pace::Coarse), c(), "'", |_, d| {
+        story(NextLight, c(), "l", |_, d| d.model.selection == Target::Light(0)),
+        story(Intensity(Delta::Up, StepSize::Coarse), c(), "'", |_, d| {
             lamp(d.scene()).intensity > 1.05
         }),
-        story(Intensity(Change::Down, Pace::Coarse), c(), ";", |_, d| {
+        story(Intensity(Delta::Down, StepSize::Coarse), c(), ";", |_, d| {
             lamp(d.scene()).intensity < 0.95
         }),
-        story(Intensity(Change::Up, Pace::Fine), c(), "Alt-'", |_, d| {
+        story(Intensity(Delta::Up, StepSize::Fine), c(), "Alt-'", |_, d| {
             (1.001..1.05).contains(&lamp(d.scene()).intensity)
         }),
-        story(Intensity(Change::Down, Pace::Fine), c(), "Alt-;", |_, d| {
+        story(Intensity(Delta::Down, StepSize::Fine), c(), "Alt-;", |_, d| {
             (0.95..0.999).contains(&lamp(d.scene()).intensity)
         }),
         story(SwitchLight, c(), "L", |_, d| !lamp(d.scene()).on),
         story(AddLight, c(), "A Enter Enter", |_, d| {
-            d.scene().lights.len() == 2 && d.model.selection == Subject::Light(1)
+            d.scene().lights.len() == 2 && d.model.selection == Target::Light(1)
         }),
-        story(Roughness(Change::Up, Pace::Coarse), c(), "]", |_, d| {
+        story(Roughness(Delta::Up, StepSize::Coarse), c(), "]", |_, d| {
             mirror(d.scene()).roughness > 0.0525
         }),
-        story(Roughness(Change::Down, Pace::Coarse), c(), ",", |_, d| {
+        story(Roughness(Delta::Down, StepSize::Coarse), c(), ",", |_, d| {
             mirror(d.scene()).roughness < 0.0475
         }),
-        story(Roughness(Change::Up, Pace::Fine), c(), "}", |_, d| {
+        story(Roughness(Delta::Up, StepSize::Fine), c(), "}", |_, d| {
             (0.0501..0.0525).contains(&mirror(d.scene()).roughness)
         }),
-        story(Roughness(Change::Down, Pace::Fine), c(), "<", |_, d| {
+        story(Roughness(Delta::Down, StepSize::Fine), c(), "<", |_, d| {
             (0.0475..0.0499).contains(&mirror(d.scene()).roughness)
         }),
-        story(Reflection(Change::Up), c(), ")", |_, d| mirror(d.scene()).reflection > 0.5),
-        story(Reflection(Change::Down), c(), "(", |_, d| mirror(d.scene()).reflection < 0.5),
+        story(Reflection(Delta::Up), c(), ")", |_, d| mirror(d.scene()).reflection > 0.5),
+        story(Reflection(Delta::Down), c(), "(", |_, d| mirror(d.scene()).reflection < 0.5),
         story(NextLobe, c(), "b", |_, d| mirror(d.scene()).lobe == Lobe::Square),
     ]
 }
 
 fn object_stories() -> Vec<Story> {
-    let c = || Subject::Camera;
+    let c = || Target::Camera;
     vec![
         story(AddObject, c(), "a Enter Enter", |_, d| {
-            d.scene().objects.len() == 4 && d.model.selection == Subject::Object(3)
+            d.scene().objects.len() == 4 && d.model.selection == Target::Object(3)
         }),
         story(Duplicate, BALL, "D", |_, d| {
             d.scene().objects.len() == 4 && d.model.selection != BALL
@@ -204,33 +210,51 @@ fn object_stories() -> Vec<Story> {
         story(Delete, BALL, "x", |_, d| d.scene().objects.iter().all(|o| o.name != "ball")),
         story(Rename, BALL, "e Ctrl-u `pearl` Enter", |_, d| d.scene().objects[1].name == "pearl"),
         story(MoveMode, BALL, "m", |_, d| d.model.mode == Mode::Move),
-        story(Move(Way::Left, Pace::Coarse), BALL, "m Left", |_, d| ball(d.scene())[0] < 0.0),
-        story(Move(Way::Right, Pace::Coarse), BALL, "m Right", |_, d| ball(d.scene())[0] > 0.0),
-        story(Move(Way::In, Pace::Coarse), BALL, "m Up", |_, d| ball(d.scene())[2] < 0.0),
-        story(Move(Way::Out, Pace::Coarse), BALL, "m Down", |_, d| ball(d.scene())[2] > 0.0),
-        story(Move(Way::Up, Pace::Coarse), BALL, "m PageUp", |_, d| ball(d.scene())[1] > 1.0),
-        story(Move(Way::Down, Pace::Coarse), BALL, "m PageDown", |_, d| ball(d.scene())[1] < 1.0),
-        story(Move(Way::Left, Pace::Fine), BALL, "m Right Shift-Left", |_, d| {
-            ball(d.scene())[0] > 0.0
-        }),
-        story(Move(Way::Right, Pace::Fine), BALL, "m Left Shift-Right", |_, d| {
+        story(Move(Direction::Left, StepSize::Coarse), BALL, "m Left", |_, d| {
             ball(d.scene())[0] < 0.0
         }),
-        story(Move(Way::In, Pace::Fine), BALL, "m Down Shift-Up", |_, d| ball(d.scene())[2] > 0.0),
-        story(Move(Way::Out, Pace::Fine), BALL, "m Up Shift-Down", |_, d| ball(d.scene())[2] < 0.0),
-        story(Move(Way::Up, Pace::Fine), BALL, "m PageDown Shift-PageUp", |_, d| {
-            ball(d.scene())[1] < 1.0
+        story(Move(Direction::Right, StepSize::Coarse), BALL, "m Right", |_, d| {
+            ball(d.scene())[0] > 0.0
         }),
-        story(Move(Way::Down, Pace::Fine), BALL, "m PageUp Shift-PageDown", |_, d| {
+        story(Move(Direction::In, StepSize::Coarse), BALL, "m Up", |_, d| ball(d.scene())[2] < 0.0),
+        story(Move(Direction::Out, StepSize::Coarse), BALL, "m Down", |_, d| {
+            ball(d.scene())[2] > 0.0
+        }),
+        story(Move(Direction::Up, StepSize::Coarse), BALL, "m PageUp", |_, d| {
             ball(d.scene())[1] > 1.0
         }),
-        story(TurnMode, GLASS, "r", |_, d| d.model.mode == Mode::Turn),
-        story(Turn(Way::Left, Pace::Coarse), GLASS, "r Left", |_, d| normal(d.scene())[0] < -0.2),
-        story(Turn(Way::Right, Pace::Coarse), GLASS, "r Right", |_, d| normal(d.scene())[0] > 0.2),
-        story(Turn(Way::Left, Pace::Fine), GLASS, "r Shift-Left", |_, d| {
+        story(Move(Direction::Down, StepSize::Coarse), BALL, "m PageDown", |_, d| {
+            ball(d.scene())[1] < 1.0
+        }),
+        story(Move(Direction::Left, StepSize::Fine), BALL, "m Right Shift-Left", |_, d| {
+            ball(d.scene())[0] > 0.0
+        }),
+        story(Move(Direction::Right, StepSize::Fine), BALL, "m Left Shift-Right", |_, d| {
+            ball(d.scene())[0] < 0.0
+        }),
+        story(Move(Direction::In, StepSize::Fine), BALL, "m Down Shift-Up", |_, d| {
+            ball(d.scene())[2] > 0.0
+        }),
+        story(Move(Direction::Out, StepSize::Fine), BALL, "m Up Shift-Down", |_, d| {
+            ball(d.scene())[2] < 0.0
+        }),
+        story(Move(Direction::Up, StepSize::Fine), BALL, "m PageDown Shift-PageUp", |_, d| {
+            ball(d.scene())[1] < 1.0
+        }),
+        story(Move(Direction::Down, StepSize::Fine), BALL, "m PageUp Shift-PageDown", |_, d| {
+            ball(d.scene())[1] > 1.0
+        }),
+        story(TurnMode, GLASS, "r", |_, d| d.model.mode == Mode::Rotate),
+        story(Rotate(Direction::Left, StepSize::Coarse), GLASS, "r Left", |_, d| {
+            normal(d.scene())[0] < -0.2
+        }),
+        story(Rotate(Direction::Right, StepSize::Coarse), GLASS, "r Right", |_, d| {
+            normal(d.scene())[0] > 0.2
+        }),
+        story(Rotate(Direction::Left, StepSize::Fine), GLASS, "r Shift-Left", |_, d| {
             (-0.02..-0.01).contains(&normal(d.scene())[0])
         }),
-        story(Turn(Way::Right, Pace::Fine), GLASS, "r Shift-Right", |_, d| {
+        story(Rotate(Direction::Right, StepSize::Fine), GLASS, "r Shift-Right", |_, d| {
             (0.01..0.02).contains(&normal(d.scene())[0])
         }),
         story(Drop, BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),
@@ -242,34 +266,38 @@ fn object_stories() -> Vec<Story> {
 }
 
 fn panel_stories() -> Vec<Story> {
-    let c = || Subject::Camera;
+    let c = || Target::Camera;
     vec![
         story(NextPanel, c(), "Tab", |_, d| d.model.focus == Focus::Outline),
         story(PreviousPanel, c(), "Shift-Tab", |_, d| d.model.focus == Focus::Inspector),
         story(Leave, BALL, "m Esc", |_, d| d.model.mode == Mode::Orbit),
         story(Open, BALL, "Enter", |_, d| d.model.focus == Focus::Inspector),
-        story(Cursor(Way::Down), c(), "Tab Down", |_, d| {
-            d.model.selection == Subject::View("v1".into())
+        story(Cursor(Direction::Down), c(), "Tab Down", |_, d| {
+            d.model.selection == Target::View("v1".into())
         }),
-        story(Cursor(Way::Up), c(), "Tab Down Down Up", |_, d| {
-            d.model.selection == Subject::View("v1".into())
+        story(Cursor(Direction::Up), c(), "Tab Down Down Up", |_, d| {
+            d.model.selection == Target::View("v1".into())
         }),
-        story(Page(Way::Down), c(), "Tab PageDown", |_, d| {
-            !matches!(d.model.selection, Subject::Camera | Subject::View(_))
+        story(Page(Direction::Down), c(), "Tab PageDown", |_, d| {
+            !matches!(d.model.selection, Target::Camera | Target::View(_))
         }),
-        story(Page(Way::Up), Subject::Trace, "Tab PageUp", |_, d| {
-            !matches!(d.model.selection, Subject::Trace | Subject::Film)
+        story(Page(Direction::Up), Target::IntegratorSettings, "Tab PageUp", |_, d| {
+            !matches!(d.model.selection, Target::IntegratorSettings | Target::Film)
         }),
-        story(First, Subject::Trace, "Tab Home", |_, d| d.model.selection == Subject::Camera),
-        story(Last, c(), "Tab End", |_, d| d.model.selection == Subject::Trace),
-        story(Step(Change::Up, Pace::Coarse), c(), "Enter Right", |_, d| eye(d.scene())[0] > 0.05),
-        story(Step(Change::Down, Pace::Coarse), c(), "Enter Left", |_, d| {
+        story(First, Target::IntegratorSettings, "Tab Home", |_, d| {
+            d.model.selection == Target::Camera
+        }),
+        story(Last, c(), "Tab End", |_, d| d.model.selection == Target::IntegratorSettings),
+        story(Step(Delta::Up, StepSize::Coarse), c(), "Enter Right", |_, d| {
+            eye(d.scene())[0] > 0.05
+        }),
+        story(Step(Delta::Down, StepSize::Coarse), c(), "Enter Left", |_, d| {
             eye(d.scene())[0] < -0.05
         }),
-        story(Step(Change::Up, Pace::Fine), c(), "Enter Shift-Right", |_, d| {
+        story(Step(Delta::Up, StepSize::Fine), c(), "Enter Shift-Right", |_, d| {
             (0.001..0.05).contains(&eye(d.scene())[0])
         }),
-        story(Step(Change::Down, Pace::Fine), c(), "Enter Shift-Left", |_, d| {
+        story(Step(Delta::Down, StepSize::Fine), c(), "Enter Shift-Left", |_, d| {
             (-0.05..-0.001).contains(&eye(d.scene())[0])
         }),
         story(ClearField, c(), "Enter `7` Enter Down Backspace", |_, d| {
@@ -282,7 +310,7 @@ fn panel_stories() -> Vec<Story> {
 }
 
 fn file_stories() -> Vec<Story> {
-    let c = || Subject::Camera;
+    let c = || Target::Camera;
     vec![
         story(Undo, c(), "Left u", |a, d| d.scene() == a && !d.model.is_unsaved()),
         story(Redo, c(), "Left u U", |_, d| eye(d.scene())[0] < 0.0),
@@ -301,10 +329,10 @@ fn file_stories() -> Vec<Story> {
 }
 
 fn picture_stories() -> Vec<Story> {
-    let c = || Subject::Camera;
+    let c = || Target::Camera;
     let probe = |d: &Desk| d.model.probe.unwrap();
     let fine = |way, keys, at: [usize; 2]| {
-        story(MoveProbe(way, Pace::Fine), c(), keys, move |_, d| probe(d) == at)
+        story(MoveProbe(way, StepSize::Fine), c(), keys, move |_, d| probe(d) == at)
     };
     vec![
         story(ExportPng, c(), "p", |_, d| {
@@ -318,30 +346,38 @@ fn picture_stories() -> Vec<Story> {
         story(CancelExport, c(), "Ctrl-e Enter Ctrl-x", |_, d| {
             d.asked(|e| *e == Effect::CancelExport) && d.model.export.is_none()
         }),
-        story(Exposure(Change::Up), c(), "=", |_, d| d.model.display.exposure_ev == 0.25),
-        story(Exposure(Change::Down), c(), "-", |_, d| d.model.display.exposure_ev == -0.25),
+        story(Exposure(Delta::Up), c(), "=", |_, d| d.model.display.exposure_ev == 0.25),
+        story(Exposure(Delta::Down), c(), "-", |_, d| d.model.display.exposure_ev == -0.25),
         story(ResetExposure, c(), "= = 0", |_, d| d.model.display.exposure_ev == 0.0),
         story(NextTone, c(), "t", |_, d| {
             d.model.display.tone == Tone::Neutral && d.asked(|e| matches!(e, Effect::Display(_)))
         }),
-        story(NextChannel, c(), "v", |_, d| d.model.channel == Channel::Noise),
-        story(PreviousChannel, c(), "V", |_, d| d.model.channel == Channel::Depth),
+        story(NextChannel, c(), "v", |_, d| d.model.channel == DisplayChannel::Noise),
+        story(PreviousChannel, c(), "V", |_, d| d.model.channel == DisplayChannel::Depth),
         story(Probe, c(), "i", |_, d| {
             d.asked(|e| *e == Effect::Probe(Some([32, 24]))) && d.model.mode == Mode::Probe
         }),
-        story(MoveProbe(Way::Left, Pace::Coarse), c(), "i Left", move |_, d| probe(d)[0] < 32),
-        story(MoveProbe(Way::Right, Pace::Coarse), c(), "i Right", move |_, d| probe(d)[0] > 32),
-        story(MoveProbe(Way::Up, Pace::Coarse), c(), "i Up", move |_, d| probe(d)[1] < 24),
+        story(MoveProbe(Direction::Left, StepSize::Coarse), c(), "i Left", move |_, d| {
+            probe(d)[0] < 32
+        }),
+        story(MoveProbe(Direction::Right, StepSize::Coarse), c(), "i Right", move |_, d| {
+            probe(d)[0] > 32
+        }),
+        story(MoveProbe(Direction::Up, StepSize::Coarse), c(), "i Up", move |_, d| {
+            probe(d)[1] < 24
+        }),
         story(CopyPath, c(), "p y", |_, d| d.asked(|e| matches!(e, Effect::Copy(_)))),
         story(ShowExport, c(), "p o", |_, d| d.asked(|e| matches!(e, Effect::Look { .. }))),
-        story(MoveProbe(Way::Down, Pace::Coarse), c(), "i Down", move |_, d| probe(d)[1] > 24),
-        fine(Way::Left, "i Shift-Left", [31, 24]),
-        fine(Way::Right, "i Shift-Right", [33, 24]),
-        fine(Way::Up, "i Shift-Up", [32, 23]),
-        fine(Way::Down, "i Shift-Down", [32, 25]),
+        story(MoveProbe(Direction::Down, StepSize::Coarse), c(), "i Down", move |_, d| {
+            probe(d)[1] > 24
+        }),
+        fine(Direction::Left, "i Shift-Left", [31, 24]),
+        fine(Direction::Right, "i Shift-Right", [33, 24]),
+        fine(Direction::Up, "i Shift-Up", [32, 23]),
+        fine(Direction::Down, "i Shift-Down", [32, 25]),
         story(Keep, c(), "k", |_, d| d.model.comparison.kept.is_some()),
-        story(Flip, c(), "k c", |_, d| d.model.comparison.shown == Compared::Kept),
-        story(Difference, c(), "k C", |_, d| d.model.comparison.shown == Compared::Difference),
+        story(Flip, c(), "k c", |_, d| d.model.comparison.shown == CompareView::Pinned),
+        story(Difference, c(), "k C", |_, d| d.model.comparison.shown == CompareView::Difference),
         story(Pause, c(), "Space", |_, d| d.model.paused && d.asked(|e| *e == Effect::Pause(true))),
         story(Restart, c(), "R", |_, d| d.asked(|e| *e == Effect::Restart)),
         story(StopAt, c(), "T Ctrl-u `spp 100, time 5` Enter", |_, d| {
@@ -353,8 +389,8 @@ fn picture_stories() -> Vec<Story> {
             // From the target, half a code, to the next finer one.
             d.model.stop.noise_codes == Some(0.25) && d.model.overlay.is_none()
         }),
-        story(Threads(Change::Up), c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(3))),
-        story(Threads(Change::Down), c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(1))),
+        story(Threads(Delta::Up), c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(3))),
+        story(Threads(Delta::Down), c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(1))),
         story(Priority, c(), ":", |_, d| d.asked(|e| *e == Effect::LowPriority(true))),
         story(NextColors, c(), "#", |_, d| d.model.colors == Colors::Indexed),
         story(Help, c(), "?", |_, d| matches!(d.model.overlay, Some(Overlay::Help { .. }))),

@@ -13,7 +13,7 @@ use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::{begin, update};
 use zerkalo::film::{Film, Header, LightWeights};
 use zerkalo::render::schedule::Stop;
-use zerkalo::scene::edit::Subject;
+use zerkalo::scene::edit::Target;
 use zerkalo::scene::{Document, SaveError, Scene};
 use zerkalo::terminal::event::{Button, Code, Key, Mouse, MouseKind};
 
@@ -129,7 +129,7 @@ impl Desk {
         self.model.scene()
     }
 
-    pub fn select(&mut self, subject: Subject) {
+    pub fn select(&mut self, subject: Target) {
         assert!(subject.exists(self.scene()), "{subject:?}");
         self.model.selection = subject;
     }

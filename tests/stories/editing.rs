@@ -5,12 +5,12 @@ use std::time::Duration;
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
-use zerkalo::scene::edit::Subject;
+use zerkalo::scene::edit::Target;
 use zerkalo::shape::Shape;
 
-const BALL: Subject = Subject::Object(1);
+const BALL: Target = Target::Object(1);
 
-fn desk(subject: Subject, keys: &str) -> Desk {
+fn desk(subject: Target, keys: &str) -> Desk {
     let mut desk = Desk::new(ROOM);
     desk.select(subject);
     desk.keys(keys);
@@ -87,7 +87,7 @@ fn a_whole_vector_or_colour_can_be_typed_into_any_of_its_lines() {
     let mut desk = desk(BALL, "Enter Down Down Down `1, 2 -3` Enter");
     let Shape::Sphere(sphere) = &desk.scene().objects[1].shape else { panic!() };
     assert_eq!(sphere.center, [1.0, 2.0, -3.0]);
-    desk.select(Subject::Material("red".into()));
+    desk.select(Target::Material("red".into()));
     desk.keys("Home Down Down `#ffffff` Enter");
     assert_eq!(desk.scene().materials["red"].color.0, [1.0; 3]);
 }
@@ -102,14 +102,14 @@ fn words_are_chosen_from_a_list_or_stepped() {
     assert_eq!(desk.scene().objects[1].material, "mirror");
     desk.keys("u Right");
     assert_ne!(desk.scene().objects[1].material, "red");
-    desk.select(Subject::Light(0));
+    desk.select(Target::Light(0));
     desk.keys("End Enter");
     assert!(!desk.scene().lights[0].on, "Enter switches a switch");
 }
 
 #[test]
 fn a_form_shows_what_it_makes_and_is_taken_as_a_whole() {
-    let mut desk = desk(Subject::Camera, "a Enter");
+    let mut desk = desk(Target::Camera, "a Enter");
     assert_eq!(desk.scene().objects.len(), 4, "it is seen while the form is open");
     assert!(matches!(desk.effects.last(), Some(Effect::Show(s)) if s.objects.len() == 4));
     assert_eq!(desk.text(), ROOM, "but not there yet");
@@ -121,7 +121,7 @@ fn a_form_shows_what_it_makes_and_is_taken_as_a_whole() {
     assert!(desk.model.overlay.is_none());
     let Shape::Sphere(sphere) = &desk.scene().objects[3].shape else { panic!() };
     assert_eq!((sphere.radius, desk.scene().materials.len()), (0.2, 3));
-    assert_eq!(desk.model.selection, Subject::Object(3));
+    assert_eq!(desk.model.selection, Target::Object(3));
     desk.keys("u");
     assert_eq!(desk.text(), ROOM, "one step");
 }
@@ -144,7 +144,7 @@ fn a_form_is_cancelled_as_a_whole() {
 
 #[test]
 fn a_form_shares_a_material_and_leaves_no_other_behind() {
-    let mut desk = desk(Subject::Camera, "a Enter Down");
+    let mut desk = desk(Target::Camera, "a Enter Down");
     for _ in 0..3 {
         desk.keys("Right");
         if desk.scene().objects[3].material == "red" {
@@ -158,7 +158,7 @@ fn a_form_shares_a_material_and_leaves_no_other_behind() {
 
 #[test]
 fn a_wrong_value_in_a_form_stays_in_the_form() {
-    let mut desk = desk(Subject::Camera, "a Enter End Home `ball` Enter");
+    let mut desk = desk(Target::Camera, "a Enter End Home `ball` Enter");
     assert!(desk.problem().is_some_and(|p| p.contains("same name")), "{:?}", desk.problem());
     desk.keys("Backspace `2` Enter Enter");
     assert_eq!(desk.scene().objects[3].name, "bal2");
@@ -166,7 +166,7 @@ fn a_wrong_value_in_a_form_stays_in_the_form() {
 
 #[test]
 fn a_held_key_is_one_step_and_a_pause_ends_it() {
-    let mut desk = desk(Subject::Camera, "] ] ] ] ]");
+    let mut desk = desk(Target::Camera, "] ] ] ] ]");
     desk.keys("u");
     assert_eq!(desk.text(), ROOM);
     desk.keys("] ]");
@@ -187,7 +187,7 @@ fn a_mode_is_one_step_however_long_it_takes() {
     assert_ne!(desk.text(), ROOM);
     desk.keys("u");
     assert_eq!(desk.text(), ROOM);
-    let mut desk = self::desk(Subject::Film, "m");
+    let mut desk = self::desk(Target::Film, "m");
     assert!(desk.notice().contains("cannot be moved"), "{}", desk.notice());
     desk.keys("Left");
     assert!(desk.scene().camera.eye[0] < 0.0, "the keys still move the camera");
@@ -228,10 +228,10 @@ fn prompts_say_what_is_wrong_and_stay_open() {
 
 #[test]
 fn strength_of_light_is_told_and_keeps_its_subject() {
-    let mut desk = desk(Subject::Ambient, "' '");
+    let mut desk = desk(Target::Ambient, "' '");
     assert!(desk.scene().ambient.color.0[0] > 0.1 && desk.scene().lights[0].intensity == 1.0);
     assert!(desk.notice().starts_with("ambient: "), "{}", desk.notice());
-    assert_eq!(desk.model.selection, Subject::Ambient);
+    assert_eq!(desk.model.selection, Target::Ambient);
     desk.keys("L");
     assert!(desk.notice().contains("no switch"));
 }

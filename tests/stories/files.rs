@@ -4,12 +4,12 @@ use crate::desk::{Desk, FILE, ROOM};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo::dashboard::message::{Effect, LeftBehind, Message};
+use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::model::{Colors, Model, Start};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::{begin, update};
 use zerkalo::render::schedule::Stop;
-use zerkalo::scene::edit::Subject;
+use zerkalo::scene::edit::Target;
 use zerkalo::scene::{SaveError, Scene, built_in};
 
 fn start(path: Option<&str>, text: &str) -> Model {
@@ -114,12 +114,12 @@ fn somebody_elses_version_is_asked_about() {
 #[test]
 fn a_changed_file_is_read_at_once_unless_edits_would_be_lost() {
     let mut desk = Desk::new(ROOM);
-    desk.select(Subject::Object(1));
+    desk.select(Target::Object(1));
     let other = ROOM.replace("radius = 0.5", "radius = 0.25");
     desk.disk.insert(FILE.into(), other.clone());
     desk.send(Message::ChangedOnDisk);
     assert_eq!(desk.text(), other);
-    assert_eq!(desk.model.selection, Subject::Object(1), "found again by its name");
+    assert_eq!(desk.model.selection, Target::Object(1), "found again by its name");
     desk.keys("Left");
     desk.disk.insert(FILE.into(), ROOM.into());
     desk.send(Message::ChangedOnDisk);
@@ -204,11 +204,11 @@ fn edits_bring_back_a_scene_whose_file_is_spoilt() {
     let mut model = start(Some(FILE), "[camera");
     begin(&mut model);
     let scene = Arc::new(Scene::parse(ROOM, FILE).unwrap());
-    let left = LeftBehind { scene: Arc::clone(&scene), age: Duration::ZERO, changed: true };
-    update(&mut model, Message::LeftBehind(left), Duration::ZERO);
+    let left = OrphanedEdits { scene: Arc::clone(&scene), age: Duration::ZERO, changed: true };
+    update(&mut model, Message::OrphanedEdits(left), Duration::ZERO);
     let effects = press(&mut model, "r");
     assert!(effects.contains(&Effect::Show(Arc::clone(&scene))), "{effects:?}");
-    assert!(effects.contains(&Effect::TakeUp) && effects.contains(&Effect::Journal(Some(scene))));
+    assert!(effects.contains(&Effect::TakeUp) && effects.contains(&Effect::KeepEdits(Some(scene))));
     assert!(model.is_unsaved() && !model.file.blank);
     // What stands in the file is not overwritten unasked.
     let effects = press(&mut model, "Ctrl-s");
@@ -237,7 +237,7 @@ fn the_last_picture_is_looked_at_until_a_key_comes() {
     desk.keys("o");
     assert!(desk.model.overlay.is_none() && desk.notice().contains("No picture"));
     desk.keys("p o");
-    let looked = |desk: &Desk| matches!(&desk.model.overlay, Some(Overlay::Still(looked)) if looked.path.ends_with("room-1.png"));
+    let looked = |desk: &Desk| matches!(&desk.model.overlay, Some(Overlay::ViewerImage(looked)) if looked.path.ends_with("room-1.png"));
     assert!(looked(&desk));
     // Made anew for a screen of another size; what was made for the old one is not shown.
     desk.effects.clear();
@@ -249,7 +249,7 @@ fn the_last_picture_is_looked_at_until_a_key_comes() {
     assert!(desk.model.overlay.is_none() && desk.text() == before);
     // One that cannot be read is told and leads back.
     desk.keys("o");
-    let message = Message::Still("room-1.png".into(), Err("it is gone".to_string()));
+    let message = Message::ViewerImage("room-1.png".into(), Err("it is gone".to_string()));
     update(&mut desk.model, message, Duration::ZERO);
     assert!(desk.model.overlay.is_none() && desk.notice().contains("room-1.png cannot be shown"));
     desk.keys("o Ctrl-c");

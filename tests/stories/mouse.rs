@@ -5,7 +5,7 @@ use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::Effect;
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::panel_lines::{OutlineLine, outline};
-use zerkalo::scene::edit::Subject;
+use zerkalo::scene::edit::Target;
 use zerkalo::shape::Shape;
 use zerkalo::terminal::event::{Button, MouseKind};
 
@@ -27,12 +27,12 @@ fn a_click_selects_what_is_seen() {
     let mut desk = Desk::new(ROOM);
     let [x, y] = middle(&desk);
     desk.click(x, y);
-    assert_eq!(desk.model.selection, Subject::Object(1), "the ball");
+    assert_eq!(desk.model.selection, Target::Object(1), "the ball");
     let image = desk.model.layout().unwrap().image;
     desk.click(x, image.y + image.height - 1);
-    assert_eq!(desk.model.selection, Subject::Object(0), "the floor");
+    assert_eq!(desk.model.selection, Target::Object(0), "the floor");
     desk.click(x, image.y);
-    assert_eq!(desk.model.selection, Subject::Background);
+    assert_eq!(desk.model.selection, Target::Background);
     assert_eq!(desk.text(), ROOM);
 }
 
@@ -55,7 +55,7 @@ fn a_drag_is_one_step_of_undo() {
 #[test]
 fn a_drag_moves_what_is_being_moved_and_stays_under_the_hand() {
     let mut desk = Desk::new(ROOM);
-    desk.select(Subject::Object(1));
+    desk.select(Target::Object(1));
     desk.keys("m");
     let at = middle(&desk);
     let columns = f64::from(desk.model.layout().unwrap().image.width);
@@ -85,7 +85,7 @@ fn the_wheel_dollies_and_scrolls_and_steps() {
     desk.mouse(MouseKind::Scroll(3), rows.x + 1, rows.y);
     let eye = desk.scene().camera.eye;
     assert!(eye[0] > 0.2, "three coarse steps of the eye's x: {eye:?}");
-    desk.select(Subject::Material("mirror".into()));
+    desk.select(Target::Material("mirror".into()));
     desk.keys("Tab");
     let (rows, _) = desk.model.inspector_rows().unwrap();
     desk.mouse(MouseKind::Scroll(-2), rows.x + 1, rows.y + 2);
@@ -106,7 +106,7 @@ fn outline_and_inspector_are_clicked_line_by_line() {
             assert_eq!(desk.model.selection, subject);
         }
     }
-    desk.select(Subject::Object(1));
+    desk.select(Target::Object(1));
     desk.keys("Enter");
     let (rows, _) = desk.model.inspector_rows().unwrap();
     // Name, material, shape, center x.
@@ -142,7 +142,7 @@ fn a_click_while_probing_places_the_probe() {
     desk.click(image.x, image.y);
     let probe = desk.model.probe.unwrap();
     assert!(probe[0] <= 1 && probe[1] <= 1, "{probe:?}");
-    assert_eq!(desk.model.selection, Subject::Camera, "a probe selects nothing");
+    assert_eq!(desk.model.selection, Target::Camera, "a probe selects nothing");
     desk.keys("Esc");
     assert_eq!(desk.model.probe, None);
     assert!(desk.asked(|e| *e == Effect::Probe(None)));

@@ -3,7 +3,7 @@
 use crate::desk::{Desk, ROOM};
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo::dashboard::message::{Effect, LeftBehind, Message};
+use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::scene::Scene;
 
@@ -11,16 +11,16 @@ use zerkalo::scene::Scene;
 fn kept(desk: &mut Desk) -> Vec<Option<Arc<Scene>>> {
     let effects = std::mem::take(&mut desk.effects);
     let kept = effects.into_iter().filter_map(|effect| match effect {
-        Effect::Journal(scene) => Some(scene),
+        Effect::KeepEdits(scene) => Some(scene),
         _ => None,
     });
     kept.collect()
 }
 
-fn left_behind(desk: &Desk, changed: bool) -> LeftBehind {
+fn left_behind(desk: &Desk, changed: bool) -> OrphanedEdits {
     let mut scene = desk.scene().clone();
     scene.trace.depth = 7;
-    LeftBehind { scene: Arc::new(scene), age: Duration::from_secs(720), changed }
+    OrphanedEdits { scene: Arc::new(scene), age: Duration::from_secs(720), changed }
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn every_edit_is_kept_until_it_is_saved_undone_or_left() {
     assert!(matches!(&kept(&mut desk)[..], [Some(_)]), "the file has what was undone");
     desk.keys("q `d`");
     let end: Vec<_> = desk.effects.iter().rev().take(2).collect();
-    assert_eq!(end, [&Effect::Quit, &Effect::Journal(None)]);
+    assert_eq!(end, [&Effect::Quit, &Effect::KeepEdits(None)]);
 }
 
 #[test]
@@ -56,7 +56,7 @@ fn what_is_being_filled_in_is_kept_when_it_is_confirmed() {
 fn edits_that_were_left_behind_are_offered_and_taken_up() {
     let mut desk = Desk::new(ROOM);
     let left = left_behind(&desk, false);
-    desk.send(Message::LeftBehind(left.clone()));
+    desk.send(Message::OrphanedEdits(left.clone()));
     let Some(Overlay::Question(question)) = &desk.model.overlay else { panic!() };
     assert!(question.text.contains("12 minutes ago") && !question.text.contains("changed"));
     desk.effects.clear();
@@ -74,7 +74,7 @@ fn edits_that_were_left_behind_are_offered_and_taken_up() {
 #[test]
 fn whoever_looks_at_the_file_first_finds_them_again() {
     let mut desk = Desk::new(ROOM);
-    desk.send(Message::LeftBehind(left_behind(&desk, true)));
+    desk.send(Message::OrphanedEdits(left_behind(&desk, true)));
     let Some(Overlay::Question(question)) = &desk.model.overlay else { panic!() };
     assert!(question.text.contains("changed since"), "{}", question.text);
     desk.keys("`f` Left");
@@ -89,7 +89,7 @@ fn whoever_looks_at_the_file_first_finds_them_again() {
 fn whoever_is_busy_is_not_interrupted() {
     let mut desk = Desk::new(ROOM);
     desk.keys("a");
-    desk.send(Message::LeftBehind(left_behind(&desk, false)));
+    desk.send(Message::OrphanedEdits(left_behind(&desk, false)));
     assert!(matches!(desk.model.overlay, Some(Overlay::Pick(_))));
     assert!(desk.notice().contains("recover"));
     desk.keys("Esc");
@@ -100,8 +100,8 @@ fn whoever_is_busy_is_not_interrupted() {
 #[test]
 fn edits_that_change_nothing_are_done_with() {
     let mut desk = Desk::new(ROOM);
-    let same = LeftBehind { scene: Arc::clone(desk.model.scene()), ..left_behind(&desk, true) };
-    desk.send(Message::LeftBehind(same));
+    let same = OrphanedEdits { scene: Arc::clone(desk.model.scene()), ..left_behind(&desk, true) };
+    desk.send(Message::OrphanedEdits(same));
     desk.keys("Enter");
     assert!(desk.asked(|e| *e == Effect::Discard) && !desk.asked(|e| *e == Effect::TakeUp));
     assert!(!desk.model.is_unsaved());

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
-use zerkalo::dashboard::action::{Action, Change, Pace, Way};
+use zerkalo::dashboard::action::{Action, Delta, Direction, StepSize};
 use zerkalo::dashboard::hints::reference;
 use zerkalo::dashboard::keymap::{KEYMAP, lookup};
 use zerkalo::terminal::event::Key;
@@ -40,19 +40,19 @@ fn every_action_has_one_row_and_a_label_of_its_own() {
 /// Every action there is. The match makes that a new one cannot be forgotten.
 fn every_action() -> Vec<Action> {
     use Action::*;
-    let ways = [Way::Left, Way::Right, Way::Up, Way::Down];
-    let (changes, paces) = ([Change::Up, Change::Down], [Pace::Coarse, Pace::Fine]);
-    let both = |f: fn(Change, Pace) -> Action| -> Vec<Action> {
+    let ways = [Direction::Left, Direction::Right, Direction::Up, Direction::Down];
+    let (changes, paces) = ([Delta::Up, Delta::Down], [StepSize::Coarse, StepSize::Fine]);
+    let both = |f: fn(Delta, StepSize) -> Action| -> Vec<Action> {
         changes.iter().flat_map(|c| paces.map(|p| f(*c, p))).collect()
     };
     let one_of_each = [
-        Orbit(Way::Left),
-        Pan(Way::Left),
-        Dolly(Way::In, Pace::Fine),
-        Look(Way::Left),
-        Fly(Way::In),
-        Roll(Way::Left),
-        ViewAngle(Change::Up),
+        Orbit(Direction::Left),
+        Pan(Direction::Left),
+        Dolly(Direction::In, StepSize::Fine),
+        Look(Direction::Left),
+        Fly(Direction::In),
+        Roll(Direction::Left),
+        ViewAngle(Delta::Up),
         Frame,
         ResetCamera,
         StoreView,
@@ -60,15 +60,15 @@ fn every_action() -> Vec<Action> {
         MoveMode,
         TurnMode,
         FlyMode,
-        Move(Way::In, Pace::Fine),
-        Turn(Way::Left, Pace::Fine),
+        Move(Direction::In, StepSize::Fine),
+        Rotate(Direction::Left, StepSize::Fine),
         Leave,
         NextLight,
-        Intensity(Change::Up, Pace::Fine),
+        Intensity(Delta::Up, StepSize::Fine),
         SwitchLight,
         AddLight,
-        Roughness(Change::Up, Pace::Fine),
-        Reflection(Change::Up),
+        Roughness(Delta::Up, StepSize::Fine),
+        Reflection(Delta::Up),
         NextLobe,
         AddObject,
         Duplicate,
@@ -79,12 +79,12 @@ fn every_action() -> Vec<Action> {
         NextPanel,
         PreviousPanel,
         OnlyPicture,
-        Cursor(Way::Up),
+        Cursor(Direction::Up),
         First,
         Last,
-        Page(Way::Up),
+        Page(Direction::Up),
         Open,
-        Step(Change::Up, Pace::Fine),
+        Step(Delta::Up, StepSize::Fine),
         ClearField,
         Undo,
         Redo,
@@ -104,17 +104,17 @@ fn every_action() -> Vec<Action> {
         ShowExport,
         ExportSized,
         CancelExport,
-        Exposure(Change::Up),
+        Exposure(Delta::Up),
         ResetExposure,
         NextTone,
         NextChannel,
         PreviousChannel,
         Probe,
-        MoveProbe(Way::Left, Pace::Fine),
+        MoveProbe(Direction::Left, StepSize::Fine),
         Keep,
         Flip,
         Difference,
-        Threads(Change::Up),
+        Threads(Delta::Up),
         Priority,
         NextColors,
         Help,
@@ -126,22 +126,24 @@ fn every_action() -> Vec<Action> {
             Orbit(_) => ways.map(Orbit).into(),
             Pan(_) => ways.map(Pan).into(),
             Look(_) => ways.map(Look).into(),
-            Dolly(..) => {
-                [Way::In, Way::Out].iter().flat_map(|w| paces.map(|p| Dolly(*w, p))).collect()
-            }
-            Fly(_) => ways.into_iter().chain([Way::In, Way::Out]).map(Fly).collect(),
+            Dolly(..) => [Direction::In, Direction::Out]
+                .iter()
+                .flat_map(|w| paces.map(|p| Dolly(*w, p)))
+                .collect(),
+            Fly(_) => ways.into_iter().chain([Direction::In, Direction::Out]).map(Fly).collect(),
             Move(..) => ways
                 .into_iter()
-                .chain([Way::In, Way::Out])
+                .chain([Direction::In, Direction::Out])
                 .flat_map(|w| paces.map(|p| Move(w, p)))
                 .collect(),
             MoveProbe(..) => ways.iter().flat_map(|w| paces.map(|p| MoveProbe(*w, p))).collect(),
-            Roll(_) => [Way::Left, Way::Right].map(Roll).into(),
-            Turn(..) => {
-                [Way::Left, Way::Right].iter().flat_map(|w| paces.map(|p| Turn(*w, p))).collect()
-            }
-            Cursor(_) => [Way::Up, Way::Down].map(Cursor).into(),
-            Page(_) => [Way::Up, Way::Down].map(Page).into(),
+            Roll(_) => [Direction::Left, Direction::Right].map(Roll).into(),
+            Rotate(..) => [Direction::Left, Direction::Right]
+                .iter()
+                .flat_map(|w| paces.map(|p| Rotate(*w, p)))
+                .collect(),
+            Cursor(_) => [Direction::Up, Direction::Down].map(Cursor).into(),
+            Page(_) => [Direction::Up, Direction::Down].map(Page).into(),
             RecallView(_) => (1..=9).map(RecallView).collect(),
             ViewAngle(_) => changes.map(ViewAngle).into(),
             Reflection(_) => changes.map(Reflection).into(),

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use zerkalo::asset::{Assets, LoadProgress};
 use zerkalo::film::Replicates;
 use zerkalo::material::Fresnel;
-use zerkalo::scene::edit::{Entry, Subject, rows, set, step, toggle};
+use zerkalo::scene::edit::{Target, Widget, rows, set, step, toggle};
 use zerkalo::scene::{Document, Scene, SceneFile};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
@@ -128,13 +128,13 @@ fn the_dashboard_edits_textures_and_reads_no_file_twice() {
     }));
     let mut file = SceneFile::open_with(&path, assets).unwrap();
     let mut scene = file.document().scene().clone();
-    let m = Subject::Material("m".into());
+    let m = Target::Material("m".into());
     let row =
         |scene: &Scene, key: &str| rows(scene, &m).unwrap().into_iter().find(|row| row.key == key);
     let texture = row(&scene, "texture").unwrap();
     assert_eq!(
         (texture.entry, texture.value.as_str(), texture.is_default),
-        (Entry::Kind, "", true)
+        (Widget::Kind, "", true)
     );
     assert!(row(&scene, "texture.image.file").is_none());
     for (key, text) in [

@@ -43,12 +43,12 @@ struct Variation<'a> {
     bias_codes: Option<f64>,
     /// The least that could be told from noise.
     bias_least_codes: Option<f64>,
-    crossings: Vec<Crossing>,
+    crossings: Vec<TimeToTarget>,
     points: Vec<Point>,
 }
 
 #[derive(Serialize)]
-struct Crossing {
+struct TimeToTarget {
     codes: f64,
     seconds: f64,
     spread: f64,
@@ -112,7 +112,7 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
     let slope = measured.slope();
     let crossing = |codes: &f64| {
         let c = measured.crossing(*codes)?;
-        Some(Crossing {
+        Some(TimeToTarget {
             codes: *codes,
             seconds: c.seconds,
             spread: c.spread,

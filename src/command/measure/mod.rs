@@ -7,7 +7,7 @@ use crate::command::args::MeasureArgs;
 use crate::command::signals::Signals;
 use crate::command::{Failure, say, warn};
 use crate::film::{self, Display};
-use crate::measure::{self, Plan, Reference, Topic};
+use crate::measure::{self, Experiment, Plan, Reference};
 use crate::scene::Document;
 use crate::world::{self, AnyWorld};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -15,7 +15,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// What most people ask.
-const SHORT: [Topic; 3] = [Topic::Adaptivity, Topic::Precision, Topic::Threads];
+const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];
 
 pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let failed = |why: String| Failure::Failed(why);
@@ -45,7 +45,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     };
     let topics = match (&args.only, args.full) {
         (topics, _) if !topics.is_empty() => topics.clone(),
-        (_, true) => Topic::ALL.iter().map(|(topic, ..)| *topic).collect(),
+        (_, true) => Experiment::ALL.iter().map(|(topic, ..)| *topic).collect(),
         _ => SHORT.to_vec(),
     };
     let seconds = args.seconds.unwrap_or(if args.full { 300.0 } else { 50.0 });

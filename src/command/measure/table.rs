@@ -1,6 +1,6 @@
 //! A measurement for people.
 
-use crate::measure::{Crossing, Measured, Measurement, Steadiness, Topic, median};
+use crate::measure::{Experiment, Measured, Measurement, Steadiness, TimeToTarget, median};
 use std::fmt;
 use std::path::Path;
 
@@ -56,7 +56,7 @@ fn percent(share: f64) -> String {
     format!("±{:.0} %", 100.0 * share)
 }
 
-fn reached(crossing: &Crossing) -> String {
+fn reached(crossing: &TimeToTarget) -> String {
     let least = if crossing.at_most { "< " } else { "" };
     format!("{least}{} {}", time(crossing.seconds), percent(crossing.spread))
 }
@@ -166,7 +166,7 @@ impl fmt::Display for About<'_> {
         if !m.expected.is_empty() {
             writeln!(f, "  ~ was not waited for: expected from how the noise fell last")?;
         }
-        let mut last = Topic::Default;
+        let mut last = Experiment::Default;
         for measured in &m.measured[1..] {
             if measured.topic != last {
                 last = measured.topic;
@@ -190,7 +190,7 @@ impl fmt::Display for About<'_> {
 }
 
 impl About<'_> {
-    fn heading(&self, f: &mut fmt::Formatter, topic: Topic) -> fmt::Result {
+    fn heading(&self, f: &mut fmt::Formatter, topic: Experiment) -> fmt::Result {
         writeln!(f, "\n{} (to {:.2} codes)", topic.question(), self.measurement.compared_at)?;
         let last = if topic.unbiased() { "" } else { "   off by" };
         writeln!(

@@ -1,7 +1,7 @@
 //! Unsaved edits on their way to where the next start finds them: soon after the last, not after each.
 
-use crate::dashboard::message::{LeftBehind, Message};
-use crate::scene::{Found, Lost, Recovery, Scene, SceneErrors, SceneFile, sweep};
+use crate::dashboard::message::{Message, OrphanedEdits};
+use crate::scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, sweep};
 use crate::value::printable;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,12 +13,12 @@ const QUIET: Duration = Duration::from_millis(400);
 const LONGEST: Duration = Duration::from_secs(1);
 
 /// Unsaved edits of one scene after another, and those that were found at the start.
-pub struct Journal {
+pub struct Autosave {
     recovery: Recovery,
     state: Option<PathBuf>,
     pending: Option<Pending>,
     /// What was found and has not been decided about; the last is the next to be offered.
-    found: Vec<Lost>,
+    found: Vec<Orphan>,
     /// It was told already that edits cannot be kept.
     complained: bool,
 }
@@ -29,7 +29,7 @@ struct Pending {
     last: Instant,
 }
 
-impl Journal {
+impl Autosave {
     /// For the scene at `path`, or without one for that called `name`. `state`: the user's folder for
     /// what programs remember.
     pub fn new(path: Option<&Path>, name: &str, state: Option<PathBuf>) -> Self {
@@ -108,7 +108,7 @@ impl Journal {
         let beside = file.map_or_else(Some, SceneFile::path).and_then(Path::parent);
         let beside = beside.filter(|folder| !folder.as_os_str().is_empty());
         [Some(Path::new(".")), beside, self.state.as_deref()].into_iter().flatten().for_each(sweep);
-        let Found { mut lost, unreadable, elsewhere } = self.recovery.find();
+        let RecoveryFile { mut lost, unreadable, elsewhere } = self.recovery.find();
         let mut messages: Vec<_> = unreadable
             .iter()
             .map(|(path, why)| {
@@ -135,7 +135,7 @@ impl Journal {
                 continue;
             }
             return Some(match scene(lost, file) {
-                Ok(scene) => Message::LeftBehind(LeftBehind {
+                Ok(scene) => Message::OrphanedEdits(OrphanedEdits {
                     scene: Arc::new(scene),
                     age: SystemTime::now().duration_since(lost.written).unwrap_or_default(),
                     changed: file.map_or(true, |file| lost.base != file.fingerprint()),
@@ -168,7 +168,7 @@ impl Journal {
     }
 }
 
-fn scene(lost: &Lost, file: Result<&SceneFile, &Path>) -> Result<Scene, SceneErrors> {
+fn scene(lost: &Orphan, file: Result<&SceneFile, &Path>) -> Result<Scene, SceneErrors> {
     let name = lost.path().display().to_string();
     match file {
         Ok(file) => file.parse(&lost.text, &name),
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn edits_are_written_when_they_pause_and_at_the_latest_after_a_second() {
-        let mut journal = Journal::new(None, "a", None);
+        let mut journal = Autosave::new(None, "a", None);
         let start = Instant::now();
         let at = |ms| start + Duration::from_millis(ms);
         assert_eq!(journal.due(), None);
@@ -211,23 +211,23 @@ mod tests {
         let path = folder.path().join("a.toml");
         std::fs::write(&path, starter()).unwrap();
         let file = SceneFile::open(&path).unwrap();
-        let mut first = Journal::new(Some(&path), "", None);
+        let mut first = Autosave::new(Some(&path), "", None);
         assert!(first.search(Ok(&file)).is_empty());
         first.note(Some(scene(3)), Instant::now());
         assert!(first.write(&file).is_none());
         assert_eq!(first.path(), Some(&*folder.path().join(".a.toml.unsaved")));
         // Whoever is alive is not offered to others, but told of.
-        let mut second = Journal::new(Some(&path), "", None);
+        let mut second = Autosave::new(Some(&path), "", None);
         let told = second.search(Ok(&file));
         assert!(matches!(&told[..], [Message::Trouble(t)] if t.contains("elsewhere")), "{told:?}");
         drop(first);
         let told = second.search(Ok(&file));
-        let [Message::LeftBehind(left)] = &told[..] else { panic!("{told:?}") };
+        let [Message::OrphanedEdits(left)] = &told[..] else { panic!("{told:?}") };
         assert_eq!((&left.scene, left.changed), (&scene(3), false));
         // What another program wrote meanwhile is told of.
         std::fs::write(&path, format!("# new\n{}", starter())).unwrap();
         let file = SceneFile::open(&path).unwrap();
-        let Some(Message::LeftBehind(left)) = second.offer(Ok(&file)) else { panic!() };
+        let Some(Message::OrphanedEdits(left)) = second.offer(Ok(&file)) else { panic!() };
         assert!(left.changed);
         assert!(second.take_up(None).is_none());
         assert!(second.offer(Ok(&file)).is_none());
@@ -246,7 +246,7 @@ mod tests {
         std::fs::write(&path, starter()).unwrap();
         let file = SceneFile::open(&path).unwrap();
         let hidden = folder.path().join(".a.toml.unsaved");
-        let mut journal = Journal::new(Some(&path), "", None);
+        let mut journal = Autosave::new(Some(&path), "", None);
         std::fs::write(&hidden, starter()).unwrap();
         assert!(journal.search(Ok(&file)).is_empty() && !hidden.exists());
         std::fs::write(&hidden, "[camera\n").unwrap();
@@ -264,9 +264,9 @@ mod tests {
         let path = folder.path().join("a.toml");
         std::fs::write(&path, "[camera\n").unwrap();
         std::fs::write(folder.path().join(".a.toml.unsaved"), starter()).unwrap();
-        let mut journal = Journal::new(Some(&path), "", None);
+        let mut journal = Autosave::new(Some(&path), "", None);
         let told = journal.search(Err(&path));
-        assert!(matches!(&told[..], [Message::LeftBehind(left)] if left.changed), "{told:?}");
+        assert!(matches!(&told[..], [Message::OrphanedEdits(left)] if left.changed), "{told:?}");
         let mut file = journal.take_up(Some(&path)).unwrap();
         let scene = file.document().scene().clone();
         file.save(&scene, false).unwrap();
@@ -275,7 +275,7 @@ mod tests {
 
     #[test]
     fn complaints_come_once() {
-        let mut journal = Journal::new(None, "a", None);
+        let mut journal = Autosave::new(None, "a", None);
         let file = SceneFile::untitled(starter().to_string(), "a").unwrap();
         let mut write = || {
             journal.note(Some(scene(3)), Instant::now());

@@ -1,9 +1,9 @@
 //! The terminal and the line to it, looked at without showing anything.
 
 use crate::dashboard::run::signals::{expect, watch};
-use crate::terminal::flow::{Mode, Queue, Start};
+use crate::terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
 use crate::terminal::{
-    Capabilities, Event, Keyboard, Multiplexer, Reply, Screen, Surroundings, Tty, cell_px,
+    Capabilities, Environment, Event, Keyboard, Multiplexer, Reply, Screen, Tty, cell_px,
     cursor_question, probe, size,
 };
 use rustix::termios::tcgetwinsize;
@@ -21,11 +21,11 @@ const MOST_BYTES: usize = 1 << 20;
 
 /// What was found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Examined {
+pub struct TerminalReport {
     /// What the terminal can do.
     pub terminal: Capabilities,
     /// How the dashboard knows what has arrived.
-    pub mode: Mode,
+    pub mode: PacingMode,
     /// Columns and rows.
     pub cells: [u16; 2],
     /// Width and height in pixels.
@@ -39,7 +39,7 @@ pub struct Examined {
 ///
 /// # Errors
 /// If there is no terminal, or it is gone.
-pub fn examine(surroundings: Surroundings, measure: bool) -> io::Result<Examined> {
+pub fn examine(surroundings: Environment, measure: bool) -> io::Result<TerminalReport> {
     // On a screen of its own, which goes with whatever a terminal shows of questions that it does not
     // understand.
     let signals = expect()?;
@@ -52,13 +52,13 @@ pub fn examine(surroundings: Surroundings, measure: bool) -> io::Result<Examined
     if multiplexer.is_some() && terminal.passthrough.is_none() {
         terminal.passthrough = answer(&tty, &mut keyboard, multiplexer, &[], PATIENCE)?;
     }
-    let queue = terminal.surroundings.ssh.as_deref().and_then(Queue::find);
-    let mode = Start::of(&terminal, queue.is_some(), None).mode;
+    let queue = terminal.surroundings.ssh.as_deref().and_then(TcpSendQueue::find);
+    let mode = InitialLink::of(&terminal, queue.is_some(), None).mode;
     // Answers of somebody in between say nothing about the line.
     let through = match mode {
-        Mode::Local => Some(None),
-        Mode::Answers(through) => Some(through),
-        Mode::Queue | Mode::Fixed => None,
+        PacingMode::Unlimited => Some(None),
+        PacingMode::AckClocked(through) => Some(through),
+        PacingMode::SendQueue | PacingMode::FixedRate => None,
     };
     let round_trip = match through {
         Some(Some(_)) => terminal.passthrough,
@@ -76,7 +76,7 @@ pub fn examine(surroundings: Surroundings, measure: bool) -> io::Result<Examined
     let known = window.ws_xpixel > 0 && window.ws_ypixel > 0;
     let by_cells = || terminal.cell_px.map(|px| [0, 1].map(|i| px[i].saturating_mul(cells[i])));
     let pixels = known.then_some([window.ws_xpixel, window.ws_ypixel]).or_else(by_cells);
-    Ok(Examined { terminal, mode, cells, pixels, rate })
+    Ok(TerminalReport { terminal, mode, cells, pixels, rate })
 }
 
 /// Writes `before` and asks where the cursor is: how long the answer took; `None`: there was none.

@@ -1,7 +1,7 @@
 //! Does what `update` asks for.
 
 use crate::dashboard::message::{Effect, Format, Message};
-use crate::dashboard::run::exporter::{Order, Sized, Studio, stem};
+use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport, stem};
 use crate::dashboard::run::file_worker::Files;
 use crate::render::schedule::Settings;
 use crate::render::session::{Session, View};
@@ -17,7 +17,7 @@ use std::time::Duration;
 const LOW_PRIORITY: i32 = 19;
 
 /// What the hands work with.
-pub struct Tools {
+pub struct EffectSetup {
     /// The scene's file; or where it is, as long as it cannot be read.
     pub file: Result<SceneFile, PathBuf>,
     /// The folder for unsaved edits that cannot be kept beside their scene.
@@ -31,11 +31,11 @@ pub struct Tools {
 }
 
 /// The renderer, the files, and what is being written.
-pub struct Hands {
+pub struct EffectRunner {
     session: Session<RenderState>,
     files: Files,
-    studio: Studio,
-    sized: Option<Sized>,
+    studio: Exporter,
+    sized: Option<ResizedExport>,
     view: View,
     threads: usize,
     niceness: i32,
@@ -45,10 +45,10 @@ pub struct Hands {
     done: Receiver<Message>,
 }
 
-impl Hands {
+impl EffectRunner {
     /// Starts the threads.
-    pub fn new(tools: Tools) -> io::Result<Self> {
-        let Tools { file, state, threads, options, settings } = tools;
+    pub fn new(tools: EffectSetup) -> io::Result<Self> {
+        let EffectSetup { file, state, threads, options, settings } = tools;
         let (results, done) = unbounded();
         let stem = match &file {
             Ok(file) => stem(file.path(), file.document().name()),
@@ -56,7 +56,7 @@ impl Hands {
         };
         let session = Session::new(threads, options.clone(), settings)?;
         let files = Files::new(file, state, results.clone())?;
-        let studio = Studio {
+        let studio = Exporter {
             paper: files.paper(),
             folder: PathBuf::new(),
             stem,
@@ -88,7 +88,7 @@ impl Hands {
         self.results.clone()
     }
 
-    /// What was done, as messages; pass them through [`Hands::note`].
+    /// What was done, as messages; pass them through [`EffectRunner::note`].
     pub fn done(&self) -> &Receiver<Message> {
         &self.done
     }
@@ -140,7 +140,7 @@ impl Hands {
             Effect::Load => self.files.load(),
             Effect::Export(format) => self.export(format),
             Effect::ExportSized { scene, format, display, stop } => {
-                let order = Order {
+                let order = ExportRequest {
                     scene,
                     format,
                     display,
@@ -149,7 +149,8 @@ impl Hands {
                     settings: self.settings,
                     threads: self.threads,
                 };
-                let started = Sized::start(order, self.studio.clone(), self.results.clone());
+                let started =
+                    ResizedExport::start(order, self.studio.clone(), self.results.clone());
                 match started {
                     Ok(sized) => self.sized = Some(sized),
                     Err(error) => self.refuse(&error),
@@ -160,7 +161,7 @@ impl Hands {
                     sized.cancel();
                 }
             }
-            Effect::Journal(scene) => self.files.journal(scene),
+            Effect::KeepEdits(scene) => self.files.journal(scene),
             Effect::TakeUp => self.files.take_up(),
             Effect::Discard => self.files.discard(),
             // The loop's own.

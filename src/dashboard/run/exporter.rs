@@ -1,7 +1,7 @@
 //! Pictures written while the work goes on: the film as it stands, or a render at another size.
 
 use crate::dashboard::message::{Exported, Format, Message};
-use crate::dashboard::run::file_worker::Paper;
+use crate::dashboard::run::file_worker::SharedDocument;
 use crate::dashboard::run::paths;
 use crate::film::{Depth, Display, ImageOutput};
 use crate::render::export::{Provenance, scene_hash};
@@ -23,9 +23,9 @@ const LOOK: Duration = Duration::from_millis(200);
 
 /// What every picture of this scene has in common.
 #[derive(Clone)]
-pub struct Studio {
+pub struct Exporter {
     /// The scene's file.
-    pub paper: Paper,
+    pub paper: SharedDocument,
     /// Where pictures are put.
     pub folder: PathBuf,
     /// What pictures are called, before the counter.
@@ -36,7 +36,7 @@ pub struct Studio {
     pub adaptive: bool,
 }
 
-impl Studio {
+impl Exporter {
     /// Writes the picture of `rendering` under the next free name.
     pub fn write(
         &self,
@@ -82,13 +82,13 @@ impl Studio {
 }
 
 /// A render at another size, in a thread of its own.
-pub struct Sized {
+pub struct ResizedExport {
     cancelled: Arc<AtomicBool>,
     thread: JoinHandle<()>,
 }
 
 /// What is to be rendered.
-pub struct Order {
+pub struct ExportRequest {
     /// The scene, with the size that is wanted.
     pub scene: Arc<Scene>,
     /// The format.
@@ -105,9 +105,13 @@ pub struct Order {
     pub threads: usize,
 }
 
-impl Sized {
+impl ResizedExport {
     /// Starts the thread. It tells of its progress, and at last of the picture, unless cancelled.
-    pub fn start(order: Order, studio: Studio, results: Sender<Message>) -> io::Result<Self> {
+    pub fn start(
+        order: ExportRequest,
+        studio: Exporter,
+        results: Sender<Message>,
+    ) -> io::Result<Self> {
         let cancelled = Arc::new(AtomicBool::new(false));
         let mark = Arc::clone(&cancelled);
         let thread = thread::Builder::new().name("export".into()).spawn(move || {
@@ -138,8 +142,8 @@ impl Sized {
 
 /// Renders and writes; `None`: cancelled.
 fn render(
-    order: Order,
-    studio: &Studio,
+    order: ExportRequest,
+    studio: &Exporter,
     cancelled: &AtomicBool,
     tell: &dyn Fn(f64),
 ) -> Option<Result<Exported, String>> {

@@ -2,7 +2,7 @@
 //! is noticed.
 
 use crate::dashboard::message::Message;
-use crate::dashboard::run::autosave::Journal;
+use crate::dashboard::run::autosave::Autosave;
 use crate::scene::{DiskState, Document, SaveError, Scene, SceneErrors, SceneFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 use std::fs;
@@ -18,7 +18,7 @@ const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 enum Job {
     Save { scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool },
     Load,
-    Journal(Option<Arc<Scene>>),
+    Autosave(Option<Arc<Scene>>),
     Secure(Sender<()>),
     TakeUp,
     Discard,
@@ -26,9 +26,9 @@ enum Job {
 
 /// The scene file as it was last read or written; nothing if it never could be read.
 #[derive(Clone, Default)]
-pub struct Paper(Arc<Mutex<Option<Arc<Document>>>>);
+pub struct SharedDocument(Arc<Mutex<Option<Arc<Document>>>>);
 
-impl Paper {
+impl SharedDocument {
     /// The document.
     pub fn document(&self) -> Option<Arc<Document>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
@@ -43,7 +43,7 @@ impl Paper {
 /// The thread that reads and writes the scene's file.
 pub struct Files {
     jobs: Option<Sender<Job>>,
-    paper: Paper,
+    paper: SharedDocument,
     thread: Option<JoinHandle<Option<PathBuf>>>,
 }
 
@@ -57,7 +57,7 @@ impl Files {
         results: Sender<Message>,
     ) -> io::Result<Self> {
         let (jobs, inbox) = unbounded();
-        let paper = Paper::default();
+        let paper = SharedDocument::default();
         let (path, file) = match file {
             Ok(file) => (file.path().map(Path::to_path_buf), Some(file)),
             Err(path) => (Some(path), None),
@@ -66,8 +66,8 @@ impl Files {
         // known already.
         let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
         let name = file.as_ref().map_or("", |file| file.document().name());
-        let journal = Journal::new(path.as_deref(), name, state);
-        let clerk = Clerk { path, file, seen, journal, paper: paper.clone(), results };
+        let journal = Autosave::new(path.as_deref(), name, state);
+        let clerk = FileWorker { path, file, seen, journal, paper: paper.clone(), results };
         let thread = thread::Builder::new().name("files".into()).spawn(|| clerk.run(inbox))?;
         Ok(Self { jobs: Some(jobs), paper, thread: Some(thread) })
     }
@@ -85,7 +85,7 @@ impl Files {
     /// The scene has unsaved edits, and is this now; `None`: it has none any more. They are written
     /// where the next start finds them: soon, or at the end.
     pub fn journal(&self, scene: Option<Arc<Scene>>) {
-        self.give(Job::Journal(scene));
+        self.give(Job::Autosave(scene));
     }
 
     /// Unsaved edits are written now. Waits for that at most as long as `patience`.
@@ -95,12 +95,12 @@ impl Files {
         let _ = told.recv_timeout(patience);
     }
 
-    /// The edits of the last [`Message::LeftBehind`] are what is unsaved now.
+    /// The edits of the last [`Message::OrphanedEdits`] are what is unsaved now.
     pub fn take_up(&self) {
         self.give(Job::TakeUp);
     }
 
-    /// The edits of the last [`Message::LeftBehind`] are not wanted.
+    /// The edits of the last [`Message::OrphanedEdits`] are not wanted.
     pub fn discard(&self) {
         self.give(Job::Discard);
     }
@@ -120,7 +120,7 @@ impl Files {
     }
 
     /// What the file holds.
-    pub fn paper(&self) -> Paper {
+    pub fn paper(&self) -> SharedDocument {
         self.paper.clone()
     }
 
@@ -138,26 +138,26 @@ impl Drop for Files {
 }
 
 /// What tells one state of a file from another.
-type Stamp = Option<(SystemTime, u64)>;
+type FileStamp = Option<(SystemTime, u64)>;
 
-fn stamp(path: &Path) -> Stamp {
+fn stamp(path: &Path) -> FileStamp {
     let metadata = fs::metadata(path).ok()?;
     Some((metadata.modified().ok()?, metadata.len()))
 }
 
-struct Clerk {
+struct FileWorker {
     /// Where it is, if it is anywhere yet.
     path: Option<PathBuf>,
     /// The file, once it could be read.
     file: Option<SceneFile>,
     /// The state of the file when it was last read, written or looked at.
-    seen: Stamp,
-    journal: Journal,
-    paper: Paper,
+    seen: FileStamp,
+    journal: Autosave,
+    paper: SharedDocument,
     results: Sender<Message>,
 }
 
-impl Clerk {
+impl FileWorker {
     /// Works until there is nobody to work for. Where unsaved edits are kept, if there are any.
     fn run(mut self, inbox: Receiver<Job>) -> Option<PathBuf> {
         self.publish();
@@ -198,7 +198,7 @@ impl Clerk {
                 let loaded = self.load();
                 self.tell(Message::Loaded(Box::new(loaded)));
             }
-            Job::Journal(scene) => self.journal.note(scene, Instant::now()),
+            Job::Autosave(scene) => self.journal.note(scene, Instant::now()),
             Job::Secure(done) => {
                 self.write_journal();
                 // Nobody waits any more if it has taken long.
@@ -378,7 +378,7 @@ mod tests {
         let (files, inbox) = opened(&path);
         let offered = inbox.recv_timeout(PATIENCE).unwrap();
         assert!(
-            matches!(&offered, Message::LeftBehind(left) if left.scene == scene),
+            matches!(&offered, Message::OrphanedEdits(left) if left.scene == scene),
             "{offered:?}"
         );
         files.take_up();

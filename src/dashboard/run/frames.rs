@@ -2,11 +2,11 @@
 
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::run::image_upload::Sending;
+use crate::dashboard::run::image_upload::ImageUpload;
 use crate::dashboard::run::writer::{Writer, Written};
 use crate::dashboard::view::{View, is_settled};
-use crate::terminal::diff::{Pacing, Wanted};
-use crate::terminal::flow::{Allowance, Link, Queue, Reading, Start};
+use crate::terminal::diff::{FrameDiff, TargetFrame};
+use crate::terminal::flow::{FlowControl, FrameBudget, InitialLink, LinkStatus, TcpSendQueue};
 use crate::terminal::{Capabilities, Tty, copied, cursor_question};
 use crossbeam_channel::Receiver;
 use ratatui::buffer::Buffer;
@@ -22,11 +22,11 @@ const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
 const QUESTION_BYTES: usize = 16;
 
 /// Frames on their way to the terminal.
-pub struct Frames {
+pub struct FramePipeline {
     view: View,
-    pacing: Pacing,
-    link: Link,
-    queue: Option<Queue>,
+    pacing: FrameDiff,
+    link: FlowControl,
+    queue: Option<TcpSendQueue>,
     synchronised: bool,
     writer: Writer,
     /// Bytes so far.
@@ -34,12 +34,12 @@ pub struct Frames {
     wanted: Buffer,
     /// Where the cursor ought to be shown, if it ought to.
     cursor: Option<Position>,
-    facts: Facts,
+    facts: FrameMeta,
     /// For the clipboard: goes out with the next frame.
     copied: String,
     tty: Arc<Tty>,
     /// The still that the model shows.
-    sending: Option<Sending>,
+    sending: Option<ImageUpload>,
     /// What takes away one that it shows no more: goes out before the next frame.
     removal: Vec<u8>,
     /// It has gone out.
@@ -48,7 +48,7 @@ pub struct Frames {
 
 /// What a frame has to know of the model, as it was when it was drawn.
 #[derive(Clone, Copy, Debug, Default)]
-struct Facts {
+struct FrameMeta {
     version: u64,
     samples: f64,
     settled: bool,
@@ -56,7 +56,7 @@ struct Facts {
 
 /// What became of an attempt to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Drawn {
+pub enum DrawOutcome {
     /// Nothing may be sent now; nothing was drawn.
     Nothing,
     /// Only the picture differs, and has to wait.
@@ -71,21 +71,21 @@ pub enum Drawn {
     Picture,
 }
 
-impl Frames {
+impl FramePipeline {
     /// For a terminal that shows nothing. `bandwidth`: bytes a second that the user wants to be sent.
     pub fn new(tty: Arc<Tty>, terminal: &Capabilities, bandwidth: Option<f64>) -> io::Result<Self> {
-        let queue = terminal.surroundings.ssh.as_deref().and_then(Queue::find);
+        let queue = terminal.surroundings.ssh.as_deref().and_then(TcpSendQueue::find);
         Ok(Self {
             view: View::default(),
-            pacing: Pacing::new(),
-            link: Link::new(Start::of(terminal, queue.is_some(), bandwidth)),
+            pacing: FrameDiff::new(),
+            link: FlowControl::new(InitialLink::of(terminal, queue.is_some(), bandwidth)),
             queue,
             synchronised: terminal.synchronised,
             writer: Writer::new(Arc::clone(&tty))?,
             sent: 0,
             wanted: Buffer::empty(Rect::ZERO),
             cursor: None,
-            facts: Facts::default(),
+            facts: FrameMeta::default(),
             copied: String::new(),
             tty,
             sending: None,
@@ -101,25 +101,25 @@ impl Frames {
 
     /// Nothing is known any more of what the terminal shows.
     pub fn forget(&mut self) {
-        self.pacing = Pacing::new();
+        self.pacing = FrameDiff::new();
         self.give_up();
     }
 
     /// How much of the still that is shown has been sent, 0..=1.
     pub fn still_sent(&self) -> Option<f64> {
-        self.sending.as_ref().map(Sending::share)
+        self.sending.as_ref().map(ImageUpload::share)
     }
 
     /// The model's still is the one that is sent.
     pub fn follow(&mut self, model: &Model) {
         let still = match &model.overlay {
-            Some(Overlay::Still(looked)) => looked.still.as_ref(),
+            Some(Overlay::ViewerImage(looked)) => looked.still.as_ref(),
             _ => None,
         };
-        let same = |sending: &Sending| still.is_some_and(|still| sending.is_of(still));
+        let same = |sending: &ImageUpload| still.is_some_and(|still| sending.is_of(still));
         if !self.sending.as_ref().is_some_and(same) {
             self.give_up();
-            self.sending = still.map(|still| Sending::new(Arc::clone(still)));
+            self.sending = still.map(|still| ImageUpload::new(Arc::clone(still)));
         }
     }
 
@@ -129,15 +129,15 @@ impl Frames {
             let (removal, destroys) = sending.removal();
             self.removal.extend(removal);
             if destroys {
-                self.pacing = Pacing::new();
+                self.pacing = FrameDiff::new();
             }
         }
     }
 
     /// Sends the next slice of a still.
-    fn slice(&mut self, now: Duration, allowance: Allowance) -> Drawn {
+    fn slice(&mut self, now: Duration, allowance: FrameBudget) -> DrawOutcome {
         let Some(sending) = self.sending.as_mut().filter(|_| allowance.picture) else {
-            return Drawn::Nothing;
+            return DrawOutcome::Nothing;
         };
         if !sending.has_begun() {
             // Whatever happens from here on.
@@ -156,7 +156,7 @@ impl Frames {
             self.link.sent(now, bytes.len(), true, 0);
         }
         self.writer.send(bytes);
-        Drawn::Slice
+        DrawOutcome::Slice
     }
 
     /// Whether the last frame has been written.
@@ -170,7 +170,7 @@ impl Frames {
     }
 
     /// What the user is told about the line.
-    pub fn reading(&self) -> Option<Reading> {
+    pub fn reading(&self) -> Option<LinkStatus> {
         self.link.reading()
     }
 
@@ -198,7 +198,7 @@ impl Frames {
     pub fn look(&mut self, now: Duration) {
         self.link.look(now);
         if self.link.asks_kernel(now) {
-            self.link.held_back(now, self.queue.as_ref().and_then(Queue::bytes));
+            self.link.held_back(now, self.queue.as_ref().and_then(TcpSendQueue::bytes));
         }
     }
 
@@ -233,7 +233,7 @@ impl Frames {
     }
 
     /// Draws the model, if it has `changed`, and sends what the line has room for. `subject` counts up
-    /// when the picture is another one than the same with more samples. Only when [`Frames::ready`].
+    /// when the picture is another one than the same with more samples. Only when [`FramePipeline::ready`].
     pub fn draw(
         &mut self,
         model: &Model,
@@ -241,8 +241,8 @@ impl Frames {
         changed: bool,
         answers: bool,
         subject: u64,
-    ) -> Drawn {
-        let Some(whole) = self.link.allowance(now, answers) else { return Drawn::Nothing };
+    ) -> DrawOutcome {
+        let Some(whole) = self.link.allowance(now, answers) else { return DrawOutcome::Nothing };
         let mut allowance = whole;
         if let Some(sending) = &self.sending {
             if sending.is_open() {
@@ -255,8 +255,8 @@ impl Frames {
             self.redraw(model);
         }
         let (picture, uncovered) = self.view.place();
-        let Facts { version, samples, settled } = self.facts;
-        let wanted = Wanted {
+        let FrameMeta { version, samples, settled } = self.facts;
+        let wanted = TargetFrame {
             cells: &self.wanted,
             cursor: self.cursor,
             picture,
@@ -281,11 +281,15 @@ impl Frames {
             self.writer.keep(bytes);
             let rest = self.pacing.rest();
             let follows =
-                |sending: &Sending| sending.is_unfinished() && sending.follows(rest.visible);
+                |sending: &ImageUpload| sending.is_unfinished() && sending.follows(rest.visible);
             if !rest.text && self.sending.as_ref().is_some_and(follows) {
                 return self.slice(now, whole);
             }
-            return if self.pacing.rest().visible { Drawn::BranchStack } else { Drawn::Same };
+            return if self.pacing.rest().visible {
+                DrawOutcome::BranchStack
+            } else {
+                DrawOutcome::Same
+            };
         }
         if self.synchronised {
             bytes.extend(SYNCHRONISED[1]);
@@ -298,7 +302,7 @@ impl Frames {
         self.sent += bytes.len() as u64;
         self.link.sent(now, bytes.len(), frame.picture, frame.flushed);
         self.writer.send(bytes);
-        if frame.picture { Drawn::Picture } else { Drawn::Text }
+        if frame.picture { DrawOutcome::Picture } else { DrawOutcome::Text }
     }
 
     /// Tells when the frame on its way has been written.
@@ -319,7 +323,7 @@ impl Frames {
         self.wanted.resize(Rect { x: 0, y: 0, width, height });
         self.wanted.reset();
         self.cursor = self.view.draw(model, &mut self.wanted);
-        self.facts = Facts {
+        self.facts = FrameMeta {
             version: model.picture_version,
             samples: model.snapshot.as_ref().map_or(0.0, |s| s.report.spp.mean),
             settled: is_settled(model),

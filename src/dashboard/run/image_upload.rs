@@ -1,6 +1,6 @@
 //! A still on its way to the terminal, slice by slice, or there.
 
-use crate::terminal::image::Still;
+use crate::terminal::image::ViewerImage;
 use std::sync::Arc;
 
 /// The most bytes at once, so that a key takes effect soon however fast the line seems to be.
@@ -10,8 +10,8 @@ const END: &[u8] = b"\x1b\\";
 
 /// A still of which something may have been sent.
 #[derive(Debug)]
-pub struct Sending {
-    still: Arc<Still>,
+pub struct ImageUpload {
+    still: Arc<ViewerImage>,
     sent: usize,
     /// A sequence is open: nothing else can be sent.
     open: bool,
@@ -19,14 +19,14 @@ pub struct Sending {
     pub seen: bool,
 }
 
-impl Sending {
+impl ImageUpload {
     /// Nothing has been sent.
-    pub fn new(still: Arc<Still>) -> Self {
+    pub fn new(still: Arc<ViewerImage>) -> Self {
         Self { still, sent: 0, open: false, seen: false }
     }
 
     /// Whether it is this one.
-    pub fn is_of(&self, still: &Arc<Still>) -> bool {
+    pub fn is_of(&self, still: &Arc<ViewerImage>) -> bool {
         Arc::ptr_eq(&self.still, still)
     }
 

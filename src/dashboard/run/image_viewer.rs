@@ -5,7 +5,7 @@ use crate::dashboard::overlay::Overlay;
 use crate::dashboard::run::{Dashboard, TELL_INTERVAL};
 use crate::film::Display;
 use crate::terminal::cell_px;
-use crate::terminal::image::{Protocol, Still, Window};
+use crate::terminal::image::{ImageViewport, Protocol, ViewerImage};
 use std::path::Path;
 use std::sync::Arc;
 use std::thread;
@@ -23,17 +23,18 @@ impl Dashboard {
         terminal.cell_px = cell_px;
         let most_bytes = self.frames.reading().map(|line| line.rate * LONGEST.as_secs_f64());
         let protocol = Protocol::of(&terminal);
-        let window = Window { protocol, screen, cell_px, sixel_px: terminal.sixel_px, most_bytes };
+        let window =
+            ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, most_bytes };
         let (path, results) = (path.to_path_buf(), self.hands.results());
         let failed = results.clone();
         let asked = path.clone();
         let started = thread::Builder::new().name("still".into()).spawn(move || {
-            let still = Still::read(&path, &display, &window).map(Arc::new);
+            let still = ViewerImage::read(&path, &display, &window).map(Arc::new);
             // Nobody listens any more when the program ends.
-            let _ = results.send(Message::Still(path, still));
+            let _ = results.send(Message::ViewerImage(path, still));
         });
         if let Err(error) = started {
-            let _ = failed.send(Message::Still(asked, Err(error.to_string())));
+            let _ = failed.send(Message::ViewerImage(asked, Err(error.to_string())));
         }
     }
 
@@ -41,7 +42,7 @@ impl Dashboard {
     pub(super) fn tell_of_still(&mut self, now: Duration) {
         let Some(sent) = self.frames.still_sent() else { return };
         let known = match &self.model.overlay {
-            Some(Overlay::Still(looked)) => looked.sent,
+            Some(Overlay::ViewerImage(looked)) => looked.sent,
             _ => return,
         };
         if sent != known && (sent == 1.0 || self.told + TELL_INTERVAL <= now) {

@@ -3,7 +3,7 @@
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::Dashboard;
-use crate::dashboard::run::signals::{HUNG_UP, Told, Whom, stop};
+use crate::dashboard::run::signals::{HUNG_UP, SignalEvent, StopTarget, stop};
 use crate::terminal::{Timed, Tty, size};
 use crossbeam_channel::Receiver;
 use std::io;
@@ -20,22 +20,22 @@ const SECURED_WITHIN: Duration = Duration::from_secs(2);
 const STOPS_WITHIN: Duration = Duration::from_millis(500);
 
 /// The terminal and what comes from outside.
-pub(super) struct Line {
+pub(super) struct TerminalIo {
     /// What is written to.
     pub tty: Arc<Tty>,
     /// What comes from the terminal.
     pub input: Receiver<io::Result<Timed>>,
     /// What comes from others.
-    pub signals: Receiver<Told>,
+    pub signals: Receiver<SignalEvent>,
     /// Somebody has given the terminal back, for good.
     pub left: Receiver<()>,
 }
 
 /// A size that may change again at once.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Resizing(Option<(Duration, Duration)>);
+pub(super) struct ResizeDebounce(Option<(Duration, Duration)>);
 
-impl Resizing {
+impl ResizeDebounce {
     /// It has changed.
     pub fn note(&mut self, now: Duration) {
         let first = self.0.map_or(now, |(first, _)| first);
@@ -50,22 +50,22 @@ impl Resizing {
 
 impl Dashboard {
     /// Does what a signal says; the exit status if that is to end.
-    pub(super) fn heed(&mut self, told: Told, line: &Line) -> Option<u8> {
+    pub(super) fn heed(&mut self, told: SignalEvent, line: &TerminalIo) -> Option<u8> {
         match told {
-            Told::End(status) => Some(status),
-            Told::Resized => {
+            SignalEvent::End(status) => Some(status),
+            SignalEvent::Resized => {
                 self.resizing.note(self.began.elapsed());
                 None
             }
-            Told::Stop => self.suspend(Whom::Itself, line),
+            SignalEvent::Stop => self.suspend(StopTarget::Itself, line),
             // It was stopped without being asked: by SIGSTOP.
-            Told::Continue => self.resume(line),
+            SignalEvent::Continue => self.resume(line),
         }
     }
 
     /// Gives the terminal back, stops, and takes it again when told to go on; the exit status if the
     /// program is to end instead.
-    pub(super) fn suspend(&mut self, whom: Whom, line: &Line) -> Option<u8> {
+    pub(super) fn suspend(&mut self, whom: StopTarget, line: &TerminalIo) -> Option<u8> {
         // It may never go on.
         self.hands.secure(SECURED_WITHIN);
         self.await_answers(&line.input);
@@ -73,9 +73,9 @@ impl Dashboard {
         let mut stopped = stop(whom).is_ok();
         while stopped {
             match line.signals.recv_timeout(STOPS_WITHIN) {
-                Ok(Told::End(status)) => return Some(status),
-                Ok(Told::Continue) => break,
-                Ok(Told::Resized | Told::Stop) => {}
+                Ok(SignalEvent::End(status)) => return Some(status),
+                Ok(SignalEvent::Continue) => break,
+                Ok(SignalEvent::Resized | SignalEvent::Stop) => {}
                 Err(_) => stopped = false,
             }
         }
@@ -87,7 +87,7 @@ impl Dashboard {
     }
 
     /// Takes the terminal, whatever has become of it, and draws everything anew.
-    fn resume(&mut self, line: &Line) -> Option<u8> {
+    fn resume(&mut self, line: &TerminalIo) -> Option<u8> {
         if line.tty.resume().is_err() {
             return Some(HUNG_UP);
         }
@@ -97,7 +97,7 @@ impl Dashboard {
 
     /// The terminal may have another size; what it shows is not known.
     pub(super) fn resize(&mut self) {
-        self.resizing = Resizing::default();
+        self.resizing = ResizeDebounce::default();
         self.frames.forget();
         // Whether there is a terminal at all the next frame will tell.
         let screen = size().unwrap_or(self.model.screen);
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn a_storm_of_sizes_counts_once_it_is_over_or_has_been_long() {
         let ms = Duration::from_millis;
-        let mut resizing = Resizing::default();
+        let mut resizing = ResizeDebounce::default();
         assert_eq!(resizing.due(), None);
         resizing.note(ms(1000));
         assert_eq!(resizing.due(), Some(ms(1090)));

@@ -34,7 +34,7 @@ struct Answered {
 /// Events and their answers. Always at work, because answers do not wait for the frame interval;
 /// what was answered is remembered only if somebody wants to know.
 #[derive(Debug)]
-pub struct Trace {
+pub struct LatencyRecorder {
     began: Instant,
     awaiting: Vec<Awaiting>,
     in_flight: Vec<Awaiting>,
@@ -51,8 +51,8 @@ struct Load {
     bytes: u64,
 }
 
-impl Trace {
-    /// From now on; `remember`: for [`Trace::write`].
+impl LatencyRecorder {
+    /// From now on; `remember`: for [`LatencyRecorder::write`].
     pub fn new(remember: bool) -> Self {
         Self {
             began: Instant::now(),
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_picture_answers_its_scene_and_those_before() {
-        let mut trace = Trace::new(true);
+        let mut trace = LatencyRecorder::new(true);
         let start = trace.began;
         let at = |ms| start + Duration::from_millis(ms);
         assert!(!trace.answers(0));
@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     fn the_line_counts_while_differences_wait() {
-        let mut trace = Trace::new(true);
+        let mut trace = LatencyRecorder::new(true);
         let ms = Duration::from_millis;
         for (at, waits, sent) in
             [(0, false, 100), (1000, true, 1100), (1100, true, 2100), (1200, false, 3000)]
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn nothing_is_remembered_unasked() {
-        let mut trace = Trace::new(false);
+        let mut trace = LatencyRecorder::new(false);
         trace.event(trace.began, None);
         trace.sent(0);
         trace.written(trace.began);

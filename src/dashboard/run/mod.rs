@@ -23,24 +23,24 @@ use crate::render::Options;
 use crate::render::schedule::{Settings, Stop};
 use crate::render::session::{Snapshot, State};
 use crate::scene::{SceneErrors, SceneFile};
-use crate::terminal::flow::Reading;
+use crate::terminal::flow::LinkStatus;
 use crate::terminal::{
-    Capabilities, Event, Keyboard, Reply, Screen, Surroundings, Timed, probe, size,
+    Capabilities, Environment, Event, Keyboard, Reply, Screen, Timed, probe, size,
 };
 use crossbeam_channel::{Receiver, after, never, select};
-use effects::{Hands, Tools};
-use frames::{Drawn, Frames};
+use effects::{EffectRunner, EffectSetup};
+use frames::{DrawOutcome, FramePipeline};
 use input::Input;
-use job_control::{Line, Resizing};
-use latency::Trace;
-use signals::{HUNG_UP, Whom};
+use job_control::{ResizeDebounce, TerminalIo};
+use latency::LatencyRecorder;
+use signals::{HUNG_UP, StopTarget};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 pub use crate::dashboard::model::Colors;
-pub use diagnose::{Examined, examine};
+pub use diagnose::{TerminalReport, examine};
 
 /// What a dashboard is started with.
 pub struct Setup {
@@ -57,7 +57,7 @@ pub struct Setup {
     /// How many colours the terminal has; `None`: as it turns out.
     pub colors: Option<Colors>,
     /// What the environment tells about the terminal.
-    pub surroundings: Surroundings,
+    pub surroundings: Environment,
     /// Bytes a second that are sent, whatever the line may carry; `None`: what it carries.
     pub bandwidth: Option<f64>,
     /// Where to write how long answers took.
@@ -92,7 +92,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         Ok(file) => (file.path().map(PathBuf::from), file.document().name().to_string()),
         Err(path) => (Some(path.clone()), String::new()),
     };
-    let mut hands = Hands::new(Tools { file, state, threads, options, settings })?;
+    let mut hands = EffectRunner::new(EffectSetup { file, state, threads, options, settings })?;
     if let Ok(scene) = &start {
         // While the terminal is asked what it can do.
         hands.show(Arc::clone(scene));
@@ -118,13 +118,13 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     let mut dashboard = Dashboard {
         model,
         hands,
-        frames: Frames::new(screen.tty(), &terminal, bandwidth)?,
+        frames: FramePipeline::new(screen.tty(), &terminal, bandwidth)?,
         terminal,
-        trace: Trace::new(trace.is_some()),
+        trace: LatencyRecorder::new(trace.is_some()),
         began: Instant::now(),
         shown: 0,
         subject: 0,
-        resizing: Resizing::default(),
+        resizing: ResizeDebounce::default(),
         told: Duration::ZERO,
         changed: true,
         suspend: false,
@@ -134,7 +134,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     dashboard.take(Message::Resize(dashboard.model.screen));
     let input = input::read(keyboard)?;
     let line =
-        Line { tty: screen.tty(), input, signals: signals.told, left: screen.left().clone() };
+        TerminalIo { tty: screen.tty(), input, signals: signals.told, left: screen.left().clone() };
     let result = dashboard.watch(&line);
     // First of all, and whatever else there is to write.
     dashboard.hands.secure(Duration::ZERO);
@@ -159,18 +159,18 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
 
 struct Dashboard {
     model: Model,
-    hands: Hands,
-    frames: Frames,
+    hands: EffectRunner,
+    frames: FramePipeline,
     /// What the terminal can do, as far as it has said.
     terminal: Capabilities,
-    trace: Trace,
+    trace: LatencyRecorder,
     began: Instant,
     /// The scene whose picture the model has: its number.
     shown: u64,
     /// Counts up when the picture is another one than the same with more samples.
     subject: u64,
     /// The terminal's size may change again at once.
-    resizing: Resizing,
+    resizing: ResizeDebounce,
     /// When the line was told about last.
     told: Duration,
     /// The screen may have to change.
@@ -181,7 +181,7 @@ struct Dashboard {
 
 impl Dashboard {
     /// Lets things happen until the end; the exit status of a signal.
-    fn watch(&mut self, line: &Line) -> io::Result<Option<u8>> {
+    fn watch(&mut self, line: &TerminalIo) -> io::Result<Option<u8>> {
         let bell = self.hands.session().bell().clone();
         let done = self.hands.done().clone();
         let written = self.frames.written().clone();
@@ -245,7 +245,7 @@ impl Dashboard {
                 self.take_done(message);
             }
             if std::mem::take(&mut self.suspend)
-                && let Some(status) = self.suspend(Whom::Group, line)
+                && let Some(status) = self.suspend(StopTarget::Group, line)
             {
                 return Ok(Some(status));
             }
@@ -367,11 +367,11 @@ impl Dashboard {
         }
         self.frames.look(now);
         let reading = self.frames.reading();
-        let mode = |line: &Option<Reading>| line.as_ref().map(|line| line.mode);
+        let mode = |line: &Option<LinkStatus>| line.as_ref().map(|line| line.mode);
         let other = mode(&reading) != mode(&self.model.line);
         if other || self.changed && self.told + TELL_INTERVAL <= now {
             self.told = now;
-            self.take(Message::Line(reading));
+            self.take(Message::LinkStatus(reading));
         }
         self.tell_of_still(now);
         self.frames.follow(&self.model);
@@ -383,17 +383,17 @@ impl Dashboard {
                 let drawn = self.frames.draw(&self.model, now, self.changed, answers, self.subject);
                 let (waits, sent) = self.frames.load();
                 self.trace.line(now, waits, sent);
-                self.changed &= matches!(drawn, Drawn::Nothing | Drawn::Slice);
+                self.changed &= matches!(drawn, DrawOutcome::Nothing | DrawOutcome::Slice);
                 match drawn {
-                    Drawn::Nothing | Drawn::BranchStack | Drawn::Slice => {}
-                    Drawn::Same => {
+                    DrawOutcome::Nothing | DrawOutcome::BranchStack | DrawOutcome::Slice => {}
+                    DrawOutcome::Same => {
                         // The screen was the answer already.
                         self.trace.sent(self.shown);
                         self.trace.written(Instant::now());
                     }
                     // No picture answers by its number.
-                    Drawn::Text => self.trace.sent(0),
-                    Drawn::Picture => self.trace.sent(self.shown),
+                    DrawOutcome::Text => self.trace.sent(0),
+                    DrawOutcome::Picture => self.trace.sent(self.shown),
                 }
                 let answers = self.trace.answers(self.shown);
                 due = if self.frames.ready() {

@@ -23,7 +23,7 @@ pub(super) const HUNG_UP: u8 = (SIGNALLED + SIGHUP) as u8;
 
 /// What a signal says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Told {
+pub(super) enum SignalEvent {
     /// End, with this exit status: 129, 130 or 143.
     End(u8),
     /// The terminal may have another size.
@@ -37,7 +37,7 @@ pub(super) enum Told {
 /// What signals say.
 pub(super) struct Signals {
     /// One after the other.
-    pub told: Receiver<Told>,
+    pub told: Receiver<SignalEvent>,
     /// One of them says to end.
     ending: Arc<AtomicBool>,
 }
@@ -51,7 +51,7 @@ impl Signals {
 
 /// Whom a stop concerns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Whom {
+pub(super) enum StopTarget {
     /// This process.
     Itself,
     /// Everybody whom the shell has started together, as when its user presses Ctrl-Z.
@@ -77,15 +77,15 @@ pub(super) fn watch(
     thread::Builder::new().name("signals".into()).spawn(move || {
         for signal in signals.forever() {
             let what = match signal {
-                SIGWINCH => Told::Resized,
-                SIGTSTP => Told::Stop,
-                SIGCONT => Told::Continue,
-                _ => Told::End((SIGNALLED + signal) as u8),
+                SIGWINCH => SignalEvent::Resized,
+                SIGTSTP => SignalEvent::Stop,
+                SIGCONT => SignalEvent::Continue,
+                _ => SignalEvent::End((SIGNALLED + signal) as u8),
             };
             // Nobody listens any more when the program ends.
             let _ = teller.send(what);
-            mark.fetch_or(matches!(what, Told::End(_)), Ordering::Release);
-            if let Told::End(status) = what {
+            mark.fetch_or(matches!(what, SignalEvent::End(_)), Ordering::Release);
+            if let SignalEvent::End(status) = what {
                 thread::sleep(patience);
                 tty.leave();
                 std::process::exit(status.into());
@@ -98,10 +98,10 @@ pub(super) fn watch(
 /// Stops until somebody says to go on; a moment may pass before it happens. It does not happen if there
 /// is no shell that could say so: the kernel sees to that for every signal that stops but SIGSTOP. Of
 /// those SIGTSTP is listened to here, so it is another one.
-pub(super) fn stop(whom: Whom) -> io::Result<()> {
+pub(super) fn stop(whom: StopTarget) -> io::Result<()> {
     match whom {
-        Whom::Itself => kill_process(getpid(), Signal::TTIN)?,
-        Whom::Group => kill_current_process_group(Signal::TTIN)?,
+        StopTarget::Itself => kill_process(getpid(), Signal::TTIN)?,
+        StopTarget::Group => kill_current_process_group(Signal::TTIN)?,
     }
     Ok(())
 }

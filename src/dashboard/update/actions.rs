@@ -1,21 +1,21 @@
 //! Which method carries out which action.
 
-use crate::dashboard::action::{Action, Change, Pace, Way};
+use crate::dashboard::action::{Action, Delta, Direction, StepSize};
 use crate::dashboard::layout::Focus;
 use crate::dashboard::message::{Effect, Format};
-use crate::dashboard::model::{Compared, Inspector, Mode};
+use crate::dashboard::model::{CompareView, Inspector, Mode};
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::update::Turn;
+use crate::dashboard::update::UpdateContext;
 
 /// Coarse steps are 1 (or -1), fine ones a tenth: as `scene::edit::step` counts.
-pub(super) fn steps(change: Change, pace: Pace) -> f64 {
+pub(super) fn steps(change: Delta, pace: StepSize) -> f64 {
     let size = match pace {
-        Pace::Coarse => 1.0,
-        Pace::Fine => 0.1,
+        StepSize::Coarse => 1.0,
+        StepSize::Fine => 0.1,
     };
     match change {
-        Change::Up => size,
-        Change::Down => -size,
+        Delta::Up => size,
+        Delta::Down => -size,
     }
 }
 
@@ -38,7 +38,7 @@ fn needs_no_scene(action: Action) -> bool {
     )
 }
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     /// Carries out an action; `typed` is the character that asked for it, if it was one.
     pub(super) fn act(&mut self, action: Action, typed: Option<char>) {
         let in_list =
@@ -61,17 +61,17 @@ impl Turn<'_> {
             Action::StoreView => self.ask_view_name(),
             Action::RecallView(number) => self.recall_view(number),
             Action::MoveMode => self.enter_mode(Mode::Move),
-            Action::TurnMode => self.enter_mode(Mode::Turn),
+            Action::TurnMode => self.enter_mode(Mode::Rotate),
             Action::FlyMode => self.enter_mode(Mode::Fly),
             Action::Move(way, pace) => self.move_selection(way, pace),
-            Action::Turn(way, pace) => self.turn_selection(way, pace),
+            Action::Rotate(way, pace) => self.turn_selection(way, pace),
             Action::Leave => self.leave(),
             Action::NextLight => self.next_light(),
             Action::Intensity(change, pace) => self.intensity(steps(change, pace)),
             Action::SwitchLight => self.switch_light(),
             Action::AddLight => self.pick_light(),
             Action::Roughness(change, pace) => self.roughness(steps(change, pace)),
-            Action::Reflection(change) => self.reflection(steps(change, Pace::Coarse)),
+            Action::Reflection(change) => self.reflection(steps(change, StepSize::Coarse)),
             Action::NextLobe => self.next_lobe(),
             Action::AddObject => self.pick_object(),
             Action::Duplicate => self.duplicate(),
@@ -82,7 +82,7 @@ impl Turn<'_> {
             Action::NextPanel => self.next_panel(1),
             Action::PreviousPanel => self.next_panel(-1),
             Action::OnlyPicture => self.only_picture(),
-            Action::Cursor(way) => self.walk(if way == Way::Up { -1 } else { 1 }),
+            Action::Cursor(way) => self.walk(if way == Direction::Up { -1 } else { 1 }),
             Action::First => self.walk(isize::MIN / 2),
             Action::Last => self.walk(isize::MAX / 2),
             Action::Page(way) => self.page(way),
@@ -107,7 +107,7 @@ impl Turn<'_> {
             Action::ShowExport => self.look_at_export(),
             Action::ExportSized => self.ask_export_size(),
             Action::CancelExport => self.cancel_export(),
-            Action::Exposure(change) => self.exposure(steps(change, Pace::Coarse)),
+            Action::Exposure(change) => self.exposure(steps(change, StepSize::Coarse)),
             Action::ResetExposure => self.reset_exposure(),
             Action::NextTone => self.next_tone(),
             Action::NextChannel => self.next_channel(1),
@@ -115,8 +115,8 @@ impl Turn<'_> {
             Action::Probe => self.toggle_probe(),
             Action::MoveProbe(way, pace) => self.move_probe(way, pace),
             Action::Keep => self.keep(),
-            Action::Flip => self.compare(Compared::Kept),
-            Action::Difference => self.compare(Compared::Difference),
+            Action::Flip => self.compare(CompareView::Pinned),
+            Action::Difference => self.compare(CompareView::Difference),
             Action::Threads(change) => self.threads(change),
             Action::Priority => self.priority(),
             Action::NextColors => self.next_colors(),
@@ -135,7 +135,7 @@ impl Turn<'_> {
     pub(super) fn enter_mode(&mut self, mode: Mode) {
         let movable = match mode {
             Mode::Move => self.check_movable(),
-            Mode::Turn => self.check_turnable(),
+            Mode::Rotate => self.check_turnable(),
             _ => true,
         };
         if movable {
@@ -157,8 +157,8 @@ impl Turn<'_> {
             self.model.focus = Focus::Picture;
         } else if self.model.only_picture {
             self.only_picture();
-        } else if self.model.comparison.shown != Compared::Live {
-            self.model.comparison.shown = Compared::Live;
+        } else if self.model.comparison.shown != CompareView::Live {
+            self.model.comparison.shown = CompareView::Live;
             self.repaint();
         }
     }

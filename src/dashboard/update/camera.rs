@@ -1,11 +1,11 @@
 //! Moving the camera by keys and by hand.
 
 use crate::camera::Camera;
-use crate::dashboard::action::{Change, Pace, Way};
-use crate::dashboard::update::{Hold, Turn};
+use crate::dashboard::action::{Delta, Direction, StepSize};
+use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::Scene;
 use crate::scene::edit::{
-    Edit, Refusal, Subject, bounds, focus_distance, recall_view, scene_bounds, step_length,
+    Edit, EditError, Target, bounds, focus_distance, recall_view, scene_bounds, step_length,
 };
 
 /// Degrees of a step around the pivot, of the picture about its centre.
@@ -21,20 +21,20 @@ const DOLLY_FINE: f64 = 0.99;
 const ZOOM: f64 = 0.95;
 
 /// To the right and up as numbers.
-fn right_up(way: Way) -> [f64; 2] {
+fn right_up(way: Direction) -> [f64; 2] {
     match way {
-        Way::Left => [-1.0, 0.0],
-        Way::Right => [1.0, 0.0],
-        Way::Up => [0.0, 1.0],
-        Way::Down => [0.0, -1.0],
-        Way::In | Way::Out => [0.0, 0.0],
+        Direction::Left => [-1.0, 0.0],
+        Direction::Right => [1.0, 0.0],
+        Direction::Up => [0.0, 1.0],
+        Direction::Down => [0.0, -1.0],
+        Direction::In | Direction::Out => [0.0, 0.0],
     }
 }
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     /// Puts another camera in place of the scene's. Moves that follow each other are one step of undo,
     /// whatever they are.
-    pub(super) fn set_camera(&mut self, hold: Hold, f: impl Fn(&Camera, f64) -> Camera) {
+    pub(super) fn set_camera(&mut self, hold: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
         let scene = self.scene();
         let camera = f(&scene.camera, focus_distance(scene));
         if camera == scene.camera {
@@ -43,59 +43,59 @@ impl Turn<'_> {
         let next = Scene { camera, ..Scene::clone(scene) };
         // Of a camera without faults comes one without faults.
         let edit =
-            Edit { scene: next, subject: Subject::Camera, label: "camera".to_string(), note: None };
-        self.commit(Ok::<_, Refusal>(edit), hold);
+            Edit { scene: next, subject: Target::Camera, label: "camera".to_string(), note: None };
+        self.commit(Ok::<_, EditError>(edit), hold);
     }
 
-    pub(super) fn orbit(&mut self, way: Way) {
+    pub(super) fn orbit(&mut self, way: Direction) {
         let [right, up] = right_up(way).map(|x| x * ORBIT_DEGREES);
-        self.set_camera(Hold::Repeat, |camera, distance| camera.orbit(right, up, distance));
+        self.set_camera(Coalesce::Repeat, |camera, distance| camera.orbit(right, up, distance));
     }
 
-    pub(super) fn pan(&mut self, way: Way) {
+    pub(super) fn pan(&mut self, way: Direction) {
         let [right, up] = right_up(way).map(|x| x * PAN_SHARE);
-        self.set_camera(Hold::Repeat, |camera, distance| camera.pan(right, up, distance));
+        self.set_camera(Coalesce::Repeat, |camera, distance| camera.pan(right, up, distance));
     }
 
-    pub(super) fn dolly(&mut self, way: Way, pace: Pace) {
+    pub(super) fn dolly(&mut self, way: Direction, pace: StepSize) {
         let nearer = match pace {
-            Pace::Coarse => DOLLY,
-            Pace::Fine => DOLLY_FINE,
+            StepSize::Coarse => DOLLY,
+            StepSize::Fine => DOLLY_FINE,
         };
-        let factor = if way == Way::In { nearer } else { 1.0 / nearer };
-        self.set_camera(Hold::Repeat, |camera, distance| camera.dolly(factor, distance));
+        let factor = if way == Direction::In { nearer } else { 1.0 / nearer };
+        self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
     }
 
     /// Turns of the wheel: towards the picture is nearer.
     pub(super) fn dolly_by_wheel(&mut self, ticks: i32) {
         let factor = DOLLY.powi(ticks.clamp(-50, 50));
-        self.set_camera(Hold::Repeat, |camera, distance| camera.dolly(factor, distance));
+        self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
     }
 
-    pub(super) fn look(&mut self, way: Way) {
+    pub(super) fn look(&mut self, way: Direction) {
         let [right, up] = right_up(way).map(|x| x * LOOK_DEGREES);
-        self.set_camera(Hold::Repeat, |camera, _| camera.look(right, up));
+        self.set_camera(Coalesce::Repeat, |camera, _| camera.look(right, up));
     }
 
-    pub(super) fn fly(&mut self, way: Way) {
+    pub(super) fn fly(&mut self, way: Direction) {
         let step = 2.0 * step_length(self.scene());
         let [right, up] = right_up(way).map(|x| x * step);
         let ahead = match way {
-            Way::In => step,
-            Way::Out => -step,
+            Direction::In => step,
+            Direction::Out => -step,
             _ => 0.0,
         };
-        self.set_camera(Hold::Repeat, |camera, _| camera.fly([right, up, ahead]));
+        self.set_camera(Coalesce::Repeat, |camera, _| camera.fly([right, up, ahead]));
     }
 
-    pub(super) fn roll(&mut self, way: Way) {
+    pub(super) fn roll(&mut self, way: Direction) {
         let degrees = right_up(way)[0] * ORBIT_DEGREES;
-        self.set_camera(Hold::Repeat, |camera, _| camera.roll(degrees));
+        self.set_camera(Coalesce::Repeat, |camera, _| camera.roll(degrees));
     }
 
-    pub(super) fn view_angle(&mut self, change: Change) {
-        let factor = if change == Change::Up { 1.0 / ZOOM } else { ZOOM };
-        self.set_camera(Hold::Repeat, |camera, _| camera.zoom(factor));
+    pub(super) fn view_angle(&mut self, change: Delta) {
+        let factor = if change == Delta::Up { 1.0 / ZOOM } else { ZOOM };
+        self.set_camera(Coalesce::Repeat, |camera, _| camera.zoom(factor));
         let (key, degrees) = self.scene().camera.view_angle.key_degrees();
         self.say(format!("{key} view angle {degrees}°"));
     }
@@ -107,14 +107,14 @@ impl Turn<'_> {
         let [width, height] = scene.film.size.map(f64::from);
         // A lamp is a point: it is shown with what is around it.
         let radius = if ball.radius > 0.0 { ball.radius } else { 5.0 * step_length(scene) };
-        self.set_camera(Hold::Single, |camera, _| {
+        self.set_camera(Coalesce::Single, |camera, _| {
             camera.framed(ball.center, radius, width / height)
         });
     }
 
     pub(super) fn reset_camera(&mut self) {
         let camera = self.model.file.saved.camera.clone();
-        self.set_camera(Hold::Single, |_, _| camera.clone());
+        self.set_camera(Coalesce::Single, |_, _| camera.clone());
     }
 
     pub(super) fn recall_view(&mut self, number: u8) {
@@ -122,7 +122,7 @@ impl Turn<'_> {
         match self.scene().views.keys().nth(index).cloned() {
             Some(name) => {
                 let edit = recall_view(self.scene(), &name);
-                if self.commit(edit, Hold::Single) {
+                if self.commit(edit, Coalesce::Single) {
                     self.say(format!("viewpoint {number}: {name}"));
                 }
             }
@@ -134,7 +134,7 @@ impl Turn<'_> {
     /// width is half a turn. What is seen follows the hand.
     pub(super) fn orbit_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(180.0);
-        self.set_camera(Hold::Gesture, |camera, distance| {
+        self.set_camera(Coalesce::Gesture, |camera, distance| {
             camera.orbit(-right * degrees, down * degrees, distance)
         });
     }
@@ -142,13 +142,15 @@ impl Turn<'_> {
     /// The same for looking around.
     pub(super) fn look_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(90.0);
-        self.set_camera(Hold::Gesture, |camera, _| camera.look(-right * degrees, down * degrees));
+        self.set_camera(Coalesce::Gesture, |camera, _| {
+            camera.look(-right * degrees, down * degrees)
+        });
     }
 
     /// A drag that takes the point under the hand along, at the distance of the pivot.
     pub(super) fn pan_by_hand(&mut self, right: f64, down: f64) {
         let share = self.per_half_cell(2.0 * self.half_width());
-        self.set_camera(Hold::Gesture, |camera, distance| {
+        self.set_camera(Coalesce::Gesture, |camera, distance| {
             camera.pan(-right * share, down * share, distance)
         });
     }

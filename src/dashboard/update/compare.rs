@@ -1,9 +1,9 @@
 //! What the picture shows: exposure, tone curve, channel, probe, kept against live.
 
-use crate::dashboard::action::{Pace, Way};
-use crate::dashboard::message::{Channel, Effect};
-use crate::dashboard::model::{Compared, Mode};
-use crate::dashboard::update::Turn;
+use crate::dashboard::action::{Direction, StepSize};
+use crate::dashboard::message::{DisplayChannel, Effect};
+use crate::dashboard::model::{CompareView, Mode};
+use crate::dashboard::update::UpdateContext;
 use crate::film::{LinearImage, Tone};
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ const EXPOSURE_STEP: f64 = 0.25;
 /// The most stops up or down: beyond it everything is white or black.
 const MOST_EXPOSURE: f64 = 20.0;
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     pub(super) fn exposure(&mut self, steps: f64) {
         let ev = self.model.display.exposure_ev + steps * EXPOSURE_STEP;
         self.set_exposure(ev.clamp(-MOST_EXPOSURE, MOST_EXPOSURE));
@@ -43,7 +43,7 @@ impl Turn<'_> {
     }
 
     pub(super) fn next_channel(&mut self, by: isize) {
-        let all = Channel::ALL;
+        let all = DisplayChannel::ALL;
         let at = all.iter().position(|channel| *channel == self.model.channel).unwrap_or(0);
         let next = (at as isize + by).rem_euclid(all.len() as isize) as usize;
         self.model.channel = all[next];
@@ -69,22 +69,22 @@ impl Turn<'_> {
     }
 
     /// By a cell of the picture, or by one pixel of the film.
-    pub(super) fn move_probe(&mut self, way: Way, pace: Pace) {
+    pub(super) fn move_probe(&mut self, way: Direction, pace: StepSize) {
         let Some([x, y]) = self.model.probe else {
             self.toggle_probe();
             return;
         };
         let film = self.scene().film.size.map(|n| n as usize);
         let step = match (pace, self.model.layout()) {
-            (Pace::Coarse, Some(layout)) => {
+            (StepSize::Coarse, Some(layout)) => {
                 [(film[0] / layout.raster[0]).max(1), (2 * film[1] / layout.raster[1]).max(1)]
             }
             _ => [1, 1],
         };
         let to = match way {
-            Way::Left => [x.saturating_sub(step[0]), y],
-            Way::Right => [x + step[0], y],
-            Way::Up => [x, y.saturating_sub(step[1])],
+            Direction::Left => [x.saturating_sub(step[0]), y],
+            Direction::Right => [x + step[0], y],
+            Direction::Up => [x, y.saturating_sub(step[1])],
             _ => [x, y + step[1]],
         };
         self.set_probe(Some(to));
@@ -101,13 +101,13 @@ impl Turn<'_> {
     }
 
     /// Shows the kept picture or the difference; the live one if it is that already.
-    pub(super) fn compare(&mut self, what: Compared) {
+    pub(super) fn compare(&mut self, what: CompareView) {
         if self.model.comparison.kept.is_none() {
             self.say("No picture is kept yet · k keeps one");
             return;
         }
         let shown = &mut self.model.comparison.shown;
-        *shown = if *shown == what { Compared::Live } else { what };
+        *shown = if *shown == what { CompareView::Live } else { what };
         self.repaint();
     }
 }

@@ -4,10 +4,10 @@ use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::overlay::{Overlay, Pick, PickFor};
 use crate::dashboard::panel_lines::{FieldLine, walk_fields};
-use crate::dashboard::update::{Hold, Turn};
-use crate::scene::edit::{self, Edit, Entry, Refusal, Row};
+use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::scene::edit::{self, Edit, EditError, Property, Widget};
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     fn cursor(&self) -> usize {
         match &self.model.overlay {
             Some(Overlay::Form(form)) => form.cursor,
@@ -43,7 +43,7 @@ impl Turn<'_> {
     }
 
     /// The field's row of the scene's table: all its words and numbers.
-    fn row(&self, field: &FieldLine) -> Option<Row> {
+    fn row(&self, field: &FieldLine) -> Option<Property> {
         let rows = edit::rows(self.scene(), &field.subject).ok()?;
         rows.into_iter().find(|row| row.key == field.key)
     }
@@ -55,7 +55,7 @@ impl Turn<'_> {
         let words = self.row(&field).map(|row| row.words).unwrap_or_default();
         let chosen = !words.is_empty();
         match typed {
-            None if field.entry == Entry::Switch => self.step_field(1.0),
+            None if field.entry == Widget::Switch => self.step_field(1.0),
             None if chosen && !self.in_form() => {
                 let cursor = words.iter().position(|word| word.name == field.value);
                 self.model.overlay = Some(Overlay::Pick(Pick {
@@ -69,7 +69,7 @@ impl Turn<'_> {
                     scroll: 0,
                 }));
             }
-            Some(' ') if chosen || field.entry == Entry::Switch => self.step_field(1.0),
+            Some(' ') if chosen || field.entry == Widget::Switch => self.step_field(1.0),
             Some(' ') => {}
             Some(c) => self.set_editor(Some(Editor::new(c))),
             None => self.set_editor(Some(Editor::new(field.value))),
@@ -97,7 +97,7 @@ impl Turn<'_> {
         match self.set_field(&field, &text) {
             Ok(edit) => {
                 self.set_editor(None);
-                self.record(edit, Hold::Single);
+                self.record(edit, Coalesce::Single);
                 true
             }
             Err(refusal) => {
@@ -110,7 +110,7 @@ impl Turn<'_> {
     }
 
     /// What was typed for one number of several may also be all of them, or a colour in hex.
-    fn set_field(&self, field: &FieldLine, text: &str) -> Result<Edit, Refusal> {
+    fn set_field(&self, field: &FieldLine, text: &str) -> Result<Edit, EditError> {
         let scene = self.scene();
         let whole = text.contains(['#', ',', ';', ' ', '[']);
         match field.component {
@@ -132,21 +132,21 @@ impl Turn<'_> {
         if let Some(field) = self.field() {
             let FieldLine { subject, key, component, .. } = &field;
             let edit = edit::step(self.scene(), subject, key, *component, steps);
-            self.commit(edit, Hold::Repeat);
+            self.commit(edit, Coalesce::Repeat);
         }
     }
 
     pub(super) fn clear_field(&mut self) {
         if let Some(field) = self.field() {
             let edit = edit::set(self.scene(), &field.subject, &field.key, "");
-            self.commit(edit, Hold::Single);
+            self.commit(edit, Coalesce::Single);
         }
     }
 
     /// Sets the word that was chosen from a list.
-    pub(super) fn set_word(&mut self, subject: &edit::Subject, key: &str, word: &str) {
+    pub(super) fn set_word(&mut self, subject: &edit::Target, key: &str, word: &str) {
         let edit = edit::set(self.scene(), subject, key, word);
-        self.commit(edit, Hold::Single);
+        self.commit(edit, Coalesce::Single);
     }
 
     /// Gives the focus to the inspector.

@@ -3,14 +3,14 @@
 use crate::dashboard::message::{Effect, Exported};
 use crate::dashboard::model::{Tone, short_name};
 use crate::dashboard::overlay::Answer;
-use crate::dashboard::update::Turn;
-use crate::scene::edit::Subject;
+use crate::dashboard::update::UpdateContext;
+use crate::scene::edit::Target;
 use crate::scene::{SaveError, Scene, SceneErrors};
 use crate::value::printable;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     pub(super) fn undo(&mut self) {
         let undone = self.model.history.undo();
         self.went_back(undone, "undone", "There is nothing to undo");
@@ -108,7 +108,8 @@ impl Turn<'_> {
         if self.model.file.path.is_none() {
             self.say("This scene has no file to read yet");
         } else if self.model.is_unsaved() {
-            let text = format!("Reading {} again loses the unsaved edits.", self.model.file.name);
+            let text =
+                format!("LinkStatus {} again loses the unsaved edits.", self.model.file.name);
             self.ask(
                 text,
                 &[('k', "keep my edits", Answer::Nothing), ('r', "read the file", Answer::Load)],
@@ -151,9 +152,9 @@ impl Turn<'_> {
                 self.model.file.blank = false;
                 self.model.history.restart(scene);
                 let outline = crate::scene::edit::outline(self.scene());
-                let same = |(_, subject): &(_, Subject)| subject.title(self.scene()) == title;
+                let same = |(_, subject): &(_, Target)| subject.title(self.scene()) == title;
                 let found = outline.iter().find(|entry| same(entry));
-                let found = found.map_or(Subject::Camera, |(_, subject)| subject.clone());
+                let found = found.map_or(Target::Camera, |(_, subject)| subject.clone());
                 self.model.inspector.editor = None;
                 self.select(found);
                 self.show();
@@ -215,7 +216,7 @@ impl Turn<'_> {
     }
 }
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     pub(super) fn copy_path(&mut self) {
         let Some(path) = self.model.last_export.clone() else {
             self.say("No picture was written yet · p writes one");

@@ -1,11 +1,11 @@
 //! New objects and lights: a kind from a list, then a form that the picture previews.
 
 use crate::dashboard::overlay::{Form, Overlay, Pick, PickFor};
-use crate::dashboard::update::{Hold, Turn};
-use crate::scene::edit::{self, Edit, Refusal, Word};
+use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::scene::edit::{self, Edit, EditError, Word};
 use std::sync::Arc;
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     pub(super) fn pick_object(&mut self) {
         self.pick_kind(PickFor::Object, "add an object", edit::object_kinds());
     }
@@ -29,7 +29,7 @@ impl Turn<'_> {
         self.open_form(&format!("{kind} light"), edit::add_light(self.scene(), kind));
     }
 
-    fn open_form(&mut self, what: &str, edit: Result<Edit, Refusal>) {
+    fn open_form(&mut self, what: &str, edit: Result<Edit, EditError>) {
         match edit {
             Ok(Edit { scene, subject, label, .. }) => {
                 self.end_mode();
@@ -68,7 +68,7 @@ impl Turn<'_> {
         }
         let scene = Arc::unwrap_or_clone(scene);
         let edit = Edit { scene, subject: form.subject.clone(), label: form.label, note: None };
-        self.record(edit, Hold::Single);
+        self.record(edit, Coalesce::Single);
         self.select(form.subject);
         let label = self.model.selection.label(self.scene());
         self.say(format!("{label} is there · m moves it · r turns it · u takes it back"));

@@ -2,13 +2,13 @@
 
 use crate::dashboard::message::Effect;
 use crate::dashboard::model::short_name;
-use crate::dashboard::overlay::{Looked, Overlay};
-use crate::dashboard::update::Turn;
-use crate::terminal::image::Still;
+use crate::dashboard::overlay::{Overlay, ViewedImage};
+use crate::dashboard::update::UpdateContext;
+use crate::terminal::image::ViewerImage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     /// Shows the last picture that was written.
     pub(super) fn look_at_export(&mut self) {
         match self.model.last_export.clone() {
@@ -21,13 +21,14 @@ impl Turn<'_> {
         let (display, screen) = (self.model.display, self.model.screen);
         self.emit(Effect::Look { path: path.clone(), display, screen });
         self.model.drag = None;
-        self.model.overlay = Some(Overlay::Still(Looked { path, still: None, sent: 0.0 }));
+        self.model.overlay =
+            Some(Overlay::ViewerImage(ViewedImage { path, still: None, sent: 0.0 }));
         self.repaint();
     }
 
     /// On a screen of another size.
     pub(super) fn look_again(&mut self) {
-        if let Some(Overlay::Still(looked)) = &self.model.overlay {
+        if let Some(Overlay::ViewerImage(looked)) = &self.model.overlay {
             self.look_at(looked.path.clone());
         }
     }
@@ -39,9 +40,9 @@ impl Turn<'_> {
     }
 
     /// A picture is ready, or cannot be read.
-    pub(super) fn still(&mut self, path: &Path, result: Result<Arc<Still>, String>) {
+    pub(super) fn still(&mut self, path: &Path, result: Result<Arc<ViewerImage>, String>) {
         let screen = self.model.screen;
-        let Some(Overlay::Still(looked)) = &mut self.model.overlay else { return };
+        let Some(Overlay::ViewerImage(looked)) = &mut self.model.overlay else { return };
         if looked.path != path {
             return;
         }

@@ -5,7 +5,7 @@ use crate::dashboard::editor::Editor;
 use crate::dashboard::keymap::{Context, lookup};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::update::Turn;
+use crate::dashboard::update::UpdateContext;
 use crate::terminal::event::{Code, Key};
 
 /// The character that a key types, if it is one that types.
@@ -29,13 +29,13 @@ impl Model {
     }
 }
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     pub(super) fn key(&mut self, key: Key) {
         self.model.first_time = false;
         if self.model.notice.as_ref().is_some_and(|notice| notice.until.is_none()) {
             self.model.notice = None;
         }
-        if let Some(Overlay::Still(_)) = self.model.overlay {
+        if let Some(Overlay::ViewerImage(_)) = self.model.overlay {
             match lookup(Context::Overlay, key) {
                 Some(action @ (Action::Suspend | Action::Quit)) => self.act(action, None),
                 _ => self.look_away(),

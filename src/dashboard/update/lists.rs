@@ -1,13 +1,13 @@
 //! Moving over lines and choosing: outline, inspector, palette, lists, help, questions.
 
-use crate::dashboard::action::Way;
+use crate::dashboard::action::Direction;
 use crate::dashboard::editor::Editor;
 use crate::dashboard::hints::help;
 use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::overlay::{Answer, Overlay, Palette, PickFor, Question};
 use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
-use crate::dashboard::update::Turn;
+use crate::dashboard::update::UpdateContext;
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
@@ -18,7 +18,7 @@ fn moved(cursor: usize, steps: isize, len: usize) -> usize {
     cursor.saturating_add_signed(steps).min(len.saturating_sub(1))
 }
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     /// Moves the cursor of whatever has it by `steps` lines.
     pub(super) fn walk(&mut self, steps: isize) {
         let rows = self.model.place().map_or(1, |place| usize::from(place.list.height));
@@ -44,7 +44,7 @@ impl Turn<'_> {
             Some(Overlay::Question(question)) => {
                 question.cursor = moved(question.cursor, steps, question.answers.len());
             }
-            Some(Overlay::Prompt(_) | Overlay::Still(_)) => {}
+            Some(Overlay::Prompt(_) | Overlay::ViewerImage(_)) => {}
             Some(Overlay::Form(_)) => {
                 if self.apply_field() {
                     self.walk_field(steps);
@@ -55,14 +55,14 @@ impl Turn<'_> {
         }
     }
 
-    pub(super) fn page(&mut self, way: Way) {
+    pub(super) fn page(&mut self, way: Direction) {
         let rows = match (self.model.place(), self.model.focus) {
             (Some(place), _) => place.list.height,
             (None, Focus::Outline) => self.model.outline_rows().map_or(1, |rows| rows.height),
             (None, _) => self.model.inspector_rows().map_or(1, |(rows, _)| rows.height),
         };
         let page = isize::from(i16::try_from(rows).unwrap_or(1)).max(2) - 1;
-        self.walk(if way == Way::Up { -page } else { page });
+        self.walk(if way == Direction::Up { -page } else { page });
     }
 
     fn walk_outline(&mut self, steps: isize) {
@@ -114,7 +114,7 @@ impl Turn<'_> {
             }
             Some(Overlay::Prompt(_)) => self.answer_prompt(),
             Some(Overlay::Question(question)) => self.answer(question.cursor),
-            Some(Overlay::Still(_)) => {}
+            Some(Overlay::ViewerImage(_)) => {}
             None if self.model.focus == Focus::Inspector => {
                 if self.model.inspector.editor.is_some() {
                     self.apply_field();

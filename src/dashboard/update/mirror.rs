@@ -1,32 +1,32 @@
 //! The keys that act on the mirror.
 
-use crate::dashboard::update::{Hold, Turn};
-use crate::scene::edit::{self, Edit, Refusal, Subject};
+use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::scene::edit::{self, Edit, EditError, Target};
 use crate::value::{excerpt, number};
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     pub(super) fn roughness(&mut self, steps: f64) {
         let edit = edit::roughen(self.scene(), Some(&self.model.selection), steps);
-        self.commit_mirror(edit, Hold::Repeat);
+        self.commit_mirror(edit, Coalesce::Repeat);
     }
 
     pub(super) fn reflection(&mut self, steps: f64) {
         let edit = edit::reflect(self.scene(), Some(&self.model.selection), steps);
-        self.commit_mirror(edit, Hold::Repeat);
+        self.commit_mirror(edit, Coalesce::Repeat);
     }
 
     pub(super) fn next_lobe(&mut self) {
         let edit = edit::next_lobe(self.scene(), Some(&self.model.selection), true);
-        self.commit_mirror(edit, Hold::Single);
+        self.commit_mirror(edit, Coalesce::Single);
     }
 
     /// Carries the edit out and tells what the mirror is like now.
-    fn commit_mirror(&mut self, edit: Result<Edit, Refusal>, hold: Hold) {
+    fn commit_mirror(&mut self, edit: Result<Edit, EditError>, hold: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         self.commit(edit, hold);
-        let Some(Subject::Material(name)) = subject else { return };
+        let Some(Target::Material(name)) = subject else { return };
         let Some(material) = self.scene().materials.get(&name) else { return };
-        let lobe = edit::rows(self.scene(), &Subject::Material(name.clone()))
+        let lobe = edit::rows(self.scene(), &Target::Material(name.clone()))
             .ok()
             .and_then(|rows| rows.into_iter().find(|row| row.key == "lobe"))
             .map_or_else(String::new, |row| format!(" · {}", row.value));

@@ -20,10 +20,12 @@ mod render;
 use crate::dashboard::message::{Effect, Message};
 use crate::dashboard::model::{Inspector, Model, Notice, Tone};
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::panel_lines::{Line, nearest_field, outline, outline_position, scrolled};
+use crate::dashboard::panel_lines::{
+    PanelLine, nearest_field, outline, outline_position, scrolled,
+};
 use crate::render::session::State;
 use crate::scene::Scene;
-use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::printable;
 use files::capital;
 use std::mem::discriminant;
@@ -36,7 +38,7 @@ const REPEAT_WINDOW: Duration = Duration::from_millis(700);
 
 /// What a model that has just been made asks for.
 pub fn begin(model: &mut Model) -> Vec<Effect> {
-    let mut turn = Turn::new(model, Duration::ZERO);
+    let mut turn = UpdateContext::new(model, Duration::ZERO);
     turn.emit(Effect::Stop(turn.model.stop));
     if !turn.model.file.blank {
         turn.show();
@@ -47,7 +49,7 @@ pub fn begin(model: &mut Model) -> Vec<Effect> {
 
 /// Takes in a message at the time `now` (since any fixed moment) and says what is to be done.
 pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
-    let mut turn = Turn::new(model, now);
+    let mut turn = UpdateContext::new(model, now);
     turn.forget_notice();
     turn.take(message);
     turn.settle();
@@ -55,7 +57,7 @@ pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect>
 }
 
 /// One message being taken in.
-struct Turn<'a> {
+struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
@@ -65,7 +67,7 @@ struct Turn<'a> {
 
 /// How an edit joins the one before.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Hold {
+enum Coalesce {
     /// It stands alone.
     Single,
     /// It joins edits of the same label a moment ago.
@@ -74,7 +76,7 @@ enum Hold {
     Gesture,
 }
 
-impl<'a> Turn<'a> {
+impl<'a> UpdateContext<'a> {
     fn new(model: &'a mut Model, now: Duration) -> Self {
         Self { model, now, effects: Vec::new(), follow: true }
     }
@@ -103,7 +105,7 @@ impl<'a> Turn<'a> {
             Message::Saved(scene, result) => self.saved(scene, result),
             Message::Loaded(result) => self.loaded(*result),
             Message::ChangedOnDisk => self.changed_on_disk(),
-            Message::LeftBehind(left) => self.left_behind(left),
+            Message::OrphanedEdits(left) => self.left_behind(left),
             Message::Trouble(text) => {
                 self.follow = false;
                 self.notify(Tone::Bad, capital(&text), None);
@@ -115,14 +117,14 @@ impl<'a> Turn<'a> {
                     export.progress = progress;
                 }
             }
-            Message::Still(path, result) => self.still(&path, result),
+            Message::ViewerImage(path, result) => self.still(&path, result),
             Message::StillSent(sent) => {
                 self.follow = false;
-                if let Some(Overlay::Still(looked)) = &mut self.model.overlay {
+                if let Some(Overlay::ViewerImage(looked)) = &mut self.model.overlay {
                     looked.sent = sent;
                 }
             }
-            Message::Line(line) => {
+            Message::LinkStatus(line) => {
                 self.follow = false;
                 self.model.line = line;
             }
@@ -155,7 +157,7 @@ impl<'a> Turn<'a> {
     }
 
     /// Carries an edit out or says why it is refused. Whether the scene is another now.
-    fn commit(&mut self, edit: Result<Edit, Refusal>, hold: Hold) -> bool {
+    fn commit(&mut self, edit: Result<Edit, EditError>, hold: Coalesce) -> bool {
         match edit {
             Ok(edit) => self.record(edit, hold),
             Err(refusal) => {
@@ -165,7 +167,7 @@ impl<'a> Turn<'a> {
         }
     }
 
-    fn record(&mut self, edit: Edit, hold: Hold) -> bool {
+    fn record(&mut self, edit: Edit, hold: Coalesce) -> bool {
         if let Some(note) = &edit.note {
             self.say(note.clone());
         }
@@ -182,15 +184,15 @@ impl<'a> Turn<'a> {
         let model = &mut *self.model;
         let soon = |last: Duration| self.now.saturating_sub(last) <= REPEAT_WINDOW;
         let joins = match hold {
-            Hold::Single => false,
-            Hold::Repeat => model.last_edit.is_some_and(soon),
-            Hold::Gesture => true,
+            Coalesce::Single => false,
+            Coalesce::Repeat => model.last_edit.is_some_and(soon),
+            Coalesce::Gesture => true,
         };
         if !joins {
             model.history.end_gesture();
         }
-        let changed = model.history.record(scene, &edit.label, hold != Hold::Single);
-        model.last_edit = (hold == Hold::Repeat).then_some(self.now);
+        let changed = model.history.record(scene, &edit.label, hold != Coalesce::Single);
+        model.last_edit = (hold == Coalesce::Repeat).then_some(self.now);
         if changed {
             self.show();
         }
@@ -204,16 +206,16 @@ impl<'a> Turn<'a> {
     }
 
     /// As `commit`; afterwards what was edited is selected.
-    fn commit_and_select(&mut self, edit: Result<Edit, Refusal>) -> bool {
+    fn commit_and_select(&mut self, edit: Result<Edit, EditError>) -> bool {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
-        let changed = self.commit(edit, Hold::Single);
+        let changed = self.commit(edit, Coalesce::Single);
         if let Some(subject) = subject {
             self.select(subject);
         }
         changed
     }
 
-    fn select(&mut self, subject: Subject) {
+    fn select(&mut self, subject: Target) {
         if self.model.selection != subject {
             self.model.selection = subject;
             self.model.inspector = Inspector::default();
@@ -254,14 +256,14 @@ impl<'a> Turn<'a> {
     /// renderer knows the raster.
     fn settle(&mut self) {
         if !self.model.selection.exists(self.model.scene()) {
-            let last = |len: usize, of: fn(usize) -> Subject| len.checked_sub(1).map(of);
+            let last = |len: usize, of: fn(usize) -> Target| len.checked_sub(1).map(of);
             let scene = self.model.scene();
             let near = match self.model.selection {
-                Subject::Object(_) => last(scene.objects.len(), Subject::Object),
-                Subject::Light(_) => last(scene.lights.len(), Subject::Light),
+                Target::Object(_) => last(scene.objects.len(), Target::Object),
+                Target::Light(_) => last(scene.lights.len(), Target::Light),
                 _ => None,
             };
-            self.select(near.unwrap_or(Subject::Camera));
+            self.select(near.unwrap_or(Target::Camera));
         }
         let raster = self.model.layout().map(|layout| layout.raster);
         if let Some(raster) = raster.filter(|raster| self.model.raster != Some(*raster)) {
@@ -297,7 +299,13 @@ impl<'a> Turn<'a> {
     }
 }
 
-fn settle_cursor(cursor: &mut usize, scroll: &mut usize, lines: &[Line], rows: u16, follow: bool) {
+fn settle_cursor(
+    cursor: &mut usize,
+    scroll: &mut usize,
+    lines: &[PanelLine],
+    rows: u16,
+    follow: bool,
+) {
     let rows = usize::from(rows);
     *cursor = nearest_field(lines, *cursor);
     *scroll = (*scroll).min(lines.len().saturating_sub(rows));

@@ -3,11 +3,11 @@
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{Drag, Mode};
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::panel_lines::{Line, OutlineLine, outline};
-use crate::dashboard::update::Turn;
+use crate::dashboard::panel_lines::{OutlineLine, PanelLine, outline};
+use crate::dashboard::update::UpdateContext;
 use crate::render::session::QUALITIES;
 use crate::scene::Scene;
-use crate::scene::edit::Subject;
+use crate::scene::edit::Target;
 use crate::terminal::Area;
 use crate::terminal::event::{Button, Mouse, MouseKind};
 use glam::DVec3;
@@ -21,7 +21,7 @@ fn line_at(rows: Area, scroll: usize, mouse: Mouse) -> Option<usize> {
     inside.then(|| usize::from(mouse.row - rows.y) + scroll)
 }
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     pub(super) fn mouse(&mut self, mouse: Mouse) {
         self.model.first_time = false;
         match mouse.kind {
@@ -88,7 +88,7 @@ impl Turn<'_> {
     fn press_in_inspector(&mut self, rows: Area, mouse: Mouse) {
         let lines = self.model.field_lines();
         let at = line_at(rows, self.model.inspector.scroll, mouse);
-        let at = at.filter(|at| lines.get(*at).and_then(Line::field).is_some());
+        let at = at.filter(|at| lines.get(*at).and_then(PanelLine::field).is_some());
         let again = self.model.focus == Focus::Inspector && at == Some(self.model.inspector.cursor);
         self.set_focus(Focus::Inspector);
         match at {
@@ -112,7 +112,7 @@ impl Turn<'_> {
                 let at = line_at(place.list, form.scroll, mouse);
                 let (cursor, typing) = (form.cursor, form.editor.is_some());
                 let lines = self.model.field_lines();
-                let at = at.filter(|at| lines.get(*at).and_then(Line::field).is_some());
+                let at = at.filter(|at| lines.get(*at).and_then(PanelLine::field).is_some());
                 match at {
                     Some(at) if at == cursor && !typing => self.open_field(None),
                     Some(at) if self.apply_field() => self.set_cursor(at),
@@ -120,7 +120,7 @@ impl Turn<'_> {
                 }
                 return;
             }
-            Some(Overlay::Still(_)) => return self.look_away(),
+            Some(Overlay::ViewerImage(_)) => return self.look_away(),
             _ => return,
         };
         if let Some(at) = line_at(place.list, scroll, mouse).filter(|at| *at < len) {
@@ -149,7 +149,7 @@ impl Turn<'_> {
         match (self.model.mode, other) {
             (Mode::Probe, _) => self.probe_at(mouse),
             (Mode::Move, upright) => self.move_by_hand(right, down, upright),
-            (Mode::Turn, false) => self.turn_by(right * 2.0),
+            (Mode::Rotate, false) => self.turn_by(right * 2.0),
             (Mode::Fly, false) => self.look_by_hand(right, down),
             (Mode::Orbit, false) => self.orbit_by_hand(right, down),
             (_, true) => self.pan_by_hand(right, down),
@@ -169,7 +169,7 @@ impl Turn<'_> {
 
     /// Whether all drags and keys are one step, until the mode ends.
     fn moves_or_turns(&self) -> bool {
-        matches!(self.model.mode, Mode::Move | Mode::Turn)
+        matches!(self.model.mode, Mode::Move | Mode::Rotate)
     }
 
     fn click(&mut self, drag: Drag, mouse: Mouse) {
@@ -183,7 +183,7 @@ impl Turn<'_> {
         let film = self.scene().film.size;
         let pixel = self.model.layout().and_then(|l| l.film_pixel(film, mouse.column, mouse.row));
         if let Some(pixel) = pixel {
-            let seen = seen_at(self.scene(), pixel).map_or(Subject::Background, Subject::Object);
+            let seen = seen_at(self.scene(), pixel).map_or(Target::Background, Target::Object);
             if seen != self.model.selection {
                 self.end_mode();
             }

@@ -1,8 +1,8 @@
 //! Moving, turning, copying, removing what is selected.
 
-use crate::dashboard::action::{Pace, Way};
+use crate::dashboard::action::{Direction, StepSize};
 use crate::dashboard::model::Mode;
-use crate::dashboard::update::{Hold, Turn};
+use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::edit::{self, bounds, step_length};
 use glam::{DVec2, DVec3};
 
@@ -18,7 +18,7 @@ fn nearest_axis(v: DVec3) -> DVec3 {
     if v.x.abs() >= v.z.abs() { DVec3::X * v.x.signum() } else { DVec3::Z * v.z.signum() }
 }
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     /// The directions in the ground that look like right and away in the picture, along the
     /// coordinate axes, so that coordinates stay round.
     fn ground_axes(&self) -> [DVec3; 2] {
@@ -38,18 +38,18 @@ impl Turn<'_> {
         tried.map_err(|refusal| self.refuse(&refusal.to_string())).is_ok()
     }
 
-    pub(super) fn move_selection(&mut self, way: Way, pace: Pace) {
+    pub(super) fn move_selection(&mut self, way: Direction, pace: StepSize) {
         let coarse = step_length(self.scene());
-        let step = if pace == Pace::Fine { 0.1 * coarse } else { coarse };
+        let step = if pace == StepSize::Fine { 0.1 * coarse } else { coarse };
         let [right, away] = self.ground_axes();
         let by = step
             * match way {
-                Way::Left => -right,
-                Way::Right => right,
-                Way::In => away,
-                Way::Out => -away,
-                Way::Up => DVec3::Y,
-                Way::Down => DVec3::NEG_Y,
+                Direction::Left => -right,
+                Direction::Right => right,
+                Direction::In => away,
+                Direction::Out => -away,
+                Direction::Up => DVec3::Y,
+                Direction::Down => DVec3::NEG_Y,
             };
         self.move_by(by);
     }
@@ -60,9 +60,9 @@ impl Turn<'_> {
     }
 
     /// In a mode or a drag all steps are one; otherwise (from the palette) those of a moment.
-    fn gesture(&self) -> Hold {
-        let in_mode = matches!(self.model.mode, Mode::Move | Mode::Turn);
-        if in_mode || self.model.drag.is_some() { Hold::Gesture } else { Hold::Repeat }
+    fn gesture(&self) -> Coalesce {
+        let in_mode = matches!(self.model.mode, Mode::Move | Mode::Rotate);
+        if in_mode || self.model.drag.is_some() { Coalesce::Gesture } else { Coalesce::Repeat }
     }
 
     /// Moves the selection by a drag of so many half cells to the right and down: in the ground
@@ -90,10 +90,10 @@ impl Turn<'_> {
         self.move_by(by);
     }
 
-    pub(super) fn turn_selection(&mut self, way: Way, pace: Pace) {
-        let degrees = if pace == Pace::Fine { TURN_DEGREES_FINE } else { TURN_DEGREES };
+    pub(super) fn turn_selection(&mut self, way: Direction, pace: StepSize) {
+        let degrees = if pace == StepSize::Fine { TURN_DEGREES_FINE } else { TURN_DEGREES };
         // Counter-clockwise from above: the near side goes to the right.
-        self.turn_by(if way == Way::Right { degrees } else { -degrees });
+        self.turn_by(if way == Direction::Right { degrees } else { -degrees });
     }
 
     pub(super) fn turn_by(&mut self, degrees: f64) {
@@ -103,7 +103,7 @@ impl Turn<'_> {
 
     pub(super) fn drop_down(&mut self) {
         let edit = edit::drop_down(self.scene(), &self.model.selection);
-        self.commit(edit, Hold::Single);
+        self.commit(edit, Coalesce::Single);
     }
 
     pub(super) fn duplicate(&mut self) {
@@ -125,6 +125,6 @@ impl Turn<'_> {
 
     pub(super) fn own_material(&mut self) {
         let edit = edit::own_material(self.scene(), &self.model.selection);
-        self.commit(edit, Hold::Single);
+        self.commit(edit, Coalesce::Single);
     }
 }

@@ -4,14 +4,14 @@ use crate::dashboard::editor::Editor;
 use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::RunningExport;
 use crate::dashboard::overlay::{Overlay, Prompt, PromptFor};
-use crate::dashboard::update::{Hold, Turn};
+use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::render::schedule::Stop;
-use crate::scene::edit::{self, Subject};
+use crate::scene::edit::{self, Target};
 use crate::value::{excerpt, number};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     fn prompt(&mut self, purpose: PromptFor, title: &str, help: &str, text: impl Into<String>) {
         let (title, help) = (title.to_string(), help.to_string());
         let editor = Editor::new(text);
@@ -35,9 +35,9 @@ impl Turn<'_> {
         let subject = self.model.selection.clone();
         let scene = self.scene();
         let name = match &subject {
-            Subject::Light(i) => scene.lights.get(*i).map(|light| light.name.clone()),
-            Subject::Object(i) => scene.objects.get(*i).map(|object| object.name.clone()),
-            Subject::Material(name) | Subject::View(name) => Some(name.clone()),
+            Target::Light(i) => scene.lights.get(*i).map(|light| light.name.clone()),
+            Target::Object(i) => scene.objects.get(*i).map(|object| object.name.clone()),
+            Target::Material(name) | Target::View(name) => Some(name.clone()),
             _ => None,
         };
         match name {
@@ -113,7 +113,7 @@ impl Turn<'_> {
         Ok(())
     }
 
-    fn rename(&mut self, subject: &Subject, text: &str) -> Result<(), String> {
+    fn rename(&mut self, subject: &Target, text: &str) -> Result<(), String> {
         let edit = edit::rename(self.scene(), subject, text).map_err(|e| e.to_string())?;
         self.commit_and_select(Ok(edit));
         Ok(())
@@ -121,7 +121,7 @@ impl Turn<'_> {
 
     fn store_view(&mut self, text: &str) -> Result<(), String> {
         let edit = edit::store_view(self.scene(), Some(text)).map_err(|e| e.to_string())?;
-        self.record(edit, Hold::Single);
+        self.record(edit, Coalesce::Single);
         let number = self.scene().views.keys().position(|name| name == text).map_or(0, |at| at + 1);
         let key = if number <= 9 { format!(" · key {number}") } else { String::new() };
         self.say(format!("viewpoint {} is stored{key}", excerpt(text)));
@@ -139,7 +139,7 @@ impl Turn<'_> {
         if let Some(more) = words.next() {
             return Err(format!("\"{}\" is too much.", excerpt(more)));
         }
-        let film = edit::set(self.scene(), &Subject::Film, "size", size);
+        let film = edit::set(self.scene(), &Target::Film, "size", size);
         let scene = film.map_err(|refusal| refusal.to_string())?.scene;
         let size = scene.film.size;
         self.model.export = Some(RunningExport { size, format, progress: 0.0 });

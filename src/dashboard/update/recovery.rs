@@ -1,15 +1,15 @@
 //! Unsaved edits: those of a program that was killed, and those of this one, which may be.
 
-use crate::dashboard::message::{Effect, LeftBehind};
+use crate::dashboard::message::{Effect, OrphanedEdits};
 use crate::dashboard::model::Tone;
 use crate::dashboard::overlay::Answer;
-use crate::dashboard::update::Turn;
+use crate::dashboard::update::UpdateContext;
 use std::sync::Arc;
 use std::time::Duration;
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     /// Edits were found that nobody saved.
-    pub(super) fn left_behind(&mut self, left: LeftBehind) {
+    pub(super) fn left_behind(&mut self, left: OrphanedEdits) {
         self.follow = false;
         self.model.left_behind = Some(left);
         if self.model.overlay.is_some() || self.model.editor().is_some() {
@@ -84,7 +84,7 @@ impl Turn<'_> {
         };
         if !same {
             self.model.journaled.clone_from(&scene);
-            self.effects.insert(quit.unwrap_or(self.effects.len()), Effect::Journal(scene));
+            self.effects.insert(quit.unwrap_or(self.effects.len()), Effect::KeepEdits(scene));
         }
     }
 }

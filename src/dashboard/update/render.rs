@@ -1,15 +1,15 @@
 //! The work: pause, restart, targets, threads; exports; the terminal's colours.
 
-use crate::dashboard::action::Change;
+use crate::dashboard::action::Delta;
 use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::Colors;
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::update::Turn;
+use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::prompt::stop_text;
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
 
-impl Turn<'_> {
+impl UpdateContext<'_> {
     pub(super) fn pause(&mut self) {
         self.model.paused = !self.model.paused;
         self.emit(Effect::Pause(self.model.paused));
@@ -36,8 +36,8 @@ impl Turn<'_> {
             Some(Overlay::Quality { cursor: cursor.unwrap_or(QUALITIES.len() - 1) });
     }
 
-    pub(super) fn threads(&mut self, change: Change) {
-        let more = if change == Change::Up { 1 } else { -1 };
+    pub(super) fn threads(&mut self, change: Delta) {
+        let more = if change == Delta::Up { 1 } else { -1 };
         let threads = self.model.threads.saturating_add_signed(more);
         self.model.threads = threads.clamp(1, self.model.most_threads);
         self.emit(Effect::Threads(self.model.threads));

@@ -4,13 +4,13 @@ use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay_layout::wrapped;
-use crate::dashboard::panel_lines::{FieldLine, Line};
+use crate::dashboard::panel_lines::{FieldLine, PanelLine};
 use crate::dashboard::view::frame::{panel, scroll_mark};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::text::{Row, columns, skip};
 use crate::dashboard::view::theme::Theme;
 use crate::film::Display;
-use crate::scene::edit::Entry;
+use crate::scene::edit::Widget;
 use crate::terminal::Area;
 use crate::value::{number, significant};
 use ratatui::buffer::Buffer;
@@ -24,7 +24,7 @@ const LENGTH: &str = "scene units";
 /// Fields in their area.
 pub struct Fields<'a> {
     /// The lines.
-    pub lines: &'a [Line],
+    pub lines: &'a [PanelLine],
     /// Rows for them.
     pub list: Area,
     /// Rows for what is to be said about the one under the cursor.
@@ -71,15 +71,16 @@ impl Fields<'_> {
     pub fn draw(&self, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
         let rows = usize::from(self.list.height);
         let first = self.scroll.min(self.lines.len().saturating_sub(rows));
-        let label = |line: &Line| line.field().map_or(0, |f| 1 + 2 * f.depth + columns(&f.label));
+        let label =
+            |line: &PanelLine| line.field().map_or(0, |f| 1 + 2 * f.depth + columns(&f.label));
         let widest = self.lines.iter().map(label).max().unwrap_or(0);
         let labels = widest.min(usize::from(self.list.width) * 9 / 20);
         let mut typing = None;
         for (row, (i, line)) in (0..).zip(self.lines.iter().enumerate().skip(first).take(rows)) {
             let to = Row::new(buffer, self.list, row);
             match line {
-                Line::Heading(title) => heading(to, title, theme),
-                Line::Field(field) => {
+                PanelLine::Heading(title) => heading(to, title, theme),
+                PanelLine::Field(field) => {
                     let at = self.field(field, i == self.cursor, labels, to, theme);
                     typing = typing.or(at);
                 }
@@ -120,7 +121,7 @@ impl Fields<'_> {
         if let Some(style) = swatch {
             to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
         }
-        let words = matches!(field.entry, Entry::Choice | Entry::Kind | Entry::Switch);
+        let words = matches!(field.entry, Widget::Choice | Widget::Kind | Widget::Switch);
         match field.value.as_str() {
             "" => to.put("–", theme.dim()),
             words_value if words && chosen => {
@@ -141,7 +142,7 @@ impl Fields<'_> {
     /// What is to be said about the field under the cursor: what is wrong, else what it is and what
     /// may be typed.
     fn say(&self, theme: &Theme, buffer: &mut Buffer) {
-        let Some(field) = self.lines.get(self.cursor).and_then(Line::field) else { return };
+        let Some(field) = self.lines.get(self.cursor).and_then(PanelLine::field) else { return };
         let width = self.help.width.saturating_sub(2);
         let problem = self.editor.and_then(|e| e.problem.as_deref()).or(self.problem);
         let said = match problem {

@@ -1,8 +1,8 @@
 //! Panels' borders with their titles, and the picture's panel.
 
 use crate::dashboard::layout::{Focus, Layout};
-use crate::dashboard::message::Channel;
-use crate::dashboard::model::{Compared, Mode, Model};
+use crate::dashboard::message::DisplayChannel;
+use crate::dashboard::model::{CompareView, Mode, Model};
 use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::text::{Row, columns, number, rect};
 use crate::dashboard::view::theme::Theme;
@@ -106,13 +106,13 @@ pub fn draw(
 fn chips(model: &Model) -> Vec<(String, bool)> {
     let mut chips = Vec::new();
     match (model.comparison.shown, model.channel) {
-        (Compared::Kept, _) => {
+        (CompareView::Pinned, _) => {
             let spp = model.comparison.kept.as_ref().map_or(0.0, |(_, spp)| *spp);
             chips.push((format!("kept picture, {spp:.0} spp"), true));
         }
-        (Compared::Difference, _) => chips.push(("live − kept".to_string(), true)),
-        (Compared::Live, Channel::Beauty) => {}
-        (Compared::Live, channel) => chips.push((channel.name().to_string(), true)),
+        (CompareView::Difference, _) => chips.push(("live − kept".to_string(), true)),
+        (CompareView::Live, DisplayChannel::Beauty) => {}
+        (CompareView::Live, channel) => chips.push((channel.name().to_string(), true)),
     }
     let exposure = model.display.exposure_ev;
     if exposure != 0.0 {
@@ -131,7 +131,7 @@ fn mode(model: &Model) -> Option<String> {
     Some(match model.mode {
         Mode::Orbit => return None,
         Mode::Move => format!("moving {}", selected()),
-        Mode::Turn => format!("turning {}", selected()),
+        Mode::Rotate => format!("turning {}", selected()),
         Mode::Fly => "flying".to_string(),
         Mode::Probe => "probing".to_string(),
     })

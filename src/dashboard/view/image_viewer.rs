@@ -1,13 +1,13 @@
 //! A written picture on the whole screen.
 
 use crate::dashboard::model::{Model, short_name};
-use crate::dashboard::overlay::Looked;
+use crate::dashboard::overlay::ViewedImage;
 use crate::dashboard::view::picture::paint;
 use crate::dashboard::view::text::Row;
 use crate::dashboard::view::theme::Theme;
 use crate::terminal::Area;
 use crate::terminal::cells::PictureCells;
-use crate::terminal::image::{Protocol, Still};
+use crate::terminal::image::{Protocol, ViewerImage};
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Style};
 
@@ -15,7 +15,7 @@ use ratatui::style::{Color, Style};
 /// are a picture and not text.
 pub fn draw(
     model: &Model,
-    looked: &Looked,
+    looked: &ViewedImage,
     theme: &Theme,
     buffer: &mut Buffer,
 ) -> Option<PictureCells> {
@@ -49,7 +49,7 @@ pub fn draw(
 }
 
 /// What is seen, and why it is not better.
-fn told(looked: &Looked, still: &Still) -> (String, &'static str) {
+fn told(looked: &ViewedImage, still: &ViewerImage) -> (String, &'static str) {
     let [width, height] = still.size;
     let whole = format!("{width}×{height}");
     let size = match still.shown {

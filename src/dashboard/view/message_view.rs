@@ -6,7 +6,7 @@ use crate::dashboard::overlay_layout::wrapped;
 use crate::dashboard::view::text::Row;
 use crate::dashboard::view::theme::Theme;
 use crate::render::session::State;
-use crate::scene::Message;
+use crate::scene::Diagnostic;
 use crate::terminal::Area;
 use crate::value::printable;
 use ratatui::buffer::Buffer;
@@ -50,7 +50,7 @@ pub fn broken(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer
 }
 
 /// One message: where, what, the remedy.
-fn told(message: &Message, width: u16, theme: &Theme) -> Lines {
+fn told(message: &Diagnostic, width: u16, theme: &Theme) -> Lines {
     let mut lines = Vec::new();
     if let Some((line, column)) = message.place {
         lines.push((format!("line {line}, column {column}"), theme.accent()));

@@ -23,7 +23,7 @@ use crate::dashboard::layout::{Focus, Layout, SMALLEST};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
 use crate::terminal::cells::{Colors, PictureCells};
-use picture::Imager;
+use picture::PictureView;
 pub use picture::is_settled;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
@@ -33,7 +33,7 @@ use theme::Theme;
 /// Draws models.
 #[derive(Debug, Default)]
 pub struct View {
-    imager: Imager,
+    imager: PictureView,
     /// What the picture was made for.
     made_for: Option<Version>,
     picture: PictureCells,
@@ -67,7 +67,7 @@ impl View {
     /// Where text is being typed, if it is.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme::new(model.colors);
-        if let Some(Overlay::Still(looked)) = &model.overlay {
+        if let Some(Overlay::ViewerImage(looked)) = &model.overlay {
             let shown = image_viewer::draw(model, looked, &theme, buffer);
             (self.place, self.uncovered) = match (shown, &looked.still) {
                 (Some(cells), Some(still)) => picture::uncovered(&cells, still.place, buffer),

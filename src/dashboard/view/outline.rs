@@ -1,14 +1,14 @@
 //! The outline: everything in the scene.
 
 use crate::dashboard::layout::{Focus, Layout};
-use crate::dashboard::message::Channel;
-use crate::dashboard::model::{Compared, Model};
+use crate::dashboard::message::DisplayChannel;
+use crate::dashboard::model::{CompareView, Model};
 use crate::dashboard::panel_lines::{OutlineLine, outline};
 use crate::dashboard::view::frame::{panel, scroll_mark};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::text::{Row, columns};
 use crate::dashboard::view::theme::Theme;
-use crate::scene::edit::Subject;
+use crate::scene::edit::Target;
 use crate::terminal::cells::object_color;
 use ratatui::buffer::Buffer;
 
@@ -22,7 +22,8 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     let rows = usize::from(inner.height);
     let first = model.outline_scroll.min(lines.len().saturating_sub(rows));
     // The view of object ids needs a key to its colours.
-    let with_ids = model.channel == Channel::Objects && model.comparison.shown == Compared::Live;
+    let with_ids =
+        model.channel == DisplayChannel::Objects && model.comparison.shown == CompareView::Live;
     for (row, line) in (0..).zip(lines.iter().skip(first).take(rows)) {
         let mut to = Row::new(buffer, inner, row);
         match line {
@@ -39,7 +40,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
                     to.fill(name);
                 }
                 let id = match subject {
-                    Subject::Object(i) if with_ids => theme.swatch(object_color(*i as u32)),
+                    Target::Object(i) if with_ids => theme.swatch(object_color(*i as u32)),
                     _ => None,
                 };
                 match id {

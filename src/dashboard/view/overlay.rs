@@ -5,7 +5,7 @@ use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::{ABOUT, Cost};
 use crate::dashboard::overlay::{Form, Overlay, Palette, Pick, Prompt, Question};
-use crate::dashboard::overlay_layout::{Place, wrapped};
+use crate::dashboard::overlay_layout::{OverlayLayout, wrapped};
 use crate::dashboard::view::fields::{Fields, typed};
 use crate::dashboard::view::frame::{overlay, scroll_mark};
 use crate::dashboard::view::text::{Row, columns, cut, duration, durations};
@@ -27,7 +27,7 @@ pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Positio
         Overlay::Form(open) => return form(model, open, &place, theme, buffer),
         Overlay::Prompt(open) => return prompt(open, &place, theme, buffer),
         // It has the whole screen.
-        Overlay::Still(_) => {}
+        Overlay::ViewerImage(_) => {}
         Overlay::Question(open) => question(open, &place, theme, buffer),
     }
     None
@@ -35,7 +35,7 @@ pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Positio
 
 /// The part of `all` lines that is shown from `scroll` on: its first line and rows, with a mark.
 fn window(
-    place: &Place,
+    place: &OverlayLayout,
     scroll: usize,
     all: usize,
     theme: &Theme,
@@ -47,7 +47,7 @@ fn window(
     (first, rows)
 }
 
-fn keys(scroll: usize, place: &Place, theme: &Theme, buffer: &mut Buffer) {
+fn keys(scroll: usize, place: &OverlayLayout, theme: &Theme, buffer: &mut Buffer) {
     overlay(place.frame, "keys", theme, buffer);
     let lines = help();
     let (first, rows) = window(place, scroll, lines.len(), theme, buffer);
@@ -69,7 +69,13 @@ fn keys(scroll: usize, place: &Place, theme: &Theme, buffer: &mut Buffer) {
     }
 }
 
-fn inventory(model: &Model, scroll: usize, place: &Place, theme: &Theme, buffer: &mut Buffer) {
+fn inventory(
+    model: &Model,
+    scroll: usize,
+    place: &OverlayLayout,
+    theme: &Theme,
+    buffer: &mut Buffer,
+) {
     overlay(place.frame, "inventory", theme, buffer);
     let lines = model.inventory(place.list.width);
     let (first, rows) = window(place, scroll, lines.len(), theme, buffer);
@@ -78,7 +84,13 @@ fn inventory(model: &Model, scroll: usize, place: &Place, theme: &Theme, buffer:
     }
 }
 
-fn qualities(model: &Model, cursor: usize, place: &Place, theme: &Theme, buffer: &mut Buffer) {
+fn qualities(
+    model: &Model,
+    cursor: usize,
+    place: &OverlayLayout,
+    theme: &Theme,
+    buffer: &mut Buffer,
+) {
     overlay(place.frame, "quality", theme, buffer);
     for (row, quality) in (0..place.list.height).zip(model.qualities()) {
         let (mut to, name, rest) =
@@ -118,7 +130,12 @@ fn chosen<'a>(
     (to, name, rest)
 }
 
-fn palette(open: &Palette, place: &Place, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
+fn palette(
+    open: &Palette,
+    place: &OverlayLayout,
+    theme: &Theme,
+    buffer: &mut Buffer,
+) -> Option<Position> {
     overlay(place.frame, "all actions", theme, buffer);
     let mut input = Row::new(buffer, place.input, 0);
     input.put(" : ", theme.accent());
@@ -141,7 +158,7 @@ fn palette(open: &Palette, place: &Place, theme: &Theme, buffer: &mut Buffer) ->
     cursor
 }
 
-fn pick(open: &Pick, place: &Place, theme: &Theme, buffer: &mut Buffer) {
+fn pick(open: &Pick, place: &OverlayLayout, theme: &Theme, buffer: &mut Buffer) {
     overlay(place.frame, &open.title, theme, buffer);
     let (first, rows) = window(place, open.scroll, open.entries.len(), theme, buffer);
     let names = open.entries.iter().map(|(name, _)| columns(name)).max().unwrap_or(0);
@@ -155,7 +172,7 @@ fn pick(open: &Pick, place: &Place, theme: &Theme, buffer: &mut Buffer) {
 fn form(
     model: &Model,
     open: &Form,
-    place: &Place,
+    place: &OverlayLayout,
     theme: &Theme,
     buffer: &mut Buffer,
 ) -> Option<Position> {
@@ -182,7 +199,12 @@ fn say(text: &str, style: Style, help: Area, buffer: &mut Buffer) {
     }
 }
 
-fn prompt(open: &Prompt, place: &Place, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
+fn prompt(
+    open: &Prompt,
+    place: &OverlayLayout,
+    theme: &Theme,
+    buffer: &mut Buffer,
+) -> Option<Position> {
     overlay(place.frame, &open.title, theme, buffer);
     match &open.editor.problem {
         Some(problem) => say(problem, theme.bad(), place.help, buffer),
@@ -191,7 +213,7 @@ fn prompt(open: &Prompt, place: &Place, theme: &Theme, buffer: &mut Buffer) -> O
     typed(&open.editor, &mut Row::new(buffer, place.input, 0), theme)
 }
 
-fn question(open: &Question, place: &Place, theme: &Theme, buffer: &mut Buffer) {
+fn question(open: &Question, place: &OverlayLayout, theme: &Theme, buffer: &mut Buffer) {
     overlay(place.frame, "", theme, buffer);
     say(&open.text, theme.text(), place.help, buffer);
     for (row, (i, (letter, words, _))) in (0..).zip(open.answers.iter().enumerate()) {

@@ -1,14 +1,14 @@
 //! The picture: from the newest snapshot to a raster of half cells.
 
-use crate::dashboard::message::Channel;
-use crate::dashboard::model::{Compared, Model};
+use crate::dashboard::message::DisplayChannel;
+use crate::dashboard::model::{CompareView, Model};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::view::legend::Legend;
 use crate::film::{Display, LinearImage, TILE};
 use crate::render::session::{Snapshot, State};
 use crate::terminal::Area;
 use crate::terminal::cells::{
-    Ink, PictureCell, PictureCells, Raster, Scale, depth, difference, normals, objects,
+    CellColor, PictureCell, PictureCells, Raster, Scale, depth, difference, normals, objects,
 };
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -17,14 +17,14 @@ use std::sync::Arc;
 
 /// Makes rasters of models, and remembers what is slow to make.
 #[derive(Debug, Default)]
-pub struct Imager {
+pub struct PictureView {
     legend: Option<Legend>,
-    kept: Option<Kept>,
+    kept: Option<PinnedCache>,
 }
 
 /// A kept picture of the size of the screen.
 #[derive(Debug)]
-struct Kept {
+struct PinnedCache {
     of: Arc<LinearImage>,
     size: [usize; 2],
     radiance: Vec<[f32; 3]>,
@@ -32,14 +32,15 @@ struct Kept {
 
 /// Whether the picture will stay as it is until somebody does something.
 pub fn is_settled(model: &Model) -> bool {
-    if let Some(Overlay::Still(_)) = model.overlay {
+    if let Some(Overlay::ViewerImage(_)) = model.overlay {
         return true;
     }
     let resting = |s: &Snapshot| matches!(s.report.state, State::Resting(_) | State::Paused);
-    model.snapshot.as_ref().is_some_and(|s| resting(s)) || model.comparison.shown == Compared::Kept
+    model.snapshot.as_ref().is_some_and(|s| resting(s))
+        || model.comparison.shown == CompareView::Pinned
 }
 
-impl Imager {
+impl PictureView {
     /// What the colours of the last raster mean, if they stand for numbers.
     pub fn legend(&self) -> Option<&Legend> {
         self.legend.as_ref()
@@ -49,45 +50,45 @@ impl Imager {
     pub fn raster(&mut self, model: &Model, size: [usize; 2]) -> Raster {
         self.legend = None;
         let made = match (model.comparison.shown, model.channel) {
-            (Compared::Kept, _) => {
+            (CompareView::Pinned, _) => {
                 self.kept(model, size).map(|kept| shown(kept, &model.display, size))
             }
-            (Compared::Difference, _) => self.difference(model, size),
-            (Compared::Live, channel) => self.live(model, channel, size),
+            (CompareView::Difference, _) => self.difference(model, size),
+            (CompareView::Live, channel) => self.live(model, channel, size),
         };
         made.unwrap_or_default()
     }
 
-    fn live(&mut self, model: &Model, channel: Channel, size: [usize; 2]) -> Option<Raster> {
+    fn live(&mut self, model: &Model, channel: DisplayChannel, size: [usize; 2]) -> Option<Raster> {
         let snapshot = model.snapshot.as_deref()?;
         match channel {
-            Channel::Beauty => {
+            DisplayChannel::Beauty => {
                 let (radiance, from) = live_radiance(model, snapshot)?;
                 Some(resized(shown(&radiance, &model.display, from), size))
             }
-            Channel::Noise => {
+            DisplayChannel::Noise => {
                 let noise = &snapshot.tiles.noise_codes;
                 self.tiles(model, snapshot, "codes of noise", size, |i| {
                     noise.get(i).map(|n| f64::from(*n))
                 })
             }
-            Channel::Samples => {
+            DisplayChannel::Samples => {
                 let spp = &snapshot.tiles.spp;
                 self.tiles(model, snapshot, "samples per pixel", size, |i| {
                     spp.get(i).map(|n| f64::from(*n))
                 })
             }
-            Channel::Objects | Channel::Normals | Channel::Depth => {
+            DisplayChannel::Objects | DisplayChannel::Normals | DisplayChannel::Depth => {
                 let guide = snapshot.guide.as_deref()?;
                 let (columns, rows, sights) = (guide.columns, guide.rows, guide.sights());
                 let hit = |i: usize| sights.get(i).filter(|s| s.object.is_some());
                 let all = columns * rows;
                 let raster = match channel {
-                    Channel::Objects => {
+                    DisplayChannel::Objects => {
                         let ids: Vec<_> = (0..all).map(|i| hit(i).and_then(|s| s.object)).collect();
                         objects(columns, rows, &ids)
                     }
-                    Channel::Normals => {
+                    DisplayChannel::Normals => {
                         let found: Vec<_> = (0..all).map(|i| hit(i).map(|s| s.normal)).collect();
                         normals(columns, rows, &found)
                     }
@@ -134,10 +135,10 @@ impl Imager {
 
     fn kept(&mut self, model: &Model, size: [usize; 2]) -> Option<&[[f32; 3]]> {
         let (picture, _) = model.comparison.kept.as_ref()?;
-        let same = |kept: &Kept| Arc::ptr_eq(&kept.of, picture) && kept.size == size;
+        let same = |kept: &PinnedCache| Arc::ptr_eq(&kept.of, picture) && kept.size == size;
         if !self.kept.as_ref().is_some_and(same) {
             let radiance = picture.resampled(size[0], size[1]);
-            self.kept = Some(Kept { of: Arc::clone(picture), size, radiance });
+            self.kept = Some(PinnedCache { of: Arc::clone(picture), size, radiance });
         }
         self.kept.as_ref().map(|kept| &*kept.radiance)
     }
@@ -227,9 +228,9 @@ pub fn uncovered(cells: &PictureCells, area: Area, buffer: &Buffer) -> (Rect, Ve
 
 fn colors(cell: &PictureCell) -> [Color; 2] {
     [cell.fg, cell.bg].map(|ink| match ink {
-        Ink::Plain => Color::Reset,
-        Ink::Rgb([r, g, b]) => Color::Rgb(r, g, b),
-        Ink::Indexed(index) => Color::Indexed(index),
+        CellColor::Plain => Color::Reset,
+        CellColor::Rgb([r, g, b]) => Color::Rgb(r, g, b),
+        CellColor::Indexed(index) => Color::Indexed(index),
     })
 }
 

@@ -6,7 +6,7 @@ use crate::dashboard::view::frame::overlay;
 use crate::dashboard::view::text::{Row, columns, number};
 use crate::dashboard::view::theme::Theme;
 use crate::film::quantised_8;
-use crate::scene::edit::Subject;
+use crate::scene::edit::Target;
 use crate::terminal::Area;
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier, Style};
@@ -88,7 +88,7 @@ fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
     let guide = model.snapshot.as_ref()?.guide.as_deref()?;
     let [width, height] = model.scene().film.size.map(|n| n.max(1) as usize);
     let object = guide.at(x * guide.columns / width, y * guide.rows / height)?.object?;
-    let subject = Subject::Object(object as usize);
+    let subject = Target::Object(object as usize);
     subject.exists(model.scene()).then(|| subject.label(model.scene()))
 }
 

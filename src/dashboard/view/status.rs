@@ -8,7 +8,7 @@ use crate::render::schedule::StoppedBy;
 use crate::render::session::{Report, State};
 use crate::terminal::Area;
 use crate::terminal::Multiplexer;
-use crate::terminal::flow::Mode;
+use crate::terminal::flow::PacingMode;
 use ratatui::buffer::Buffer;
 use ratatui::style::{Modifier, Style};
 
@@ -103,14 +103,14 @@ fn rate(bytes_per_second: f64) -> String {
 }
 
 /// How it is known what has arrived.
-fn mode(mode: Mode) -> &'static str {
+fn mode(mode: PacingMode) -> &'static str {
     match mode {
-        Mode::Local => "here",
-        Mode::Answers(None) => "answered",
-        Mode::Answers(Some(Multiplexer::Tmux)) => "answered through tmux",
-        Mode::Answers(Some(Multiplexer::Screen)) => "answered through screen",
-        Mode::Queue => "by the kernel's queue",
-        Mode::Fixed => "fixed",
+        PacingMode::Unlimited => "here",
+        PacingMode::AckClocked(None) => "answered",
+        PacingMode::AckClocked(Some(Multiplexer::Tmux)) => "answered through tmux",
+        PacingMode::AckClocked(Some(Multiplexer::Screen)) => "answered through screen",
+        PacingMode::SendQueue => "by the kernel's queue",
+        PacingMode::FixedRate => "fixed",
     }
 }
 

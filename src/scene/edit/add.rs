@@ -3,11 +3,11 @@
 use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::Material;
 use crate::primitive::Form;
-use crate::scene::edit::bounds::{Ball, scene_bounds};
+use crate::scene::edit::bounds::{BoundingSphere, scene_bounds};
 use crate::scene::edit::placement::place_for;
 use crate::scene::edit::properties::Word;
 use crate::scene::edit::unique_name::{free_light, free_material, free_object};
-use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scale, Scene, TransformOp};
 use crate::shape::{KINDS, Shape, compose};
 use crate::value::{Color, clean, number, rounded_to, significant, unit};
@@ -51,14 +51,14 @@ fn fresh_material(scene: &Scene) -> Material {
 ///
 /// # Errors
 /// If there is no such kind or material.
-pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<Edit, Refusal> {
+pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<Edit, EditError> {
     let size = usual_size(scene);
     let room = DVec3::splat(size);
     let base = place_for(scene, room);
     let Some(mut shape) = Shape::standing(kind, base, room) else {
         let names: Vec<_> = KINDS.iter().map(|k| k.name).collect();
         let found = format!("there is no kind of object called \"{kind}\"");
-        return Err(Refusal::new(&found, &format!("Expected one of {}.", names.join(", "))));
+        return Err(EditError::new(&found, &format!("Expected one of {}.", names.join(", "))));
     };
     face_camera(&mut shape, scene);
     if let Form::Plane { .. } = shape.form() {
@@ -82,7 +82,7 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     let transform =
         if shape.anchors().is_empty() { upright_steps(&shape, base, size) } else { Vec::new() };
     next.objects.push(Object { name, material, shape, transform });
-    let subject = Subject::Object(next.objects.len() - 1);
+    let subject = Target::Object(next.objects.len() - 1);
     Edit::checked(next, subject, format!("add {kind}"))
 }
 
@@ -106,7 +106,7 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
 /// The length of a new thing: somewhat less than that of the solids that are there (the middle one of
 /// them), and than half of the scene's; 1 in an empty scene.
 fn usual_size(scene: &Scene) -> f64 {
-    let Ball { radius, .. } = scene_bounds(scene);
+    let BoundingSphere { radius, .. } = scene_bounds(scene);
     let solid = |object: &Object| {
         let form = object.form();
         let (low, high) = form.bounds()?;
@@ -139,8 +139,8 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
 ///
 /// # Errors
 /// If there is no such kind.
-pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, Refusal> {
-    let Ball { center, radius } = scene_bounds(scene);
+pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
+    let BoundingSphere { center, radius } = scene_bounds(scene);
     let center = DVec3::from_array(center);
     let [right, _, forward] = scene.camera.frame();
     let level = |v: DVec3| DVec3::new(v.x, 0.0, v.z).try_normalize().unwrap_or(DVec3::X);
@@ -167,7 +167,7 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, Refusal> {
         }
         _ => {
             let found = format!("there is no kind of light called \"{kind}\"");
-            return Err(Refusal::new(&found, "Expected \"point\" or \"directional\"."));
+            return Err(EditError::new(&found, "Expected \"point\" or \"directional\"."));
         }
     };
     light.name = free_light(scene, name);
@@ -186,7 +186,7 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, Refusal> {
     let mut next = scene.clone();
     let label = format!("add {}", light.name);
     next.lights.push(light);
-    let subject = Subject::Light(next.lights.len() - 1);
+    let subject = Target::Light(next.lights.len() - 1);
     let edit = Edit::checked(next, subject, label)?;
     Ok(match note {
         Some(note) => edit.noted(note),
@@ -198,12 +198,12 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, Refusal> {
 ///
 /// # Errors
 /// None that is known: the result is checked as every edit is.
-pub fn add_material(scene: &Scene) -> Result<Edit, Refusal> {
+pub fn add_material(scene: &Scene) -> Result<Edit, EditError> {
     let mut next = scene.clone();
     let name = free_material(scene, "material");
     next.materials.insert(name.clone(), fresh_material(scene));
     let label = format!("add {name}");
-    Edit::checked(next, Subject::Material(name), label)
+    Edit::checked(next, Target::Material(name), label)
 }
 
 #[cfg(test)]
@@ -216,7 +216,7 @@ mod tests {
         let scene = built_in();
         for word in object_kinds() {
             let edit = add_object(&scene, &word.name, None).unwrap();
-            let Subject::Object(i) = edit.subject else { panic!() };
+            let Target::Object(i) = edit.subject else { panic!() };
             let object = &edit.scene.objects[i];
             assert_eq!(object.shape.key(), word.name);
             assert_eq!(

@@ -1,14 +1,14 @@
 //! How large things are and where: for framing, for steps, for placing.
 
 use crate::primitive::Form;
-use crate::scene::edit::Subject;
+use crate::scene::edit::Target;
 use crate::scene::{Object, Scene};
 use crate::value::decade;
 use glam::DVec3;
 
 /// A ball around something.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ball {
+pub struct BoundingSphere {
     /// Its centre, in scene units.
     pub center: [f64; 3],
     /// Its radius, in scene units; greater than 0.
@@ -20,24 +20,24 @@ pub(super) type Extent = (DVec3, DVec3);
 
 /// A ball around an object (of a plane: around the point that places it), a point light, or what a
 /// camera looks at; `None` for what is nowhere in particular.
-pub fn bounds(scene: &Scene, subject: &Subject) -> Option<Ball> {
+pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     match subject {
-        Subject::Object(i) => {
+        Target::Object(i) => {
             let object = scene.objects.get(*i)?;
             Some(match object.form().bounds() {
                 Some(extent) => ball(extent),
                 None => {
                     let point = object.shape.place();
                     let at = object.scene_from_object().transform_point3(point);
-                    Ball { center: at.to_array(), radius: scene_bounds(scene).radius }
+                    BoundingSphere { center: at.to_array(), radius: scene_bounds(scene).radius }
                 }
             })
         }
-        Subject::Light(i) => {
+        Target::Light(i) => {
             let position = scene.lights.get(*i)?.point?.position;
-            Some(Ball { center: position, radius: scene_bounds(scene).radius / 10.0 })
+            Some(BoundingSphere { center: position, radius: scene_bounds(scene).radius / 10.0 })
         }
-        Subject::Material(name) => {
+        Target::Material(name) => {
             let used = scene.objects.iter().filter(|o| o.names_material(name));
             used.filter_map(|o| o.form().bounds()).reduce(union).map(ball)
         }
@@ -47,8 +47,8 @@ pub fn bounds(scene: &Scene, subject: &Subject) -> Option<Ball> {
 
 /// A ball around the solids of the scene; without solids around whatever has an end; in an empty
 /// scene around the origin with radius 1.
-pub fn scene_bounds(scene: &Scene) -> Ball {
-    middle(scene).map_or(Ball { center: [0.0; 3], radius: 1.0 }, ball)
+pub fn scene_bounds(scene: &Scene) -> BoundingSphere {
+    middle(scene).map_or(BoundingSphere { center: [0.0; 3], radius: 1.0 }, ball)
 }
 
 /// The box around the solids, or else around whatever has an end.
@@ -68,10 +68,10 @@ pub(super) fn union(a: Extent, b: Extent) -> Extent {
 }
 
 /// The ball through the corners of a box.
-fn ball((low, high): Extent) -> Ball {
+fn ball((low, high): Extent) -> BoundingSphere {
     let radius = (high - low).length() / 2.0;
     let center = low + (high - low) / 2.0;
-    Ball { center: center.to_array(), radius: radius.max(f64::MIN_POSITIVE) }
+    BoundingSphere { center: center.to_array(), radius: radius.max(f64::MIN_POSITIVE) }
 }
 
 /// The coarse step of a coordinate: a power of ten, between a hundredth and a tenth of the diameter of
@@ -88,7 +88,7 @@ pub fn focus_distance(scene: &Scene) -> f64 {
     if let Some(target) = scene.camera.target {
         return (DVec3::from_array(target) - eye).length();
     }
-    let Ball { center, radius } = scene_bounds(scene);
+    let BoundingSphere { center, radius } = scene_bounds(scene);
     let along = scene.camera.view().map_or(0.0, |w| w.dot(DVec3::from_array(center) - eye));
     if along > 0.1 * radius { along } else { radius }
 }
@@ -104,11 +104,11 @@ mod tests {
         let room = scene_bounds(&scene);
         assert!(room.radius > 1.5 && room.radius < 3.0, "{room:?}");
         assert_eq!(step_length(&scene), 0.1);
-        let floor = bounds(&scene, &Subject::Object(0)).unwrap();
+        let floor = bounds(&scene, &Target::Object(0)).unwrap();
         assert!((floor.radius - 32f64.sqrt()).abs() < 1e-12 && floor.center == [0.0; 3]);
-        let red = bounds(&scene, &Subject::Material("red".into())).unwrap();
-        assert_eq!(red, bounds(&scene, &Subject::Object(2)).unwrap());
-        assert_eq!(bounds(&scene, &Subject::Film), None);
+        let red = bounds(&scene, &Target::Material("red".into())).unwrap();
+        assert_eq!(red, bounds(&scene, &Target::Object(2)).unwrap());
+        assert_eq!(bounds(&scene, &Target::Film), None);
         scene.objects.truncate(1);
         assert_eq!(scene_bounds(&scene), floor, "without solids what there is");
         scene.objects.clear();

@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use crate::scene::edit::bounds::{is_solid, scene_bounds};
 use crate::scene::edit::set::{finish, replace};
 use crate::scene::edit::toml_view::{put, read};
-use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::edit::{Edit, EditError, Target};
 use crate::shape::Shape;
 use crate::value::{Field, NumberRange, ValueType, clean, number, rounded_to, significant, unit};
 use glam::DVec3;
@@ -36,7 +36,7 @@ pub(super) const AIM: Field = Field::required(
 );
 
 /// Which of the two a light or a camera is.
-pub(super) fn chosen(subject: &Subject, values: &Table) -> Option<&'static str> {
+pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
     crate::scene::edit::toml_view::rivals(subject)
         .iter()
         .copied()
@@ -46,33 +46,33 @@ pub(super) fn chosen(subject: &Subject, values: &Table) -> Option<&'static str> 
 /// Makes what stands behind `key` of the kind `name`. To what it is already: no change.
 pub(super) fn switch(
     scene: &Scene,
-    subject: &Subject,
+    subject: &Target,
     key: &str,
     name: &str,
-) -> Result<Edit, Refusal> {
+) -> Result<Edit, EditError> {
     let mut next = scene.clone();
     let mut note = None;
     match subject {
-        Subject::Light(i) => {
-            let light = next.lights.get_mut(*i).ok_or_else(|| Refusal::gone(subject))?;
+        Target::Light(i) => {
+            let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
             note = switch_light(light, scene, name);
         }
-        Subject::Camera => switch_camera(&mut next.camera, scene, key, name),
-        Subject::View(view) => {
-            let camera = next.views.get_mut(view).ok_or_else(|| Refusal::gone(subject))?;
+        Target::Camera => switch_camera(&mut next.camera, scene, key, name),
+        Target::View(view) => {
+            let camera = next.views.get_mut(view).ok_or_else(|| EditError::gone(subject))?;
             switch_camera(camera, scene, key, name);
         }
-        Subject::Object(i) => {
-            let object = next.objects.get_mut(*i).ok_or_else(|| Refusal::gone(subject))?;
+        Target::Object(i) => {
+            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
             if object.shape.key() != name
                 && let Some(shape) = reshaped(&object.shape, name, scene)
             {
                 object.shape = shape;
             }
         }
-        Subject::Material(material) => {
+        Target::Material(material) => {
             let material =
-                next.materials.get_mut(material).ok_or_else(|| Refusal::gone(subject))?;
+                next.materials.get_mut(material).ok_or_else(|| EditError::gone(subject))?;
             switch_texture(material, key, name);
         }
         _ => {}
@@ -156,8 +156,8 @@ pub(super) fn switch_falloff(
     index: usize,
     values: Table,
     falloff: Value,
-) -> Result<Edit, Refusal> {
-    let subject = Subject::Light(index);
+) -> Result<Edit, EditError> {
+    let subject = Target::Light(index);
     let mut edit = replace(scene, &subject, "falloff", values, falloff)?;
     let old = &scene.lights[index];
     let light = &mut edit.scene.lights[index];
@@ -272,7 +272,7 @@ mod tests {
     fn every_kind_becomes_every_other_in_its_place() {
         let scene = built_in();
         for object in 0..scene.objects.len() {
-            let subject = Subject::Object(object);
+            let subject = Target::Object(object);
             // The canonical cylinder and meshes are placed by a transform alone.
             let unplaced = ["unit_cylinder", "mesh"];
             for kind in KINDS.iter().filter(|kind| !unplaced.contains(&kind.name)) {
@@ -291,7 +291,7 @@ mod tests {
             let same = set(&scene, &subject, "shape", scene.objects[object].shape.key()).unwrap();
             assert_eq!(same.scene, scene);
         }
-        let upright = set(&scene, &Subject::Object(3), "shape", "prism").unwrap();
+        let upright = set(&scene, &Target::Object(3), "shape", "prism").unwrap();
         let Shape::Prism(prism) = &upright.scene.objects[3].shape else { panic!() };
         assert_eq!((prism.rotation, prism.side, prism.corner[1]), (30.0, 0.8, 0.0));
     }
@@ -301,7 +301,7 @@ mod tests {
         let mut scene = built_in();
         scene.lights[0].falloff = Falloff::InverseSquare;
         scene.lights[0].intensity = 40.0;
-        let lamp = Subject::Light(0);
+        let lamp = Target::Light(0);
         let edit = set(&scene, &lamp, "kind", "directional").unwrap();
         let light = &edit.scene.lights[0];
         assert!(light.point.is_none() && light.falloff == Falloff::None);
@@ -326,17 +326,17 @@ mod tests {
     fn cameras_keep_the_picture() {
         let scene = built_in();
         let camera = |scene: &Scene| scene.camera.clone();
-        let free = set(&scene, &Subject::Camera, "aim", "direction").unwrap().scene;
+        let free = set(&scene, &Target::Camera, "aim", "direction").unwrap().scene;
         let angle = camera(&free).view().unwrap().angle_between(scene.camera.view().unwrap());
         assert!(angle < 1e-5 && camera(&free).target.is_none(), "{angle}");
-        let back = set(&free, &Subject::Camera, "aim", "target").unwrap().scene;
+        let back = set(&free, &Target::Camera, "aim", "target").unwrap().scene;
         let angle = camera(&back).view().unwrap().angle_between(scene.camera.view().unwrap());
         assert!(angle < 1e-5 && camera(&back).direction.is_none(), "{angle}");
-        let wide = set(&scene, &Subject::Camera, "view_angle", "horizontal").unwrap().scene;
+        let wide = set(&scene, &Target::Camera, "view_angle", "horizontal").unwrap().scene;
         let expected = 2.0 * (20f64.to_radians().tan() * 4.0 / 3.0).atan().to_degrees();
         let (key, degrees) = wide.camera.view_angle.key_degrees();
         assert!(key == "horizontal" && (degrees - expected).abs() < 1e-3, "{degrees}");
-        let back = set(&wide, &Subject::Camera, "view_angle", "v").unwrap().scene;
+        let back = set(&wide, &Target::Camera, "view_angle", "v").unwrap().scene;
         assert!((back.camera.view_angle.key_degrees().1 - 40.0).abs() < 1e-3);
     }
 }

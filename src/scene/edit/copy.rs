@@ -6,7 +6,7 @@ use crate::scene::edit::parse_value::name;
 use crate::scene::edit::placement::place_for;
 use crate::scene::edit::translate::move_object;
 use crate::scene::edit::unique_name::{free_light, free_material, free_object, free_view};
-use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::excerpt;
 use glam::DVec3;
 
@@ -15,13 +15,13 @@ use glam::DVec3;
 ///
 /// # Errors
 /// For what a scene has only once.
-pub fn duplicate(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
+pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
-        return Err(Refusal::gone(subject));
+        return Err(EditError::gone(subject));
     }
     let mut next = scene.clone();
     let copy = match subject {
-        Subject::Object(i) => {
+        Target::Object(i) => {
             let mut copy = scene.objects[*i].clone();
             if !copy.name.is_empty() {
                 copy.name = free_object(scene, &copy.name);
@@ -41,9 +41,9 @@ pub fn duplicate(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
                 move_object(&mut copy, [0.0, -0.1 * ball.map_or(1.0, |b| b.radius), 0.0]);
             }
             next.objects.push(copy);
-            Subject::Object(next.objects.len() - 1)
+            Target::Object(next.objects.len() - 1)
         }
-        Subject::Light(i) => {
+        Target::Light(i) => {
             let mut copy = scene.lights[*i].clone();
             if !copy.name.is_empty() {
                 copy.name = free_light(scene, &copy.name);
@@ -54,21 +54,21 @@ pub fn duplicate(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
                     crate::scene::edit::translate::moved(point.position, [5.0 * step, 0.0, 0.0]);
             }
             next.lights.push(copy);
-            Subject::Light(next.lights.len() - 1)
+            Target::Light(next.lights.len() - 1)
         }
-        Subject::Material(old) => {
+        Target::Material(old) => {
             let new = free_material(scene, old);
             next.materials.insert(new.clone(), scene.materials[old].clone());
-            Subject::Material(new)
+            Target::Material(new)
         }
-        Subject::View(old) => {
+        Target::View(old) => {
             let new = free_view(scene, old);
             next.views.insert(new.clone(), scene.views[old].clone());
-            Subject::View(new)
+            Target::View(new)
         }
         _ => {
             let found = format!("there is only one {}", subject.label(scene));
-            return Err(Refusal::new(&found, ""));
+            return Err(EditError::new(&found, ""));
         }
     };
     Edit::checked(next, copy, format!("duplicate {}", subject.label(scene)))
@@ -79,9 +79,9 @@ pub fn duplicate(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
 ///
 /// # Errors
 /// For what a scene always has.
-pub fn delete(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
+pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
-        return Err(Refusal::gone(subject));
+        return Err(EditError::gone(subject));
     }
     let label = format!("delete {}", subject.label(scene));
     let mut next = scene.clone();
@@ -89,29 +89,29 @@ pub fn delete(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
     // What comes next in the list, else what came before.
     let neighbour = |i: usize, left: usize| if i < left { Some(i) } else { left.checked_sub(1) };
     let select = match subject {
-        Subject::Object(i) => {
+        Target::Object(i) => {
             next.objects.remove(*i);
-            neighbour(*i, next.objects.len()).map(Subject::Object)
+            neighbour(*i, next.objects.len()).map(Target::Object)
         }
-        Subject::Light(i) => {
+        Target::Light(i) => {
             next.lights.remove(*i);
-            neighbour(*i, next.lights.len()).map(Subject::Light)
+            neighbour(*i, next.lights.len()).map(Target::Light)
         }
-        Subject::View(name) => {
+        Target::View(name) => {
             next.views.remove(name);
-            following(next.views.keys(), name).map(Subject::View)
+            following(next.views.keys(), name).map(Target::View)
         }
-        Subject::Material(name) => {
+        Target::Material(name) => {
             next.materials.remove(name);
             note = strip(&mut next, name);
-            following(next.materials.keys(), name).map(Subject::Material)
+            following(next.materials.keys(), name).map(Target::Material)
         }
         _ => {
             let found = format!("{} belongs to every scene", subject.label(scene));
-            return Err(Refusal::new(&found, "Only its values can be changed."));
+            return Err(EditError::new(&found, "Only its values can be changed."));
         }
     };
-    let edit = Edit::checked(next, select.unwrap_or(Subject::Camera), label)?;
+    let edit = Edit::checked(next, select.unwrap_or(Target::Camera), label)?;
     Ok(match note {
         Some(note) => edit.noted(note),
         None => edit,
@@ -131,7 +131,7 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
         if !scene.objects[i].names_material(name) {
             continue;
         }
-        let label = Subject::Object(i).label(scene);
+        let label = Target::Object(i).label(scene);
         let object = &mut scene.objects[i];
         if object.material == name { &mut whole } else { &mut parts }.push(label);
         object.rename_material(name, "");
@@ -161,44 +161,44 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
 ///
 /// # Errors
 /// For what has no name, and for a name that is taken or cannot be shown.
-pub fn rename(scene: &Scene, subject: &Subject, new: &str) -> Result<Edit, Refusal> {
+pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
-        return Err(Refusal::gone(subject));
+        return Err(EditError::gone(subject));
     }
     let new = name("name", new)?;
     let mut next = scene.clone();
-    let needed = || Refusal::new("the name must not be empty", "Type one.");
-    let taken = |what| Refusal::new(&format!("there is a {what} \"{new}\" already"), "");
+    let needed = || EditError::new("the name must not be empty", "Type one.");
+    let taken = |what| EditError::new(&format!("there is a {what} \"{new}\" already"), "");
     let select = match subject {
-        Subject::Object(i) => {
+        Target::Object(i) => {
             next.objects[*i].name = new.clone();
             subject.clone()
         }
-        Subject::Light(i) => {
+        Target::Light(i) => {
             next.lights[*i].name = new.clone();
             subject.clone()
         }
-        Subject::Material(_) | Subject::View(_) if new.is_empty() => return Err(needed()),
-        Subject::Material(old) => {
+        Target::Material(_) | Target::View(_) if new.is_empty() => return Err(needed()),
+        Target::Material(old) => {
             if old != &new && next.materials.contains_key(&new) {
                 return Err(taken("material"));
             }
             let moved = next.materials.remove(old);
             next.materials.extend(moved.map(|material| (new.clone(), material)));
             next.objects.iter_mut().for_each(|object| object.rename_material(old, &new));
-            Subject::Material(new.clone())
+            Target::Material(new.clone())
         }
-        Subject::View(old) => {
+        Target::View(old) => {
             if old != &new && next.views.contains_key(&new) {
                 return Err(taken("view"));
             }
             let moved = next.views.remove(old);
             next.views.extend(moved.map(|view| (new.clone(), view)));
-            Subject::View(new.clone())
+            Target::View(new.clone())
         }
         _ => {
             let found = format!("{} has no name to change", subject.label(scene));
-            return Err(Refusal::new(&found, ""));
+            return Err(EditError::new(&found, ""));
         }
     };
     Edit::checked(next, select, format!("rename {}", subject.label(scene)))
@@ -208,11 +208,11 @@ pub fn rename(scene: &Scene, subject: &Subject, new: &str) -> Result<Edit, Refus
 ///
 /// # Errors
 /// For what is no object.
-pub fn own_material(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
-    let Subject::Object(index) = subject else {
-        return Err(Refusal::new("only objects have a material", "Select an object."));
+pub fn own_material(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
+    let Target::Object(index) = subject else {
+        return Err(EditError::new("only objects have a material", "Select an object."));
     };
-    let object = scene.objects.get(*index).ok_or_else(|| Refusal::gone(subject))?;
+    let object = scene.objects.get(*index).ok_or_else(|| EditError::gone(subject))?;
     let mut next = scene.clone();
     let old = scene.materials.get(&object.material).cloned().unwrap_or_default();
     let wanted = if object.name.is_empty() { object.shape.key() } else { &object.name };
@@ -232,56 +232,56 @@ mod tests {
     #[test]
     fn copies_stand_apart_under_their_own_name() {
         let scene = built_in();
-        let edit = duplicate(&scene, &Subject::Object(3)).unwrap();
-        assert_eq!(edit.subject, Subject::Object(6));
+        let edit = duplicate(&scene, &Target::Object(3)).unwrap();
+        assert_eq!(edit.subject, Target::Object(6));
         let (old, new) = (&scene.objects[3], &edit.scene.objects[6]);
         assert_eq!((new.name.as_str(), &new.material), ("cube 2", &old.material));
         let (a, b) = (old.form().bounds().unwrap(), new.form().bounds().unwrap());
         assert!(!(a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()), "{a:?} {b:?}");
         assert_eq!(a.0.y, b.0.y);
-        let lamp = duplicate(&scene, &Subject::Light(0)).unwrap().scene;
+        let lamp = duplicate(&scene, &Target::Light(0)).unwrap().scene;
         assert_eq!(lamp.lights[1].name, "lamp 2");
         assert_ne!(lamp.lights[1].point, lamp.lights[0].point);
-        let red = duplicate(&scene, &Subject::Material("red".into())).unwrap();
-        assert_eq!(red.subject, Subject::Material("red 2".into()));
-        assert!(duplicate(&scene, &Subject::Film).is_err());
-        assert!(duplicate(&scene, &Subject::Light(7)).is_err());
+        let red = duplicate(&scene, &Target::Material("red".into())).unwrap();
+        assert_eq!(red.subject, Target::Material("red 2".into()));
+        assert!(duplicate(&scene, &Target::Film).is_err());
+        assert!(duplicate(&scene, &Target::Light(7)).is_err());
     }
 
     #[test]
     fn deleting_selects_the_neighbour_and_names_who_lost_a_material() {
         let scene = built_in();
-        let edit = delete(&scene, &Subject::Object(5)).unwrap();
-        assert_eq!((edit.subject, edit.scene.objects.len()), (Subject::Object(4), 5));
-        let edit = delete(&scene, &Subject::Object(2)).unwrap();
-        assert_eq!(edit.subject, Subject::Object(2));
-        let edit = delete(&scene, &Subject::Material("red".into())).unwrap();
+        let edit = delete(&scene, &Target::Object(5)).unwrap();
+        assert_eq!((edit.subject, edit.scene.objects.len()), (Target::Object(4), 5));
+        let edit = delete(&scene, &Target::Object(2)).unwrap();
+        assert_eq!(edit.subject, Target::Object(2));
+        let edit = delete(&scene, &Target::Material("red".into())).unwrap();
         assert_eq!(edit.scene.objects[2].material, "");
         assert_eq!(edit.note.as_deref(), Some("ball has the default finish now."));
-        assert_eq!(edit.subject, Subject::Material("yellow".into()));
-        let edit = delete(&scene, &Subject::Light(0)).unwrap();
-        assert_eq!(edit.subject, Subject::Camera);
-        assert!(delete(&scene, &Subject::Camera).is_err());
+        assert_eq!(edit.subject, Target::Material("yellow".into()));
+        let edit = delete(&scene, &Target::Light(0)).unwrap();
+        assert_eq!(edit.subject, Target::Camera);
+        assert!(delete(&scene, &Target::Camera).is_err());
     }
 
     #[test]
     fn names_change_everywhere() {
         let scene = built_in();
-        let red = Subject::Material("red".into());
+        let red = Target::Material("red".into());
         let edit = rename(&scene, &red, " crimson ").unwrap();
         assert_eq!(edit.scene.objects[2].material, "crimson");
-        assert_eq!(edit.subject, Subject::Material("crimson".into()));
+        assert_eq!(edit.subject, Target::Material("crimson".into()));
         assert_eq!(rename(&scene, &red, "red").unwrap().scene, scene);
         assert_eq!(
-            rename(&scene, &Subject::Object(2), "bowl").unwrap().scene.objects[2].name,
+            rename(&scene, &Target::Object(2), "bowl").unwrap().scene.objects[2].name,
             "bowl"
         );
         for (subject, new) in [
             (red.clone(), "green"),
             (red, ""),
-            (Subject::Object(2), "cube"),
-            (Subject::Object(2), "a\nb"),
-            (Subject::Camera, "x"),
+            (Target::Object(2), "cube"),
+            (Target::Object(2), "a\nb"),
+            (Target::Camera, "x"),
         ] {
             assert!(rename(&scene, &subject, new).is_err(), "{subject:?} {new:?}");
         }
@@ -290,10 +290,10 @@ mod tests {
     #[test]
     fn one_object_gets_a_material_of_its_own() {
         let scene = built_in();
-        let edit = own_material(&scene, &Subject::Object(2)).unwrap();
+        let edit = own_material(&scene, &Target::Object(2)).unwrap();
         assert_eq!(edit.scene.objects[2].material, "ball");
         assert_eq!(edit.scene.materials["ball"], scene.materials["red"]);
-        assert!(own_material(&scene, &Subject::Light(0)).is_err());
+        assert!(own_material(&scene, &Target::Light(0)).is_err());
     }
 
     const COMPOUND: &str = "
@@ -318,20 +318,20 @@ mod tests {
     #[test]
     fn parts_follow_the_name_of_their_material() {
         let scene = Scene::parse(COMPOUND, "test").unwrap();
-        let edit = rename(&scene, &Subject::Material("red".into()), "crimson").unwrap();
+        let edit = rename(&scene, &Target::Material("red".into()), "crimson").unwrap();
         assert_eq!(edit.scene.objects[0].materials(), ["blue", "crimson", "crimson"]);
-        let edit = rename(&scene, &Subject::Material("blue".into()), "navy").unwrap();
+        let edit = rename(&scene, &Target::Material("blue".into()), "navy").unwrap();
         assert_eq!(edit.scene.objects[0].materials(), ["navy", "red", "red"]);
     }
 
     #[test]
     fn parts_lose_the_material_that_is_deleted() {
         let scene = Scene::parse(COMPOUND, "test").unwrap();
-        let edit = delete(&scene, &Subject::Material("red".into())).unwrap();
+        let edit = delete(&scene, &Target::Material("red".into())).unwrap();
         assert_eq!(edit.scene.objects[0].materials(), ["blue"; 3]);
         let note = "dice has the material of the whole in its parts now.";
         assert_eq!(edit.note.as_deref(), Some(note));
-        let edit = delete(&scene, &Subject::Material("blue".into())).unwrap();
+        let edit = delete(&scene, &Target::Material("blue".into())).unwrap();
         assert_eq!(edit.scene.objects[0].materials(), ["", "red", "red"]);
         assert_eq!(edit.note.as_deref(), Some("dice has the default finish now."));
     }

@@ -8,7 +8,7 @@ use crate::scene::edit::parse_value::floats;
 use crate::scene::edit::properties::is_material;
 use crate::scene::edit::set::{label, lookup, replace};
 use crate::scene::edit::toml_view::{get, read};
-use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, decade, rounded_to};
 use toml::Value;
 
@@ -23,26 +23,26 @@ use toml::Value;
 /// If there is no such key or number, or it has no value to start from.
 pub fn step(
     scene: &Scene,
-    subject: &Subject,
+    subject: &Target,
     key: &str,
     component: Option<usize>,
     steps: f64,
-) -> Result<Edit, Refusal> {
+) -> Result<Edit, EditError> {
     let values = read(scene, subject)?;
     let Some(field) = lookup(subject, key) else {
-        return Err(Refusal::new(&format!("there is no key {key} here"), ""));
+        return Err(EditError::new(&format!("there is no key {key} here"), ""));
     };
-    let Some(rule) = Rule::of(field, scene) else {
+    let Some(rule) = StepRule::of(field, scene) else {
         return toggle(scene, subject, key, steps > 0.0);
     };
     let given = get(&values, key).cloned().or_else(|| start(field, scene, subject));
     let Some(numbers) = given.as_ref().and_then(floats) else {
-        return Err(Refusal::new(&format!("{} has no value yet", field.name), "Type one."));
+        return Err(EditError::new(&format!("{} has no value yet", field.name), "Type one."));
     };
     if component.is_some_and(|c| c >= numbers.len()) {
-        return Err(Refusal::new(&format!("{key} has no such number"), ""));
+        return Err(EditError::new(&format!("{key} has no such number"), ""));
     }
-    let count = Count::of(steps);
+    let count = StepCount::of(steps);
     let next = match (component, field.takes) {
         (None, ValueType::Color(range)) => brightened(&numbers, range, count),
         (None, ValueType::Wholes(_, range)) => resized(&numbers, range, count),
@@ -75,10 +75,15 @@ pub fn step(
 ///
 /// # Errors
 /// If there is no such key or no words behind it.
-pub fn toggle(scene: &Scene, subject: &Subject, key: &str, forward: bool) -> Result<Edit, Refusal> {
+pub fn toggle(
+    scene: &Scene,
+    subject: &Target,
+    key: &str,
+    forward: bool,
+) -> Result<Edit, EditError> {
     let values = read(scene, subject)?;
     let Some(field) = lookup(subject, key) else {
-        return Err(Refusal::new(&format!("there is no key {key} here"), ""));
+        return Err(EditError::new(&format!("there is no key {key} here"), ""));
     };
     let value = get(&values, key);
     let optional = matches!(field.preset, DefaultValue::Without(_));
@@ -113,7 +118,7 @@ pub fn toggle(scene: &Scene, subject: &Subject, key: &str, forward: bool) -> Res
         }
         _ => {
             let found = format!("{} has no words to choose from", field.name);
-            return Err(Refusal::new(&found, &format!("Type {}.", field.takes)));
+            return Err(EditError::new(&found, &format!("Type {}.", field.takes)));
         }
     };
     let text = next(at, words.len(), forward, optional).map_or("", |at| words[at]);
@@ -135,9 +140,9 @@ fn next(at: Option<usize>, n: usize, forward: bool, optional: bool) -> Option<us
 }
 
 /// The value from which a key that is left out takes its first step.
-fn start(field: &Field, scene: &Scene, subject: &Subject) -> Option<Value> {
+fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<Value> {
     let material = match subject {
-        Subject::Material(name) => scene.materials.get(name),
+        Target::Material(name) => scene.materials.get(name),
         _ => None,
     };
     match (field.name, material) {
@@ -151,12 +156,12 @@ fn start(field: &Field, scene: &Scene, subject: &Subject) -> Option<Value> {
 
 /// How many steps, of which width.
 #[derive(Clone, Copy)]
-struct Count {
+struct StepCount {
     steps: i64,
     fine: bool,
 }
 
-impl Count {
+impl StepCount {
     fn of(steps: f64) -> Self {
         let limited = steps.clamp(-1e3, 1e3);
         if limited.fract() == 0.0 {
@@ -169,7 +174,7 @@ impl Count {
 
 /// How a number goes up and down.
 #[derive(Clone, Copy)]
-enum Rule {
+enum StepRule {
     /// By rungs of about a tenth. Below `floor` the next rung is 0, and from 0 it is `floor`.
     Rungs { floor: f64, range: NumberRange },
     /// By `unit` (fine: a tenth of it).
@@ -186,7 +191,7 @@ enum Rule {
     Doubles { range: NumberRange },
 }
 
-impl Rule {
+impl StepRule {
     /// `None`: no numbers.
     fn of(field: &Field, scene: &Scene) -> Option<Self> {
         Some(match field.takes {
@@ -230,8 +235,8 @@ impl Rule {
     }
 
     /// `x` after the steps; `all`: the numbers beside it.
-    fn stepped(self, x: f64, all: &[f64], count: Count) -> f64 {
-        let Count { steps, fine } = count;
+    fn stepped(self, x: f64, all: &[f64], count: StepCount) -> f64 {
+        let StepCount { steps, fine } = count;
         match self {
             Self::Rungs { floor, range } => climb(x, floor, range, count),
             Self::Units { unit, range } if range == NumberRange::COEFFICIENT && x > 2.0 => {
@@ -263,7 +268,7 @@ impl Rule {
 }
 
 /// x + unit * steps, rounded to a hundredth of a fine step.
-fn added(x: f64, unit: f64, Count { steps, fine }: Count) -> f64 {
+fn added(x: f64, unit: f64, StepCount { steps, fine }: StepCount) -> f64 {
     let width = if fine { unit / 10.0 } else { unit };
     rounded_to(x + width * steps as f64, decade(unit) - 3)
 }
@@ -282,7 +287,7 @@ fn within(x: f64, range: NumberRange, old: f64) -> f64 {
 }
 
 /// Twice or half as much per step, or one more or less.
-fn doubled(x: f64, range: NumberRange, Count { steps, fine }: Count) -> f64 {
+fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let moved = match steps {
         _ if fine => x + steps as f64,
         0.. if x == 0.0 && steps > 0 => 2f64.powi((steps.min(40) - 1) as i32),
@@ -307,7 +312,7 @@ fn fine_width(hundredths: i64) -> i64 {
 }
 
 /// `x` > 0 (or 0) after that many rungs: always on the ladder, so that up and down lead back.
-fn climb(x: f64, floor: f64, range: NumberRange, Count { steps, fine }: Count) -> f64 {
+fn climb(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let up = steps > 0;
     let mut x = x;
     for _ in 0..steps.unsigned_abs() {
@@ -356,9 +361,9 @@ fn rung(x: f64, up: bool, fine: bool) -> f64 {
 }
 
 /// A colour brighter or darker as a whole; black becomes a dark grey.
-fn brightened(channels: &[f64], range: NumberRange, count: Count) -> Vec<f64> {
+fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let largest = channels.iter().fold(0.0f64, |m, x| m.max(*x));
-    let rule = Rule::Units { unit: 0.05, range };
+    let rule = StepRule::Units { unit: 0.05, range };
     let next = match largest > 2.0 {
         true => climb(largest, 0.0, range, count),
         false => rule.stepped(largest, channels, count),
@@ -373,7 +378,7 @@ fn brightened(channels: &[f64], range: NumberRange, count: Count) -> Vec<f64> {
 
 /// Width and height together, the ratio kept as far as whole numbers can; fine: by 16 pixels of the
 /// width.
-fn resized(sides: &[f64], range: NumberRange, count: Count) -> Vec<f64> {
+fn resized(sides: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let width = sides[0];
     let next = match count.fine {
         true => ((width / 16.0).round() + count.steps as f64) * 16.0,

@@ -1,32 +1,32 @@
 //! Arrow steps: clean values, there and back, never beyond an end.
 
-use crate::scene::edit::{Entry, Row, Subject, outline, rows, set, step, toggle};
+use crate::scene::edit::{Property, Target, Widget, outline, rows, set, step, toggle};
 use crate::scene::{Scene, built_in};
 
 /// The value behind `key` after `steps`.
-fn after(scene: &Scene, subject: &Subject, key: &str, steps: f64) -> String {
+fn after(scene: &Scene, subject: &Target, key: &str, steps: f64) -> String {
     let edit = step(scene, subject, key, None, steps).unwrap_or_else(|e| panic!("{key}: {e}"));
     value(&edit.scene, subject, key)
 }
 
-fn value(scene: &Scene, subject: &Subject, key: &str) -> String {
+fn value(scene: &Scene, subject: &Target, key: &str) -> String {
     row(scene, subject, key).value
 }
 
-fn row(scene: &Scene, subject: &Subject, key: &str) -> Row {
+fn row(scene: &Scene, subject: &Target, key: &str) -> Property {
     let rows = rows(scene, subject).unwrap();
     rows.into_iter().find(|r| r.key == key).unwrap_or_else(|| panic!("no row {key}"))
 }
 
-fn with(subject: &Subject, key: &str, text: &str) -> Scene {
+fn with(subject: &Target, key: &str, text: &str) -> Scene {
     set(&built_in(), subject, key, text).unwrap_or_else(|e| panic!("{key} = {text}: {e}")).scene
 }
 
 #[test]
 fn each_kind_of_number_has_a_step_that_makes_sense() {
-    let ball = Subject::Object(2);
-    let red = Subject::Material("red".into());
-    let lamp = Subject::Light(0);
+    let ball = Target::Object(2);
+    let red = Target::Material("red".into());
+    let lamp = Target::Light(0);
     for (subject, key, from, steps, to) in [
         (&ball, "shape.sphere.radius", "0.5", 1.0, "0.55"),
         (&ball, "shape.sphere.radius", "0.5", -1.0, "0.45"),
@@ -42,11 +42,11 @@ fn each_kind_of_number_has_a_step_that_makes_sense() {
         (&ball, "shape.sphere.radius", "1e9", 1.0, "1e9"),
         (&ball, "shape.sphere.center", "0.35 0 -1", 1.0, "0.45, 0.1, -0.9"),
         (&ball, "shape.sphere.center", "1.33094 0 0", 0.1, "1.3409, 0.01, 0.01"),
-        (&Subject::Camera, "view_angle.vertical", "40", 1.0, "45"),
-        (&Subject::Camera, "view_angle.vertical", "40", -0.1, "39.5"),
-        (&Subject::Camera, "view_angle.vertical", "179", 1.0, "179.5"),
-        (&Subject::Camera, "near", "0", 1.0, "0.01"),
-        (&Subject::Object(3), "shape.cube.rotation", "30", 1.0, "35"),
+        (&Target::Camera, "view_angle.vertical", "40", 1.0, "45"),
+        (&Target::Camera, "view_angle.vertical", "40", -0.1, "39.5"),
+        (&Target::Camera, "view_angle.vertical", "179", 1.0, "179.5"),
+        (&Target::Camera, "near", "0", 1.0, "0.01"),
+        (&Target::Object(3), "shape.cube.rotation", "30", 1.0, "35"),
         (&red, "diffuse", "0.65", 1.0, "0.7"),
         (&red, "diffuse", "0.65", -0.1, "0.645"),
         (&red, "diffuse", "0.02", -1.0, "0"),
@@ -62,15 +62,15 @@ fn each_kind_of_number_has_a_step_that_makes_sense() {
         (&lamp, "intensity", "0", 1.0, "0.01"),
         (&lamp, "intensity", "0.01", -1.0, "0"),
         (&lamp, "color", "4 2 1", 1.0, "4.5, 2.25, 1.125"),
-        (&Subject::Trace, "depth", "16", 0.1, "17"),
-        (&Subject::Trace, "depth", "16", 1.0, "26"),
-        (&Subject::Trace, "depth", "3", -1.0, "0"),
-        (&Subject::Film, "rays_per_pixel", "0", 1.0, "1"),
-        (&Subject::Film, "rays_per_pixel", "64", 1.0, "128"),
-        (&Subject::Film, "rays_per_pixel", "1", -1.0, "0"),
-        (&Subject::Film, "size", "640 480", 1.0, "1280, 960"),
-        (&Subject::Film, "size", "640 480", -0.1, "624, 468"),
-        (&Subject::Film, "size", "8192 8192", 1.0, "8192, 8192"),
+        (&Target::IntegratorSettings, "depth", "16", 0.1, "17"),
+        (&Target::IntegratorSettings, "depth", "16", 1.0, "26"),
+        (&Target::IntegratorSettings, "depth", "3", -1.0, "0"),
+        (&Target::Film, "rays_per_pixel", "0", 1.0, "1"),
+        (&Target::Film, "rays_per_pixel", "64", 1.0, "128"),
+        (&Target::Film, "rays_per_pixel", "1", -1.0, "0"),
+        (&Target::Film, "size", "640 480", 1.0, "1280, 960"),
+        (&Target::Film, "size", "640 480", -0.1, "624, 468"),
+        (&Target::Film, "size", "8192 8192", 1.0, "8192, 8192"),
     ] {
         let scene = with(subject, key, from);
         assert_eq!(after(&scene, subject, key, steps), to, "{key} {from} {steps:+}");
@@ -79,13 +79,13 @@ fn each_kind_of_number_has_a_step_that_makes_sense() {
 
 #[test]
 fn one_number_of_several_moves_alone() {
-    let ball = Subject::Object(2);
+    let ball = Target::Object(2);
     let edit = step(&built_in(), &ball, "shape.sphere.center", Some(2), -1.0).unwrap();
     assert_eq!(value(&edit.scene, &ball, "shape.sphere.center"), "-0.9, 0.5, -0.1");
-    let edit = step(&built_in(), &Subject::Film, "size", Some(0), 0.1).unwrap();
-    assert_eq!(value(&edit.scene, &Subject::Film, "size"), "641, 480");
+    let edit = step(&built_in(), &Target::Film, "size", Some(0), 0.1).unwrap();
+    assert_eq!(value(&edit.scene, &Target::Film, "size"), "641, 480");
     assert!(step(&built_in(), &ball, "shape.sphere.center", Some(3), 1.0).is_err());
-    let mirror = Subject::Object(1);
+    let mirror = Target::Object(1);
     let flat = with(&mirror, "shape.rectangle.normal", "0.05 0 0");
     let edit = step(&flat, &mirror, "shape.rectangle.normal", Some(0), -1.0).unwrap();
     assert_ne!(value(&edit.scene, &mirror, "shape.rectangle.normal"), "0, 0, 0");
@@ -93,7 +93,7 @@ fn one_number_of_several_moves_alone() {
 
 #[test]
 fn ladders_lead_back_and_their_values_are_short() {
-    let ball = Subject::Object(2);
+    let ball = Target::Object(2);
     let key = "shape.sphere.radius";
     for width in [1.0, 0.1] {
         let mut scene = with(&ball, key, "1");
@@ -123,7 +123,7 @@ fn text_to(text: &str) -> f64 {
 
 #[test]
 fn a_key_that_is_left_out_starts_from_what_holds() {
-    let red = Subject::Material("red".into());
+    let red = Target::Material("red".into());
     let scene = with(&red, "roughness", "0.2");
     // 0.2 / (2 sqrt 2) is 0.0707.
     assert_eq!(after(&scene, &red, "alpha", 1.0), "0.08");
@@ -136,7 +136,7 @@ fn no_step_is_refused_at_an_end() {
     let scene = built_in();
     for (_, subject) in outline(&scene) {
         for row in rows(&scene, &subject).unwrap() {
-            if !matches!(row.entry, Entry::Numbers | Entry::Color) {
+            if !matches!(row.entry, Widget::Numbers | Widget::Color) {
                 continue;
             }
             for component in std::iter::once(None).chain((0..row.components.len()).map(Some)) {
@@ -155,7 +155,7 @@ fn no_step_is_refused_at_an_end() {
 
 #[test]
 fn words_go_round() {
-    let red = Subject::Material("red".into());
+    let red = Target::Material("red".into());
     let mut scene = built_in();
     let mut seen = Vec::new();
     for _ in 0..5 {
@@ -166,19 +166,19 @@ fn words_go_round() {
     assert_eq!(scene, built_in());
     let edit = toggle(&scene, &red, "metal", false).unwrap();
     assert_eq!(value(&edit.scene, &red, "metal"), "iron");
-    let ball = Subject::Object(2);
+    let ball = Target::Object(2);
     let edit = toggle(&scene, &ball, "material", true).unwrap();
     assert_eq!(edit.scene.objects[2].material, "yellow");
     let edit = toggle(&scene, &ball, "shape", true).unwrap();
     assert_eq!(edit.scene.objects[2].shape.key(), "cube");
-    let edit = toggle(&scene, &Subject::Light(0), "kind", true).unwrap();
+    let edit = toggle(&scene, &Target::Light(0), "kind", true).unwrap();
     assert!(edit.scene.lights[0].directional.is_some());
-    let edit = toggle(&scene, &Subject::Camera, "aim", false).unwrap();
+    let edit = toggle(&scene, &Target::Camera, "aim", false).unwrap();
     assert!(edit.scene.camera.direction.is_some());
-    let edit = toggle(&scene, &Subject::Light(0), "on", true).unwrap();
+    let edit = toggle(&scene, &Target::Light(0), "on", true).unwrap();
     assert!(!edit.scene.lights[0].on);
     // A step on words is the same.
-    let edit = step(&scene, &Subject::Light(0), "falloff", None, 1.0).unwrap();
-    assert_eq!(value(&edit.scene, &Subject::Light(0), "falloff"), "inverse-square");
+    let edit = step(&scene, &Target::Light(0), "falloff", None, 1.0).unwrap();
+    assert_eq!(value(&edit.scene, &Target::Light(0), "falloff"), "inverse-square");
     assert!(toggle(&scene, &ball, "name", true).is_err());
 }

@@ -3,16 +3,16 @@
 use crate::primitive::Form;
 use crate::scene::Scene;
 use crate::scene::edit::target::mirror_of;
-use crate::scene::edit::{Edit, Refusal, Subject, step, toggle};
+use crate::scene::edit::{Edit, EditError, Target, step, toggle};
 
 /// The material that the mirror keys act on: that of the selected object (or the selected material) if
 /// it reflects; else that of the first rectangle that reflects; else the one that reflects most among
 /// those of objects and their parts. If nothing reflects: the selected one, else that of the first rectangle,
 /// so that a mirror that was turned down to nothing can be turned up again. `None`: there is none of all these.
-pub fn mirror(scene: &Scene, selected: Option<&Subject>) -> Option<String> {
+pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
     let chosen = selected.and_then(|subject| match subject.material(scene) {
-        Some(Subject::Material(name)) => Some(name),
+        Some(Target::Material(name)) => Some(name),
         _ => None,
     });
     let mirrors =
@@ -20,7 +20,7 @@ pub fn mirror(scene: &Scene, selected: Option<&Subject>) -> Option<String> {
     if let Some(chosen) = chosen.clone().filter(mirrors) {
         return Some(chosen);
     }
-    if let Some(Subject::Object(i)) = selected
+    if let Some(Target::Object(i)) = selected
         && let Some(part) = reflecting(*i)
     {
         return Some(part);
@@ -43,10 +43,10 @@ pub fn mirror(scene: &Scene, selected: Option<&Subject>) -> Option<String> {
     chosen.or_else(|| all.find(|i| rectangle(i) && named(i)).and_then(name))
 }
 
-fn the_mirror(scene: &Scene, selected: Option<&Subject>) -> Result<Subject, Refusal> {
-    mirror(scene, selected).map(Subject::Material).ok_or_else(|| {
+fn the_mirror(scene: &Scene, selected: Option<&Target>) -> Result<Target, EditError> {
+    mirror(scene, selected).map(Target::Material).ok_or_else(|| {
         let help = "Give an object's material a reflection first.";
-        Refusal::new("nothing in this scene reflects", help)
+        EditError::new("nothing in this scene reflects", help)
     })
 }
 
@@ -54,7 +54,7 @@ fn the_mirror(scene: &Scene, selected: Option<&Subject>) -> Result<Subject, Refu
 ///
 /// # Errors
 /// If nothing in the scene reflects.
-pub fn roughen(scene: &Scene, selected: Option<&Subject>, steps: f64) -> Result<Edit, Refusal> {
+pub fn roughen(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<Edit, EditError> {
     step(scene, &the_mirror(scene, selected)?, "roughness", None, steps)
 }
 
@@ -62,7 +62,7 @@ pub fn roughen(scene: &Scene, selected: Option<&Subject>, steps: f64) -> Result<
 ///
 /// # Errors
 /// If there is nothing in the scene to be a mirror.
-pub fn reflect(scene: &Scene, selected: Option<&Subject>, steps: f64) -> Result<Edit, Refusal> {
+pub fn reflect(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<Edit, EditError> {
     step(scene, &the_mirror(scene, selected)?, "reflection", None, steps)
 }
 
@@ -72,9 +72,9 @@ pub fn reflect(scene: &Scene, selected: Option<&Subject>, steps: f64) -> Result<
 /// If nothing in the scene reflects.
 pub fn next_lobe(
     scene: &Scene,
-    selected: Option<&Subject>,
+    selected: Option<&Target>,
     forward: bool,
-) -> Result<Edit, Refusal> {
+) -> Result<Edit, EditError> {
     toggle(scene, &the_mirror(scene, selected)?, "lobe", forward)
 }
 
@@ -87,19 +87,19 @@ mod tests {
     #[test]
     fn the_mirror_is_found() {
         let mut scene = built_in();
-        let at = |scene: &Scene, subject: Option<Subject>| mirror(scene, subject.as_ref()).unwrap();
+        let at = |scene: &Scene, subject: Option<Target>| mirror(scene, subject.as_ref()).unwrap();
         assert_eq!(at(&scene, None), "mirror");
-        assert_eq!(at(&scene, Some(Subject::Object(2))), "red");
-        assert_eq!(at(&scene, Some(Subject::Object(3))), "mirror", "the cube does not reflect");
-        assert_eq!(at(&scene, Some(Subject::Material("floor".into()))), "floor");
-        assert_eq!(at(&scene, Some(Subject::Camera)), "mirror");
+        assert_eq!(at(&scene, Some(Target::Object(2))), "red");
+        assert_eq!(at(&scene, Some(Target::Object(3))), "mirror", "the cube does not reflect");
+        assert_eq!(at(&scene, Some(Target::Material("floor".into()))), "floor");
+        assert_eq!(at(&scene, Some(Target::Camera)), "mirror");
         scene.materials.get_mut("mirror").unwrap().reflection = 0.0;
         assert_eq!(at(&scene, None), "red");
         for material in scene.materials.values_mut() {
             material.reflection = 0.0;
         }
         assert_eq!(at(&scene, None), "mirror", "so that it can be turned up again");
-        assert_eq!(at(&scene, Some(Subject::Object(3))), "green");
+        assert_eq!(at(&scene, Some(Target::Object(3))), "green");
         scene.objects.clear();
         assert_eq!(mirror(&scene, None), None);
         assert!(roughen(&scene, None, 1.0).unwrap_err().found.contains("nothing"));
@@ -119,9 +119,9 @@ mod tests {
         ";
         let scene = Scene::parse(text, "test").unwrap();
         assert_eq!(mirror(&scene, None).as_deref(), Some("glossy"));
-        assert_eq!(mirror(&scene, Some(&Subject::Object(0))).as_deref(), Some("glossy"));
+        assert_eq!(mirror(&scene, Some(&Target::Object(0))).as_deref(), Some("glossy"));
         let outline = crate::scene::edit::outline(&scene);
-        let (section, _) = outline.iter().find(|(_, s)| *s == Subject::Object(0)).unwrap();
+        let (section, _) = outline.iter().find(|(_, s)| *s == Target::Object(0)).unwrap();
         assert_eq!(*section, crate::scene::edit::Section::Mirrors);
     }
 

@@ -2,7 +2,7 @@
 //! no terminal, no clock, and no file but those that a scene names, each looked for when it is named.
 //!
 //! Every function leaves the given scene as it was and either returns an [`Edit`] whose scene has no
-//! faults, or a [`Refusal`] that says why not. The given scene must have no faults.
+//! faults, or a [`EditError`] that says why not. The given scene must have no faults.
 
 mod add;
 mod bounds;
@@ -24,15 +24,15 @@ mod unique_name;
 mod viewpoints;
 
 pub use add::{add_light, add_material, add_object, light_kinds, object_kinds};
-pub use bounds::{Ball, bounds, focus_distance, scene_bounds, step_length};
+pub use bounds::{BoundingSphere, bounds, focus_distance, scene_bounds, step_length};
 pub use copy::{delete, duplicate, own_material, rename};
 pub use increment::{step, toggle};
 pub use mirror::{mirror, next_lobe, reflect, roughen};
 pub use placement::drop_down;
-pub use properties::{Entry, Row, Word, rows};
+pub use properties::{Property, Widget, Word, rows};
 pub use rotate::turn;
 pub use set::{set, set_component};
-pub use target::{Section, Subject, outline};
+pub use target::{Section, Target, outline};
 pub use translate::move_by;
 pub use viewpoints::{recall_view, store_view};
 
@@ -46,7 +46,7 @@ pub struct Edit {
     /// The edited scene; without faults.
     pub scene: Scene,
     /// What to select now: what was edited, added, or stands where something was deleted.
-    pub subject: Subject,
+    pub subject: Target,
     /// What was done, in a few words: `move cube`, `radius of ball`. The same words for every step of
     /// one gesture.
     pub label: String,
@@ -56,33 +56,33 @@ pub struct Edit {
 
 /// Why something was not done; the scene stays as it was.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Refusal {
+pub struct EditError {
     /// What was found, as a phrase.
     pub found: String,
     /// What is expected, or would help, in sentences; may be empty.
     pub help: String,
 }
 
-impl fmt::Display for Refusal {
+impl fmt::Display for EditError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{}.", self.found)?;
         if self.help.is_empty() { Ok(()) } else { write!(f, " {}", self.help) }
     }
 }
 
-impl std::error::Error for Refusal {}
+impl std::error::Error for EditError {}
 
-impl Refusal {
+impl EditError {
     fn new(found: &str, help: &str) -> Self {
         Self { found: found.to_string(), help: help.to_string() }
     }
 
-    fn gone(subject: &Subject) -> Self {
+    fn gone(subject: &Target) -> Self {
         let what = match subject {
-            Subject::View(name) => format!("there is no view \"{}\"", excerpt(name)),
-            Subject::Material(name) => format!("there is no material \"{}\"", excerpt(name)),
-            Subject::Light(i) => format!("there is no light {}", i + 1),
-            Subject::Object(i) => format!("there is no object {}", i + 1),
+            Target::View(name) => format!("there is no view \"{}\"", excerpt(name)),
+            Target::Material(name) => format!("there is no material \"{}\"", excerpt(name)),
+            Target::Light(i) => format!("there is no light {}", i + 1),
+            Target::Object(i) => format!("there is no object {}", i + 1),
             _ => "it cannot be read".to_string(),
         };
         Self::new(&what, "")
@@ -91,10 +91,10 @@ impl Refusal {
 
 impl Edit {
     /// `scene` as an edit if it has no faults, otherwise the first of them.
-    fn checked(mut scene: Scene, subject: Subject, label: String) -> Result<Self, Refusal> {
+    fn checked(mut scene: Scene, subject: Target, label: String) -> Result<Self, EditError> {
         scene.resolve();
         match scene.faults().into_iter().next() {
-            Some(fault) => Err(Refusal { found: fault.found, help: fault.help }),
+            Some(fault) => Err(EditError { found: fault.found, help: fault.help }),
             None => Ok(Self { scene, subject, label, note: None }),
         }
     }

@@ -1,23 +1,23 @@
 //! Values as people type and read them.
 
-use crate::scene::edit::Refusal;
+use crate::scene::edit::EditError;
 use crate::scene::format::suggest::nearest;
 use crate::value::{Color, Field, ValueType, excerpt, number, printable};
 use toml::Value;
 
 /// The value that `text` stands for behind the key `field`. Says nothing about ranges, except where
 /// the number would have no place at all.
-pub(super) fn parse(field: &Field, text: &str) -> Result<Value, Refusal> {
+pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
     let text = text.trim();
     let wrong = || {
         let found = format!("{} cannot be \"{}\"", field.name, excerpt(text));
-        Refusal::new(&found, &format!("Expected {}.", field.takes))
+        EditError::new(&found, &format!("Expected {}.", field.takes))
     };
     let list = |n: usize| match numbers(text) {
         Some(list) if list.len() == n => Ok(list),
         Some(list) => {
             let found = format!("{} needs {n} numbers, not {}", field.name, list.len());
-            Err(Refusal::new(&found, &format!("Expected {}.", field.takes)))
+            Err(EditError::new(&found, &format!("Expected {}.", field.takes)))
         }
         None => Err(wrong()),
     };
@@ -78,7 +78,7 @@ pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
 }
 
 /// As `choose`, with the reason if there is none or more than one.
-pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, Refusal> {
+pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, EditError> {
     choose(text, words).ok_or_else(|| {
         let quote = |word: &str| format!("\"{}\"", excerpt(word));
         let quoted: Vec<_> = words.iter().take(20).map(|w| quote(w)).collect();
@@ -87,16 +87,16 @@ pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, R
         if let Some(meant) = nearest(text, words.iter().copied()) {
             help += &format!(" Did you mean {}?", quote(meant));
         }
-        Refusal::new(&format!("{} cannot be \"{}\"", field.name, excerpt(text)), &help)
+        EditError::new(&format!("{} cannot be \"{}\"", field.name, excerpt(text)), &help)
     })
 }
 
 /// `text` as a name that a file, an outline and a terminal can show.
-pub(super) fn name(what: &str, text: &str) -> Result<String, Refusal> {
+pub(super) fn name(what: &str, text: &str) -> Result<String, EditError> {
     let text = text.trim();
     let help = "Expected at most 60 characters, none of them a control character.";
     if text.chars().count() > 60 || printable(text) != text {
-        return Err(Refusal::new(&format!("{what} cannot be \"{}\"", excerpt(text)), help));
+        return Err(EditError::new(&format!("{what} cannot be \"{}\"", excerpt(text)), help));
     }
     Ok(text.to_string())
 }

@@ -2,8 +2,8 @@
 
 use crate::camera::Camera;
 use crate::primitive::Form;
-use crate::scene::edit::bounds::{Ball, Extent, is_solid, scene_bounds};
-use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::edit::bounds::{BoundingSphere, Extent, is_solid, scene_bounds};
+use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{decade, rounded_to, significant};
 use glam::{DVec2, DVec3};
@@ -14,14 +14,14 @@ use glam::{DVec2, DVec3};
 ///
 /// # Errors
 /// For what is no object, has no lowest point, or if nothing is under or above it.
-pub fn drop_down(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
-    let Subject::Object(index) = subject else {
-        return Err(Refusal::new("only objects can be dropped", "Select an object."));
+pub fn drop_down(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
+    let Target::Object(index) = subject else {
+        return Err(EditError::new("only objects can be dropped", "Select an object."));
     };
-    let object = scene.objects.get(*index).ok_or_else(|| Refusal::gone(subject))?;
+    let object = scene.objects.get(*index).ok_or_else(|| EditError::gone(subject))?;
     let form = object.form();
     let Some((low, high)) = form.bounds() else {
-        return Err(Refusal::new("a plane without end has no lowest point", ""));
+        return Err(EditError::new("a plane without end has no lowest point", ""));
     };
     let others: Vec<_> = scene
         .objects
@@ -48,7 +48,7 @@ pub fn drop_down(scene: &Scene, subject: &Subject) -> Result<Edit, Refusal> {
     let rest = below.or_else(|| heights(false).into_iter().reduce(f64::min));
     let Some(rest) = rest else {
         let help = "Add a platform or a plane first.";
-        return Err(Refusal::new("nothing is under it to rest on", help));
+        return Err(EditError::new("nothing is under it to rest on", help));
     };
     let mut next = scene.clone();
     let dropped = &mut next.objects[*index];
@@ -97,7 +97,7 @@ fn feet(form: &Form, (low, high): Extent) -> Vec<DVec2> {
 /// The middle of the underside of a new thing with the lengths `size`: in the middle of what the
 /// camera sees, on what is there, and free of what stands there already.
 pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
-    let Ball { radius, .. } = scene_bounds(scene);
+    let BoundingSphere { radius, .. } = scene_bounds(scene);
     let eye = DVec3::from_array(scene.camera.eye);
     let forward = scene.camera.view().unwrap_or(DVec3::NEG_Z);
     let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
@@ -207,7 +207,7 @@ mod tests {
         let scene = built_in();
         for i in 2..6 {
             for by in [[0.0, 1.23, 0.0], [0.0, -0.217, 0.0], [0.1, 0.777, 0.1]] {
-                let subject = Subject::Object(i);
+                let subject = Target::Object(i);
                 let up = move_by(&scene, &subject, by).unwrap().scene;
                 let down = drop_down(&up, &subject).unwrap();
                 assert_eq!(lowest(&down.scene, i), 0.0, "object {i} {by:?}");
@@ -222,7 +222,7 @@ mod tests {
                     [[object]]\nshape.cube = { corner = [-0.5, 3, 0.5], edge = 1 }\n\
                     transform = [{ rotate_y = 30.0 }]\n";
         let scene = Scene::parse(text, "text").unwrap();
-        let cube = Subject::Object(2);
+        let cube = Target::Object(2);
         let on_table = drop_down(&scene, &cube).unwrap().scene;
         assert!((lowest(&on_table, 2) - 0.25).abs() < 1e-15);
         let aside = move_by(&scene, &cube, [5.0, 0.0, 0.0]).unwrap().scene;
@@ -231,10 +231,10 @@ mod tests {
         assert!((lowest(&drop_down(&corner, &cube).unwrap().scene, 2) - 0.25).abs() < 1e-15);
         let sunk = move_by(&aside, &cube, [0.0, -9.0, 0.0]).unwrap().scene;
         assert!((lowest(&drop_down(&sunk, &cube).unwrap().scene, 2) + 1.0).abs() < 1e-15);
-        let refusal = drop_down(&scene, &Subject::Object(0)).unwrap_err();
+        let refusal = drop_down(&scene, &Target::Object(0)).unwrap_err();
         assert!(refusal.found.contains("no lowest point"), "{refusal}");
         let alone = Scene { objects: vec![scene.objects[2].clone()], ..Scene::default() };
-        let refusal = drop_down(&alone, &Subject::Object(0)).unwrap_err();
+        let refusal = drop_down(&alone, &Target::Object(0)).unwrap_err();
         assert!(refusal.found.contains("nothing is under it"), "{refusal}");
     }
 }

@@ -4,7 +4,7 @@ use crate::scene::Scene;
 use crate::scene::edit::convert::{AIM, KIND, chosen};
 use crate::scene::edit::parse_value::{color, floats, show};
 use crate::scene::edit::toml_view::{fields, get, read, rivals};
-use crate::scene::edit::{Refusal, Subject};
+use crate::scene::edit::{EditError, Target};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, number};
 use toml::{Table, Value};
 
@@ -19,26 +19,26 @@ pub struct Word {
 
 /// What kind of value a row holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Entry {
+pub enum Widget {
     /// Any text: a name.
     Text,
     /// `true` or `false`.
     Switch,
-    /// One of [`Row::words`].
+    /// One of [`Property::words`].
     Choice,
-    /// One of [`Row::words`]; other rows below depend on it. A shape's kind, a light's kind.
+    /// One of [`Property::words`]; other rows below depend on it. A shape's kind, a light's kind.
     Kind,
-    /// A list of steps; each of [`Row::words`], typed here, adds one at the end.
+    /// A list of steps; each of [`Property::words`], typed here, adds one at the end.
     List,
     /// One or more numbers.
     Numbers,
-    /// Three numbers from [`Row::color`], or `#rrggbb`.
+    /// Three numbers from [`Property::color`], or `#rrggbb`.
     Color,
 }
 
 /// One row of an inspector.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct Property {
     /// The key to set it by, dotted: `shape.sphere.radius`, `transform.0.rotate_y`.
     pub key: String,
     /// The last part of the key, in words.
@@ -46,7 +46,7 @@ pub struct Row {
     /// How deep it stands below other rows: 0, 1, 2.
     pub depth: usize,
     /// What kind of value it holds.
-    pub entry: Entry,
+    pub entry: Widget,
     /// The value as it can be typed again, printable; empty: none is given.
     pub value: String,
     /// The numbers of the value one by one, as text; empty unless it holds numbers or a colour. A
@@ -69,16 +69,16 @@ pub struct Row {
 }
 
 /// The rows of `subject` in the order of its table. An object's material has rows of its own
-/// ([`Subject::material`]).
+/// ([`Target::material`]).
 ///
 /// # Errors
 /// If the scene has no such subject.
-pub fn rows(scene: &Scene, subject: &Subject) -> Result<Vec<Row>, Refusal> {
+pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError> {
     let values = read(scene, subject)?;
-    let mut walk = Walk { scene, subject, rows: Vec::new() };
+    let mut walk = PropertyWalker { scene, subject, rows: Vec::new() };
     let virtual_kind = match subject {
-        Subject::Light(_) => Some(&KIND),
-        Subject::Camera | Subject::View(_) => Some(&AIM),
+        Target::Light(_) => Some(&KIND),
+        Target::Camera | Target::View(_) => Some(&AIM),
         _ => None,
     };
     for field in fields(subject) {
@@ -99,13 +99,13 @@ pub fn rows(scene: &Scene, subject: &Subject) -> Result<Vec<Row>, Refusal> {
     Ok(walk.rows)
 }
 
-struct Walk<'a> {
+struct PropertyWalker<'a> {
     scene: &'a Scene,
-    subject: &'a Subject,
-    rows: Vec<Row>,
+    subject: &'a Target,
+    rows: Vec<Property>,
 }
 
-impl Walk<'_> {
+impl PropertyWalker<'_> {
     fn field(&mut self, field: &'static Field, values: &Table, key: String, depth: usize) {
         let value = get(values, field.name);
         match (field.takes, value) {
@@ -131,7 +131,7 @@ impl Walk<'_> {
         let ValueType::ListOf(kinds) = field.takes else { return };
         let list = value.and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
         let mut row = self.row(field, key.to_string(), depth);
-        row.entry = Entry::List;
+        row.entry = Widget::List;
         row.value = match list.len() {
             0 => String::new(),
             1 => "1 step".to_string(),
@@ -157,7 +157,7 @@ impl Walk<'_> {
         if let ValueType::OneOf(kinds) = field.takes {
             row.words = words(kinds);
         }
-        row.entry = Entry::Kind;
+        row.entry = Widget::Kind;
         row.value = given.unwrap_or_default().to_string();
         let optional = matches!(field.preset, DefaultValue::Without(_));
         row.default = row.default.filter(|_| optional);
@@ -169,26 +169,26 @@ impl Walk<'_> {
         let mut row = self.row(field, key, depth);
         row.value = value.map_or(String::new(), |value| show(field.takes, value));
         match field.takes {
-            ValueType::Text => row.entry = Entry::Text,
-            ValueType::Switch => row.entry = Entry::Switch,
+            ValueType::Text => row.entry = Widget::Text,
+            ValueType::Switch => row.entry = Widget::Switch,
             ValueType::Choice(choices) => {
-                row.entry = Entry::Choice;
+                row.entry = Widget::Choice;
                 let word =
                     |c: &crate::value::Choice| Word { name: c.name.into(), doc: c.doc.into() };
                 row.words = choices.iter().map(word).collect();
             }
             ValueType::Color(_) => {
-                row.entry = Entry::Color;
+                row.entry = Widget::Color;
                 row.color = value.and_then(color).map(|c| c.0);
             }
             _ => {}
         }
-        if matches!(row.entry, Entry::Numbers | Entry::Color) {
+        if matches!(row.entry, Widget::Numbers | Widget::Color) {
             let numbers = value.and_then(floats).unwrap_or_default();
             row.components = numbers.into_iter().map(number).collect();
         }
         if is_material(self.subject, field) {
-            row.entry = Entry::Choice;
+            row.entry = Widget::Choice;
             let name = |name: &String| Word { name: name.clone(), doc: String::new() };
             row.words = self.scene.materials.keys().map(name).collect();
         }
@@ -200,12 +200,12 @@ impl Walk<'_> {
         self.rows.push(row);
     }
 
-    fn row(&self, field: &'static Field, key: String, depth: usize) -> Row {
-        Row {
+    fn row(&self, field: &'static Field, key: String, depth: usize) -> Property {
+        Property {
             key,
             label: field.name.replace('_', " "),
             depth,
-            entry: Entry::Numbers,
+            entry: Widget::Numbers,
             value: String::new(),
             components: Vec::new(),
             color: None,
@@ -224,8 +224,8 @@ impl Walk<'_> {
 }
 
 /// Whether `field` of `subject` names a material.
-pub(super) fn is_material(subject: &Subject, field: &Field) -> bool {
-    matches!(subject, Subject::Object(_)) && field.name == "material"
+pub(super) fn is_material(subject: &Target, field: &Field) -> bool {
+    matches!(subject, Target::Object(_)) && field.name == "material"
 }
 
 /// The value that a default stands for.
@@ -266,7 +266,7 @@ mod tests {
     use crate::scene::built_in;
     use crate::scene::edit::{outline, set};
 
-    fn row(scene: &Scene, subject: &Subject, key: &str) -> Row {
+    fn row(scene: &Scene, subject: &Target, key: &str) -> Property {
         let rows = rows(scene, subject).unwrap();
         rows.into_iter().find(|r| r.key == key).unwrap_or_else(|| panic!("no row {key}"))
     }
@@ -274,28 +274,28 @@ mod tests {
     #[test]
     fn nested_tables_are_flat_and_their_kind_shows() {
         let scene = built_in();
-        let keys = |subject: &Subject| -> Vec<String> {
+        let keys = |subject: &Target| -> Vec<String> {
             rows(&scene, subject).unwrap().into_iter().map(|r| r.key).collect()
         };
         let ball = ["name", "material", "shape", "shape.sphere.center", "shape.sphere.radius"];
-        assert_eq!(keys(&Subject::Object(2))[..5], ball);
+        assert_eq!(keys(&Target::Object(2))[..5], ball);
         assert_eq!(
-            keys(&Subject::Camera),
+            keys(&Target::Camera),
             ["eye", "aim", "target", "up", "view_angle", "view_angle.vertical", "near"]
         );
-        assert_eq!(keys(&Subject::Light(0))[..3], ["name", "kind", "point.position"]);
-        let radius = row(&scene, &Subject::Object(2), "shape.sphere.radius");
+        assert_eq!(keys(&Target::Light(0))[..3], ["name", "kind", "point.position"]);
+        let radius = row(&scene, &Target::Object(2), "shape.sphere.radius");
         assert_eq!((radius.value.as_str(), radius.components.len()), ("0.5", 1));
         assert_eq!((radius.unit, radius.depth, radius.is_default), ("scene units", 1, false));
         assert_eq!(radius.expected, "a number greater than 0, at most 1e9");
-        let shape = row(&scene, &Subject::Object(2), "shape");
-        assert_eq!((shape.value.as_str(), shape.entry), ("sphere", Entry::Kind));
+        let shape = row(&scene, &Target::Object(2), "shape");
+        assert_eq!((shape.value.as_str(), shape.entry), ("sphere", Widget::Kind));
         assert_eq!(shape.words.len(), crate::shape::KINDS.len());
-        let alpha = row(&scene, &Subject::Material("red".into()), "alpha");
+        let alpha = row(&scene, &Target::Material("red".into()), "alpha");
         assert!(alpha.value.is_empty() && alpha.components.is_empty() && alpha.is_default);
         assert_eq!(alpha.default.as_deref(), Some("roughness / (2 √2)"));
-        let material = row(&scene, &Subject::Object(2), "material");
-        assert_eq!((material.entry, material.words.len()), (Entry::Choice, 6));
+        let material = row(&scene, &Target::Object(2), "material");
+        assert_eq!((material.entry, material.words.len()), (Widget::Choice, 6));
     }
 
     /// Whatever a row shows can be typed back without a change.
@@ -310,7 +310,7 @@ mod tests {
         scene.views.insert("left".into(), scene.camera.clone());
         for (_, subject) in outline(&scene) {
             for row in rows(&scene, &subject).unwrap() {
-                if row.entry == Entry::List || row.value.is_empty() {
+                if row.entry == Widget::List || row.value.is_empty() {
                     continue;
                 }
                 let again = set(&scene, &subject, &row.key, &row.value);

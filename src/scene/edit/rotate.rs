@@ -1,7 +1,7 @@
 //! Turning things about the vertical.
 
 use crate::scene::edit::bounds::scene_bounds;
-use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{decade, rounded_to, sin_cos_degrees, turned};
 use glam::DVec3;
@@ -13,20 +13,20 @@ use glam::DVec3;
 ///
 /// # Errors
 /// For what cannot be turned.
-pub fn turn(scene: &Scene, subject: &Subject, degrees: f64) -> Result<Edit, Refusal> {
+pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditError> {
     if !degrees.is_finite() {
-        return Err(Refusal::new("that is no angle to turn by", ""));
+        return Err(EditError::new("that is no angle to turn by", ""));
     }
     let mut next = scene.clone();
     match subject {
-        Subject::Object(i) => {
-            let object = next.objects.get_mut(*i).ok_or_else(|| Refusal::gone(subject))?;
+        Target::Object(i) => {
+            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
             if !object.transform.is_empty() || !object.shape.turn(degrees) {
                 turn_by_steps(object, degrees);
             }
         }
-        Subject::Light(i) => {
-            let light = next.lights.get_mut(*i).ok_or_else(|| Refusal::gone(subject))?;
+        Target::Light(i) => {
+            let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
             if let Some(directional) = &mut light.directional {
                 directional.direction = turned(directional.direction, degrees);
             }
@@ -41,7 +41,7 @@ pub fn turn(scene: &Scene, subject: &Subject, degrees: f64) -> Result<Edit, Refu
         }
         _ => {
             let found = format!("{} cannot be turned", subject.label(scene));
-            return Err(Refusal::new(&found, "Select an object or a light."));
+            return Err(EditError::new(&found, "Select an object or a light."));
         }
     }
     let label = format!("turn {}", subject.label(scene));
@@ -98,10 +98,10 @@ mod tests {
     #[test]
     fn shapes_with_a_rotation_use_it() {
         let scene = built_in();
-        let edit = turn(&scene, &Subject::Object(3), 5.0).unwrap();
+        let edit = turn(&scene, &Target::Object(3), 5.0).unwrap();
         let Shape::Cube(cube) = &edit.scene.objects[3].shape else { panic!() };
         assert!(cube.rotation == 35.0 && edit.scene.objects[3].transform.is_empty());
-        let edit = turn(&scene, &Subject::Object(1), 90.0).unwrap();
+        let edit = turn(&scene, &Target::Object(1), 90.0).unwrap();
         let Shape::Rectangle(mirror) = &edit.scene.objects[1].shape else { panic!() };
         assert_eq!(mirror.normal, [1.0, 0.0, 0.0]);
     }
@@ -125,14 +125,14 @@ mod tests {
                 let start = Scene { objects: vec![object], ..Scene::default() };
                 let mut scene = start.clone();
                 for _ in 0..72 {
-                    scene = turn(&scene, &Subject::Object(0), 5.0).unwrap().scene;
+                    scene = turn(&scene, &Target::Object(0), 5.0).unwrap().scene;
                     let steps = scene.objects[0].transform.len();
                     assert!(steps <= 3, "{}: {steps} steps", kind.name);
                 }
                 if kind.name != "plane" {
                     let (a, b) = (middle(&start.objects[0]), middle(&scene.objects[0]));
                     assert!((a - b).length() < 1e-5, "{}: {a} {b}", kind.name);
-                    let half = turn(&start, &Subject::Object(0), 180.0).unwrap().scene;
+                    let half = turn(&start, &Target::Object(0), 180.0).unwrap().scene;
                     let c = middle(&half.objects[0]);
                     // The box around what is uneven does not turn with it.
                     let uneven = ["prism", "union", "intersection", "difference"];
@@ -150,11 +150,11 @@ mod tests {
         let scene = built_in();
         let mut round = scene.clone();
         for _ in 0..72 {
-            round = turn(&round, &Subject::Light(0), 5.0).unwrap().scene;
+            round = turn(&round, &Target::Light(0), 5.0).unwrap().scene;
         }
         let [a, b] = [&scene, &round].map(|s| DVec3::from(s.lights[0].point.unwrap().position));
         assert!((a - b).length() < 1e-4, "{a} {b}");
-        assert!(turn(&scene, &Subject::Camera, 5.0).is_err());
-        assert!(turn(&scene, &Subject::Light(0), f64::NAN).is_err());
+        assert!(turn(&scene, &Target::Camera, 5.0).is_err());
+        assert!(turn(&scene, &Target::Light(0), f64::NAN).is_err());
     }
 }

@@ -6,20 +6,20 @@ use crate::scene::edit::convert::{AIM, KIND};
 use crate::scene::edit::parse_value::{floats, parse, word};
 use crate::scene::edit::properties::is_material;
 use crate::scene::edit::toml_view::{field, fields, get, put, read, rivals, write};
-use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, ValueType};
 use toml::{Table, Value};
 
-/// Sets what stands behind `key` (of a [`Row`](crate::scene::edit::Row)) to what `text` says. Empty text takes the
+/// Sets what stands behind `key` (of a [`Property`](crate::scene::edit::Property)) to what `text` says. Empty text takes the
 /// key away where it may be left out, so that its default holds; an empty step of a transform goes.
 ///
 /// # Errors
 /// What was found and what is expected, if `text` cannot be read or the scene would have a fault.
-pub fn set(scene: &Scene, subject: &Subject, key: &str, text: &str) -> Result<Edit, Refusal> {
+pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edit, EditError> {
     let text = text.trim();
     let values = read(scene, subject)?;
     let Some(field) = lookup(subject, key) else {
-        return Err(Refusal::new(&format!("there is no key {key} here"), ""));
+        return Err(EditError::new(&format!("there is no key {key} here"), ""));
     };
     let optional = matches!(field.preset, DefaultValue::Without(_));
     match field.takes {
@@ -51,7 +51,7 @@ pub fn set(scene: &Scene, subject: &Subject, key: &str, text: &str) -> Result<Ed
     } else {
         parse(field, text)?
     };
-    if let (Subject::Light(i), "falloff") = (subject, key) {
+    if let (Target::Light(i), "falloff") = (subject, key) {
         return convert::switch_falloff(scene, *i, values, value);
     }
     replace(scene, subject, key, values, value)
@@ -63,15 +63,15 @@ pub fn set(scene: &Scene, subject: &Subject, key: &str, text: &str) -> Result<Ed
 /// As [`set`].
 pub fn set_component(
     scene: &Scene,
-    subject: &Subject,
+    subject: &Target,
     key: &str,
     component: usize,
     text: &str,
-) -> Result<Edit, Refusal> {
+) -> Result<Edit, EditError> {
     let values = read(scene, subject)?;
     let list = get(&values, key).and_then(floats).unwrap_or_default();
     if component >= list.len() {
-        return Err(Refusal::new(&format!("{key} has no number {}", component + 1), ""));
+        return Err(EditError::new(&format!("{key} has no number {}", component + 1), ""));
     }
     let text = text.trim();
     // The same reading and the same words of refusal as for the whole list.
@@ -82,16 +82,16 @@ pub fn set_component(
         .collect();
     if text.is_empty() || text.contains([',', ' ', ';', '[', ']', '#']) {
         let found = format!("number {} of {key} cannot be \"{text}\"", component + 1);
-        return Err(Refusal::new(&found, "Expected one number."));
+        return Err(EditError::new(&found, "Expected one number."));
     }
     set(scene, subject, key, &parts.join(" "))
 }
 
 /// The field behind `key`, also of the keys that only an inspector has.
-pub(super) fn lookup(subject: &Subject, key: &str) -> Option<&'static Field> {
+pub(super) fn lookup(subject: &Target, key: &str) -> Option<&'static Field> {
     match (subject, key) {
-        (Subject::Light(_), "kind") => Some(&KIND),
-        (Subject::Camera | Subject::View(_), "aim") => Some(&AIM),
+        (Target::Light(_), "kind") => Some(&KIND),
+        (Target::Camera | Target::View(_), "aim") => Some(&AIM),
         _ => field(fields(subject), key),
     }
 }
@@ -99,11 +99,11 @@ pub(super) fn lookup(subject: &Subject, key: &str) -> Option<&'static Field> {
 /// Puts `value` behind `key`, takes rivals of the key away, checks.
 pub(super) fn replace(
     scene: &Scene,
-    subject: &Subject,
+    subject: &Target,
     key: &str,
     mut values: Table,
     value: Value,
-) -> Result<Edit, Refusal> {
+) -> Result<Edit, EditError> {
     let mut gone = None;
     let first = key.split('.').next().unwrap_or(key);
     if rivals(subject).contains(&first) {
@@ -112,7 +112,7 @@ pub(super) fn replace(
         }
     }
     if !put(&mut values, key, Some(value)) {
-        return Err(Refusal::new(&format!("there is no place for {key} here"), ""));
+        return Err(EditError::new(&format!("there is no place for {key} here"), ""));
     }
     let edit = finish(scene, subject, key, values)?;
     Ok(match gone {
@@ -124,21 +124,21 @@ pub(super) fn replace(
 /// Takes `key` away.
 fn clear(
     scene: &Scene,
-    subject: &Subject,
+    subject: &Target,
     key: &str,
     field: &Field,
     mut values: Table,
-) -> Result<Edit, Refusal> {
+) -> Result<Edit, EditError> {
     let parts: Vec<_> = key.split('.').collect();
     if let ["transform", index, ..] = parts[..] {
         let list = values.get_mut("transform").and_then(Value::as_array_mut);
         match (list, index.parse::<usize>()) {
             (Some(list), Ok(i)) if i < list.len() => drop(list.remove(i)),
-            _ => return Err(Refusal::new(&format!("there is no step {key}"), "")),
+            _ => return Err(EditError::new(&format!("there is no step {key}"), "")),
         }
     } else if field.preset == DefaultValue::Required {
         let found = format!("{} must not be left out", field.name);
-        return Err(Refusal::new(&found, &format!("Expected {}.", field.takes)));
+        return Err(EditError::new(&found, &format!("Expected {}.", field.takes)));
     } else {
         put(&mut values, key, None);
     }
@@ -148,16 +148,16 @@ fn clear(
 /// The scene with these values, checked.
 pub(super) fn finish(
     scene: &Scene,
-    subject: &Subject,
+    subject: &Target,
     key: &str,
     values: Table,
-) -> Result<Edit, Refusal> {
+) -> Result<Edit, EditError> {
     let next = write(scene, subject, values)?;
     Edit::checked(next, subject.clone(), label(scene, subject, key))
 }
 
 /// `radius of ball`.
-pub(super) fn label(scene: &Scene, subject: &Subject, key: &str) -> String {
+pub(super) fn label(scene: &Scene, subject: &Target, key: &str) -> String {
     let last = key.rsplit('.').next().unwrap_or(key).replace('_', " ");
     format!("{last} of {}", subject.label(scene))
 }
@@ -168,11 +168,11 @@ mod tests {
     use crate::scene::built_in;
     use crate::shape::Shape;
 
-    fn ball() -> Subject {
-        Subject::Object(2)
+    fn ball() -> Target {
+        Target::Object(2)
     }
 
-    fn refused(subject: &Subject, key: &str, text: &str) -> String {
+    fn refused(subject: &Target, key: &str, text: &str) -> String {
         set(&built_in(), subject, key, text).unwrap_err().to_string()
     }
 
@@ -186,11 +186,11 @@ mod tests {
         let edit = set_component(&scene, &ball(), "shape.sphere.center", 1, "2").unwrap();
         let Shape::Sphere(sphere) = &edit.scene.objects[2].shape else { panic!() };
         assert_eq!(sphere.center, [-0.9, 2.0, 0.0]);
-        let edit = set(&scene, &Subject::Film, "size", "320x200").unwrap();
+        let edit = set(&scene, &Target::Film, "size", "320x200").unwrap();
         assert_eq!(edit.scene.film.size, [320, 200]);
         let edit = set(&scene, &ball(), "material", "gr").unwrap();
         assert_eq!(edit.scene.objects[2].material, "green");
-        let edit = set(&scene, &Subject::Light(0), "on", "off").unwrap();
+        let edit = set(&scene, &Target::Light(0), "on", "off").unwrap();
         assert!(!edit.scene.lights[0].on);
     }
 
@@ -205,12 +205,12 @@ mod tests {
             (ball(), "material", "rde", "Did you mean \"red\"?"),
             (ball(), "shape", "ball", "Expected one of \"sphere\", \"cube\""),
             (ball(), "no.such", "1", "there is no key no.such here"),
-            (Subject::Camera, "target", "0.6 1.4 4.5", "target is the eye itself"),
-            (Subject::Camera, "view_angle.vertical", "180", "Expected a number between 0 and 180"),
-            (Subject::Film, "size", "99999 1", "size cannot be"),
-            (Subject::Film, "size", "16384 16384", "268435456 pixels"),
-            (Subject::Object(99), "name", "x", "there is no object 100"),
-            (Subject::Material("rot".into()), "color", "1 1 1", "there is no material \"rot\""),
+            (Target::Camera, "target", "0.6 1.4 4.5", "target is the eye itself"),
+            (Target::Camera, "view_angle.vertical", "180", "Expected a number between 0 and 180"),
+            (Target::Film, "size", "99999 1", "size cannot be"),
+            (Target::Film, "size", "16384 16384", "268435456 pixels"),
+            (Target::Object(99), "name", "x", "there is no object 100"),
+            (Target::Material("rot".into()), "color", "1 1 1", "there is no material \"rot\""),
         ] {
             let message = refused(&subject, key, text);
             assert!(message.contains(words), "{message}");
@@ -224,7 +224,7 @@ mod tests {
     #[test]
     fn empty_text_brings_the_default_back() {
         let scene = built_in();
-        let red = Subject::Material("red".into());
+        let red = Target::Material("red".into());
         let edit = set(&scene, &red, "exponent", "").unwrap();
         assert_eq!(edit.scene.materials["red"].exponent, 32.0);
         let edit = set(&scene, &ball(), "name", "").unwrap();
@@ -236,12 +236,12 @@ mod tests {
     #[test]
     fn rivals_give_way() {
         let scene = built_in();
-        let red = Subject::Material("red".into());
+        let red = Target::Material("red".into());
         let gold = set(&scene, &red, "metal", "gold").unwrap().scene;
         let edit = set(&gold, &red, "reflectance", "0.5 0.5 0.5").unwrap();
         assert!(edit.scene.materials["red"].metal.is_none());
         assert!(edit.note.unwrap().contains("metal is gone"));
-        let edit = set(&scene, &Subject::Camera, "direction", "0 0 -1").unwrap();
+        let edit = set(&scene, &Target::Camera, "direction", "0 0 -1").unwrap();
         assert_eq!(edit.scene.camera.target, None);
     }
 

@@ -1,11 +1,11 @@
 //! What can be selected and edited.
 
-use crate::scene::{Finding, Message, Object, Scene};
+use crate::scene::{Diagnostic, Object, Problem, Scene};
 use crate::value::excerpt;
 
 /// One thing of a scene that can be selected and edited.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Subject {
+pub enum Target {
     /// The camera that the picture is taken from.
     Camera,
     /// A viewpoint kept by name.
@@ -23,7 +23,7 @@ pub enum Subject {
     /// The picture's raster.
     Film,
     /// How far paths are followed.
-    Trace,
+    IntegratorSettings,
 }
 
 /// A part of the outline.
@@ -61,20 +61,20 @@ impl Section {
 }
 
 /// Every subject of the scene, each once, in the order in which an outline shows them.
-pub fn outline(scene: &Scene) -> Vec<(Section, Subject)> {
-    let mut list = vec![(Section::Camera, Subject::Camera)];
-    list.extend(scene.views.keys().map(|name| (Section::Camera, Subject::View(name.clone()))));
-    list.push((Section::Surroundings, Subject::Ambient));
-    list.push((Section::Surroundings, Subject::Background));
-    list.extend((0..scene.lights.len()).map(|i| (Section::Lights, Subject::Light(i))));
+pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
+    let mut list = vec![(Section::Camera, Target::Camera)];
+    list.extend(scene.views.keys().map(|name| (Section::Camera, Target::View(name.clone()))));
+    list.push((Section::Surroundings, Target::Ambient));
+    list.push((Section::Surroundings, Target::Background));
+    list.extend((0..scene.lights.len()).map(|i| (Section::Lights, Target::Light(i))));
     let (mirrors, others): (Vec<_>, Vec<_>) =
         (0..scene.objects.len()).partition(|i| reflects(scene, *i));
-    list.extend(mirrors.into_iter().map(|i| (Section::Mirrors, Subject::Object(i))));
-    list.extend(others.into_iter().map(|i| (Section::Objects, Subject::Object(i))));
+    list.extend(mirrors.into_iter().map(|i| (Section::Mirrors, Target::Object(i))));
+    list.extend(others.into_iter().map(|i| (Section::Objects, Target::Object(i))));
     let materials = scene.materials.keys();
-    list.extend(materials.map(|name| (Section::Materials, Subject::Material(name.clone()))));
-    list.push((Section::Picture, Subject::Film));
-    list.push((Section::Picture, Subject::Trace));
+    list.extend(materials.map(|name| (Section::Materials, Target::Material(name.clone()))));
+    list.push((Section::Picture, Target::Film));
+    list.push((Section::Picture, Target::IntegratorSettings));
     list
 }
 
@@ -92,7 +92,7 @@ pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
     known.filter(|(_, k)| *k > 0.0).reduce(|a, b| if b.1 > a.1 { b } else { a })
 }
 
-impl Subject {
+impl Target {
     /// Whether the scene (still) has it.
     pub fn exists(&self, scene: &Scene) -> bool {
         match self {
@@ -100,7 +100,11 @@ impl Subject {
             Self::Light(i) => *i < scene.lights.len(),
             Self::Object(i) => *i < scene.objects.len(),
             Self::Material(name) => scene.materials.contains_key(name),
-            Self::Camera | Self::Ambient | Self::Background | Self::Film | Self::Trace => true,
+            Self::Camera
+            | Self::Ambient
+            | Self::Background
+            | Self::Film
+            | Self::IntegratorSettings => true,
         }
     }
 
@@ -111,7 +115,7 @@ impl Subject {
             Self::Ambient => &["ambient"],
             Self::Background => &["background"],
             Self::Film => &["film"],
-            Self::Trace => &["trace"],
+            Self::IntegratorSettings => &["trace"],
             Self::View(name) => &["views", name],
             Self::Material(name) => &["materials", name],
             Self::Light(i) => &["light", &i.to_string()],
@@ -120,7 +124,7 @@ impl Subject {
         keys.iter().map(|key| key.to_string()).collect()
     }
 
-    /// What a path of keys (of a [`Finding`]) leads to; `None`: the scene as a whole.
+    /// What a path of keys (of a [`Problem`]) leads to; `None`: the scene as a whole.
     pub fn of_path(path: &[String]) -> Option<Self> {
         let index = || path.get(1)?.parse().ok();
         match path.first()?.as_str() {
@@ -132,20 +136,20 @@ impl Subject {
             "object" => index().map(Self::Object),
             "materials" => path.get(1).cloned().map(Self::Material),
             "film" => Some(Self::Film),
-            "trace" => Some(Self::Trace),
+            "trace" => Some(Self::IntegratorSettings),
             _ => None,
         }
     }
 
     /// What a finding about the scene is about, and the key in it; the key may be empty.
-    pub fn of_finding(finding: &Finding) -> Option<(Self, String)> {
+    pub fn of_finding(finding: &Problem) -> Option<(Self, String)> {
         let subject = Self::of_path(&finding.path)?;
         let rest = finding.path.get(subject.path().len()..).unwrap_or_default();
         Some((subject, rest.join(".")))
     }
 
     /// What a message about the scene's file is about.
-    pub fn of_message(scene: &Scene, message: &Message) -> Option<Self> {
+    pub fn of_message(scene: &Scene, message: &Diagnostic) -> Option<Self> {
         let subjects = outline(scene).into_iter().map(|(_, subject)| subject);
         subjects.into_iter().find(|subject| subject.title(scene) == message.subject)
     }
@@ -167,7 +171,7 @@ impl Subject {
             Self::Ambient => "ambient".into(),
             Self::Background => "background".into(),
             Self::Film => "film".into(),
-            Self::Trace => "trace".into(),
+            Self::IntegratorSettings => "trace".into(),
         }
     }
 
@@ -216,21 +220,21 @@ mod tests {
         scene.lights[0].name.clear();
         scene.views.insert("left".into(), scene.camera.clone());
         for (_, subject) in outline(&scene) {
-            assert_eq!(Subject::of_path(&subject.path()).as_ref(), Some(&subject));
-            let message = Message {
+            assert_eq!(Target::of_path(&subject.path()).as_ref(), Some(&subject));
+            let message = Diagnostic {
                 file: String::new(),
                 place: None,
                 subject: subject.title(&scene),
                 found: String::new(),
                 help: String::new(),
             };
-            assert_eq!(Subject::of_message(&scene, &message), Some(subject));
+            assert_eq!(Target::of_message(&scene, &message), Some(subject));
         }
         scene.materials.get_mut("red").unwrap().roughness = -1.0;
-        let found = Subject::of_finding(&scene.faults()[0]);
-        assert_eq!(found, Some((Subject::Material("red".into()), "roughness".into())));
-        assert!(!Subject::Object(6).exists(&scene) && !Subject::View("x".into()).exists(&scene));
-        assert_eq!(Subject::Object(2).material(&scene), Some(Subject::Material("red".into())));
-        assert_eq!(Subject::Camera.material(&scene), None);
+        let found = Target::of_finding(&scene.faults()[0]);
+        assert_eq!(found, Some((Target::Material("red".into()), "roughness".into())));
+        assert!(!Target::Object(6).exists(&scene) && !Target::View("x".into()).exists(&scene));
+        assert_eq!(Target::Object(2).material(&scene), Some(Target::Material("red".into())));
+        assert_eq!(Target::Camera.material(&scene), None);
     }
 }

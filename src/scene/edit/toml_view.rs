@@ -2,7 +2,7 @@
 //! taken apart, never the whole scene.
 
 use crate::scene::Scene;
-use crate::scene::edit::{Refusal, Subject};
+use crate::scene::edit::{EditError, Target};
 use crate::scene::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, OBJECT_FIELDS, TRACE_FIELDS};
 use crate::value::{Field, ValueType};
 use crate::{camera, light, material};
@@ -11,52 +11,52 @@ use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
 /// The keys that `subject` may have.
-pub(super) fn fields(subject: &Subject) -> &'static [Field] {
+pub(super) fn fields(subject: &Target) -> &'static [Field] {
     match subject {
-        Subject::Camera | Subject::View(_) => camera::FIELDS,
-        Subject::Ambient => AMBIENT_FIELDS,
-        Subject::Background => BACKGROUND_FIELDS,
-        Subject::Light(_) => light::FIELDS,
-        Subject::Object(_) => OBJECT_FIELDS,
-        Subject::Material(_) => material::FIELDS,
-        Subject::Film => FILM_FIELDS,
-        Subject::Trace => TRACE_FIELDS,
+        Target::Camera | Target::View(_) => camera::FIELDS,
+        Target::Ambient => AMBIENT_FIELDS,
+        Target::Background => BACKGROUND_FIELDS,
+        Target::Light(_) => light::FIELDS,
+        Target::Object(_) => OBJECT_FIELDS,
+        Target::Material(_) => material::FIELDS,
+        Target::Film => FILM_FIELDS,
+        Target::IntegratorSettings => TRACE_FIELDS,
     }
 }
 
 /// Keys of which at most one is given.
-pub(super) fn rivals(subject: &Subject) -> &'static [&'static str] {
+pub(super) fn rivals(subject: &Target) -> &'static [&'static str] {
     match subject {
-        Subject::Camera | Subject::View(_) => &["target", "direction"],
-        Subject::Light(_) => &["point", "directional"],
-        Subject::Material(_) => &["reflectance", "metal"],
+        Target::Camera | Target::View(_) => &["target", "direction"],
+        Target::Light(_) => &["point", "directional"],
+        Target::Material(_) => &["reflectance", "metal"],
         _ => &[],
     }
 }
 
 /// The values of `subject`, those that hold because nothing else is said among them.
-pub(super) fn read(scene: &Scene, subject: &Subject) -> Result<Table, Refusal> {
+pub(super) fn read(scene: &Scene, subject: &Target) -> Result<Table, EditError> {
     fn table<T: Serialize>(part: Option<&T>) -> Option<Table> {
         part.and_then(|part| Table::try_from(part).ok())
     }
     let read = match subject {
-        Subject::Camera => table(Some(&scene.camera)),
-        Subject::View(name) => table(scene.views.get(name)),
-        Subject::Ambient => table(Some(&scene.ambient)),
-        Subject::Background => table(Some(&scene.background)),
-        Subject::Light(i) => table(scene.lights.get(*i)),
-        Subject::Object(i) => table(scene.objects.get(*i)),
-        Subject::Material(name) => table(scene.materials.get(name)),
-        Subject::Film => table(Some(&scene.film)),
-        Subject::Trace => table(Some(&scene.trace)),
+        Target::Camera => table(Some(&scene.camera)),
+        Target::View(name) => table(scene.views.get(name)),
+        Target::Ambient => table(Some(&scene.ambient)),
+        Target::Background => table(Some(&scene.background)),
+        Target::Light(i) => table(scene.lights.get(*i)),
+        Target::Object(i) => table(scene.objects.get(*i)),
+        Target::Material(name) => table(scene.materials.get(name)),
+        Target::Film => table(Some(&scene.film)),
+        Target::IntegratorSettings => table(Some(&scene.trace)),
     };
-    read.ok_or_else(|| Refusal::gone(subject))
+    read.ok_or_else(|| EditError::gone(subject))
 }
 
 /// A copy of `scene` with the values of `subject` replaced.
-pub(super) fn write(scene: &Scene, subject: &Subject, values: Table) -> Result<Scene, Refusal> {
-    fn fill<T: DeserializeOwned>(part: Option<&mut T>, values: Table) -> Result<(), Refusal> {
-        let wrong = |e: toml::de::Error| Refusal::new(e.message(), "The scene stays as it was.");
+pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Scene, EditError> {
+    fn fill<T: DeserializeOwned>(part: Option<&mut T>, values: Table) -> Result<(), EditError> {
+        let wrong = |e: toml::de::Error| EditError::new(e.message(), "The scene stays as it was.");
         if let Some(part) = part {
             // As text: the readers of files serve, and no second set of them is compiled.
             *part = toml::from_str(&values.to_string()).map_err(wrong)?;
@@ -65,26 +65,26 @@ pub(super) fn write(scene: &Scene, subject: &Subject, values: Table) -> Result<S
     }
     let mut next = scene.clone();
     match subject {
-        Subject::Camera => fill(Some(&mut next.camera), values)?,
-        Subject::View(name) => fill(next.views.get_mut(name), values)?,
-        Subject::Ambient => fill(Some(&mut next.ambient), values)?,
-        Subject::Background => fill(Some(&mut next.background), values)?,
-        Subject::Light(i) => fill(next.lights.get_mut(*i), values)?,
-        Subject::Object(i) => {
+        Target::Camera => fill(Some(&mut next.camera), values)?,
+        Target::View(name) => fill(next.views.get_mut(name), values)?,
+        Target::Ambient => fill(Some(&mut next.ambient), values)?,
+        Target::Background => fill(Some(&mut next.background), values)?,
+        Target::Light(i) => fill(next.lights.get_mut(*i), values)?,
+        Target::Object(i) => {
             fill(next.objects.get_mut(*i), values)?;
             if let (Some(new), Some(old)) = (next.objects.get_mut(*i), scene.objects.get(*i)) {
                 new.shape.resolve_as(&old.shape);
             }
         }
-        Subject::Material(name) => {
+        Target::Material(name) => {
             fill(next.materials.get_mut(name), values)?;
             let old = scene.materials.get(name);
             if let (Some(new), Some(old)) = (next.materials.get_mut(name), old) {
                 new.resolve_as(old);
             }
         }
-        Subject::Film => fill(Some(&mut next.film), values)?,
-        Subject::Trace => fill(Some(&mut next.trace), values)?,
+        Target::Film => fill(Some(&mut next.film), values)?,
+        Target::IntegratorSettings => fill(Some(&mut next.trace), values)?,
     }
     Ok(next)
 }

@@ -2,7 +2,7 @@
 
 use crate::light::{Directional, Light};
 use crate::scene::edit::bounds::scene_bounds;
-use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{decade, rounded_to, unit};
 use glam::DVec3;
@@ -13,32 +13,32 @@ use glam::DVec3;
 ///
 /// # Errors
 /// For what cannot be moved, and at the end of the coordinates.
-pub fn move_by(scene: &Scene, subject: &Subject, by: [f64; 3]) -> Result<Edit, Refusal> {
+pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, EditError> {
     if by.iter().any(|x| !x.is_finite()) {
-        return Err(Refusal::new("that is no distance to move by", ""));
+        return Err(EditError::new("that is no distance to move by", ""));
     }
     let mut next = scene.clone();
     match subject {
-        Subject::Object(i) => {
-            let object = next.objects.get_mut(*i).ok_or_else(|| Refusal::gone(subject))?;
+        Target::Object(i) => {
+            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
             move_object(object, by);
         }
-        Subject::Light(i) => {
-            let light = next.lights.get_mut(*i).ok_or_else(|| Refusal::gone(subject))?;
+        Target::Light(i) => {
+            let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
             move_light(light, by, scene);
         }
-        Subject::Camera | Subject::View(_) => {
+        Target::Camera | Target::View(_) => {
             let camera = match subject {
-                Subject::View(name) => next.views.get_mut(name),
+                Target::View(name) => next.views.get_mut(name),
                 _ => Some(&mut next.camera),
             };
-            let camera = camera.ok_or_else(|| Refusal::gone(subject))?;
+            let camera = camera.ok_or_else(|| EditError::gone(subject))?;
             camera.eye = moved(camera.eye, by);
             camera.target = camera.target.map(|target| moved(target, by));
         }
         _ => {
             let found = format!("{} cannot be moved", subject.label(scene));
-            return Err(Refusal::new(&found, "Select an object, a light or the camera."));
+            return Err(EditError::new(&found, "Select an object, a light or the camera."));
         }
     }
     let label = format!("move {}", subject.label(scene));
@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn objects_move_by_their_own_keys_or_a_last_translation() {
         let scene = built_in();
-        let ball = Subject::Object(2);
+        let ball = Target::Object(2);
         let edit = move_by(&scene, &ball, [0.1, 0.0, -0.2]).unwrap();
         assert_eq!(edit.label, "move ball");
         let Shape::Sphere(sphere) = &edit.scene.objects[2].shape else { panic!() };
@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn lights_move_and_turn() {
         let mut scene = built_in();
-        let lamp = Subject::Light(0);
+        let lamp = Target::Light(0);
         let edit = move_by(&scene, &lamp, [0.0, 0.1, 0.0]).unwrap();
         assert_eq!(edit.scene.lights[0].point.unwrap().position, [2.0, 4.1, 3.0]);
         scene.lights[0].point = None;
@@ -126,10 +126,10 @@ mod tests {
     #[test]
     fn the_end_of_the_world_is_a_refusal() {
         let scene = built_in();
-        assert!(move_by(&scene, &Subject::Object(2), [1e10, 0.0, 0.0]).is_err());
-        assert!(move_by(&scene, &Subject::Object(2), [f64::NAN, 0.0, 0.0]).is_err());
-        assert!(move_by(&scene, &Subject::Film, [1.0, 0.0, 0.0]).is_err());
-        let camera = move_by(&scene, &Subject::Camera, [0.5, 0.0, 0.0]).unwrap().scene.camera;
+        assert!(move_by(&scene, &Target::Object(2), [1e10, 0.0, 0.0]).is_err());
+        assert!(move_by(&scene, &Target::Object(2), [f64::NAN, 0.0, 0.0]).is_err());
+        assert!(move_by(&scene, &Target::Film, [1.0, 0.0, 0.0]).is_err());
+        let camera = move_by(&scene, &Target::Camera, [0.5, 0.0, 0.0]).unwrap().scene.camera;
         assert_eq!((camera.eye, camera.target), ([1.1, 1.4, 4.5], Some([0.5, 0.8, -0.5])));
     }
 }

@@ -3,25 +3,25 @@
 use crate::scene::Scene;
 use crate::scene::edit::parse_value::name;
 use crate::scene::edit::unique_name::free_view;
-use crate::scene::edit::{Edit, Refusal, Subject};
+use crate::scene::edit::{Edit, EditError, Target};
 
 /// Keeps the camera as a view with the given name, in place of one that has it already; without a
 /// name as `view`, `view 2` and so on.
 ///
 /// # Errors
 /// If the name cannot be shown.
-pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, Refusal> {
+pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError> {
     let kept = match given {
         Some(given) => name("name", given)?,
         None => free_view(scene, "view"),
     };
     if kept.is_empty() {
-        return Err(Refusal::new("a view needs a name", ""));
+        return Err(EditError::new("a view needs a name", ""));
     }
     let mut next = scene.clone();
     let old = next.views.insert(kept.clone(), scene.camera.clone());
     let label = format!("store view {kept}");
-    let edit = Edit::checked(next, Subject::View(kept.clone()), label)?;
+    let edit = Edit::checked(next, Target::View(kept.clone()), label)?;
     let replaced = old.is_some_and(|old| old != scene.camera);
     Ok(if replaced { edit.noted(format!("View {kept} was replaced.")) } else { edit })
 }
@@ -30,11 +30,11 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, Refusal> {
 ///
 /// # Errors
 /// If there is none.
-pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, Refusal> {
-    let subject = Subject::View(name.to_string());
-    let view = scene.views.get(name).ok_or_else(|| Refusal::gone(&subject))?;
+pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
+    let subject = Target::View(name.to_string());
+    let view = scene.views.get(name).ok_or_else(|| EditError::gone(&subject))?;
     let next = Scene { camera: view.clone(), ..scene.clone() };
-    Edit::checked(next, Subject::Camera, format!("recall view {}", subject.label(scene)))
+    Edit::checked(next, Target::Camera, format!("recall view {}", subject.label(scene)))
 }
 
 #[cfg(test)]
@@ -46,13 +46,13 @@ mod tests {
     fn views_are_kept_and_come_back() {
         let scene = built_in();
         let edit = store_view(&scene, None).unwrap();
-        assert_eq!(edit.subject, Subject::View("view".into()));
+        assert_eq!(edit.subject, Target::View("view".into()));
         let edit = store_view(&edit.scene, None).unwrap();
-        assert_eq!(edit.subject, Subject::View("view 2".into()));
+        assert_eq!(edit.subject, Target::View("view 2".into()));
         let mut moved = edit.scene;
         moved.camera.eye = [3.0, 2.0, 1.0];
         let back = recall_view(&moved, "view").unwrap();
-        assert_eq!((back.scene.camera, back.subject), (scene.camera.clone(), Subject::Camera));
+        assert_eq!((back.scene.camera, back.subject), (scene.camera.clone(), Target::Camera));
         let edit = store_view(&moved, Some(" view ")).unwrap();
         assert_eq!(edit.scene.views["view"], moved.camera);
         assert!(edit.note.is_some());

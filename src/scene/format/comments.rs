@@ -4,12 +4,12 @@ use toml_edit::{DocumentMut, Item, Table};
 
 /// Remembers comments of removed tables that stand apart from them.
 #[derive(Default)]
-pub(crate) struct Keeper {
+pub(crate) struct CommentKeeper {
     /// Where the removed table stood, and the comment.
     kept: Vec<(isize, String)>,
 }
 
-impl Keeper {
+impl CommentKeeper {
     /// Takes note of what stands above the tables of a removed item.
     pub(crate) fn removed(&mut self, item: &Item) {
         match item {

@@ -4,7 +4,7 @@
 //! key that is not in the text has its default; it is written only when its value differs from
 //! that.
 
-use crate::scene::format::comments::Keeper;
+use crate::scene::format::comments::CommentKeeper;
 use crate::scene::format::emit::{color, fresh, fresh_entry, leaf};
 use crate::scene::format::list_diff::align;
 use crate::scene::format::schema;
@@ -14,7 +14,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike};
 
 /// Makes `document`, which describes the scene `old`, describe `new`.
 pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml::Table) {
-    let mut rewriter = Rewriter { keeper: Keeper::default() };
+    let mut rewriter = Rewriter { keeper: CommentKeeper::default() };
     rewriter.table(document.as_table_mut(), true, old, new, &Keys::These(schema::FIELDS));
     rewriter.keeper.put_back(document);
     if document.as_table().iter().all(|(_, item)| is_nothing(item)) {
@@ -59,7 +59,7 @@ impl Keys {
 }
 
 struct Rewriter {
-    keeper: Keeper,
+    keeper: CommentKeeper,
 }
 
 impl Rewriter {

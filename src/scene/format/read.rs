@@ -3,7 +3,7 @@
 use crate::scene::diagnostic::SceneErrors;
 use crate::scene::format::schema;
 use crate::scene::format::source_map::{located, place};
-use crate::scene::{Library, Scene};
+use crate::scene::{AssetResolver, Scene};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -21,7 +21,7 @@ impl Scene {
     /// wrong types, values out of range, names that lead nowhere. What is wrong with the form hides
     /// what is wrong with the values.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
-        let library = Library::of(path, Arc::default());
+        let library = AssetResolver::of(path, Arc::default());
         read_text(path).and_then(|t| Self::parse_in(&t, &path.display().to_string(), library))
     }
 
@@ -31,11 +31,15 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`].
     pub fn parse(text: &str, name: &str) -> Result<Self, SceneErrors> {
-        Self::parse_in(text, name, Library::of(Path::new(name), Arc::default()))
+        Self::parse_in(text, name, AssetResolver::of(Path::new(name), Arc::default()))
     }
 
     /// As [`Scene::parse`], with the files that the scene names in `library`.
-    pub(crate) fn parse_in(text: &str, name: &str, library: Library) -> Result<Self, SceneErrors> {
+    pub(crate) fn parse_in(
+        text: &str,
+        name: &str,
+        library: AssetResolver,
+    ) -> Result<Self, SceneErrors> {
         let (root, syntax) = DeTable::parse_recoverable(text);
         let at = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
         if let Some(error) = syntax.iter().min_by_key(|e| at(e)) {

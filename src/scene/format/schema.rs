@@ -2,7 +2,7 @@
 //! type, keys that are missing. Everything wrong is found in one walk.
 
 use crate::scene::OBJECT_FIELDS;
-use crate::scene::diagnostic::Message;
+use crate::scene::diagnostic::Diagnostic;
 use crate::scene::format::source_map::place;
 use crate::scene::format::suggest::nearest;
 use crate::scene::settings::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, TRACE_FIELDS};
@@ -55,9 +55,9 @@ const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) 
 }
 
 /// Everything wrong with the form of the scene file `file`, whose `text` is TOML.
-pub(crate) fn check(file: &str, text: &str, root: &Spanned<DeTable>) -> Vec<Message> {
+pub(crate) fn check(file: &str, text: &str, root: &Spanned<DeTable>) -> Vec<Diagnostic> {
     let mut walk =
-        Walk { file, text, root: root.get_ref(), path: Vec::new(), messages: Vec::new() };
+        SchemaChecker { file, text, root: root.get_ref(), path: Vec::new(), messages: Vec::new() };
     walk.table(root.get_ref(), 0..0, FIELDS);
     walk.messages
 }
@@ -81,22 +81,22 @@ fn phrase(keys: &[String]) -> String {
     }
 }
 
-struct Walk<'a> {
+struct SchemaChecker<'a> {
     file: &'a str,
     text: &'a str,
     root: &'a DeTable<'a>,
     path: Vec<String>,
-    messages: Vec<Message>,
+    messages: Vec<Diagnostic>,
 }
 
-impl Walk<'_> {
+impl SchemaChecker<'_> {
     fn add(&mut self, span: ops::Range<usize>, found: String, help: String) {
         let subject = subject(&self.path, |list, index| {
             let entry = self.root.get(list)?.get_ref().as_array()?.get(index)?;
             entry.get_ref().as_table()?.get("name")?.get_ref().as_str().map(str::to_string)
         });
         let place = Some(place(self.text, span.start));
-        self.messages.push(Message { file: self.file.to_string(), place, subject, found, help });
+        self.messages.push(Diagnostic { file: self.file.to_string(), place, subject, found, help });
     }
 
     /// The keys below the thing that the subject names: `shape.sphere`.

@@ -1,7 +1,7 @@
 //! From keys to lines and columns.
 
-use crate::scene::diagnostic::Message;
-use crate::scene::validate::Finding;
+use crate::scene::diagnostic::Diagnostic;
+use crate::scene::validate::Problem;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -43,11 +43,11 @@ fn deepest(value: &Spanned<DeValue>, path: &[String]) -> Range<usize> {
 }
 
 /// Messages for `findings` about the scene in `text`, in the order of the file.
-pub(crate) fn located(file: &str, text: &str, findings: Vec<Finding>) -> Vec<Message> {
+pub(crate) fn located(file: &str, text: &str, findings: Vec<Problem>) -> Vec<Diagnostic> {
     let root = DeTable::parse(text).ok();
     let mut messages: Vec<_> = findings
         .into_iter()
-        .map(|finding| Message {
+        .map(|finding| Diagnostic {
             file: file.to_string(),
             place: root.as_ref().map(|r| place(text, span(r.get_ref(), &finding.path).start)),
             subject: finding.subject,

@@ -69,7 +69,7 @@ impl Raster {
 
 /// A colour of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub enum Ink {
+pub enum CellColor {
     /// What the terminal has by itself.
     #[default]
     Plain,
@@ -85,18 +85,18 @@ pub struct PictureCell {
     /// One column wide.
     pub glyph: char,
     /// Colour of the glyph.
-    pub fg: Ink,
+    pub fg: CellColor,
     /// Colour behind it.
-    pub bg: Ink,
+    pub bg: CellColor,
 }
 
 impl PictureCell {
     /// How the upper and the lower half look in a terminal of dark ground that follows xterm.
     pub fn halves(&self) -> [Oklab; 2] {
         let rgb = |ink, plain| match ink {
-            Ink::Plain => plain,
-            Ink::Rgb(rgb) => rgb,
-            Ink::Indexed(index) => palette256::rgb(index),
+            CellColor::Plain => plain,
+            CellColor::Rgb(rgb) => rgb,
+            CellColor::Indexed(index) => palette256::rgb(index),
         };
         let (fg, bg) = (rgb(self.fg, PLAIN_FG), rgb(self.bg, PLAIN_BG));
         match self.glyph {
@@ -118,7 +118,7 @@ impl PictureCell {
             _ => return None,
         };
         match halves {
-            [Ink::Rgb(upper), Ink::Rgb(lower)] => Some([upper, lower]),
+            [CellColor::Rgb(upper), CellColor::Rgb(lower)] => Some([upper, lower]),
             _ => None,
         }
     }
@@ -126,7 +126,7 @@ impl PictureCell {
 
 impl Default for PictureCell {
     fn default() -> Self {
-        Self { glyph: ' ', fg: Ink::Plain, bg: Ink::Plain }
+        Self { glyph: ' ', fg: CellColor::Plain, bg: CellColor::Plain }
     }
 }
 
@@ -168,8 +168,8 @@ impl PictureCells {
                     Some(indices) => {
                         let index = |y: usize| indices[y * raster.width + x];
                         joined(
-                            Ink::Indexed(index(2 * y)),
-                            lower.map(|_| Ink::Indexed(index(2 * y + 1))),
+                            CellColor::Indexed(index(2 * y)),
+                            lower.map(|_| CellColor::Indexed(index(2 * y + 1))),
                         )
                     }
                 });
@@ -188,19 +188,21 @@ impl PictureCells {
 }
 
 /// Two colours in one cell, if there is a lower one; a single colour needs no glyph.
-fn joined(upper: Ink, lower: Option<Ink>) -> PictureCell {
+fn joined(upper: CellColor, lower: Option<CellColor>) -> PictureCell {
     match lower {
-        Some(lower) if lower == upper => PictureCell { glyph: ' ', fg: Ink::Plain, bg: upper },
+        Some(lower) if lower == upper => {
+            PictureCell { glyph: ' ', fg: CellColor::Plain, bg: upper }
+        }
         Some(lower) => PictureCell { glyph: '▀', fg: upper, bg: lower },
-        None => PictureCell { glyph: '▀', fg: upper, bg: Ink::Plain },
+        None => PictureCell { glyph: '▀', fg: upper, bg: CellColor::Plain },
     }
 }
 
 fn pair(upper: [u8; 3], lower: [u8; 3], colors: Colors) -> PictureCell {
     match colors {
-        Colors::True => joined(Ink::Rgb(upper), Some(Ink::Rgb(lower))),
+        Colors::True => joined(CellColor::Rgb(upper), Some(CellColor::Rgb(lower))),
         Colors::Indexed => {
-            let index = |rgb| Ink::Indexed(palette256::nearest(rgb));
+            let index = |rgb| CellColor::Indexed(palette256::nearest(rgb));
             joined(index(upper), Some(index(lower)))
         }
         Colors::Sixteen => palette16::pair(upper, lower),
@@ -210,13 +212,13 @@ fn pair(upper: [u8; 3], lower: [u8; 3], colors: Colors) -> PictureCell {
 
 fn half(glyph: char, rgb: [u8; 3], colors: Colors) -> PictureCell {
     let fg = match colors {
-        Colors::True => Ink::Rgb(rgb),
-        Colors::Indexed => Ink::Indexed(palette256::nearest(rgb)),
-        Colors::Sixteen => Ink::Indexed(palette16::nearest(rgb)),
+        Colors::True => CellColor::Rgb(rgb),
+        Colors::Indexed => CellColor::Indexed(palette256::nearest(rgb)),
+        Colors::Sixteen => CellColor::Indexed(palette16::nearest(rgb)),
         Colors::Mono if Oklab::of(rgb).l < 0.5 => return PictureCell::default(),
-        Colors::Mono => Ink::Plain,
+        Colors::Mono => CellColor::Plain,
     };
-    PictureCell { glyph, fg, bg: Ink::Plain }
+    PictureCell { glyph, fg, bg: CellColor::Plain }
 }
 
 #[cfg(test)]

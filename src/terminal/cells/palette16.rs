@@ -1,8 +1,8 @@
 //! Few colours or none: the density of glyphs carries what colours cannot.
 
 use crate::terminal::cells::oklab::{Oklab, code, linear};
-use crate::terminal::cells::palette_cache::Choices;
-use crate::terminal::cells::{Ink, PLAIN_BG, PLAIN_FG, PictureCell, palette256};
+use crate::terminal::cells::palette_cache::PaletteCache;
+use crate::terminal::cells::{CellColor, PLAIN_BG, PLAIN_FG, PictureCell, palette256};
 use std::sync::LazyLock;
 
 /// Glyphs and how much of their cell they cover. Shades are what their names say; the others were
@@ -41,30 +41,34 @@ pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
 static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     let mixed = NEUTRAL.into_iter().flat_map(|bg| (0..16).map(move |fg| (fg, bg)));
     let mixed = mixed.filter(|(fg, bg)| fg != bg).flat_map(|(fg, bg)| {
-        SHADES.map(|glyph| PictureCell { glyph, fg: Ink::Indexed(fg), bg: Ink::Indexed(bg) })
+        SHADES.map(|glyph| PictureCell {
+            glyph,
+            fg: CellColor::Indexed(fg),
+            bg: CellColor::Indexed(bg),
+        })
     });
     (0..16).map(flat).chain(mixed).collect()
 });
 
 /// What [`CELLS`] look like.
-static SHADED: LazyLock<Choices> = LazyLock::new(|| {
+static SHADED: LazyLock<PaletteCache> = LazyLock::new(|| {
     let look = |cell: &PictureCell| match (cell.fg, cell.bg) {
-        (Ink::Indexed(fg), Ink::Indexed(bg)) => {
+        (CellColor::Indexed(fg), CellColor::Indexed(bg)) => {
             mixture(palette256::rgb(fg), palette256::rgb(bg), coverage(cell.glyph))
         }
-        (_, Ink::Indexed(bg)) => Oklab::of(palette256::rgb(bg)),
+        (_, CellColor::Indexed(bg)) => Oklab::of(palette256::rgb(bg)),
         _ => Oklab::of(PLAIN_BG),
     };
-    Choices::new(CELLS.iter().map(look).collect())
+    PaletteCache::new(CELLS.iter().map(look).collect())
 });
 
 /// What the 16 colours look like.
-static BARE: LazyLock<Choices> = LazyLock::new(|| {
-    Choices::new((0..16).map(|index| Oklab::of(palette256::rgb(index))).collect())
+static BARE: LazyLock<PaletteCache> = LazyLock::new(|| {
+    PaletteCache::new((0..16).map(|index| Oklab::of(palette256::rgb(index))).collect())
 });
 
 fn flat(index: u8) -> PictureCell {
-    PictureCell { glyph: ' ', fg: Ink::Plain, bg: Ink::Indexed(index) }
+    PictureCell { glyph: ' ', fg: CellColor::Plain, bg: CellColor::Indexed(index) }
 }
 
 /// The nearest of the 16 colours.
@@ -85,7 +89,11 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     let error = |looks: [Oklab; 2]| wanted[0].distance(looks[0]) + wanted[1].distance(looks[1]);
     let of_halves = error([top, bottom].map(|index| BARE.look(index.into())));
     if top != bottom && of_halves + HALVES_GAIN < error([SHADED.look(shade); 2]) {
-        return PictureCell { glyph: '▀', fg: Ink::Indexed(top), bg: Ink::Indexed(bottom) };
+        return PictureCell {
+            glyph: '▀',
+            fg: CellColor::Indexed(top),
+            bg: CellColor::Indexed(bottom),
+        };
     }
     CELLS[shade]
 }
@@ -110,7 +118,7 @@ pub fn pair_mono(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     };
     let glyph = if top > bottom { halves('▀', top, bottom) } else { halves('▄', bottom, top) }
         .unwrap_or(glyph);
-    PictureCell { glyph, fg: Ink::Plain, bg: Ink::Plain }
+    PictureCell { glyph, fg: CellColor::Plain, bg: CellColor::Plain }
 }
 
 #[cfg(test)]
@@ -122,7 +130,7 @@ mod tests {
         let mut last = 0.0;
         for code in 0..=255u8 {
             let cell = pair_mono([code; 3], [code; 3]);
-            assert_eq!((cell.fg, cell.bg), (Ink::Plain, Ink::Plain));
+            assert_eq!((cell.fg, cell.bg), (CellColor::Plain, CellColor::Plain));
             assert!(coverage(cell.glyph) >= last, "{code}: {}", cell.glyph);
             last = coverage(cell.glyph);
         }
@@ -140,7 +148,8 @@ mod tests {
         assert_eq!(flat([0, 0, 0]), super::flat(0));
         // A dark red is red with black, a light one red with white.
         for (rgb, neutral) in [([110, 0, 0], 0), ([255, 150, 140], 15)] {
-            let PictureCell { glyph, fg: Ink::Indexed(fg), bg: Ink::Indexed(bg) } = flat(rgb)
+            let PictureCell { glyph, fg: CellColor::Indexed(fg), bg: CellColor::Indexed(bg) } =
+                flat(rgb)
             else {
                 panic!("{rgb:?}");
             };
@@ -148,7 +157,10 @@ mod tests {
             assert!(bg == neutral || bg == 7, "{rgb:?} {bg}");
         }
         let edge = pair([255, 255, 255], [0, 0, 238]);
-        assert_eq!(edge, PictureCell { glyph: '▀', fg: Ink::Indexed(15), bg: Ink::Indexed(4) });
+        assert_eq!(
+            edge,
+            PictureCell { glyph: '▀', fg: CellColor::Indexed(15), bg: CellColor::Indexed(4) }
+        );
     }
 
     /// Shades bring the picture much closer than the bare 16 colours.

@@ -1,7 +1,7 @@
 //! The 256 colours of xterm: 16 that users choose, a cube of 216, 24 greys.
 
 use crate::terminal::cells::oklab::Oklab;
-use crate::terminal::cells::palette_cache::Choices;
+use crate::terminal::cells::palette_cache::PaletteCache;
 use std::sync::LazyLock;
 
 /// Codes along each edge of the cube.
@@ -44,8 +44,8 @@ pub fn rgb(index: u8) -> [u8; 3] {
 }
 
 /// The colours from [`FIRST`] on.
-static CHOICES: LazyLock<Choices> =
-    LazyLock::new(|| Choices::new((FIRST..=255).map(|index| Oklab::of(rgb(index))).collect()));
+static CHOICES: LazyLock<PaletteCache> =
+    LazyLock::new(|| PaletteCache::new((FIRST..=255).map(|index| Oklab::of(rgb(index))).collect()));
 
 /// The colour of cube and greys that looks most like `rgb`, which is taken to 6 bits a channel. (Two
 /// neighbours in the table are 10 codes and more apart.)

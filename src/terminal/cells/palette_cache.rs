@@ -7,14 +7,14 @@ use std::sync::atomic::{AtomicU16, Ordering};
 const BITS: usize = 6;
 
 /// Colours to choose from.
-pub struct Choices {
+pub struct PaletteCache {
     looks: Vec<Oklab>,
     /// For each of the 2^18 boxes of sRGB the number of the nearest choice, plus 1; 0: not looked for
     /// yet.
     known: Vec<AtomicU16>,
 }
 
-impl Choices {
+impl PaletteCache {
     /// From colours that look like this; 65,535 at most, and one at least.
     pub fn new(looks: Vec<Oklab>) -> Self {
         Self { looks, known: (0..1 << (3 * BITS)).map(|_| AtomicU16::new(0)).collect() }

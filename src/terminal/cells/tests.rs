@@ -13,7 +13,7 @@ fn checker(width: usize, height: usize) -> Raster {
 fn two_pixels_to_a_cell() {
     let cells = PictureCells::new(&checker(3, 4), Colors::True, false);
     assert_eq!((cells.columns, cells.rows, cells.cells.len()), (3, 2, 6));
-    let [red, sky] = [Ink::Rgb(RED), Ink::Rgb(SKY)];
+    let [red, sky] = [CellColor::Rgb(RED), CellColor::Rgb(SKY)];
     assert_eq!(cells.cell(0, 0), Some(&PictureCell { glyph: '▀', fg: red, bg: sky }));
     assert_eq!(cells.cell(1, 0), Some(&PictureCell { glyph: '▀', fg: sky, bg: red }));
     assert_eq!([cells.cell(3, 0), cells.cell(0, 2)], [None, None]);
@@ -22,7 +22,10 @@ fn two_pixels_to_a_cell() {
 #[test]
 fn equal_halves_need_no_glyph() {
     let cells = PictureCells::new(&Raster::from_fn(1, 2, |_| SKY), Colors::True, false);
-    assert_eq!(cells.cells, [PictureCell { glyph: ' ', fg: Ink::Plain, bg: Ink::Rgb(SKY) }]);
+    assert_eq!(
+        cells.cells,
+        [PictureCell { glyph: ' ', fg: CellColor::Plain, bg: CellColor::Rgb(SKY) }]
+    );
 }
 
 #[test]
@@ -32,7 +35,7 @@ fn an_odd_last_row_leaves_the_lower_half_alone() {
             let cells = PictureCells::new(&checker(2, 3), colors, settled);
             assert_eq!((cells.columns, cells.rows, cells.cells.len()), (2, 2, 4));
             for cell in &cells.cells[2..] {
-                assert_eq!(cell.bg, Ink::Plain, "{colors:?}");
+                assert_eq!(cell.bg, CellColor::Plain, "{colors:?}");
                 assert!(cell.glyph == '▀' || cell.glyph == ' ', "{colors:?}");
             }
         }

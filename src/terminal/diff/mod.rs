@@ -11,9 +11,9 @@ mod perceptual;
 #[cfg(test)]
 mod tests;
 
-use crate::terminal::flow::Allowance;
+use crate::terminal::flow::FrameBudget;
 pub use encode::Encoder;
-use perceptual::Sight;
+use perceptual::PerceptualDiff;
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::{Position, Rect};
 use std::time::Duration;
@@ -25,7 +25,7 @@ const IDLE: Duration = Duration::from_secs(2);
 
 /// What the terminal ought to show.
 #[derive(Clone, Copy, Debug)]
-pub struct Wanted<'a> {
+pub struct TargetFrame<'a> {
     /// All of it.
     pub cells: &'a Buffer,
     /// Where text is being typed.
@@ -55,7 +55,7 @@ pub struct Frame {
 
 /// What is still to be sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Rest {
+pub struct Pending {
     /// Text.
     pub text: bool,
     /// Differences of the picture that can be seen.
@@ -66,13 +66,13 @@ pub struct Rest {
 
 /// What the terminal shows, beside what it ought to show.
 #[derive(Debug)]
-pub struct Pacing {
+pub struct FrameDiff {
     shown: Buffer,
     /// Nothing is known of what the terminal shows: it has to be cleared.
     unknown: bool,
     cursor: Option<Position>,
     encoder: Encoder,
-    sight: Sight,
+    sight: PerceptualDiff,
     subject: Option<u64>,
     /// The picture as it is now has not been shown in any form.
     fresh: bool,
@@ -81,10 +81,10 @@ pub struct Pacing {
     version: u64,
     /// When the version came.
     since: Duration,
-    rest: Rest,
+    rest: Pending,
 }
 
-impl Pacing {
+impl FrameDiff {
     /// For a terminal that shows nothing.
     pub fn new() -> Self {
         Self {
@@ -92,18 +92,18 @@ impl Pacing {
             unknown: true,
             cursor: None,
             encoder: Encoder::new(0),
-            sight: Sight::default(),
+            sight: PerceptualDiff::default(),
             subject: None,
             fresh: true,
             next_samples: 0.0,
             version: 0,
             since: Duration::ZERO,
-            rest: Rest::default(),
+            rest: Pending::default(),
         }
     }
 
     /// What the last frame has left.
-    pub fn rest(&self) -> Rest {
+    pub fn rest(&self) -> Pending {
         self.rest
     }
 
@@ -116,9 +116,9 @@ impl Pacing {
     /// most `threshold`, in OKLab, cannot be seen.
     pub fn frame(
         &mut self,
-        wanted: &Wanted,
+        wanted: &TargetFrame,
         now: Duration,
-        allowance: Allowance,
+        allowance: FrameBudget,
         threshold: f32,
         out: &mut Vec<u8>,
     ) -> Frame {
@@ -141,7 +141,7 @@ impl Pacing {
             self.rest.text = !self.text(wanted, room, out);
             let room = room.saturating_sub(out.len());
             self.look_for(wanted, now, threshold);
-            frame = self.picture(wanted, now, Allowance { bytes: room, ..allowance }, out);
+            frame = self.picture(wanted, now, FrameBudget { bytes: room, ..allowance }, out);
         }
         if out.len() == before && wanted.cursor == self.cursor {
             // The cursor was hidden for nothing.
@@ -157,16 +157,16 @@ impl Pacing {
     }
 
     /// Every cell that differs.
-    fn everything(&mut self, wanted: &Wanted, out: &mut Vec<u8>) {
+    fn everything(&mut self, wanted: &TargetFrame, out: &mut Vec<u8>) {
         for (x, y, cell) in self.shown.diff_iter(wanted.cells) {
             self.encoder.cell(out, x, y, cell);
         }
         self.shown.clone_from(wanted.cells);
-        self.rest = Rest::default();
+        self.rest = Pending::default();
     }
 
     /// Rows of text that differ, as many as there is room for, but one; whether that was all.
-    fn text(&mut self, wanted: &Wanted, room: usize, out: &mut Vec<u8>) -> bool {
+    fn text(&mut self, wanted: &TargetFrame, room: usize, out: &mut Vec<u8>) -> bool {
         let differences = self.shown.diff(wanted.cells);
         let text = differences.into_iter().filter(|(x, y, _)| !wanted.shows_picture(*x, *y));
         let text: Vec<_> = text.collect();
@@ -197,7 +197,7 @@ impl Pacing {
     }
 
     /// Takes note of what the picture ought to look like.
-    fn look_for(&mut self, wanted: &Wanted, now: Duration, threshold: f32) {
+    fn look_for(&mut self, wanted: &TargetFrame, now: Duration, threshold: f32) {
         if self.version != wanted.version {
             (self.version, self.since) = (wanted.version, now);
         }
@@ -218,9 +218,9 @@ impl Pacing {
     /// Cells of the picture, as many as there is room for.
     fn picture(
         &mut self,
-        wanted: &Wanted,
+        wanted: &TargetFrame,
         now: Duration,
-        allowance: Allowance,
+        allowance: FrameBudget,
         out: &mut Vec<u8>,
     ) -> Frame {
         let area = wanted.picture;
@@ -307,7 +307,7 @@ impl Pacing {
         best
     }
 
-    fn send(&mut self, wanted: &Wanted, part: Part, out: &mut Vec<u8>) {
+    fn send(&mut self, wanted: &TargetFrame, part: Part, out: &mut Vec<u8>) {
         out.extend(&part.bytes);
         self.encoder = part.encoder;
         for (at, cell) in part.cells {
@@ -327,7 +327,7 @@ struct Part {
     cells: Vec<(usize, Cell)>,
 }
 
-impl Wanted<'_> {
+impl TargetFrame<'_> {
     /// The number of a cell within the picture's area.
     fn place(&self, x: u16, y: u16) -> Option<usize> {
         let area = self.picture;
@@ -346,7 +346,7 @@ fn position(area: Rect, at: usize) -> Position {
     Position { x: area.x + (at % width) as u16, y: area.y + (at / width) as u16 }
 }
 
-impl Default for Pacing {
+impl Default for FrameDiff {
     fn default() -> Self {
         Self::new()
     }

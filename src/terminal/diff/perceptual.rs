@@ -1,7 +1,7 @@
 //! How the cells of the picture look, as they are shown and as they ought to be.
 
-use crate::terminal::cells::{Ink, Oklab, PictureCell, blocks};
-use crate::terminal::diff::{Wanted, position};
+use crate::terminal::cells::{CellColor, Oklab, PictureCell, blocks};
+use crate::terminal::diff::{TargetFrame, position};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -11,7 +11,7 @@ const UNKNOWN: f32 = 2.0;
 
 /// One cell of the picture.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct CellColors {
     /// What ought to be there; `None`: something that is not the picture.
     wanted: Option<PictureCell>,
     look: [Oklab; 2],
@@ -27,12 +27,12 @@ struct Seen {
 
 /// The cells of the picture's area, row by row.
 #[derive(Debug, Default)]
-pub struct Sight {
+pub struct PerceptualDiff {
     area: Rect,
-    cells: Vec<Seen>,
+    cells: Vec<CellColors>,
 }
 
-impl Sight {
+impl PerceptualDiff {
     /// Nothing is known of what is shown.
     pub fn forget(&mut self) {
         self.area = Rect::ZERO;
@@ -44,7 +44,7 @@ impl Sight {
         if self.area != area {
             self.area = area;
             let black = Oklab { l: 0.0, a: 0.0, b: 0.0 };
-            let unknown = Seen {
+            let unknown = CellColors {
                 wanted: None,
                 look: [black; 2],
                 shown: None,
@@ -58,7 +58,13 @@ impl Sight {
     }
 
     /// Compares what is shown with what ought to be. `look_again`: every difference counts.
-    pub fn compare(&mut self, wanted: &Wanted, shown: &Buffer, look_again: bool, threshold: f32) {
+    pub fn compare(
+        &mut self,
+        wanted: &TargetFrame,
+        shown: &Buffer,
+        look_again: bool,
+        threshold: f32,
+    ) {
         for (at, seen) in self.cells.iter_mut().enumerate() {
             let place = position(self.area, at);
             let cell = &wanted.cells[place];
@@ -123,7 +129,7 @@ impl Sight {
 
     /// The picture in blocks of `side` x `side` half cells: its cells, and of those that look more like
     /// the picture than what is shown, by how much, and the number.
-    pub fn coarse(&self, wanted: &Wanted, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
+    pub fn coarse(&self, wanted: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
         let rows = usize::from(self.area.height);
         let mut halves = vec![None; 2 * width * rows];
@@ -154,7 +160,7 @@ impl Sight {
         (cells, better)
     }
 
-    fn those(&self, which: impl Fn(&Seen) -> bool) -> Vec<(f32, usize)> {
+    fn those(&self, which: impl Fn(&CellColors) -> bool) -> Vec<(f32, usize)> {
         let cells = self.cells.iter().enumerate().filter(|(_, seen)| which(seen));
         cells.map(|(at, seen)| (seen.error, at)).collect()
     }
@@ -168,9 +174,9 @@ fn difference(a: [Oklab; 2], b: [Oklab; 2]) -> f32 {
 /// A cell that was made from one of the picture.
 fn picture_cell(cell: &Cell) -> PictureCell {
     let ink = |color| match color {
-        Color::Rgb(r, g, b) => Ink::Rgb([r, g, b]),
-        Color::Indexed(index) => Ink::Indexed(index),
-        _ => Ink::Plain,
+        Color::Rgb(r, g, b) => CellColor::Rgb([r, g, b]),
+        Color::Indexed(index) => CellColor::Indexed(index),
+        _ => CellColor::Plain,
     };
     let glyph = cell.symbol().chars().next().unwrap_or(' ');
     PictureCell { glyph, fg: ink(cell.fg), bg: ink(cell.bg) }

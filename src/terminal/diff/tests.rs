@@ -1,24 +1,24 @@
 use crate::terminal::diff::*;
-use crate::terminal::flow::Allowance;
+use crate::terminal::flow::FrameBudget;
 use ratatui::style::{Color, Style};
 use std::num::NonZeroU16;
 
 const AREA: Rect = Rect { x: 0, y: 0, width: 40, height: 12 };
 const PICTURE: Rect = Rect { x: 2, y: 1, width: 30, height: 8 };
 const THRESHOLD: f32 = 0.02;
-const EVERYTHING: Allowance = Allowance { bytes: usize::MAX, picture: true, flush: usize::MAX };
+const EVERYTHING: FrameBudget = FrameBudget { bytes: usize::MAX, picture: true, flush: usize::MAX };
 
 fn ms(n: u64) -> Duration {
     Duration::from_millis(n)
 }
 
-fn within(bytes: usize) -> Allowance {
-    Allowance { bytes, picture: true, flush: bytes / 2 }
+fn within(bytes: usize) -> FrameBudget {
+    FrameBudget { bytes, picture: true, flush: bytes / 2 }
 }
 
 /// A screen with a picture, a terminal, and what goes between.
 struct Desk {
-    pacing: Pacing,
+    pacing: FrameDiff,
     cells: Buffer,
     uncovered: Vec<bool>,
     cursor: Option<Position>,
@@ -33,7 +33,7 @@ impl Desk {
     fn new() -> Self {
         let [rows, columns] = [AREA.height, AREA.width].map(|n| NonZeroU16::new(n).unwrap());
         let mut desk = Self {
-            pacing: Pacing::new(),
+            pacing: FrameDiff::new(),
             cells: Buffer::empty(AREA),
             uncovered: vec![true; 240],
             cursor: None,
@@ -62,8 +62,8 @@ impl Desk {
         self.cells.set_string(0, row, text, Style::new());
     }
 
-    fn frame(&mut self, now: u64, allowance: Allowance) -> (Frame, Vec<u8>) {
-        let wanted = Wanted {
+    fn frame(&mut self, now: u64, allowance: FrameBudget) -> (Frame, Vec<u8>) {
+        let wanted = TargetFrame {
             cells: &self.cells,
             cursor: self.cursor,
             picture: PICTURE,
@@ -90,7 +90,7 @@ impl Desk {
         for i in 0..100 {
             self.frame(100_000 + i, within(20_000));
         }
-        assert_eq!((self.exact(), self.pacing.rest()), (240, Rest::default()));
+        assert_eq!((self.exact(), self.pacing.rest()), (240, Pending::default()));
     }
 
     fn is_exact(&self, x: u16, y: u16) -> bool {
@@ -117,7 +117,7 @@ fn a_terminal_that_is_here_is_shown_everything_at_once() {
     assert!(frame.picture && bytes.starts_with(b"\x1b[m\x1b[2J"));
     assert_eq!(desk.exact(), 240);
     assert!(desk.parser.screen().contents().contains("words"));
-    assert_eq!(desk.pacing.rest(), Rest::default());
+    assert_eq!(desk.pacing.rest(), Pending::default());
     assert_eq!(desk.frame(1, EVERYTHING).1, b"");
     // The least change goes out, and only that.
     desk.cells[(5, 5)].set_bg(Color::Rgb(1, 2, 3));
@@ -153,7 +153,7 @@ fn text_goes_before_the_picture_and_frames_stay_within_their_budget() {
 fn beside_other_frames_only_text_goes() {
     let mut desk = Desk::new();
     desk.say(10, "words");
-    let beside = Allowance { bytes: 1500, picture: false, flush: 0 };
+    let beside = FrameBudget { bytes: 1500, picture: false, flush: 0 };
     let (frame, _) = desk.frame(0, beside);
     assert_eq!((frame, desk.exact()), (Frame::default(), 0));
     assert!(desk.parser.screen().contents().contains("words"));
@@ -162,7 +162,7 @@ fn beside_other_frames_only_text_goes() {
     // Text that is too much comes row by row.
     let long: String = ('a'..='z').chain('0'..='9').collect();
     (9..12).for_each(|row| desk.say(row, &long));
-    let narrow = Allowance { bytes: 120, ..beside };
+    let narrow = FrameBudget { bytes: 120, ..beside };
     for rows in 1..=3 {
         let (_, bytes) = desk.frame(2, narrow);
         assert!(bytes.len() <= 120, "{}", bytes.len());
@@ -203,14 +203,14 @@ fn differences_that_nobody_sees_wait_for_rest() {
     desk.paint(|x, y| [8 * x as u8, 20 * y as u8, 101]);
     desk.samples = 2.0;
     assert_eq!(desk.frame(100, within(20_000)).1, b"");
-    let Rest { visible, hidden, .. } = desk.pacing.rest();
+    let Pending { visible, hidden, .. } = desk.pacing.rest();
     assert_eq!((visible, hidden), (false, Some(ms(100) + IDLE)));
     // After a while without anything new they go, in slices.
     let (frame, bytes) = desk.frame(2200, within(4000));
     assert!(frame.flushed > 500 && frame.flushed <= 2000 && bytes.len() <= 2000, "{frame:?}");
     // When the picture is done they go at once; but not before the line has time for them.
     desk.settled = true;
-    assert_eq!(desk.frame(2300, Allowance { flush: 0, ..within(4000) }).1, b"");
+    assert_eq!(desk.frame(2300, FrameBudget { flush: 0, ..within(4000) }).1, b"");
     while desk.pacing.rest().hidden.is_some() {
         assert!(desk.frame(2400, within(4000)).0.flushed > 0);
     }

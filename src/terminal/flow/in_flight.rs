@@ -5,7 +5,7 @@ use std::time::Duration;
 
 /// A frame on its way.
 #[derive(Clone, Copy, Debug)]
-pub struct Flight {
+pub struct InFlight {
     pub sent: Duration,
     pub bytes: usize,
     /// It has parts of the picture.
@@ -14,7 +14,7 @@ pub struct Flight {
 
 /// A frame that has arrived.
 #[derive(Clone, Copy, Debug)]
-pub struct Landed {
+pub struct Acked {
     pub sent: Duration,
     pub bytes: usize,
     /// No other frame was on its way when it was sent.
@@ -23,22 +23,22 @@ pub struct Landed {
 
 /// Frames on their way, in order.
 #[derive(Debug, Default)]
-pub struct Flights {
-    queue: VecDeque<(Flight, bool)>,
+pub struct FramesInFlight {
+    queue: VecDeque<(InFlight, bool)>,
     /// When the last one arrived.
     arrived: Option<Duration>,
 }
 
-impl Flights {
-    pub fn add(&mut self, flight: Flight) {
+impl FramesInFlight {
+    pub fn add(&mut self, flight: InFlight) {
         let alone = self.queue.is_empty();
         self.queue.push_back((flight, alone));
     }
 
     /// The oldest has arrived; with when the one before it had.
-    pub fn answered(&mut self, at: Duration) -> Option<(Landed, Option<Duration>)> {
-        let (Flight { sent, bytes, .. }, alone) = self.queue.pop_front()?;
-        Some((Landed { sent, bytes, alone }, self.arrived.replace(at)))
+    pub fn answered(&mut self, at: Duration) -> Option<(Acked, Option<Duration>)> {
+        let (InFlight { sent, bytes, .. }, alone) = self.queue.pop_front()?;
+        Some((Acked { sent, bytes, alone }, self.arrived.replace(at)))
     }
 
     pub fn is_empty(&self) -> bool {

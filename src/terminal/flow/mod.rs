@@ -17,11 +17,11 @@ mod tcp_send_queue;
 mod tests;
 
 use crate::terminal::Multiplexer;
-use in_flight::{Flight, Flights};
-pub use initial::Start;
-use send_queue_estimate::Held;
+use in_flight::{FramesInFlight, InFlight};
+pub use initial::InitialLink;
+use send_queue_estimate::SendQueueEstimate;
 use std::time::Duration;
-pub use tcp_send_queue::Queue;
+pub use tcp_send_queue::TcpSendQueue;
 
 /// Frames come no faster than this.
 pub const FRAME_INTERVAL: Duration = Duration::from_millis(33);
@@ -56,20 +56,20 @@ pub const DEFAULT_RATE: f64 = 30e3;
 const FLUSH_SHARE: f64 = 0.25;
 /// How it is known what has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
+pub enum PacingMode {
     /// Whoever reads is here: what was written has arrived.
-    Local,
+    Unlimited,
     /// The terminal answers; through a multiplexer, if there is one.
-    Answers(Option<Multiplexer>),
+    AckClocked(Option<Multiplexer>),
     /// The kernel tells what it has not got rid of yet.
-    Queue,
+    SendQueue,
     /// It is not known.
-    Fixed,
+    FixedRate,
 }
 
 /// What a frame may contain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Allowance {
+pub struct FrameBudget {
     /// Bytes of everything; `usize::MAX`: as many as there are.
     pub bytes: usize,
     /// Whether parts of the picture may be among them.
@@ -80,25 +80,25 @@ pub struct Allowance {
 
 /// What the user is told about the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading {
+pub struct LinkStatus {
     /// Bytes a second: measured, or fixed.
     pub rate: f64,
     /// How it is known what has arrived.
-    pub mode: Mode,
+    pub mode: PacingMode,
 }
 
 /// The line to the terminal.
 #[derive(Debug)]
-pub struct Link {
-    mode: Mode,
+pub struct FlowControl {
+    mode: PacingMode,
     /// What to go back to when answers come again.
-    silent: Option<Mode>,
-    start: Start,
+    silent: Option<PacingMode>,
+    start: InitialLink,
     /// Bytes a second.
     rate: f64,
     round_trip: Option<Duration>,
     learned: Duration,
-    flights: Flights,
+    flights: FramesInFlight,
     losses: u32,
     /// When the user began to act.
     acting_since: Duration,
@@ -110,21 +110,25 @@ pub struct Link {
     clear_at: Duration,
     /// When the next slice of invisible differences may go.
     flush_at: Duration,
-    held_back: Held,
+    held_back: SendQueueEstimate,
 }
 
-impl Link {
+impl FlowControl {
     /// A line of which `start` is known.
-    pub fn new(start: Start) -> Self {
+    pub fn new(start: InitialLink) -> Self {
         let span = FRAME_SPAN.as_secs_f64();
         Self {
             mode: start.mode,
             silent: None,
-            rate: if start.mode == Mode::Fixed { start.fixed_rate } else { BUDGET[1] / span },
+            rate: if start.mode == PacingMode::FixedRate {
+                start.fixed_rate
+            } else {
+                BUDGET[1] / span
+            },
             round_trip: start.round_trip,
             learned: Duration::ZERO,
             start,
-            flights: Flights::default(),
+            flights: FramesInFlight::default(),
             losses: 0,
             acting_since: Duration::ZERO,
             acting_until: Duration::ZERO,
@@ -132,19 +136,20 @@ impl Link {
             free_at: Duration::ZERO,
             clear_at: Duration::ZERO,
             flush_at: Duration::ZERO,
-            held_back: Held::default(),
+            held_back: SendQueueEstimate::default(),
         }
     }
 
     /// For the user; nothing about a terminal that is here.
-    pub fn reading(&self) -> Option<Reading> {
-        (self.mode != Mode::Local).then_some(Reading { rate: self.rate, mode: self.mode })
+    pub fn reading(&self) -> Option<LinkStatus> {
+        (self.mode != PacingMode::Unlimited)
+            .then_some(LinkStatus { rate: self.rate, mode: self.mode })
     }
 
     /// The OKLab distance from which on a difference is worth sending.
     pub fn threshold(&self) -> f32 {
         match self.mode {
-            Mode::Local => 0.0,
+            PacingMode::Unlimited => 0.0,
             // 10 Mbit/s and 300 kbit/s.
             _ if self.rate > 1.25e6 => 0.01,
             _ if self.rate < 37.5e3 => 0.04,
@@ -163,51 +168,52 @@ impl Link {
     /// How the question after a frame is asked; `None`: it is not.
     pub fn question(&self) -> Option<Option<Multiplexer>> {
         match self.mode {
-            Mode::Answers(through) => Some(through),
+            PacingMode::AckClocked(through) => Some(through),
             _ => None,
         }
     }
 
-    /// Whether the kernel is to be asked, with [`Link::held_back`].
+    /// Whether the kernel is to be asked, with [`FlowControl::held_back`].
     pub fn asks_kernel(&self, now: Duration) -> bool {
         let asked = self.held_back.asked;
-        self.mode == Mode::Queue && asked.is_none_or(|asked| asked + QUEUE_INTERVAL <= now)
+        self.mode == PacingMode::SendQueue
+            && asked.is_none_or(|asked| asked + QUEUE_INTERVAL <= now)
     }
 
     /// What may be sent now; `answers`: it shows what the user has just done. `None`: nothing.
-    pub fn allowance(&self, now: Duration, answers: bool) -> Option<Allowance> {
+    pub fn allowance(&self, now: Duration, answers: bool) -> Option<FrameBudget> {
         // A small frame, because its answer is to tell how long the way is.
         let bytes = if self.is_learning(now) { SMALL } else { self.budget() };
         let due = |interval| self.last_frame.is_none_or(|last| answers || last + interval <= now);
         if due(FRAME_INTERVAL) && self.has_room(now, answers) {
             let flush = if self.flush_at <= now { bytes / 2 } else { 0 };
-            return Some(Allowance { bytes, picture: true, flush });
+            return Some(FrameBudget { bytes, picture: true, flush });
         }
         let beside = BESIDE.saturating_sub(self.flights.text_bytes());
-        let may_beside = self.mode != Mode::Fixed || self.free_at <= now + 2 * FRAME_SPAN;
+        let may_beside = self.mode != PacingMode::FixedRate || self.free_at <= now + 2 * FRAME_SPAN;
         let due = due(TEXT_INTERVAL) && may_beside && beside >= BESIDE / 4;
-        due.then_some(Allowance { bytes: beside, picture: false, flush: 0 })
+        due.then_some(FrameBudget { bytes: beside, picture: false, flush: 0 })
     }
 
-    /// When to ask for an [`Link::allowance`] again if it is not given now, by time alone. `text`:
+    /// When to ask for an [`FlowControl::allowance`] again if it is not given now, by time alone. `text`:
     /// there may be some to send.
     pub fn wakes_at(&self, now: Duration, text: bool) -> Duration {
         let after = |interval| self.last_frame.map_or(now, |last| last + interval);
         let frame = after(FRAME_INTERVAL);
         let room = match self.mode {
-            Mode::Local => frame,
-            Mode::Answers(_) if self.has_room(now, false) => frame,
-            Mode::Answers(_) if self.free_at > now => frame.max(self.free_at),
-            Mode::Answers(_) if now < self.acting_until.min(self.clear_at) => {
+            PacingMode::Unlimited => frame,
+            PacingMode::AckClocked(_) if self.has_room(now, false) => frame,
+            PacingMode::AckClocked(_) if self.free_at > now => frame.max(self.free_at),
+            PacingMode::AckClocked(_) if now < self.acting_until.min(self.clear_at) => {
                 frame.max(self.clear_at)
             }
             // Before that an answer comes, or is lost.
-            Mode::Answers(_) => self.lost_at().unwrap_or(frame),
-            Mode::Queue => {
+            PacingMode::AckClocked(_) => self.lost_at().unwrap_or(frame),
+            PacingMode::SendQueue => {
                 let asked = self.held_back.asked.map_or(now, |asked| asked + QUEUE_INTERVAL);
                 if self.has_room(now, false) { frame } else { frame.max(asked) }
             }
-            Mode::Fixed => frame.max(self.free_at),
+            PacingMode::FixedRate => frame.max(self.free_at),
         };
         let at = if text { room.min(after(TEXT_INTERVAL)) } else { room };
         if at > now { at } else { now + QUEUE_INTERVAL }
@@ -227,23 +233,25 @@ impl Link {
             self.flush_at = now + seconds(flushed, FLUSH_SHARE * self.rate);
         }
         match self.mode {
-            Mode::Local => {}
-            Mode::Answers(_) => {
+            PacingMode::Unlimited => {}
+            PacingMode::AckClocked(_) => {
                 self.clear_at = self.clear_at.max(now) + seconds(bytes, self.rate);
-                self.flights.add(Flight { sent: now, bytes, picture });
+                self.flights.add(InFlight { sent: now, bytes, picture });
             }
-            Mode::Queue => {
+            PacingMode::SendQueue => {
                 self.held_back.sent += bytes as f64;
                 self.held_back.bytes += bytes as f64;
             }
-            Mode::Fixed => self.free_at = self.free_at.max(now) + seconds(bytes, self.rate),
+            PacingMode::FixedRate => {
+                self.free_at = self.free_at.max(now) + seconds(bytes, self.rate)
+            }
         }
     }
 
     /// Bytes were sent that end in the midst of a sequence, where nothing can be asked: the line is
     /// taken to carry what it has carried so far.
     pub fn sent_unasked(&mut self, now: Duration, bytes: usize) {
-        if let Mode::Answers(_) = self.mode {
+        if let PacingMode::AckClocked(_) = self.mode {
             self.last_frame = Some(now);
             let took = Duration::from_secs_f64(bytes as f64 / self.rate);
             self.free_at = self.free_at.max(now) + took;
@@ -258,7 +266,7 @@ impl Link {
             // After a tunnel: the answers have come after all.
             self.mode = mode;
             self.rate = self.rate.min(self.start.fixed_rate);
-            self.flights = Flights::default();
+            self.flights = FramesInFlight::default();
             self.losses = 0;
             return true;
         }
@@ -291,7 +299,7 @@ impl Link {
     /// The kernel has got rid of all but so many bytes; `None`: it does not know (any more).
     pub fn held_back(&mut self, now: Duration, bytes: Option<usize>) {
         let Some(bytes) = bytes else {
-            self.go_without_answers(Mode::Fixed, now);
+            self.go_without_answers(PacingMode::FixedRate, now);
             return;
         };
         let held = &mut self.held_back;
@@ -327,11 +335,12 @@ impl Link {
         if self.lost_at().is_none_or(|at| at > now) {
             return;
         }
-        self.flights = Flights::default();
+        self.flights = FramesInFlight::default();
         self.rate = (self.rate / 2.0).max(BUDGET[0] / FRAME_SPAN.as_secs_f64());
         self.losses += 1;
         if self.losses >= MOST_LOSSES {
-            let otherwise = if self.start.queue { Mode::Queue } else { Mode::Fixed };
+            let otherwise =
+                if self.start.queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
             self.go_without_answers(otherwise, now);
         }
     }
@@ -350,16 +359,16 @@ impl Link {
     /// Bytes of a frame.
     fn budget(&self) -> usize {
         match self.mode {
-            Mode::Local => usize::MAX,
+            PacingMode::Unlimited => usize::MAX,
             _ => (self.rate * FRAME_SPAN.as_secs_f64()).clamp(BUDGET[0], BUDGET[2]) as usize,
         }
     }
 
     fn has_room(&self, now: Duration, answers: bool) -> bool {
         match self.mode {
-            Mode::Local => true,
-            Mode::Answers(_) if self.free_at > now => false,
-            Mode::Answers(_) => {
+            PacingMode::Unlimited => true,
+            PacingMode::AckClocked(_) if self.free_at > now => false,
+            PacingMode::AckClocked(_) => {
                 if self.is_learning(now) {
                     return self.flights.is_empty();
                 }
@@ -374,11 +383,11 @@ impl Link {
                 let first = acting && answers && newest.is_some_and(|at| at < self.acting_since);
                 first || self.flights.pictures() < most
             }
-            Mode::Queue => {
+            PacingMode::SendQueue => {
                 let most = LEAST_QUEUE.max(self.rate * FRAME_SPAN.as_secs_f64());
                 self.held_back.bytes < most
             }
-            Mode::Fixed => {
+            PacingMode::FixedRate => {
                 let early = if answers { FRAME_SPAN } else { Duration::ZERO };
                 self.free_at <= now + early
             }
@@ -394,21 +403,21 @@ impl Link {
     /// Whether the next frame is to tell how long the way is: not while somebody acts.
     fn is_learning(&self, now: Duration) -> bool {
         let known = self.round_trip.is_some() && now < self.learned + LEARN_INTERVAL;
-        matches!(self.mode, Mode::Answers(_)) && !known && now >= self.acting_until
+        matches!(self.mode, PacingMode::AckClocked(_)) && !known && now >= self.acting_until
     }
 
     fn lost_at(&self) -> Option<Duration> {
         self.flights.oldest().map(|sent| sent + LOST_AFTER)
     }
 
-    fn go_without_answers(&mut self, mode: Mode, now: Duration) {
-        if matches!(self.mode, Mode::Answers(_)) {
+    fn go_without_answers(&mut self, mode: PacingMode, now: Duration) {
+        if matches!(self.mode, PacingMode::AckClocked(_)) {
             self.silent = Some(self.mode);
         }
         self.mode = mode;
         self.free_at = now;
-        self.held_back = Held::default();
-        if mode == Mode::Fixed {
+        self.held_back = SendQueueEstimate::default();
+        if mode == PacingMode::FixedRate {
             self.rate = self.start.fixed_rate;
         }
     }

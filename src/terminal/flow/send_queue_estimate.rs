@@ -4,7 +4,7 @@ use std::time::Duration;
 
 /// What the kernel holds back.
 #[derive(Debug, Default)]
-pub struct Held {
+pub struct SendQueueEstimate {
     /// Bytes.
     pub bytes: f64,
     /// When it was asked last.

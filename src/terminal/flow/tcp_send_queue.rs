@@ -6,12 +6,12 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
 /// The connection of SSH.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Queue {
+pub struct TcpSendQueue {
     local: SocketAddr,
     remote: SocketAddr,
 }
 
-impl Queue {
+impl TcpSendQueue {
     /// By `SSH_CONNECTION`, if the kernel knows that connection.
     pub fn find(ssh_connection: &str) -> Option<Self> {
         let queue = Self::named(ssh_connection)?;
@@ -85,7 +85,7 @@ mod tests {
         let v6 = "   1: 0000000000000000FFFF00000200000A:0016 0000000000000000FFFF00000100000A:1389 \
                   01 00000010:00000000 01:00000014\n";
         let table = format!("{head}{v4}{v6}");
-        let found = |text: &str| Queue::named(text).and_then(|queue| queue.found(&table));
+        let found = |text: &str| TcpSendQueue::named(text).and_then(|queue| queue.found(&table));
         assert_eq!(found("10.0.0.1 5000 10.0.0.2 22"), Some(16_000));
         assert_eq!(found("10.0.0.1 5001 10.0.0.2 22"), Some(16));
         assert_eq!(found("::ffff:10.0.0.1 5001 ::ffff:10.0.0.2 22"), Some(16));
@@ -94,7 +94,7 @@ mod tests {
             assert_eq!(found(wrong), None, "{wrong}");
         }
         assert_eq!(
-            Queue::named("10.0.0.1 5000 10.0.0.2 22").unwrap().found("nonsense\n0:\n"),
+            TcpSendQueue::named("10.0.0.1 5000 10.0.0.2 22").unwrap().found("nonsense\n0:\n"),
             None
         );
     }
@@ -108,7 +108,7 @@ mod tests {
         let (_client, from) = listener.accept().unwrap();
         let remote = listener.local_addr().unwrap();
         let text = format!("{} {} {} {}", remote.ip(), remote.port(), from.ip(), from.port());
-        let Some(queue) = Queue::find(&text) else {
+        let Some(queue) = TcpSendQueue::find(&text) else {
             // Some containers hide the table.
             assert!(!std::path::Path::new("/proc/net/tcp").exists(), "{text} is not found");
             return;

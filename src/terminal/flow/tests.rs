@@ -1,12 +1,12 @@
 use crate::terminal::flow::*;
-use crate::terminal::{Capabilities, Surroundings};
+use crate::terminal::{Capabilities, Environment};
 
 fn ms(n: u64) -> Duration {
     Duration::from_millis(n)
 }
 
-fn start(mode: Mode) -> Start {
-    Start { mode, round_trip: Some(ms(100)), queue: false, fixed_rate: DEFAULT_RATE }
+fn start(mode: PacingMode) -> InitialLink {
+    InitialLink { mode, round_trip: Some(ms(100)), queue: false, fixed_rate: DEFAULT_RATE }
 }
 
 /// A line of `rate` bytes a second with a terminal at its end that answers after `round_trip`.
@@ -26,7 +26,12 @@ impl Wire {
 
 /// Sends as much as it may for `seconds`: the share of the line that was used in the second half, and
 /// the longest time that bytes waited for the line.
-fn saturate(link: &mut Link, wire: &mut Wire, seconds: u64, acting: bool) -> (f64, Duration) {
+fn saturate(
+    link: &mut FlowControl,
+    wire: &mut Wire,
+    seconds: u64,
+    acting: bool,
+) -> (f64, Duration) {
     let mut answers = std::collections::VecDeque::new();
     let (mut used, mut waited) = (0, Duration::ZERO);
     for at in 0..seconds * 1000 {
@@ -54,7 +59,10 @@ fn saturate(link: &mut Link, wire: &mut Wire, seconds: u64, acting: bool) -> (f6
 #[test]
 fn the_rate_is_found_and_the_line_is_kept_busy() {
     for (rate, round_trip) in [(125e3, 100), (125e3, 30), (1.25e6, 40), (20e3, 300), (12.5e6, 10)] {
-        let mut link = Link::new(Start { round_trip: None, ..start(Mode::Answers(None)) });
+        let mut link = FlowControl::new(InitialLink {
+            round_trip: None,
+            ..start(PacingMode::AckClocked(None))
+        });
         let mut wire = Wire { rate, round_trip: ms(round_trip), free_at: Duration::ZERO };
         let (busy, waited) = saturate(&mut link, &mut wire, 70, false);
         let found = link.reading().unwrap().rate;
@@ -69,13 +77,13 @@ fn the_rate_is_found_and_the_line_is_kept_busy() {
 
 #[test]
 fn who_acts_waits_for_one_frame_only() {
-    let mut link = Link::new(start(Mode::Answers(None)));
+    let mut link = FlowControl::new(start(PacingMode::AckClocked(None)));
     let mut wire = Wire { rate: 125e3, round_trip: ms(100), free_at: Duration::ZERO };
     let (busy, waited) = saturate(&mut link, &mut wire, 20, true);
     assert!(waited < ms(160) && busy > 0.8, "{waited:?}, busy {busy:.2}");
     let now = ms(20_000);
     link.act(now);
-    link.flights = Flights::default();
+    link.flights = FramesInFlight::default();
     link.sent(now, 9000, true, 0);
     // The answer to a key may go beside that, the next one not.
     assert!(link.allowance(now + ms(40), false).is_none());
@@ -83,14 +91,14 @@ fn who_acts_waits_for_one_frame_only() {
     assert!(answer.picture);
     link.sent(now + ms(1), answer.bytes, true, 0);
     let beside = link.allowance(now + ms(2), true).unwrap();
-    assert_eq!(beside, Allowance { bytes: BESIDE, picture: false, flush: 0 });
+    assert_eq!(beside, FrameBudget { bytes: BESIDE, picture: false, flush: 0 });
     link.sent(now + ms(2), BESIDE, false, 0);
     assert_eq!(link.allowance(now + ms(3), true), None);
 }
 
 #[test]
 fn the_first_answer_does_not_wait_for_what_was_sent_before() {
-    let mut link = Link::new(start(Mode::Answers(None)));
+    let mut link = FlowControl::new(start(PacingMode::AckClocked(None)));
     (0..2).for_each(|i| link.sent(ms(40 * i), 8000, true, 0));
     let now = ms(80);
     assert_eq!(link.allowance(now, false), None);
@@ -104,8 +112,8 @@ fn the_first_answer_does_not_wait_for_what_was_sent_before() {
 
 #[test]
 fn a_terminal_that_is_here_takes_everything() {
-    let mut link = Link::new(start(Mode::Local));
-    let all = Allowance { bytes: usize::MAX, picture: true, flush: usize::MAX / 2 };
+    let mut link = FlowControl::new(start(PacingMode::Unlimited));
+    let all = FrameBudget { bytes: usize::MAX, picture: true, flush: usize::MAX / 2 };
     assert_eq!(link.allowance(ms(5), false), Some(all));
     link.sent(ms(5), 100_000, true, 0);
     assert_eq!(link.allowance(ms(6), true), Some(all));
@@ -117,7 +125,7 @@ fn a_terminal_that_is_here_takes_everything() {
 
 #[test]
 fn lost_answers_end_the_questions_and_late_ones_bring_them_back() {
-    let mut link = Link::new(start(Mode::Answers(None)));
+    let mut link = FlowControl::new(start(PacingMode::AckClocked(None)));
     let mut now = ms(0);
     for _ in 0..MOST_LOSSES {
         assert!(link.question().is_some());
@@ -128,7 +136,7 @@ fn lost_answers_end_the_questions_and_late_ones_bring_them_back() {
         link.look(now);
     }
     let reading = link.reading().unwrap();
-    assert_eq!((reading.mode, reading.rate), (Mode::Fixed, DEFAULT_RATE));
+    assert_eq!((reading.mode, reading.rate), (PacingMode::FixedRate, DEFAULT_RATE));
     assert_eq!(link.question(), None);
     // It goes on at that rate.
     let mut sent = 0;
@@ -142,17 +150,18 @@ fn lost_answers_end_the_questions_and_late_ones_bring_them_back() {
     }
     assert!((0.9..1.1).contains(&(sent as f64 / 10.0 / DEFAULT_RATE)), "{sent}");
     assert!(link.answered(now));
-    assert_eq!(link.reading().unwrap().mode, Mode::Answers(None));
+    assert_eq!(link.reading().unwrap().mode, PacingMode::AckClocked(None));
 }
 
 #[test]
 fn the_kernel_is_the_second_choice() {
-    let mut link = Link::new(Start { queue: true, ..start(Mode::Answers(None)) });
+    let mut link =
+        FlowControl::new(InitialLink { queue: true, ..start(PacingMode::AckClocked(None)) });
     for i in 0..u64::from(MOST_LOSSES) {
         link.sent(LOST_AFTER * i as u32, 4000, true, 0);
         link.look(LOST_AFTER * (i as u32 + 1));
     }
-    assert_eq!(link.reading().unwrap().mode, Mode::Queue);
+    assert_eq!(link.reading().unwrap().mode, PacingMode::SendQueue);
     // A line of 100 kB/s: the rate is learned from what the kernel holds back.
     let (mut queue, mut most) = (0.0f64, 0.0f64);
     for at in 9_001..20_000 {
@@ -172,12 +181,12 @@ fn the_kernel_is_the_second_choice() {
     assert!(most < 32e3, "{most}");
     // The connection has gone.
     link.held_back(ms(20_000), None);
-    assert_eq!(link.reading().unwrap().mode, Mode::Fixed);
+    assert_eq!(link.reading().unwrap().mode, PacingMode::FixedRate);
 }
 
 #[test]
 fn differences_that_nobody_sees_take_a_quarter_of_the_line() {
-    let mut link = Link::new(start(Mode::Fixed));
+    let mut link = FlowControl::new(start(PacingMode::FixedRate));
     let mut flushed = 0;
     for at in 0..20_000 {
         let Some(allowance) = link.allowance(ms(at), false) else { continue };
@@ -192,34 +201,36 @@ fn differences_that_nobody_sees_take_a_quarter_of_the_line() {
 
 #[test]
 fn slow_and_fast_lines_have_thresholds_of_their_own() {
-    let at = |rate| Link { rate, ..Link::new(start(Mode::Answers(None))) }.threshold();
+    let at = |rate| {
+        FlowControl { rate, ..FlowControl::new(start(PacingMode::AckClocked(None))) }.threshold()
+    };
     assert_eq!([at(30e3), at(125e3), at(2e6)], [0.04, 0.02, 0.01]);
 }
 
 #[test]
 fn who_answers_is_found_out() {
     let ssh = |multiplexer, round_trip, passthrough| {
-        let surroundings = Surroundings {
+        let surroundings = Environment {
             ssh: Some("10.0.0.1 5000 10.0.0.2 22".into()),
             multiplexer,
-            ..Surroundings::default()
+            ..Environment::default()
         };
         let asked = Capabilities::unasked(surroundings);
         Capabilities { round_trip, passthrough, ..asked }
     };
     let tmux = Some(Multiplexer::Tmux);
     for (terminal, queue, rate, expected) in [
-        (ssh(None, Some(ms(100)), None), true, None, Mode::Answers(None)),
-        (ssh(None, Some(ms(1)), None), true, None, Mode::Queue),
-        (ssh(None, Some(ms(1)), None), false, None, Mode::Fixed),
-        (ssh(None, None, None), false, None, Mode::Fixed),
-        (ssh(tmux, Some(ms(1)), Some(ms(100))), true, None, Mode::Answers(tmux)),
-        (ssh(tmux, Some(ms(1)), None), true, None, Mode::Queue),
-        (ssh(tmux, Some(ms(1)), None), false, None, Mode::Fixed),
-        (ssh(None, Some(ms(100)), None), true, Some(5e3), Mode::Fixed),
-        (Capabilities::unasked(Surroundings::default()), false, None, Mode::Local),
+        (ssh(None, Some(ms(100)), None), true, None, PacingMode::AckClocked(None)),
+        (ssh(None, Some(ms(1)), None), true, None, PacingMode::SendQueue),
+        (ssh(None, Some(ms(1)), None), false, None, PacingMode::FixedRate),
+        (ssh(None, None, None), false, None, PacingMode::FixedRate),
+        (ssh(tmux, Some(ms(1)), Some(ms(100))), true, None, PacingMode::AckClocked(tmux)),
+        (ssh(tmux, Some(ms(1)), None), true, None, PacingMode::SendQueue),
+        (ssh(tmux, Some(ms(1)), None), false, None, PacingMode::FixedRate),
+        (ssh(None, Some(ms(100)), None), true, Some(5e3), PacingMode::FixedRate),
+        (Capabilities::unasked(Environment::default()), false, None, PacingMode::Unlimited),
     ] {
-        let start = Start::of(&terminal, queue, rate);
+        let start = InitialLink::of(&terminal, queue, rate);
         assert_eq!(start.mode, expected, "{terminal:?}");
         assert_eq!(start.fixed_rate, rate.unwrap_or(DEFAULT_RATE));
     }

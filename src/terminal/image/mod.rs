@@ -39,7 +39,7 @@ pub enum Protocol {
 
 /// Where a picture is to be shown, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Window {
+pub struct ImageViewport {
     /// How.
     pub protocol: Protocol,
     /// Columns and rows of the screen, the last of which tells what is seen.
@@ -54,7 +54,7 @@ pub struct Window {
 
 /// A picture that is ready to be shown.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Still {
+pub struct ViewerImage {
     /// Columns and rows of the screen that it was made for.
     pub screen: [u16; 2],
     /// Width and height of the picture in the file.
@@ -98,7 +98,7 @@ impl Protocol {
     }
 }
 
-impl Window {
+impl ImageViewport {
     /// The same in pixels, and how many of them a cell is; what pictures are made of as blocks counts
     /// as square.
     fn px(&self) -> ([usize; 2], [usize; 2]) {
@@ -130,13 +130,13 @@ impl Window {
     }
 }
 
-impl Still {
+impl ViewerImage {
     /// Reads the picture at `path`, shown as `display` says if it is linear light, and makes it ready
     /// for `window`.
     ///
     /// # Errors
     /// Why it cannot be read or shown.
-    pub fn read(path: &Path, display: &Display, window: &Window) -> Result<Self, String> {
+    pub fn read(path: &Path, display: &Display, window: &ImageViewport) -> Result<Self, String> {
         let (size, pixels) = if path.extension().is_some_and(|e| e == "exr") {
             let picture = read_exr(path)?;
             (picture.size, picture.pixels.iter().copied().map(display.to_8()).collect())
@@ -147,7 +147,7 @@ impl Still {
     }
 
     /// The same for a picture of this `size`, row by row.
-    fn of(size: [usize; 2], pixels: &[[u8; 3]], window: &Window) -> Result<Self, String> {
+    fn of(size: [usize; 2], pixels: &[[u8; 3]], window: &ImageViewport) -> Result<Self, String> {
         if size.contains(&0) || window.screen[1] < 2 {
             return Err("there is nothing to see".to_string());
         }
@@ -178,7 +178,7 @@ impl Still {
                 Raster { width: halves[0], height: halves[1], pixels }
             }
         };
-        let Window { protocol, screen, .. } = *window;
+        let ImageViewport { protocol, screen, .. } = *window;
         Ok(Self { screen, size, shown, protocol, place, raster, transfer })
     }
 
@@ -194,7 +194,7 @@ impl Still {
 mod tests {
     use super::*;
 
-    const WINDOW: Window = Window {
+    const WINDOW: ImageViewport = ImageViewport {
         protocol: Protocol::Kitty,
         screen: [100, 31],
         cell_px: Some([10, 20]),
@@ -204,9 +204,9 @@ mod tests {
 
     #[test]
     fn pictures_keep_their_shape_and_are_not_enlarged() {
-        let blocks = Window { protocol: Protocol::Blocks, ..WINDOW };
-        let sixel = Window { protocol: Protocol::Sixel(256), screen: [200, 31], ..WINDOW };
-        let slow = Window { most_bytes: Some(1.6e4), ..WINDOW };
+        let blocks = ImageViewport { protocol: Protocol::Blocks, ..WINDOW };
+        let sixel = ImageViewport { protocol: Protocol::Sixel(256), screen: [200, 31], ..WINDOW };
+        let slow = ImageViewport { most_bytes: Some(1.6e4), ..WINDOW };
         for (window, size, expected) in [
             (WINDOW, [640, 480], [640, 480]),
             (WINDOW, [2000, 1000], [1000, 500]),
@@ -227,9 +227,9 @@ mod tests {
             [Protocol::Kitty, Protocol::KittyThroughTmux, Protocol::Sixel(16), Protocol::Blocks]
         {
             for size in [[64, 48], [3000, 2000], [1, 700], [999, 2]] {
-                let window = Window { protocol, ..WINDOW };
+                let window = ImageViewport { protocol, ..WINDOW };
                 let pixels = vec![[9, 8, 7]; size[0] * size[1]];
-                let still = Still::of(size, &pixels, &window).unwrap();
+                let still = ViewerImage::of(size, &pixels, &window).unwrap();
                 let Area { x, y, width, height } = still.place;
                 assert!(x + width <= 100 && y + height <= 30, "{:?}", still.place);
                 assert!((100 - width).abs_diff(2 * x) <= 1 && (30 - height).abs_diff(2 * y) <= 1);
@@ -239,6 +239,6 @@ mod tests {
                 assert!(still.raster.pixels.iter().all(|p| *p == [9, 8, 7]));
             }
         }
-        assert!(Still::of([0, 5], &[], &WINDOW).is_err());
+        assert!(ViewerImage::of([0, 5], &[], &WINDOW).is_err());
     }
 }

@@ -3,20 +3,20 @@
 use crate::dashboard::editor::Editor;
 use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::layout::Focus;
-use crate::dashboard::message::{Channel, Format, LeftBehind, Message};
+use crate::dashboard::message::{DisplayChannel, Format, Message, OrphanedEdits};
 use crate::dashboard::model::{
-    Colors, Compared, Inspector, Mode, Model, Notice, RunningExport, Start, Tone,
+    Colors, CompareView, Inspector, Mode, Model, Notice, RunningExport, Start, Tone,
 };
 use crate::dashboard::overlay::{
     Answer, Form, Overlay, Palette, Pick, PickFor, Prompt, PromptFor, Question,
 };
-use crate::dashboard::panel_lines::{Line, scrolled};
+use crate::dashboard::panel_lines::{PanelLine, scrolled};
 use crate::dashboard::testing::report;
 use crate::dashboard::update::update;
 use crate::film::{LightWeights, Probe};
 use crate::render::schedule::{Spp, Stop, StoppedBy};
 use crate::render::session::{Report, Snapshot, State, TileMaps};
-use crate::scene::edit::{self, Subject};
+use crate::scene::edit::{self, Target};
 use crate::scene::{Scene, built_in};
 use std::sync::Arc;
 use std::time::Duration;
@@ -84,19 +84,19 @@ pub fn snapshot(report: Report) -> Snapshot {
 fn select(model: &mut Model, object: &str) {
     let scene = Arc::clone(model.scene());
     let found = (0..scene.objects.len())
-        .map(Subject::Object)
+        .map(Target::Object)
         .find(|subject| subject.label(&scene) == object);
     model.selection = found.unwrap_or_else(|| panic!("{object} in the built-in scene"));
 }
 
 /// The first object that is no mirror.
 fn select_first(model: &mut Model) {
-    let name = Subject::Object(0).label(model.scene());
+    let name = Target::Object(0).label(model.scene());
     select(model, &name);
 }
 
 fn field(model: &Model, key: &str) -> usize {
-    let is = |line: &Line| line.field().is_some_and(|field| field.key == key);
+    let is = |line: &PanelLine| line.field().is_some_and(|field| field.key == key);
     model.field_lines().iter().position(is).unwrap_or_else(|| panic!("a field {key}"))
 }
 
@@ -189,7 +189,7 @@ pub const STATES: &[Named] = &[
         m.snapshot.as_mut().unwrap().report.state = State::Failed(why.to_string());
     }),
     ("unsaved-and-shown-otherwise", |m| {
-        let edit = edit::delete(m.scene(), &Subject::Object(0)).unwrap();
+        let edit = edit::delete(m.scene(), &Target::Object(0)).unwrap();
         m.history.record(Arc::new(edit.scene), "delete", false);
         m.display.exposure_ev = 0.75;
         m.display.tone = crate::film::Tone::Neutral;
@@ -218,14 +218,14 @@ pub const STATES: &[Named] = &[
     }),
     ("turning", |m| {
         select_first(m);
-        m.mode = Mode::Turn;
+        m.mode = Mode::Rotate;
     }),
     ("flying", |m| m.mode = Mode::Fly),
     ("probing", probing),
-    ("noise", |m| m.channel = Channel::Noise),
-    ("samples", |m| m.channel = Channel::Samples),
-    ("objects", |m| m.channel = Channel::Objects),
-    ("kept", |m| m.comparison.shown = Compared::Kept),
+    ("noise", |m| m.channel = DisplayChannel::Noise),
+    ("samples", |m| m.channel = DisplayChannel::Samples),
+    ("objects", |m| m.channel = DisplayChannel::Objects),
+    ("kept", |m| m.comparison.shown = CompareView::Pinned),
     ("only-picture", |m| m.only_picture = true),
     ("notice", |m| {
         notice(
@@ -280,8 +280,8 @@ pub const STATES: &[Named] = &[
     }),
     ("left-behind", |m| {
         let age = Duration::from_secs(720);
-        let left = LeftBehind { scene: Arc::new(built_in()), age, changed: true };
-        update(m, Message::LeftBehind(left), Duration::ZERO);
+        let left = OrphanedEdits { scene: Arc::new(built_in()), age, changed: true };
+        update(m, Message::OrphanedEdits(left), Duration::ZERO);
     }),
     ("file-became-unreadable", broken),
     ("broken-file", |m| {
@@ -297,6 +297,6 @@ pub const STATES: &[Named] = &[
         m.file.name = crate::value::printable("鏡\u{1b}]0;evil\u{7}.toml");
         m.history.record(Arc::new(scene), "names", false);
         m.focus = Focus::Outline;
-        m.selection = Subject::Object(0);
+        m.selection = Target::Object(0);
     }),
 ];
