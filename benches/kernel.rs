@@ -53,7 +53,7 @@ impl Random {
         let directions: Vec<DVec3> = (0..L::WIDTH).map(|_| lane().normalize()).collect();
         Ray {
             origin: Vec3::of(from.to_array()),
-            direction: Vec3::from_fn(|i| directions[i].to_array().map(L::Scalar::of)),
+            direction: Vec3::from_fn(|i| directions[i].to_array().map(L::Scalar::from_f64)),
         }
     }
 }
@@ -149,8 +149,8 @@ fn sampler(c: &mut Criterion) {
         group.bench_function(kind.name(), |b| {
             b.iter(|| {
                 let points = sampler.block(64, Single::WIDTH);
-                let draws = points.of_pixel(sampler.key((black_box(17), 23), 0));
-                (draws.pixel(), draws.lobe(0))
+                let draws = points.for_pixel(sampler.key((black_box(17), 23), 0));
+                (draws.pixel(), draws.lobe_2d(0))
             })
         });
     }

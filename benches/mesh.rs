@@ -24,7 +24,7 @@ const SIDE: usize = 1024;
 /// A packet from one ray per lane: origin and direction.
 fn packet<L: SimdFloat>(mut ray: impl FnMut(usize) -> ([f64; 3], [f64; 3])) -> Ray<L> {
     let rays: Vec<_> = (0..L::WIDTH).map(&mut ray).collect();
-    let vector = |v: [f64; 3]| v.map(L::Scalar::of);
+    let vector = |v: [f64; 3]| v.map(L::Scalar::from_f64);
     Ray {
         origin: Vec3::from_fn(|i| vector(rays[i].0)),
         direction: Vec3::from_fn(|i| vector(rays[i].1)),
@@ -65,7 +65,7 @@ fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
 
 /// Millions of rays per second; `how`: together, apart, or as the packet itself suggests.
 fn speed<L: SimdFloat>(mesh: &Mesh, rays: &[Ray<L>], how: Option<bool>) -> f64 {
-    let limit = L::of(L::MAX);
+    let limit = L::from_f64(L::MAX);
     let seconds = in_turns(
         3,
         &mut [&mut || {

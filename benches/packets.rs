@@ -51,7 +51,7 @@ fn lines(form: &Form) -> Vec<([f64; 3], [f64; 3])> {
 /// Something that traces the lines.
 fn tracer<L: SimdFloat>(form: &Form, lines: &[([f64; 3], [f64; 3])]) -> impl FnMut() + use<L> {
     let geometry = Aggregate::<L>::with_tree(std::slice::from_ref(form), false);
-    let vector = |v: [f64; 3]| v.map(L::Scalar::of);
+    let vector = |v: [f64; 3]| v.map(L::Scalar::from_f64);
     let packet = |lines: &[([f64; 3], [f64; 3])]| Ray::<L> {
         origin: Vec3::from_fn(|i| vector(lines[i].0)),
         direction: Vec3::from_fn(|i| vector(lines[i].1)),

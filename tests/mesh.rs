@@ -68,7 +68,7 @@ fn nothing_slips_through<L: SimdFloat>(mesh: &Mesh, rays: usize) {
     let mut random = Random(0x5EED);
     let triangles = &mesh.mesh().triangles;
     let corner = |i: u32| mesh.mesh().positions[i as usize].map(f64::from);
-    let limit = L::of(L::MAX);
+    let limit = L::from_f64(L::MAX);
     for packet in 0..rays / L::WIDTH {
         let origin: [f64; 3] = std::array::from_fn(|_| 0.5 * (random.next() - 0.5));
         // Half of the packets have their rays close together.
@@ -88,7 +88,7 @@ fn nothing_slips_through<L: SimdFloat>(mesh: &Mesh, rays: usize) {
             .collect();
         let ray = Ray {
             origin: Vec3::<L>::of(origin),
-            direction: Vec3::<L>::from_fn(|i| directions[i].map(L::Scalar::of)),
+            direction: Vec3::<L>::from_fn(|i| directions[i].map(L::Scalar::from_f64)),
         };
         let found = triangle_mesh::closest(mesh, &ray, limit);
         let blocked = triangle_mesh::blocked(mesh, &ray, limit);
@@ -99,7 +99,7 @@ fn nothing_slips_through<L: SimdFloat>(mesh: &Mesh, rays: usize) {
             assert!(blocked.lane(i), "not blocked from {origin:?} to {direction:?}");
             for other in &both {
                 assert_eq!(other.t.lane(i), t, "{origin:?} {direction:?}");
-                assert_eq!(other.triangle.tag_lane(i), found.triangle.tag_lane(i));
+                assert_eq!(other.triangle.id_lane(i), found.triangle.id_lane(i));
             }
             let at: [f64; 3] = std::array::from_fn(|k| origin[k] + t.to_f64() * direction[k]);
             let radius = at.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -24,7 +24,7 @@ impl<L: SimdFloat> SlabPacket<L> {
     /// Rays that meet boxes as if these were larger by `pad` on both sides of each axis.
     #[inline(always)]
     pub fn new(ray: &Ray<L>, pad: Vec3<L>) -> Self {
-        let safe = |d: L| L::one() / d.abs().max(L::of(1e-30)).copysign(d);
+        let safe = |d: L| L::one() / d.abs().max(L::from_f64(1e-30)).copysign(d);
         let d = ray.direction;
         let inverse = Vec3::new(safe(d.x), safe(d.y), safe(d.z));
         Self { above: ray.origin + pad, below: ray.origin - pad, inverse }
@@ -43,8 +43,8 @@ impl<L: SimdFloat> SlabPacket<L> {
     /// Which rays enter the box between the corners `low` and `high` no farther than `limit`.
     #[inline(always)]
     pub fn enters(&self, low: Vec3<L>, high: Vec3<L>, limit: L) -> L::Mask {
-        let a = (low - self.above).times(self.inverse);
-        let b = (high - self.below).times(self.inverse);
+        let a = (low - self.above).component_mul(self.inverse);
+        let b = (high - self.below).component_mul(self.inverse);
         let near = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z)).max(L::zero());
         let far = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z)) * grown();
         near.le(far) & near.le(limit)
@@ -76,7 +76,7 @@ impl<S: Float> PacketBounds<S> {
             }
         }
         let first = lanes.trailing_zeros() as usize;
-        let here = L::from_fn(|i| L::Scalar::of(f64::from(lanes >> i & 1))).gt(L::zero());
+        let here = L::from_fn(|i| L::Scalar::from_f64(f64::from(lanes >> i & 1))).gt(L::zero());
         let (_, above) = ends(beam.above, here, first);
         let (below, _) = ends(beam.below, here, first);
         let (low, high) = ends(d, here, first);
@@ -107,9 +107,9 @@ impl<S: Float> PacketBounds<S> {
         let [low, high] = self.inverse.map(Vec3::splat);
         let near = of(self.near) - Vec3::splat(self.near_origin);
         let far = of(self.far) - Vec3::splat(self.far_origin);
-        let (mut first, mut last) = (near.times(low), far.times(low));
+        let (mut first, mut last) = (near.component_mul(low), far.component_mul(low));
         if !ONE {
-            let (a, b) = (near.times(high), far.times(high));
+            let (a, b) = (near.component_mul(high), far.component_mul(high));
             first = Vec3::new(first.x.min(a.x), first.y.min(a.y), first.z.min(a.z));
             last = Vec3::new(last.x.max(b.x), last.y.max(b.y), last.z.max(b.z));
         }
@@ -123,7 +123,7 @@ impl<S: Float> PacketBounds<S> {
 #[inline(always)]
 fn ends<L: SimdFloat>(v: Vec3<L>, here: L::Mask, first: usize) -> ([L::Scalar; 3], [L::Scalar; 3]) {
     let v = Vec3::select(here, v, Vec3::splat(v.lane(first)));
-    let [x, y, z] = [v.x.extremes(), v.y.extremes(), v.z.extremes()];
+    let [x, y, z] = [v.x.min_max(), v.y.min_max(), v.z.min_max()];
     ([x.0, y.0, z.0], [x.1, y.1, z.1])
 }
 
@@ -131,19 +131,19 @@ fn ends<L: SimdFloat>(v: Vec3<L>, here: L::Mask, first: usize) -> ([L::Scalar; 3
 /// Ray Traversal*).
 #[inline(always)]
 fn grown<L: SimdFloat>() -> L {
-    L::of(1.0 + 8.0 * L::EPSILON)
+    L::from_f64(1.0 + 8.0 * L::EPSILON)
 }
 
 /// One number in all lanes.
 #[inline(always)]
 pub fn all<L: SimdFloat>(x: f32) -> L {
-    L::splat(L::Scalar::of(f64::from(x)))
+    L::splat(L::Scalar::from_f64(f64::from(x)))
 }
 
 /// Part `part` of eight numbers, in lanes; lanes beyond them repeat.
 #[inline(always)]
 pub fn lanes_of<L: SimdFloat>(numbers: &[f32; BVH_WIDTH], part: usize) -> L {
-    L::from_fn(|i| L::Scalar::of(f64::from(numbers[(part * L::WIDTH + i) % BVH_WIDTH])))
+    L::from_fn(|i| L::Scalar::from_f64(f64::from(numbers[(part * L::WIDTH + i) % BVH_WIDTH])))
 }
 
 /// The lanes of a part that do not repeat.
@@ -200,12 +200,12 @@ pub fn together<L: SimdFloat>(
     stack: &mut [StackEntry<L::Scalar>],
     mut leaf: impl FnMut(usize, L) -> L,
 ) {
-    let mut farthest = limit.extremes().1;
+    let mut farthest = limit.min_max().1;
     let (mut top, mut child) = (0, 0);
     loop {
         if child & LEAF_FLAG != 0 {
             limit = leaf((child & !LEAF_FLAG) as usize, limit);
-            farthest = limit.extremes().1;
+            farthest = limit.min_max().1;
         } else {
             let branch = &boxes.branches()[child as usize];
             let base = top;

@@ -25,7 +25,8 @@ impl<L: SimdFloat> Ray<L> {
         let lane = lanes.trailing_zeros() as usize;
         let turned = self.direction - Vec3::splat(self.direction.lane(lane));
         let shifted = self.origin - Vec3::splat(self.origin.lane(lane));
-        let near = turned.length2().le(L::of(turn * turn)) & shifted.max_abs().le(L::of(shift));
+        let near = turned.length_squared().le(L::from_f64(turn * turn))
+            & shifted.max_abs().le(L::from_f64(shift));
         near.bits() & lanes == lanes
     }
 }
@@ -45,13 +46,13 @@ impl<L: SimdFloat> Hit<L> {
     /// Nothing met.
     #[inline(always)]
     pub fn none() -> Self {
-        Self::nearer_than(L::of(L::MAX))
+        Self::nearer_than(L::from_f64(L::MAX))
     }
 
     /// Nothing met yet, and nothing to be met at `t` or beyond.
     #[inline(always)]
     pub(crate) fn nearer_than(t: L) -> Self {
-        Self { t, item: L::tag(0), facet: L::tag(0) }
+        Self { t, item: L::from_id(0), facet: L::from_id(0) }
     }
 
     /// Takes a distance and the tags of an item and a triangle in `lanes`, whatever is known there.
@@ -67,14 +68,14 @@ impl<L: SimdFloat> Hit<L> {
     pub(crate) fn narrow(&mut self, mask: L::Mask, t: L, item: u32) {
         let nearer = mask & t.gt(L::zero()) & t.lt(self.t);
         self.t = L::select(nearer, t, self.t);
-        self.item = L::select(nearer, L::tag(item), self.item);
+        self.item = L::select(nearer, L::from_id(item), self.item);
     }
 
     /// Takes `other` where it is nearer, or as near with a lower tag.
     #[inline(always)]
     pub(crate) fn take(&mut self, other: &Self) {
         let mut nearer = other.t.lt(self.t);
-        let tie = (other.t.le(self.t) & other.t.lt(L::of(L::MAX))).and_not(nearer);
+        let tie = (other.t.le(self.t) & other.t.lt(L::from_f64(L::MAX))).and_not(nearer);
         // Rare; and tags are subnormal as floats, which some processors compare slowly.
         if tie.any() {
             nearer = nearer | (tie & other.item.lt(self.item));

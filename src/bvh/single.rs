@@ -143,7 +143,8 @@ impl<S: Float> RayTraversal<S> {
             let first = part * L::WIDTH;
             met |= (enters.bits() & fresh()) << first;
             // Less by more than rounding to single precision may add: no key is beyond its box.
-            let near = L::select(enters, near * L::of(1.0 - 2e-7), L::of(f64::INFINITY));
+            let near =
+                L::select(enters, near * L::from_f64(1.0 - 2e-7), L::from_f64(f64::INFINITY));
             for (i, key) in keys[first..].iter_mut().enumerate().take(L::WIDTH) {
                 let bits = (near.lane(i).to_f64() as f32).to_bits();
                 *key = bits & !(PLACE | 1 << 31) | (first + i) as u32;
@@ -167,7 +168,7 @@ impl<S: Float> RayTraversal<S> {
         while self.frames > 0 {
             let frame = &mut frames[self.frames - 1];
             let least = take(&mut frame.keys);
-            if S::of(f64::from(f32::from_bits(least & !PLACE))) <= self.limit {
+            if S::from_f64(f64::from(f32::from_bits(least & !PLACE))) <= self.limit {
                 frame.left -= 1;
                 self.frames -= usize::from(frame.left == 0);
                 let branch = &boxes.branches()[frame.branch as usize];

@@ -15,10 +15,10 @@ pub struct PinholeCamera {
     v: DVec3,
     w: DVec3,
     /// Per pixel to the right and downward, on the picture plane at unit distance.
-    right: DVec3,
-    down: DVec3,
+    dx_axis: DVec3,
+    dy_axis: DVec3,
     /// The picture plane's corner above pixel (0, 0), seen from the eye.
-    corner: DVec3,
+    raster_corner: DVec3,
     near: f64,
 }
 
@@ -68,9 +68,9 @@ impl PinholeCamera {
             u,
             v,
             w,
-            right: u * (2.0 * half_width / width),
-            down: -v * (2.0 * half_height / height),
-            corner: w - u * half_width + v * half_height,
+            dx_axis: u * (2.0 * half_width / width),
+            dy_axis: -v * (2.0 * half_height / height),
+            raster_corner: w - u * half_width + v * half_height,
             near: camera.near,
         }
     }
@@ -90,12 +90,12 @@ impl PinholeCamera {
     pub fn pixel_angle(&self) -> f64 {
         // At the distance d along the ray a step across it by p turns the ray by about p / d, and one
         // aslant by no less than p / d^2.
-        self.pixel() / self.corner.length_squared()
+        self.pixel() / self.raster_corner.length_squared()
     }
 
     /// Side of a pixel on the picture plane at unit distance; of an oblong one the smaller.
     pub fn pixel(&self) -> f64 {
-        self.right.length().min(self.down.length())
+        self.dx_axis.length().min(self.dy_axis.length())
     }
 
     /// From the eye to the corners of a rectangle of the raster, on the picture plane at unit distance.
@@ -103,33 +103,38 @@ impl PinholeCamera {
         let (x0, y0) = (x as f64, y as f64);
         let (x1, y1) = (x0 + width as f64, y0 + height as f64);
         [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
-            .map(|(x, y)| self.corner + self.right * x + self.down * y)
+            .map(|(x, y)| self.raster_corner + self.dx_axis * x + self.dy_axis * y)
     }
 
     /// Where a point in front of the eye is seen on the raster \[pixels\].
     pub fn project(&self, point: DVec3) -> [f64; 2] {
         let to = point - self.eye;
-        let on_plane = to / to.dot(self.w) - self.corner;
-        [self.right, self.down].map(|pixel| on_plane.dot(pixel) / pixel.length_squared())
+        let on_plane = to / to.dot(self.w) - self.raster_corner;
+        [self.dx_axis, self.dy_axis].map(|pixel| on_plane.dot(pixel) / pixel.length_squared())
     }
 
     /// From the eye to the corner of a pixel, on the plane at unit distance.
     #[inline(always)]
-    pub fn toward<S: Float>(&self, (x, y): (u32, u32)) -> [S; 3] {
-        let corner = self.corner + self.right * f64::from(x) + self.down * f64::from(y);
-        corner.to_array().map(S::of)
+    pub fn pixel_corner_direction<S: Float>(&self, (x, y): (u32, u32)) -> [S; 3] {
+        let raster_corner =
+            self.raster_corner + self.dx_axis * f64::from(x) + self.dy_axis * f64::from(y);
+        raster_corner.to_array().map(S::from_f64)
     }
 
-    /// Origins and unit directions of rays through points of pixels: `base` as [`PinholeCamera::toward`] gives it, `(dx,
+    /// Origins and unit directions of rays through points of pixels: `base` as [`PinholeCamera::pixel_corner_direction`] gives it, `(dx,
     /// dy)` from there to the right and downward \[pixels\]. They begin on the near plane.
     #[inline(always)]
     pub fn rays<L: SimdFloat>(&self, base: Vec3<L>, (dx, dy): (L, L)) -> (Vec3<L>, Vec3<L>) {
-        let right = Vec3::of(self.right.to_array());
-        let down = Vec3::of(self.down.to_array());
-        let toward = right.mul_add(dx, down.mul_add(dy, base));
+        let dx_axis = Vec3::of(self.dx_axis.to_array());
+        let dy_axis = Vec3::of(self.dy_axis.to_array());
+        let pixel_corner_direction = dx_axis.mul_add(dx, dy_axis.mul_add(dy, base));
         let eye = Vec3::of(self.eye.to_array());
-        // At unit distance along w, `toward` reaches the plane at distance `near` after `near` steps.
-        let origin = if self.near > 0.0 { toward.mul_add(L::of(self.near), eye) } else { eye };
-        (origin, toward.normalize())
+        // At unit distance along w, `pixel_corner_direction` reaches the plane at distance `near` after `near` steps.
+        let origin = if self.near > 0.0 {
+            pixel_corner_direction.mul_add(L::from_f64(self.near), eye)
+        } else {
+            eye
+        };
+        (origin, pixel_corner_direction.normalize())
     }
 }

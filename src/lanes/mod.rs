@@ -46,7 +46,7 @@ pub trait Float: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
     /// Distance from 1 to the next larger number of this precision.
     const EPSILON: f64;
     /// Nearest value of this precision.
-    fn of(x: f64) -> Self;
+    fn from_f64(x: f64) -> Self;
     /// Exact.
     fn to_f64(self) -> f64;
 }
@@ -54,7 +54,7 @@ pub trait Float: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
 impl Float for f32 {
     const EPSILON: f64 = f32::EPSILON as f64;
     #[inline(always)]
-    fn of(x: f64) -> Self {
+    fn from_f64(x: f64) -> Self {
         x as f32
     }
     #[inline(always)]
@@ -66,7 +66,7 @@ impl Float for f32 {
 impl Float for f64 {
     const EPSILON: f64 = f64::EPSILON;
     #[inline(always)]
-    fn of(x: f64) -> Self {
+    fn from_f64(x: f64) -> Self {
         x
     }
     #[inline(always)]
@@ -173,18 +173,18 @@ pub trait SimdFloat:
     fn lane(self, i: usize) -> Self::Scalar;
     /// The same value, rounded to this precision, in every lane.
     #[inline(always)]
-    fn of(x: f64) -> Self {
-        Self::splat(Self::Scalar::of(x))
+    fn from_f64(x: f64) -> Self {
+        Self::splat(Self::Scalar::from_f64(x))
     }
     /// Zero in every lane.
     #[inline(always)]
     fn zero() -> Self {
-        Self::of(0.0)
+        Self::from_f64(0.0)
     }
     /// One in every lane.
     #[inline(always)]
     fn one() -> Self {
-        Self::of(1.0)
+        Self::from_f64(1.0)
     }
 
     /// `self * a + b`, rounded once if the target has fused multiply-add, else twice.
@@ -195,7 +195,7 @@ pub trait SimdFloat:
     fn max(self, other: Self) -> Self;
     /// The smallest and the largest lane; lanes that are NaN do not count (the largest number and its
     /// negative, if all are).
-    fn extremes(self) -> (Self::Scalar, Self::Scalar);
+    fn min_max(self) -> (Self::Scalar, Self::Scalar);
     /// Absolute value.
     fn abs(self) -> Self;
     /// Square root; NaN below zero.
@@ -231,22 +231,22 @@ pub trait SimdFloat:
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// `self` where `mask` is true, zero elsewhere.
     #[inline(always)]
-    fn only(self, mask: Self::Mask) -> Self {
+    fn masked(self, mask: Self::Mask) -> Self {
         Self::select(mask, self, Self::zero())
     }
 
     /// A 32-bit label carried through [`SimdFloat::select`]; not a number to compute with. Labels below
     /// 2^31 - 2^23 compare by [`SimdFloat::lt`] and [`SimdFloat::le`] like integers, as the bits of all
     /// positive floats do.
-    fn tag(label: u32) -> Self;
+    fn from_id(label: u32) -> Self;
     /// The label in lane `i`.
-    fn tag_lane(self, i: usize) -> u32;
+    fn id_lane(self, i: usize) -> u32;
     /// Where the label is `label`.
-    fn has_tag(self, label: u32) -> Self::Mask;
+    fn id_eq(self, label: u32) -> Self::Mask;
 
     /// Uniform in [0, 1) from 32 random bits: 24 of them in single precision, all in double (there
     /// in the middle of its step).
-    fn unit(bits: Self::SimdU32) -> Self;
+    fn to_unit(bits: Self::SimdU32) -> Self;
 
     /// The sum over lanes of `round(lane * scale)`. Each lane is rounded by itself, so that the sum
     /// is exact in any grouping; `|lane * scale|` must not exceed 2^49.

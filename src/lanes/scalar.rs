@@ -118,7 +118,7 @@ macro_rules! scalar_lanes {
                 if self > other { self } else { other }
             }
             #[inline(always)]
-            fn extremes(self) -> (Self, Self) {
+            fn min_max(self) -> (Self, Self) {
                 (SimdFloat::min(self, <$float>::MAX), SimdFloat::max(self, -<$float>::MAX))
             }
             #[inline(always)]
@@ -166,19 +166,19 @@ macro_rules! scalar_lanes {
                 if mask { yes } else { no }
             }
             #[inline(always)]
-            fn tag(label: u32) -> Self {
+            fn from_id(label: u32) -> Self {
                 <$float>::from_bits($bits::from(label))
             }
             #[inline(always)]
-            fn tag_lane(self, _: usize) -> u32 {
+            fn id_lane(self, _: usize) -> u32 {
                 self.to_bits() as u32
             }
             #[inline(always)]
-            fn has_tag(self, label: u32) -> bool {
-                self.tag_lane(0) == label
+            fn id_eq(self, label: u32) -> bool {
+                self.id_lane(0) == label
             }
             #[inline(always)]
-            fn unit(bits: One) -> Self {
+            fn to_unit(bits: One) -> Self {
                 let unit: fn(u32) -> $float = $unit;
                 unit(bits.0)
             }

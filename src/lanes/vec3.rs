@@ -28,7 +28,7 @@ impl<L: SimdFloat> Vec3<L> {
     /// The same vector, rounded to this precision, in every lane.
     #[inline(always)]
     pub fn of(v: [f64; 3]) -> Self {
-        Self::splat(v.map(L::Scalar::of))
+        Self::splat(v.map(L::Scalar::from_f64))
     }
     /// Lane `i` is `f(i)`.
     #[inline(always)]
@@ -61,19 +61,19 @@ impl<L: SimdFloat> Vec3<L> {
     }
     /// Squared length.
     #[inline(always)]
-    pub fn length2(self) -> L {
+    pub fn length_squared(self) -> L {
         self.dot(self)
     }
     /// The vector divided by its length; not finite for a zero vector.
     #[inline(always)]
     pub fn normalize(self) -> Self {
-        self * (L::one() / self.length2().sqrt())
+        self * (L::one() / self.length_squared().sqrt())
     }
     /// The vector divided by its length, if that is 1 but for a few roundings: one step of Newton's
     /// method takes the place of the root.
     #[inline(always)]
     pub fn renormalize(self) -> Self {
-        self * self.length2().mul_add(L::of(-0.5), L::of(1.5))
+        self * self.length_squared().mul_add(L::from_f64(-0.5), L::from_f64(1.5))
     }
     /// `self * t + b`.
     #[inline(always)]
@@ -82,7 +82,7 @@ impl<L: SimdFloat> Vec3<L> {
     }
     /// Coordinate by coordinate.
     #[inline(always)]
-    pub fn times(self, o: Self) -> Self {
+    pub fn component_mul(self, o: Self) -> Self {
         Self::new(self.x * o.x, self.y * o.y, self.z * o.z)
     }
     /// The largest coordinate.
@@ -106,13 +106,13 @@ impl<L: SimdFloat> Vec3<L> {
     }
     /// `self` where `mask` is true, zero elsewhere.
     #[inline(always)]
-    pub fn only(self, mask: L::Mask) -> Self {
-        Self::new(self.x.only(mask), self.y.only(mask), self.z.only(mask))
+    pub fn masked(self, mask: L::Mask) -> Self {
+        Self::new(self.x.masked(mask), self.y.masked(mask), self.z.masked(mask))
     }
     /// The mirror image of this direction at a plane with unit normal `n`: v - 2 (v.n) n.
     #[inline(always)]
     pub fn reflect(self, n: Self) -> Self {
-        let twice = self.dot(n) * L::of(-2.0);
+        let twice = self.dot(n) * L::from_f64(-2.0);
         n.mul_add(twice, self)
     }
 }

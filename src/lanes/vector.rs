@@ -144,7 +144,7 @@ macro_rules! vector_lanes {
                 $vector::fast_max(self, other)
             }
             #[inline(always)]
-            fn extremes(self) -> ($scalar, $scalar) {
+            fn min_max(self) -> ($scalar, $scalar) {
                 // Both halves at once, then one by one.
                 let most = $vector::splat($scalar::MAX);
                 let [a, b]: [$half; 2] = cast(SimdFloat::min(self, most));
@@ -203,23 +203,23 @@ macro_rules! vector_lanes {
                 mask.select(yes, no)
             }
             #[inline(always)]
-            fn only(self, mask: Self) -> Self {
+            fn masked(self, mask: Self) -> Self {
                 self & mask
             }
             #[inline(always)]
-            fn tag(label: u32) -> Self {
+            fn from_id(label: u32) -> Self {
                 $vector::splat($scalar::from_bits($raw::from(label)))
             }
             #[inline(always)]
-            fn tag_lane(self, i: usize) -> u32 {
+            fn id_lane(self, i: usize) -> u32 {
                 self.as_array()[i].to_bits() as u32
             }
             #[inline(always)]
-            fn has_tag(self, label: u32) -> Self {
-                $vector::from_bits(self.to_bits().simd_eq(Self::tag(label).to_bits()))
+            fn id_eq(self, label: u32) -> Self {
+                $vector::from_bits(self.to_bits().simd_eq(Self::from_id(label).to_bits()))
             }
             #[inline(always)]
-            fn unit(bits: $bits) -> Self {
+            fn to_unit(bits: $bits) -> Self {
                 let unit: fn($bits) -> $vector = $unit;
                 unit(bits)
             }

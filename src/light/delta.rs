@@ -11,19 +11,19 @@ use std::f64::consts::PI;
 #[derive(Clone, Copy, Debug)]
 pub enum DeltaLight<S> {
     /// A point whose irradiance falls with the square of the distance: 1 / d^2.
-    Falling {
+    InverseSquare {
         /// Where it stands.
         position: [S; 3],
     },
     /// A point with the same normal irradiance, pi, everywhere.
-    Even {
+    Constant {
         /// Where it stands.
         position: [S; 3],
     },
     /// Light along one direction with normal irradiance pi.
     Directional {
         /// Unit vector towards the light.
-        towards: [S; 3],
+        wi: [S; 3],
     },
 }
 
@@ -31,7 +31,7 @@ pub enum DeltaLight<S> {
 #[derive(Clone, Copy, Debug)]
 pub struct LightSample<L> {
     /// Unit vector towards the light.
-    pub towards: Vec3<L>,
+    pub wi: Vec3<L>,
     /// Distance to the light; the largest number for light from infinity.
     pub distance: L,
     /// Irradiance of a surface that faces the light.
@@ -43,35 +43,35 @@ impl<S: Float> DeltaLight<S> {
     /// or no direction.
     pub fn new(light: &Light, origin: DVec3) -> Option<Self> {
         if let Some(point) = &light.point {
-            let position = (DVec3::from(point.position) - origin).to_array().map(S::of);
+            let position = (DVec3::from(point.position) - origin).to_array().map(S::from_f64);
             return Some(match light.falloff {
-                Falloff::InverseSquare => Self::Falling { position },
-                Falloff::None => Self::Even { position },
+                Falloff::InverseSquare => Self::InverseSquare { position },
+                Falloff::None => Self::Constant { position },
             });
         }
         let towards = -unit(light.directional?.direction)?;
-        Some(Self::Directional { towards: towards.to_array().map(S::of) })
+        Some(Self::Directional { wi: towards.to_array().map(S::from_f64) })
     }
 
     /// The light that arrives at `point`, if nothing is in the way.
     #[inline(always)]
-    pub fn at<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> LightSample<L> {
+    pub fn sample_li<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> LightSample<L> {
         match self {
-            Self::Directional { towards } => LightSample {
-                towards: Vec3::splat(*towards),
-                distance: L::of(L::MAX),
-                irradiance: L::of(PI),
+            Self::Directional { wi: towards } => LightSample {
+                wi: Vec3::splat(*towards),
+                distance: L::from_f64(L::MAX),
+                irradiance: L::from_f64(PI),
             },
-            Self::Falling { position } | Self::Even { position } => {
+            Self::InverseSquare { position } | Self::Constant { position } => {
                 let to = Vec3::splat(*position) - point;
-                let distance = to.length2().sqrt();
+                let distance = to.length_squared().sqrt();
                 let inverse = L::one() / distance;
                 let irradiance = match self {
                     // Infinity times black would be no number.
-                    Self::Falling { .. } => (inverse * inverse).min(L::of(L::MAX)),
-                    _ => L::of(PI),
+                    Self::InverseSquare { .. } => (inverse * inverse).min(L::from_f64(L::MAX)),
+                    _ => L::from_f64(PI),
                 };
-                LightSample { towards: to * inverse, distance, irradiance }
+                LightSample { wi: to * inverse, distance, irradiance }
             }
         }
     }
@@ -79,7 +79,7 @@ impl<S: Float> DeltaLight<S> {
     /// Normal irradiance at a typical place: at the origin, but not nearer than `radius`.
     pub fn typical_irradiance(&self, radius: f64) -> f64 {
         match self {
-            Self::Falling { position } => {
+            Self::InverseSquare { position } => {
                 let d = DVec3::from(position.map(S::to_f64)).length().max(radius);
                 if d > 0.0 { 1.0 / (d * d) } else { 1.0 }
             }

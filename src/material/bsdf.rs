@@ -30,7 +30,7 @@ impl<S: Float> MicrofacetDistribution<S> {
     /// Of slope `alpha`.
     pub fn new(ggx: bool, alpha: f64, masking: Masking) -> Self {
         let alpha2 = alpha * alpha;
-        let [alpha, alpha2, inverse_alpha2] = [alpha, alpha2, 1.0 / alpha2].map(S::of);
+        let [alpha, alpha2, inverse_alpha2] = [alpha, alpha2, 1.0 / alpha2].map(S::from_f64);
         Self { ggx, alpha, alpha2, inverse_alpha2, masking }
     }
 }
@@ -103,9 +103,9 @@ pub struct Bsdf<S> {
     /// k_t and what bends the light, if it lets any through.
     pub transmission: Option<Transmission<S>>,
     /// F of the highlight.
-    pub reflectance: Reflectance<S>,
+    pub highlight_fresnel: Reflectance<S>,
     /// F of the reflection, as far as it does not depend on what lies on the other side.
-    pub mirrored: Reflectance<S>,
+    pub reflection_fresnel: Reflectance<S>,
     /// Whether lights matter to it.
     pub wants_light: bool,
     /// Whether its back is like its front.
@@ -121,14 +121,14 @@ pub fn one_minus_cos_of_tan(r: f64) -> f64 {
 impl<S: Float> Bsdf<S> {
     /// Compiles `material`; `reflects`: the scene traces reflected and transmitted rays at all.
     pub fn new(material: &Material, reflects: bool) -> Self {
-        let slope = material.slope().max(SMOOTH_ALPHA);
+        let slope = material.microfacet_alpha().max(SMOOTH_ALPHA);
         let facets = |ggx| MicrofacetDistribution::new(ggx, slope, material.masking);
-        let strength = S::of(material.specular);
+        let strength = S::from_f64(material.specular);
         let shine = match material.highlight {
             _ if material.specular == 0.0 => SpecularModel::None,
             Highlight::Phong => SpecularModel::Phong {
                 strength,
-                exponent: S::of(material.exponent),
+                exponent: S::from_f64(material.exponent),
                 sharp: material.exponent > SHARP_EXPONENT,
             },
             Highlight::CookTorrance => SpecularModel::MicrofacetDistribution {
@@ -140,30 +140,36 @@ impl<S: Float> Bsdf<S> {
         let spread = match material.lobe {
             Lobe::Mirror => ReflectionLobe::Mirror,
             Lobe::Cone | Lobe::Square if r == 0.0 => ReflectionLobe::Mirror,
-            Lobe::Cone => ReflectionLobe::Cone { one_minus_cos: S::of(one_minus_cos_of_tan(r)) },
-            Lobe::Square => ReflectionLobe::Square { side: S::of(std::f64::consts::PI.sqrt() * r) },
-            Lobe::Beckmann | Lobe::Ggx if material.slope() < SMOOTH_ALPHA => ReflectionLobe::Mirror,
+            Lobe::Cone => {
+                ReflectionLobe::Cone { one_minus_cos: S::from_f64(one_minus_cos_of_tan(r)) }
+            }
+            Lobe::Square => {
+                ReflectionLobe::Square { side: S::from_f64(std::f64::consts::PI.sqrt() * r) }
+            }
+            Lobe::Beckmann | Lobe::Ggx if material.microfacet_alpha() < SMOOTH_ALPHA => {
+                ReflectionLobe::Mirror
+            }
             Lobe::Beckmann => ReflectionLobe::MicrofacetDistribution(facets(false)),
             Lobe::Ggx => ReflectionLobe::MicrofacetDistribution(facets(true)),
         };
         let (k_r, k_t) = (material.reflection, material.transmission);
-        let dielectric = material.law() == Fresnel::Dielectric;
+        let dielectric = material.fresnel_mode() == Fresnel::Dielectric;
         let transmission = (reflects && k_t > 0.0).then(|| Transmission {
-            strength: S::of(k_t),
-            index: S::of(material.index),
+            strength: S::from_f64(k_t),
+            index: S::from_f64(material.index),
             dielectric,
         });
         let reflectance = Reflectance::new(material);
         let shared = dielectric && transmission.is_some();
         let black = material.diffuse == 0.0 || material.color.0 == [0.0; 3];
         Self {
-            ambient: material.color.0.map(|c| S::of(c * material.ambient)),
-            diffuse: material.color.0.map(|c| S::of(c * material.diffuse)),
+            ambient: material.color.0.map(|c| S::from_f64(c * material.ambient)),
+            diffuse: material.color.0.map(|c| S::from_f64(c * material.diffuse)),
             shine,
-            reflection: (reflects && k_r > 0.0).then(|| (S::of(k_r), spread)),
+            reflection: (reflects && k_r > 0.0).then(|| (S::from_f64(k_r), spread)),
             transmission,
-            reflectance,
-            mirrored: if shared { Reflectance::white() } else { reflectance },
+            highlight_fresnel: reflectance,
+            reflection_fresnel: if shared { Reflectance::white() } else { reflectance },
             wants_light: !black || material.specular != 0.0,
             two_sided: material.two_sided,
         }

@@ -22,7 +22,7 @@ pub struct BsdfSample<L> {
 fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     let along = h.dot(n);
     let across = h - n * along;
-    (along, (across.length2() / (along * along)).min(L::of(1e15)))
+    (along, (across.length_squared() / (along * along)).min(L::from_f64(1e15)))
 }
 
 /// `cos`^alpha, of a cosine that was computed from unit vectors; 0 from 90 degrees on.
@@ -31,8 +31,8 @@ fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
 /// here.
 #[inline(always)]
 fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
-    let power = (cos.max(L::of(1e-30)).min(L::one()).ln() * alpha).exp();
-    power.only(cos.gt(L::zero()))
+    let power = (cos.max(L::from_f64(1e-30)).min(L::one()).ln() * alpha).exp();
+    power.masked(cos.gt(L::zero()))
 }
 
 /// The same of the angle between `a` and `b`, for alpha above
@@ -44,13 +44,13 @@ fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
 /// single precision.
 #[inline(always)]
 fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
-    let (along, across2) = (a.dot(b), a.cross(b).length2());
-    let s = across2 / (along * along * L::of(2.0) + across2);
+    let (along, across2) = (a.dot(b), a.cross(b).length_squared());
+    let s = across2 / (along * along * L::from_f64(2.0) + across2);
     let s2 = s * s;
     let series = [1.0 / 5.0, 1.0 / 3.0, 1.0]
         .into_iter()
-        .fold(L::of(1.0 / 7.0), |sum, term| sum.mul_add(s2, L::of(term)));
-    (-(alpha * s * series)).exp().only(along.gt(L::zero()))
+        .fold(L::from_f64(1.0 / 7.0), |sum, term| sum.mul_add(s2, L::from_f64(term)));
+    (-(alpha * s * series)).exp().masked(along.gt(L::zero()))
 }
 
 /// Microfacet terms in a lane type.
@@ -87,10 +87,10 @@ fn beckmann_lambda<L: SimdFloat>(a: L) -> L {
         5.661_643_591_547_971e-5,
         -2.270_107_819_080_595_3e-5,
     ];
-    let x = L::of(2.0) - L::of(6.0) / (a + L::of(2.0));
-    let k = K.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::of(*k)));
+    let x = L::from_f64(2.0) - L::from_f64(6.0) / (a + L::from_f64(2.0));
+    let k = K.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::from_f64(*k)));
     let a2 = a * a;
-    let below = a * a2.mul_add(L::of(4.0 * PI.sqrt()), L::of(2.0 * PI.sqrt()));
+    let below = a * a2.mul_add(L::from_f64(4.0 * PI.sqrt()), L::from_f64(2.0 * PI.sqrt()));
     (-a2).exp() * k / below
 }
 
@@ -111,7 +111,7 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
     #[inline(always)]
     fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L) {
         match self.masking {
-            Masking::VCavity => ((L::of(2.0) * nh * nv.min(nl)).min(vh), vh),
+            Masking::VCavity => ((L::from_f64(2.0) * nh * nv.min(nl)).min(vh), vh),
             Masking::Smith => (L::one(), L::one() + self.lambda(nv) + self.lambda(nl)),
         }
     }
@@ -122,14 +122,14 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         let alpha2 = L::splat(self.alpha2);
         let (cos2, sin2) = (c * c, (L::one() - c * c).max(L::zero()));
         if self.ggx {
-            return ((alpha2 * sin2 / cos2 + L::one()).sqrt() - L::one()) * L::of(0.5);
+            return ((alpha2 * sin2 / cos2 + L::one()).sqrt() - L::one()) * L::from_f64(0.5);
         }
         // Seen steeply by all lanes, as most surfaces are: nothing is hidden.
-        let flat = cos2.lt(sin2 * alpha2 * L::of(STEEP * STEEP));
+        let flat = cos2.lt(sin2 * alpha2 * L::from_f64(STEEP * STEEP));
         if flat.none() {
             return L::zero();
         }
-        beckmann_lambda(c / (alpha2 * sin2).sqrt()).only(flat)
+        beckmann_lambda(c / (alpha2 * sin2).sqrt()).masked(flat)
     }
 }
 
@@ -163,21 +163,21 @@ impl<S: Float> Bsdf<S> {
                     let cos = r.dot(view);
                     cosine_power(cos, alpha)
                 };
-                let value = L::splat(*strength) * power * L::of(FRAC_1_PI);
+                let value = L::splat(*strength) * power * L::from_f64(FRAC_1_PI);
                 Vec3::new(value, value, value)
             }
             SpecularModel::MicrofacetDistribution { strength, facets } => {
                 // The half vector, not of unit length: its square is twice its product with either.
                 let h = view + light;
                 let (nh, tan2) = along_tan2(h, n);
-                let h2 = h.length2();
-                let (seen, all) = facets.masking(nh, nv, nl, h2 * L::of(0.5));
+                let h2 = h.length_squared();
+                let (seen, all) = facets.masking(nh, nv, nl, h2 * L::from_f64(0.5));
                 // f N.L = D G F / (4 N.V): the light's cosine cancels.
                 let d: L = facets.density(tan2);
-                let k = L::of(0.25 * strength.to_f64());
+                let k = L::from_f64(0.25 * strength.to_f64());
                 let value = d * seen * k / (nv * all);
                 let valid = nh.gt(L::zero()) & nv.gt(L::zero());
-                self.reflectance.times(|| h2.sqrt() * L::of(0.5), value).only(valid)
+                self.highlight_fresnel.times(|| h2.sqrt() * L::from_f64(0.5), value).masked(valid)
             }
         }
     }
@@ -186,7 +186,7 @@ impl<S: Float> Bsdf<S> {
     /// `n` on the viewer's side; `u`, `v` uniform in [0, 1). `fold`: lobes that dip under the surface
     /// are mirrored up, otherwise lost there.
     #[inline(always)]
-    pub fn reflect<L: SimdFloat<Scalar = S>>(
+    pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
         strength: S,
         spread: &ReflectionLobe<S>,
@@ -208,7 +208,7 @@ impl<S: Float> Bsdf<S> {
                 (Frame::around(mirror.renormalize()).to_world(local), k)
             }
             ReflectionLobe::MicrofacetDistribution(facets) => {
-                return self.facet(k, facets, incident, n, (u, v));
+                return self.sample_microfacet(k, facets, incident, n, (u, v));
             }
         };
         let up = direction.dot(n);
@@ -220,13 +220,14 @@ impl<S: Float> Bsdf<S> {
         };
         // The facet that would send this ray: half-way between view and reflected direction, whose
         // cosine with either is half the length of their sum (without cancellation at grazing angles).
-        let cos = || ((direction - incident).length2().sqrt() * L::of(0.5)).min(L::one());
-        BsdfSample { direction, weight: self.mirrored.times(cos, weight) }
+        let cos =
+            || ((direction - incident).length_squared().sqrt() * L::from_f64(0.5)).min(L::one());
+        BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }
     }
 
     /// Reflection at a sampled microfacet. Below the surface G is zero, and so is the weight.
     #[inline(always)]
-    fn facet<L: SimdFloat<Scalar = S>>(
+    fn sample_microfacet<L: SimdFloat<Scalar = S>>(
         &self,
         k: L,
         facets: &MicrofacetDistribution<S>,
@@ -255,7 +256,7 @@ impl<S: Float> Bsdf<S> {
         let valid = vh.gt(L::zero()) & light.z.gt(L::zero()) & view.z.gt(L::zero());
         BsdfSample {
             direction: frame.to_world(light).renormalize(),
-            weight: self.mirrored.times(|| vh, weight).only(valid),
+            weight: self.reflection_fresnel.times(|| vh, weight).masked(valid),
         }
     }
 

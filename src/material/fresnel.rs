@@ -38,7 +38,7 @@ impl<S: Float> Reflectance<S> {
     /// Of a material: its F0 (white if it names none) under its law.
     pub fn new(material: &Material) -> Self {
         let f0 = material.f0().0;
-        let law = material.law();
+        let law = material.fresnel_mode();
         let index2 = match law {
             Fresnel::Dielectric => [material.index.powi(2) - 1.0; 3],
             _ => f0.map(|f| index_from_f0(f).powi(2) - 1.0),
@@ -46,8 +46,10 @@ impl<S: Float> Reflectance<S> {
         let total = f0.map(|f| f >= 1.0 - f64::powi(2.0, -24));
         Self {
             law,
-            f0: f0.map(S::of),
-            index2_less_1: std::array::from_fn(|i| S::of(if total[i] { 0.0 } else { index2[i] })),
+            f0: f0.map(S::from_f64),
+            index2_less_1: std::array::from_fn(|i| {
+                S::from_f64(if total[i] { 0.0 } else { index2[i] })
+            }),
             total,
         }
     }
@@ -90,9 +92,9 @@ impl<S: Float> Reflectance<S> {
         let g = c.mul_add(c, L::splat(self.index2_less_1[channel])).max(L::zero()).sqrt();
         let (plus, minus) = (g + c, g - c);
         // n = 1 seen edge-on: g = c = 0, no boundary, nothing is reflected.
-        let ratio = minus / plus.max(L::of(1e-30));
+        let ratio = minus / plus.max(L::from_f64(1e-30));
         let other = (c * plus - L::one()) / (c * minus + L::one());
-        L::of(0.5) * ratio * ratio * (L::one() + other * other)
+        L::from_f64(0.5) * ratio * ratio * (L::one() + other * other)
     }
 }
 
@@ -149,7 +151,7 @@ mod tests {
         let s = ((ci - 1.5 * ct) / (ci + 1.5 * ct)).powi(2);
         let p = ((1.5 * ci - ct) / (1.5 * ci + ct)).powi(2);
         assert!((exact(0.04).at(0.5).x - 0.5 * (s + p)).abs() < 1e-12);
-        let lanes: crate::lanes::Double = exact(0.04).at(SimdFloat::of(0.5)).x;
+        let lanes: crate::lanes::Double = exact(0.04).at(SimdFloat::from_f64(0.5)).x;
         assert_eq!(lanes.lane(2), exact(0.04).at(0.5).x);
     }
 }

@@ -41,9 +41,9 @@ pub struct TexCoord<L> {
     /// Up.
     pub v: L,
     /// Gradient of u.
-    pub du: Vec3<L>,
+    pub grad_u: Vec3<L>,
     /// Gradient of v.
-    pub dv: Vec3<L>,
+    pub grad_v: Vec3<L>,
 }
 
 /// A projection onto one thing of the scene.
@@ -98,7 +98,8 @@ impl<S: Float> TextureMapping<S> {
         };
         let outer = scene_from_texture.matrix3;
         let inner = outer.inverse();
-        let columns = |m: DMat3| [m.x_axis, m.y_axis, m.z_axis].map(|c| c.to_array().map(S::of));
+        let columns =
+            |m: DMat3| [m.x_axis, m.y_axis, m.z_axis].map(|c| c.to_array().map(S::from_f64));
         let mut scale = placement.scale;
         let extent = high - low;
         if projection == Projection::Planar && placement.mapping == Mapping::Uv {
@@ -109,11 +110,11 @@ impl<S: Float> TextureMapping<S> {
             projection,
             texture_from_scene: columns(inner),
             scene_from_texture: columns(outer),
-            middle: scene_from_texture.transform_point3(middle).to_array().map(S::of),
-            inner_middle: (middle - begin).to_array().map(S::of),
-            extent: extent.to_array().map(S::of),
-            scale: scale.map(S::of),
-            offset: placement.offset.map(S::of),
+            middle: scene_from_texture.transform_point3(middle).to_array().map(S::from_f64),
+            inner_middle: (middle - begin).to_array().map(S::from_f64),
+            extent: extent.to_array().map(S::from_f64),
+            scale: scale.map(S::from_f64),
+            offset: placement.offset.map(S::from_f64),
         }
     }
 
@@ -149,7 +150,7 @@ impl<S: Float> TextureMapping<S> {
                 sides(p, normal, Vec3::splat(self.extent))
             }
             Projection::Uv => {
-                TexCoord { u: L::zero(), v: L::zero(), du: Vec3::zero(), dv: Vec3::zero() }
+                TexCoord { u: L::zero(), v: L::zero(), grad_u: Vec3::zero(), grad_v: Vec3::zero() }
             }
         };
         self.placed(found)
@@ -161,8 +162,8 @@ impl<S: Float> TextureMapping<S> {
         TexCoord {
             u: found.u.mul_add(su, ou),
             v: found.v.mul_add(sv, ov),
-            du: found.du * su,
-            dv: found.dv * sv,
+            grad_u: found.grad_u * su,
+            grad_v: found.grad_v * sv,
         }
     }
 
@@ -196,7 +197,7 @@ fn unit<L: SimdFloat>(axis: usize, length: L) -> Vec3<L> {
 }
 
 fn planar<L: SimdFloat>(p: Vec3<L>) -> TexCoord<L> {
-    TexCoord { u: p.x, v: p.y, du: unit(0, L::one()), dv: unit(1, L::one()) }
+    TexCoord { u: p.x, v: p.y, grad_u: unit(0, L::one()), grad_v: unit(1, L::one()) }
 }
 
 /// The angle around y in turns, its gradient, and the square of the distance from y.
@@ -204,36 +205,36 @@ fn planar<L: SimdFloat>(p: Vec3<L>) -> TexCoord<L> {
 fn around<L: SimdFloat>(p: Vec3<L>) -> (L, Vec3<L>, L) {
     let across2 = p.x.mul_add(p.x, p.z * p.z);
     // On the axis there is no angle, and no gradient that were finite.
-    let across2 = across2.max(p.length2() * L::of(1e-12)).max(L::of(1e-30));
-    let turns = p.x.atan2(p.z).mul_add(L::of(1.0 / TAU), L::of(0.5));
-    let per = L::of(1.0 / TAU) / across2;
+    let across2 = across2.max(p.length_squared() * L::from_f64(1e-12)).max(L::from_f64(1e-30));
+    let turns = p.x.atan2(p.z).mul_add(L::from_f64(1.0 / TAU), L::from_f64(0.5));
+    let per = L::from_f64(1.0 / TAU) / across2;
     (turns, Vec3::new(p.z * per, L::zero(), -(p.x * per)), across2)
 }
 
 fn spherical<L: SimdFloat>(p: Vec3<L>) -> TexCoord<L> {
     let (u, du, across2) = around(p);
     let across = across2.sqrt();
-    let v = p.y.atan2(across).mul_add(L::of(FRAC_1_PI), L::of(0.5));
-    let per = L::of(FRAC_1_PI) / across2.mul_add(L::one(), p.y * p.y);
+    let v = p.y.atan2(across).mul_add(L::from_f64(FRAC_1_PI), L::from_f64(0.5));
+    let per = L::from_f64(FRAC_1_PI) / across2.mul_add(L::one(), p.y * p.y);
     let inward = -(p.y * per) / across;
-    TexCoord { u, v, du, dv: Vec3::new(p.x * inward, across * per, p.z * inward) }
+    TexCoord { u, v, grad_u: du, grad_v: Vec3::new(p.x * inward, across * per, p.z * inward) }
 }
 
 fn cylindrical<L: SimdFloat>(p: Vec3<L>, height: L) -> TexCoord<L> {
     let (u, du, _) = around(p);
     let flat = height.le(L::zero());
-    let per = (L::one() / L::select(flat, L::one(), height)).only(!flat);
-    let (free, low, high) = (p.y * per, L::of(RIM), L::of(1.0 - RIM));
+    let per = (L::one() / L::select(flat, L::one(), height)).masked(!flat);
+    let (free, low, high) = (p.y * per, L::from_f64(RIM), L::from_f64(1.0 - RIM));
     let inside = free.ge(low) & free.le(high);
-    TexCoord { u, v: free.max(low).min(high), du, dv: unit(1, per.only(inside)) }
+    TexCoord { u, v: free.max(low).min(high), grad_u: du, grad_v: unit(1, per.masked(inside)) }
 }
 
 /// Sides of a box from its lower corner on: which one, the normal says.
 fn sides<L: SimdFloat>(p: Vec3<L>, normal: Vec3<L>, extent: Vec3<L>) -> TexCoord<L> {
     let zero = L::zero();
     let [ax, ay, az] = [normal.x, normal.y, normal.z].map(L::abs);
-    let on_z = (az * L::of(TIE)).ge(ax.max(ay));
-    let on_y = (ay * L::of(TIE)).ge(ax).and_not(on_z);
+    let on_z = (az * L::from_f64(TIE)).ge(ax.max(ay));
+    let on_y = (ay * L::from_f64(TIE)).ge(ax).and_not(on_z);
     let pick = |x, y, z| L::select(on_z, z, L::select(on_y, y, x));
     let sign = L::one().copysign(pick(normal.x, normal.y, normal.z));
     let front = sign.gt(zero);
@@ -241,8 +242,8 @@ fn sides<L: SimdFloat>(p: Vec3<L>, normal: Vec3<L>, extent: Vec3<L>) -> TexCoord
     TexCoord {
         u: pick(from(!front, extent.z, p.z), p.x, from(front, extent.x, p.x)),
         v: pick(p.y, from(!front, extent.z, p.z), p.y),
-        du: Vec3::new(pick(zero, L::one(), sign), zero, pick(-sign, zero, zero)),
-        dv: Vec3::new(zero, pick(L::one(), zero, L::one()), pick(zero, -sign, zero)),
+        grad_u: Vec3::new(pick(zero, L::one(), sign), zero, pick(-sign, zero, zero)),
+        grad_v: Vec3::new(zero, pick(L::one(), zero, L::one()), pick(zero, -sign, zero)),
     }
 }
 
@@ -281,7 +282,7 @@ mod tests {
                     let h = 1e-6;
                     let (a, b) = (at(&p, point - way * h, normal), at(&p, point + way * h, normal));
                     let column = Vec3::<f64>::splat(p.texture_from_scene[axis]);
-                    for (a, b, gradient) in [(a.u, b.u, here.du), (a.v, b.v, here.dv)] {
+                    for (a, b, gradient) in [(a.u, b.u, here.grad_u), (a.v, b.v, here.grad_v)] {
                         let slope = (b - a) / (2.0 * h);
                         let told = gradient.dot(column);
                         assert!(
@@ -305,7 +306,7 @@ mod tests {
             );
             for point in [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]] {
                 let c = p.coordinates(Vec3::<f32>::of(point), Vec3::of([0.0, 1.0, 0.0]));
-                let numbers = [c.u, c.v, c.du.max_abs(), c.dv.max_abs()];
+                let numbers = [c.u, c.v, c.grad_u.max_abs(), c.grad_v.max_abs()];
                 assert!(numbers.iter().all(|x| x.is_finite()), "{projection:?} {point:?} {c:?}");
             }
         }

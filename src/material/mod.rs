@@ -187,7 +187,7 @@ impl Default for Material {
 impl Material {
     /// Reflectance at normal incidence: the metal's, the given one, that of a dielectric, or white.
     pub fn f0(&self) -> Color {
-        let own = match self.law() {
+        let own = match self.fresnel_mode() {
             Fresnel::Dielectric => Color([f0_from_index(self.index); 3]),
             _ => Color::WHITE,
         };
@@ -195,13 +195,13 @@ impl Material {
     }
 
     /// How reflectance depends on the angle.
-    pub fn law(&self) -> Fresnel {
+    pub fn fresnel_mode(&self) -> Fresnel {
         let usual = if self.metal.is_some() { Fresnel::Exact } else { Fresnel::Constant };
         self.fresnel.unwrap_or(usual)
     }
 
     /// Slope alpha of the microfacets: the given one, or that with the second moment of the cone.
-    pub fn slope(&self) -> f64 {
+    pub fn microfacet_alpha(&self) -> f64 {
         self.alpha.unwrap_or(self.roughness / 8f64.sqrt())
     }
 

@@ -11,7 +11,7 @@ pub struct Interface<L: SimdFloat> {
     /// Unit direction of the refracted rays; meaningless where all is reflected.
     pub refracted: Vec3<L>,
     /// Lanes past the critical angle: nothing gets to the other side.
-    pub total: L::Mask,
+    pub tir: L::Mask,
     /// Cosine of the angle of incidence.
     cos_i: L,
     /// Cosine of the angle of refraction; 0 past the critical angle.
@@ -30,7 +30,7 @@ pub struct FresnelSplit<L> {
     /// Factor of what is seen through the surface.
     pub transmitted: L,
     /// Factor of a perfect reflection that takes the place of the transmitted ray.
-    pub total: L,
+    pub tir: L,
 }
 
 impl<L: SimdFloat> Interface<L> {
@@ -45,13 +45,13 @@ impl<L: SimdFloat> Interface<L> {
         let along = n.mul_add(cos_i, incident);
         let ratio = n_i / n_t;
         let same = n_i.le(n_t) & n_t.le(n_i);
-        let sin2_t = ratio * ratio * along.length2();
+        let sin2_t = ratio * ratio * along.length_squared();
         let total = sin2_t.ge(L::one()).and_not(same);
         let cos_t = (L::one() - sin2_t).max(L::zero()).sqrt();
         let bent = n.mul_add(-cos_t, along * ratio).renormalize();
         Self {
             refracted: Vec3::select(same, incident, bent),
-            total,
+            tir: total,
             cos_i: cos_i.max(L::zero()),
             cos_t: L::select(same, cos_i.max(L::zero()), cos_t),
             n_i,
@@ -65,19 +65,19 @@ impl<L: SimdFloat> Interface<L> {
         let Self { cos_i, cos_t, n_i, n_t, .. } = *self;
         let share = |a: L, b: L| {
             // Both are zero where nothing bends and the ray grazes: no boundary.
-            let r = (a - b) / (a + b).max(L::of(1e-30));
+            let r = (a - b) / (a + b).max(L::from_f64(1e-30));
             r * r
         };
         let s = share(n_i * cos_i, n_t * cos_t);
         let p = share(n_t * cos_i, n_i * cos_t);
-        (L::select(self.total, L::one(), s), L::select(self.total, L::one(), p))
+        (L::select(self.tir, L::one(), s), L::select(self.tir, L::one(), p))
     }
 
     /// Share of unpolarised light that the boundary reflects, F.
     #[inline(always)]
     pub fn reflectance(&self) -> L {
         let (s, p) = self.polarised();
-        (s + p) * L::of(0.5)
+        (s + p) * L::from_f64(0.5)
     }
 
     /// The same for a thin pane, a slab with this boundary on both sides, with all its inner
@@ -98,26 +98,26 @@ impl<L: SimdFloat> Interface<L> {
             let f = self.reflectance();
             return FresnelSplit {
                 reflected: f,
-                transmitted: (k_t * (L::one() - f)).only(!self.total),
-                total: L::zero(),
+                transmitted: (k_t * (L::one() - f)).masked(!self.tir),
+                tir: L::zero(),
             };
         }
         FresnelSplit {
-            reflected: L::one().only(outer.and_not(self.total)),
-            transmitted: k_t.only(!self.total),
-            total: L::one().only(self.total),
+            reflected: L::one().masked(outer.and_not(self.tir)),
+            transmitted: k_t.masked(!self.tir),
+            tir: L::one().masked(self.tir),
         }
     }
 
     /// What the rays count by a thin pane, which they cross without bending.
     #[inline(always)]
-    pub fn split_by_pane(&self, by: &Transmission<L::Scalar>) -> FresnelSplit<L> {
+    pub fn split_thin(&self, by: &Transmission<L::Scalar>) -> FresnelSplit<L> {
         let k_t = L::splat(by.strength);
         if !by.dielectric {
-            return FresnelSplit { reflected: L::one(), transmitted: k_t, total: L::zero() };
+            return FresnelSplit { reflected: L::one(), transmitted: k_t, tir: L::zero() };
         }
         let f = self.pane_reflectance();
-        FresnelSplit { reflected: f, transmitted: k_t * (L::one() - f), total: L::zero() }
+        FresnelSplit { reflected: f, transmitted: k_t * (L::one() - f), tir: L::zero() }
     }
 }
 
@@ -131,7 +131,7 @@ mod tests {
     fn at<L: SimdFloat>(degrees: f64, n_i: f64, n_t: f64) -> Interface<L> {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let up = Vec3::of([0.0, 0.0, 1.0]);
-        Interface::new(Vec3::of([sin, 0.0, -cos]), up, L::of(n_i), L::of(n_t))
+        Interface::new(Vec3::of([sin, 0.0, -cos]), up, L::from_f64(n_i), L::from_f64(n_t))
     }
 
     /// Share of the energy that goes on: n_t cos t / (n_i cos i) times the squared amplitudes.
@@ -173,8 +173,8 @@ mod tests {
                 let i = at::<f64>(degrees, n, 1.0);
                 let f = i.reflectance();
                 assert!((0.0..=1.0).contains(&f), "{n} {degrees} {f}");
-                assert_eq!(i.total, f == 1.0 && n > 1.0, "{n} {degrees}");
-                if !i.total && n > 1.0 {
+                assert_eq!(i.tir, f == 1.0 && n > 1.0, "{n} {degrees}");
+                if !i.tir && n > 1.0 {
                     assert!((f + transmittance(&i) - 1.0).abs() < 1e-12, "{n} {degrees}");
                     // 1 - F = 4 n cos t / cos i at most, and cos^2 t = 2 d cot c at the distance d
                     // from the critical angle c.
@@ -192,7 +192,7 @@ mod tests {
                 for (n_i, n_t) in [(1.0, n), (n, 1.0)] {
                     let i = at::<f64>(degrees, n_i, n_t);
                     let f = i.reflectance();
-                    let t = if i.total || degrees == 90.0 { 1.0 - f } else { transmittance(&i) };
+                    let t = if i.tir || degrees == 90.0 { 1.0 - f } else { transmittance(&i) };
                     assert!((f + t - 1.0).abs() < 1e-12, "{n_i} {n_t} {degrees}: {f} {t}");
                     worst = worst.max((f + t - 1.0).abs());
                     let single = at::<f32>(degrees, n_i, n_t).reflectance();
@@ -211,7 +211,7 @@ mod tests {
             let there = at::<f64>(degrees, 1.0, 1.5);
             let t = there.refracted;
             assert!((t.x - degrees.to_radians().sin() / 1.5).abs() < 1e-15);
-            assert!((t.length2() - 1.0).abs() < 1e-14 && t.z < 0.0);
+            assert!((t.length_squared() - 1.0).abs() < 1e-14 && t.z < 0.0);
             let up = Vec3::of([0.0, 0.0, -1.0]);
             let back = Interface::<f64>::new(-t, up, 1.5, 1.0).refracted;
             let (sin, cos) = degrees.to_radians().sin_cos();
@@ -220,7 +220,7 @@ mod tests {
         let straight = at::<Single>(50.0, 1.3, 1.3);
         let (sin, _) = 50f64.to_radians().sin_cos();
         assert_eq!(SimdFloat::lane(straight.refracted.x, 3), sin as f32);
-        assert!(straight.total.none());
+        assert!(straight.tir.none());
         assert_eq!(SimdFloat::lane(straight.reflectance(), 0), 0.0);
     }
 
@@ -230,7 +230,7 @@ mod tests {
             let (wide, one) = (at::<Double>(degrees, 1.5, 1.0), at::<f64>(degrees, 1.5, 1.0));
             assert_eq!(SimdFloat::lane(wide.refracted.x, 1), one.refracted.x);
             assert_eq!(SimdFloat::lane(wide.reflectance(), 2), one.reflectance());
-            assert_eq!(Mask::lane(wide.total, 0), one.total);
+            assert_eq!(Mask::lane(wide.tir, 0), one.tir);
         }
     }
 }

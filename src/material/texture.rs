@@ -313,7 +313,7 @@ impl Texture {
     }
 
     /// Whether it shows anything: an image without a file does not.
-    pub fn shows(&self) -> bool {
+    pub fn has_effect(&self) -> bool {
         match self {
             Self::Image(image) => image.image().is_some(),
             Self::Checker(_) => true,
@@ -346,7 +346,7 @@ impl Bump {
     }
 
     /// Whether it turns any normal: without a file, or with the height 0, it does not.
-    pub fn shows(&self) -> bool {
+    pub fn has_effect(&self) -> bool {
         let Self::Image(image) = self;
         image.height != 0.0 && image.image().is_some()
     }

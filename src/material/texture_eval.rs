@@ -82,7 +82,7 @@ fn gathered<L: SimdFloat>(bits: u32, mut f: impl FnMut(usize) -> [f64; 3]) -> Ve
         left &= left - 1;
         all[lane] = f(lane);
     }
-    Vec3::from_fn(|lane| all[lane].map(L::Scalar::of))
+    Vec3::from_fn(|lane| all[lane].map(L::Scalar::from_f64))
 }
 
 impl<S: Float> CompiledTexture<S> {
@@ -90,7 +90,7 @@ impl<S: Float> CompiledTexture<S> {
     pub fn new(texture: &Texture) -> Option<Self> {
         match texture {
             Texture::Checker(checker) => {
-                Some(Self::Checker([checker.even, checker.odd].map(|c| c.0.map(S::of))))
+                Some(Self::Checker([checker.even, checker.odd].map(|c| c.0.map(S::from_f64))))
             }
             Texture::Image(texture) => Some(Self::Image {
                 image: texture.image()?.clone(),
@@ -101,7 +101,7 @@ impl<S: Float> CompiledTexture<S> {
     }
 
     /// The colours at (u, v) in the lanes of `bits`.
-    pub fn colors<L: SimdFloat<Scalar = S>>(&self, (u, v): (L, L), bits: u32) -> Vec3<L> {
+    pub fn eval<L: SimdFloat<Scalar = S>>(&self, (u, v): (L, L), bits: u32) -> Vec3<L> {
         let at = |lane| (u.lane(lane).to_f64(), v.lane(lane).to_f64());
         match self {
             Self::Checker(colors) => gathered(bits, |lane| {
@@ -121,7 +121,7 @@ impl BumpMap {
     /// Of a bump; `None`: it turns nothing.
     pub fn new(bump: &Bump) -> Option<Self> {
         let Bump::Image(of) = bump;
-        bump.shows().then_some(())?;
+        bump.has_effect().then_some(())?;
         Some(Self { image: of.image()?.clone(), wrap: of.wrap, height: of.height })
     }
 
@@ -129,7 +129,7 @@ impl BumpMap {
     ///
     /// The differences of the pixels on both sides of each pixel, bilinear between pixels: so slopes
     /// change evenly, where those of bilinear heights would jump from pixel to pixel.
-    pub fn slopes<L: SimdFloat>(&self, (u, v): (L, L), bits: u32) -> (L, L) {
+    pub fn gradient<L: SimdFloat>(&self, (u, v): (L, L), bits: u32) -> (L, L) {
         let slopes: Vec3<L> = gathered(bits, |lane| {
             let [du, dv] = self.slope_at(u.lane(lane).to_f64(), v.lane(lane).to_f64());
             [du, dv, 0.0]

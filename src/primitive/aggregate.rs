@@ -227,10 +227,10 @@ impl<L: SimdFloat> Aggregate<L> {
             let (part, i) = self.tree_items[item];
             let part = &self.parts[part as usize];
             // As near is near enough: of equal distances the lowest tag counts.
-            let mut one = Hit::nearer_than(limit * L::of(1.0 + 2.0 * L::EPSILON));
+            let mut one = Hit::nearer_than(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
             part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut one);
             // Lanes of no interest have met nothing.
-            one.t = L::select(one.t.gt(L::zero()), one.t, L::of(L::MAX));
+            one.t = L::select(one.t.gt(L::zero()), one.t, L::from_f64(L::MAX));
             hit.take(&one);
             hit.t
         });
@@ -334,7 +334,7 @@ impl<L: SimdFloat> Aggregate<L> {
         wanted: L::Mask,
         mut blocked: L::Mask,
     ) -> L::Mask {
-        let limit_of = |blocked| L::select(wanted.and_not(blocked), limit, L::of(-1.0));
+        let limit_of = |blocked| L::select(wanted.and_not(blocked), limit, L::from_f64(-1.0));
         tree.walk(ray, limit_of(blocked), |item, left| {
             let open = left.gt(L::zero());
             let new = self.blocked_by_one(item as u32, ray, left, open);
@@ -413,7 +413,7 @@ impl<L: SimdFloat> Aggregate<L> {
 /// Nothing met yet; what nobody wants goes no way.
 #[inline(always)]
 fn nearest_wanted<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
-    Hit::nearer_than(L::select(wanted, L::of(L::MAX), L::of(-1.0)))
+    Hit::nearer_than(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))
 }
 
 fn indices(range: &Range<u32>) -> Range<usize> {

@@ -39,7 +39,7 @@ impl<L: SimdFloat> SurfacePoint<L> {
     /// involved.
     #[inline(always)]
     pub fn lift(&self) -> L {
-        self.reach.max(self.point.max_abs()) * L::of(8.0 * L::EPSILON)
+        self.reach.max(self.point.max_abs()) * L::from_f64(8.0 * L::EPSILON)
     }
 }
 

@@ -39,13 +39,13 @@ impl<S: Float> ConicalFrustum<S> {
         let up = inverse.transpose() * DVec3::Z;
         let center = m.transform_point3(DVec3::new(0.0, 0.0, 0.5));
         Some(Self {
-            center: center.to_array().map(S::of),
+            center: center.to_array().map(S::from_f64),
             unit_from_scene: rows(inverse),
-            slope: S::of(top - 1.0),
-            middle: S::of(0.5 * (1.0 + top)),
-            cap_normal: up.normalize().to_array().map(S::of),
-            height: S::of(up.length().recip()),
-            reach: S::of(reach(form)),
+            slope: S::from_f64(top - 1.0),
+            middle: S::from_f64(0.5 * (1.0 + top)),
+            cap_normal: up.normalize().to_array().map(S::from_f64),
+            height: S::from_f64(up.length().recip()),
+            reach: S::from_f64(reach(form)),
         })
     }
 }
@@ -83,17 +83,17 @@ impl<L: SimdFloat> Chord<L> {
 /// to a generator, leaves one of them finite.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
-    let (zero, half) = (L::zero(), L::of(0.5));
+    let (zero, half) = (L::zero(), L::from_f64(0.5));
     let f = times(&s.unit_from_scene, ray.origin - Vec3::splat(s.center));
     let d = times(&s.unit_from_scene, ray.direction);
-    let scale = L::one() / d.length2().sqrt();
+    let scale = L::one() / d.length_squared().sqrt();
     let d = d * scale;
     // Twice: what the first step rounds off along the direction, the second takes away.
     let back = -f.dot(d);
     let p = d.mul_add(back, f);
     let again = -p.dot(d);
     let p = d.mul_add(again, p);
-    let near = p.length2().le(L::of(AROUND2));
+    let near = p.length_squared().le(L::from_f64(AROUND2));
     if near.none() {
         return None;
     }
@@ -117,7 +117,7 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     let (low, high) = (t0.min(t1), t0.max(t1));
     // A line along a generator or the axis that touches nothing: inside everywhere or nowhere.
     let level = L::mask(true).and_not(turns) & a.abs().le(zero);
-    let (all, none) = (L::of(L::MAX), L::of(-L::MAX));
+    let (all, none) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
     // Of the two nappes the one where the radius is positive, on which the line ends or begins.
     let widens = kd.gt(zero);
     let enter_side = L::select(steep, L::select(widens, high, none), low);
@@ -126,7 +126,7 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     let leave_side = L::select(level, all, leave_side);
     let crosses = (steep | discriminant.ge(zero)).and_not(level) | (level & c.le(zero));
     // Between the planes of the ends; a parallel line is within or without by its height.
-    let tiny = L::of(1e-30);
+    let tiny = L::from_f64(1e-30);
     let inverse = L::one() / d.z.abs().max(tiny).copysign(d.z);
     let (z0, z1) = ((-half - p.z) * inverse, (half - p.z) * inverse);
     let (enter_ends, leave_ends) = (z0.min(z1), z0.max(z1));
@@ -170,10 +170,10 @@ impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
         let s = self;
         let p = times(&s.unit_from_scene, point - Vec3::splat(s.center));
         let (side, rho) = side_normal(s, p.x, p.y);
-        let steepness = L::one() / side.length2().sqrt();
+        let steepness = L::one() / side.length_squared().sqrt();
         let radius = L::splat(s.slope).mul_add(p.z, L::splat(s.middle));
         let beside = (rho - radius) * steepness;
-        let above = (p.z.abs() - L::of(0.5)) * L::splat(s.height);
+        let above = (p.z.abs() - L::from_f64(0.5)) * L::splat(s.height);
         let cap = Vec3::splat(s.cap_normal);
         let cap = Vec3::select(p.z.lt(L::zero()), -cap, cap);
         let on_side = beside.ge(above);
@@ -192,7 +192,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for ConicalFrustum<L::Scalar> {
         let cosine = |on_side: L::Mask, t: L| {
             let at = chord.direction.mul_add(t, chord.point);
             let (normal, _) = side_normal(s, at.x, at.y);
-            let side = (normal.dot(ray.direction) / normal.length2().sqrt()).abs();
+            let side = (normal.dot(ray.direction) / normal.length_squared().sqrt()).abs();
             L::select(on_side, side, cap)
         };
         Some(Span {

@@ -38,10 +38,10 @@ impl<S: Float> ConvexPolyhedron<S> {
         let center = 0.5 * (low + high);
         let radius2 = corners.iter().map(|c| c.distance_squared(center)).fold(0.0, f64::max);
         let mut out = Self {
-            center: center.to_array().map(S::of),
+            center: center.to_array().map(S::from_f64),
             // Rounded up: the test may let a miss through, never lose a hit.
-            radius2: S::of(radius2 * (1.0 + 8.0 * S::EPSILON)),
-            reach: S::of(reach(form)),
+            radius2: S::from_f64(radius2 * (1.0 + 8.0 * S::EPSILON)),
+            reach: S::from_f64(reach(form)),
             slabs: Vec::new(),
             faces: Vec::new(),
         };
@@ -53,14 +53,14 @@ impl<S: Float> ConvexPolyhedron<S> {
             let opposite = (i + 1..faces.len())
                 .find(|j| !paired[*j] && (faces[*j].normal + face.normal).length() < 1e-14);
             let high = face.offset - face.normal.dot(center);
-            let normal = face.normal.to_array().map(S::of);
+            let normal = face.normal.to_array().map(S::from_f64);
             match opposite {
                 Some(j) => {
                     paired[j] = true;
                     let low = -(faces[j].offset - faces[j].normal.dot(center));
-                    out.slabs.push(Slab { normal, low: S::of(low), high: S::of(high) });
+                    out.slabs.push(Slab { normal, low: S::from_f64(low), high: S::from_f64(high) });
                 }
-                None => out.faces.push(Face { normal, high: S::of(high) }),
+                None => out.faces.push(Face { normal, high: S::from_f64(high) }),
             }
         }
         Some(out)
@@ -74,16 +74,16 @@ impl<S: Float> ConvexPolyhedron<S> {
         let from_center = ray.origin - Vec3::splat(self.center);
         let along = from_center.dot(ray.direction);
         let across = ray.direction.mul_add(-along, from_center);
-        let near = across.length2().le(L::splat(self.radius2));
+        let near = across.length_squared().le(L::splat(self.radius2));
         if near.none() {
             return None;
         }
-        let mut enter = L::of(-L::MAX);
-        let mut leave = L::of(L::MAX);
+        let mut enter = L::from_f64(-L::MAX);
+        let mut leave = L::from_f64(L::MAX);
         // A direction parallel to a face becomes one that is so nearly, on the side of its zero's
         // sign: 0 / 0 cannot occur, a line inside the face is not cut by it, one beyond it has an
         // empty chord, and one in the face's plane touches the solid or not by that sign.
-        let tiny = L::of(1e-30);
+        let tiny = L::from_f64(1e-30);
         let steep = |speed: L| speed.abs().max(tiny).copysign(speed);
         for slab in &self.slabs {
             let normal = Vec3::splat(slab.normal);
@@ -118,7 +118,7 @@ impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let from_center = point - Vec3::splat(self.center);
-        let mut outside = L::of(-L::MAX);
+        let mut outside = L::from_f64(-L::MAX);
         let mut normal = Vec3::zero();
         for slab in &self.slabs {
             let n = Vec3::splat(slab.normal);
@@ -148,7 +148,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for ConvexPolyhedron<L::Scalar> {
         let from_center = ray.origin - Vec3::splat(self.center);
         // The face at an end is the one that is nearest there, of those that the line crosses in
         // the right sense.
-        let mut best = (L::of(-L::MAX), L::of(-L::MAX));
+        let mut best = (L::from_f64(-L::MAX), L::from_f64(-L::MAX));
         let mut cosines = (L::one(), L::one());
         let mut face = |normal: Vec3<L>, offset: L| {
             let speed = normal.dot(ray.direction);

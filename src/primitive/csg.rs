@@ -126,9 +126,9 @@ impl<S: Float> Compounds<S> {
         let (low, high) = compound.bounds().unwrap_or_default();
         let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * S::EPSILON);
         self.compounds.push(SolidOperand {
-            center: (0.5 * (low + high)).to_array().map(S::of),
-            radius2: S::of(radius * radius),
-            reach: S::of(compound.parts.iter().map(reach).fold(0.0, f64::max)),
+            center: (0.5 * (low + high)).to_array().map(S::from_f64),
+            radius2: S::from_f64(radius * radius),
+            reach: S::from_f64(compound.parts.iter().map(reach).fold(0.0, f64::max)),
             parts: first_part..self.parts.len(),
             ops: first_op..self.ops.len(),
             depth,
@@ -201,7 +201,7 @@ impl<S: Float> Compounds<S> {
             before: L::mask(false),
             after: L::mask(false),
             t: L::zero(),
-            tag: L::tag(0),
+            tag: L::from_id(0),
         };
         with_room(one.depth, nothing, |stack| {
             let mut top = 0;
@@ -210,7 +210,7 @@ impl<S: Float> Compounds<S> {
                     let span = &spans[*i as usize];
                     let (was, is) = (span.at(before), span.at(after));
                     let t = L::select(is, span.enter, span.leave);
-                    let tag = L::tag(base + one.parts.start as u32 + i);
+                    let tag = L::from_id(base + one.parts.start as u32 + i);
                     stack[top] = Transition { before: was, after: is, t, tag };
                     top += 1;
                     continue;
@@ -241,18 +241,19 @@ impl<S: Float> Compounds<S> {
         let across = ray.direction.mul_add(-along, from_center);
         let radius2 = L::splat(one.radius2);
         // Ahead, or around the origin.
-        let ahead = along.le(L::zero()) | from_center.length2().le(radius2);
-        let near = wanted & across.length2().le(radius2) & ahead;
+        let ahead = along.le(L::zero()) | from_center.length_squared().le(radius2);
+        let near = wanted & across.length_squared().le(radius2) & ahead;
         if near.none() {
             return;
         }
-        let (never, always) = (L::of(L::MAX), L::of(-L::MAX));
+        let (never, always) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
         let parts = &self.parts[one.parts.clone()];
         let outside = Interval { enter: never, leave: always };
         let end = Event { t: never, tie: L::zero() };
         with_room(parts.len(), outside, |spans| {
             with_room(2 * parts.len(), end, |ends| {
-                let tie = ray.origin.max_abs().max(L::splat(one.reach)) * L::of(TIE * L::EPSILON);
+                let tie =
+                    ray.origin.max_abs().max(L::splat(one.reach)) * L::from_f64(TIE * L::EPSILON);
                 let mut count = 0;
                 for (span, part) in spans.iter_mut().zip(parts) {
                     let found = each!(&part.solid, solid => solid.span(ray));
@@ -284,16 +285,16 @@ impl<S: Float> Compounds<S> {
         mut open: L::Mask,
         hit: &mut Hit<L>,
     ) {
-        let last = Event { t: L::of(L::MAX), tie: L::zero() };
+        let last = Event { t: L::from_f64(L::MAX), tie: L::zero() };
         let mut state = L::mask(false);
-        let mut before = L::of(-L::MAX);
+        let mut before = L::from_f64(-L::MAX);
         for (i, end) in ends.iter().enumerate() {
             let next = ends.get(i + 1).unwrap_or(&last);
             let gap = open & (next.t - end.t).gt(end.tie.min(next.tie));
             if gap.none() {
                 continue;
             }
-            let middle = L::of(0.5) * end.t + L::of(0.5) * next.t;
+            let middle = L::from_f64(0.5) * end.t + L::from_f64(0.5) * next.t;
             let inside = self.inside(one, spans, middle);
             let changed = gap & (inside.and_not(state) | state.and_not(inside));
             if changed.any() {

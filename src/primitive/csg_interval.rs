@@ -74,12 +74,12 @@ pub fn with_room<T: Copy, R>(n: usize, fill: T, use_it: impl FnOnce(&mut [T]) ->
 /// The ends of a span; those of lines that do not meet the solid stand behind all others.
 #[inline(always)]
 pub fn both_ends<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
-    let never = L::of(L::MAX);
+    let never = L::from_f64(L::MAX);
     let end = |t: L, cosine: L| {
         let real = span.meets & t.abs().lt(never);
         Event {
             t: L::select(span.meets, t, never),
-            tie: (tie / cosine.max(L::of(FLATTEST))).only(real),
+            tie: (tie / cosine.max(L::from_f64(FLATTEST))).masked(real),
         }
     };
     [end(span.enter, span.enter_cosine), end(span.leave, span.leave_cosine)]

@@ -19,7 +19,7 @@ pub struct Ellipsoid<S> {
 
 /// The rows of a matrix, rounded.
 pub(crate) fn rows<S: Float>(m: DMat3) -> [[S; 3]; 3] {
-    m.transpose().to_cols_array_2d().map(|row| row.map(S::of))
+    m.transpose().to_cols_array_2d().map(|row| row.map(S::from_f64))
 }
 
 /// A matrix, given by rows, times a vector.
@@ -33,10 +33,10 @@ impl<S: Float> Ellipsoid<S> {
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Ellipsoid { scene_from_unit: m } = form else { return None };
         Some(Self {
-            center: m.translation.to_array().map(S::of),
+            center: m.translation.to_array().map(S::from_f64),
             unit_from_scene: rows(m.matrix3.inverse()),
             scene_from_unit: rows(m.matrix3),
-            reach: S::of(reach(form)),
+            reach: S::from_f64(reach(form)),
         })
     }
 }
@@ -46,7 +46,7 @@ impl<S: Float> Ellipsoid<S> {
 fn chord<L: SimdFloat>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
     let f = times(&e.unit_from_scene, ray.origin - Vec3::splat(e.center));
     let d = times(&e.unit_from_scene, ray.direction);
-    let scale = L::one() / d.length2().sqrt();
+    let scale = L::one() / d.length_squared().sqrt();
     let (near, far, meets) = crossings(f, d * scale, L::one())?;
     Some((near * scale, far * scale, meets))
 }

@@ -83,7 +83,7 @@ impl<S: Float> ItemBox<S> {
     /// Of a form, in its own space if `own` and if it has one; `None`: it has no end.
     pub fn new(form: &Form, own: bool) -> Option<Self> {
         let bounds = form.bounds()?;
-        let vector = |v: DVec3| v.to_array().map(S::of);
+        let vector = |v: DVec3| v.to_array().map(S::from_f64);
         let made = |bounds, space| {
             let [low, high] = padded(bounds, S::EPSILON.max(GIVEN)).map(vector);
             Self { low, high, space }
@@ -97,8 +97,8 @@ impl<S: Float> ItemBox<S> {
         let space = BoxFrame {
             center: vector(scene_from_own.transform_point3(middle)),
             rows: rows.map(vector),
-            growth: rows.map(|r| S::of(r.abs().element_sum())),
-            reach: S::of(bounds.0.abs().max(bounds.1.abs()).max_element()),
+            growth: rows.map(|r| S::from_f64(r.abs().element_sum())),
+            reach: S::from_f64(bounds.0.abs().max(bounds.1.abs()).max_element()),
         };
         Some(made((low - middle, high - middle), Some(space)))
     }
@@ -109,13 +109,13 @@ impl<S: Float> ItemBox<S> {
         let far = ray.origin.max_abs();
         let beam = match &self.space {
             None => {
-                let pad = far * L::of(4.0 * L::EPSILON);
+                let pad = far * L::from_f64(4.0 * L::EPSILON);
                 SlabPacket::new(ray, Vec3::new(pad, pad, pad))
             }
             Some(space) => {
                 // What origin, direction and centre lose on their way into the space, at most, by the
                 // time the ray has come to the thing.
-                let lost = (far + L::splat(space.reach)) * L::of(64.0 * L::EPSILON);
+                let lost = (far + L::splat(space.reach)) * L::from_f64(64.0 * L::EPSILON);
                 let rows = space.rows.map(Vec3::splat);
                 let of = |v: Vec3<L>| Vec3::new(rows[0].dot(v), rows[1].dot(v), rows[2].dot(v));
                 let inner = Ray {

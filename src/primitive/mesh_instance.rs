@@ -57,10 +57,10 @@ impl<S: Float> MeshInstance<S> {
         Some(Self {
             mesh: mesh.clone(),
             extent: ItemBox::new(form, false)?,
-            mesh_from_scene: columns.map(|c| c.to_array().map(S::of)),
-            center: scene_from_mesh.transform_point3(middle).to_array().map(S::of),
-            mesh_center: middle.to_array().map(S::of),
-            reach: S::of(outer.max(inner)),
+            mesh_from_scene: columns.map(|c| c.to_array().map(S::from_f64)),
+            center: scene_from_mesh.transform_point3(middle).to_array().map(S::from_f64),
+            mesh_center: middle.to_array().map(S::from_f64),
+            reach: S::from_f64(outer.max(inner)),
             smooth: *smooth,
         })
     }
@@ -87,7 +87,7 @@ impl<S: Float> MeshInstance<S> {
     #[inline(always)]
     fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
         let direction = self.vector(ray.direction);
-        let length = direction.length2().sqrt();
+        let length = direction.length_squared().sqrt();
         let direction = direction * (L::one() / length);
         (Ray { origin: self.point(ray.origin), direction }, length)
     }
@@ -97,10 +97,10 @@ impl<S: Float> MeshInstance<S> {
     fn vertices<L: SimdFloat<Scalar = S>>(&self, facet: L, of: &[[f32; 3]]) -> [Vec3<L>; 3] {
         let triangles = &self.mesh.mesh().triangles;
         // Lanes that met something else may hold any tag.
-        let number = |lane| (facet.tag_lane(lane) as usize).min(triangles.len() - 1);
+        let number = |lane| (facet.id_lane(lane) as usize).min(triangles.len() - 1);
         std::array::from_fn(|k| {
             Vec3::from_fn(|lane| {
-                of[triangles[number(lane)][k] as usize].map(|x| S::of(f64::from(x)))
+                of[triangles[number(lane)][k] as usize].map(|x| S::from_f64(f64::from(x)))
             })
         })
     }
@@ -109,10 +109,10 @@ impl<S: Float> MeshInstance<S> {
     #[inline(always)]
     fn pairs<L: SimdFloat<Scalar = S>>(&self, facet: L, of: &[[f32; 2]]) -> [[L; 2]; 3] {
         let triangles = &self.mesh.mesh().triangles;
-        let number = |lane| (facet.tag_lane(lane) as usize).min(triangles.len() - 1);
+        let number = |lane| (facet.id_lane(lane) as usize).min(triangles.len() - 1);
         let one = |vertex: usize, k: usize| {
             let pair = |lane| of[triangles[number(lane)][vertex] as usize][k];
-            L::from_fn(|lane| S::of(f64::from(pair(lane))))
+            L::from_fn(|lane| S::from_f64(f64::from(pair(lane))))
         };
         std::array::from_fn(|vertex| [one(vertex, 0), one(vertex, 1)])
     }
@@ -137,7 +137,7 @@ impl<L: SimdFloat> Triangle<L> {
         let [a, b, c] = self.corners;
         let (to_b, to_c) = (b - a, c - a);
         let normal = to_b.cross(to_c);
-        let inverse = L::one() / normal.length2();
+        let inverse = L::one() / normal.length_squared();
         [to_c.cross(normal) * inverse, normal.cross(to_b) * inverse]
     }
 
@@ -176,8 +176,8 @@ impl<S: Float> Meshes<S> {
             let (inner, length) = item.ray(ray);
             // Beyond by what the way into the mesh's space and back rounds off: what is known decides only
             // here below, in the scene's distances, so that the order of things does not matter.
-            let limit = hit.t * length * L::of(1.0 + 4.0 * L::EPSILON);
-            let limit = L::select(near, limit, L::of(-1.0));
+            let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
+            let limit = L::select(near, limit, L::from_f64(-1.0));
             let found = triangle_mesh::closest(&item.mesh, &inner, limit);
             let met = found.t.lt(limit);
             let before = hit.t;
@@ -206,7 +206,7 @@ impl<S: Float> Meshes<S> {
                 continue;
             }
             let (inner, length) = item.ray(ray);
-            let limit = L::select(open, limit * length, L::of(-1.0));
+            let limit = L::select(open, limit * length, L::from_f64(-1.0));
             blocked = blocked | triangle_mesh::blocked(&item.mesh, &inner, limit);
         }
         blocked
@@ -229,7 +229,7 @@ impl<S: Float> Meshes<S> {
         let flat = Vec3::select(sound, flat * (L::one() / largest), Vec3::of([0.0, 0.0, 1.0]));
         let height = flat.dot(item.point(point) - triangle.corners[0]);
         let normal = item.normal(flat);
-        let inverse = L::one() / normal.length2().sqrt();
+        let inverse = L::one() / normal.length_squared().sqrt();
         let normal = normal * inverse;
         let point = normal.mul_add(-height * inverse, point);
         SurfacePoint { point, normal, reach: L::splat(item.reach) }
@@ -253,7 +253,7 @@ impl<S: Float> Meshes<S> {
         let weights = item.triangle(facet).weights(item.point(point));
         let [a, b, c] = item.vertices(facet, item.mesh.smooth_normals());
         let smooth = item.normal(a * weights[0] + b * weights[1] + c * weights[2]);
-        let smooth = smooth * (L::one() / smooth.length2().sqrt());
+        let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
         // Normals that cancel, or a triangle without area, leave no number.
         facing(smooth, normal, direction)
     }
@@ -286,10 +286,10 @@ impl<S: Float> Meshes<S> {
     pub fn color<L: SimdFloat<Scalar = S>>(&self, item: usize, facet: L) -> Option<Vec3<L>> {
         let mesh = self.items[item].mesh.mesh();
         mesh.color(0)?;
-        let number = |lane| (facet.tag_lane(lane) as usize).min(mesh.triangles.len() - 1);
+        let number = |lane| (facet.id_lane(lane) as usize).min(mesh.triangles.len() - 1);
         let white = [1.0; 3];
         Some(Vec3::from_fn(|lane| {
-            mesh.color(number(lane)).unwrap_or(white).map(|x| S::of(f64::from(x)))
+            mesh.color(number(lane)).unwrap_or(white).map(|x| S::from_f64(f64::from(x)))
         }))
     }
 

@@ -24,13 +24,13 @@ impl<S: Float> Parallelogram<S> {
         let Form::Parallelogram { corner, u, v } = form else { return None };
         let n = u.cross(*v);
         let area2 = n.length_squared();
-        let of = |v: DVec3| v.to_array().map(S::of);
+        let of = |v: DVec3| v.to_array().map(S::from_f64);
         Some(Self {
             corner: of(*corner),
             normal: of(n.normalize()),
             dual_u: of(v.cross(n) / area2),
             dual_v: of(n.cross(*u) / area2),
-            reach: S::of(reach(form)),
+            reach: S::from_f64(reach(form)),
         })
     }
 }
@@ -68,7 +68,7 @@ impl<S: Float> Plane<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Plane { normal, offset } = form else { return None };
-        Some(Self { normal: normal.to_array().map(S::of), offset: S::of(*offset) })
+        Some(Self { normal: normal.to_array().map(S::from_f64), offset: S::from_f64(*offset) })
     }
 }
 
@@ -96,7 +96,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
         let normal = Vec3::splat(self.normal);
         let speed = ray.direction.dot(normal);
         let height = ray.origin.dot(normal) - L::splat(self.offset);
-        let (all, none) = (L::of(L::MAX), L::of(-L::MAX));
+        let (all, none) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
         let t = -height / speed;
         let (enters, leaves) = (speed.lt(L::zero()), speed.gt(L::zero()));
         // A line parallel to the plane is behind it or before it for ever. A crossing beyond all

@@ -57,7 +57,7 @@ impl SceneBvh {
         }
         // What an item's own test rounds off of a distant origin must not be cut off by its box: the
         // boxes grow by a few roundings of the origin.
-        let pad = ray.origin.max_abs() * L::of(4.0 * L::EPSILON);
+        let pad = ray.origin.max_abs() * L::from_f64(4.0 * L::EPSILON);
         let beam = SlabPacket::new(ray, Vec3::new(pad, pad, pad));
         let boxes = &self.boxes;
         if self.is_together(ray, wanted) {
@@ -67,11 +67,11 @@ impl SceneBvh {
                 together(boxes, (&beam, bounds.as_ref()), limit, stack, leaf)
             });
         }
-        let numbers = L::from_fn(|lane| L::Scalar::of(lane as f64));
+        let numbers = L::from_fn(|lane| L::Scalar::from_f64(lane as f64));
         let leaf = |lane: usize, number: usize, limit: L::Scalar| {
-            let number_of = L::of(lane as f64);
+            let number_of = L::from_f64(lane as f64);
             let here = numbers.le(number_of) & numbers.ge(number_of);
-            let limit = L::select(here, L::splat(limit), L::of(-1.0));
+            let limit = L::select(here, L::splat(limit), L::from_f64(-1.0));
             leaf(self.items[number] as usize, limit).lane(lane)
         };
         with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {

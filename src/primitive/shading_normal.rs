@@ -12,9 +12,9 @@ const LEAST_COSINE: f64 = 0.02;
 pub fn facing<L: SimdFloat>(shading: Vec3<L>, normal: Vec3<L>, direction: Vec3<L>) -> Vec3<L> {
     let side = shading.dot(normal);
     let shading = Vec3::select(side.lt(L::zero()), -shading, shading);
-    let short = (L::of(LEAST_COSINE) + shading.dot(direction)).max(L::zero());
+    let short = (L::from_f64(LEAST_COSINE) + shading.dot(direction)).max(L::zero());
     let bent = direction.mul_add(-short, shading);
-    let bent = bent * (L::one() / bent.length2().sqrt());
+    let bent = bent * (L::one() / bent.length_squared().sqrt());
     let sound = bent.dot(normal).gt(L::zero());
     Vec3::select(sound, bent, normal)
 }

@@ -20,10 +20,10 @@ impl<S: Float> Sphere<S> {
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Sphere { center, radius } = form else { return None };
         Some(Self {
-            center: center.to_array().map(S::of),
-            radius: S::of(*radius),
-            radius2: S::of(radius * radius),
-            reach: S::of(reach(form)),
+            center: center.to_array().map(S::from_f64),
+            radius: S::from_f64(*radius),
+            radius2: S::from_f64(radius * radius),
+            reach: S::from_f64(reach(form)),
         })
     }
 }
@@ -39,14 +39,14 @@ impl<S: Float> Sphere<S> {
 pub fn crossings<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option<(L, L, L::Mask)> {
     let b = -f.dot(d);
     let across = d.mul_add(b, f);
-    let discriminant = radius2 - across.length2();
+    let discriminant = radius2 - across.length_squared();
     let meets = discriminant.ge(L::zero());
     if meets.none() {
         return None;
     }
     let root = discriminant.max(L::zero()).sqrt();
     let q = b + root.copysign(b);
-    let c = f.length2() - radius2;
+    let c = f.length_squared() - radius2;
     // q = 0 only for a line that starts at the centre of its own touching point: both ends are 0.
     let other = c / q;
     let other = L::select(q.abs().gt(L::zero()), other, L::zero());
@@ -76,7 +76,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for Sphere<L::Scalar> {
         let f = ray.origin - Vec3::splat(self.center);
         let (enter, leave, meets) = crossings(f, ray.direction, L::splat(self.radius2))?;
         // Half the chord over the radius.
-        let cosine = (leave - enter) * (L::of(0.5) / L::splat(self.radius));
+        let cosine = (leave - enter) * (L::from_f64(0.5) / L::splat(self.radius));
         Some(Span { enter, leave, enter_cosine: cosine, leave_cosine: cosine, meets })
     }
 }

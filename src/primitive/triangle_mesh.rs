@@ -43,7 +43,7 @@ struct ShearedRay<L> {
 fn beam<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
     let [low, high] = mesh.mesh().bounds;
     let reach = low.iter().chain(&high).fold(0.0f32, |m, x| m.max(x.abs()));
-    let pad = (ray.origin.max_abs() + all(reach)) * L::of(8.0 * L::EPSILON);
+    let pad = (ray.origin.max_abs() + all(reach)) * L::from_f64(8.0 * L::EPSILON);
     SlabPacket::new(ray, Vec3::new(pad, pad, pad))
 }
 
@@ -117,7 +117,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     ) -> TriangleHit<L> {
         let pierce = ShearedRay::new(ray);
         let wanted = limit.gt(L::zero()).bits();
-        let mut found = TriangleHit { t: limit, triangle: L::tag(0) };
+        let mut found = TriangleHit { t: limit, triangle: L::from_id(0) };
         if wanted == 0 {
             return found;
         }
@@ -140,7 +140,9 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                     high.z.max(c.z),
                 ];
                 let bits = match &bounds {
-                    Some(bounds) => bounds.meets::<false, L>(|k| sides[k], L::of(L::MAX)).1.bits(),
+                    Some(bounds) => {
+                        bounds.meets::<false, L>(|k| sides[k], L::from_f64(L::MAX)).1.bits()
+                    }
                     None => fresh(),
                 };
                 let mut bits = bits & fresh() & ((1 << L::WIDTH) - 1);
@@ -155,9 +157,9 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                     if tie.none() {
                         continue;
                     }
-                    let number = L::tag(first + i as u32);
+                    let number = L::from_id(first + i as u32);
                     let nearer = tie & (t.lt(found.t) | number.lt(found.triangle));
-                    let t = if ANY { L::of(-1.0) } else { t };
+                    let t = if ANY { L::from_f64(-1.0) } else { t };
                     found.t = L::select(nearer, t, found.t);
                     found.triangle = L::select(nearer, number, found.triangle);
                 }
@@ -210,7 +212,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                     }
                 }
             }
-            if ANY && *best < limit { L::Scalar::of(-1.0) } else { *best }
+            if ANY && *best < limit { L::Scalar::from_f64(-1.0) } else { *best }
         };
         let soon = |number: usize| {
             let rows = self.mesh.leaves()[number].corners.as_flattened();
@@ -221,12 +223,12 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             apart(boxes, (beam, limit), wanted, stack, soon, leaf)
         });
         let t = L::from_fn(|i| found[i].0);
-        let t = if ANY { L::select(t.lt(limit), L::of(-1.0), limit) } else { t };
-        let mut triangle = L::tag(0);
-        let lanes = L::from_fn(|i| L::Scalar::of(i as f64));
+        let t = if ANY { L::select(t.lt(limit), L::from_f64(-1.0), limit) } else { t };
+        let mut triangle = L::from_id(0);
+        let lanes = L::from_fn(|i| L::Scalar::from_f64(i as f64));
         for (lane, (_, number)) in found.iter().enumerate().take(L::WIDTH) {
-            let here = lanes.le(L::of(lane as f64)) & lanes.ge(L::of(lane as f64));
-            triangle = L::select(here, L::tag(*number), triangle);
+            let here = lanes.le(L::from_f64(lane as f64)) & lanes.ge(L::from_f64(lane as f64));
+            triangle = L::select(here, L::from_id(*number), triangle);
         }
         TriangleHit { t, triangle }
     }

@@ -73,7 +73,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     pub(super) fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
         let mut limits = [L::zero(); MAX_GROUPS];
         for (limit, scale) in limits.iter_mut().zip(world.scales()) {
-            *limit = L::of((49f64.exp2() / scale).min(L::MAX));
+            *limit = L::from_f64((49f64.exp2() / scale).min(L::MAX));
         }
         Self {
             world,
@@ -174,7 +174,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         first: u32,
     ) {
         let (key, toward) = sites.one(i);
-        let draws = points.of_pixel(key);
+        let draws = points.for_pixel(key);
         let rays = self.world.view().rays(toward, self.jitter(&draws));
         work.trace(self.world, rays, &draws, L::mask(true));
         self.check(work, |lane| (sites.at(i), first + lane as u32));
@@ -192,7 +192,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         first: u32,
     ) {
         let (keys, toward) = sites.several::<L, COUNT>(packet.start);
-        let draws = points.of_pixels(keys);
+        let draws = points.for_pixels(keys);
         let rays = self.world.view().rays(toward, self.jitter(&draws));
         work.trace(self.world, rays, &draws, first_lanes::<L>(packet.len() * COUNT));
         self.check(work, |lane| {
@@ -203,7 +203,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     /// Where in their pixels the samples lie.
     #[inline(always)]
     fn jitter(&self, draws: &PacketSampler<'_, L>) -> (L, L) {
-        if self.world.jitter() { draws.pixel() } else { (L::of(0.5), L::of(0.5)) }
+        if self.world.jitter() { draws.pixel() } else { (L::from_f64(0.5), L::from_f64(0.5)) }
     }
 
     /// Gives the sums over the lanes to `put`, by group.
@@ -263,7 +263,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
             let light = v.x.ge(zero) & v.y.ge(zero) & v.z.ge(zero);
             bad = bad | !light;
             saturated = saturated | (light & v.max_element().gt(limit));
-            *group = Vec3::new(v.x.min(limit), v.y.min(limit), v.z.min(limit)).only(light);
+            *group = Vec3::new(v.x.min(limit), v.y.min(limit), v.z.min(limit)).masked(light);
         }
         for lane in (0..L::WIDTH).filter(|lane| (bad | saturated).lane(*lane)) {
             let ((x, y), index) = which(lane);
@@ -324,7 +324,7 @@ fn first_lanes<L: SimdFloat>(count: usize) -> L::Mask {
     if count == L::WIDTH {
         return L::mask(true);
     }
-    let lanes = L::from_fn(|lane| L::Scalar::of(if lane < count { 1.0 } else { 0.0 }));
+    let lanes = L::from_fn(|lane| L::Scalar::from_f64(if lane < count { 1.0 } else { 0.0 }));
     lanes.gt(L::zero())
 }
 
@@ -387,8 +387,8 @@ mod tests {
             let tile = film.slots(&[0]).remove(0).open();
             let mut work = PacketScratch::<Single>::new(0, None);
             work.radiance.groups[0].x =
-                Single::from_fn(|i| Float::of(if i == 3 { odd } else { 0.5 }));
-            work.radiance.groups[1].y = Single::of(0.25);
+                Single::from_fn(|i| Float::from_f64(if i == 3 { odd } else { 0.5 }));
+            work.radiance.groups[1].y = Single::from_f64(0.25);
             tracer.check(&mut work, |lane| ((lane as u32, 0), 0));
             let pixels = [0, 1, 2, 3, 4, 5, 6, 7];
             tracer.sum_of_each::<1, _>(&work.radiance, &pixels, |pixel, group, sums| {

@@ -50,7 +50,7 @@ impl<S: Float> PixelBlock<S> {
         }
         let [x, y, z] = &mut out.toward;
         for (((x, y), z), at) in x.iter_mut().zip(y).zip(z).zip(at()) {
-            [*x, *y, *z] = view.toward(at);
+            [*x, *y, *z] = view.pixel_corner_direction(at);
         }
         out
     }

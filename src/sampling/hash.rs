@@ -5,24 +5,24 @@ use crate::lanes::SimdU32;
 /// A bijective mixer of 32 bits with low bias (constants: Wellons 2018, *Prospecting for Hash
 /// Functions*, `lowbias32`).
 #[inline(always)]
-pub fn mix<B: SimdU32>(x: B) -> B {
+pub fn hash<B: SimdU32>(x: B) -> B {
     let x = (x ^ (x >> 16)) * B::splat(0x7feb_352d);
     let x = (x ^ (x >> 15)) * B::splat(0x846c_a68b);
     x ^ (x >> 16)
 }
 
 /// [`mix`] of one word.
-pub const fn mix1(mut x: u32) -> u32 {
+pub const fn hash_scalar(mut x: u32) -> u32 {
     x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
     x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
     x ^ (x >> 16)
 }
 
 /// One word from several, each of which changes it.
-pub fn fold(words: &[u32]) -> u32 {
-    words
-        .iter()
-        .fold(0x9e37_79b9, |h, w| mix1(h.rotate_left(5).wrapping_add(0x85eb_ca6b) ^ mix1(*w)))
+pub fn hash_words(words: &[u32]) -> u32 {
+    words.iter().fold(0x9e37_79b9, |h, w| {
+        hash_scalar(h.rotate_left(5).wrapping_add(0x85eb_ca6b) ^ hash_scalar(*w))
+    })
 }
 
 /// Owen scrambling of numbers whose first binary digit is in bit 0: every digit is flipped or not by
@@ -31,12 +31,12 @@ pub fn fold(words: &[u32]) -> u32 {
 /// The Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
 #[inline(always)]
 pub fn owen<B: SimdU32>(x: B, seed: B) -> B {
-    owen_rest(owen_begin(x), seed, owen_factor(seed))
+    owen_scramble_suffix(owen_scramble_prefix(x), seed, owen_factor(seed))
 }
 
 /// The part of [`owen`] before the seed takes part.
 #[inline(always)]
-pub fn owen_begin<B: SimdU32>(x: B) -> B {
+pub fn owen_scramble_prefix<B: SimdU32>(x: B) -> B {
     x ^ (x * B::splat(0x3d20_adea))
 }
 
@@ -48,8 +48,8 @@ pub fn owen_factor<B: SimdU32>(seed: B) -> B {
 
 /// What is left of [`owen`] after [`owen_begin`].
 #[inline(always)]
-pub fn owen_rest<B: SimdU32>(begun: B, seed: B, factor: B) -> B {
-    let x = (begun + seed) * factor;
+pub fn owen_scramble_suffix<B: SimdU32>(prefix: B, seed: B, factor: B) -> B {
+    let x = (prefix + seed) * factor;
     let x = x ^ (x * B::splat(0x0552_6c56));
     x ^ (x * B::splat(0x53a2_2864))
 }

@@ -1,7 +1,9 @@
 //! The random numbers of a packet of samples.
 
 use crate::lanes::{MAX_WIDTH, SimdFloat, SimdU32};
-use crate::sampling::hash::{fold, mix, mix1, owen, owen_begin, owen_factor, owen_rest};
+use crate::sampling::hash::{
+    hash, hash_scalar, hash_words, owen, owen_factor, owen_scramble_prefix, owen_scramble_suffix,
+};
 use crate::sampling::sobol;
 use crate::sampling::sobol::DIMENSIONS;
 
@@ -46,12 +48,12 @@ pub struct Sampler<L: SimdFloat> {
     seeds: [[u32; 2]; 2],
     /// Dimensions of the first lobe: after the two of the pixel, if these are used.
     first_lobe: usize,
-    /// `low[k][d]`: Sobol points 0..2^k in dimension d, again and again.
-    low: [[L::SimdU32; DIMENSIONS]; SHAPES],
+    /// `low_bits[k][d]`: Sobol points 0..2^k in dimension d, again and again.
+    low_bits: [[L::SimdU32; DIMENSIONS]; SHAPES],
     /// 0, 1, 2, ... in the lanes.
     ramp: L::SimdU32,
     /// A constant per dimension that sets its scrambling apart.
-    apart: [u32; DIMENSIONS],
+    dimension_salt: [u32; DIMENSIONS],
 }
 
 /// The part of a packet's numbers that depends on the samples' indices alone.
@@ -59,8 +61,8 @@ pub struct SampleBlock<'a, L: SimdFloat> {
     sampler: &'a Sampler<L>,
     /// Index in each lane.
     index: L::SimdU32,
-    /// `begun[d]`: the Sobol points of the indices in dimension d, their scrambling begun.
-    begun: [L::SimdU32; DIMENSIONS],
+    /// `owen_prefix[d]`: the Sobol points of the indices in dimension d, their scrambling begun.
+    owen_prefix: [L::SimdU32; DIMENSIONS],
 }
 
 impl<L: SimdFloat> Sampler<L> {
@@ -68,18 +70,18 @@ impl<L: SimdFloat> Sampler<L> {
     /// otherwise the lobes have them.
     pub fn new(settings: SampleSettings, jitter: bool) -> Self {
         let word = |replicate: u32, use_: u32| {
-            fold(&[settings.seed as u32, (settings.seed >> 32) as u32, replicate, use_])
+            hash_words(&[settings.seed as u32, (settings.seed >> 32) as u32, replicate, use_])
         };
-        let low = |k: usize, d| {
+        let low_bits = |k: usize, d| {
             L::SimdU32::from_fn(|lane| sobol::point(d, lane as u32 & ((1u32 << k) - 1)))
         };
         Self {
             settings,
             seeds: [0, 1].map(|replicate| [word(replicate, 0), word(replicate, 1)]),
             first_lobe: if jitter { 2 } else { 0 },
-            low: std::array::from_fn(|k| std::array::from_fn(|d| low(k, d))),
+            low_bits: std::array::from_fn(|k| std::array::from_fn(|d| low_bits(k, d))),
             ramp: L::SimdU32::from_fn(|lane| lane as u32),
-            apart: std::array::from_fn(|d| mix1(d as u32 + 1)),
+            dimension_salt: std::array::from_fn(|d| hash_scalar(d as u32 + 1)),
         }
     }
 
@@ -90,11 +92,11 @@ impl<L: SimdFloat> Sampler<L> {
         debug_assert!(count.is_power_of_two() && count <= L::WIDTH);
         debug_assert!((first as usize).is_multiple_of(count));
         // Aligned points are one point XOR constants.
-        let low = &self.low[count.ilog2() as usize];
-        let point = |d| L::SimdU32::splat(sobol::point(d, first)) ^ low[d];
-        let begun = std::array::from_fn(|d| owen_begin(point(d)));
+        let low_bits = &self.low_bits[count.ilog2() as usize];
+        let point = |d| L::SimdU32::splat(sobol::point(d, first)) ^ low_bits[d];
+        let owen_prefix = std::array::from_fn(|d| owen_scramble_prefix(point(d)));
         let within = self.ramp & L::SimdU32::splat(count as u32 - 1);
-        SampleBlock { sampler: self, index: L::SimdU32::splat(first) + within, begun }
+        SampleBlock { sampler: self, index: L::SimdU32::splat(first) + within, owen_prefix }
     }
 
     /// The key of a pixel's samples in one replicate (0: A, 1: B). Distinct for all pixels of a
@@ -102,20 +104,20 @@ impl<L: SimdFloat> Sampler<L> {
     #[inline(always)]
     pub fn key(&self, (x, y): (u32, u32), replicate: usize) -> u32 {
         let [before, after] = self.seeds[replicate];
-        mix1(mix1((x | y << 16) ^ before) ^ after)
+        hash_scalar(hash_scalar((x | y << 16) ^ before) ^ after)
     }
 }
 
 impl<L: SimdFloat> SampleBlock<'_, L> {
     /// Samples of the pixel that [`Sampler::key`] gave a key.
     #[inline(always)]
-    pub fn of_pixel(&self, key: u32) -> PacketSampler<'_, L> {
+    pub fn for_pixel(&self, key: u32) -> PacketSampler<'_, L> {
         PacketSampler { points: self, key: L::SimdU32::splat(key), of_one: Some(key) }
     }
 
     /// Samples of several pixels, by the keys of the pixels in the lanes.
     #[inline(always)]
-    pub fn of_pixels(&self, keys: L::SimdU32) -> PacketSampler<'_, L> {
+    pub fn for_pixels(&self, keys: L::SimdU32) -> PacketSampler<'_, L> {
         PacketSampler { points: self, key: keys, of_one: None }
     }
 }
@@ -138,14 +140,14 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
 
     /// Two numbers in [0, 1) for the lobe of the surface met after `bounce` reflections.
     #[inline(always)]
-    pub fn lobe(&self, bounce: u32) -> (L, L) {
+    pub fn lobe_2d(&self, bounce: u32) -> (L, L) {
         let d = self.points.sampler.first_lobe + 2 * bounce as usize;
         if bounce < 2 { (self.joint(d), self.joint(d + 1)) } else { self.padded(bounce - 2) }
     }
 
     /// A number in [0, 1) for choice `number` of a path, from 0: one of two ways to go on.
     #[inline(always)]
-    pub fn choice(&self, number: u32) -> L {
+    pub fn branch_1d(&self, number: u32) -> L {
         if number < CHOICES {
             self.joint(DIMENSIONS - CHOICES as usize + number as usize)
         } else {
@@ -157,16 +159,16 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     #[inline(always)]
     fn joint(&self, d: usize) -> L {
         let points = self.points;
-        let apart = points.sampler.apart[d];
+        let dimension_salt = points.sampler.dimension_salt[d];
         let seed = match self.of_one {
-            Some(key) => L::SimdU32::splat(mix1(key ^ apart)),
-            None => mix(self.key ^ L::SimdU32::splat(apart)),
+            Some(key) => L::SimdU32::splat(hash_scalar(key ^ dimension_salt)),
+            None => hash(self.key ^ L::SimdU32::splat(dimension_salt)),
         };
         match points.sampler.settings.kind {
-            SamplerKind::Random => L::unit(mix(mix(points.index ^ seed) + self.key)),
-            SamplerKind::Sobol => {
-                L::unit(owen_rest(points.begun[d], seed, owen_factor(seed)).reverse())
-            }
+            SamplerKind::Random => L::to_unit(hash(hash(points.index ^ seed) + self.key)),
+            SamplerKind::Sobol => L::to_unit(
+                owen_scramble_suffix(points.owen_prefix[d], seed, owen_factor(seed)).reverse(),
+            ),
         }
     }
 
@@ -191,19 +193,19 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     #[inline(always)]
     fn padded_set<const N: usize>(&self, set: u32, dimensions: [usize; N]) -> [L; N] {
         let SampleBlock { sampler, index, .. } = self.points;
-        let key = mix(self.key + L::SimdU32::splat(mix1(set)));
+        let key = hash(self.key + L::SimdU32::splat(hash_scalar(set)));
         let shuffled = owen(index.reverse(), key).reverse();
         let mut at = [0; MAX_WIDTH];
         for (lane, at) in at.iter_mut().enumerate().take(L::WIDTH) {
             *at = shuffled.lane(lane);
         }
         dimensions.map(|d| {
-            let seed = mix(key ^ L::SimdU32::splat(sampler.apart[d]));
+            let seed = hash(key ^ L::SimdU32::splat(sampler.dimension_salt[d]));
             match sampler.settings.kind {
-                SamplerKind::Random => L::unit(mix(mix(*index ^ seed) + key)),
+                SamplerKind::Random => L::to_unit(hash(hash(*index ^ seed) + key)),
                 SamplerKind::Sobol => {
                     let x = L::SimdU32::from_fn(|lane| sobol::point(d, at[lane]));
-                    L::unit(owen(x, seed).reverse())
+                    L::to_unit(owen(x, seed).reverse())
                 }
             }
         })

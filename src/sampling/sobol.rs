@@ -15,7 +15,7 @@
 //!
 //! Values are stored with the first binary digit in bit 0, as the scrambling hash wants them.
 
-use crate::sampling::hash::mix1;
+use crate::sampling::hash::hash_scalar;
 
 /// Dimensions of one joint set.
 pub const DIMENSIONS: usize = 8;
@@ -37,7 +37,7 @@ const fn column(pair: usize, bit: usize) -> u32 {
     if bit < found.len() {
         return found[bit];
     }
-    own | (mix1((32 * (pair - 1) + bit) as u32) & (own - 1))
+    own | (hash_scalar((32 * (pair - 1) + bit) as u32) & (own - 1))
 }
 
 /// The Sobol sequence's directions in dimension 0 or 1, first digit in bit 0.
@@ -157,7 +157,7 @@ mod tests {
         let mut state = 1;
         let mut random = || {
             state += 1;
-            mix1(state)
+            hash_scalar(state)
         };
         for (name, weights, points, most) in [
             ("the lobe", [0.0, 1.0], 64, 0.30),

@@ -19,7 +19,7 @@ pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
     let wide = a.abs().gt(b.abs());
     let (far, near) = (L::select(wide, a, b), L::select(wide, b, a));
     // In the centre itself, any angle.
-    let (s, c) = sin_cos_eighth(near / far.abs().max(L::of(1e-30)).copysign(far));
+    let (s, c) = sin_cos_eighth(near / far.abs().max(L::from_f64(1e-30)).copysign(far));
     (far * L::select(wide, c, s), far * L::select(wide, s, c), far * far)
 }
 
@@ -51,7 +51,7 @@ fn sin_cos_eighth<L: SimdFloat>(x: L) -> (L, L) {
 /// `k[0] + k[1] x + k[2] x^2 + ...`
 #[inline(always)]
 fn polynomial<L: SimdFloat>(k: &[f64], x: L) -> L {
-    k.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::of(*k)))
+    k.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::from_f64(*k)))
 }
 
 /// A uniform direction in the cone of half-angle theta about z.
@@ -62,7 +62,7 @@ pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     let (x, y, r2) = disk(u, v);
     let drop = r2 * one_minus_cos;
     // Areas on the sphere are as areas on the disk; sin = r scale.
-    let scale = (one_minus_cos * (L::of(2.0) - drop)).max(L::zero()).sqrt();
+    let scale = (one_minus_cos * (L::from_f64(2.0) - drop)).max(L::zero()).sqrt();
     Vec3::new(x * scale, y * scale, L::one() - drop)
 }
 
@@ -75,7 +75,7 @@ pub fn cone_pdf(direction_z: f64, one_minus_cos: f64) -> f64 {
 /// perpendicular to z and centred on it.
 #[inline(always)]
 pub fn square<L: SimdFloat>(u: L, v: L, side: L) -> Vec3<L> {
-    let half = L::of(0.5);
+    let half = L::from_f64(0.5);
     Vec3::new((u - half) * side, (v - half) * side, L::one()).normalize()
 }
 
@@ -129,14 +129,14 @@ fn erf_inverse<L: SimdFloat>(u: L) -> L {
         7.554_361_036_64e-6,
         3.185_092_156_69e-5,
     ];
-    let within = u.max(L::of(2e-11));
-    let w = -(L::of(4.0) * within * (L::one() - within)).ln();
-    let mut ratio = polynomial(&MIDDLE, w - L::of(2.5));
-    let outside = w.gt(L::of(5.0));
+    let within = u.max(L::from_f64(2e-11));
+    let w = -(L::from_f64(4.0) * within * (L::one() - within)).ln();
+    let mut ratio = polynomial(&MIDDLE, w - L::from_f64(2.5));
+    let outside = w.gt(L::from_f64(5.0));
     // One in three hundred.
     if outside.any() {
         let root = w.max(L::zero()).sqrt();
-        ratio = L::select(outside, polynomial(&TAILS, root - L::of(3.5)), ratio);
+        ratio = L::select(outside, polynomial(&TAILS, root - L::from_f64(3.5)), ratio);
     }
     ratio * (u + u - L::one())
 }
@@ -151,7 +151,7 @@ pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L>
     let (x, y, r2) = disk(u, v);
     let height = L::one() + stretched.z;
     let drop = r2 * height;
-    let scale = (height * (L::of(2.0) - drop)).max(L::zero()).sqrt();
+    let scale = (height * (L::from_f64(2.0) - drop)).max(L::zero()).sqrt();
     let h = Vec3::new(x.mul_add(scale, stretched.x), y.mul_add(scale, stretched.y), height - drop);
     Vec3::new(h.x * alpha, h.y * alpha, h.z.max(L::zero())).normalize()
 }
@@ -161,14 +161,16 @@ pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L>
 #[inline(always)]
 pub fn beckmann_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
     let secant2 = tan2 + L::one();
-    (-(tan2 * inverse_alpha2)).exp() * (secant2 * secant2) * (inverse_alpha2 * L::of(FRAC_1_PI))
+    (-(tan2 * inverse_alpha2)).exp()
+        * (secant2 * secant2)
+        * (inverse_alpha2 * L::from_f64(FRAC_1_PI))
 }
 
 /// The GGX distribution D [1/sr]: 1 / (pi alpha^2 cos^4 (1 + tan2 / alpha^2)^2).
 #[inline(always)]
 pub fn ggx_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
     let ratio = (tan2 + L::one()) / (tan2 * inverse_alpha2 + L::one());
-    ratio * ratio * (inverse_alpha2 * L::of(FRAC_1_PI))
+    ratio * ratio * (inverse_alpha2 * L::from_f64(FRAC_1_PI))
 }
 
 #[cfg(test)]
@@ -196,7 +198,7 @@ mod tests {
     /// The error function undoes it, from the middle to the last number in the tails.
     fn undone<L: SimdFloat>(numbers: &[f64], most: f64) {
         for u in numbers {
-            let x: f64 = erf_inverse(L::of(*u)).lane(0).to_f64();
+            let x: f64 = erf_inverse(L::from_f64(*u)).lane(0).to_f64();
             // The number that belongs to x, and how far from u, in the slope's own units.
             let tail = u.min(1.0 - u);
             let off = 0.5 * erfc(x.abs()) - tail;
@@ -222,7 +224,7 @@ mod tests {
     }
 
     fn ends<L: SimdFloat>() {
-        let at = |u: f64| erf_inverse(L::of(u)).lane(0).to_f64();
+        let at = |u: f64| erf_inverse(L::from_f64(u)).lane(0).to_f64();
         assert_eq!(at(0.5), 0.0);
         assert!((-5.0..-4.5).contains(&at(0.0)), "{}", at(0.0));
     }
@@ -230,7 +232,7 @@ mod tests {
     /// Squares about the centre become circles, and areas stay areas.
     fn round<L: SimdFloat>(most: f64) {
         let at = |u: f64, v: f64| {
-            let (x, y, r2) = disk(L::of(u), L::of(v));
+            let (x, y, r2) = disk(L::from_f64(u), L::from_f64(v));
             [x, y, r2].map(|x| x.lane(0).to_f64())
         };
         assert_eq!(at(0.5, 0.5), [0.0; 3]);

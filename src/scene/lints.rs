@@ -95,7 +95,7 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
         Highlight::CookTorrance => m.specular.max(m.reflection),
     };
     let f0 = m.metal.map(|metal| metal.f0()).or(m.reflectance).unwrap_or(Color::WHITE).largest();
-    let passed = match m.law() {
+    let passed = match m.fresnel_mode() {
         // F and 1 - F of the same light.
         Fresnel::Dielectric => mirrored.max(m.transmission),
         _ => mirrored * f0 + m.transmission,

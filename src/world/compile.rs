@@ -174,7 +174,7 @@ impl<L: SimdFloat> World<L> {
             .into_iter()
             .filter_map(|(light, group, weight)| {
                 let lamp = DeltaLight::new(&scene.lights[light], placed.origin)?;
-                let weight = (weight != [1.0; 3]).then(|| weight.map(L::Scalar::of));
+                let weight = (weight != [1.0; 3]).then(|| weight.map(L::Scalar::from_f64));
                 let position = scene.lights[light].point.map(|p| DVec3::from(p.position));
                 let on_surface = position.and_then(|position| {
                     let origin = placed.origin;

@@ -44,11 +44,11 @@ impl<S: Float> OnSurface<S> {
             if !normals.is_empty() {
                 largest = largest.max(rounding);
             }
-            let rounded = |normal: DVec3| normal.to_array().map(S::of);
+            let rounded = |normal: DVec3| normal.to_array().map(S::from_f64);
             solids.extend(normals.into_iter().map(|of| of.into_iter().map(rounded).collect()));
         }
-        let lift = S::of(LIFT * largest);
-        let position = position.to_array().map(S::of);
+        let lift = S::from_f64(LIFT * largest);
+        let position = position.to_array().map(S::from_f64);
         (!solids.is_empty()).then_some(Self { position, solids, lift })
     }
 
@@ -73,16 +73,16 @@ impl<S: Float> OnSurface<S> {
             }
             let lift = Vec3::select(outside, out, inward);
             // The least height over the surfaces that the ray ends before.
-            let mut least = L::of(L::MAX);
+            let mut least = L::from_f64(L::MAX);
             for normal in normals.iter().map(|n| Vec3::splat(*n)) {
                 let before = to.dot(normal).lt(L::zero()) | !outside;
                 least = L::select(before, least.min(normal.dot(lift).abs()), least);
             }
-            let longest = lift.length2().sqrt() * L::of(1.0 / SHARPEST);
+            let longest = lift.length_squared().sqrt() * L::from_f64(1.0 / SHARPEST);
             let scale = L::splat(self.lift) / least.max(longest);
             end = lift.mul_add(scale, end);
         }
-        let distance = end.length2().sqrt();
+        let distance = end.length_squared().sqrt();
         (end * (L::one() / distance), distance)
     }
 }

@@ -123,7 +123,7 @@ impl Response {
         let highlight = match material.highlight {
             Highlight::Phong => 1.0,
             // D F G / 4 of microfacets seen and lit straight on, with D = 1 / (pi alpha^2).
-            Highlight::CookTorrance => 0.25 / material.slope().max(SMOOTH_ALPHA).powi(2),
+            Highlight::CookTorrance => 0.25 / material.microfacet_alpha().max(SMOOTH_ALPHA).powi(2),
         };
         let most = matt.into_iter().fold(0.0, f64::max) + shine;
         let least = least_of(matt).or_else(|| least_of([shine]))?;
@@ -187,7 +187,7 @@ impl<'a> SceneDistances<'a> {
         let of_mirrors = materials.iter().filter(|m| Response::new(m).is_none());
         let faintest = least_of(of_mirrors.copied().filter_map(passed_on).flatten());
         // Fresnel's equations share the light between both; fixed coefficients need not.
-        let strongest = materials.iter().map(|m| match m.law() {
+        let strongest = materials.iter().map(|m| match m.fresnel_mode() {
             Fresnel::Dielectric => m.reflection.max(m.transmission),
             _ => m.reflection + m.transmission,
         });
@@ -222,7 +222,7 @@ impl<'a> SceneDistances<'a> {
     /// Of a lamp of unit strength.
     pub fn lamp<S: Float>(&self, lamp: &DeltaLight<S>) -> RadianceRange {
         let typical = lamp.typical_irradiance(self.radius) * FRAC_1_PI;
-        let DeltaLight::Falling { position } = lamp else {
+        let DeltaLight::InverseSquare { position } = lamp else {
             let all = self.responses.iter().flatten().copied().reduce(Response::or);
             let Response { least, most, peak } =
                 all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 });

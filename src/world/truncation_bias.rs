@@ -8,12 +8,12 @@ use glam::DVec3;
 /// Largest share of light that a material sends on, reflected and transmitted together, of any channel.
 fn strongest(material: &Material, flat: bool) -> f64 {
     let (k_r, k_t) = (material.reflection, material.transmission);
-    let f = match material.law() {
+    let f = match material.fresnel_mode() {
         Fresnel::Constant => material.f0().0.into_iter().fold(0.0, f64::max).min(1.0),
         // At grazing angles.
         _ => 1.0,
     };
-    match material.law() {
+    match material.fresnel_mode() {
         _ if k_t == 0.0 => k_r * f,
         Fresnel::Dielectric => k_r.max(k_t),
         _ if flat => k_r * f + k_t,

@@ -12,13 +12,13 @@ const SMOOTHEST: f64 = 1e-3;
 
 /// Reflectance at cosine `c` between light and facet.
 fn fresnel(material: &Material, c: f64) -> DVec3 {
-    let channel = |f0: f64| match material.law() {
+    let channel = |f0: f64| match material.fresnel_mode() {
         Fresnel::Constant => f0,
         Fresnel::Schlick => f0 + (1.0 - f0) * (1.0 - c).powi(5),
         Fresnel::Exact if f0 >= 1.0 => 1.0,
         Fresnel::Exact | Fresnel::Dielectric => {
             // The mean of both polarisations (Fresnel), for light from a vacuum.
-            let n = match material.law() {
+            let n = match material.fresnel_mode() {
                 Fresnel::Dielectric => material.index,
                 _ => (1.0 + f0.sqrt()) / (1.0 - f0.sqrt()),
             };
@@ -88,7 +88,7 @@ pub fn highlight(material: &Material, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
         }
         Highlight::CookTorrance => {
             let ggx = material.lobe == Lobe::Ggx;
-            let alpha = material.slope().max(SMOOTHEST);
+            let alpha = material.microfacet_alpha().max(SMOOTHEST);
             let h = (v + l).normalize();
             let nv = n.dot(v);
             if nv <= 0.0 || v.dot(h) <= 0.0 || n.dot(h) <= 0.0 {
@@ -133,7 +133,7 @@ pub fn reflect(
     }
     let facets = matches!(material.lobe, Lobe::Beckmann | Lobe::Ggx);
     let sharp = material.lobe == Lobe::Mirror
-        || if facets { material.slope() < SMOOTHEST } else { radius == 0.0 };
+        || if facets { material.microfacet_alpha() < SMOOTHEST } else { radius == 0.0 };
     if facets && !sharp {
         return facet(material, n, v, mutation, numbers);
     }
@@ -171,7 +171,8 @@ fn facet(
     numbers: &mut Numbers,
 ) -> Option<(DVec3, DVec3)> {
     let ggx = material.lobe == Lobe::Ggx;
-    let alpha = material.slope() * if mutation == Mutation::WiderLobe { 1.05 } else { 1.0 };
+    let alpha =
+        material.microfacet_alpha() * if mutation == Mutation::WiderLobe { 1.05 } else { 1.0 };
     let u = numbers.unit();
     let tan2 = alpha * alpha * if ggx { u / (1.0 - u) } else { -(1.0 - u).ln() };
     let cos = 1.0 / (1.0 + tan2).sqrt();

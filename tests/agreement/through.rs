@@ -69,7 +69,7 @@ impl Tracer<'_> {
                 along * t.sin() - n * t.cos()
             })
         };
-        let dielectric = material.law() == Fresnel::Dielectric;
+        let dielectric = material.fresnel_mode() == Fresnel::Dielectric;
         let f = match (dielectric, open) {
             (true, false) => polarised(i, t, n_i, n_t).iter().sum::<f64>() / 2.0,
             // Between the two sides of a pane the light goes to and fro.

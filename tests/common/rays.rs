@@ -29,7 +29,7 @@ pub struct Met {
 pub fn packets<L: SimdFloat>(lines: &[Line]) -> impl Iterator<Item = (Ray<L>, usize)> + '_ {
     lines.chunks(L::WIDTH).map(|lines| {
         let at = |i: usize| lines[i.min(lines.len() - 1)];
-        let real = |v: DVec3| v.to_array().map(L::Scalar::of);
+        let real = |v: DVec3| v.to_array().map(L::Scalar::from_f64);
         let origin = Vec3::from_fn(|i| real(at(i).0));
         let direction = Vec3::from_fn(|i| real(at(i).1));
         (Ray { origin, direction }, lines.len())
@@ -47,10 +47,10 @@ pub fn surface<L: SimdFloat>(
     hit: &Hit<L>,
 ) -> SurfacePoint<L> {
     let mut all = SurfacePoint { point: ray.at(hit.t), normal: Vec3::zero(), reach: L::zero() };
-    let mut left = hit.t.lt(L::of(L::MAX));
+    let mut left = hit.t.lt(L::from_f64(L::MAX));
     while left.any() {
-        let item = hit.item.tag_lane(left.bits().trailing_zeros() as usize);
-        let here = left & hit.item.has_tag(item);
+        let item = hit.item.id_lane(left.bits().trailing_zeros() as usize);
+        let here = left & hit.item.id_eq(item);
         let one = geometry.surface(item, hit.facet, ray.at(hit.t));
         all.point = Vec3::select(here, one.point, all.point);
         all.normal = Vec3::select(here, one.normal, all.normal);
@@ -65,12 +65,12 @@ pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Opt
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
         let hit = geometry.closest(&ray, geometry.all());
-        let met = hit.t.lt(L::of(L::MAX));
+        let met = hit.t.lt(L::from_f64(L::MAX));
         let surface = surface(geometry, &ray, &hit);
         out.extend((0..count).map(|i| {
             met.lane(i).then(|| Met {
                 t: hit.t.lane(i).to_f64(),
-                form: geometry.sources()[hit.item.tag_lane(i) as usize].form,
+                form: geometry.sources()[hit.item.id_lane(i) as usize].form,
                 point: to_dvec3(surface.point, i),
                 normal: to_dvec3(surface.normal, i),
             })
@@ -83,7 +83,7 @@ pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Opt
 pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64) -> Vec<bool> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
-        let blocked = geometry.blocked(&ray, L::of(limit), L::mask(true), geometry.all());
+        let blocked = geometry.blocked(&ray, L::from_f64(limit), L::mask(true), geometry.all());
         out.extend((0..count).map(|i| blocked.lane(i)));
     }
     out
@@ -150,7 +150,7 @@ impl Traced {
         let points = sampler.block(0, L::WIDTH);
         let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
         for (ray, count) in packets::<L>(lines) {
-            let draws = points.of_pixel(sampler.key((0, 0), 0));
+            let draws = points.for_pixel(sampler.key((0, 0), 0));
             world.trace((ray.origin, ray.direction), None, &draws, L::mask(true), &mut radiance);
             for i in 0..count {
                 let mut sum = DVec3::ZERO;

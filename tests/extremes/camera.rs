@@ -20,8 +20,10 @@ fn check_finite<L: SimdFloat>(camera: &Camera, size: [u32; 2], name: &str) {
     let ys = [0, size[1] / 2, size[1] - 1];
     for at in xs.into_iter().flat_map(|x| ys.map(|y| (x, y))) {
         for offset in [0.0, 0.5, 1.0] {
-            let (o, d) =
-                view.rays(Vec3::<L>::splat(view.toward(at)), (L::of(offset), L::of(offset)));
+            let (o, d) = view.rays(
+                Vec3::<L>::splat(view.pixel_corner_direction(at)),
+                (L::from_f64(offset), L::from_f64(offset)),
+            );
             for lane in 0..L::WIDTH {
                 let (o, d) = (to_dvec3(o, lane), to_dvec3(d, lane));
                 assert!(o.is_finite() && d.is_finite(), "{name}: pixel {at:?}: {o} {d}");
@@ -64,8 +66,10 @@ fn extreme_17_narrow_and_wide_angles_are_right() {
         let camera = Camera { view_angle: ViewAngle::Horizontal(degrees), ..Camera::default() };
         let view = PinholeCamera::new(&camera, [1000, 1], DVec3::ZERO);
         let angle = |y: f64| {
-            let (_, left) = view.rays(Vec3::<f64>::splat(view.toward((0, 0))), (0.0, y));
-            let (_, right) = view.rays(Vec3::<f64>::splat(view.toward((999, 0))), (1.0, y));
+            let (_, left) =
+                view.rays(Vec3::<f64>::splat(view.pixel_corner_direction((0, 0))), (0.0, y));
+            let (_, right) =
+                view.rays(Vec3::<f64>::splat(view.pixel_corner_direction((999, 0))), (1.0, y));
             let (a, b) =
                 (DVec3::new(left.x, left.y, left.z), DVec3::new(right.x, right.y, right.z));
             a.cross(b).length().atan2(a.dot(b)).to_degrees()
@@ -132,7 +136,7 @@ fn check_frames<L: SimdFloat>(bound: f64) {
             normals[2 % L::WIDTH] = [0.0, 0.0, -1.0 - e];
             normals[3 % L::WIDTH] = [0.0, -0.0, 1.0];
         }
-        let n = Vec3::<L>::from_fn(|i| normals[i].map(zerkalo::lanes::Float::of));
+        let n = Vec3::<L>::from_fn(|i| normals[i].map(zerkalo::lanes::Float::from_f64));
         let frame = Frame::around(n);
         for i in 0..L::WIDTH {
             let [t, b, n] = [frame.t, frame.b, frame.n].map(|v| to_dvec3(v, i));

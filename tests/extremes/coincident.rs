@@ -131,7 +131,7 @@ fn faces_on_each_other_show_the_first_part() {
         let line = (from, (at - from).normalize());
         let (ray, _) = crate::rays::packets::<Single>(&[line]).next().unwrap();
         let hit = geometry.closest(&ray, geometry.all());
-        let item = geometry.sources()[hit.item.tag_lane(0) as usize];
+        let item = geometry.sources()[hit.item.id_lane(0) as usize];
         assert_eq!((item.form, item.part), (0, 0), "{line:?}");
     }
 }

@@ -103,7 +103,8 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
         let lost = closest(&geometry, &lines).iter().filter(|met| met.is_none()).count();
         let lit: usize = packets::<L>(&lines)
             .map(|(ray, count)| {
-                let blocked = geometry.blocked(&ray, L::of(L::MAX), L::mask(true), geometry.all());
+                let blocked =
+                    geometry.blocked(&ray, L::from_f64(L::MAX), L::mask(true), geometry.all());
                 (0..count).filter(|lane| !blocked.lane(*lane)).count()
             })
             .sum();

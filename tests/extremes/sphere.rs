@@ -168,7 +168,8 @@ fn extreme_02_sphere_as_ground() {
         let lines: Vec<Line> = pixels
             .iter()
             .map(|at| {
-                let (o, d) = view.rays(Vec3::<f64>::splat(view.toward(*at)), (0.5, 0.5));
+                let (o, d) =
+                    view.rays(Vec3::<f64>::splat(view.pixel_corner_direction(*at)), (0.5, 0.5));
                 (DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z))
             })
             .collect();
@@ -258,7 +259,8 @@ fn closed_form_10_every_pixel_of_a_sphere() {
     let mut covered = 0;
     for y in 0..200 {
         for x in 0..320 {
-            let (o, d) = view.rays(Vec3::<f64>::splat(view.toward((x, y))), (0.5, 0.5));
+            let (o, d) =
+                view.rays(Vec3::<f64>::splat(view.pixel_corner_direction((x, y))), (0.5, 0.5));
             let line = (DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z));
             let met = closest(&geometry, &[line])[0].is_some();
             let step = 2.0 * half / 320.0;

@@ -35,10 +35,10 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
     let narrow = Aggregate::<S>::with_tree(forms, tree);
     for (n, (packet, count)) in packets::<L>(lines).enumerate() {
         let hit = wide.closest(&packet, wide.all());
-        let met = hit.t.lt(L::of(L::MAX));
+        let met = hit.t.lt(L::from_f64(L::MAX));
         let here = surface(&wide, &packet, &hit);
         let limit = 2.0;
-        let blocked = wide.blocked(&packet, L::of(limit), L::mask(true), wide.all());
+        let blocked = wide.blocked(&packet, L::from_f64(limit), L::mask(true), wide.all());
         for i in 0..count {
             let ray =
                 Ray { origin: lane_of(packet.origin, i), direction: lane_of(packet.direction, i) };
@@ -54,13 +54,13 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
                 )
             };
             assert!(same(hit.t.lane(i).to_f64(), one.t.lane(0).to_f64()), "{}", told());
-            let limit = <S as SimdFloat>::of(limit);
+            let limit = <S as SimdFloat>::from_f64(limit);
             let b = narrow.blocked(&ray, limit, S::mask(true), narrow.all()).any();
             assert!(blocked.lane(i) == b, "blocked: {}", told());
             if !met.lane(i) {
                 continue;
             }
-            assert!(hit.item.tag_lane(i) == one.item.tag_lane(0), "item: {}", told());
+            assert!(hit.item.id_lane(i) == one.item.id_lane(0), "item: {}", told());
             let s = surface(&narrow, &ray, &one);
             let equal = same3(here.point, s.point, i)
                 && same3(here.normal, s.normal, i)

@@ -52,8 +52,8 @@ fn compare_with<L: SimdFloat>(
     for (packet, lanes) in packets::<L>(lines) {
         let (a, b) = (list.closest(&packet, list.all()), tree.closest(&packet, tree.all()));
         let limits: Vec<f64> = (0..L::WIDTH).map(|_| numbers.between(0.0, 20.0)).collect();
-        let wanted = L::from_fn(|_| L::Scalar::of(numbers.unit())).lt(L::of(0.8));
-        let limit = L::from_fn(|i| L::Scalar::of(limits[i]));
+        let wanted = L::from_fn(|_| L::Scalar::from_f64(numbers.unit())).lt(L::from_f64(0.8));
+        let limit = L::from_fn(|i| L::Scalar::from_f64(limits[i]));
         let (c, d) = (
             list.blocked(&packet, limit, wanted, list.all()) & wanted,
             tree.blocked(&packet, limit, wanted, tree.all()) & wanted,
@@ -66,11 +66,11 @@ fn compare_with<L: SimdFloat>(
             let (s, t) = (a.t.lane(i).to_f64(), b.t.lane(i).to_f64());
             assert!(s == t, "{}: list {s}, here {t}", told());
             assert!(
-                s >= L::MAX || a.item.tag_lane(i) == b.item.tag_lane(i),
+                s >= L::MAX || a.item.id_lane(i) == b.item.id_lane(i),
                 "{}: at {s} list meets {}, here {}",
                 told(),
-                a.item.tag_lane(i),
-                b.item.tag_lane(i)
+                a.item.id_lane(i),
+                b.item.id_lane(i)
             );
         }
         assert_eq!(c.bits(), d.bits(), "{} {how}, seed {seed}, {count} items: blocked", L::NAME);

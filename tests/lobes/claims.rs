@@ -27,7 +27,7 @@ fn every_word_is_walked() {
     assert_eq!(read("lobe").iter().map(|m| m.lobe).collect::<Vec<_>>(), Lobe::ALL);
     assert_eq!(read("highlight").iter().map(|m| m.highlight).collect::<Vec<_>>(), Highlight::ALL);
     assert_eq!(read("masking").iter().map(|m| m.masking).collect::<Vec<_>>(), Masking::ALL);
-    assert_eq!(read("fresnel").iter().map(|m| m.law()).collect::<Vec<_>>(), Fresnel::ALL);
+    assert_eq!(read("fresnel").iter().map(|m| m.fresnel_mode()).collect::<Vec<_>>(), Fresnel::ALL);
 }
 
 /// What a transparent surface reflects and transmits together, from outside and from inside, and the
@@ -50,8 +50,8 @@ fn transparent_surfaces_keep_what_they_claim() {
                 let incident = Vec3::new(sin, 0.0, -cos);
                 let there = Interface::new(incident, n, n_i, n_t);
                 let split = there.split(&transmission, n_i == 1.0);
-                lost = lost.max((split.reflected + split.transmitted + split.total - 1.0).abs());
-                if !there.total {
+                lost = lost.max((split.reflected + split.transmitted + split.tir - 1.0).abs());
+                if !there.tir {
                     let back = Interface::new(-there.refracted, -n, n_t, n_i);
                     let back = back.split(&transmission, n_i != 1.0);
                     lopsided = lopsided.max((back.reflected - split.reflected).abs());

@@ -32,7 +32,7 @@ fn power(n: [f64; 3], view: [f64; 3], light: [f64; 3], alpha: f64) -> f64 {
 /// Highlights around their middle, for every exponent that a scene may have: at most k_s, and as bright as they
 /// should be.
 fn check<L: SimdFloat>(rounding: f64) {
-    let most = L::of(0.7) * L::of(std::f64::consts::FRAC_1_PI);
+    let most = L::from_f64(0.7) * L::from_f64(std::f64::consts::FRAC_1_PI);
     let most = most.lane(0).to_f64();
     for tenth in 0..=90 {
         let alpha = 10f64.powf(f64::from(tenth) / 10.0);

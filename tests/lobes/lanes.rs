@@ -34,7 +34,7 @@ fn worst_ulps<L: SimdFloat>(
 ) -> f64 {
     let mut worst: f64 = 0.0;
     for first in (0..400_000).step_by(L::WIDTH) {
-        let x = L::from_fn(|lane| L::Scalar::of(inputs(first + lane as u32)));
+        let x = L::from_fn(|lane| L::Scalar::from_f64(inputs(first + lane as u32)));
         let y = f(x);
         for lane in 0..L::WIDTH {
             let exact = exact(x.lane(lane).to_f64());
@@ -58,18 +58,18 @@ fn sine_and_cosine<L: SimdFloat>() {
 /// Angles of points in all directions: within 3 roundings of 1, of angles up to pi. An axis gives no NaN.
 fn arc_tangent<L: SimdFloat>() {
     let angle = |i: u32| std::f64::consts::PI * (2.0 * uniform(i) - 1.0);
-    let rounded = |x: f64| L::of(x).lane(0).to_f64();
+    let rounded = |x: f64| L::from_f64(x).lane(0).to_f64();
     let mut worst: f64 = 0.0;
     for i in 0..100_000 {
         let (y, x) = angle(i).sin_cos();
         let (y, x) = (rounded(y * 3.0), rounded(x * 3.0));
-        let found = L::of(y).atan2(L::of(x)).lane(0).to_f64();
+        let found = L::from_f64(y).atan2(L::from_f64(x)).lane(0).to_f64();
         worst = worst.max((found - y.atan2(x)).abs() / L::EPSILON);
     }
     println!("{}: atan2 {worst:.2}", L::NAME);
     assert!(worst <= 3.0, "{}: atan2 {worst}", L::NAME);
-    assert_eq!(L::of(0.0).atan2(L::of(0.0)).lane(0).to_f64(), 0.0);
-    assert_eq!(L::of(0.0).atan2(L::of(2.0)).lane(0).to_f64(), 0.0);
+    assert_eq!(L::from_f64(0.0).atan2(L::from_f64(0.0)).lane(0).to_f64(), 0.0);
+    assert_eq!(L::from_f64(0.0).atan2(L::from_f64(2.0)).lane(0).to_f64(), 0.0);
 }
 
 /// Logarithms of what Beckmann's lobe (1 - u) and Phong's highlight (a cosine, at least 1e-30) ask
@@ -86,11 +86,11 @@ fn logarithm_and_exponential<L: SimdFloat>() {
     assert!(ln <= 1.5 && ln_share <= 1.5, "{}: ln {ln} {ln_share}", L::NAME);
     assert!(exp <= 1.5 && exp_near <= 1.5, "{}: exp {exp} {exp_near}", L::NAME);
     // ln 1 = 0 and exp 0 = 1 keep a mirror direction and the top of a highlight exact.
-    assert_eq!(L::of(1.0).ln().lane(0).to_f64(), 0.0);
-    assert_eq!(L::of(0.0).exp().lane(0).to_f64(), 1.0);
+    assert_eq!(L::from_f64(1.0).ln().lane(0).to_f64(), 0.0);
+    assert_eq!(L::from_f64(0.0).exp().lane(0).to_f64(), 1.0);
     // What underflows is nothing: neither negative nor NaN.
     for x in [-104.0, -800.0, -1e6, -1e30, -L::MAX, f64::NEG_INFINITY] {
-        let y = L::of(x).exp().lane(0).to_f64();
+        let y = L::from_f64(x).exp().lane(0).to_f64();
         assert!((0.0..1e-44).contains(&y), "{}: exp {x} = {y}", L::NAME);
     }
 }
@@ -114,7 +114,7 @@ fn fixed_point<L: SimdFloat>() {
             let x = (2.0 * uniform(!at) - 1.0) * magnitude.exp2() / scale;
             if i % 7 == 0 { halves[lane % 8] / scale } else { x }
         };
-        let x = L::from_fn(|lane| L::Scalar::of(value(lane)));
+        let x = L::from_fn(|lane| L::Scalar::from_f64(value(lane)));
         let exact = |lane| (x.lane(lane).to_f64() * scale).round_ties_even() as i64;
         for (lane, fixed) in x.fixed(scale).into_iter().enumerate() {
             let expected = if lane < L::WIDTH { exact(lane) } else { 0 };
@@ -123,8 +123,8 @@ fn fixed_point<L: SimdFloat>() {
         assert_eq!(x.fixed_sum(scale), (0..L::WIDTH).map(exact).sum::<i64>(), "{} {i}", L::NAME);
     }
     let most = 2f64.powi(51) * (1.0 - 2.0 * L::EPSILON);
-    assert_eq!(L::of(most).fixed_sum(1.0), most as i64 * L::WIDTH as i64);
-    assert_eq!(L::of(-most).fixed_sum(1.0), -(most as i64) * L::WIDTH as i64);
+    assert_eq!(L::from_f64(most).fixed_sum(1.0), most as i64 * L::WIDTH as i64);
+    assert_eq!(L::from_f64(-most).fixed_sum(1.0), -(most as i64) * L::WIDTH as i64);
 }
 
 #[test]
@@ -144,13 +144,13 @@ fn integers<L: SimdFloat>() {
             assert_eq!((x >> shift).lane(lane), one >> shift);
             assert_eq!((x * x + x).lane(lane), one.wrapping_mul(one).wrapping_add(one));
             // Uniform numbers: never 1, the top bits kept.
-            let unit = L::unit(x).lane(lane).to_f64();
+            let unit = L::to_unit(x).lane(lane).to_f64();
             assert!((0.0..1.0).contains(&unit));
             assert_eq!((unit * 16_777_216.0) as u32, one >> 8);
         }
     }
-    assert!(L::unit(L::SimdU32::splat(u32::MAX)).lane(0).to_f64() < 1.0);
-    assert!(L::unit(L::SimdU32::splat(0)).lane(0).to_f64() >= 0.0);
+    assert!(L::to_unit(L::SimdU32::splat(u32::MAX)).lane(0).to_f64() < 1.0);
+    assert!(L::to_unit(L::SimdU32::splat(0)).lane(0).to_f64() >= 0.0);
 }
 
 #[test]
@@ -160,7 +160,7 @@ fn integers_are_those_of_the_processor() {
 
 /// Every pattern of truth values.
 fn masks<L: SimdFloat>() {
-    let lane_of = |bits: u32| L::from_fn(|i| L::Scalar::of(f64::from(bits >> i & 1)));
+    let lane_of = |bits: u32| L::from_fn(|i| L::Scalar::from_f64(f64::from(bits >> i & 1)));
     for bits in 0..1u32 << L::WIDTH {
         let mask = lane_of(bits).gt(L::zero());
         assert_eq!(mask.bits(), bits);
@@ -173,14 +173,14 @@ fn masks<L: SimdFloat>() {
         assert_eq!((mask & other).bits(), bits & other_bits);
         assert_eq!((mask | other).bits(), bits | other_bits);
         assert_eq!(mask.and_not(other).bits(), bits & !other_bits);
-        let (yes, no) = (L::of(2.0), L::of(-3.0));
+        let (yes, no) = (L::from_f64(2.0), L::from_f64(-3.0));
         for lane in 0..L::WIDTH {
             let truth = bits >> lane & 1 == 1;
             assert_eq!(mask.lane(lane), truth);
             let chosen = L::select(mask, yes, no).lane(lane).to_f64();
             assert_eq!(chosen, if truth { 2.0 } else { -3.0 });
             // `only` clears what would poison a sum.
-            let nan = L::of(f64::NAN).only(mask).lane(lane).to_f64();
+            let nan = L::from_f64(f64::NAN).masked(mask).lane(lane).to_f64();
             assert_eq!(nan.is_nan(), truth);
             assert!(truth || nan == 0.0);
         }
@@ -195,14 +195,15 @@ fn tags<L: SimdFloat>() {
         for b in labels {
             for i in 0..8 {
                 let bits = noise(i ^ a ^ b.rotate_left(7)) & ((1 << L::WIDTH) - 1);
-                let mask = L::from_fn(|i| L::Scalar::of(f64::from(bits >> i & 1))).gt(L::zero());
-                let mixed = L::select(mask, L::tag(a), L::tag(b));
+                let mask =
+                    L::from_fn(|i| L::Scalar::from_f64(f64::from(bits >> i & 1))).gt(L::zero());
+                let mixed = L::select(mask, L::from_id(a), L::from_id(b));
                 for lane in 0..L::WIDTH {
                     let expected = if mask.lane(lane) { a } else { b };
-                    assert_eq!(mixed.tag_lane(lane), expected, "{} {a:x} {b:x}", L::NAME);
+                    assert_eq!(mixed.id_lane(lane), expected, "{} {a:x} {b:x}", L::NAME);
                 }
                 let has = if a == b { (1 << L::WIDTH) - 1 } else { bits };
-                assert_eq!(mixed.has_tag(a).bits(), has, "{} {a:x} {b:x}", L::NAME);
+                assert_eq!(mixed.id_eq(a).bits(), has, "{} {a:x} {b:x}", L::NAME);
             }
         }
     }
@@ -216,9 +217,9 @@ fn masks_select_and_labels_survive() {
 
 /// NaN on the left loses; comparisons with NaN are false.
 fn not_a_number<L: SimdFloat>() {
-    let nan = L::of(f64::NAN);
+    let nan = L::from_f64(f64::NAN);
     for x in [-1.0, 0.0, 2.5, f64::INFINITY, f64::NEG_INFINITY] {
-        let x = L::of(x);
+        let x = L::from_f64(x);
         let value = x.lane(0).to_f64();
         assert_eq!(nan.min(x).lane(0).to_f64(), value, "{}", L::NAME);
         assert_eq!(nan.max(x).lane(0).to_f64(), value, "{}", L::NAME);
@@ -226,13 +227,19 @@ fn not_a_number<L: SimdFloat>() {
             assert!(mask.none());
         }
         for y in [-4.0, 0.5, 1e30] {
-            assert_eq!(x.min(L::of(y)).lane(0).to_f64(), value.min(L::of(y).lane(0).to_f64()));
-            assert_eq!(x.max(L::of(y)).lane(0).to_f64(), value.max(L::of(y).lane(0).to_f64()));
+            assert_eq!(
+                x.min(L::from_f64(y)).lane(0).to_f64(),
+                value.min(L::from_f64(y).lane(0).to_f64())
+            );
+            assert_eq!(
+                x.max(L::from_f64(y)).lane(0).to_f64(),
+                value.max(L::from_f64(y).lane(0).to_f64())
+            );
         }
     }
-    assert!(L::of(-1.0).sqrt().lane(0).to_f64().is_nan());
-    assert_eq!(L::of(3.0).copysign(L::of(-0.0)).lane(0).to_f64(), -3.0);
-    assert_eq!((-L::of(0.0)).lane(0).to_f64().to_bits(), (-0.0f64).to_bits());
+    assert!(L::from_f64(-1.0).sqrt().lane(0).to_f64().is_nan());
+    assert_eq!(L::from_f64(3.0).copysign(L::from_f64(-0.0)).lane(0).to_f64(), -3.0);
+    assert_eq!((-L::from_f64(0.0)).lane(0).to_f64().to_bits(), (-0.0f64).to_bits());
 }
 
 #[test]
@@ -246,11 +253,11 @@ fn ends_of_lanes<L: SimdFloat>() {
         let numbers: Vec<f64> = (0..L::WIDTH as u32)
             .map(|lane| match i.wrapping_mul(0x9e37_79b9) >> lane & 3 {
                 0 => f64::NAN,
-                _ => f64::from(L::of(uniform(16 * i + lane) - 0.5).lane(0).to_f64() as f32),
+                _ => f64::from(L::from_f64(uniform(16 * i + lane) - 0.5).lane(0).to_f64() as f32),
             })
             .collect();
         let known = || numbers.iter().copied().filter(|x| !x.is_nan());
-        let (low, high) = L::from_fn(|lane| Float::of(numbers[lane])).extremes();
+        let (low, high) = L::from_fn(|lane| Float::from_f64(numbers[lane])).min_max();
         assert_eq!(low.to_f64(), known().fold(L::MAX, f64::min), "{}: {numbers:?}", L::NAME);
         assert_eq!(high.to_f64(), known().fold(-L::MAX, f64::max), "{}: {numbers:?}", L::NAME);
     }
@@ -263,7 +270,8 @@ fn the_ends_of_lanes_are_found() {
 
 /// Arithmetic up to the square root and the fused product are the same bits at every width.
 fn same_bits<One: SimdFloat, Many: SimdFloat<Scalar = One::Scalar>>() {
-    let value = |i: u32| One::Scalar::of((uniform(i) - 0.5) * (60.0 * uniform(!i) - 30.0).exp2());
+    let value =
+        |i: u32| One::Scalar::from_f64((uniform(i) - 0.5) * (60.0 * uniform(!i) - 30.0).exp2());
     let bits = |x: One::Scalar| x.to_f64().to_bits();
     for i in 0..20_000u32 {
         let at = |k: u32| Many::from_fn(|lane| value(i * 64 + k * 16 + lane as u32));

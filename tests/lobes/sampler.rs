@@ -20,8 +20,8 @@ fn pairs<L: SimdFloat>(
     let mut out = Vec::new();
     for first in (0..count).step_by(L::WIDTH) {
         let points = sampler.block(first, L::WIDTH);
-        let draws = points.of_pixel(sampler.key((x, y), replicate));
-        let (u, v) = bounce.map_or_else(|| draws.pixel(), |b| draws.lobe(b));
+        let draws = points.for_pixel(sampler.key((x, y), replicate));
+        let (u, v) = bounce.map_or_else(|| draws.pixel(), |b| draws.lobe_2d(b));
         out.extend((0..L::WIDTH).map(|i| [u.lane(i).to_f64(), v.lane(i).to_f64()]));
     }
     out.truncate(count as usize);
@@ -85,10 +85,10 @@ fn packets_equal_singles<One: SimdFloat, Many: SimdFloat>() {
                 for first in [0u32, 16, 256, 65_536, 0x00ff_fff0, u32::MAX - 15] {
                     for bounce in (0..10).map(Some).chain([None]) {
                         let pair = |d: &zerkalo::sampling::PacketSampler<'_, Many>| {
-                            bounce.map_or_else(|| d.pixel(), |b| d.lobe(b))
+                            bounce.map_or_else(|| d.pixel(), |b| d.lobe_2d(b))
                         };
                         let single = |d: &zerkalo::sampling::PacketSampler<'_, One>| {
-                            let (u, v) = bounce.map_or_else(|| d.pixel(), |b| d.lobe(b));
+                            let (u, v) = bounce.map_or_else(|| d.pixel(), |b| d.lobe_2d(b));
                             (bits(u.lane(0).to_f64()), bits(v.lane(0).to_f64()))
                         };
                         let lane_of = |p: (Many, Many), lane| {
@@ -100,16 +100,16 @@ fn packets_equal_singles<One: SimdFloat, Many: SimdFloat>() {
                             let at =
                                 |lane| ((lane / count) as u32 * 77, 1000 - (lane / count) as u32);
                             let key = |lane| many.key(at(lane), replicate);
-                            let field = pair(&points.of_pixels(Many::SimdU32::from_fn(key)));
-                            let row = pair(&points.of_pixel(key(0)));
+                            let field = pair(&points.for_pixels(Many::SimdU32::from_fn(key)));
+                            let row = pair(&points.for_pixel(key(0)));
                             for lane in 0..Many::WIDTH {
                                 let index = first + (lane % count) as u32;
                                 let points = one.block(index, 1);
                                 let name = format!("{kind:?} {index} {count} {bounce:?}");
                                 let expected =
-                                    single(&points.of_pixel(one.key(at(lane), replicate)));
+                                    single(&points.for_pixel(one.key(at(lane), replicate)));
                                 assert_eq!(lane_of(field, lane), expected, "{name}");
-                                let expected = single(&points.of_pixel(one.key(at(0), replicate)));
+                                let expected = single(&points.for_pixel(one.key(at(0), replicate)));
                                 assert_eq!(lane_of(row, lane), expected, "{name}");
                             }
                             count /= 2;
@@ -130,9 +130,9 @@ fn packets_draw_what_single_samples_draw() {
 /// All numbers that sample `index` of a pixel uses in ten bounces.
 fn numbers(sampler: &Sampler<f64>, pixel: (u32, u32), replicate: usize, index: u32) -> Vec<f64> {
     let points = sampler.block(index, 1);
-    let draws = points.of_pixel(sampler.key(pixel, replicate));
+    let draws = points.for_pixel(sampler.key(pixel, replicate));
     let place = draws.pixel();
-    let lobes = (0..10).flat_map(|b| <[f64; 2]>::from(draws.lobe(b)));
+    let lobes = (0..10).flat_map(|b| <[f64; 2]>::from(draws.lobe_2d(b)));
     [place.0, place.1].into_iter().chain(lobes).collect()
 }
 

@@ -106,8 +106,8 @@ pub fn each_reflection<L: SimdFloat>(
     let sampler = Sampler::<L>::new(settings, false);
     for first in (0..count).step_by(L::WIDTH) {
         let key = sampler.key(numbers.pixel, 0);
-        let uv = sampler.block(first, L::WIDTH).of_pixel(key).lobe(0);
-        let r = finish.reflect(strength, &spread, incident, n, uv, fold);
+        let uv = sampler.block(first, L::WIDTH).for_pixel(key).lobe_2d(0);
+        let r = finish.sample(strength, &spread, incident, n, uv, fold);
         for lane in 0..L::WIDTH {
             take(r.direction.lane(lane).map(Float::to_f64), r.weight.lane(lane).map(Float::to_f64));
         }
@@ -123,10 +123,10 @@ pub fn trace<L: SimdFloat>(
     first: u32,
 ) -> Vec<Vec<Vector>> {
     let points = sampler.block(first, L::WIDTH);
-    let draws = points.of_pixel(sampler.key(pixel, replicate));
-    let half = L::of(0.5);
+    let draws = points.for_pixel(sampler.key(pixel, replicate));
+    let half = L::from_f64(0.5);
     let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
-    let rays = world.view().rays(Vec3::splat(world.view().toward(pixel)), jitter);
+    let rays = world.view().rays(Vec3::splat(world.view().pixel_corner_direction(pixel)), jitter);
     let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
     let all = L::mask(true);
     assert!(all.all());

@@ -41,12 +41,13 @@ fn check_slab<L: SimdFloat>() -> f64 {
             let from = ray.origin;
             for (n_i, n_t) in [(1.0, n), (n, 1.0)] {
                 let hit = geometry.closest(&ray, geometry.all());
-                let surface = geometry.surface(hit.item.tag_lane(0), hit.facet, ray.at(hit.t));
+                let surface = geometry.surface(hit.item.id_lane(0), hit.facet, ray.at(hit.t));
                 let entering = number(surface.normal.dot(ray.direction)) < 0.0;
                 assert_eq!(entering, n_i == 1.0 && number(ray.origin.z) > 0.0, "{n} {i}");
                 let normal = if entering { surface.normal } else { -surface.normal };
-                let interface = Interface::new(ray.direction, normal, L::of(n_i), L::of(n_t));
-                assert!(interface.total.bits() & 1 == 0, "{n} {i}");
+                let interface =
+                    Interface::new(ray.direction, normal, L::from_f64(n_i), L::from_f64(n_t));
+                assert!(interface.tir.bits() & 1 == 0, "{n} {i}");
                 let origin = normal.mul_add(-surface.lift(), surface.point);
                 ray = Ray { origin, direction: interface.refracted };
             }

@@ -146,7 +146,9 @@ fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<Value> {
         _ => None,
     };
     match (field.name, material) {
-        ("alpha", Some(material)) => Some(Value::Float(rounded_to(material.slope(), -4))),
+        ("alpha", Some(material)) => {
+            Some(Value::Float(rounded_to(material.microfacet_alpha(), -4)))
+        }
         ("reflectance", Some(material)) => {
             Some(Value::Array(material.f0().0.map(Value::Float).to_vec()))
         }

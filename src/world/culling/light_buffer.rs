@@ -82,11 +82,11 @@ impl<S: Float> LightBuffer<S> {
 
         let ProjectedBounds { chart, places, side } = ProjectedBounds::new(towards, &balls);
         let count = chart.faces() * side * side;
-        let (mut counts, mut until) = (vec![0; count], vec![S::of(f64::INFINITY); count]);
+        let (mut counts, mut until) = (vec![0; count], vec![S::from_f64(f64::INFINITY); count]);
         let mut entries: Vec<(usize, Entry<S>)> = Vec::new();
         let mut crowded_out = 0;
         for (near, number) in order {
-            let (near, own) = (S::of(near), occluders[number as usize].own.unwrap_or(NONE));
+            let (near, own) = (S::from_f64(near), occluders[number as usize].own.unwrap_or(NONE));
             let mut balance = 0;
             for cell in places[number as usize].iter().flat_map(|place| place.cells(side)) {
                 if counts[cell] < FEW {
@@ -117,7 +117,7 @@ impl<S: Float> LightBuffer<S> {
             things[cells[cell].end as usize] = thing;
             cells[cell].end += 1;
         }
-        Some(Self { chart, side, scale: S::of(scale), cells, things })
+        Some(Self { chart, side, scale: S::from_f64(scale), cells, things })
     }
 
     /// [`Aggregate::blocked`] for rays to this light, which end after `limit`. `on`: tags of the items that the
@@ -152,7 +152,7 @@ impl<S: Float> LightBuffer<S> {
             }
             left = left.and_not(here);
             let Cell { first, end, until } = self.cells[number.to_f64() as usize];
-            let farthest = L::select(here, depth, L::of(-L::MAX)).extremes().1;
+            let farthest = L::select(here, depth, L::from_f64(-L::MAX)).min_max().1;
             beyond = beyond | (here & depth.gt(L::splat(until)));
             for thing in &self.things[first as usize..end as usize] {
                 if thing.near > farthest {
@@ -222,22 +222,22 @@ mod tests {
                     _ => middle + normals[lane] * apart,
                 }
             };
-            let axis = |a: usize| L::from_fn(|i| L::Scalar::of(point(i)[a]));
+            let axis = |a: usize| L::from_fn(|i| L::Scalar::from_f64(point(i)[a]));
             let origin = Vec3::new(axis(0), axis(1), axis(2));
             let (direction, limit) = match towards {
-                LightTarget::Direction(d) => (Vec3::of(d.to_array()), L::of(L::MAX)),
+                LightTarget::Direction(d) => (Vec3::of(d.to_array()), L::from_f64(L::MAX)),
                 LightTarget::Point(light) => {
                     let to = Vec3::of(light.to_array()) - origin;
-                    let distance = to.length2().sqrt();
+                    let distance = to.length_squared().sqrt();
                     (to * (L::one() / distance), distance)
                 }
             };
             let ray = Ray { origin, direction };
-            let normal = |a: usize| L::from_fn(|i| L::Scalar::of(normals[i][a]));
+            let normal = |a: usize| L::from_fn(|i| L::Scalar::from_f64(normals[i][a]));
             let facing = Vec3::new(normal(0), normal(1), normal(2)).dot(direction);
             let wanted = facing.gt(L::zero());
-            let (first, second) = (L::tag(ball_of(0) as u32), L::tag(ball_of(1) as u32));
-            let odd = L::from_fn(|i| L::Scalar::of((i % 2) as f64)).gt(L::zero());
+            let (first, second) = (L::from_id(ball_of(0) as u32), L::from_id(ball_of(1) as u32));
+            let odd = L::from_fn(|i| L::Scalar::from_f64((i % 2) as f64)).gt(L::zero());
             let on = (L::select(odd, second, first), L::mask(round % 6 >= 4));
             let all = geometry.all();
             let expected = geometry.blocked(&ray, limit, wanted, all) & wanted;
@@ -300,9 +300,9 @@ mod tests {
         let buffer = LightBuffer::<f32>::new(&towards, &occluders(&balls)).expect("a buffer");
         let ray = Ray { origin: Vec3::<Single>::zero(), direction: Vec3::of([0.0, 1.0, 0.0]) };
         let ask = |outside| {
-            let on = (Single::tag(0), Single::mask(outside));
+            let on = (Single::from_id(0), Single::mask(outside));
             let wanted = Single::mask(true);
-            buffer.blocked(&geometry, &ray, on, Single::of(9.0), wanted, geometry.all())
+            buffer.blocked(&geometry, &ray, on, Single::from_f64(9.0), wanted, geometry.all())
         };
         assert!(ask(false).all());
         // Who says that this is outside is believed.

@@ -30,11 +30,11 @@ impl<S: Float> LightProjection<S> {
     /// cell.
     #[inline(always)]
     pub fn place<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
-        let side = L::of(side as f64);
+        let side = L::from_f64(side as f64);
         // A number below 2^22 plus this has no fraction bits left in single precision; in double one
         // below 2^51.
-        let rounder = L::of(1.5 / L::EPSILON);
-        let half = L::of(0.5);
+        let rounder = L::from_f64(1.5 / L::EPSILON);
+        let half = L::from_f64(0.5);
         let number = |x: L| {
             let x = x.mul_add(side, -half).max(L::zero()).min(side - L::one());
             (x + rounder) - rounder
@@ -49,8 +49,8 @@ impl<S: Float> LightProjection<S> {
                 let major = pick(d.x, d.y, d.z);
                 let scale = half / major.abs();
                 let (u, v) = (pick(d.y, d.z, d.x), pick(d.z, d.x, d.y));
-                let face =
-                    pick(L::zero(), L::of(2.0), L::of(4.0)) + L::one().only(major.lt(L::zero()));
+                let face = pick(L::zero(), L::from_f64(2.0), L::from_f64(4.0))
+                    + L::one().masked(major.lt(L::zero()));
                 let (u, v) = (number(u.mul_add(scale, half)), number(v.mul_add(scale, half)));
                 (face.mul_add(side, v).mul_add(side, u), limit)
             }
@@ -160,7 +160,7 @@ fn window<S: Float>(balls: &[BoundingSphere]) -> Option<(LightProjection<S>, Vec
     };
     let seen: Vec<_> = balls.iter().map(seen).collect::<Option<_>>()?;
     let (low, scale, places) = fitted(&seen);
-    let axes = axes.map(|axis| axis.to_array().map(S::of));
+    let axes = axes.map(|axis| axis.to_array().map(S::from_f64));
     Some((LightProjection::Perspective { axes, low, scale }, places))
 }
 
@@ -176,7 +176,7 @@ fn far<S: Float>(
     };
     let seen: Vec<_> = balls.iter().map(seen).collect();
     let (low, scale, places) = fitted(&seen);
-    let axes = [right, up].map(|axis| axis.to_array().map(S::of));
+    let axes = [right, up].map(|axis| axis.to_array().map(S::from_f64));
     (LightProjection::Orthographic { axes, low, scale }, places)
 }
 
@@ -188,7 +188,7 @@ fn fitted<S: Float>(seen: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<FaceRec
     let scale = (high - low).recip();
     let at = |v: DVec2| (v - low) * scale;
     let place = |s: &(DVec2, DVec2)| vec![FaceRect { face: 0, low: at(s.0), high: at(s.1) }];
-    let reals = |v: DVec2| v.to_array().map(S::of);
+    let reals = |v: DVec2| v.to_array().map(S::from_f64);
     (reals(low), reals(scale), seen.iter().map(place).collect())
 }
 

@@ -93,10 +93,10 @@ impl FrustumCuller {
         let bounds: Vec<BoundingVolume> = forms.into_iter().map(bound).collect();
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let towards = lamps.iter().map(|lamp| match lamp {
-            DeltaLight::Falling { position } | DeltaLight::Even { position } => {
+            DeltaLight::InverseSquare { position } | DeltaLight::Constant { position } => {
                 LightTarget::Point(vector(position))
             }
-            DeltaLight::Directional { towards } => LightTarget::Direction(vector(towards)),
+            DeltaLight::Directional { wi: towards } => LightTarget::Direction(vector(towards)),
         });
         // The outside of a convex thing does not see itself, and only paths that begin inside, or are
         // let in, get inside.

@@ -90,7 +90,7 @@ impl<L: SimdFloat> Seam<L> {
     /// Nowhere.
     pub fn none() -> Self {
         let zero = Vec3::zero();
-        let item = L::tag(0);
+        let item = L::from_id(0);
         Self { lanes: L::mask(false), item, point: zero, axis: zero, layer: L::zero() }
     }
 
@@ -133,7 +133,7 @@ impl<S: Float> Contacts<S> {
         for (a, b) in pairs(forms, |a, b| lets_through[a] || lets_through[b]) {
             let rounding = (epsilon * reach(&forms[a]).max(reach(&forms[b]))).max(given);
             if may_touch(&forms[a], &forms[b], 4.0 * TIE * rounding) {
-                let tie = S::of(TIE * rounding);
+                let tie = S::from_f64(TIE * rounding);
                 touching[a].push(Contact { item: first[b], tie });
                 touching[b].push(Contact { item: first[a], tie });
             }
@@ -152,7 +152,7 @@ impl<S: Float> Contacts<S> {
                 (0, false, _) => (SurfaceKind::Opaque, 4.0 * count + number),
                 (rank, ..) => (SurfaceKind::Transparent(rank), 3.0 * count - f64::from(rank)),
             };
-            (kind, S::of(layer))
+            (kind, S::from_f64(layer))
         };
         let kinds = sources.iter().enumerate().map(kind).collect();
         let of = sources.iter().map(|source| touching[source.form].clone()).collect();
@@ -190,8 +190,8 @@ impl<S: Float> Contacts<S> {
             lanes: L::mask(false),
             touching: L::mask(false),
             item: seam.item,
-            facet: L::tag(0),
-            layer: L::of(L::MAX),
+            facet: L::from_id(0),
+            layer: L::from_f64(L::MAX),
             lift: L::zero(),
         };
         self.search(geometry, seam, inside, &mut out);
@@ -207,7 +207,7 @@ impl<S: Float> Contacts<S> {
         leaves: L::Mask,
         inside: &MediumStack<L>,
     ) -> Layer<L> {
-        let before = L::of(-L::MAX);
+        let before = L::from_f64(-L::MAX);
         let mut layer = L::zero();
         let mut left = seam.lanes;
         while let Some((item, here)) = first_tag(seam.item, left) {
@@ -218,7 +218,7 @@ impl<S: Float> Contacts<S> {
             lanes: L::mask(false),
             touching: L::mask(false),
             item: seam.item,
-            facet: L::tag(0),
+            facet: L::from_id(0),
             layer,
             lift: L::zero(),
         };
@@ -235,7 +235,7 @@ impl<S: Float> Contacts<S> {
         inside: &MediumStack<L>,
         out: &mut Layer<L>,
     ) {
-        let rounding = seam.point.max_abs() * L::of(TIE * L::EPSILON);
+        let rounding = seam.point.max_abs() * L::from_f64(TIE * L::EPSILON);
         let mut left = seam.lanes;
         while let Some((item, here)) = first_tag(seam.item, left) {
             left = left.and_not(here);
@@ -243,7 +243,7 @@ impl<S: Float> Contacts<S> {
                 // Along the normal, through the point: so the angle of the ray does not matter.
                 let tie = rounding.max(L::splat(contact.tie));
                 let origin = seam.axis.mul_add(-tie, seam.point);
-                let limit = L::select(here, tie + tie, L::of(-1.0));
+                let limit = L::select(here, tie + tie, L::from_f64(-1.0));
                 let ray = Ray { origin, direction: seam.axis };
                 let hit = geometry.closest_to(contact.item, &ray, limit);
                 let mut met = here & hit.t.lt(limit);
@@ -252,18 +252,18 @@ impl<S: Float> Contacts<S> {
                     let normal = geometry.surface(other, hit.facet, seam.point).normal;
                     let cosine = normal.dot(seam.axis);
                     let leaves = cosine.gt(L::zero());
-                    let mut these = these & cosine.abs().gt(L::of(PARALLEL));
+                    let mut these = these & cosine.abs().gt(L::from_f64(PARALLEL));
                     if let (SurfaceKind::Transparent(rank), _) = &self.kinds[other as usize] {
                         // What a path is not inside of it cannot leave.
-                        let within = inside.holds(L::of(f64::from(*rank)));
+                        let within = inside.holds(L::from_f64(f64::from(*rank)));
                         these = these & ((within & leaves) | (!within & !leaves));
                     }
                     let layer = self.layer(other, leaves, seam.layer);
                     out.touching = out.touching | these;
-                    out.lift = L::select(these, out.lift.max(tie * L::of(LIFT)), out.lift);
+                    out.lift = L::select(these, out.lift.max(tie * L::from_f64(LIFT)), out.lift);
                     let nearer = these & layer.gt(seam.layer) & layer.lt(out.layer);
                     out.lanes = out.lanes | nearer;
-                    out.item = L::select(nearer, L::tag(other), out.item);
+                    out.item = L::select(nearer, L::from_id(other), out.item);
                     out.facet = L::select(nearer, hit.facet, out.facet);
                     out.layer = L::select(nearer, layer, out.layer);
                 }

@@ -35,9 +35,11 @@ impl<L: SimdFloat> World<L> {
     /// At most one packet of it.
     fn look_at(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
         let point = |lane: usize| points[lane.min(points.len() - 1)];
-        let base = Vec3::from_fn(|lane| self.view.toward(point(lane).map(|c| c as u32).into()));
+        let base = Vec3::from_fn(|lane| {
+            self.view.pixel_corner_direction(point(lane).map(|c| c as u32).into())
+        });
         let within = |axis: usize| {
-            L::from_fn(|lane| L::Scalar::of(point(lane)[axis] - point(lane)[axis].floor()))
+            L::from_fn(|lane| L::Scalar::from_f64(point(lane)[axis] - point(lane)[axis].floor()))
         };
         let (origin, direction) = self.view.rays(base, (within(0), within(1)));
         let ray = Ray { origin, direction };
@@ -47,10 +49,10 @@ impl<L: SimdFloat> World<L> {
         let from_eye = at - eye;
         let depth = from_eye.dot(from_eye).sqrt();
         seen.fill(FirstHit::NOTHING);
-        let mut left = hit.t.lt(L::of(L::MAX)).bits() & lanes_below(points.len());
+        let mut left = hit.t.lt(L::from_f64(L::MAX)).bits() & lanes_below(points.len());
         while left != 0 {
-            let item = hit.item.tag_lane(left.trailing_zeros() as usize);
-            let here = hit.item.has_tag(item).bits() & left;
+            let item = hit.item.id_lane(left.trailing_zeros() as usize);
+            let here = hit.item.id_eq(item).bits() & left;
             left &= !here;
             let normal = self.geometry.surface(item, hit.facet, at).normal;
             let facing = normal.dot(direction);

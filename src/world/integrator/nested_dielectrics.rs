@@ -153,7 +153,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
             around.then(|| (form as u32 + 1, Aggregate::with_tree(&forms[form..=form], false)))
         };
         let around_eye = indices[1..].iter().enumerate().filter_map(around).collect();
-        let indices = indices.into_iter().map(|n| n.unwrap_or(L::Scalar::of(1.0))).collect();
+        let indices = indices.into_iter().map(|n| n.unwrap_or(L::Scalar::from_f64(1.0))).collect();
         Some(Self { rank_of, indices, around_eye, contacts })
     }
 
@@ -167,14 +167,14 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let mut inside = MediumStack::nothing();
         for (rank, solid) in &self.around_eye {
             let hit = solid.closest(ray, solid.all());
-            let mut left = hit.t.lt(L::of(L::MAX));
+            let mut left = hit.t.lt(L::from_f64(L::MAX));
             let mut within = L::mask(false);
             while let Some((item, here)) = first_tag(hit.item, left) {
                 let normal = solid.surface(item, hit.facet, ray.at(hit.t)).normal;
                 within = within | (here & normal.dot(ray.direction).gt(L::zero()));
                 left = left.and_not(here);
             }
-            let entered = inside.with(L::of(f64::from(*rank)));
+            let entered = inside.with(L::from_f64(f64::from(*rank)));
             inside = MediumStack::select(within, &entered, &inside);
         }
         inside
@@ -203,7 +203,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let mut rank = L::zero();
         let mut left = lanes;
         while let Some((item, here)) = first_tag(met.item, left) {
-            rank = L::select(here, L::of(f64::from(self.rank_of[item as usize])), rank);
+            rank = L::select(here, L::from_f64(f64::from(self.rank_of[item as usize])), rank);
             left = left.and_not(here);
         }
         let solid = rank.gt(L::zero());

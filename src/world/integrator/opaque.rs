@@ -40,7 +40,7 @@ impl<L: SimdFloat> Path<L> {
     /// `weight`, finite where mirrors amplify without end.
     #[inline(always)]
     pub fn bounded(weight: Vec3<L>) -> Vec3<L> {
-        let most = L::of(Self::HEAVIEST);
+        let most = L::from_f64(Self::HEAVIEST);
         Vec3::new(most.min(weight.x), most.min(weight.y), most.min(weight.z))
     }
 }
@@ -82,8 +82,8 @@ pub(crate) fn first_tag<L: SimdFloat>(tags: L, mask: L::Mask) -> Option<(u32, L:
     if bits == 0 {
         return None;
     }
-    let tag = tags.tag_lane(bits.trailing_zeros() as usize);
-    Some((tag, mask & tags.has_tag(tag)))
+    let tag = tags.id_lane(bits.trailing_zeros() as usize);
+    Some((tag, mask & tags.id_eq(tag)))
 }
 
 impl<L: SimdFloat> SurfaceInteraction<L> {
@@ -129,7 +129,7 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
     #[inline(always)]
     pub fn outward(&self, direction: Vec3<L>) -> Vec3<L> {
         let height = direction.dot(self.geometric).min(L::zero());
-        self.geometric.mul_add(height * L::of(-2.0), direction)
+        self.geometric.mul_add(height * L::from_f64(-2.0), direction)
     }
 
     /// Takes what is `other`'s in `lanes`, which have nothing yet.
@@ -198,9 +198,9 @@ impl<L: SimdFloat> World<L> {
             } else {
                 self.geometry.closest_of(&path.ray, &outlook.seen, active)
             };
-            let ended = hit.t.lt(L::of(L::MAX));
+            let ended = hit.t.lt(L::from_f64(L::MAX));
             if let Some(group) = self.background {
-                out.groups[group] += path.weight.only(active.and_not(ended));
+                out.groups[group] += path.weight.masked(active.and_not(ended));
             }
             active = active & ended;
             let Some(met) = self.meet::<PLAIN>(&path.ray, &hit, active) else { return counts };
@@ -276,7 +276,7 @@ impl<L: SimdFloat> World<L> {
             && self.colored
             && let Some(color) = self.own_color(&patch())
         {
-            (tint, diffuse) = (color, diffuse.times(color));
+            (tint, diffuse) = (color, diffuse.component_mul(color));
         }
         let finished = if finish.two_sided { lanes } else { lanes & front };
         let those = |having: bool| if having { finished } else { L::mask(false) };
@@ -288,7 +288,7 @@ impl<L: SimdFloat> World<L> {
             lift: surface.lift(),
             front: front & lanes,
             item: hit.item,
-            finish: L::tag(number),
+            finish: L::from_id(number),
             diffuse,
             finished,
             lit: those(finish.wants_light),
@@ -311,9 +311,9 @@ impl<L: SimdFloat> World<L> {
             for (finish, lanes) in met.finishes(met.finished) {
                 let mut ambient = Vec3::splat(self.finishes[finish].ambient);
                 if !PLAIN && self.colored {
-                    ambient = ambient.times(met.tint);
+                    ambient = ambient.component_mul(met.tint);
                 }
-                out.groups[group] += path.weight.times(ambient).only(lanes);
+                out.groups[group] += path.weight.component_mul(ambient).masked(lanes);
             }
         }
         if met.lit.none() {
@@ -321,11 +321,11 @@ impl<L: SimdFloat> World<L> {
         }
         let start = met.start();
         for (number, (source, shading)) in self.sources.iter().zip(&outlook.shading).enumerate() {
-            let arrival = source.lamp.at(start);
-            let nl = met.normal.dot(arrival.towards);
+            let arrival = source.lamp.sample_li(start);
+            let nl = met.normal.dot(arrival.wi);
             let mut lit = met.lit & nl.gt(L::zero());
             if !PLAIN && self.smooth {
-                lit = lit & met.geometric.dot(arrival.towards).gt(L::zero());
+                lit = lit & met.geometric.dot(arrival.wi).gt(L::zero());
             }
             if lit.none() {
                 continue;
@@ -333,7 +333,7 @@ impl<L: SimdFloat> World<L> {
             if self.shadows {
                 counts.rays += u64::from(lit.bits().count_ones());
                 let (direction, within) = match &source.on_surface {
-                    None => (arrival.towards, arrival.distance),
+                    None => (arrival.wi, arrival.distance),
                     Some(on) => on.end(start),
                 };
                 let ray = Ray { origin: start, direction };
@@ -350,18 +350,18 @@ impl<L: SimdFloat> World<L> {
                     continue;
                 }
             }
-            let mut value = met.diffuse * (nl * L::of(FRAC_1_PI));
+            let mut value = met.diffuse * (nl * L::from_f64(FRAC_1_PI));
             for (finish, lanes) in met.finishes(met.shining & lit) {
                 let (finish, view) = (&self.finishes[finish], -path.ray.direction);
                 let nv = met.normal.dot(view);
-                let shine = finish.highlight(met.normal, view, arrival.towards, nl, nv);
-                value += shine.only(lanes);
+                let shine = finish.highlight(met.normal, view, arrival.wi, nl, nv);
+                value += shine.masked(lanes);
             }
-            let mut value = path.weight.times(value) * arrival.irradiance;
+            let mut value = path.weight.component_mul(value) * arrival.irradiance;
             if let Some(strength) = source.weight {
-                value = value.times(Vec3::splat(strength));
+                value = value.component_mul(Vec3::splat(strength));
             }
-            out.groups[source.group] += value.only(lit);
+            out.groups[source.group] += value.masked(lit);
         }
     }
 
@@ -384,19 +384,19 @@ impl<L: SimdFloat> World<L> {
                 (L::zero(), L::zero())
             } else {
                 counts.glossy = true;
-                *numbers.get_or_insert_with(|| draws.lobe(bounce))
+                *numbers.get_or_insert_with(|| draws.lobe_2d(bounce))
             };
-            let r = finish.reflect(*strength, spread, incident, met.normal, uv, self.fold);
+            let r = finish.sample(*strength, spread, incident, met.normal, uv, self.fold);
             let mut out = r.direction;
             if !PLAIN && self.smooth {
                 out = met.outward(out);
             }
             path.ray.direction = Vec3::select(lanes, out, path.ray.direction);
-            let weight = Path::bounded(weight.times(r.weight));
+            let weight = Path::bounded(weight.component_mul(r.weight));
             path.weight = Vec3::select(lanes, weight, path.weight);
         }
         path.ray.origin = met.start();
         let strongest = path.weight.max_element();
-        met.reflecting & strongest.gt(L::zero()) & strongest.ge(L::of(self.min_weight))
+        met.reflecting & strongest.gt(L::zero()) & strongest.ge(L::from_f64(self.min_weight))
     }
 }

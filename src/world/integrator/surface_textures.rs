@@ -60,8 +60,8 @@ impl<L: SimdFloat> SurfaceTextures<L> {
         material: impl Fn(&PrimitiveId) -> &'a Material,
     ) -> Option<Self> {
         let worn = |m: &Material| {
-            m.texture.as_ref().is_some_and(Texture::shows)
-                || m.bump.as_ref().is_some_and(Bump::shows)
+            m.texture.as_ref().is_some_and(Texture::has_effect)
+                || m.bump.as_ref().is_some_and(Bump::has_effect)
         };
         if !sources.iter().any(|source| worn(material(source))) {
             return None;
@@ -132,7 +132,7 @@ fn coordinates<L: SimdFloat>(
     {
         let [u, v] = own.uv;
         let [du, dv] = own.gradients;
-        return projector.placed(TexCoord { u, v, du, dv });
+        return projector.placed(TexCoord { u, v, grad_u: du, grad_v: dv });
     }
     projector.coordinates(surface.point, surface.normal)
 }
@@ -151,8 +151,8 @@ impl<L: SimdFloat> World<L> {
             return painted;
         };
         let at = coordinates(&self.geometry, projector, patch);
-        let color = pattern.colors((at.u, at.v), patch.lanes.bits());
-        Some(painted.map_or(color, |painted| painted.times(color)))
+        let color = pattern.eval((at.u, at.v), patch.lanes.bits());
+        Some(painted.map_or(color, |painted| painted.component_mul(color)))
     }
 
     /// The normal that light is computed with where rays along `direction` meet a surface whose
@@ -172,8 +172,8 @@ impl<L: SimdFloat> World<L> {
             return normal;
         };
         let at = coordinates(&self.geometry, projector, patch);
-        let (along_u, along_v) = heights.slopes((at.u, at.v), patch.lanes.bits());
-        let gradient = at.du * along_u + at.dv * along_v;
+        let (along_u, along_v) = heights.gradient((at.u, at.v), patch.lanes.bits());
+        let gradient = at.grad_u * along_u + at.grad_v * along_v;
         let outward = L::select(front, L::one(), -L::one());
         facing(projector.bumped(normal, outward, gradient), geometric, direction)
     }

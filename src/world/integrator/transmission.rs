@@ -112,9 +112,9 @@ impl<L: SimdFloat> World<L> {
             hit.take_in(next.lanes, L::zero(), (next.item, next.facet));
             behind = Some(next);
         }
-        let ended = hit.t.lt(L::of(L::MAX));
+        let ended = hit.t.lt(L::from_f64(L::MAX));
         if let Some(group) = self.background {
-            out.groups[group] += path.weight.only(arm.lanes.and_not(ended));
+            out.groups[group] += path.weight.masked(arm.lanes.and_not(ended));
         }
         let lanes = arm.lanes & ended;
         let Some(mut met) = self.meet::<false>(&path.ray, &hit, lanes) else { return false };
@@ -141,7 +141,7 @@ impl<L: SimdFloat> World<L> {
         let ways = self.ways(&path, &met, &crossing, draws, bounce - 1, counts);
         let worth = |weight: Vec3<L>| {
             let strongest = weight.max_element();
-            strongest.gt(L::zero()) & strongest.ge(L::of(self.min_weight))
+            strongest.gt(L::zero()) & strongest.ge(L::from_f64(self.min_weight))
         };
         let mirrors = (met.reflecting | crossing.lanes) & worth(ways.mirrored_weight);
         let passes = crossing.lanes & worth(ways.passed_weight);
@@ -165,7 +165,7 @@ impl<L: SimdFloat> World<L> {
             } else {
                 counts.glossy = true;
                 let (r, t) = (mirrored_weight.max_element(), passed_weight.max_element());
-                let back = both & (draws.choice(bounce - 1 - BOTH as u32) * (r + t)).lt(r);
+                let back = both & (draws.branch_1d(bounce - 1 - BOTH as u32) * (r + t)).lt(r);
                 through = through.and_not(back);
                 let scaled = |v: Vec3<L>, k: L| Vec3::select(both, v * ((r + t) / k), v);
                 mirrored_weight = scaled(mirrored_weight, r);
@@ -205,7 +205,7 @@ impl<L: SimdFloat> World<L> {
                 met.shade(next.lanes);
             }
             (layer, among) = (next.layer, next.lanes);
-            lift = lift.max(next.lift.only(among));
+            lift = lift.max(next.lift.masked(among));
         }
         let mut fresh = L::mask(false);
         let mut left = lanes.and_not(among);
@@ -231,7 +231,7 @@ impl<L: SimdFloat> World<L> {
             }
             layer = L::select(first.touching, first.layer, layer);
             among = among | first.touching;
-            lift = lift.max(first.lift.only(first.touching));
+            lift = lift.max(first.lift.masked(first.touching));
         }
         met.lift = L::select(among, lift, met.lift);
         Seam { lanes: among, item: met.item, point: met.point, axis: -met.geometric, layer }
@@ -282,16 +282,16 @@ impl<L: SimdFloat> World<L> {
             if let Some(transmission) = &finish.transmission {
                 let mut split = interface.split(transmission, crossing.outer);
                 if crossing.pane.any() {
-                    let pane = interface.split_by_pane(transmission);
+                    let pane = interface.split_thin(transmission);
                     let choose = |a, b| L::select(crossing.pane, a, b);
                     split.reflected = choose(pane.reflected, split.reflected);
                     split.transmitted = choose(pane.transmitted, split.transmitted);
-                    split.total = choose(pane.total, split.total);
+                    split.tir = choose(pane.tir, split.tir);
                 }
-                own = split.reflected.only(!crossing.hidden);
+                own = split.reflected.masked(!crossing.hidden);
                 let passed = L::select(crossing.hidden, L::one(), split.transmitted);
                 ways.passed_weight = Vec3::select(lanes, path.weight * passed, ways.passed_weight);
-                let total = path.weight * split.total.only(!crossing.hidden);
+                let total = path.weight * split.tir.masked(!crossing.hidden);
                 ways.mirrored_weight = Vec3::select(lanes, total, ways.mirrored_weight);
             }
             let Some((strength, spread)) = &finish.reflection else { continue };
@@ -304,10 +304,10 @@ impl<L: SimdFloat> World<L> {
                 (L::zero(), L::zero())
             } else {
                 counts.glossy = true;
-                *numbers.get_or_insert_with(|| draws.lobe(bounce))
+                *numbers.get_or_insert_with(|| draws.lobe_2d(bounce))
             };
-            let r = finish.reflect(*strength, spread, incident, met.normal, uv, self.fold);
-            let weight = path.weight.times(r.weight) * own;
+            let r = finish.sample(*strength, spread, incident, met.normal, uv, self.fold);
+            let weight = path.weight.component_mul(r.weight) * own;
             ways.mirrored = Vec3::select(lanes, r.direction, ways.mirrored);
             ways.mirrored_weight = Vec3::select(lanes, weight, ways.mirrored_weight);
         }
