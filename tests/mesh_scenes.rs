@@ -184,8 +184,8 @@ fn sights(scene: &Scene, precision: Precision) -> Vec<FirstHit> {
     let points: Vec<[f64; 2]> = (0..width * height)
         .map(|i| [(i % width) as f64 + 0.37, (i / width) as f64 + 0.61])
         .collect();
-    let mut seen = vec![FirstHit::NOTHING; points.len()];
-    world.look(&points, &mut seen);
+    let mut seen = vec![FirstHit::MISS; points.len()];
+    world.first_hit(&points, &mut seen);
     seen
 }
 

@@ -22,13 +22,13 @@ pub const LEAF_FLAG: u32 = 1 << 31;
 #[repr(align(32))]
 pub struct Bvh8Node {
     /// Smallest coordinates of the boxes on the three axes, then the largest.
-    pub sides: [[f32; BVH_WIDTH]; 6],
+    pub bounds: [[f32; BVH_WIDTH]; 6],
     /// What is in each box: the number of a branch, or of a leaf and [`LEAF_FLAG`].
     pub child: [u32; BVH_WIDTH],
 }
 
 const EMPTY_NODE: Bvh8Node = Bvh8Node {
-    sides: [
+    bounds: [
         [f32::INFINITY; BVH_WIDTH],
         [f32::INFINITY; BVH_WIDTH],
         [f32::INFINITY; BVH_WIDTH],
@@ -41,8 +41,8 @@ const EMPTY_NODE: Bvh8Node = Bvh8Node {
 
 impl Bvh8Node {
     /// Numbers of the places that hold a box.
-    pub fn places(&self) -> impl Iterator<Item = usize> {
-        (0..BVH_WIDTH).filter(|i| self.sides[0][*i] <= self.sides[3][*i])
+    pub fn children(&self) -> impl Iterator<Item = usize> {
+        (0..BVH_WIDTH).filter(|i| self.bounds[0][*i] <= self.bounds[3][*i])
     }
 }
 
@@ -84,7 +84,7 @@ impl Bvh8 {
             order: Vec::new(),
             leaves: Vec::new(),
         };
-        built.join(&binary);
+        built.collapse(&binary);
         built.order = binary.primitive_indices;
         built
     }
@@ -107,7 +107,7 @@ impl Bvh8 {
 
 impl Bvh8Build {
     /// Makes branches and leaves of the nodes of a binary tree.
-    fn join(&mut self, binary: &Bvh2) {
+    fn collapse(&mut self, binary: &Bvh2) {
         let nodes = &binary.nodes;
         let groups = CollapsePlan::of(nodes);
         let mut todo = vec![(0usize, 0usize, 1usize)];
@@ -123,8 +123,8 @@ impl Bvh8Build {
                 let n = &nodes[*node];
                 let (low, high) = (n.aabb().min.to_array(), n.aabb().max.to_array());
                 for axis in 0..3 {
-                    new.sides[axis][i] = low[axis];
-                    new.sides[axis + 3][i] = high[axis];
+                    new.bounds[axis][i] = low[axis];
+                    new.bounds[axis + 3][i] = high[axis];
                 }
                 if n.is_leaf() {
                     new.child[i] = LEAF_FLAG | self.leaves.len() as u32;
@@ -235,9 +235,9 @@ mod tests {
         while let Some((branch, depth, around)) = todo.pop() {
             deepest = depth.max(deepest);
             let branch = &boxes.branches()[branch as usize];
-            for place in branch.places() {
+            for place in branch.children() {
                 let mut around: Vec<[f32; 6]> = around.clone();
-                around.push(branch.sides.map(|side| side[place]));
+                around.push(branch.bounds.map(|side| side[place]));
                 let child = branch.child[place];
                 if child & LEAF_FLAG == 0 {
                     todo.push((child, depth + 1, around));

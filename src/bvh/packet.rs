@@ -34,7 +34,7 @@ impl<L: SimdFloat> SlabPacket<L> {
     #[inline(always)]
     fn meets(&self, branch: &Bvh8Node, i: usize, limit: L) -> L::Mask {
         let corner = |k: usize| {
-            let axis = |a: usize| all(branch.sides[k + a][i]);
+            let axis = |a: usize| broadcast(branch.bounds[k + a][i]);
             Vec3::new(axis(0), axis(1), axis(2))
         };
         self.enters(corner(0), corner(3), limit)
@@ -46,7 +46,7 @@ impl<L: SimdFloat> SlabPacket<L> {
         let a = (low - self.above).component_mul(self.inverse);
         let b = (high - self.below).component_mul(self.inverse);
         let near = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z)).max(L::zero());
-        let far = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z)) * grown();
+        let far = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z)) * far_scale();
         near.le(far) & near.le(limit)
     }
 }
@@ -114,7 +114,7 @@ impl<S: Float> PacketBounds<S> {
             last = Vec3::new(last.x.max(b.x), last.y.max(b.y), last.z.max(b.z));
         }
         let first = first.x.max(first.y).max(first.z).max(L::zero());
-        let last = last.x.min(last.y).min(last.z) * grown();
+        let last = last.x.min(last.y).min(last.z) * far_scale();
         (first, first.le(last) & first.le(limit))
     }
 }
@@ -130,25 +130,25 @@ fn ends<L: SimdFloat>(v: Vec3<L>, here: L::Mask, first: usize) -> ([L::Scalar; 3
 /// The far side of a box moves out by some roundings, so that no hit is lost (Ize 2013, *Robust BVH
 /// Ray Traversal*).
 #[inline(always)]
-fn grown<L: SimdFloat>() -> L {
+fn far_scale<L: SimdFloat>() -> L {
     L::from_f64(1.0 + 8.0 * L::EPSILON)
 }
 
 /// One number in all lanes.
 #[inline(always)]
-pub fn all<L: SimdFloat>(x: f32) -> L {
+pub fn broadcast<L: SimdFloat>(x: f32) -> L {
     L::splat(L::Scalar::from_f64(f64::from(x)))
 }
 
 /// Part `part` of eight numbers, in lanes; lanes beyond them repeat.
 #[inline(always)]
-pub fn lanes_of<L: SimdFloat>(numbers: &[f32; BVH_WIDTH], part: usize) -> L {
+pub fn load_wide<L: SimdFloat>(numbers: &[f32; BVH_WIDTH], part: usize) -> L {
     L::from_fn(|i| L::Scalar::from_f64(f64::from(numbers[(part * L::WIDTH + i) % BVH_WIDTH])))
 }
 
 /// The lanes of a part that do not repeat.
 #[inline(always)]
-pub const fn fresh() -> u32 {
+pub const fn valid_lanes() -> u32 {
     (1 << BVH_WIDTH) - 1
 }
 
@@ -179,7 +179,12 @@ pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
 
 /// Puts an entry on the stack, above those that are entered later, of the ones from `base` on.
 #[inline(always)]
-fn push<S: Float>(stack: &mut [StackEntry<S>], base: usize, top: &mut usize, entry: StackEntry<S>) {
+fn push_sorted<S: Float>(
+    stack: &mut [StackEntry<S>],
+    base: usize,
+    top: &mut usize,
+    entry: StackEntry<S>,
+) {
     let mut at = *top;
     while at > base && stack[at - 1].near < entry.near {
         stack[at] = stack[at - 1];
@@ -193,7 +198,7 @@ fn push<S: Float>(stack: &mut [StackEntry<S>], base: usize, top: &mut usize, ent
 /// first that are nearer as far as `bounds` knows; `leaf` returns the distances beyond which nothing
 /// matters any more. `bounds`: of the lanes whose limit is not negative, if they have any.
 #[inline(always)]
-pub fn together<L: SimdFloat>(
+pub fn traverse_packet<L: SimdFloat>(
     boxes: &Bvh8,
     (beam, bounds): (&SlabPacket<L>, Option<&PacketBounds<L::Scalar>>),
     mut limit: L,
@@ -210,20 +215,25 @@ pub fn together<L: SimdFloat>(
             let branch = &boxes.branches()[child as usize];
             let base = top;
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
-                let side = |k: usize| lanes_of(&branch.sides[k], part);
+                let side = |k: usize| load_wide(&branch.bounds[k], part);
                 let (near, met) = match bounds {
                     Some(bounds) => bounds.meets::<false, L>(side, L::splat(farthest)),
                     // Of no use to order them; but empty places are known.
                     None => (L::zero(), side(0).le(side(3))),
                 };
-                let mut bits = met.bits() & fresh() & ((1 << L::WIDTH) - 1);
+                let mut bits = met.bits() & valid_lanes() & ((1 << L::WIDTH) - 1);
                 while bits != 0 {
                     let i = bits.trailing_zeros() as usize;
                     bits &= bits - 1;
                     let place = part * L::WIDTH + i;
                     if beam.meets(branch, place, limit).any() {
                         let child = branch.child[place];
-                        push(stack, base, &mut top, StackEntry { child, near: near.lane(i) });
+                        push_sorted(
+                            stack,
+                            base,
+                            &mut top,
+                            StackEntry { child, near: near.lane(i) },
+                        );
                     }
                 }
             }

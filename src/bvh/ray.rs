@@ -39,20 +39,20 @@ pub struct Hit<L> {
     /// Tag of the item met; meaningless where nothing was.
     pub item: L,
     /// Tag of the triangle of a mesh met; meaningless elsewhere.
-    pub facet: L,
+    pub triangle: L,
 }
 
 impl<L: SimdFloat> Hit<L> {
     /// Nothing met.
     #[inline(always)]
     pub fn none() -> Self {
-        Self::nearer_than(L::from_f64(L::MAX))
+        Self::with_t_max(L::from_f64(L::MAX))
     }
 
     /// Nothing met yet, and nothing to be met at `t` or beyond.
     #[inline(always)]
-    pub(crate) fn nearer_than(t: L) -> Self {
-        Self { t, item: L::from_id(0), facet: L::from_id(0) }
+    pub(crate) fn with_t_max(t: L) -> Self {
+        Self { t, item: L::from_id(0), triangle: L::from_id(0) }
     }
 
     /// Takes a distance and the tags of an item and a triangle in `lanes`, whatever is known there.
@@ -60,12 +60,12 @@ impl<L: SimdFloat> Hit<L> {
     pub fn take_in(&mut self, lanes: L::Mask, t: L, (item, facet): (L, L)) {
         self.t = L::select(lanes, t, self.t);
         self.item = L::select(lanes, item, self.item);
-        self.facet = L::select(lanes, facet, self.facet);
+        self.triangle = L::select(lanes, facet, self.triangle);
     }
 
     /// Takes `t` and `item` where `t` is positive, nearer than what is known, and `mask` is true.
     #[inline(always)]
-    pub(crate) fn narrow(&mut self, mask: L::Mask, t: L, item: u32) {
+    pub(crate) fn keep_closer(&mut self, mask: L::Mask, t: L, item: u32) {
         let nearer = mask & t.gt(L::zero()) & t.lt(self.t);
         self.t = L::select(nearer, t, self.t);
         self.item = L::select(nearer, L::from_id(item), self.item);
@@ -73,7 +73,7 @@ impl<L: SimdFloat> Hit<L> {
 
     /// Takes `other` where it is nearer, or as near with a lower tag.
     #[inline(always)]
-    pub(crate) fn take(&mut self, other: &Self) {
+    pub(crate) fn merge(&mut self, other: &Self) {
         let mut nearer = other.t.lt(self.t);
         let tie = (other.t.le(self.t) & other.t.lt(L::from_f64(L::MAX))).and_not(nearer);
         // Rare; and tags are subnormal as floats, which some processors compare slowly.
@@ -82,6 +82,6 @@ impl<L: SimdFloat> Hit<L> {
         }
         self.t = L::select(nearer, other.t, self.t);
         self.item = L::select(nearer, other.item, self.item);
-        self.facet = L::select(nearer, other.facet, self.facet);
+        self.triangle = L::select(nearer, other.triangle, self.triangle);
     }
 }

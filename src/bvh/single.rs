@@ -5,7 +5,7 @@
 //! not in order: the nearest of them is looked for when it is needed, without a jump. For what costs time
 //! with random rays, but for memory, is jumps that the processor foretells wrongly.
 
-use crate::bvh::packet::{PacketBounds, SlabPacket, fresh, lanes_of};
+use crate::bvh::packet::{PacketBounds, SlabPacket, load_wide, valid_lanes};
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 
@@ -39,15 +39,15 @@ struct RayTraversal<S> {
 
 /// Calls `leaf(lane, leaf, limit)` for the leaves whose boxes the ray of a lane enters no farther than its
 /// limit, nearer ones first; `leaf` returns the distance beyond which nothing matters to that ray any
-/// more. `lanes`: those that go. `soon(leaf)` is called before a leaf is needed. `frames`: as many for each
+/// more. `lanes`: those that go. `prefetch_leaf(leaf)` is called before a leaf is needed. `frames`: as many for each
 /// lane as the tree is deep.
 #[inline(never)]
-pub fn apart<L: SimdFloat>(
+pub fn traverse_rays<L: SimdFloat>(
     boxes: &Bvh8,
     (beam, limit): (&SlabPacket<L>, L),
     lanes: u32,
     frames: &mut [StackFrame],
-    soon: impl Fn(usize),
+    prefetch_leaf: impl Fn(usize),
     mut leaf: impl FnMut(usize, usize, L::Scalar) -> L::Scalar,
 ) {
     let room = boxes.depth();
@@ -60,7 +60,7 @@ pub fn apart<L: SimdFloat>(
         let mut go = |lane: usize, child: u32| {
             if child & LEAF_FLAG != 0 {
                 at_leaf |= 1 << lane;
-                soon((child & !LEAF_FLAG) as usize);
+                prefetch_leaf((child & !LEAF_FLAG) as usize);
             } else {
                 at_branch |= 1 << lane;
                 fetch(&boxes.branches()[child as usize]);
@@ -70,7 +70,7 @@ pub fn apart<L: SimdFloat>(
             let lane = branches.trailing_zeros() as usize % L::WIDTH;
             branches &= branches - 1;
             let (walker, frames) = (&mut walkers[lane], &mut frames[lane * room..][..room]);
-            if walker.open::<L>(boxes, frames) || walker.next(boxes, frames) {
+            if walker.expand::<L>(boxes, frames) || walker.next(boxes, frames) {
                 go(lane, walker.child);
             }
         }
@@ -89,7 +89,7 @@ pub fn apart<L: SimdFloat>(
 /// Begins to bring a branch from memory.
 #[inline(always)]
 fn fetch(branch: &Bvh8Node) {
-    let [a, _, b, _, c, _] = &branch.sides;
+    let [a, _, b, _, c, _] = &branch.bounds;
     prefetch(a);
     prefetch(b);
     prefetch(c);
@@ -134,14 +134,18 @@ impl<S: Float> RayTraversal<S> {
     /// Goes to the nearest of the boxes of the branch at hand that the ray enters and makes a frame of the
     /// others; false: it enters none.
     #[inline(always)]
-    fn open<L: SimdFloat<Scalar = S>>(&mut self, boxes: &Bvh8, frames: &mut [StackFrame]) -> bool {
+    fn expand<L: SimdFloat<Scalar = S>>(
+        &mut self,
+        boxes: &Bvh8,
+        frames: &mut [StackFrame],
+    ) -> bool {
         let branch = &boxes.branches()[self.child as usize];
         let (mut keys, mut met) = ([NO_KEY; BVH_WIDTH], 0);
         for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
-            let side = |k: usize| lanes_of::<L>(&branch.sides[k], part);
+            let side = |k: usize| load_wide::<L>(&branch.bounds[k], part);
             let (near, enters) = self.ray.meets::<true, L>(side, L::splat(self.limit));
             let first = part * L::WIDTH;
-            met |= (enters.bits() & fresh()) << first;
+            met |= (enters.bits() & valid_lanes()) << first;
             // Less by more than rounding to single precision may add: no key is beyond its box.
             let near =
                 L::select(enters, near * L::from_f64(1.0 - 2e-7), L::from_f64(f64::INFINITY));

@@ -107,7 +107,7 @@ pub struct Bsdf<S> {
     /// F of the reflection, as far as it does not depend on what lies on the other side.
     pub reflection_fresnel: Reflectance<S>,
     /// Whether lights matter to it.
-    pub wants_light: bool,
+    pub has_direct: bool,
     /// Whether its back is like its front.
     pub two_sided: bool,
 }
@@ -170,7 +170,7 @@ impl<S: Float> Bsdf<S> {
             transmission,
             highlight_fresnel: reflectance,
             reflection_fresnel: if shared { Reflectance::white() } else { reflectance },
-            wants_light: !black || material.specular != 0.0,
+            has_direct: !black || material.specular != 0.0,
             two_sided: material.two_sided,
         }
     }

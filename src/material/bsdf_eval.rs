@@ -136,7 +136,7 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
 impl<S: Float> Bsdf<S> {
     /// Whether lights leave highlights on it.
     #[inline(always)]
-    pub fn shines(&self) -> bool {
+    pub fn has_highlight(&self) -> bool {
         !matches!(self.shine, SpecularModel::None)
     }
 

@@ -166,7 +166,7 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     /// Whether there is neither a tree nor a box: nothing but lists.
-    pub fn is_listed(&self) -> bool {
+    pub fn has_no_tree(&self) -> bool {
         self.tree.is_none() && self.extents.is_empty()
     }
 
@@ -227,11 +227,11 @@ impl<L: SimdFloat> Aggregate<L> {
             let (part, i) = self.tree_items[item];
             let part = &self.parts[part as usize];
             // As near is near enough: of equal distances the lowest tag counts.
-            let mut one = Hit::nearer_than(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
+            let mut one = Hit::with_t_max(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
             part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut one);
             // Lanes of no interest have met nothing.
             one.t = L::select(one.t.gt(L::zero()), one.t, L::from_f64(L::MAX));
-            hit.take(&one);
+            hit.merge(&one);
             hit.t
         });
         hit
@@ -347,7 +347,7 @@ impl<L: SimdFloat> Aggregate<L> {
     /// Where rays meet `item`, a compound's first part for all of it, nearer than `limit`.
     pub fn closest_to(&self, item: u32, ray: &Ray<L>, limit: L) -> Hit<L> {
         let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
-        let (i, mut hit) = ((item - part.base) as usize, Hit::nearer_than(limit));
+        let (i, mut hit) = ((item - part.base) as usize, Hit::with_t_max(limit));
         part.batch.closest(i..i + 1, part.base, ray, &mut hit);
         hit
     }
@@ -413,7 +413,7 @@ impl<L: SimdFloat> Aggregate<L> {
 /// Nothing met yet; what nobody wants goes no way.
 #[inline(always)]
 fn nearest_wanted<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
-    Hit::nearer_than(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))
+    Hit::with_t_max(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))
 }
 
 fn indices(range: &Range<u32>) -> Range<usize> {

@@ -124,7 +124,7 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
 fn closest<L: SimdFloat>(items: &[impl Primitive<L>], first: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
     for (tag, item) in (first..).zip(items) {
         if let Some((t, meets)) = item.crossing(ray) {
-            hit.narrow(meets, t, tag);
+            hit.keep_closer(meets, t, tag);
         }
     }
 }

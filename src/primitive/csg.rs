@@ -347,7 +347,7 @@ impl<S: Float> Compounds<S> {
             if open.none() {
                 break;
             }
-            let mut hit = Hit::nearer_than(limit);
+            let mut hit = Hit::with_t_max(limit);
             self.meet(&self.compounds[*compound as usize], 0, ray, open, &mut hit);
             blocked = blocked | hit.t.lt(limit);
         }

@@ -181,8 +181,8 @@ impl<S: Float> Meshes<S> {
             let found = triangle_mesh::closest(&item.mesh, &inner, limit);
             let met = found.t.lt(limit);
             let before = hit.t;
-            hit.narrow(met, found.t / length, tag);
-            hit.facet = L::select(hit.t.lt(before), found.triangle, hit.facet);
+            hit.keep_closer(met, found.t / length, tag);
+            hit.triangle = L::select(hit.t.lt(before), found.triangle, hit.triangle);
         }
     }
 

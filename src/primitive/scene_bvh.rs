@@ -2,8 +2,8 @@
 //! others ray by ray.
 
 use crate::bvh::Ray;
-use crate::bvh::packet::{PacketBounds, SlabPacket, together, with_stack};
-use crate::bvh::single::apart;
+use crate::bvh::packet::{PacketBounds, SlabPacket, traverse_packet, with_stack};
+use crate::bvh::single::traverse_rays;
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Build};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::item_box::padded;
@@ -64,7 +64,7 @@ impl SceneBvh {
             let bounds = PacketBounds::around(&beam, wanted);
             let leaf = |number: usize, limit| leaf(self.items[number] as usize, limit);
             return with_stack::<_, _, 128, 512>(BVH_WIDTH, boxes, |stack| {
-                together(boxes, (&beam, bounds.as_ref()), limit, stack, leaf)
+                traverse_packet(boxes, (&beam, bounds.as_ref()), limit, stack, leaf)
             });
         }
         let numbers = L::from_fn(|lane| L::Scalar::from_f64(lane as f64));
@@ -75,7 +75,7 @@ impl SceneBvh {
             leaf(self.items[number] as usize, limit).lane(lane)
         };
         with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {
-            apart(boxes, (&beam, limit), wanted, stack, |_| (), leaf)
+            traverse_rays(boxes, (&beam, limit), wanted, stack, |_| (), leaf)
         });
     }
 

@@ -7,8 +7,10 @@
 use crate::asset::{Mesh, TriangleBlock};
 use crate::bvh::BVH_WIDTH;
 use crate::bvh::Ray;
-use crate::bvh::packet::{PacketBounds, SlabPacket, all, fresh, lanes_of, together, with_stack};
-use crate::bvh::single::apart;
+use crate::bvh::packet::{
+    PacketBounds, SlabPacket, broadcast, load_wide, traverse_packet, valid_lanes, with_stack,
+};
+use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 
 /// Packets go together whose directions differ by no more than this for each lane over the root of the
@@ -43,7 +45,7 @@ struct ShearedRay<L> {
 fn beam<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
     let [low, high] = mesh.mesh().bounds;
     let reach = low.iter().chain(&high).fold(0.0f32, |m, x| m.max(x.abs()));
-    let pad = (ray.origin.max_abs() + all(reach)) * L::from_f64(8.0 * L::EPSILON);
+    let pad = (ray.origin.max_abs() + broadcast(reach)) * L::from_f64(8.0 * L::EPSILON);
     SlabPacket::new(ray, Vec3::new(pad, pad, pad))
 }
 
@@ -96,7 +98,7 @@ impl<L: SimdFloat> ShearedRay<L> {
     #[inline(always)]
     fn corners(leaf: &TriangleBlock, part: usize) -> [Vec3<L>; 3] {
         leaf.corners.each_ref().map(|c| {
-            let axis = |a: usize| lanes_of(&c[a], part);
+            let axis = |a: usize| load_wide(&c[a], part);
             Vec3::new(axis(0), axis(1), axis(2))
         })
     }
@@ -143,14 +145,14 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                     Some(bounds) => {
                         bounds.meets::<false, L>(|k| sides[k], L::from_f64(L::MAX)).1.bits()
                     }
-                    None => fresh(),
+                    None => valid_lanes(),
                 };
-                let mut bits = bits & fresh() & ((1 << L::WIDTH) - 1);
+                let mut bits = bits & valid_lanes() & ((1 << L::WIDTH) - 1);
                 while bits != 0 {
                     let i = part * L::WIDTH + bits.trailing_zeros() as usize;
                     bits &= bits - 1;
                     let one = |c: &[[f32; BVH_WIDTH]; 3]| {
-                        Vec3::new(all(c[0][i]), all(c[1][i]), all(c[2][i]))
+                        Vec3::new(broadcast(c[0][i]), broadcast(c[1][i]), broadcast(c[2][i]))
                     };
                     let (t, met) = pierce.meet(leaf.corners.each_ref().map(one));
                     let tie = met & t.le(found.t);
@@ -167,7 +169,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             found.t
         };
         with_stack::<_, _, 128, 512>(BVH_WIDTH, boxes, |stack| {
-            together(boxes, (beam, bounds.as_ref()), limit, stack, leaf)
+            traverse_packet(boxes, (beam, bounds.as_ref()), limit, stack, leaf)
         });
         found
     }
@@ -201,7 +203,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             let (best, triangle) = &mut found[lane];
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
                 let (t, met) = pierce.meet(ShearedRay::corners(leaf, part));
-                let mut bits = (met & t.le(L::splat(*best))).bits() & fresh();
+                let mut bits = (met & t.le(L::splat(*best))).bits() & valid_lanes();
                 while bits != 0 {
                     let lane = bits.trailing_zeros();
                     bits &= bits - 1;
@@ -220,7 +222,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         };
         let boxes = self.mesh.boxes();
         with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {
-            apart(boxes, (beam, limit), wanted, stack, soon, leaf)
+            traverse_rays(boxes, (beam, limit), wanted, stack, soon, leaf)
         });
         let t = L::from_fn(|i| found[i].0);
         let t = if ANY { L::select(t.lt(limit), L::from_f64(-1.0), limit) } else { t };

@@ -26,7 +26,7 @@ impl FeatureBuffer {
         look: impl Fn(&[[f64; 2]], &mut [FirstHit]) + Sync,
         pool: &rayon::ThreadPool,
     ) -> Self {
-        let mut sights = vec![FirstHit::NOTHING; columns * rows];
+        let mut sights = vec![FirstHit::MISS; columns * rows];
         let center = |cell: usize, cells: usize, pixels: usize| {
             (cell as f64 + 0.5) * pixels as f64 / cells as f64
         };

@@ -85,21 +85,21 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
             self.add_pixels(&mut tiles, None, (before, step), counts);
         } else {
             for (tile, counts) in tiles.chunks_mut(1).zip(counts.chunks_mut(1)) {
-                let outlook = self.world.outlook(tile[0].0, tile[0].1.extent());
-                if !outlook.as_ref().is_some_and(|outlook| self.world.is_black(outlook)) {
-                    self.add_pixels(tile, outlook, (before, step), counts);
+                let candidates = self.world.candidates(tile[0].0, tile[0].1.extent());
+                if !candidates.as_ref().is_some_and(|candidates| self.world.is_black(candidates)) {
+                    self.add_pixels(tile, candidates, (before, step), counts);
                 }
             }
         }
         tiles.into_iter().for_each(|(_, tile)| tile.set_lattice(step));
     }
 
-    /// Samples of those pixels in tiles, given with their origins, that share packets. `outlook`: of all
+    /// Samples of those pixels in tiles, given with their origins, that share packets. `candidates`: of all
     /// of them.
     fn add_pixels(
         &self,
         tiles: &mut [([usize; 2], &mut Tile)],
-        outlook: Option<TileCandidates>,
+        candidates: Option<TileCandidates>,
         (before, step): (usize, usize),
         counts: &mut [Counts],
     ) {
@@ -114,7 +114,7 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
         };
         let sites = self.sites(0, pixels.iter().map(place));
         let points = self.sampler.block(0, 1);
-        let mut work = PacketScratch::new(0, outlook);
+        let mut work = PacketScratch::new(0, candidates);
         for range in sites.packets(L::WIDTH) {
             let packet = &pixels[range.clone()];
             self.pixels::<1>(&mut work, &points, &sites, range, 0);

@@ -86,14 +86,14 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     /// Samples of all pixels of a tile: packets of one pixel where enough aligned samples are asked
     /// for, of several pixels elsewhere.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
-        let outlook = self.world.outlook(origin, tile.extent());
-        if outlook.as_ref().is_some_and(|outlook| self.world.is_black(outlook)) {
+        let candidates = self.world.candidates(origin, tile.extent());
+        if candidates.as_ref().is_some_and(|candidates| self.world.is_black(candidates)) {
             tile.advance(replicate, job.count);
             return Counts::default();
         }
         // Asked for now, they are there once the first samples are traced.
         tile.prefetch(replicate);
-        let mut work = PacketScratch::new(replicate, outlook);
+        let mut work = PacketScratch::new(replicate, candidates);
         let part: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
             &self.whole
@@ -277,7 +277,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
 /// What the packets of one job share and fill.
 pub(super) struct PacketScratch<L: SimdFloat> {
     replicate: usize,
-    outlook: Option<TileCandidates>,
+    candidates: Option<TileCandidates>,
     pub(super) radiance: Radiance<L>,
     pub(super) counts: Counts,
     /// Samples that were NaN or negative in some group.
@@ -287,10 +287,10 @@ pub(super) struct PacketScratch<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> PacketScratch<L> {
-    pub(super) fn new(replicate: usize, outlook: Option<TileCandidates>) -> Self {
+    pub(super) fn new(replicate: usize, candidates: Option<TileCandidates>) -> Self {
         Self {
             replicate,
-            outlook,
+            candidates,
             radiance: Radiance { groups: [Vec3::zero(); MAX_GROUPS] },
             counts: Counts::default(),
             bad: Vec::new(),
@@ -306,7 +306,7 @@ impl<L: SimdFloat> PacketScratch<L> {
         draws: &PacketSampler<'_, L>,
         active: L::Mask,
     ) {
-        let cost = world.trace(rays, self.outlook.as_ref(), draws, active, &mut self.radiance);
+        let cost = world.trace(rays, self.candidates.as_ref(), draws, active, &mut self.radiance);
         self.counts.rays += cost.rays;
         self.counts.glossy |= cost.glossy;
     }

@@ -24,7 +24,7 @@ impl Relighting {
     /// have groups of their own.
     pub fn mix(&self, scene: &Scene) -> Option<LightWeights> {
         let serves =
-            std::ptr::eq(scene, &*self.compiled) || self.groups.serve(&self.compiled, scene);
+            std::ptr::eq(scene, &*self.compiled) || self.groups.can_reuse(&self.compiled, scene);
         serves.then(|| LightWeights { weights: self.groups.mix(scene) })
     }
 

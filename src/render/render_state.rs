@@ -158,7 +158,7 @@ impl RenderBackend for RenderState {
     }
 
     fn look(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
-        self.world.look(points, seen);
+        self.world.first_hit(points, seen);
     }
 
     fn lanes(&self) -> &'static str {

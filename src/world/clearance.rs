@@ -154,9 +154,9 @@ fn from_mesh(mesh: &Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
         }
         let branch = &mesh.boxes().branches()[branch as usize];
         let first = todo.len();
-        for i in branch.places() {
+        for i in branch.children() {
             let corner =
-                |from: usize| DVec3::from([0, 1, 2].map(|a| f64::from(branch.sides[a + from][i])));
+                |from: usize| DVec3::from([0, 1, 2].map(|a| f64::from(branch.bounds[a + from][i])));
             let away = (corner(0) - inside).max(inside - corner(3)).max(DVec3::ZERO).length();
             let bound = away * shrinks;
             if bound >= least {

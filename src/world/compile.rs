@@ -53,8 +53,8 @@ pub(super) struct LightSource<S> {
 pub struct World<L: SimdFloat> {
     pub(super) geometry: Aggregate<L>,
     /// For each item of the geometry, its finish.
-    pub(super) finish_of: Vec<u32>,
-    pub(super) finishes: Vec<Bsdf<L::Scalar>>,
+    pub(super) bsdf_of: Vec<u32>,
+    pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
     pub(super) sources: Vec<LightSource<L::Scalar>>,
     pub(super) ambient: Option<usize>,
     pub(super) background: Option<usize>,
@@ -64,17 +64,17 @@ pub struct World<L: SimdFloat> {
     /// Things have colours of their own.
     pub(super) colored: bool,
     /// Neither smooth nor colored, and all things in lists: no trees, no boxes.
-    pub(super) plain: bool,
+    pub(super) simple: bool,
     /// Textures and bumps; `None`: there are none.
-    pub(super) skins: Option<SurfaceTextures<L>>,
+    pub(super) surface_textures: Option<SurfaceTextures<L>>,
     /// What lets light through; `None`: nothing does.
-    pub(super) media: Option<NestedDielectrics<L>>,
+    pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,
     /// The most surfaces that a path meets after the first.
     pub(super) depth: u32,
     pub(super) min_weight: f64,
     pub(super) fold: bool,
     pub(super) view: PinholeCamera,
-    pub(super) panorama: TileCandidates,
+    pub(super) all_candidates: TileCandidates,
     /// For each light, if the geometry has a tree that may be gone round.
     pub(super) light_buffers: Vec<Option<LightBuffer<L::Scalar>>>,
     culling: CullingMode,
@@ -151,9 +151,10 @@ impl<L: SimdFloat> World<L> {
 
         let of_part =
             |s: &crate::primitive::PrimitiveId| used[finish_of_object[s.form][s.part] as usize];
-        let skins = SurfaceTextures::new(scene, geometry.sources(), placed.origin, of_part);
+        let surface_textures =
+            SurfaceTextures::new(scene, geometry.sources(), placed.origin, of_part);
 
-        let lit = finishes.iter().any(|f| f.wants_light);
+        let lit = finishes.iter().any(|f| f.has_direct);
         let ambient = used.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3]);
         let groups = LightGroups::new(scene, lit, ambient);
         let extent = placed.extent(scene);
@@ -191,7 +192,7 @@ impl<L: SimdFloat> World<L> {
         let inventory = Inventory::new(
             scene,
             geometry.to_string(),
-            &skins.as_ref().map(SurfaceTextures::words).unwrap_or_default(),
+            &surface_textures.as_ref().map(SurfaceTextures::words).unwrap_or_default(),
             &finishes,
             &groups.members,
             sources.len(),
@@ -206,7 +207,7 @@ impl<L: SimdFloat> World<L> {
             view.corners([0, 0], size).map(DVec3::length).into_iter().fold(0.0, f64::max);
         let begin = (view.eye(), scene.camera.near * farthest);
         let given = f64::EPSILON * placed.origin.abs().max_element();
-        let media = NestedDielectrics::new(
+        let nested_dielectrics = NestedDielectrics::new(
             &placed.forms,
             geometry.sources(),
             &finish_of,
@@ -214,14 +215,15 @@ impl<L: SimdFloat> World<L> {
             begin,
             given,
         );
-        let entered =
-            media.as_ref().map_or(vec![false; finish_of.len()], NestedDielectrics::entered);
-        let mut panorama = TileCandidates::everything(&geometry, lamps.len());
+        let entered = nested_dielectrics
+            .as_ref()
+            .map_or(vec![false; finish_of.len()], NestedDielectrics::entered);
+        let mut all_candidates = TileCandidates::all(&geometry, lamps.len());
         let mut light_buffers = Vec::new();
         let culling = match acceleration {
             Acceleration::Auto => {
                 let of = FrustumCuller::new(forms().collect(), eye, &entered, (&lamps, off_lamps));
-                panorama = of.outlook(&geometry, None);
+                all_candidates = of.candidates(&geometry, None);
                 if geometry.has_tree() {
                     if level >= RayTypes::Shadows {
                         light_buffers = of.light_buffers(&geometry);
@@ -229,23 +231,24 @@ impl<L: SimdFloat> World<L> {
                     let things = geometry.in_tree().into_iter();
                     let seen = |item: u32| {
                         let source = geometry.sources()[item as usize];
-                        (item, ScreenBounds::of(&placed.forms[source.form], &view))
+                        (item, ScreenBounds::project(&placed.forms[source.form], &view))
                     };
                     CullingMode::ScreenGrid(ScreenGrid::new(size, things.map(seen)))
                 } else {
-                    CullingMode::Pencils(of)
+                    CullingMode::Frusta(of)
                 }
             }
-            Acceleration::Projected => {
-                CullingMode::Rectangles(forms().map(|form| ScreenBounds::of(form, &view)).collect())
-            }
-            _ => CullingMode::Nothing,
+            Acceleration::Projected => CullingMode::ScreenBounds(
+                forms().map(|form| ScreenBounds::project(form, &view)).collect(),
+            ),
+            _ => CullingMode::Off,
         };
-        let smooth = geometry.is_smooth() || skins.as_ref().is_some_and(SurfaceTextures::is_bumped);
-        let colored =
-            geometry.is_colored() || skins.as_ref().is_some_and(SurfaceTextures::is_colored);
+        let smooth = geometry.is_smooth()
+            || surface_textures.as_ref().is_some_and(SurfaceTextures::is_bumped);
+        let colored = geometry.is_colored()
+            || surface_textures.as_ref().is_some_and(SurfaceTextures::is_colored);
         Self {
-            panorama,
+            all_candidates,
             light_buffers,
             culling,
             ambient: groups.find(&LightGroupSource::Ambient),
@@ -254,8 +257,8 @@ impl<L: SimdFloat> World<L> {
                 .flatten(),
             smooth,
             colored,
-            plain: !smooth && !colored && geometry.is_listed(),
-            skins,
+            simple: !smooth && !colored && geometry.has_no_tree(),
+            surface_textures,
             shadows: level >= RayTypes::Shadows && !geometry.is_empty(),
             depth: if going_on { scene.trace.depth } else { 0 },
             min_weight: scene.trace.min_weight,
@@ -264,11 +267,11 @@ impl<L: SimdFloat> World<L> {
             names: groups.names(scene),
             jitter: scene.film.filter == Filter::Box,
             glossy: finishes.iter().any(glossy),
-            biases: truncation_bias::biases(scene),
-            media,
+            biases: truncation_bias::truncation_bounds(scene),
+            nested_dielectrics,
             geometry,
-            finish_of,
-            finishes,
+            bsdf_of: finish_of,
+            bsdfs: finishes,
             sources,
             groups,
             scales,
@@ -302,14 +305,14 @@ impl<L: SimdFloat> World<L> {
     }
 
     /// What camera rays through a rectangle of the raster may meet; `None`: that is not ruled out here.
-    pub fn outlook(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<TileCandidates> {
+    pub fn candidates(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<TileCandidates> {
         let lamps = self.sources.len();
-        self.culling.outlook(&self.geometry, lamps, &self.view, (origin, extent))
+        self.culling.candidates(&self.geometry, lamps, &self.view, (origin, extent))
     }
 
     /// Whether all camera rays that have this outlook meet nothing, and nothing is black.
-    pub fn is_black(&self, outlook: &TileCandidates) -> bool {
-        self.background.is_none() && outlook.seen.is_empty()
+    pub fn is_black(&self, candidates: &TileCandidates) -> bool {
+        self.background.is_none() && candidates.primary.is_empty()
     }
 
     /// What it contains.
@@ -383,8 +386,8 @@ impl AnyWorld {
 
     /// What the camera sees through each of `points` of the raster (columns and rows in pixels, with
     /// fractions), into `seen` of the same length.
-    pub fn look(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
-        either!(self, w => w.look(points, seen))
+    pub fn first_hit(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
+        either!(self, w => w.first_hit(points, seen))
     }
 
     /// Steps per unit of radiance in the film's integers, per group: powers of two.

@@ -55,7 +55,7 @@ impl LightGroups {
             members.push(LightGroupSource::Background);
         }
         let shining: Vec<usize> =
-            (0..scene.lights.len()).filter(|i| lit && shines(&scene.lights[*i])).collect();
+            (0..scene.lights.len()).filter(|i| lit && emits(&scene.lights[*i])).collect();
         let pixels = scene.film.size.iter().map(|n| u64::from(*n)).product::<u64>().max(1);
         let affordable = (FILM_BYTES / (pixels * GROUP_BYTES)) as usize;
         let room = affordable.saturating_sub(members.len()).clamp(1, MAX_LIGHT_GROUPS);
@@ -84,7 +84,7 @@ impl LightGroups {
             match member {
                 LightGroupSource::Light(i) => out.push((*i, group, [1.0; 3])),
                 LightGroupSource::Shared(list) => {
-                    out.extend(list.iter().map(|i| (*i, group, strength(&scene.lights[*i]))));
+                    out.extend(list.iter().map(|i| (*i, group, emission(&scene.lights[*i]))));
                 }
                 LightGroupSource::Ambient | LightGroupSource::Background => {}
             }
@@ -98,7 +98,7 @@ impl LightGroups {
         let weight = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => scene.ambient.color.0,
             LightGroupSource::Background => scene.background.color.0,
-            LightGroupSource::Light(i) => scene.lights.get(*i).map_or([0.0; 3], strength),
+            LightGroupSource::Light(i) => scene.lights.get(*i).map_or([0.0; 3], emission),
             LightGroupSource::Shared(_) => [1.0; 3],
         };
         self.members.iter().map(weight).collect()
@@ -131,7 +131,7 @@ impl LightGroups {
             Some(surroundings.lamp(&lamp))
         };
         let of_shared = |i: &usize| {
-            let channels = strength(&scene.lights[*i]).into_iter().filter(|s| *s > 0.0);
+            let channels = emission(&scene.lights[*i]).into_iter().filter(|s| *s > 0.0);
             let (least, most) = (channels.clone().reduce(f64::min)?, channels.reduce(f64::max)?);
             Some(of_light(*i)?.times(least, most))
         };
@@ -153,12 +153,12 @@ impl LightGroups {
 }
 
 /// Colour times intensity; black if it is off.
-pub(super) fn strength(light: &Light) -> [f64; 3] {
+pub(super) fn emission(light: &Light) -> [f64; 3] {
     if light.on { light.color.scaled(light.intensity).0 } else { [0.0; 3] }
 }
 
-pub(super) fn shines(light: &Light) -> bool {
-    strength(light) != [0.0; 3]
+pub(super) fn emits(light: &Light) -> bool {
+    emission(light) != [0.0; 3]
 }
 
 #[cfg(test)]
@@ -189,7 +189,7 @@ mod tests {
     fn serves(groups: &LightGroups, scene: &Scene, change: impl Fn(&mut Scene)) -> bool {
         let mut changed = scene.clone();
         change(&mut changed);
-        groups.serve(scene, &changed)
+        groups.can_reuse(scene, &changed)
     }
 
     #[test]

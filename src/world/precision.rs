@@ -14,14 +14,14 @@ use glam::DVec3;
 use std::ops::Range;
 
 /// The largest extent over the thinnest thing: rays start 1/128 of it above a surface.
-const THINNEST: f64 = 8192.0;
+const MAX_EXTENT_PER_THICKNESS: f64 = 8192.0;
 
 /// The largest extent over the narrowest gap between things: eight times the height at which rays start.
-const NARROWEST: f64 = 131_072.0;
+const MAX_EXTENT_PER_GAP: f64 = 131_072.0;
 
 /// The largest extent over what a pixel shows of the thing nearest to the eye: 32 times the height at
 /// which rays start.
-const FINEST: f64 = 32_768.0;
+const MAX_EXTENT_PER_PIXEL: f64 = 32_768.0;
 
 /// How much closer the eye may be to flat things: points are put back on a plane almost exactly, and its
 /// normal is the same everywhere.
@@ -29,14 +29,14 @@ const FLAT: f64 = 8.0;
 
 /// The largest extent over the distance of a lamp from things: the height at which rays start is then
 /// 1/512 of it, and so is the error of the light's angle.
-const NEAREST: f64 = 2048.0;
+const MAX_EXTENT_PER_LIGHT_DISTANCE: f64 = 2048.0;
 
 /// The least angle between the rays of neighbouring pixels \[radians\]: 64 roundings of a direction.
 const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 
 /// Gaps below this part of the extent, and below a few roundings of the place in the file, are between
 /// numbers that were meant to be equal.
-const CLOSED: f64 = 1.0 / 17_592_186_044_416.0;
+const COINCIDENT_GAP: f64 = 1.0 / 17_592_186_044_416.0;
 
 /// The extent of a mesh over that of its details.
 const MESH_DETAILS: f64 = 64.0;
@@ -48,7 +48,7 @@ const MOST_PAIRS: usize = 1 << 20;
 /// `forms`: all things, around `origin`; `extent`: the largest coordinate of things and eye there.
 pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
     let thinnest = forms.iter().map(thickness).fold(f64::INFINITY, f64::min);
-    if extent > THINNEST * thinnest {
+    if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
         return false;
     }
     let view = PinholeCamera::new(&scene.camera, scene.film.size, origin);
@@ -59,16 +59,16 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     };
     let seen_from =
         forms.iter().filter_map(distance).fold(f64::INFINITY, f64::min).max(scene.camera.near);
-    if angle < LEAST_ANGLE || extent > FINEST * angle * seen_from {
+    if angle < LEAST_ANGLE || extent > MAX_EXTENT_PER_PIXEL * angle * seen_from {
         return false;
     }
     let lamps = scene.lights.iter().filter(|l| l.on).filter_map(|l| l.point);
     let mut distances = lamps.map(|lamp| clearance(forms, DVec3::from(lamp.position) - origin));
-    if distances.any(|distance| extent > NEAREST * distance) {
+    if distances.any(|distance| extent > MAX_EXTENT_PER_LIGHT_DISTANCE * distance) {
         return false;
     }
     let rounded = 16.0 * f64::EPSILON * origin.abs().max_element();
-    let narrow = (CLOSED * extent).max(rounded)..extent / NARROWEST;
+    let narrow = (COINCIDENT_GAP * extent).max(rounded)..extent / MAX_EXTENT_PER_GAP;
     let pixel = |point: DVec3| angle * point.distance(view.eye());
     !has_gap(forms, narrow, pixel)
 }

@@ -9,7 +9,7 @@ use crate::material::Material;
 use crate::scene::{FilmSettings, Object, Scene};
 use crate::shape::Shape;
 use crate::value::Color;
-use crate::world::light_groups::{LightGroupSource, LightGroups, shines, strength};
+use crate::world::light_groups::{LightGroupSource, LightGroups, emission, emits};
 use std::borrow::Cow;
 
 impl LightGroups {
@@ -17,7 +17,7 @@ impl LightGroups {
     /// of `scene` too, mixed otherwise: they differ in nothing but the strength of lights, ambient and
     /// background that have groups, in names, in materials that nothing is made of, and in the cap on
     /// rays per pixel, which only says how many samples there are to be.
-    pub fn serve(&self, compiled: &Scene, scene: &Scene) -> bool {
+    pub fn can_reuse(&self, compiled: &Scene, scene: &Scene) -> bool {
         let Scene {
             film,
             trace,
@@ -43,11 +43,11 @@ impl LightGroups {
                 .iter()
                 .zip(objects)
                 .all(|(a, b)| same_object((compiled, a), (scene, b)))
-            && self.serve_lights(compiled, scene)
+            && self.can_relight(compiled, scene)
     }
 
-    /// The part of [`LightGroups::serve`] that is about lights. One that does not shine may stand anywhere.
-    fn serve_lights(&self, compiled: &Scene, scene: &Scene) -> bool {
+    /// The part of [`LightGroups::can_reuse`] that is about lights. One that does not shine may stand anywhere.
+    fn can_relight(&self, compiled: &Scene, scene: &Scene) -> bool {
         let is_compiled = |i: usize| {
             let of = |m: &LightGroupSource| match m {
                 LightGroupSource::Light(own) => *own == i,
@@ -57,10 +57,10 @@ impl LightGroups {
             self.members.iter().any(of)
         };
         let same_place = |i: usize, light: &Light| of_unit(&compiled.lights[i]) == of_unit(light);
-        let mut shining = scene.lights.iter().enumerate().filter(|(_, light)| shines(light));
+        let mut shining = scene.lights.iter().enumerate().filter(|(_, light)| emits(light));
         let shared = |member: &LightGroupSource| match member {
             LightGroupSource::Shared(list) => list.iter().all(|i| {
-                scene.lights.get(*i).is_some_and(|l| strength(l) == strength(&compiled.lights[*i]))
+                scene.lights.get(*i).is_some_and(|l| emission(l) == emission(&compiled.lights[*i]))
             }),
             LightGroupSource::Ambient
             | LightGroupSource::Background

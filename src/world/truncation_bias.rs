@@ -6,7 +6,7 @@ use crate::scene::{Object, RayTypes, Scene};
 use glam::DVec3;
 
 /// Largest share of light that a material sends on, reflected and transmitted together, of any channel.
-fn strongest(material: &Material, flat: bool) -> f64 {
+fn max_albedo(material: &Material, flat: bool) -> f64 {
     let (k_r, k_t) = (material.reflection, material.transmission);
     let f = match material.fresnel_mode() {
         Fresnel::Constant => material.f0().0.into_iter().fold(0.0, f64::max).min(1.0),
@@ -28,7 +28,7 @@ struct ObjectTraits {
     /// It may see itself from outside.
     compound: bool,
     /// Paths may begin inside.
-    begun_in: bool,
+    contains_eye: bool,
 }
 
 /// How far beside its place rounding to single precision may put the eye, as a share of the scene's extent.
@@ -47,7 +47,7 @@ impl ObjectTraits {
         Self {
             flat,
             compound: matches!(form, Form::Csg(_) | Form::Mesh { .. }),
-            begun_in: !flat && (within || scene.camera.near > 0.0),
+            contains_eye: !flat && (within || scene.camera.near > 0.0),
         }
     }
 
@@ -56,7 +56,7 @@ impl ObjectTraits {
     /// that: what they would reflect into the surface leaves it, and what they would keep outside goes in.
     fn sees_itself(&self, material: &Material) -> bool {
         let let_in = !self.flat && material.transmission > 0.0;
-        self.compound || let_in || self.begun_in && material.two_sided
+        self.compound || let_in || self.contains_eye && material.two_sided
     }
 }
 
@@ -65,7 +65,7 @@ struct Reach {
     /// The largest share of one surface.
     first: f64,
     /// The largest product of the shares of two surfaces of which one sees the other.
-    pair: f64,
+    round_trip_albedo: f64,
     /// Some surface sends on reflected and transmitted light.
     through: bool,
 }
@@ -73,16 +73,16 @@ struct Reach {
 impl Reach {
     fn new(scene: &Scene) -> Self {
         let default = Material::default();
-        let (mut first, mut second, mut pair) = (0.0f64, 0.0f64, 0.0f64);
+        let (mut first, mut second, mut round_trip_albedo) = (0.0f64, 0.0f64, 0.0f64);
         let (mut entered, mut through) = (0, false);
         for object in &scene.objects {
             let place = ObjectTraits::new(object, scene);
             let mut enters = false;
             for name in object.materials() {
                 let material = scene.materials.get(name).unwrap_or(&default);
-                let rho = strongest(material, place.flat);
+                let rho = max_albedo(material, place.flat);
                 if rho > 0.0 && place.sees_itself(material) {
-                    pair = pair.max(rho * rho);
+                    round_trip_albedo = round_trip_albedo.max(rho * rho);
                 }
                 through |= material.transmission > 0.0;
                 enters |= material.transmission > 0.0 && !place.flat;
@@ -91,24 +91,28 @@ impl Reach {
             }
             entered += u32::from(enters);
         }
-        pair = pair.max(first * second);
+        round_trip_albedo = round_trip_albedo.max(first * second);
         if entered > 1 {
             // Where they overlap, paths meet surfaces that change nothing.
-            (first, pair) = (first.max(1.0), pair.max(1.0));
+            (first, round_trip_albedo) = (first.max(1.0), round_trip_albedo.max(1.0));
         }
-        Self { first, pair, through }
+        Self { first, round_trip_albedo, through }
     }
 
     /// The most that paths weigh which have met `n` surfaces.
     fn weight(&self, n: u32) -> f64 {
-        let pairs = self.pair.powi(i32::try_from(n / 2).unwrap_or(i32::MAX));
+        let pairs = self.round_trip_albedo.powi(i32::try_from(n / 2).unwrap_or(i32::MAX));
         if n.is_multiple_of(2) { pairs } else { pairs * self.first }
     }
 
     /// The most that paths weigh which have met `n` surfaces or more; infinite: nothing is known.
     fn from(&self, n: u32) -> f64 {
         let sum = self.weight(n) + self.weight(n.saturating_add(1));
-        if self.pair < 1.0 { sum / (1.0 - self.pair) } else { f64::INFINITY }
+        if self.round_trip_albedo < 1.0 {
+            sum / (1.0 - self.round_trip_albedo)
+        } else {
+            f64::INFINITY
+        }
     }
 
     /// The most that paths weigh where they end because they weigh less than `least`, at surfaces of at most
@@ -124,7 +128,7 @@ impl Reach {
 
 /// The brightness that `scene`'s limits can cut off, in words; empty: they cut nothing.
 ///
-/// Two surfaces in a row send on at most `pair`, the largest product of the shares of two surfaces of
+/// Two surfaces in a row send on at most `round_trip_albedo`, the largest product of the shares of two surfaces of
 /// which one sees the other. So all paths that have met n surfaces weigh at most
 /// w(n) = pair^(n/2) together, for odd n that of n - 1 times the largest share, and all of n and
 /// more at most (w(n) + w(n + 1)) / (1 - pair). What they add is at most that times the brightest surface (or the
@@ -133,7 +137,7 @@ impl Reach {
 ///
 /// Of a transparent ball it is not claimed that light leaves it where it comes to its surface again: the angles are
 /// equal there, but at the rim rounding decides whether the critical angle is passed, and bumps change them.
-pub fn biases(scene: &Scene) -> Vec<String> {
+pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
     let reach = Reach::new(scene);
     if scene.trace.level < RayTypes::Full || reach.first == 0.0 {
         return Vec::new();
@@ -188,9 +192,9 @@ mod tests {
 
     #[test]
     fn a_thing_alone_is_met_twice_only_from_inside() {
-        assert_eq!(biases(&scene("[0.0, 0.0, 5.0]", &[(0.9, BALL)])), [""; 0]);
-        assert_eq!(biases(&scene("[0.0, 0.0, 5.0]", &[(0.9, FLOOR)])), [""; 0]);
-        let inside = biases(&scene("[0.0, 0.0, 0.5]", &[(0.9, BALL)]));
+        assert_eq!(truncation_bounds(&scene("[0.0, 0.0, 5.0]", &[(0.9, BALL)])), [""; 0]);
+        assert_eq!(truncation_bounds(&scene("[0.0, 0.0, 5.0]", &[(0.9, FLOOR)])), [""; 0]);
+        let inside = truncation_bounds(&scene("[0.0, 0.0, 0.5]", &[(0.9, BALL)]));
         // 0.9^17 / (1 - 0.9)
         assert_eq!(
             inside,
@@ -199,7 +203,7 @@ mod tests {
         let mut one = scene("[0.0, 0.0, 5.0]", &[(0.9, BALL)]);
         one.trace.depth = 0;
         assert_eq!(
-            biases(&one),
+            truncation_bounds(&one),
             ["depth 0 cuts longer paths (at most 9.00e-1 of the brightest surface)"]
         );
     }
@@ -210,10 +214,11 @@ mod tests {
         two.trace.depth = 3;
         // Four reflections: 0.09^2 (1 + 0.9) / (1 - 0.09)
         assert_eq!(
-            biases(&two),
+            truncation_bounds(&two),
             ["depth 3 cuts longer paths (at most 1.70e-2 of the brightest surface)"]
         );
-        let full = biases(&scene("[0.0, 0.0, 5.0]", &[(1.0, BALL), (1.0, FLOOR)])).concat();
+        let full =
+            truncation_bounds(&scene("[0.0, 0.0, 5.0]", &[(1.0, BALL), (1.0, FLOOR)])).concat();
         assert!(full.contains("no bound"), "{full}");
     }
 
@@ -226,7 +231,7 @@ mod tests {
             scene
         };
         let outside = "[0.0, 0.0, 5.0]";
-        let told = |scene: &Scene| biases(scene).concat();
+        let told = |scene: &Scene| truncation_bounds(scene).concat();
         let cube = "box = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0] }";
         for shape in [BALL, cube] {
             for eye in [outside, "[0.0, 0.0, 0.5]"] {
@@ -236,11 +241,11 @@ mod tests {
         }
         // 0.5^17 / (1 - 0.5)
         assert_eq!(
-            biases(&with(0.4, Fresnel::Dielectric, outside, BALL)),
+            truncation_bounds(&with(0.4, Fresnel::Dielectric, outside, BALL)),
             ["depth 16 cuts longer paths (at most 1.53e-5 of the brightest surface)"]
         );
         // A pane alone is met once.
-        assert_eq!(biases(&with(0.4, Fresnel::Dielectric, outside, FLOOR)), [""; 0]);
+        assert_eq!(truncation_bounds(&with(0.4, Fresnel::Dielectric, outside, FLOOR)), [""; 0]);
     }
 
     #[test]
@@ -263,20 +268,20 @@ mod tests {
         opaque.trace.min_weight = 0.01;
         // 0.01 (1 + 0.5) / (1 - 0.25)
         assert_eq!(
-            biases(&opaque)[1],
+            truncation_bounds(&opaque)[1],
             "min_weight 0.01 cuts weaker paths (at most 2.00e-2 of the brightest surface)"
         );
         let mut glass = opaque.clone();
         let m0 = glass.materials.get_mut("m0").unwrap();
         (m0.transmission, m0.fresnel) = (0.5, Some(Fresnel::Dielectric));
-        let told = biases(&glass).concat();
+        let told = truncation_bounds(&glass).concat();
         // 0.08, 0.08, 0.08, 1/16, 1/32, ..., 2^-16: 0.365 in all, times 2.
         assert!(told.contains("min_weight 0.01 cuts weaker paths (at most 7.3"), "{told}");
     }
 
     #[test]
     fn an_eye_that_rounding_puts_inside_begins_inside() {
-        let just = biases(&scene("[0.0, 0.0, 1.00000001]", &[(0.9, BALL)])).concat();
+        let just = truncation_bounds(&scene("[0.0, 0.0, 1.00000001]", &[(0.9, BALL)])).concat();
         assert!(just.contains("depth 16 cuts"), "{just}");
     }
 }

@@ -51,7 +51,7 @@ pub fn surface<L: SimdFloat>(
     while left.any() {
         let item = hit.item.id_lane(left.bits().trailing_zeros() as usize);
         let here = left & hit.item.id_eq(item);
-        let one = geometry.surface(item, hit.facet, ray.at(hit.t));
+        let one = geometry.surface(item, hit.triangle, ray.at(hit.t));
         all.point = Vec3::select(here, one.point, all.point);
         all.normal = Vec3::select(here, one.normal, all.normal);
         all.reach = L::select(here, one.reach, all.reach);

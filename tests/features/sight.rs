@@ -48,9 +48,9 @@ pub fn sighting(camera: &Camera, [width, height]: [u32; 2], [x, y]: [f64; 2]) ->
 /// What the program sees through the centres of the pixels.
 pub fn sights(scene: &Scene) -> Vec<FirstHit> {
     let centers = centers(scene.film.size);
-    let mut seen = vec![FirstHit::NOTHING; centers.len()];
+    let mut seen = vec![FirstHit::MISS; centers.len()];
     let world = AnyWorld::compile(scene, &Options { precision: Precision::Double });
-    world.look(&centers, &mut seen);
+    world.first_hit(&centers, &mut seen);
     seen
 }
 

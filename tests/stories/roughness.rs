@@ -56,7 +56,7 @@ fn roughness_changes_what_the_mirror_shows_and_not_a_bit_elsewhere() {
     // Pixels that show the mirror, and in it an object rather than the background.
     let [width, height] = SIZE.map(|n| n as usize);
     let size = [width, height];
-    let look = |points: &[[f64; 2]], seen: &mut [FirstHit]| before.world.look(points, seen);
+    let look = |points: &[[f64; 2]], seen: &mut [FirstHit]| before.world.first_hit(points, seen);
     let seen = FeatureBuffer::new(size, size, look, &pool(2));
     let mirror = smooth.objects.iter().position(|o| o.name == "mirror").unwrap() as u32;
     let others = changed(&before, &marked(&smooth, |name| name != "mirror"));

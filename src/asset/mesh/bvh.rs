@@ -123,8 +123,9 @@ impl Mesh {
             }
             let branch = &self.boxes.branches()[branch as usize];
             let first = todo.len();
-            for i in branch.places() {
-                let reach = |a| along(a, branch.sides[a][i]).max(along(a, branch.sides[a + 3][i]));
+            for i in branch.children() {
+                let reach =
+                    |a| along(a, branch.bounds[a][i]).max(along(a, branch.bounds[a + 3][i]));
                 let bound: f64 = (0..3).map(reach).sum();
                 if bound <= best {
                     continue;

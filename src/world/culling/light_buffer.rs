@@ -5,17 +5,17 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat};
 use crate::primitive::{Aggregate, BoundingSphere, F32_RAY_ERROR, LightTarget, PrimitiveSet};
 use crate::world::culling::light_projection::{LightProjection, ProjectedBounds};
-use crate::world::integrator::opaque::first_tag;
+use crate::world::integrator::opaque::next_distinct;
 
 /// So many things are kept for a cell, the nearest to the light.
-const FEW: usize = 16;
+const MAX_PER_CELL: usize = 16;
 
 /// No item's number.
 const NONE: u32 = u32::MAX;
 
 /// What stands in the way of one light.
 pub(crate) struct LightBuffer<S> {
-    chart: LightProjection<S>,
+    projection: LightProjection<S>,
     /// Cells in a row of the chart, and rows.
     side: usize,
     /// The largest coordinate of the things and the light: from farther off, rays stray too far.
@@ -23,7 +23,7 @@ pub(crate) struct LightBuffer<S> {
     /// Row by row, face by face.
     cells: Vec<Cell<S>>,
     /// Of one cell after the other, those nearer to the light first.
-    things: Vec<Entry<S>>,
+    entries: Vec<Entry<S>>,
 }
 
 #[derive(Clone, Copy)]
@@ -31,7 +31,7 @@ struct Cell<S> {
     first: u32,
     end: u32,
     /// Up to this depth all things are known.
-    until: S,
+    complete_to: S,
 }
 
 /// A thing of the geometry's tree.
@@ -80,50 +80,53 @@ impl<S: Float> LightBuffer<S> {
         let mut order: Vec<(f64, u32)> = balls.iter().map(begin).zip(0..).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
 
-        let ProjectedBounds { chart, places, side } = ProjectedBounds::new(towards, &balls);
-        let count = chart.faces() * side * side;
-        let (mut counts, mut until) = (vec![0; count], vec![S::from_f64(f64::INFINITY); count]);
-        let mut entries: Vec<(usize, Entry<S>)> = Vec::new();
-        let mut crowded_out = 0;
+        let ProjectedBounds { projection, rects: places, side } =
+            ProjectedBounds::new(towards, &balls);
+        let count = projection.faces() * side * side;
+        let (mut counts, mut complete_to) =
+            (vec![0; count], vec![S::from_f64(f64::INFINITY); count]);
+        let mut placed: Vec<(usize, Entry<S>)> = Vec::new();
+        let mut overflowed = 0;
         for (near, number) in order {
             let (near, own) = (S::from_f64(near), occluders[number as usize].own.unwrap_or(NONE));
             let mut balance = 0;
             for cell in places[number as usize].iter().flat_map(|place| place.cells(side)) {
-                if counts[cell] < FEW {
+                if counts[cell] < MAX_PER_CELL {
                     counts[cell] += 1;
-                    entries.push((cell, Entry { number, own, near }));
+                    placed.push((cell, Entry { number, own, near }));
                     balance += 1;
                 } else {
-                    until[cell] = if until[cell] < near { until[cell] } else { near };
+                    complete_to[cell] =
+                        if complete_to[cell] < near { complete_to[cell] } else { near };
                     balance -= 1;
                 }
             }
-            crowded_out += usize::from(balance < 0);
-            if 2 * crowded_out >= occluders.len() {
+            overflowed += usize::from(balance < 0);
+            if 2 * overflowed >= occluders.len() {
                 return None;
             }
         }
         let mut end = 0;
-        let cell = |(count, until): (&usize, &S)| {
+        let cell = |(count, complete_to): (&usize, &S)| {
             // Grows to its end when it is filled.
-            let cell = Cell { first: end, end, until: *until };
+            let cell = Cell { first: end, end, complete_to: *complete_to };
             end += *count as u32;
             cell
         };
-        let mut cells: Vec<Cell<S>> = counts.iter().zip(&until).map(cell).collect();
-        let nothing = Entry { number: 0, own: NONE, near: S::default() };
-        let mut things = vec![nothing; entries.len()];
-        for (cell, thing) in entries {
-            things[cells[cell].end as usize] = thing;
+        let mut cells: Vec<Cell<S>> = counts.iter().zip(&complete_to).map(cell).collect();
+        let empty = Entry { number: 0, own: NONE, near: S::default() };
+        let mut entries = vec![empty; placed.len()];
+        for (cell, entry) in placed {
+            entries[cells[cell].end as usize] = entry;
             cells[cell].end += 1;
         }
-        Some(Self { chart, side, scale: S::from_f64(scale), cells, things })
+        Some(Self { projection, side, scale: S::from_f64(scale), cells, entries })
     }
 
     /// [`Aggregate::blocked`] for rays to this light, which end after `limit`. `on`: tags of the items that the
     /// rays begin on, and where that is on their outsides.
     #[inline(never)]
-    pub fn blocked<L: SimdFloat<Scalar = S>>(
+    pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
         ray: &Ray<L>,
@@ -135,9 +138,9 @@ impl<S: Float> LightBuffer<S> {
         let mut blocked = geometry.blocked_by_listed(ray, limit, wanted, by);
         let mut beyond = wanted.and_not(blocked) & ray.origin.max_abs().gt(L::splat(self.scale));
         let mut left = wanted.and_not(blocked | beyond);
-        let (cell, depth) = self.chart.place(ray, limit, self.side);
+        let (cell, depth) = self.projection.lookup(ray, limit, self.side);
         // The item on whose outside all begin.
-        let own = match first_tag(on.0, wanted) {
+        let own = match next_distinct(on.0, wanted) {
             Some((own, all)) if wanted.and_not(all & on.1).none() => Some(own),
             _ => None,
         };
@@ -151,10 +154,10 @@ impl<S: Float> LightBuffer<S> {
                 break;
             }
             left = left.and_not(here);
-            let Cell { first, end, until } = self.cells[number.to_f64() as usize];
+            let Cell { first, end, complete_to } = self.cells[number.to_f64() as usize];
             let farthest = L::select(here, depth, L::from_f64(-L::MAX)).min_max().1;
-            beyond = beyond | (here & depth.gt(L::splat(until)));
-            for thing in &self.things[first as usize..end as usize] {
+            beyond = beyond | (here & depth.gt(L::splat(complete_to)));
+            for thing in &self.entries[first as usize..end as usize] {
                 if thing.near > farthest {
                     break;
                 }
@@ -241,7 +244,7 @@ mod tests {
             let on = (L::select(odd, second, first), L::mask(round % 6 >= 4));
             let all = geometry.all();
             let expected = geometry.blocked(&ray, limit, wanted, all) & wanted;
-            let found = buffer.blocked(&geometry, &ray, on, limit, wanted, all) & wanted;
+            let found = buffer.occluded(&geometry, &ray, on, limit, wanted, all) & wanted;
             assert_eq!(found.bits(), expected.bits(), "{towards:?}, round {round}");
             count += found.bits().count_ones() as usize;
         }
@@ -280,7 +283,10 @@ mod tests {
             [LightTarget::Point(DVec3::new(0.0, 4.0, 4.0)), LightTarget::Direction(DVec3::X)]
         {
             let buffer = LightBuffer::<f32>::new(&towards, &occluders(&balls)).expect("a buffer");
-            assert!(buffer.cells.iter().any(|cell| cell.until < f32::INFINITY), "{towards:?}");
+            assert!(
+                buffer.cells.iter().any(|cell| cell.complete_to < f32::INFINITY),
+                "{towards:?}"
+            );
             let mut random = Random(5);
             assert!(compare::<Single>(&towards, &balls, &mut random) > 100);
             compare::<Double>(&towards, &balls, &mut random);
@@ -302,7 +308,7 @@ mod tests {
         let ask = |outside| {
             let on = (Single::from_id(0), Single::mask(outside));
             let wanted = Single::mask(true);
-            buffer.blocked(&geometry, &ray, on, Single::from_f64(9.0), wanted, geometry.all())
+            buffer.occluded(&geometry, &ray, on, Single::from_f64(9.0), wanted, geometry.all())
         };
         assert!(ask(false).all());
         // Who says that this is outside is believed.
@@ -315,7 +321,7 @@ mod tests {
         let light = LightTarget::Point(DVec3::ZERO);
         let few =
             LightBuffer::<f32>::new(&light, &occluders(&balls(&mut random, 400, 0.3))).unwrap();
-        let mean = few.things.len() as f64 / few.cells.len() as f64;
+        let mean = few.entries.len() as f64 / few.cells.len() as f64;
         assert!(mean < 4.0, "{mean} in a cell");
         let many = balls(&mut random, 4000, 3.0);
         assert!(LightBuffer::<f32>::new(&light, &occluders(&many)).is_none());

@@ -29,7 +29,7 @@ impl<S: Float> LightProjection<S> {
     /// In which cell the light sees where rays begin, and at which depth. What is seen nowhere gets some
     /// cell.
     #[inline(always)]
-    pub fn place<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
+    pub fn lookup<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
         let side = L::from_f64(side as f64);
         // A number below 2^22 plus this has no fraction bits left in single precision; in double one
         // below 2^51.
@@ -96,9 +96,9 @@ impl FaceRect {
 /// A chart and what is seen on it.
 pub(crate) struct ProjectedBounds<S> {
     /// The chart.
-    pub chart: LightProjection<S>,
+    pub projection: LightProjection<S>,
     /// Of each ball.
-    pub places: Vec<Vec<FaceRect>>,
+    pub rects: Vec<Vec<FaceRect>>,
     /// So many cells are good in a row.
     pub side: usize,
 }
@@ -106,19 +106,19 @@ pub(crate) struct ProjectedBounds<S> {
 impl<S: Float> ProjectedBounds<S> {
     /// Of balls, whose places are relative to a light that stands somewhere.
     pub fn new(towards: &LightTarget, balls: &[BoundingSphere]) -> Self {
-        let (chart, places) = match towards {
-            LightTarget::Direction(direction) => far(*direction, balls),
-            LightTarget::Point(_) => window(balls).unwrap_or_else(|| cube(balls)),
+        let (projection, places) = match towards {
+            LightTarget::Direction(direction) => orthographic(*direction, balls),
+            LightTarget::Point(_) => perspective(balls).unwrap_or_else(|| cube_map(balls)),
         };
-        let finest = if matches!(chart, LightProjection::CubeMap) { 2.0 } else { 4.0 };
+        let finest = if matches!(projection, LightProjection::CubeMap) { 2.0 } else { 4.0 };
         let side = (finest * (balls.len() as f64).sqrt()).clamp(8.0, 128.0) as usize;
-        Self { chart, places, side }
+        Self { projection, rects: places, side }
     }
 }
 
 /// Of the directions to the points of a ball in front of a plane through the origin, the smallest and the
 /// largest x / z: `x` and `z` are its centre's. `None`: it is all behind.
-fn slopes(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
+fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     let distance = x.hypot(z);
     if distance <= radius {
         return Some((f64::NEG_INFINITY, f64::INFINITY));
@@ -132,11 +132,12 @@ fn slopes(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
 }
 
 /// Balls around a light.
-fn cube<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
+fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
     let on = |ball: &BoundingSphere, face: usize| {
         let axis = |i: usize| ball.center[(face / 2 + i) % 3];
         let z = if face.is_multiple_of(2) { axis(0) } else { -axis(0) };
-        let (x, y) = (slopes(axis(1), z, ball.radius)?, slopes(axis(2), z, ball.radius)?);
+        let (x, y) =
+            (tangent_range(axis(1), z, ball.radius)?, tangent_range(axis(2), z, ball.radius)?);
         let (low, high) = (DVec2::new(x.0, y.0), DVec2::new(x.1, y.1));
         let half = |v: DVec2| 0.5 * v.clamp(DVec2::NEG_ONE, DVec2::ONE) + 0.5;
         let is_seen = low.max_element() <= 1.0 && high.min_element() >= -1.0;
@@ -147,13 +148,15 @@ fn cube<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<Face
 }
 
 /// Balls on one side of a light; `None`: they are not.
-fn window<S: Float>(balls: &[BoundingSphere]) -> Option<(LightProjection<S>, Vec<Vec<FaceRect>>)> {
+fn perspective<S: Float>(
+    balls: &[BoundingSphere],
+) -> Option<(LightProjection<S>, Vec<Vec<FaceRect>>)> {
     let forward = balls.iter().map(|b| b.center).sum::<DVec3>().try_normalize()?;
     let (right, up) = forward.any_orthonormal_pair();
     let axes = [right, up, forward];
     let seen = |ball: &BoundingSphere| {
         let [x, y, z] = axes.map(|axis| ball.center.dot(axis));
-        let (x, y) = (slopes(x, z, ball.radius)?, slopes(y, z, ball.radius)?);
+        let (x, y) = (tangent_range(x, z, ball.radius)?, tangent_range(y, z, ball.radius)?);
         let seen = (DVec2::new(x.0, y.0), DVec2::new(x.1, y.1));
         let widest = seen.0.abs().max(seen.1.abs()).max_element();
         (z > ball.radius && widest <= WIDEST).then_some(seen)
@@ -165,7 +168,7 @@ fn window<S: Float>(balls: &[BoundingSphere]) -> Option<(LightProjection<S>, Vec
 }
 
 /// Balls seen against `direction`.
-fn far<S: Float>(
+fn orthographic<S: Float>(
     direction: DVec3,
     balls: &[BoundingSphere],
 ) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
@@ -220,13 +223,13 @@ pub(crate) mod tests {
             // With another one, so that the ball is not all of the chart.
             let balls =
                 [ball, BoundingSphere { center: center + DVec3::new(0.5, 1.0, 0.7), radius: 0.1 }];
-            let (chart, places) = match round / 3 % 3 {
-                0 => cube::<L::Scalar>(&balls),
-                1 => match window(&balls) {
-                    Some(window) => window,
+            let (projection, places) = match round / 3 % 3 {
+                0 => cube_map::<L::Scalar>(&balls),
+                1 => match perspective(&balls) {
+                    Some(perspective) => perspective,
                     None => continue,
                 },
-                _ => far(random.point(1.0).normalize(), &balls),
+                _ => orthographic(random.point(1.0).normalize(), &balls),
             };
             let cells: Vec<usize> = places[0].iter().flat_map(|place| place.cells(side)).collect();
             for _ in 0..100 {
@@ -236,7 +239,7 @@ pub(crate) mod tests {
                 let point = center + to * ball.radius * (1.0 - slack);
                 let origin = Vec3::of(point.to_array());
                 let direction = Vec3::of((-point.normalize()).to_array());
-                let (cell, _) = chart.place(&Ray { origin, direction }, L::one(), side);
+                let (cell, _) = projection.lookup(&Ray { origin, direction }, L::one(), side);
                 let cell = cell.lane(0).to_f64();
                 assert!(cells.contains(&(cell as usize)), "{round}: {ball:?}, {point}: {cell}");
             }
@@ -253,12 +256,12 @@ pub(crate) mod tests {
     #[test]
     fn every_direction_has_a_cell() {
         let balls = [BoundingSphere { center: DVec3::NEG_Y * 5.0, radius: 1.0 }];
-        let (window, _) = window::<f32>(&balls).expect("it is on one side");
-        for chart in [cube(&balls).0, window, far(DVec3::Y, &balls).0] {
+        let (perspective, _) = perspective::<f32>(&balls).expect("it is on one side");
+        for projection in [cube_map(&balls).0, perspective, orthographic(DVec3::Y, &balls).0] {
             for to in [[1.0, 0.0, 0.0], [0.0, 1.0, -0.0], [-0.0, 0.0, -1.0], [f64::NAN; 3]] {
                 let ray = Ray { origin: Vec3::of(to), direction: Vec3::<Single>::of(to) };
-                let cell = chart.place(&ray, Single::one(), 8).0.as_array()[0];
-                assert!(cell >= 0.0 && cell < (chart.faces() * 64) as f32, "{to:?}: {cell}");
+                let cell = projection.lookup(&ray, Single::one(), 8).0.as_array()[0];
+                assert!(cell >= 0.0 && cell < (projection.faces() * 64) as f32, "{to:?}: {cell}");
             }
         }
     }

@@ -16,34 +16,34 @@ use glam::DVec3;
 #[derive(Clone, Debug)]
 pub struct TileCandidates {
     /// What the camera rays may meet.
-    pub(crate) seen: PrimitiveSet,
+    pub(crate) primary: PrimitiveSet,
     /// For each light of the world, what shadow rays may meet.
-    pub(crate) shading: Vec<PrimitiveSet>,
+    pub(crate) occluders: Vec<PrimitiveSet>,
 }
 
 impl TileCandidates {
     /// Everything, for `lamps` lights.
-    pub(crate) fn everything<L: SimdFloat>(geometry: &Aggregate<L>, lamps: usize) -> Self {
-        Self { seen: geometry.all().clone(), shading: vec![geometry.all().clone(); lamps] }
+    pub(crate) fn all<L: SimdFloat>(geometry: &Aggregate<L>, lamps: usize) -> Self {
+        Self { primary: geometry.all().clone(), occluders: vec![geometry.all().clone(); lamps] }
     }
 }
 
 /// How the rays of a part of the picture are kept from things that they cannot meet.
 pub(crate) enum CullingMode {
     /// By a pencil of lines from the eye, and what stands between it and the lights.
-    Pencils(FrustumCuller),
+    Frusta(FrustumCuller),
     /// By rectangles on the screen.
-    Rectangles(Vec<ScreenBounds>),
+    ScreenBounds(Vec<ScreenBounds>),
     /// By lists of the few things of a tree that are seen in each part of the screen.
     ScreenGrid(ScreenGrid),
     /// Not at all, or by the geometry itself.
-    Nothing,
+    Off,
 }
 
 impl CullingMode {
     /// What camera rays through a rectangle of the raster may meet, and the shadow rays from where they
     /// end, to `lamps` lights; `None`: nothing is ruled out.
-    pub fn outlook<L: SimdFloat>(
+    pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
         lamps: usize,
@@ -51,21 +51,21 @@ impl CullingMode {
         (origin, extent): ([usize; 2], [usize; 2]),
     ) -> Option<TileCandidates> {
         match self {
-            Self::Pencils(surroundings) => {
+            Self::Frusta(surroundings) => {
                 let [_, _, forward] = view.frame();
                 let corners = view.corners(origin, extent);
                 let pencil = Frustum { apex: view.eye(), forward, corners };
-                Some(surroundings.outlook(geometry, Some(&pencil)))
+                Some(surroundings.candidates(geometry, Some(&pencil)))
             }
-            Self::Rectangles(of) => {
+            Self::ScreenBounds(of) => {
                 let seen = geometry.select(|item| of[item as usize].overlaps(origin, extent));
-                Some(TileCandidates { seen, ..TileCandidates::everything(geometry, lamps) })
+                Some(TileCandidates { primary: seen, ..TileCandidates::all(geometry, lamps) })
             }
             Self::ScreenGrid(cells) => {
-                let seen = geometry.select_few(&cells.seen(origin, extent)?);
-                Some(TileCandidates { seen, ..TileCandidates::everything(geometry, lamps) })
+                let seen = geometry.select_few(&cells.candidates(origin, extent)?);
+                Some(TileCandidates { primary: seen, ..TileCandidates::all(geometry, lamps) })
             }
-            Self::Nothing => None,
+            Self::Off => None,
         }
     }
 }
@@ -75,7 +75,7 @@ pub(crate) struct FrustumCuller {
     /// For each item of the geometry.
     bounds: Vec<BoundingVolume>,
     /// For each item: paths may be inside it, so that it may shade itself.
-    hollow: Vec<bool>,
+    self_shadowing: Vec<bool>,
     /// For each light.
     towards: Vec<LightTarget>,
 }
@@ -100,12 +100,12 @@ impl FrustumCuller {
         });
         // The outside of a convex thing does not see itself, and only paths that begin inside, or are
         // let in, get inside.
-        let hollow = |(b, entered): (&BoundingVolume, &bool)| {
+        let self_shadowing = |(b, entered): (&BoundingVolume, &bool)| {
             let holds_eye = || eye.is_none_or(|eye| b.ball().holds(eye));
             !b.is_convex() || !b.is_flat() && (*entered || holds_eye())
         };
-        let hollow = bounds.iter().zip(entered).map(hollow).collect();
-        Self { towards: towards.collect(), hollow, bounds }
+        let self_shadowing = bounds.iter().zip(entered).map(self_shadowing).collect();
+        Self { towards: towards.collect(), self_shadowing, bounds }
     }
 
     /// For each light what shadow rays to it meet of the things in the geometry's tree.
@@ -115,14 +115,14 @@ impl FrustumCuller {
     ) -> Vec<Option<LightBuffer<L::Scalar>>> {
         let occluder = |item: u32| Occluder {
             ball: self.bounds[item as usize].ball(),
-            own: (!self.hollow[item as usize]).then_some(item),
+            own: (!self.self_shadowing[item as usize]).then_some(item),
         };
         let occluders: Vec<Occluder> = geometry.in_tree().into_iter().map(occluder).collect();
         self.towards.iter().map(|towards| LightBuffer::new(towards, &occluders)).collect()
     }
 
     /// The outlook of camera rays inside `pencil`; `None`: of any rays.
-    pub fn outlook<L: SimdFloat>(
+    pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
         pencil: Option<&Frustum>,
@@ -136,12 +136,13 @@ impl FrustumCuller {
         let shades = |item: usize, towards: &LightTarget| {
             let lit = |(other, part): (usize, &Option<BoundingSphere>)| {
                 part.is_some_and(|part| {
-                    (other != item || self.hollow[item]) && self.bounds[item].shades(&part, towards)
+                    (other != item || self.self_shadowing[item])
+                        && self.bounds[item].shades(&part, towards)
                 })
             };
             parts.iter().enumerate().any(lit)
         };
         let of_light = |towards| geometry.select(|item| shades(item as usize, towards));
-        TileCandidates { seen, shading: self.towards.iter().map(of_light).collect() }
+        TileCandidates { primary: seen, occluders: self.towards.iter().map(of_light).collect() }
     }
 }

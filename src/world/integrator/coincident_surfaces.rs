@@ -15,7 +15,7 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::{Aggregate, Form, PrimitiveId};
 use crate::world::integrator::nested_dielectrics::MediumStack;
-use crate::world::integrator::opaque::first_tag;
+use crate::world::integrator::opaque::next_distinct;
 use glam::DVec3;
 
 /// Surfaces that are so many roundings of the largest coordinate apart lie on each other, as the parts of a
@@ -60,7 +60,7 @@ pub(crate) struct Contacts<S> {
 
 /// Where rays begin on surfaces that lie on others.
 #[derive(Clone, Copy)]
-pub(crate) struct Seam<L: SimdFloat> {
+pub(crate) struct CoincidentState<L: SimdFloat> {
     /// Lanes where they do.
     pub lanes: L::Mask,
     /// Tag of the item.
@@ -74,7 +74,7 @@ pub(crate) struct Seam<L: SimdFloat> {
 }
 
 /// Surfaces in a layer.
-pub(crate) struct Layer<L: SimdFloat> {
+pub(crate) struct CoincidentQuery<L: SimdFloat> {
     /// Lanes where there is one.
     pub lanes: L::Mask,
     /// Lanes where something lies on the surface at hand.
@@ -86,7 +86,7 @@ pub(crate) struct Layer<L: SimdFloat> {
     pub lift: L,
 }
 
-impl<L: SimdFloat> Seam<L> {
+impl<L: SimdFloat> CoincidentState<L> {
     /// Nowhere.
     pub fn none() -> Self {
         let zero = Vec3::zero();
@@ -183,88 +183,88 @@ impl<S: Float> Contacts<S> {
     pub fn next<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
-        seam: &Seam<L>,
+        coincident: &CoincidentState<L>,
         inside: &MediumStack<L>,
-    ) -> Layer<L> {
-        let mut out = Layer {
+    ) -> CoincidentQuery<L> {
+        let mut out = CoincidentQuery {
             lanes: L::mask(false),
             touching: L::mask(false),
-            item: seam.item,
+            item: coincident.item,
             facet: L::from_id(0),
             layer: L::from_f64(L::MAX),
             lift: L::zero(),
         };
-        self.search(geometry, seam, inside, &mut out);
+        self.search(geometry, coincident, inside, &mut out);
         out
     }
 
-    /// The surface that rays meet first of the one that `seam` says and those that lie on it; the seam's
+    /// The surface that rays meet first of the one that `coincident` says and those that lie on it; the seam's
     /// layer means nothing. `leaves`: lanes that go where the normal of the seam's item points to.
     pub fn first<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
-        seam: &Seam<L>,
+        coincident: &CoincidentState<L>,
         leaves: L::Mask,
         inside: &MediumStack<L>,
-    ) -> Layer<L> {
+    ) -> CoincidentQuery<L> {
         let before = L::from_f64(-L::MAX);
         let mut layer = L::zero();
-        let mut left = seam.lanes;
-        while let Some((item, here)) = first_tag(seam.item, left) {
+        let mut left = coincident.lanes;
+        while let Some((item, here)) = next_distinct(coincident.item, left) {
             layer = L::select(here, self.layer(item, leaves, before), layer);
             left = left.and_not(here);
         }
-        let mut out = Layer {
+        let mut out = CoincidentQuery {
             lanes: L::mask(false),
             touching: L::mask(false),
-            item: seam.item,
+            item: coincident.item,
             facet: L::from_id(0),
             layer,
             lift: L::zero(),
         };
-        self.search(geometry, &Seam { layer: before, ..*seam }, inside, &mut out);
+        self.search(geometry, &CoincidentState { layer: before, ..*coincident }, inside, &mut out);
         out
     }
 
-    /// Puts into `out` what comes before its layer and behind that of `seam`.
+    /// Puts into `out` what comes before its layer and behind that of `coincident`.
     #[inline(never)]
     fn search<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
-        seam: &Seam<L>,
+        coincident: &CoincidentState<L>,
         inside: &MediumStack<L>,
-        out: &mut Layer<L>,
+        out: &mut CoincidentQuery<L>,
     ) {
-        let rounding = seam.point.max_abs() * L::from_f64(TIE * L::EPSILON);
-        let mut left = seam.lanes;
-        while let Some((item, here)) = first_tag(seam.item, left) {
+        let rounding = coincident.point.max_abs() * L::from_f64(TIE * L::EPSILON);
+        let mut left = coincident.lanes;
+        while let Some((item, here)) = next_distinct(coincident.item, left) {
             left = left.and_not(here);
             for contact in &self.of[item as usize] {
                 // Along the normal, through the point: so the angle of the ray does not matter.
                 let tie = rounding.max(L::splat(contact.tie));
-                let origin = seam.axis.mul_add(-tie, seam.point);
+                let origin = coincident.axis.mul_add(-tie, coincident.point);
                 let limit = L::select(here, tie + tie, L::from_f64(-1.0));
-                let ray = Ray { origin, direction: seam.axis };
+                let ray = Ray { origin, direction: coincident.axis };
                 let hit = geometry.closest_to(contact.item, &ray, limit);
                 let mut met = here & hit.t.lt(limit);
-                while let Some((other, these)) = first_tag(hit.item, met) {
+                while let Some((other, these)) = next_distinct(hit.item, met) {
                     met = met.and_not(these);
-                    let normal = geometry.surface(other, hit.facet, seam.point).normal;
-                    let cosine = normal.dot(seam.axis);
+                    let normal = geometry.surface(other, hit.triangle, coincident.point).normal;
+                    let cosine = normal.dot(coincident.axis);
                     let leaves = cosine.gt(L::zero());
                     let mut these = these & cosine.abs().gt(L::from_f64(PARALLEL));
                     if let (SurfaceKind::Transparent(rank), _) = &self.kinds[other as usize] {
                         // What a path is not inside of it cannot leave.
-                        let within = inside.holds(L::from_f64(f64::from(*rank)));
+                        let within = inside.contains(L::from_f64(f64::from(*rank)));
                         these = these & ((within & leaves) | (!within & !leaves));
                     }
-                    let layer = self.layer(other, leaves, seam.layer);
+                    let layer = self.layer(other, leaves, coincident.layer);
                     out.touching = out.touching | these;
                     out.lift = L::select(these, out.lift.max(tie * L::from_f64(LIFT)), out.lift);
-                    let nearer = these & layer.gt(seam.layer) & layer.lt(out.layer);
+                    let nearer = these & layer.gt(coincident.layer) & layer.lt(out.layer);
                     out.lanes = out.lanes | nearer;
                     out.item = L::select(nearer, L::from_id(other), out.item);
-                    out.facet = L::select(nearer, hit.facet, out.facet);
+                    out.facet = L::select(nearer, hit.triangle, out.facet);
                     out.layer = L::select(nearer, layer, out.layer);
                 }
             }

@@ -19,14 +19,14 @@ pub struct FirstHit {
 
 impl FirstHit {
     /// Nothing but background.
-    pub const NOTHING: Self =
+    pub const MISS: Self =
         Self { object: None, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
 }
 
 impl<L: SimdFloat> World<L> {
     /// What the camera sees through each of `points` of the raster (columns and rows in pixels, with
     /// fractions), into `seen` of the same length.
-    pub fn look(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
+    pub fn first_hit(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
         for (points, seen) in points.chunks(L::WIDTH).zip(seen.chunks_mut(L::WIDTH)) {
             self.look_at(points, seen);
         }
@@ -48,15 +48,15 @@ impl<L: SimdFloat> World<L> {
         let eye = Vec3::of(self.view.eye().to_array());
         let from_eye = at - eye;
         let depth = from_eye.dot(from_eye).sqrt();
-        seen.fill(FirstHit::NOTHING);
+        seen.fill(FirstHit::MISS);
         let mut left = hit.t.lt(L::from_f64(L::MAX)).bits() & lanes_below(points.len());
         while left != 0 {
             let item = hit.item.id_lane(left.trailing_zeros() as usize);
             let here = hit.item.id_eq(item).bits() & left;
             left &= !here;
-            let normal = self.geometry.surface(item, hit.facet, at).normal;
+            let normal = self.geometry.surface(item, hit.triangle, at).normal;
             let facing = normal.dot(direction);
-            let finish = &self.finishes[self.finish_of[item as usize] as usize];
+            let finish = &self.bsdfs[self.bsdf_of[item as usize] as usize];
             for (lane, sight) in seen.iter_mut().enumerate().filter(|(l, _)| here >> l & 1 != 0) {
                 let front = facing.lane(lane).to_f64() < 0.0;
                 let side = if front { 1.0 } else { -1.0 };
@@ -108,10 +108,10 @@ mod tests {
         shape.rectangle = { center = [97.0, 1.0, 0.0], size = [2.0, 20.0], normal = [0.0, 0.0, -1.0] }
     "#;
 
-    fn look<L: SimdFloat>(points: &[[f64; 2]]) -> Vec<FirstHit> {
+    fn first_hit<L: SimdFloat>(points: &[[f64; 2]]) -> Vec<FirstHit> {
         let world = World::<L>::new(&Scene::parse(SCENE, "test").unwrap());
-        let mut seen = vec![FirstHit::NOTHING; points.len()];
-        world.look(points, &mut seen);
+        let mut seen = vec![FirstHit::MISS; points.len()];
+        world.first_hit(points, &mut seen);
         seen
     }
 
@@ -119,10 +119,12 @@ mod tests {
     #[test]
     fn the_camera_sees_objects_distances_and_normals() {
         let points = [[15.0, 10.0], [21.0, 10.0], [9.0, 10.0], [15.0, 0.5], [21.0, 19.9]];
-        for seen in [look::<Single>(&points), look::<Double>(&points), look::<f64>(&points)] {
+        for seen in
+            [first_hit::<Single>(&points), first_hit::<Double>(&points), first_hit::<f64>(&points)]
+        {
             let objects: Vec<_> = seen.iter().map(|s| s.object).collect();
             assert_eq!(objects, [Some(0), Some(1), Some(2), None, Some(1)]);
-            assert_eq!(seen[3], FirstHit::NOTHING);
+            assert_eq!(seen[3], FirstHit::MISS);
             assert_eq!(
                 seen.iter().map(|s| s.reflects).collect::<Vec<_>>(),
                 [false, true, false, false, true]

@@ -10,58 +10,58 @@ use crate::lanes::{Float, Mask, SimdFloat};
 use crate::material::Bsdf;
 use crate::primitive::{Aggregate, Form, PrimitiveId};
 use crate::world::integrator::coincident_surfaces::Contacts;
-use crate::world::integrator::opaque::{SurfaceInteraction, first_tag};
+use crate::world::integrator::opaque::{SurfaceInteraction, next_distinct};
 use glam::DVec3;
 
 /// So many solids around one point are told apart; of more, those that are listed last.
-const NESTED: usize = 4;
+const MAX_NESTING: usize = 4;
 
 /// The solids that paths are inside, by rank: 0 is none; of two the one with the higher rank fills the
 /// space. From the highest down.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MediumStack<L> {
-    ranks: [L; NESTED],
+    priorities: [L; MAX_NESTING],
 }
 
 impl<L: SimdFloat> MediumStack<L> {
     /// Outside of everything.
     #[inline(always)]
-    pub fn nothing() -> Self {
-        Self { ranks: [L::zero(); NESTED] }
+    pub fn vacuum() -> Self {
+        Self { priorities: [L::zero(); MAX_NESTING] }
     }
 
     /// Rank of the solid that fills the space.
     #[inline(always)]
     fn top(&self) -> L {
-        self.ranks[0]
+        self.priorities[0]
     }
 
-    /// Whether they are inside of `rank`.
-    pub fn holds(&self, rank: L) -> L::Mask {
-        self.ranks.iter().fold(L::mask(false), |found, of| found | equal(*of, rank))
+    /// Whether they are inside of `priority`.
+    pub fn contains(&self, priority: L) -> L::Mask {
+        self.priorities.iter().fold(L::mask(false), |found, of| found | equal(*of, priority))
     }
 
-    /// Outside of `rank`.
+    /// Outside of `priority`.
     #[inline(always)]
-    fn without(&self, rank: L) -> Self {
+    fn without(&self, priority: L) -> Self {
         let mut out = *self;
         let mut found = L::mask(false);
-        for (i, of) in self.ranks.iter().enumerate() {
-            found = found | equal(*of, rank);
-            let next = self.ranks.get(i + 1).copied().unwrap_or(L::zero());
-            out.ranks[i] = L::select(found, next, *of);
+        for (i, of) in self.priorities.iter().enumerate() {
+            found = found | equal(*of, priority);
+            let next = self.priorities.get(i + 1).copied().unwrap_or(L::zero());
+            out.priorities[i] = L::select(found, next, *of);
         }
         out
     }
 
-    /// Inside of `rank`, beside what holds already.
+    /// Inside of `priority`, beside what holds already.
     #[inline(always)]
-    fn with(&self, rank: L) -> Self {
-        let mut out = self.without(rank);
-        let mut rank = rank;
-        for of in &mut out.ranks {
-            let (high, low) = (of.max(rank), of.min(rank));
-            (*of, rank) = (high, low);
+    fn with(&self, priority: L) -> Self {
+        let mut out = self.without(priority);
+        let mut priority = priority;
+        for of in &mut out.priorities {
+            let (high, low) = (of.max(priority), of.min(priority));
+            (*of, priority) = (high, low);
         }
         out
     }
@@ -69,7 +69,11 @@ impl<L: SimdFloat> MediumStack<L> {
     /// `yes` where `mask` is true, `no` elsewhere.
     #[inline(always)]
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
-        Self { ranks: std::array::from_fn(|i| L::select(mask, yes.ranks[i], no.ranks[i])) }
+        Self {
+            priorities: std::array::from_fn(|i| {
+                L::select(mask, yes.priorities[i], no.priorities[i])
+            }),
+        }
     }
 }
 
@@ -82,7 +86,7 @@ fn equal<L: SimdFloat>(a: L, b: L) -> L::Mask {
 pub(crate) struct NestedDielectrics<L: SimdFloat> {
     /// For each item of the geometry, the rank of the transparent solid that it bounds; 0: it bounds
     /// none.
-    rank_of: Vec<u32>,
+    priority_of: Vec<u32>,
     /// By rank, the index of refraction; that of rank 0 is 1.
     indices: Vec<L::Scalar>,
     /// The solids that camera rays may begin in, each alone.
@@ -98,17 +102,17 @@ pub(crate) struct InterfaceHit<L: SimdFloat> {
     /// Of these, those that meet a solid's surface from outside.
     pub outer: L::Mask,
     /// Those that meet an open surface, a thin pane.
-    pub pane: L::Mask,
+    pub thin: L::Mask,
     /// Those that meet a surface which is not there, because another solid fills the space.
-    pub hidden: L::Mask,
+    pub suppressed: L::Mask,
     /// Index of refraction before the surface.
     pub n_i: L,
     /// Index of refraction behind it; for a pane, of what it is made of.
     pub n_t: L,
     /// What reflected rays are inside.
-    pub before: MediumStack<L>,
+    pub medium_reflected: MediumStack<L>,
     /// What transmitted rays are inside.
-    pub behind: MediumStack<L>,
+    pub medium_transmitted: MediumStack<L>,
 }
 
 impl<L: SimdFloat> NestedDielectrics<L> {
@@ -128,23 +132,23 @@ impl<L: SimdFloat> NestedDielectrics<L> {
             return None;
         }
         let mut indices = vec![None; forms.len() + 1];
-        let rank_of = sources.iter().zip(finish_of).map(|(source, finish)| {
+        let priority_of = sources.iter().zip(finish_of).map(|(source, finish)| {
             let flat =
                 matches!(forms[source.form], Form::Parallelogram { .. } | Form::Plane { .. });
-            let rank = source.form + 1;
+            let priority = source.form + 1;
             match through(*finish) {
                 Some(transmission) if !flat => {
                     // The first part of a compound that lets light through says what is inside.
-                    indices[rank].get_or_insert(transmission.index);
-                    rank as u32
+                    indices[priority].get_or_insert(transmission.index);
+                    priority as u32
                 }
                 _ => 0,
             }
         });
-        let rank_of: Vec<u32> = rank_of.collect();
+        let priority_of: Vec<u32> = priority_of.collect();
         let transparent: Vec<bool> = finish_of.iter().map(|f| through(*f).is_some()).collect();
         let rounding = (L::EPSILON, given);
-        let contacts = Contacts::new(forms, sources, (&transparent, &rank_of), rounding);
+        let contacts = Contacts::new(forms, sources, (&transparent, &priority_of), rounding);
         let near = |form: &Form| {
             form.bounds().is_none_or(|(low, high)| eye.clamp(low, high).distance(eye) <= nearest)
         };
@@ -154,40 +158,40 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         };
         let around_eye = indices[1..].iter().enumerate().filter_map(around).collect();
         let indices = indices.into_iter().map(|n| n.unwrap_or(L::Scalar::from_f64(1.0))).collect();
-        Some(Self { rank_of, indices, around_eye, contacts })
+        Some(Self { priority_of, indices, around_eye, contacts })
     }
 
     /// For each item, whether paths get inside of what it bounds.
     pub fn entered(&self) -> Vec<bool> {
-        self.rank_of.iter().map(|rank| *rank > 0).collect()
+        self.priority_of.iter().map(|priority| *priority > 0).collect()
     }
 
     /// What rays begin inside of: the solids that they meet from inside first.
     pub fn at_start(&self, ray: &Ray<L>) -> MediumStack<L> {
-        let mut inside = MediumStack::nothing();
-        for (rank, solid) in &self.around_eye {
+        let mut inside = MediumStack::vacuum();
+        for (priority, solid) in &self.around_eye {
             let hit = solid.closest(ray, solid.all());
             let mut left = hit.t.lt(L::from_f64(L::MAX));
             let mut within = L::mask(false);
-            while let Some((item, here)) = first_tag(hit.item, left) {
-                let normal = solid.surface(item, hit.facet, ray.at(hit.t)).normal;
+            while let Some((item, here)) = next_distinct(hit.item, left) {
+                let normal = solid.surface(item, hit.triangle, ray.at(hit.t)).normal;
                 within = within | (here & normal.dot(ray.direction).gt(L::zero()));
                 left = left.and_not(here);
             }
-            let entered = inside.with(L::from_f64(f64::from(*rank)));
+            let entered = inside.with(L::from_f64(f64::from(*priority)));
             inside = MediumStack::select(within, &entered, &inside);
         }
         inside
     }
 
     /// Index of refraction inside of what the ranks say.
-    fn index(&self, rank: L) -> L {
-        let of = |rank: L::Scalar| self.indices[rank.to_f64() as usize];
-        let first = rank.lane(0);
-        if equal(rank, L::splat(first)).all() {
+    fn index(&self, priority: L) -> L {
+        let of = |priority: L::Scalar| self.indices[priority.to_f64() as usize];
+        let first = priority.lane(0);
+        if equal(priority, L::splat(first)).all() {
             return L::splat(of(first));
         }
-        L::from_fn(|lane| of(rank.lane(lane)))
+        L::from_fn(|lane| of(priority.lane(lane)))
     }
 
     /// Where the rays of `lanes`, which are `inside` what they are, meet surfaces that let light through.
@@ -200,14 +204,15 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         index_of_pane: L,
     ) -> InterfaceHit<L> {
         let outer = lanes & met.front;
-        let mut rank = L::zero();
+        let mut priority = L::zero();
         let mut left = lanes;
-        while let Some((item, here)) = first_tag(met.item, left) {
-            rank = L::select(here, L::from_f64(f64::from(self.rank_of[item as usize])), rank);
+        while let Some((item, here)) = next_distinct(met.item, left) {
+            priority =
+                L::select(here, L::from_f64(f64::from(self.priority_of[item as usize])), priority);
             left = left.and_not(here);
         }
-        let solid = rank.gt(L::zero());
-        let (outside, within) = (inside.without(rank), inside.with(rank));
+        let solid = priority.gt(L::zero());
+        let (outside, within) = (inside.without(priority), inside.with(priority));
         let pick =
             |yes, no| MediumStack::select(solid, &MediumStack::select(outer, yes, no), inside);
         let (before, behind) = (pick(&outside, &within), pick(&within, &outside));
@@ -215,12 +220,12 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         InterfaceHit {
             lanes,
             outer,
-            pane: lanes.and_not(solid),
-            hidden: lanes & solid & equal(before.top(), behind.top()),
+            thin: lanes.and_not(solid),
+            suppressed: lanes & solid & equal(before.top(), behind.top()),
             n_i,
             n_t: L::select(solid, self.index(behind.top()), index_of_pane),
-            before,
-            behind,
+            medium_reflected: before,
+            medium_transmitted: behind,
         }
     }
 }
@@ -229,22 +234,22 @@ impl<L: SimdFloat> NestedDielectrics<L> {
 mod tests {
     use super::*;
 
-    fn ranks(inside: &MediumStack<f64>) -> [f64; NESTED] {
-        inside.ranks
+    fn priorities(inside: &MediumStack<f64>) -> [f64; MAX_NESTING] {
+        inside.priorities
     }
 
     #[test]
     fn the_solid_listed_last_fills_the_space() {
-        let mut inside = MediumStack::<f64>::nothing();
-        for rank in [2.0, 5.0, 1.0, 5.0] {
-            inside = inside.with(rank);
+        let mut inside = MediumStack::<f64>::vacuum();
+        for priority in [2.0, 5.0, 1.0, 5.0] {
+            inside = inside.with(priority);
         }
-        assert_eq!(ranks(&inside), [5.0, 2.0, 1.0, 0.0]);
-        assert_eq!(ranks(&inside.without(2.0)), [5.0, 1.0, 0.0, 0.0]);
-        assert_eq!(ranks(&inside.without(3.0)), ranks(&inside));
-        assert_eq!(ranks(&inside.without(5.0).without(1.0).without(2.0)), [0.0; 4]);
+        assert_eq!(priorities(&inside), [5.0, 2.0, 1.0, 0.0]);
+        assert_eq!(priorities(&inside.without(2.0)), [5.0, 1.0, 0.0, 0.0]);
+        assert_eq!(priorities(&inside.without(3.0)), priorities(&inside));
+        assert_eq!(priorities(&inside.without(5.0).without(1.0).without(2.0)), [0.0; 4]);
         // Of more than can be held those that are listed last.
         let full = inside.with(3.0).with(4.0);
-        assert_eq!(ranks(&full), [5.0, 4.0, 3.0, 2.0]);
+        assert_eq!(priorities(&full), [5.0, 4.0, 3.0, 2.0]);
     }
 }

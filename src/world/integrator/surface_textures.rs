@@ -94,23 +94,25 @@ impl<L: SimdFloat> SurfaceTextures<L> {
         Some(Self { of_item: of_item.collect() })
     }
 
-    fn skins(&self) -> impl Iterator<Item = &SurfaceTexture<L::Scalar>> {
+    fn surface_textures(&self) -> impl Iterator<Item = &SurfaceTexture<L::Scalar>> {
         self.of_item.iter().flatten()
     }
 
     /// Whether colours vary anywhere.
     pub fn is_colored(&self) -> bool {
-        self.skins().any(|skin| skin.pattern.is_some())
+        self.surface_textures().any(|surface_texture| surface_texture.pattern.is_some())
     }
 
     /// Whether normals are turned anywhere.
     pub fn is_bumped(&self) -> bool {
-        self.skins().any(|skin| skin.heights.is_some())
+        self.surface_textures().any(|surface_texture| surface_texture.heights.is_some())
     }
 
     /// What occurs, in words.
     pub fn words(&self) -> Vec<&'static str> {
-        let patterns = || self.skins().filter_map(|skin| skin.pattern.as_ref());
+        let patterns = || {
+            self.surface_textures().filter_map(|surface_texture| surface_texture.pattern.as_ref())
+        };
         let image = |pattern: &CompiledTexture<_>| matches!(pattern, CompiledTexture::Image { .. });
         let mut words = Vec::new();
         words.extend(patterns().any(|(_, p)| image(p)).then_some("image texture"));
@@ -124,11 +126,11 @@ impl<L: SimdFloat> SurfaceTextures<L> {
 fn coordinates<L: SimdFloat>(
     geometry: &Aggregate<L>,
     projector: &TextureMapping<L::Scalar>,
-    patch: &ShadingPoints<L>,
+    points: &ShadingPoints<L>,
 ) -> TexCoord<L> {
-    let surface = &patch.surface;
+    let surface = &points.surface;
     if projector.wants_uv()
-        && let Some(own) = geometry.uv(patch.item, patch.facet, surface.point)
+        && let Some(own) = geometry.uv(points.item, points.facet, surface.point)
     {
         let [u, v] = own.uv;
         let [du, dv] = own.gradients;
@@ -138,20 +140,21 @@ fn coordinates<L: SimdFloat>(
 }
 
 impl<L: SimdFloat> World<L> {
-    fn skin(&self, item: u32) -> Option<&SurfaceTexture<L::Scalar>> {
-        self.skins.as_ref()?.of_item[item as usize].as_ref()
+    fn surface_texture(&self, item: u32) -> Option<&SurfaceTexture<L::Scalar>> {
+        self.surface_textures.as_ref()?.of_item[item as usize].as_ref()
     }
 
     /// The colour of its own that a thing has, if it has one: that in its mesh's file, and its texture.
     #[inline(never)]
-    pub(crate) fn own_color(&self, patch: &ShadingPoints<L>) -> Option<Vec3<L>> {
-        let painted = self.geometry.color(patch.item, patch.facet);
-        let Some((projector, pattern)) = self.skin(patch.item).and_then(|s| s.pattern.as_ref())
+    pub(crate) fn albedo_factor(&self, points: &ShadingPoints<L>) -> Option<Vec3<L>> {
+        let painted = self.geometry.color(points.item, points.facet);
+        let Some((projector, pattern)) =
+            self.surface_texture(points.item).and_then(|s| s.pattern.as_ref())
         else {
             return painted;
         };
-        let at = coordinates(&self.geometry, projector, patch);
-        let color = pattern.eval((at.u, at.v), patch.lanes.bits());
+        let at = coordinates(&self.geometry, projector, points);
+        let color = pattern.eval((at.u, at.v), points.lanes.bits());
         Some(painted.map_or(color, |painted| painted.component_mul(color)))
     }
 
@@ -161,18 +164,19 @@ impl<L: SimdFloat> World<L> {
     #[inline(never)]
     pub(crate) fn shading_normal(
         &self,
-        patch: &ShadingPoints<L>,
+        points: &ShadingPoints<L>,
         (front, geometric): (L::Mask, Vec3<L>),
         direction: Vec3<L>,
     ) -> Vec3<L> {
-        let at = (patch.surface.point, geometric);
-        let normal = self.geometry.shading_normal((patch.item, patch.facet), at, direction);
-        let Some((projector, heights)) = self.skin(patch.item).and_then(|s| s.heights.as_ref())
+        let at = (points.surface.point, geometric);
+        let normal = self.geometry.shading_normal((points.item, points.facet), at, direction);
+        let Some((projector, heights)) =
+            self.surface_texture(points.item).and_then(|s| s.heights.as_ref())
         else {
             return normal;
         };
-        let at = coordinates(&self.geometry, projector, patch);
-        let (along_u, along_v) = heights.gradient((at.u, at.v), patch.lanes.bits());
+        let at = coordinates(&self.geometry, projector, points);
+        let (along_u, along_v) = heights.gradient((at.u, at.v), points.lanes.bits());
         let gradient = at.grad_u * along_u + at.grad_v * along_v;
         let outward = L::select(front, L::one(), -L::one());
         facing(projector.bumped(normal, outward, gradient), geometric, direction)

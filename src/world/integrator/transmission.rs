@@ -6,13 +6,13 @@ use crate::material::{Interface, ReflectionLobe};
 use crate::sampling::PacketSampler;
 use crate::world::compile::World;
 use crate::world::culling::tile::TileCandidates;
-use crate::world::integrator::coincident_surfaces::{Contacts, Layer, Seam};
+use crate::world::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState, Contacts};
 use crate::world::integrator::nested_dielectrics::{InterfaceHit, MediumStack, NestedDielectrics};
-use crate::world::integrator::opaque::{Counts, Path, Radiance, SurfaceInteraction, first_tag};
+use crate::world::integrator::opaque::{Counts, Path, Radiance, SurfaceInteraction, next_distinct};
 
 /// At so many surfaces, counted from the eye, a path follows both the reflected and the transmitted ray;
 /// from then on one of them, by chance.
-const BOTH: usize = 2;
+const SPLIT_DEPTH: usize = 2;
 
 /// A packet of paths on their way.
 #[derive(Clone, Copy)]
@@ -24,181 +24,210 @@ struct Branch<L: SimdFloat> {
     /// Surfaces met before.
     bounce: u32,
     /// Where the rays begin on surfaces that lie on others.
-    seam: Seam<L>,
+    coincident: CoincidentState<L>,
 }
 
 /// Arms that wait until those that left the same surfaces are done.
 struct BranchStack<L: SimdFloat> {
-    arms: [Option<Branch<L>>; BOTH],
+    branches: [Option<Branch<L>>; SPLIT_DEPTH],
 }
 
 impl<L: SimdFloat> BranchStack<L> {
-    /// `arm` left a surface that is no farther from the eye than `BOTH`, and every arm left another.
-    fn push(&mut self, arm: Branch<L>) {
-        self.arms[arm.bounce as usize - 1] = Some(arm);
+    /// `branch` left a surface that is no farther from the eye than `SPLIT_DEPTH`, and every arm left another.
+    fn push(&mut self, branch: Branch<L>) {
+        self.branches[branch.bounce as usize - 1] = Some(branch);
     }
 
     /// The one that left the surface farthest from the eye.
     fn pop(&mut self) -> Option<Branch<L>> {
-        self.arms.iter_mut().rev().find_map(Option::take)
+        self.branches.iter_mut().rev().find_map(Option::take)
     }
 }
 
 /// Two ways to go on from a surface.
 struct SplitDirections<L> {
     /// Direction of the reflected rays.
-    mirrored: Vec3<L>,
+    reflected: Vec3<L>,
     /// What they count.
-    mirrored_weight: Vec3<L>,
+    reflected_weight: Vec3<L>,
     /// Direction of the transmitted rays.
-    passed: Vec3<L>,
+    transmitted: Vec3<L>,
     /// What they count.
-    passed_weight: Vec3<L>,
+    transmitted_weight: Vec3<L>,
 }
 
 impl<L: SimdFloat> World<L> {
-    /// [`World::trace`] for a world with `media`. In every lane what a surface transmits is traced
+    /// [`World::trace`] for a world with `nested_dielectrics`. In every lane what a surface transmits is traced
     /// before what it reflects, whatever the other lanes do.
     #[inline(never)]
-    pub(crate) fn trace_through(
+    pub(crate) fn trace_transmissive(
         &self,
-        media: &NestedDielectrics<L>,
+        nested_dielectrics: &NestedDielectrics<L>,
         ray: Ray<L>,
-        outlook: &TileCandidates,
+        candidates: &TileCandidates,
         draws: &PacketSampler<'_, L>,
         lanes: L::Mask,
         out: &mut Radiance<L>,
     ) -> Counts {
         let mut counts = Counts::default();
-        let inside = media.at_start(&ray);
-        let path = Path { ray, weight: Vec3::of([1.0; 3]) };
-        let mut waiting = BranchStack { arms: [None; BOTH] };
-        let mut arm = Branch { path, lanes, inside, bounce: 0, seam: Seam::none() };
+        let inside = nested_dielectrics.at_start(&ray);
+        let path = Path { ray, throughput: Vec3::of([1.0; 3]) };
+        let mut waiting = BranchStack { branches: [None; SPLIT_DEPTH] };
+        let mut branch =
+            Branch { path, lanes, inside, bounce: 0, coincident: CoincidentState::none() };
         loop {
-            let outlook = if arm.bounce == 0 { outlook } else { &self.panorama };
-            if !self.follow(media, &mut arm, outlook, draws, &mut waiting, out, &mut counts) {
+            let candidates = if branch.bounce == 0 { candidates } else { &self.all_candidates };
+            if !self.advance(
+                nested_dielectrics,
+                &mut branch,
+                candidates,
+                draws,
+                &mut waiting,
+                out,
+                &mut counts,
+            ) {
                 match waiting.pop() {
-                    Some(next) => arm = next,
+                    Some(next) => branch = next,
                     None => return counts,
                 }
             }
         }
     }
 
-    /// Follows `arm` to the surfaces where it ends and turns it into what goes on from there; false: nothing
+    /// Follows `branch` to the surfaces where it ends and turns it into what goes on from there; false: nothing
     /// does.
     #[allow(clippy::too_many_arguments, reason = "what a path's step reads and what it writes")]
-    fn follow(
+    fn advance(
         &self,
-        media: &NestedDielectrics<L>,
-        arm: &mut Branch<L>,
-        outlook: &TileCandidates,
+        nested_dielectrics: &NestedDielectrics<L>,
+        branch: &mut Branch<L>,
+        candidates: &TileCandidates,
         draws: &PacketSampler<'_, L>,
         waiting: &mut BranchStack<L>,
         out: &mut Radiance<L>,
         counts: &mut Counts,
     ) -> bool {
-        let Branch { mut path, inside, bounce, seam, .. } = *arm;
-        counts.rays += u64::from(arm.lanes.bits().count_ones());
-        let mut hit = self.geometry.closest_of(&path.ray, &outlook.seen, arm.lanes);
+        let Branch { mut path, inside, bounce, coincident, .. } = *branch;
+        counts.rays += u64::from(branch.lanes.bits().count_ones());
+        let mut hit = self.geometry.closest_of(&path.ray, &candidates.primary, branch.lanes);
         let mut behind = None;
-        if let Some(contacts) = &media.contacts
-            && (seam.lanes & arm.lanes).any()
+        if let Some(contacts) = &nested_dielectrics.contacts
+            && (coincident.lanes & branch.lanes).any()
         {
-            let seam = Seam { lanes: seam.lanes & arm.lanes, ..seam };
-            let next = contacts.next(&self.geometry, &seam, &inside);
-            let origin = Vec3::select(next.lanes, seam.point, path.ray.origin);
+            let coincident =
+                CoincidentState { lanes: coincident.lanes & branch.lanes, ..coincident };
+            let next = contacts.next(&self.geometry, &coincident, &inside);
+            let origin = Vec3::select(next.lanes, coincident.point, path.ray.origin);
             path.ray.origin = origin;
             hit.take_in(next.lanes, L::zero(), (next.item, next.facet));
             behind = Some(next);
         }
         let ended = hit.t.lt(L::from_f64(L::MAX));
         if let Some(group) = self.background {
-            out.groups[group] += path.weight.masked(arm.lanes.and_not(ended));
+            out.groups[group] += path.throughput.masked(branch.lanes.and_not(ended));
         }
-        let lanes = arm.lanes & ended;
-        let Some(mut met) = self.meet::<false>(&path.ray, &hit, lanes) else { return false };
-        let mut seam = Seam::none();
-        if let Some(contacts) = &media.contacts {
-            seam =
-                self.seam(contacts, &path, (&mut hit, &mut met), lanes, behind.as_ref(), &inside);
+        let lanes = branch.lanes & ended;
+        let Some(mut met) = self.interact::<false>(&path.ray, &hit, lanes) else { return false };
+        let mut coincident = CoincidentState::none();
+        if let Some(contacts) = &nested_dielectrics.contacts {
+            coincident = self.coincident(
+                contacts,
+                &path,
+                (&mut hit, &mut met),
+                lanes,
+                behind.as_ref(),
+                &inside,
+            );
         }
-        let crossing = self.crossing(media, &met, lanes, &inside);
-        if let Some(crossing) = &crossing {
-            met.leave_out(crossing.hidden);
+        let interface_hit = self.interface_hit(nested_dielectrics, &met, lanes, &inside);
+        if let Some(interface_hit) = &interface_hit {
+            met.mask_out(interface_hit.suppressed);
         }
-        self.light::<false>(&path, &met, outlook, out, counts);
+        self.direct_lighting::<false>(&path, &met, candidates, out, counts);
         if bounce == self.depth {
             return false;
         }
         let bounce = bounce + 1;
-        let Some(crossing) = crossing else {
-            arm.lanes = self.bounce::<false>(&mut arm.path, &met, draws, bounce - 1, counts);
-            arm.bounce = bounce;
-            arm.seam = seam.reversed();
-            return arm.lanes.any();
+        let Some(interface_hit) = interface_hit else {
+            branch.lanes =
+                self.sample_reflection::<false>(&mut branch.path, &met, draws, bounce - 1, counts);
+            branch.bounce = bounce;
+            branch.coincident = coincident.reversed();
+            return branch.lanes.any();
         };
-        let ways = self.ways(&path, &met, &crossing, draws, bounce - 1, counts);
+        let split_directions =
+            self.split_directions(&path, &met, &interface_hit, draws, bounce - 1, counts);
         let worth = |weight: Vec3<L>| {
             let strongest = weight.max_element();
             strongest.gt(L::zero()) & strongest.ge(L::from_f64(self.min_weight))
         };
-        let mirrors = (met.reflecting | crossing.lanes) & worth(ways.mirrored_weight);
-        let passes = crossing.lanes & worth(ways.passed_weight);
+        let mirrors =
+            (met.reflecting | interface_hit.lanes) & worth(split_directions.reflected_weight);
+        let passes = interface_hit.lanes & worth(split_directions.transmitted_weight);
         let both = mirrors & passes;
-        let mirrored = Branch {
+        let reflected = Branch {
             path: Path {
-                ray: Ray { origin: met.start(), direction: ways.mirrored },
-                weight: ways.mirrored_weight,
+                ray: Ray { origin: met.ray_origin(), direction: split_directions.reflected },
+                throughput: split_directions.reflected_weight,
             },
             lanes: both,
-            inside: MediumStack::select(crossing.lanes, &crossing.before, &inside),
+            inside: MediumStack::select(
+                interface_hit.lanes,
+                &interface_hit.medium_reflected,
+                &inside,
+            ),
             bounce,
-            seam: seam.reversed(),
+            coincident: coincident.reversed(),
         };
         // Lanes that go through, and what their paths and those of the others count.
-        let (mut through, mut mirrored_weight, mut passed_weight) =
-            (passes, ways.mirrored_weight, ways.passed_weight);
+        let (mut through, mut reflected_weight, mut transmitted_weight) =
+            (passes, split_directions.reflected_weight, split_directions.transmitted_weight);
         if both.any() {
-            if bounce as usize <= BOTH {
-                waiting.push(mirrored);
+            if bounce as usize <= SPLIT_DEPTH {
+                waiting.push(reflected);
             } else {
                 counts.glossy = true;
-                let (r, t) = (mirrored_weight.max_element(), passed_weight.max_element());
-                let back = both & (draws.branch_1d(bounce - 1 - BOTH as u32) * (r + t)).lt(r);
+                let (r, t) = (reflected_weight.max_element(), transmitted_weight.max_element());
+                let back =
+                    both & (draws.branch_1d(bounce - 1 - SPLIT_DEPTH as u32) * (r + t)).lt(r);
                 through = through.and_not(back);
                 let scaled = |v: Vec3<L>, k: L| Vec3::select(both, v * ((r + t) / k), v);
-                mirrored_weight = scaled(mirrored_weight, r);
-                passed_weight = scaled(passed_weight, t);
+                reflected_weight = scaled(reflected_weight, r);
+                transmitted_weight = scaled(transmitted_weight, t);
             }
         }
         let lanes = mirrors | passes;
         let path = Path {
             ray: Ray {
-                origin: Vec3::select(through, met.beyond(), met.start()),
-                direction: Vec3::select(through, ways.passed, ways.mirrored),
+                origin: Vec3::select(through, met.ray_origin_behind(), met.ray_origin()),
+                direction: Vec3::select(
+                    through,
+                    split_directions.transmitted,
+                    split_directions.reflected,
+                ),
             },
-            weight: Vec3::select(through, passed_weight, mirrored_weight),
+            throughput: Vec3::select(through, transmitted_weight, reflected_weight),
         };
-        let inside = MediumStack::select(through, &crossing.behind, &mirrored.inside);
-        let seam = Seam::select(through, &seam, &mirrored.seam);
-        *arm = Branch { path, lanes, inside, bounce, seam };
+        let inside =
+            MediumStack::select(through, &interface_hit.medium_transmitted, &reflected.inside);
+        let coincident = CoincidentState::select(through, &coincident, &reflected.coincident);
+        *branch = Branch { path, lanes, inside, bounce, coincident };
         lanes.any()
     }
 
     /// Where the rays of `lanes` ended on surfaces that lie on others, on which side they go on when they
     /// pass. Of such surfaces it puts those into `hit` and `met` that come first; `behind`: those that
     /// were found behind the ones that the rays left.
-    fn seam(
+    fn coincident(
         &self,
         contacts: &Contacts<L::Scalar>,
         path: &Path<L>,
         (hit, met): (&mut Hit<L>, &mut SurfaceInteraction<L>),
         lanes: L::Mask,
-        behind: Option<&Layer<L>>,
+        behind: Option<&CoincidentQuery<L>>,
         inside: &MediumStack<L>,
-    ) -> Seam<L> {
-        let (mut layer, mut lift, mut among) = (L::zero(), met.lift, L::mask(false));
+    ) -> CoincidentState<L> {
+        let (mut layer, mut lift, mut among) = (L::zero(), met.offset, L::mask(false));
         if let Some(next) = behind {
             // Light that comes from the side of the rays is blocked by what they left.
             if self.shadows {
@@ -209,7 +238,7 @@ impl<L: SimdFloat> World<L> {
         }
         let mut fresh = L::mask(false);
         let mut left = lanes.and_not(among);
-        while let Some((item, here)) = first_tag(met.item, left) {
+        while let Some((item, here)) = next_distinct(met.item, left) {
             if contacts.touches(item) {
                 fresh = fresh | here;
             }
@@ -217,13 +246,13 @@ impl<L: SimdFloat> World<L> {
         }
         if fresh.any() {
             let (item, point, axis) = (met.item, met.point, -met.geometric);
-            let seam = Seam { lanes: fresh, item, point, axis, layer: L::zero() };
-            let first = contacts.first(&self.geometry, &seam, !met.front, inside);
+            let coincident = CoincidentState { lanes: fresh, item, point, axis, layer: L::zero() };
+            let first = contacts.first(&self.geometry, &coincident, !met.front, inside);
             if first.lanes.any() {
                 hit.take_in(first.lanes, hit.t, (first.item, first.facet));
-                if let Some(other) = self.meet::<false>(&path.ray, hit, lanes) {
+                if let Some(other) = self.interact::<false>(&path.ray, hit, lanes) {
                     *met = other;
-                    lift = lift.max(met.lift);
+                    lift = lift.max(met.offset);
                     if let (Some(next), true) = (behind, self.shadows) {
                         met.shade(next.lanes);
                     }
@@ -233,68 +262,79 @@ impl<L: SimdFloat> World<L> {
             among = among | first.touching;
             lift = lift.max(first.lift.masked(first.touching));
         }
-        met.lift = L::select(among, lift, met.lift);
-        Seam { lanes: among, item: met.item, point: met.point, axis: -met.geometric, layer }
+        met.offset = L::select(among, lift, met.offset);
+        CoincidentState {
+            lanes: among,
+            item: met.item,
+            point: met.point,
+            axis: -met.geometric,
+            layer,
+        }
     }
 
     /// Where the rays of `lanes` meet surfaces that let light through; `None`: none of them does.
-    fn crossing(
+    fn interface_hit(
         &self,
-        media: &NestedDielectrics<L>,
+        nested_dielectrics: &NestedDielectrics<L>,
         met: &SurfaceInteraction<L>,
         lanes: L::Mask,
         inside: &MediumStack<L>,
     ) -> Option<InterfaceHit<L>> {
         let mut through = L::mask(false);
         let mut index = L::one();
-        for (finish, here) in met.finishes(lanes) {
-            if let Some(transmission) = &self.finishes[finish].transmission {
+        for (finish, here) in met.bsdfs(lanes) {
+            if let Some(transmission) = &self.bsdfs[finish].transmission {
                 through = through | here;
                 index = L::select(here, L::splat(transmission.index), index);
             }
         }
-        through.any().then(|| media.cross(met, through, inside, index))
+        through.any().then(|| nested_dielectrics.cross(met, through, inside, index))
     }
 
     /// How paths go on from the surfaces that they meet, of which some let light through.
-    fn ways(
+    fn split_directions(
         &self,
         path: &Path<L>,
         met: &SurfaceInteraction<L>,
-        crossing: &InterfaceHit<L>,
+        interface_hit: &InterfaceHit<L>,
         draws: &PacketSampler<'_, L>,
         bounce: u32,
         counts: &mut Counts,
     ) -> SplitDirections<L> {
         let incident = path.ray.direction;
-        let interface = Interface::new(incident, met.normal, crossing.n_i, crossing.n_t);
-        let straight = crossing.pane | crossing.hidden;
-        let mut ways = SplitDirections {
-            mirrored: incident.reflect(met.normal),
-            mirrored_weight: Vec3::zero(),
-            passed: Vec3::select(straight, incident, interface.refracted),
-            passed_weight: Vec3::zero(),
+        let interface = Interface::new(incident, met.normal, interface_hit.n_i, interface_hit.n_t);
+        let straight = interface_hit.thin | interface_hit.suppressed;
+        let mut split_directions = SplitDirections {
+            reflected: incident.reflect(met.normal),
+            reflected_weight: Vec3::zero(),
+            transmitted: Vec3::select(straight, incident, interface.refracted),
+            transmitted_weight: Vec3::zero(),
         };
         let mut numbers = None;
-        for (finish, lanes) in met.finishes(met.reflecting | crossing.lanes) {
-            let finish = &self.finishes[finish];
+        for (finish, lanes) in met.bsdfs(met.reflecting | interface_hit.lanes) {
+            let finish = &self.bsdfs[finish];
             let mut own = L::one();
             if let Some(transmission) = &finish.transmission {
-                let mut split = interface.split(transmission, crossing.outer);
-                if crossing.pane.any() {
+                let mut split = interface.split(transmission, interface_hit.outer);
+                if interface_hit.thin.any() {
                     let pane = interface.split_thin(transmission);
-                    let choose = |a, b| L::select(crossing.pane, a, b);
+                    let choose = |a, b| L::select(interface_hit.thin, a, b);
                     split.reflected = choose(pane.reflected, split.reflected);
                     split.transmitted = choose(pane.transmitted, split.transmitted);
                     split.tir = choose(pane.tir, split.tir);
                 }
-                own = split.reflected.masked(!crossing.hidden);
-                let passed = L::select(crossing.hidden, L::one(), split.transmitted);
-                ways.passed_weight = Vec3::select(lanes, path.weight * passed, ways.passed_weight);
-                let total = path.weight * split.tir.masked(!crossing.hidden);
-                ways.mirrored_weight = Vec3::select(lanes, total, ways.mirrored_weight);
+                own = split.reflected.masked(!interface_hit.suppressed);
+                let transmitted = L::select(interface_hit.suppressed, L::one(), split.transmitted);
+                split_directions.transmitted_weight = Vec3::select(
+                    lanes,
+                    path.throughput * transmitted,
+                    split_directions.transmitted_weight,
+                );
+                let total = path.throughput * split.tir.masked(!interface_hit.suppressed);
+                split_directions.reflected_weight =
+                    Vec3::select(lanes, total, split_directions.reflected_weight);
             }
-            let Some((strength, spread)) = &finish.reflection else { continue };
+            let Some((emission, spread)) = &finish.reflection else { continue };
             // Not on backs without a finish.
             let lanes = lanes & met.reflecting & own.gt(L::zero());
             if lanes.none() {
@@ -306,18 +346,20 @@ impl<L: SimdFloat> World<L> {
                 counts.glossy = true;
                 *numbers.get_or_insert_with(|| draws.lobe_2d(bounce))
             };
-            let r = finish.sample(*strength, spread, incident, met.normal, uv, self.fold);
-            let weight = path.weight.component_mul(r.weight) * own;
-            ways.mirrored = Vec3::select(lanes, r.direction, ways.mirrored);
-            ways.mirrored_weight = Vec3::select(lanes, weight, ways.mirrored_weight);
+            let r = finish.sample(*emission, spread, incident, met.normal, uv, self.fold);
+            let weight = path.throughput.component_mul(r.weight) * own;
+            split_directions.reflected =
+                Vec3::select(lanes, r.direction, split_directions.reflected);
+            split_directions.reflected_weight =
+                Vec3::select(lanes, weight, split_directions.reflected_weight);
         }
         if self.smooth {
-            ways.mirrored = met.outward(ways.mirrored);
+            split_directions.reflected = met.into_hemisphere(split_directions.reflected);
             // What would stay before the surface goes as steeply behind it.
-            ways.passed = -met.outward(-ways.passed);
+            split_directions.transmitted = -met.into_hemisphere(-split_directions.transmitted);
         }
-        ways.mirrored_weight = Path::bounded(ways.mirrored_weight);
-        ways.passed_weight = Path::bounded(ways.passed_weight);
-        ways
+        split_directions.reflected_weight = Path::bounded(split_directions.reflected_weight);
+        split_directions.transmitted_weight = Path::bounded(split_directions.transmitted_weight);
+        split_directions
     }
 }
