@@ -134,7 +134,7 @@ fn tracks(scene: &Scene, n: usize) -> Scene {
 /// Prints nanoseconds per sample of scenes with some numbers of spheres, by `auto` and in a tree.
 fn growth(scenes: &[(usize, Scene)], size: [u32; 2]) {
     let of = |by| times(scenes.iter().map(|(_, s)| Bench::new(s, by, size)).collect());
-    let [auto, tree] = [Acceleration::Auto, Acceleration::Hierarchy].map(of);
+    let [auto, tree] = [Acceleration::Auto, Acceleration::Bvh].map(of);
     let hundred = scenes.iter().position(|(n, _)| *n == 100).expect("a hundred");
     for (((count, _), time), tree) in scenes.iter().zip(&auto).zip(&tree) {
         println!("  {count:6}: {time:8.0} ({:5.2}) {tree:8.0}", time / auto[hundred]);

@@ -73,7 +73,7 @@ fn speed<L: SimdFloat>(mesh: &Mesh, rays: &[Ray<L>], how: Option<bool>) -> f64 {
                 .iter()
                 .map(|ray| match how {
                     None => triangle_mesh::closest(mesh, ray, limit),
-                    Some(together) => triangle_mesh::closest_by(mesh, ray, limit, together),
+                    Some(together) => triangle_mesh::closest_with(mesh, ray, limit, together),
                 })
                 .map(|found| found.t.lt(limit).bits().count_ones())
                 .sum();

@@ -227,10 +227,10 @@ fn the_inventory_tells_how() {
     for (by, how) in [
         (Acceleration::Auto, "list"),
         (Acceleration::None, "bare list"),
-        (Acceleration::Projected, "screen rectangles"),
-        (Acceleration::Object, "boxes of their own"),
-        (Acceleration::World, "boxes"),
-        (Acceleration::Hierarchy, "tree"),
+        (Acceleration::ScreenBounds, "screen rectangles"),
+        (Acceleration::Obb, "boxes of their own"),
+        (Acceleration::Aabb, "boxes"),
+        (Acceleration::Bvh, "tree"),
     ] {
         let mut scene = parsed(text);
         scene.trace.acceleration = by;

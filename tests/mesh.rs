@@ -91,8 +91,8 @@ fn nothing_slips_through<L: SimdFloat>(mesh: &Mesh, rays: usize) {
             direction: Vec3::<L>::from_fn(|i| directions[i].map(L::Scalar::from_f64)),
         };
         let found = triangle_mesh::closest(mesh, &ray, limit);
-        let blocked = triangle_mesh::blocked(mesh, &ray, limit);
-        let both = [true, false].map(|how| triangle_mesh::closest_by(mesh, &ray, limit, how));
+        let blocked = triangle_mesh::occluded(mesh, &ray, limit);
+        let both = [true, false].map(|how| triangle_mesh::closest_with(mesh, &ray, limit, how));
         for (i, direction) in directions.iter().enumerate() {
             let t = found.t.lane(i);
             assert!(t < limit.lane(i), "missed from {origin:?} to {direction:?}");

@@ -65,41 +65,41 @@ type CacheEntry<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
 /// Files of one kind, with the count of askings at which each was last asked for.
 struct Cache<T> {
     files: HashMap<Key, (CacheEntry<T>, u64)>,
-    asked: u64,
+    last_used: u64,
 }
 
 impl<T> Default for Cache<T> {
     fn default() -> Self {
-        Self { files: HashMap::new(), asked: 0 }
+        Self { files: HashMap::new(), last_used: 0 }
     }
 }
 
 impl<T> Cache<T> {
     /// The cell of a file; older states of the same file are forgotten.
     fn cell(&mut self, key: &Key) -> CacheEntry<T> {
-        self.asked += 1;
+        self.last_used += 1;
         self.files.retain(|k, _| k.path != key.path || k == key);
         let entry = self.files.entry(key.clone()).or_default();
-        entry.1 = self.asked;
+        entry.1 = self.last_used;
         entry.0.clone()
     }
 
     /// Forgets what nobody holds, the longest unasked first, until at most [`UNUSED_BYTES`] of it
     /// are left.
-    fn tidy(&mut self, bytes_of: impl Fn(&T) -> usize) {
+    fn evict(&mut self, bytes_of: impl Fn(&T) -> usize) {
         let mut unused: Vec<(u64, usize, Key)> = self
             .files
             .iter()
-            .filter_map(|(key, (cell, asked))| {
+            .filter_map(|(key, (cell, last_used))| {
                 let bytes = match cell.get()? {
                     Ok(file) if Arc::strong_count(file) == 1 => bytes_of(file),
                     Ok(_) => return None,
                     Err(_) => 0,
                 };
-                Some((*asked, bytes, key.clone()))
+                Some((*last_used, bytes, key.clone()))
             })
             .collect();
-        unused.sort_by_key(|(asked, ..)| std::cmp::Reverse(*asked));
+        unused.sort_by_key(|(last_used, ..)| std::cmp::Reverse(*last_used));
         let mut sum = 0usize;
         for (_, bytes, key) in unused {
             sum = sum.saturating_add(bytes);
@@ -190,7 +190,7 @@ fn load<T>(
     };
     let cell = locked(shelf).cell(&key);
     let file = cell.get_or_init(|| read(&key).map(Arc::new)).clone();
-    locked(shelf).tidy(bytes_of);
+    locked(shelf).evict(bytes_of);
     file
 }
 
@@ -219,9 +219,9 @@ mod tests {
         std::fs::write(&path, TRIANGLE).unwrap();
         let (assets, reads) = counted();
         let meshes: Vec<_> = std::thread::scope(|scope| {
-            let asked: Vec<_> =
+            let last_used: Vec<_> =
                 (0..8).map(|_| scope.spawn(|| assets.mesh(&path).unwrap())).collect();
-            asked.into_iter().map(|thread| thread.join().unwrap()).collect()
+            last_used.into_iter().map(|thread| thread.join().unwrap()).collect()
         });
         assert!(meshes.iter().all(|m| Arc::ptr_eq(m, &meshes[0])));
         assert_eq!(reads.load(Ordering::SeqCst), 1);
@@ -260,13 +260,13 @@ mod tests {
         for name in ["a", "b", "c"] {
             drop(put(&mut shelf, name));
         }
-        shelf.tidy(|bytes| *bytes);
+        shelf.evict(|bytes| *bytes);
         let known = |shelf: &Cache<usize>, name| shelf.files.contains_key(&key(name));
         assert!(known(&shelf, "held") && !known(&shelf, "a"));
         assert!(known(&shelf, "b") && known(&shelf, "c"));
         drop(held);
         shelf.cell(&key("b"));
-        shelf.tidy(|bytes| *bytes);
+        shelf.evict(|bytes| *bytes);
         assert!(!known(&shelf, "held") && known(&shelf, "b") && known(&shelf, "c"));
     }
 }

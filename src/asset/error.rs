@@ -1,6 +1,6 @@
 //! What is wrong with a file.
 
-use crate::value::printable;
+use crate::value::sanitized;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -40,7 +40,7 @@ impl AssetError {
             FileLocation::Byte(byte) => format!(", byte {byte}"),
             FileLocation::Part(part) => format!(", {part}"),
         };
-        printable(&format!("{file}{place}: {}", self.found))
+        sanitized(&format!("{file}{place}: {}", self.found))
     }
 }
 

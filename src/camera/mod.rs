@@ -79,14 +79,14 @@ pub const FIELDS: &[Field] = &[
         "[0.0, 1.0, 5.0]",
         "Where the picture is taken from.",
     ),
-    Field::without(
+    Field::optional(
         "target",
         ValueType::Numbers(3, NumberRange::COORDINATE),
         "scene units",
         "`direction` is needed",
         "The point looked at. Exactly one of `target` and `direction` is given.",
     ),
-    Field::without(
+    Field::optional(
         "direction",
         ValueType::Direction,
         "",
@@ -147,7 +147,7 @@ impl Camera {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
         let (key, degrees) = self.view_angle.key_degrees();
-        let mut angle = Validator::new(VIEW_ANGLES).numbers(key, &[degrees]).faults();
+        let mut angle = Validator::new(VIEW_ANGLES).numbers(key, &[degrees]).validate();
         for fault in &mut angle {
             fault.found = format!("view_angle.{}", fault.found);
         }
@@ -166,14 +166,14 @@ impl Camera {
         };
         let checks = Validator::new(FIELDS)
             .numbers("eye", &self.eye)
-            .maybe("target", self.target.as_ref().map(|t| &t[..]))
-            .maybe("direction", self.direction.as_ref().map(|d| &d[..]))
+            .optional("target", self.target.as_ref().map(|t| &t[..]))
+            .optional("direction", self.direction.as_ref().map(|d| &d[..]))
             .numbers("up", &self.up)
-            .inner("view_angle", angle)
+            .nested("view_angle", angle)
             .numbers("near", &[self.near])
             .and(given);
         let lost = if checks.clean() { self.lost() } else { None };
-        checks.and(lost).faults()
+        checks.and(lost).validate()
     }
 
     /// What makes a picture impossible although every number is in its range.

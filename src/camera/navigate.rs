@@ -6,7 +6,7 @@
 //! comes nearer to it than 0.1 degrees.
 
 use crate::camera::{Camera, ViewAngle};
-use crate::value::{decade, rounded_to, significant, unit};
+use crate::value::{floor_log10, round_significant, rounded_to, unit};
 use glam::DVec3;
 
 /// The steepest view up or down, in degrees above or below the plane across `up`.
@@ -112,7 +112,7 @@ impl Camera {
         let zoomed = |degrees: f64| {
             let half = (0.5 * degrees).to_radians().tan() * factor;
             let [narrow, wide] = ANGLES;
-            let new = significant(2.0 * half.atan().to_degrees(), 4).clamp(narrow, wide);
+            let new = round_significant(2.0 * half.atan().to_degrees(), 4).clamp(narrow, wide);
             // An angle beyond the limits does not jump to them against the zoom.
             if (new < degrees) == (factor < 1.0) { new } else { degrees }
         };
@@ -206,5 +206,5 @@ impl Camera {
 
 /// Rounded to about a millionth of `scale`.
 fn rounded(x: f64, scale: f64) -> f64 {
-    rounded_to(x, decade(scale) - 6)
+    rounded_to(x, floor_log10(scale) - 6)
 }

@@ -9,7 +9,7 @@ use crate::scene::{kept_in, state_folder};
 use crate::terminal::flow::{DEFAULT_RATE, PacingMode};
 use crate::terminal::image::Protocol;
 use crate::terminal::{Capabilities, Environment, Multiplexer};
-use crate::value::printable;
+use crate::value::sanitized;
 use std::env;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -109,10 +109,10 @@ impl DoctorReport {
     fn terminal(&self) -> String {
         let term = match self.surroundings.term.as_str() {
             "" => "TERM is not set".to_string(),
-            term => format!("TERM={}", printable(term)),
+            term => format!("TERM={}", sanitized(term)),
         };
         match (&self.examined, self.asked().and_then(|terminal| terminal.version.as_ref())) {
-            (Ok(_), Some(version)) => format!("{} ({term})", printable(version)),
+            (Ok(_), Some(version)) => format!("{} ({term})", sanitized(version)),
             (Ok(_), None) => format!("{term}; it does not tell its name"),
             (Err(why), _) => format!("{term}; not asked: {why}"),
         }
@@ -150,7 +150,7 @@ impl DoctorReport {
         } else if level == Colors::Indexed {
             "nothing says that it has more".to_string()
         } else {
-            format!("TERM={}", printable(term))
+            format!("TERM={}", sanitized(term))
         };
         format!("{}: {why}; --color overrides, # switches in the dashboard", level.name())
     }
@@ -160,7 +160,7 @@ impl DoctorReport {
             None => "LC_ALL, LC_CTYPE and LANG do not tell the encoding".to_string(),
             Some((name, value)) => {
                 let what = if self.is_utf8() { "UTF-8" } else { "not UTF-8" };
-                format!("{what}: {name}={}", printable(value))
+                format!("{what}: {name}={}", sanitized(value))
             }
         }
     }
@@ -170,7 +170,7 @@ impl DoctorReport {
             None => "this machine".to_string(),
             Some(connection) => {
                 let client = connection.split_whitespace().next().unwrap_or_default();
-                format!("SSH from {}", printable(client))
+                format!("SSH from {}", sanitized(client))
             }
         }
     }
@@ -294,7 +294,7 @@ fn round_trip(terminal: &Capabilities) -> String {
 }
 
 fn shown(path: &Path) -> String {
-    printable(&path.display().to_string())
+    sanitized(&path.display().to_string())
 }
 
 #[cfg(test)]
@@ -414,7 +414,7 @@ mod tests {
         found.kept = vec![evil.into()];
         examined(&mut found).terminal.version = Some(evil.into());
         let report = found.report();
-        let steers = |line: &str| printable(line) != line;
+        let steers = |line: &str| sanitized(line) != line;
         assert!(!report.lines().any(steers), "{report:?}");
         assert!(report.matches("u{1b}]52").count() >= 5, "{report}");
     }

@@ -12,7 +12,7 @@ use crate::render::schedule::{Criterion, Settings};
 use crate::sampling::{SampleSettings, SamplerKind};
 use crate::scene::{BUILT_IN, Recovery, SceneErrors, SceneFile, state_folder};
 use crate::terminal::Environment;
-use crate::value::printable;
+use crate::value::sanitized;
 use crate::world;
 use std::env;
 use std::fs::File;
@@ -104,7 +104,7 @@ fn opened(
 fn lost(path: &Path, state: Option<&Path>) -> String {
     let found = Recovery::of(Some(path), "", state).find();
     let hint = |path: &Path| {
-        let path = printable(&path.display().to_string());
+        let path = sanitized(&path.display().to_string());
         format!("\nUnsaved edits of it are kept in {path}, which is a scene file itself.")
     };
     found.lost.first().map_or(String::new(), |lost| hint(lost.path()))

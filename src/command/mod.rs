@@ -15,7 +15,7 @@ mod stats;
 
 pub use cpu::require as require_cpu;
 
-use crate::value::printable;
+use crate::value::sanitized;
 use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
@@ -82,7 +82,7 @@ fn end(error: &clap::Error) -> ! {
     // What was typed, or found by a shell's pattern, shall not steer the terminal.
     let steers = |argument: OsString| {
         let argument = argument.to_string_lossy();
-        printable(&argument) != argument
+        sanitized(&argument) != argument
     };
     if std::env::args_os().any(steers) {
         warn(error.render().to_string().trim_end());
@@ -108,5 +108,5 @@ fn say(message: &str) {
 
 /// Lines without anything in them that could steer a terminal: they may hold names of files.
 fn shown(message: &str) -> String {
-    message.split('\n').map(printable).collect::<Vec<_>>().join("\n")
+    message.split('\n').map(sanitized).collect::<Vec<_>>().join("\n")
 }

@@ -15,7 +15,7 @@ use crate::scene::{History, Scene, SceneErrors};
 pub use crate::terminal::cells::Colors;
 use crate::terminal::event::Button;
 use crate::terminal::flow::LinkStatus;
-use crate::value::printable;
+use crate::value::sanitized;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -227,7 +227,7 @@ pub struct Start {
 /// The last part of a path, printable.
 pub fn short_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
-    printable(&name.to_string_lossy())
+    sanitized(&name.to_string_lossy())
 }
 
 impl Model {
@@ -238,7 +238,7 @@ impl Model {
             Ok(scene) => (scene, None),
             Err(errors) => (Arc::new(Scene::default()), Some(errors)),
         };
-        let name = start.path.as_deref().map_or(printable(&start.name), short_name);
+        let name = start.path.as_deref().map_or(sanitized(&start.name), short_name);
         let blank = broken.is_some();
         let selection = Target::Camera;
         Self {

@@ -4,7 +4,7 @@ use crate::dashboard::model::Model;
 use crate::dashboard::overlay::{Form, Overlay};
 use crate::scene::Scene;
 use crate::scene::edit::{Property, Target, Widget, outline as subjects, rows};
-use crate::value::excerpt;
+use crate::value::truncated;
 
 /// A line of the outline.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,7 +88,7 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
                 if views <= 9 { format!("key {views}") } else { String::new() }
             }
             Target::Light(i) if !scene.lights[*i].on => "off".to_string(),
-            Target::Object(i) => excerpt(&scene.objects[*i].material),
+            Target::Object(i) => truncated(&scene.objects[*i].material),
             _ => String::new(),
         };
         lines.push(OutlineLine::Entry { label: subject.label(scene), subject, note });
@@ -110,7 +110,7 @@ pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     if let Some(Target::Material(name)) = &material {
         let users = scene.objects.iter().filter(|o| o.names_material(name)).count();
         let shared = if users > 1 { format!(" · shared by {users}") } else { String::new() };
-        lines.push(PanelLine::Heading(format!("material {}{shared}", excerpt(name))));
+        lines.push(PanelLine::Heading(format!("material {}{shared}", truncated(name))));
         lines.extend(fields(scene, &Target::Material(name.clone())));
     }
     lines
@@ -147,7 +147,7 @@ fn lines_of(subject: &Target, row: &Property) -> Vec<FieldLine> {
         label,
         depth: row.depth,
         entry: row.entry,
-        value: crate::value::printable(&value),
+        value: crate::value::sanitized(&value),
         swatch: row.color.filter(|_| component.unwrap_or(0) == 0),
         unit: row.unit,
         is_default: row.is_default,

@@ -73,15 +73,15 @@ impl Default for Light {
 
 /// The keys of `[[light]]`.
 pub const FIELDS: &[Field] = &[
-    Field::without("name", ValueType::Text, "", "a number", "Name; no two lights have the same."),
-    Field::without(
+    Field::optional("name", ValueType::Text, "", "a number", "Name; no two lights have the same."),
+    Field::optional(
         "point",
         ValueType::Table(POINT),
         "",
         "`directional` is needed",
         "Light from one point. Exactly one of `point` and `directional` is given.",
     ),
-    Field::without(
+    Field::optional(
         "directional",
         ValueType::Table(DIRECTIONAL),
         "",
@@ -137,11 +137,11 @@ impl Light {
     pub fn faults(&self) -> Vec<ValidationError> {
         let point = self
             .point
-            .map(|p| Validator::new(POINT).numbers("position", &p.position).faults())
+            .map(|p| Validator::new(POINT).numbers("position", &p.position).validate())
             .unwrap_or_default();
         let directional = self
             .directional
-            .map(|d| Validator::new(DIRECTIONAL).numbers("direction", &d.direction).faults())
+            .map(|d| Validator::new(DIRECTIONAL).numbers("direction", &d.direction).validate())
             .unwrap_or_default();
         let kinds = match (&self.point, &self.directional) {
             (Some(_), None) => None,
@@ -164,12 +164,12 @@ impl Light {
             }),
         };
         Validator::new(FIELDS)
-            .inner("point", point)
-            .inner("directional", directional)
+            .nested("point", point)
+            .nested("directional", directional)
             .numbers("color", &self.color.0)
             .numbers("intensity", &[self.intensity])
             .and(kinds)
-            .faults()
+            .validate()
     }
 }
 

@@ -64,7 +64,7 @@ pub const FIELDS: &[Field] = &[
         "\"cone\"",
         "How the reflected ray is spread; the same roughness means a comparable blur in each.",
     ),
-    Field::without(
+    Field::optional(
         "alpha",
         ValueType::Number(NumberRange::closed(0.0, 1e6)),
         "",
@@ -78,21 +78,21 @@ pub const FIELDS: &[Field] = &[
         "\"v-cavity\"",
         "Masking and shadowing between microfacets.",
     ),
-    Field::without(
+    Field::optional(
         "fresnel",
         ValueType::Choice(FRESNELS),
         "",
         "`exact` for a metal, otherwise `constant`",
         "How the reflectance depends on the angle.",
     ),
-    Field::without(
+    Field::optional(
         "reflectance",
         ValueType::Color(NumberRange::SHARE),
         "",
         "white",
         "Reflectance F0 at normal incidence. Not together with `metal`.",
     ),
-    Field::without(
+    Field::optional(
         "metal",
         ValueType::Choice(METALS),
         "",
@@ -108,14 +108,14 @@ pub const FIELDS: &[Field] = &[
          finish only `transmission` is left there, and total reflection past the critical angle \
          unless `fresnel` is `dielectric`.",
     ),
-    Field::without(
+    Field::optional(
         "texture",
         ValueType::OneOf(TEXTURE_KINDS),
         "",
         "one colour all over",
         "What multiplies `color`, from place to place.",
     ),
-    Field::without(
+    Field::optional(
         "bump",
         ValueType::OneOf(BUMP_KINDS),
         "",

@@ -227,8 +227,8 @@ impl Material {
             .numbers("transmission", &[self.transmission])
             .numbers("index", &[self.index])
             .numbers("roughness", &[self.roughness])
-            .maybe("alpha", self.alpha.as_ref().map(std::slice::from_ref))
-            .maybe("reflectance", self.reflectance.as_ref().map(|c| &c.0[..]))
+            .optional("alpha", self.alpha.as_ref().map(std::slice::from_ref))
+            .optional("reflectance", self.reflectance.as_ref().map(|c| &c.0[..]))
             .and(both.then(|| {
                 ValidationError::new(
                     "metal",
@@ -243,8 +243,8 @@ impl Material {
                     format!("no {other}: the index of refraction gives a dielectric's reflectance"),
                 )
             }))
-            .inner("texture", self.texture.as_ref().map(Texture::faults).unwrap_or_default())
-            .inner("bump", self.bump.as_ref().map(Bump::faults).unwrap_or_default())
-            .faults()
+            .nested("texture", self.texture.as_ref().map(Texture::faults).unwrap_or_default())
+            .nested("bump", self.bump.as_ref().map(Bump::faults).unwrap_or_default())
+            .validate()
     }
 }

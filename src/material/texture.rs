@@ -322,14 +322,14 @@ impl Texture {
 
     pub(super) fn faults(&self) -> Vec<ValidationError> {
         let faults = match self {
-            Self::Image(image) => image.checks(IMAGE_FIELDS).and(image.content.fault()).faults(),
+            Self::Image(image) => image.checks(IMAGE_FIELDS).and(image.content.fault()).validate(),
             Self::Checker(checker) => checker
                 .checks(CHECKER_FIELDS)
                 .numbers("even", &checker.even.0)
                 .numbers("odd", &checker.odd.0)
-                .faults(),
+                .validate(),
         };
-        faults.into_iter().map(|f| f.under(self.key())).collect()
+        faults.into_iter().map(|f| f.prefixed(self.key())).collect()
     }
 }
 
@@ -354,8 +354,8 @@ impl Bump {
     pub(super) fn faults(&self) -> Vec<ValidationError> {
         let Self::Image(image) = self;
         let checks = image.checks(BUMP_FIELDS).numbers("height", &[image.height]);
-        let faults = checks.and(image.content.fault()).faults();
-        faults.into_iter().map(|f| f.under("image")).collect()
+        let faults = checks.and(image.content.fault()).validate();
+        faults.into_iter().map(|f| f.prefixed("image")).collect()
     }
 }
 

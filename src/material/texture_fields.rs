@@ -97,7 +97,7 @@ const MAPPING: Field = Field::preset(
     "Where the coordinates u (to the right) and v (up) come from.",
 );
 
-const AXIS: Field = Field::without(
+const AXIS: Field = Field::optional(
     "axis",
     ValueType::Choice(AXES),
     "",

@@ -20,7 +20,7 @@ pub const BVH_MIN_PRIMITIVES: usize = 96;
 impl PrimitiveSet {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.runs.is_empty() && !self.tree
+        self.ranges.is_empty() && !self.tree
     }
 }
 
@@ -49,7 +49,7 @@ pub struct Aggregate<L: SimdFloat> {
 #[derive(Clone, Debug, Default)]
 pub struct PrimitiveSet {
     /// Items that are no tree's, by part and number in the part.
-    runs: Vec<(u32, Range<u32>)>,
+    ranges: Vec<(u32, Range<u32>)>,
     /// All items of the tree.
     tree: bool,
 }
@@ -62,7 +62,7 @@ impl<L: SimdFloat> Aggregate<L> {
 
     /// Compiles `forms` with or without a tree, whatever their number.
     pub fn with_tree(forms: &[Form], tree: bool) -> Self {
-        Self::compiled(forms, if tree { Acceleration::Hierarchy } else { Acceleration::Auto }, tree)
+        Self::compiled(forms, if tree { Acceleration::Bvh } else { Acceleration::Auto }, tree)
     }
 
     /// Compiles `forms` with what `acceleration` says.
@@ -70,7 +70,7 @@ impl<L: SimdFloat> Aggregate<L> {
         let many = || forms.iter().filter(|f| f.bounds().is_some()).count() >= BVH_MIN_PRIMITIVES;
         let tree = match acceleration {
             Acceleration::Auto => many(),
-            Acceleration::Hierarchy => true,
+            Acceleration::Bvh => true,
             _ => false,
         };
         Self::compiled(forms, acceleration, tree)
@@ -87,11 +87,11 @@ impl<L: SimdFloat> Aggregate<L> {
             counts: Vec::new(),
         };
         let how_listed = match acceleration {
-            Acceleration::Auto | Acceleration::Hierarchy => "list",
+            Acceleration::Auto | Acceleration::Bvh => "list",
             Acceleration::None => "bare list",
-            Acceleration::Projected => "screen rectangles",
-            Acceleration::Object => "boxes of their own",
-            Acceleration::World => "boxes",
+            Acceleration::ScreenBounds => "screen rectangles",
+            Acceleration::Obb => "boxes of their own",
+            Acceleration::Aabb => "boxes",
         };
         let mut bounds = Vec::new();
         for LabelledBatch { batch, sources, noun, detail, infinite } in compile(forms) {
@@ -112,15 +112,15 @@ impl<L: SimdFloat> Aggregate<L> {
                     out.tree_items.push((part, i as u32));
                 }
             } else {
-                out.all.runs.push((part, 0..sources.len() as u32));
+                out.all.ranges.push((part, 0..sources.len() as u32));
             }
             out.source.extend(&sources);
             out.parts.push(BatchRange { batch, base, end: out.source.len() as u32 });
         }
         out.tree = (!bounds.is_empty()).then(|| SceneBvh::new(&bounds));
         out.all.tree = out.tree.is_some();
-        if matches!(acceleration, Acceleration::Object | Acceleration::World) {
-            let own = acceleration == Acceleration::Object;
+        if matches!(acceleration, Acceleration::Obb | Acceleration::Aabb) {
+            let own = acceleration == Acceleration::Obb;
             let of = |source: &PrimitiveId| ItemBox::new(&forms[source.form], own);
             out.extents = out.source.iter().map(of).collect();
         }
@@ -129,29 +129,29 @@ impl<L: SimdFloat> Aggregate<L> {
 
     /// Those items for which `wanted` is true; all of those in a tree, which knows better.
     pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
-        let mut runs: Vec<(u32, Range<u32>)> = Vec::new();
-        for (part, range) in &self.all.runs {
+        let mut ranges: Vec<(u32, Range<u32>)> = Vec::new();
+        for (part, range) in &self.all.ranges {
             let base = self.parts[*part as usize].base;
             for i in range.clone().filter(|i| wanted(base + i)) {
-                match runs.last_mut() {
+                match ranges.last_mut() {
                     Some((last, run)) if last == part && run.end == i => run.end += 1,
-                    _ => runs.push((*part, i..i + 1)),
+                    _ => ranges.push((*part, i..i + 1)),
                 }
             }
         }
-        PrimitiveSet { runs, tree: self.all.tree }
+        PrimitiveSet { ranges, tree: self.all.tree }
     }
 
     /// Those `items` of a tree, and all that are in none.
-    pub fn select_few(&self, items: &[u32]) -> PrimitiveSet {
-        let mut runs = self.all.runs.clone();
+    pub fn select_indices(&self, items: &[u32]) -> PrimitiveSet {
+        let mut ranges = self.all.ranges.clone();
         for item in items {
             let part = self.parts.partition_point(|part| part.end <= *item);
             let i = item - self.parts[part].base;
-            runs.push((part as u32, i..i + 1));
+            ranges.push((part as u32, i..i + 1));
         }
-        runs.sort_unstable_by_key(|(part, range)| (*part, range.start));
-        PrimitiveSet { runs, tree: false }
+        ranges.sort_unstable_by_key(|(part, range)| (*part, range.start));
+        PrimitiveSet { ranges, tree: false }
     }
 
     /// The items that stand in a tree, in ascending order.
@@ -194,27 +194,27 @@ impl<L: SimdFloat> Aggregate<L> {
     /// the lowest number, so that neither the order in the tree nor the other rays of the packet decide.
     #[inline(always)]
     pub fn closest(&self, ray: &Ray<L>, of: &PrimitiveSet) -> Hit<L> {
-        self.closest_of(ray, of, L::mask(true))
+        self.closest_masked(ray, of, L::mask(true))
     }
 
     /// As [`Aggregate::closest`], in those lanes for which `wanted` is true; the others are meaningless.
     #[inline(always)]
-    pub fn closest_of(&self, ray: &Ray<L>, of: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
+    pub fn closest_masked(&self, ray: &Ray<L>, of: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         if !self.extents.is_empty() {
-            return self.closest_in_boxes(ray, of, nearest_wanted(wanted));
+            return self.closest_boxed(ray, of, nearest_wanted(wanted));
         }
-        let hit = self.closest_of_listed(ray, of, wanted);
+        let hit = self.closest_linear(ray, of, wanted);
         match &self.tree {
-            Some(tree) if of.tree => self.closest_in(tree, ray, hit),
+            Some(tree) if of.tree => self.closest_bvh(tree, ray, hit),
             _ => hit,
         }
     }
 
-    /// As [`Aggregate::closest_of`], of those items that are in no tree; boxes are not asked.
+    /// As [`Aggregate::closest_masked`], of those items that are in no tree; boxes are not asked.
     #[inline(always)]
-    pub fn closest_of_listed(&self, ray: &Ray<L>, of: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
+    pub fn closest_linear(&self, ray: &Ray<L>, of: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         let mut hit = nearest_wanted(wanted);
-        for (part, range) in &of.runs {
+        for (part, range) in &of.ranges {
             let part = &self.parts[*part as usize];
             part.batch.closest(indices(range), part.base, ray, &mut hit);
         }
@@ -222,8 +222,8 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     #[inline(never)]
-    fn closest_in(&self, tree: &SceneBvh, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
-        tree.walk(ray, hit.t, |item, limit| {
+    fn closest_bvh(&self, tree: &SceneBvh, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
+        tree.traverse(ray, hit.t, |item, limit| {
             let (part, i) = self.tree_items[item];
             let part = &self.parts[part as usize];
             // As near is near enough: of equal distances the lowest tag counts.
@@ -243,14 +243,14 @@ impl<L: SimdFloat> Aggregate<L> {
         &'a self,
         of: &'a PrimitiveSet,
     ) -> impl Iterator<Item = (&'a BatchRange<L>, u32, Option<&'a ItemBox<L::Scalar>>)> {
-        of.runs.iter().flat_map(move |(part, range)| {
+        of.ranges.iter().flat_map(move |(part, range)| {
             let part = &self.parts[*part as usize];
             range.clone().map(move |i| (part, i, self.extents[(part.base + i) as usize].as_ref()))
         })
     }
 
     #[inline(never)]
-    fn closest_in_boxes(&self, ray: &Ray<L>, of: &PrimitiveSet, mut hit: Hit<L>) -> Hit<L> {
+    fn closest_boxed(&self, ray: &Ray<L>, of: &PrimitiveSet, mut hit: Hit<L>) -> Hit<L> {
         for (part, i, extent) in self.boxed(of) {
             if extent.is_none_or(|extent| extent.meets(ray, hit.t).any()) {
                 part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut hit);
@@ -267,62 +267,62 @@ impl<L: SimdFloat> Aggregate<L> {
         wanted: L::Mask,
         by: &PrimitiveSet,
     ) -> L::Mask {
-        let mut blocked = L::mask(false);
+        let mut occluded = L::mask(false);
         for (part, i, extent) in self.boxed(by) {
-            let open = wanted.and_not(blocked);
+            let open = wanted.and_not(occluded);
             let open = extent.map_or(open, |extent| open & extent.meets(ray, limit));
             if open.any() {
-                let new = part.batch.blocked(indices(&(i..i + 1)), ray, limit, open);
-                blocked = blocked | (new & open);
-                if wanted.and_not(blocked).none() {
+                let new = part.batch.occluded(indices(&(i..i + 1)), ray, limit, open);
+                occluded = occluded | (new & open);
+                if wanted.and_not(occluded).none() {
                     break;
                 }
             }
         }
-        blocked
+        occluded
     }
 
     /// Which lanes of `wanted` meet any of some items at a distance in (0, limit).
     #[inline(always)]
-    pub fn blocked(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, by: &PrimitiveSet) -> L::Mask {
+    pub fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, by: &PrimitiveSet) -> L::Mask {
         if !self.extents.is_empty() {
             return self.blocked_in_boxes(ray, limit, wanted, by);
         }
-        let blocked = self.blocked_by_listed(ray, limit, wanted, by);
+        let occluded = self.occluded_linear(ray, limit, wanted, by);
         match &self.tree {
-            Some(tree) if by.tree && wanted.and_not(blocked).any() => {
-                self.blocked_in(tree, ray, limit, wanted, blocked)
+            Some(tree) if by.tree && wanted.and_not(occluded).any() => {
+                self.blocked_in(tree, ray, limit, wanted, occluded)
             }
-            _ => blocked,
+            _ => occluded,
         }
     }
 
-    /// As [`Aggregate::blocked`], by those items that are in no tree; boxes are not asked.
+    /// As [`Aggregate::occluded`], by those items that are in no tree; boxes are not asked.
     #[inline(always)]
-    pub fn blocked_by_listed(
+    pub fn occluded_linear(
         &self,
         ray: &Ray<L>,
         limit: L,
         wanted: L::Mask,
         by: &PrimitiveSet,
     ) -> L::Mask {
-        let mut blocked = L::mask(false);
-        for (part, range) in &by.runs {
-            let open = wanted.and_not(blocked);
+        let mut occluded = L::mask(false);
+        for (part, range) in &by.ranges {
+            let open = wanted.and_not(occluded);
             let batch = &self.parts[*part as usize].batch;
-            blocked = blocked | batch.blocked(indices(range), ray, limit, open);
-            if wanted.and_not(blocked).none() {
+            occluded = occluded | batch.occluded(indices(range), ray, limit, open);
+            if wanted.and_not(occluded).none() {
                 break;
             }
         }
-        blocked
+        occluded
     }
 
-    /// As [`Aggregate::blocked`], by one item of the tree: `number` in [`Aggregate::in_tree`].
+    /// As [`Aggregate::occluded`], by one item of the tree: `number` in [`Aggregate::in_tree`].
     #[inline(always)]
-    pub fn blocked_by_one(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+    pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (part, i) = self.tree_items[number as usize];
-        self.parts[part as usize].batch.blocked(indices(&(i..i + 1)), ray, limit, wanted)
+        self.parts[part as usize].batch.occluded(indices(&(i..i + 1)), ray, limit, wanted)
     }
 
     #[inline(never)]
@@ -332,16 +332,16 @@ impl<L: SimdFloat> Aggregate<L> {
         ray: &Ray<L>,
         limit: L,
         wanted: L::Mask,
-        mut blocked: L::Mask,
+        mut occluded: L::Mask,
     ) -> L::Mask {
-        let limit_of = |blocked| L::select(wanted.and_not(blocked), limit, L::from_f64(-1.0));
-        tree.walk(ray, limit_of(blocked), |item, left| {
+        let limit_of = |occluded| L::select(wanted.and_not(occluded), limit, L::from_f64(-1.0));
+        tree.traverse(ray, limit_of(occluded), |item, left| {
             let open = left.gt(L::zero());
-            let new = self.blocked_by_one(item as u32, ray, left, open);
-            blocked = blocked | (new & open);
-            limit_of(blocked)
+            let new = self.occluded_by(item as u32, ray, left, open);
+            occluded = occluded | (new & open);
+            limit_of(occluded)
         });
-        blocked
+        occluded
     }
 
     /// Where rays meet `item`, a compound's first part for all of it, nearer than `limit`.

@@ -22,7 +22,7 @@ pub struct SurfacePoint<L> {
     pub normal: Vec3<L>,
     /// Largest magnitude of a coordinate that took part in computing the point: its rounding error
     /// is a few units of the last place of this.
-    pub reach: L,
+    pub max_coordinate: L,
 }
 
 /// Texture coordinates that a shape has of its own, at one point.
@@ -38,8 +38,8 @@ impl<L: SimdFloat> SurfacePoint<L> {
     /// How far from the point rays start that leave the surface: a few roundings of the largest number
     /// involved.
     #[inline(always)]
-    pub fn lift(&self) -> L {
-        self.reach.max(self.point.max_abs()) * L::from_f64(8.0 * L::EPSILON)
+    pub fn ray_offset(&self) -> L {
+        self.max_coordinate.max(self.point.max_abs()) * L::from_f64(8.0 * L::EPSILON)
     }
 }
 
@@ -47,7 +47,7 @@ impl<L: SimdFloat> SurfacePoint<L> {
 pub trait Primitive<L: SimdFloat> {
     /// Distance at which each line through a ray meets the item first in front of the ray's origin, and
     /// where it meets it; there, a distance that is not positive is no hit. `None`: it meets it nowhere.
-    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;
+    fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;
 
     /// The surface at `point` (near it, from `ray.at(t)`).
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L>;
@@ -103,11 +103,17 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
     /// Where a surface of the items in `range` lies at a distance in (0, limit) of the ray. May stop
     /// early once all lanes of `wanted` are blocked.
     #[inline(always)]
-    pub fn blocked(&self, range: Range<usize>, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+    pub fn occluded(
+        &self,
+        range: Range<usize>,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+    ) -> L::Mask {
         each!(self,
-            items => blocked(&items[range], ray, limit, wanted),
-            compounds => compounds.blocked(range, ray, limit, wanted),
-            meshes => meshes.blocked(range, ray, limit, wanted))
+            items => occluded(&items[range], ray, limit, wanted),
+            compounds => compounds.occluded(range, ray, limit, wanted),
+            meshes => meshes.occluded(range, ray, limit, wanted))
     }
 
     /// The surface of `item` at `point` (near it, from `ray.at(t)`); `facet`: tag of a mesh's triangle.
@@ -123,29 +129,29 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
 #[inline(always)]
 fn closest<L: SimdFloat>(items: &[impl Primitive<L>], first: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
     for (tag, item) in (first..).zip(items) {
-        if let Some((t, meets)) = item.crossing(ray) {
+        if let Some((t, meets)) = item.intersect(ray) {
             hit.keep_closer(meets, t, tag);
         }
     }
 }
 
 #[inline(always)]
-fn blocked<L: SimdFloat>(
+fn occluded<L: SimdFloat>(
     items: &[impl Primitive<L>],
     ray: &Ray<L>,
     limit: L,
     wanted: L::Mask,
 ) -> L::Mask {
-    let mut blocked = L::mask(false);
+    let mut occluded = L::mask(false);
     for item in items {
-        if let Some((t, meets)) = item.crossing(ray) {
-            blocked = blocked | (meets & t.gt(L::zero()) & t.lt(limit));
-            if wanted.and_not(blocked).none() {
+        if let Some((t, meets)) = item.intersect(ray) {
+            occluded = occluded | (meets & t.gt(L::zero()) & t.lt(limit));
+            if wanted.and_not(occluded).none() {
                 break;
             }
         }
     }
-    blocked
+    occluded
 }
 
 /// What an item came from.
@@ -226,7 +232,7 @@ pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
     }
     if !sources.is_empty() {
         let batch = PrimitiveBatch::Meshes(Meshes::new(forms));
-        let detail = format!(" of {} triangles", grouped(triangles));
+        let detail = format!(" of {} triangles", with_thousands_separators(triangles));
         out.push(LabelledBatch {
             batch,
             sources,
@@ -239,7 +245,7 @@ pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
 }
 
 /// `69,451`
-fn grouped(n: usize) -> String {
+fn with_thousands_separators(n: usize) -> String {
     let digits = n.to_string();
     let mut out = String::new();
     for (i, digit) in digits.chars().enumerate() {
@@ -252,6 +258,6 @@ fn grouped(n: usize) -> String {
 }
 
 /// Largest magnitude of a coordinate in a bounded form.
-pub(crate) fn reach(form: &Form) -> f64 {
+pub(crate) fn max_coordinate(form: &Form) -> f64 {
     form.bounds().map_or(0.0, |(low, high)| low.abs().max(high.abs()).max_element())
 }

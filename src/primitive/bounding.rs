@@ -79,17 +79,17 @@ impl BoundingSphere {
     }
 
     /// Whether `point` lies inside or near the surface.
-    pub fn holds(&self, point: DVec3) -> bool {
-        self.center.distance(point) <= self.radius + stray(self.center) + stray(point)
+    pub fn contains(&self, point: DVec3) -> bool {
+        self.center.distance(point) <= self.radius + ray_error(self.center) + ray_error(point)
     }
 
     /// Its radius, with room for the roundings of rays from `apex`.
     fn reach(&self, apex: DVec3) -> f64 {
-        self.radius * (1.0 + F32_RAY_ERROR) + stray(self.center) + stray(apex)
+        self.radius * (1.0 + F32_RAY_ERROR) + ray_error(self.center) + ray_error(apex)
     }
 }
 
-fn stray(point: DVec3) -> f64 {
+fn ray_error(point: DVec3) -> f64 {
     F32_RAY_ERROR * point.abs().max_element()
 }
 
@@ -146,13 +146,13 @@ impl BoundingVolume {
     }
 
     /// A ball around all of it that the pencil's lines meet in front of the apex; `None`: nothing.
-    pub fn part_in(&self, pencil: &Frustum) -> Option<BoundingSphere> {
+    pub fn clip_to(&self, pencil: &Frustum) -> Option<BoundingSphere> {
         let Frustum { apex, forward, corners } = pencil;
         let ball = self.ball;
         if ball.radius.is_finite() && !pencil.meets(&ball) {
             return None;
         }
-        let room = stray(*apex) + stray(ball.center);
+        let room = ray_error(*apex) + ray_error(ball.center);
         // Depths along `forward` between which the thing lies.
         let middle = (ball.center - *apex).dot(*forward);
         let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
@@ -162,16 +162,18 @@ impl BoundingVolume {
             // the plane's height above the apex and to the slopes of the lines is allowed for.
             let height = offset - normal.dot(*apex);
             let (height, toward) = (height.abs(), normal * height.signum());
-            let slack = self.stray(*apex);
+            let slack = self.ray_error(*apex);
             let slopes = corners.map(|c| (toward.dot(c), F32_RAY_ERROR * c.length()));
             if height <= slack {
                 // The apex may be on either side.
-            } else if slopes.iter().all(|(slope, stray)| slope > stray) {
-                let nearest = slopes.map(|(slope, stray)| (height - slack) / (slope + stray));
-                let farthest = slopes.map(|(slope, stray)| (height + slack) / (slope - stray));
+            } else if slopes.iter().all(|(slope, ray_error)| slope > ray_error) {
+                let nearest =
+                    slopes.map(|(slope, ray_error)| (height - slack) / (slope + ray_error));
+                let farthest =
+                    slopes.map(|(slope, ray_error)| (height + slack) / (slope - ray_error));
                 near = near.max(nearest.into_iter().fold(f64::INFINITY, f64::min));
                 far = far.min(farthest.into_iter().fold(0.0, f64::max));
-            } else if slopes.iter().all(|(slope, stray)| *slope < -stray) {
+            } else if slopes.iter().all(|(slope, ray_error)| *slope < -ray_error) {
                 return None;
             }
         }
@@ -194,25 +196,26 @@ impl BoundingVolume {
     }
 
     /// How far off a flat thing's plane rays that lead to `point` meet it.
-    fn stray(&self, point: DVec3) -> f64 {
+    fn ray_error(&self, point: DVec3) -> f64 {
         let BoundingSphere { center, radius } = self.ball;
         let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
         let offset = self.plane.map_or(0.0, |(_, offset)| offset.abs());
-        self.slack + stray(point) + F32_RAY_ERROR * reach.max(offset)
+        self.slack + ray_error(point) + F32_RAY_ERROR * reach.max(offset)
     }
 
     /// Whether it may stand between some point of `lit` and the light.
-    pub fn shades(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
-        let slack = stray(lit.center) + F32_RAY_ERROR * lit.radius;
+    pub fn may_occlude(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
+        let slack = ray_error(lit.center) + F32_RAY_ERROR * lit.radius;
         let radius = lit.radius + slack;
         if let Some((normal, offset)) = self.plane {
             let height = normal.dot(lit.center) - offset;
             // A light on the plane within rounding may be seen on either side.
             let (beyond, unsure) = match towards {
-                LightTarget::Point(light) => (normal.dot(*light) - offset, self.stray(*light)),
+                LightTarget::Point(light) => (normal.dot(*light) - offset, self.ray_error(*light)),
                 LightTarget::Direction(direction) => (normal.dot(*direction), F32_RAY_ERROR),
             };
-            let sure = height.abs() > lit.radius + self.stray(lit.center) && beyond.abs() > unsure;
+            let sure =
+                height.abs() > lit.radius + self.ray_error(lit.center) && beyond.abs() > unsure;
             // Both on the same side.
             if sure && height.abs() > radius && height * beyond > 0.0 {
                 return false;
@@ -226,8 +229,8 @@ impl BoundingVolume {
                 let to = self.ball.center - lit.center;
                 let along = to.dot(*direction);
                 let across = (to - *direction * along).length();
-                let both =
-                    (radius + self.ball.radius) * (1.0 + F32_RAY_ERROR) + stray(self.ball.center);
+                let both = (radius + self.ball.radius) * (1.0 + F32_RAY_ERROR)
+                    + ray_error(self.ball.center);
                 across <= both && along >= -both
             }
             LightTarget::Point(light) => {
@@ -292,7 +295,7 @@ mod tests {
 
     #[test]
     fn a_pencil_meets_what_is_in_front_of_it() {
-        let part = |form: &Form| BoundingVolume::new(form).part_in(&pencil());
+        let part = |form: &Form| BoundingVolume::new(form).clip_to(&pencil());
         assert!(part(&ball([0.0, 0.0, 0.0], 1.0)).is_some());
         assert!(part(&ball([1.4, 0.0, 0.0], 1.0)).is_some());
         assert!(part(&ball([2.0, 0.0, 0.0], 1.0)).is_none());
@@ -324,8 +327,8 @@ mod tests {
             (tile([0.0, 6.0, 0.0]), false, true),
         ] {
             let bound = BoundingVolume::new(&form);
-            assert_eq!(bound.shades(&lit, &lamp), by_lamp, "lamp {form:?}");
-            assert_eq!(bound.shades(&lit, &sun), by_sun, "sun {form:?}");
+            assert_eq!(bound.may_occlude(&lit, &lamp), by_lamp, "lamp {form:?}");
+            assert_eq!(bound.may_occlude(&lit, &sun), by_sun, "sun {form:?}");
         }
     }
 
@@ -340,7 +343,7 @@ mod tests {
         let corners = ends.map(|(x, y)| DVec3::new(x, y, -1.0));
         let pencil = Frustum { apex, forward: DVec3::NEG_Z, corners };
         let meets = |center: DVec3, radius: f64| {
-            BoundingVolume::new(&Form::Sphere { center, radius }).part_in(&pencil).is_some()
+            BoundingVolume::new(&Form::Sphere { center, radius }).clip_to(&pencil).is_some()
         };
         let (mut outside, mut inside) = (0, 0);
         for i in 0..=40 {
@@ -366,7 +369,7 @@ mod tests {
     fn a_plane_through_the_eye_is_not_ruled_out() {
         for offset in [5.0 - 1e-7, 5.0, 5.0 + 1e-7] {
             let plane = BoundingVolume::new(&Form::Plane { normal: DVec3::Z, offset });
-            assert!(plane.part_in(&pencil()).is_some(), "{offset}");
+            assert!(plane.clip_to(&pencil()).is_some(), "{offset}");
         }
     }
 
@@ -379,12 +382,12 @@ mod tests {
             (random >> 40) as f64 / 16_777_216.0
         };
         let slanted = Form::Plane { normal: DVec3::new(0.3, 0.4, 0.5).normalize(), offset: 0.2 };
-        let part = BoundingVolume::new(&slanted).part_in(&pencil()).unwrap();
+        let part = BoundingVolume::new(&slanted).clip_to(&pencil()).unwrap();
         let Form::Plane { normal, offset } = slanted else { unreachable!() };
         for _ in 0..1000 {
             let toward = DVec3::new(0.2 * unit() - 0.1, 0.2 * unit() - 0.1, -1.0);
             let t = (offset - normal.dot(pencil().apex)) / normal.dot(toward);
-            assert!(t > 0.0 && part.holds(pencil().apex + toward * t));
+            assert!(t > 0.0 && part.contains(pencil().apex + toward * t));
         }
     }
 }

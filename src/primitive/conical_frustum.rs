@@ -4,7 +4,7 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, reach};
+use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
 use crate::primitive::ellipsoid::{rows, times};
 use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
@@ -19,7 +19,7 @@ pub struct ConicalFrustum<S> {
     /// Change of the radius along z, from -1 (a cone) to 0 (a cylinder).
     slope: S,
     /// Radius at the middle of the axis.
-    middle: S,
+    mid_radius: S,
     /// Unit normal of the plane z = 1/2, outward.
     cap_normal: [S; 3],
     /// Distance of the planes of both ends.
@@ -34,18 +34,18 @@ const AROUND2: f64 = 1.26;
 impl<S: Float> ConicalFrustum<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
-        let Form::ConicalFrustum { scene_from_unit: m, top } = form else { return None };
+        let Form::ConicalFrustum { scene_from_unit: m, top_radius } = form else { return None };
         let inverse = m.matrix3.inverse();
         let up = inverse.transpose() * DVec3::Z;
         let center = m.transform_point3(DVec3::new(0.0, 0.0, 0.5));
         Some(Self {
             center: center.to_array().map(S::from_f64),
             unit_from_scene: rows(inverse),
-            slope: S::from_f64(top - 1.0),
-            middle: S::from_f64(0.5 * (1.0 + top)),
+            slope: S::from_f64(top_radius - 1.0),
+            mid_radius: S::from_f64(0.5 * (1.0 + top_radius)),
             cap_normal: up.normalize().to_array().map(S::from_f64),
             height: S::from_f64(up.length().recip()),
-            reach: S::from_f64(reach(form)),
+            reach: S::from_f64(max_coordinate(form)),
         })
     }
 }
@@ -82,7 +82,7 @@ impl<L: SimdFloat> Chord<L> {
 /// and does not cancel as b^2 - a c does; its roots as q / a and c / q, so that a = 0, a line parallel
 /// to a generator, leaves one of them finite.
 #[inline(always)]
-fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
+fn interval<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let (zero, half) = (L::zero(), L::from_f64(0.5));
     let f = times(&s.unit_from_scene, ray.origin - Vec3::splat(s.center));
     let d = times(&s.unit_from_scene, ray.direction);
@@ -98,7 +98,7 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
         return None;
     }
     let k = L::splat(s.slope);
-    let r = k.mul_add(p.z, L::splat(s.middle));
+    let r = k.mul_add(p.z, L::splat(s.mid_radius));
     let (kd, kr) = (k * d.z, k * d.z * r);
     let a = d.x.mul_add(d.x, d.y.mul_add(d.y, -(kd * kd)));
     let b = p.x.mul_add(d.x, p.y.mul_add(d.y, -kr));
@@ -158,10 +158,10 @@ fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3
 
 impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
     #[inline(always)]
-    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
-        let chord = chord(self, ray)?;
-        let (enter, leave) = chord.distances();
-        Some((L::select(enter.gt(L::zero()), enter, leave), chord.meets))
+    fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+        let interval = interval(self, ray)?;
+        let (enter, leave) = interval.distances();
+        Some((L::select(enter.gt(L::zero()), enter, leave), interval.meets))
     }
 
     /// Side, base or cap: the one that is nearest, outside by most or inside by least.
@@ -171,7 +171,7 @@ impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
         let p = times(&s.unit_from_scene, point - Vec3::splat(s.center));
         let (side, rho) = side_normal(s, p.x, p.y);
         let steepness = L::one() / side.length_squared().sqrt();
-        let radius = L::splat(s.slope).mul_add(p.z, L::splat(s.middle));
+        let radius = L::splat(s.slope).mul_add(p.z, L::splat(s.mid_radius));
         let beside = (rho - radius) * steepness;
         let above = (p.z.abs() - L::from_f64(0.5)) * L::splat(s.height);
         let cap = Vec3::splat(s.cap_normal);
@@ -179,18 +179,22 @@ impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
         let on_side = beside.ge(above);
         let normal = Vec3::select(on_side, side * steepness, cap);
         let outside = L::select(on_side, beside, above);
-        SurfacePoint { point: normal.mul_add(-outside, point), normal, reach: L::splat(s.reach) }
+        SurfacePoint {
+            point: normal.mul_add(-outside, point),
+            normal,
+            max_coordinate: L::splat(s.reach),
+        }
     }
 }
 
 impl<L: SimdFloat> SolidPrimitive<L> for ConicalFrustum<L::Scalar> {
     fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let s = self;
-        let chord = chord(s, ray)?;
-        let (enter, leave) = chord.distances();
+        let interval = interval(s, ray)?;
+        let (enter, leave) = interval.distances();
         let cap = Vec3::splat(s.cap_normal).dot(ray.direction).abs();
         let cosine = |on_side: L::Mask, t: L| {
-            let at = chord.direction.mul_add(t, chord.point);
+            let at = interval.direction.mul_add(t, interval.point);
             let (normal, _) = side_normal(s, at.x, at.y);
             let side = (normal.dot(ray.direction) / normal.length_squared().sqrt()).abs();
             L::select(on_side, side, cap)
@@ -198,9 +202,9 @@ impl<L: SimdFloat> SolidPrimitive<L> for ConicalFrustum<L::Scalar> {
         Some(Span {
             enter,
             leave,
-            enter_cosine: cosine(chord.enters_side, chord.enter),
-            leave_cosine: cosine(chord.leaves_side, chord.leave),
-            meets: chord.meets,
+            enter_cosine: cosine(interval.enters_side, interval.enter),
+            leave_cosine: cosine(interval.leaves_side, interval.leave),
+            meets: interval.meets,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, reach};
+use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
 use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::DVec3;
@@ -41,7 +41,7 @@ impl<S: Float> ConvexPolyhedron<S> {
             center: center.to_array().map(S::from_f64),
             // Rounded up: the test may let a miss through, never lose a hit.
             radius2: S::from_f64(radius2 * (1.0 + 8.0 * S::EPSILON)),
-            reach: S::from_f64(reach(form)),
+            reach: S::from_f64(max_coordinate(form)),
             slabs: Vec::new(),
             faces: Vec::new(),
         };
@@ -109,7 +109,7 @@ impl<S: Float> ConvexPolyhedron<S> {
 
 impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
     #[inline(always)]
-    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+    fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let (enter, leave, meets) = self.chord(ray)?;
         Some((L::select(enter.gt(L::zero()), enter, leave), meets))
     }
@@ -138,7 +138,11 @@ impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
             outside = L::select(nearer, distance, outside);
             normal = Vec3::select(nearer, n, normal);
         }
-        SurfacePoint { point: normal.mul_add(-outside, point), normal, reach: L::splat(self.reach) }
+        SurfacePoint {
+            point: normal.mul_add(-outside, point),
+            normal,
+            max_coordinate: L::splat(self.reach),
+        }
     }
 }
 

@@ -12,10 +12,10 @@
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, reach};
+use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
 use crate::primitive::conical_frustum::ConicalFrustum;
 use crate::primitive::convex_polyhedron::ConvexPolyhedron;
-use crate::primitive::csg_interval::{Event, Interval, Transition, both_ends, insert, with_room};
+use crate::primitive::csg_interval::{Event, Interval, Transition, events, insert, with_scratch};
 use crate::primitive::csg_tree::{CsgSolid, CsgTree};
 use crate::primitive::ellipsoid::Ellipsoid;
 use crate::primitive::form::Form;
@@ -122,13 +122,13 @@ impl<S: Float> Compounds<S> {
             self.parts.push(Part { solid, reversed: false });
             self.first.push((i == 0).then_some(self.compounds.len() as u32));
         }
-        let depth = self.plan(&compound.tree, first_part, false);
+        let depth = self.build(&compound.tree, first_part, false);
         let (low, high) = compound.bounds().unwrap_or_default();
         let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * S::EPSILON);
         self.compounds.push(SolidOperand {
             center: (0.5 * (low + high)).to_array().map(S::from_f64),
             radius2: S::from_f64(radius * radius),
-            reach: S::from_f64(compound.parts.iter().map(reach).fold(0.0, f64::max)),
+            reach: S::from_f64(compound.parts.iter().map(max_coordinate).fold(0.0, f64::max)),
             parts: first_part..self.parts.len(),
             ops: first_op..self.ops.len(),
             depth,
@@ -137,7 +137,7 @@ impl<S: Float> Compounds<S> {
 
     /// Appends the operations of `tree` and returns how high the stack grows; `reversed`: its inside
     /// is outside the whole.
-    fn plan(&mut self, tree: &CsgTree, first_part: usize, reversed: bool) -> usize {
+    fn build(&mut self, tree: &CsgTree, first_part: usize, reversed: bool) -> usize {
         let (list, op) = match tree {
             CsgTree::Part(i) => {
                 self.parts[first_part + i].reversed = reversed;
@@ -151,7 +151,7 @@ impl<S: Float> Compounds<S> {
         let mut depth = 0;
         for (n, inner) in list.iter().enumerate() {
             let cuts = matches!(op, Op::Minus) && n > 0;
-            let above = self.plan(inner, first_part, reversed ^ cuts);
+            let above = self.build(inner, first_part, reversed ^ cuts);
             depth = depth.max(above + usize::from(n > 0));
             if n > 0 {
                 self.ops.push(op);
@@ -168,7 +168,7 @@ impl<S: Float> Compounds<S> {
         spans: &[Interval<L>],
         t: L,
     ) -> L::Mask {
-        with_room(one.depth, L::mask(false), |stack| {
+        with_scratch(one.depth, L::mask(false), |stack| {
             let mut top = 0;
             for op in &self.ops[one.ops.clone()] {
                 if let Op::Part(i) = op {
@@ -203,7 +203,7 @@ impl<S: Float> Compounds<S> {
             t: L::zero(),
             tag: L::from_id(0),
         };
-        with_room(one.depth, nothing, |stack| {
+        with_scratch(one.depth, nothing, |stack| {
             let mut top = 0;
             for op in &self.ops[one.ops.clone()] {
                 if let Op::Part(i) = op {
@@ -228,7 +228,7 @@ impl<S: Float> Compounds<S> {
     }
 
     /// Narrows `hit` by the lanes of `wanted`.
-    fn meet<L: SimdFloat<Scalar = S>>(
+    fn intersect_item<L: SimdFloat<Scalar = S>>(
         &self,
         one: &SolidOperand<S>,
         base: u32,
@@ -250,8 +250,8 @@ impl<S: Float> Compounds<S> {
         let parts = &self.parts[one.parts.clone()];
         let outside = Interval { enter: never, leave: always };
         let end = Event { t: never, tie: L::zero() };
-        with_room(parts.len(), outside, |spans| {
-            with_room(2 * parts.len(), end, |ends| {
+        with_scratch(parts.len(), outside, |spans| {
+            with_scratch(2 * parts.len(), end, |ends| {
                 let tie =
                     ray.origin.max_abs().max(L::splat(one.reach)) * L::from_f64(TIE * L::EPSILON);
                 let mut count = 0;
@@ -262,12 +262,12 @@ impl<S: Float> Compounds<S> {
                         enter: L::select(found.meets, found.enter, never),
                         leave: L::select(found.meets, found.leave, always),
                     };
-                    for end in both_ends(&found, tie) {
+                    for end in events(&found, tie) {
                         insert(end, ends, count);
                         count += 1;
                     }
                 }
-                self.sweep(one, (&*spans, &ends[..count]), base, near, hit);
+                self.sweep_events(one, (&*spans, &ends[..count]), base, near, hit);
             });
         });
     }
@@ -277,7 +277,7 @@ impl<S: Float> Compounds<S> {
     /// Faces that lie on each other are met at the same angle, so both ends must be as near as their
     /// ties: a face that is met flatly does not swallow others that are not.
     #[inline(always)]
-    fn sweep<L: SimdFloat<Scalar = S>>(
+    fn sweep_events<L: SimdFloat<Scalar = S>>(
         &self,
         one: &SolidOperand<S>,
         (spans, ends): (&[Interval<L>], &[Event<L>]),
@@ -327,31 +327,31 @@ impl<S: Float> Compounds<S> {
         hit: &mut Hit<L>,
     ) {
         for compound in self.first[range].iter().flatten() {
-            self.meet(&self.compounds[*compound as usize], base, ray, L::mask(true), hit);
+            self.intersect_item(&self.compounds[*compound as usize], base, ray, L::mask(true), hit);
         }
     }
 
     /// Where a surface of the compounds that begin in `range` lies at a distance in (0, limit) of the
     /// ray, of the lanes in `wanted`.
     #[inline(never)]
-    pub fn blocked<L: SimdFloat<Scalar = S>>(
+    pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
         range: Range<usize>,
         ray: &Ray<L>,
         limit: L,
         wanted: L::Mask,
     ) -> L::Mask {
-        let mut blocked = L::mask(false);
+        let mut occluded = L::mask(false);
         for compound in self.first[range].iter().flatten() {
-            let open = wanted.and_not(blocked);
+            let open = wanted.and_not(occluded);
             if open.none() {
                 break;
             }
             let mut hit = Hit::with_t_max(limit);
-            self.meet(&self.compounds[*compound as usize], 0, ray, open, &mut hit);
-            blocked = blocked | hit.t.lt(limit);
+            self.intersect_item(&self.compounds[*compound as usize], 0, ray, open, &mut hit);
+            occluded = occluded | hit.t.lt(limit);
         }
-        blocked
+        occluded
     }
 
     /// The surface of a part at `point`, outward of the whole.

@@ -66,14 +66,14 @@ impl<L: SimdFloat> Transition<L> {
 
 /// Room for `n` values while `use_it` runs: on the stack if they are few.
 #[inline(always)]
-pub fn with_room<T: Copy, R>(n: usize, fill: T, use_it: impl FnOnce(&mut [T]) -> R) -> R {
+pub fn with_scratch<T: Copy, R>(n: usize, fill: T, use_it: impl FnOnce(&mut [T]) -> R) -> R {
     const FEW: usize = 8;
     if n <= FEW { use_it(&mut [fill; FEW][..n]) } else { use_it(&mut vec![fill; n]) }
 }
 
 /// The ends of a span; those of lines that do not meet the solid stand behind all others.
 #[inline(always)]
-pub fn both_ends<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
+pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     let never = L::from_f64(L::MAX);
     let end = |t: L, cosine: L| {
         let real = span.meets & t.abs().lt(never);

@@ -2,10 +2,10 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, reach};
+use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
 use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
-use crate::primitive::sphere::crossings;
+use crate::primitive::sphere::intersections;
 use glam::DMat3;
 
 /// One ellipsoid. Matrices by rows.
@@ -36,7 +36,7 @@ impl<S: Float> Ellipsoid<S> {
             center: m.translation.to_array().map(S::from_f64),
             unit_from_scene: rows(m.matrix3.inverse()),
             scene_from_unit: rows(m.matrix3),
-            reach: S::from_f64(reach(form)),
+            reach: S::from_f64(max_coordinate(form)),
         })
     }
 }
@@ -47,13 +47,13 @@ fn chord<L: SimdFloat>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, 
     let f = times(&e.unit_from_scene, ray.origin - Vec3::splat(e.center));
     let d = times(&e.unit_from_scene, ray.direction);
     let scale = L::one() / d.length_squared().sqrt();
-    let (near, far, meets) = crossings(f, d * scale, L::one())?;
+    let (near, far, meets) = intersections(f, d * scale, L::one())?;
     Some((near * scale, far * scale, meets))
 }
 
 impl<L: SimdFloat> Primitive<L> for Ellipsoid<L::Scalar> {
     #[inline(always)]
-    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+    fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let (near, far, meets) = chord(self, ray)?;
         Some((L::select(near.gt(L::zero()), near, far), meets))
     }
@@ -70,7 +70,7 @@ impl<L: SimdFloat> Primitive<L> for Ellipsoid<L::Scalar> {
         SurfacePoint {
             point: times(&self.scene_from_unit, on_unit) + center,
             normal: normal.normalize(),
-            reach: L::splat(self.reach),
+            max_coordinate: L::splat(self.reach),
         }
     }
 }

@@ -43,7 +43,7 @@ pub enum Form {
         /// From that solid's space to the scene's.
         scene_from_unit: DAffine3,
         /// Radius at z = 1 over radius at z = 0: from 0, a cone, to 1, a cylinder.
-        top: f64,
+        top_radius: f64,
     },
     /// Solids joined, intersected, cut out of each other.
     Csg(CsgSolid),
@@ -85,12 +85,12 @@ impl Form {
     /// 0 <= z <= 1, for any s >= 0.
     pub fn conical_frustum(scene_from_canonical: DAffine3, s: f64) -> Self {
         if s <= 1.0 {
-            return Self::ConicalFrustum { scene_from_unit: scene_from_canonical, top: s };
+            return Self::ConicalFrustum { scene_from_unit: scene_from_canonical, top_radius: s };
         }
         // Upside down, with the wider end as the base.
         let flip =
             DAffine3::from_mat3_translation(DMat3::from_diagonal(DVec3::new(s, s, -1.0)), DVec3::Z);
-        Self::ConicalFrustum { scene_from_unit: scene_from_canonical * flip, top: 1.0 / s }
+        Self::ConicalFrustum { scene_from_unit: scene_from_canonical * flip, top_radius: 1.0 / s }
     }
 
     /// The form after the invertible affine map `map`. Similarities keep a sphere a sphere; any other
@@ -122,8 +122,8 @@ impl Form {
                     .collect(),
                 corners: corners.iter().map(|c| map.transform_point3(*c)).collect(),
             },
-            Self::ConicalFrustum { scene_from_unit, top } => {
-                Self::ConicalFrustum { scene_from_unit: *map * scene_from_unit, top }
+            Self::ConicalFrustum { scene_from_unit, top_radius } => {
+                Self::ConicalFrustum { scene_from_unit: *map * scene_from_unit, top_radius }
             }
             Self::Csg(compound) => Self::Csg(compound.transformed(map)),
             Self::Mesh { mesh, scene_from_mesh, smooth } => {
@@ -171,7 +171,7 @@ impl Form {
                 Some((m.translation - half, m.translation + half))
             }
             Self::ConvexPolyhedron { corners, .. } => around(corners),
-            Self::ConicalFrustum { scene_from_unit: m, top } => {
+            Self::ConicalFrustum { scene_from_unit: m, top_radius } => {
                 // Half-widths of the base's disc: lengths of the rows of the first two columns.
                 let rows = m.matrix3.transpose();
                 let half = DVec3::new(
@@ -180,15 +180,15 @@ impl Form {
                     rows.z_axis.truncate().length(),
                 );
                 let (base, cap) = (m.translation, m.translation + m.matrix3.z_axis);
-                let narrow = half * *top;
+                let narrow = half * *top_radius;
                 around(&[base - half, base + half, cap - narrow, cap + narrow])
             }
             Self::Csg(compound) => compound.bounds(),
             Self::Mesh { mesh, scene_from_mesh: m, .. } => {
                 let rows = m.matrix3.transpose();
                 let rows = [rows.x_axis, rows.y_axis, rows.z_axis].map(|r| r.to_array());
-                let high = rows.map(|r| mesh.farthest(r));
-                let low = rows.map(|r| -mesh.farthest(r.map(|x| -x)));
+                let high = rows.map(|r| mesh.support(r));
+                let low = rows.map(|r| -mesh.support(r.map(|x| -x)));
                 Some((m.translation + DVec3::from(low), m.translation + DVec3::from(high)))
             }
             Self::Parallelogram { corner, u, v } => {

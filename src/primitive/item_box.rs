@@ -19,19 +19,19 @@ pub enum Acceleration {
     /// Every ray meets everything.
     None,
     /// Camera rays meet what stands on their part of the screen: each thing has a rectangle there.
-    Projected,
+    ScreenBounds,
     /// Each thing has a box in its own space.
-    Object,
+    Obb,
     /// Each thing has a box in the scene's space.
-    World,
+    Aabb,
     /// A tree of boxes.
-    Hierarchy,
+    Bvh,
 }
 
 impl Acceleration {
     /// All of them, in the order of [`Acceleration::CHOICES`].
     pub const ALL: [Self; 6] =
-        [Self::Auto, Self::None, Self::Projected, Self::Object, Self::World, Self::Hierarchy];
+        [Self::Auto, Self::None, Self::ScreenBounds, Self::Obb, Self::Aabb, Self::Bvh];
 
     /// Their names and what they mean.
     pub const CHOICES: &'static [Choice] = &[

@@ -5,10 +5,10 @@
 use crate::asset;
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{SurfacePoint, UvGradients, reach};
-use crate::primitive::facing;
+use crate::primitive::batch::{SurfacePoint, UvGradients, max_coordinate};
 use crate::primitive::form::Form;
 use crate::primitive::item_box::ItemBox;
+use crate::primitive::keep_visible;
 use crate::primitive::triangle_mesh;
 use glam::DVec3;
 use std::ops::Range;
@@ -53,7 +53,7 @@ impl<S: Float> MeshInstance<S> {
             .fold(0.0, f64::max);
         // Coordinates in the mesh's space are rounded as well, at most those of its corners.
         let inner = low.abs().max(high.abs()).max_element() * scale;
-        let outer = reach(form);
+        let outer = max_coordinate(form);
         Some(Self {
             mesh: mesh.clone(),
             extent: ItemBox::new(form, false)?,
@@ -188,16 +188,16 @@ impl<S: Float> Meshes<S> {
 
     /// Which of the `wanted` lanes meet one of the meshes in `range` at a distance in (0, limit).
     #[inline(never)]
-    pub fn blocked<L: SimdFloat<Scalar = S>>(
+    pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
         range: Range<usize>,
         ray: &Ray<L>,
         limit: L,
         wanted: L::Mask,
     ) -> L::Mask {
-        let mut blocked = L::mask(false);
+        let mut occluded = L::mask(false);
         for item in &self.items[range] {
-            let open = wanted.and_not(blocked);
+            let open = wanted.and_not(occluded);
             if open.none() {
                 break;
             }
@@ -207,9 +207,9 @@ impl<S: Float> Meshes<S> {
             }
             let (inner, length) = item.ray(ray);
             let limit = L::select(open, limit * length, L::from_f64(-1.0));
-            blocked = blocked | triangle_mesh::blocked(&item.mesh, &inner, limit);
+            occluded = occluded | triangle_mesh::occluded(&item.mesh, &inner, limit);
         }
-        blocked
+        occluded
     }
 
     /// The surface of `item` at `point`, which lies near its triangles tagged `facet`.
@@ -232,7 +232,7 @@ impl<S: Float> Meshes<S> {
         let inverse = L::one() / normal.length_squared().sqrt();
         let normal = normal * inverse;
         let point = normal.mul_add(-height * inverse, point);
-        SurfacePoint { point, normal, reach: L::splat(item.reach) }
+        SurfacePoint { point, normal, max_coordinate: L::splat(item.reach) }
     }
 
     /// The normal that light is computed with where rays along `direction` meet the triangles tagged
@@ -255,7 +255,7 @@ impl<S: Float> Meshes<S> {
         let smooth = item.normal(a * weights[0] + b * weights[1] + c * weights[2]);
         let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
         // Normals that cancel, or a triangle without area, leave no number.
-        facing(smooth, normal, direction)
+        keep_visible(smooth, normal, direction)
     }
 
     /// The texture coordinates of `item` at `point`, which lies near its triangles tagged `facet`;

@@ -27,4 +27,4 @@ pub use bounding::{BoundingSphere, BoundingVolume, F32_RAY_ERROR, Frustum, Light
 pub use csg_tree::{CsgSolid, CsgTree};
 pub use form::{Form, HalfSpace};
 pub use item_box::Acceleration;
-pub use shading_normal::facing;
+pub use shading_normal::keep_visible;

@@ -34,7 +34,7 @@ impl Form {
             Self::ConvexPolyhedron { faces, .. } => {
                 solid(faces.iter().map(|f| (f.normal.dot(point) - f.offset, f.normal)).collect())
             }
-            Self::ConicalFrustum { scene_from_unit, top } => {
+            Self::ConicalFrustum { scene_from_unit, top_radius: top } => {
                 let unit_from_scene = scene_from_unit.inverse();
                 let normal_of = |n: DVec3| unit_from_scene.matrix3.transpose() * n;
                 let p = unit_from_scene.transform_point3(point);

@@ -2,7 +2,7 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, reach};
+use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
 use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::DVec3;
@@ -30,14 +30,14 @@ impl<S: Float> Parallelogram<S> {
             normal: of(n.normalize()),
             dual_u: of(v.cross(n) / area2),
             dual_v: of(n.cross(*u) / area2),
-            reach: S::from_f64(reach(form)),
+            reach: S::from_f64(max_coordinate(form)),
         })
     }
 }
 
 impl<L: SimdFloat> Primitive<L> for Parallelogram<L::Scalar> {
     #[inline(always)]
-    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+    fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let normal = Vec3::splat(self.normal);
         let from_corner = ray.origin - Vec3::splat(self.corner);
         // Parallel rays divide by zero: infinite or NaN distances fail every comparison.
@@ -53,7 +53,11 @@ impl<L: SimdFloat> Primitive<L> for Parallelogram<L::Scalar> {
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let normal = Vec3::splat(self.normal);
         let above = (point - Vec3::splat(self.corner)).dot(normal);
-        SurfacePoint { point: normal.mul_add(-above, point), normal, reach: L::splat(self.reach) }
+        SurfacePoint {
+            point: normal.mul_add(-above, point),
+            normal,
+            max_coordinate: L::splat(self.reach),
+        }
     }
 }
 
@@ -74,7 +78,7 @@ impl<S: Float> Plane<S> {
 
 impl<L: SimdFloat> Primitive<L> for Plane<L::Scalar> {
     #[inline(always)]
-    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+    fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let normal = Vec3::splat(self.normal);
         // Infinite or NaN for a parallel ray.
         let t = (L::splat(self.offset) - ray.origin.dot(normal)) / ray.direction.dot(normal);
@@ -86,7 +90,7 @@ impl<L: SimdFloat> Primitive<L> for Plane<L::Scalar> {
         let normal = Vec3::splat(self.normal);
         let above = point.dot(normal) - L::splat(self.offset);
         let reach = L::splat(self.offset).abs();
-        SurfacePoint { point: normal.mul_add(-above, point), normal, reach }
+        SurfacePoint { point: normal.mul_add(-above, point), normal, max_coordinate: reach }
     }
 }
 

@@ -15,7 +15,7 @@ use obvhs::BvhBuildParams;
 /// of the items' extent. Measured with spheres in a ball: of 100 even random rays go together as fast as
 /// apart, of 256 such packets of eight that differ by 0.8, of 1000 by 0.4, of 10,000 by 0.13; packets of
 /// four up to half of that.
-const TOGETHER: f64 = 1.5;
+const COHERENCE_LIMIT: f64 = 1.5;
 
 /// A tree of boxes over items, one item a leaf.
 pub struct SceneBvh {
@@ -41,7 +41,7 @@ impl SceneBvh {
         let items = leaves.iter().map(|(first, _)| order[*first as usize]).collect();
         let low = bounds.iter().map(|b| b.0).fold(DVec3::INFINITY, DVec3::min);
         let high = bounds.iter().map(|b| b.1).fold(DVec3::NEG_INFINITY, DVec3::max);
-        let turn = TOGETHER / (bounds.len() as f64).sqrt();
+        let turn = COHERENCE_LIMIT / (bounds.len() as f64).sqrt();
         Self { boxes, items, turn, shift: turn * (high - low).max_element() }
     }
 
@@ -50,7 +50,12 @@ impl SceneBvh {
     /// returns the distances beyond which nothing matters any more. Items at that very distance are
     /// still called for.
     #[inline(always)]
-    pub fn walk<L: SimdFloat>(&self, ray: &Ray<L>, limit: L, mut leaf: impl FnMut(usize, L) -> L) {
+    pub fn traverse<L: SimdFloat>(
+        &self,
+        ray: &Ray<L>,
+        limit: L,
+        mut leaf: impl FnMut(usize, L) -> L,
+    ) {
         let wanted = limit.gt(L::zero()).bits();
         if wanted == 0 {
             return;

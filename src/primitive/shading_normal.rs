@@ -9,7 +9,11 @@ const LEAST_COSINE: f64 = 0.02;
 /// looks along `direction`; where it would turn away from the viewer it is bent back to him. Where it is
 /// no direction at all, `normal`.
 #[inline(always)]
-pub fn facing<L: SimdFloat>(shading: Vec3<L>, normal: Vec3<L>, direction: Vec3<L>) -> Vec3<L> {
+pub fn keep_visible<L: SimdFloat>(
+    shading: Vec3<L>,
+    normal: Vec3<L>,
+    direction: Vec3<L>,
+) -> Vec3<L> {
     let side = shading.dot(normal);
     let shading = Vec3::select(side.lt(L::zero()), -shading, shading);
     let short = (L::from_f64(LEAST_COSINE) + shading.dot(direction)).max(L::zero());

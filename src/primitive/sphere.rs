@@ -2,7 +2,7 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, reach};
+use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
 use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
 
@@ -23,7 +23,7 @@ impl<S: Float> Sphere<S> {
             center: center.to_array().map(S::from_f64),
             radius: S::from_f64(*radius),
             radius2: S::from_f64(radius * radius),
-            reach: S::from_f64(reach(form)),
+            reach: S::from_f64(max_coordinate(form)),
         })
     }
 }
@@ -36,7 +36,7 @@ impl<S: Float> Sphere<S> {
 /// spheres (Haines, Günther, Akenine-Möller 2019, *Precision Improvements for Ray/Sphere
 /// Intersection*, Ray Tracing Gems, chapter 7).
 #[inline(always)]
-pub fn crossings<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option<(L, L, L::Mask)> {
+pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option<(L, L, L::Mask)> {
     let b = -f.dot(d);
     let across = d.mul_add(b, f);
     let discriminant = radius2 - across.length_squared();
@@ -56,9 +56,9 @@ pub fn crossings<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option<(L,
 
 impl<L: SimdFloat> Primitive<L> for Sphere<L::Scalar> {
     #[inline(always)]
-    fn crossing(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+    fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let f = ray.origin - Vec3::splat(self.center);
-        let (near, far, meets) = crossings(f, ray.direction, L::splat(self.radius2))?;
+        let (near, far, meets) = intersections(f, ray.direction, L::splat(self.radius2))?;
         Some((L::select(near.gt(L::zero()), near, far), meets))
     }
 
@@ -67,14 +67,14 @@ impl<L: SimdFloat> Primitive<L> for Sphere<L::Scalar> {
         let center = Vec3::splat(self.center);
         let normal = (point - center).normalize();
         let point = normal.mul_add(L::splat(self.radius), center);
-        SurfacePoint { point, normal, reach: L::splat(self.reach) }
+        SurfacePoint { point, normal, max_coordinate: L::splat(self.reach) }
     }
 }
 
 impl<L: SimdFloat> SolidPrimitive<L> for Sphere<L::Scalar> {
     fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let f = ray.origin - Vec3::splat(self.center);
-        let (enter, leave, meets) = crossings(f, ray.direction, L::splat(self.radius2))?;
+        let (enter, leave, meets) = intersections(f, ray.direction, L::splat(self.radius2))?;
         // Half the chord over the radius.
         let cosine = (leave - enter) * (L::from_f64(0.5) / L::splat(self.radius));
         Some(Span { enter, leave, enter_cosine: cosine, leave_cosine: cosine, meets })

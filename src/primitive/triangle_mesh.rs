@@ -127,7 +127,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         let boxes = self.mesh.boxes();
         let leaf = |number: usize, _| {
             let leaf = &self.mesh.leaves()[number];
-            let first = self.mesh.first(number);
+            let first = self.mesh.first_triangle(number);
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
                 let [a, b, c] = ShearedRay::<L>::corners(leaf, part);
                 // The triangles whose own boxes the packet may meet.
@@ -175,7 +175,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     }
 
     #[inline(always)]
-    fn go<L: SimdFloat>(&self, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
+    fn run<L: SimdFloat>(&self, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
         let beam = beam(ray, self.mesh);
         let wanted = limit.gt(L::zero()).bits();
         if is_together(ray, wanted, self.mesh) {
@@ -208,7 +208,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                     let lane = bits.trailing_zeros();
                     bits &= bits - 1;
                     let t = t.lane(lane as usize);
-                    let number = self.mesh.first(number) + (part * L::WIDTH) as u32 + lane;
+                    let number = self.mesh.first_triangle(number) + (part * L::WIDTH) as u32 + lane;
                     if t < *best || t == *best && number < *triangle {
                         (*best, *triangle) = (t, number);
                     }
@@ -253,18 +253,23 @@ fn is_together<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
 /// number. Directions have unit length. Lanes whose limit is not positive are left out.
 #[inline(never)]
 pub fn closest<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
-    MeshTraversal::<false> { mesh }.go(ray, limit)
+    MeshTraversal::<false> { mesh }.run(ray, limit)
 }
 
 /// Which lanes meet a triangle nearer than `limit`.
 #[inline(never)]
-pub fn blocked<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
-    MeshTraversal::<true> { mesh }.go(ray, limit).t.lt(limit)
+pub fn occluded<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
+    MeshTraversal::<true> { mesh }.run(ray, limit).t.lt(limit)
 }
 
 /// As [`closest`], all lanes together or each by itself: for tests and benches.
 #[inline(never)]
-pub fn closest_by<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L, all: bool) -> TriangleHit<L> {
+pub fn closest_with<L: SimdFloat>(
+    mesh: &Mesh,
+    ray: &Ray<L>,
+    limit: L,
+    all: bool,
+) -> TriangleHit<L> {
     let (beam, walk) = (beam(ray, mesh), MeshTraversal::<false> { mesh });
     if all { walk.together((ray, &beam), limit) } else { walk.apart((ray, &beam), limit) }
 }

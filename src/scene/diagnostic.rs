@@ -1,6 +1,6 @@
 //! What people read when something about a scene file is wrong or dubious.
 
-use crate::value::printable;
+use crate::value::sanitized;
 use std::fmt;
 
 /// One message: where, about what, what was found, what would be right.
@@ -23,19 +23,19 @@ const MAX_INDENT: usize = 24;
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let mut head = printable(&self.file);
+        let mut head = sanitized(&self.file);
         if let Some((line, column)) = self.place {
             head += &format!(":{line}:{column}");
         }
         head += "  ";
         let indent = head.chars().count().min(MAX_INDENT);
         if !self.subject.is_empty() {
-            head += &printable(&self.subject);
+            head += &sanitized(&self.subject);
             head += ": ";
         }
-        write!(f, "{head}{}.", printable(&self.found))?;
+        write!(f, "{head}{}.", sanitized(&self.found))?;
         if !self.help.is_empty() {
-            write!(f, "\n{:indent$}{}", "", printable(&self.help))?;
+            write!(f, "\n{:indent$}{}", "", sanitized(&self.help))?;
         }
         Ok(())
     }

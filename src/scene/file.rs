@@ -3,7 +3,7 @@
 use crate::asset::Assets;
 use crate::scene::recovery::{TEMPORARY, claim};
 use crate::scene::{Document, Scene, SceneErrors};
-use crate::value::{fnv1a64, printable};
+use crate::value::{fnv1a64, sanitized};
 use std::fmt;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
@@ -50,7 +50,7 @@ pub enum SaveError {
 
 impl fmt::Display for SaveError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let shown = |path: &PathBuf| printable(&path.display().to_string());
+        let shown = |path: &PathBuf| sanitized(&path.display().to_string());
         match self {
             Self::Untitled => f.write_str("this scene has no file yet; save it under a name"),
             Self::Changed(path) => write!(
@@ -205,7 +205,7 @@ impl SceneFile {
         let meshes = scene.objects.iter().filter_map(|object| object.shape.file());
         let images = scene.materials.values().flat_map(|material| material.files());
         if let Some(file) = meshes.chain(images).find(|file| library.loses(file, path)) {
-            let file = printable(file);
+            let file = sanitized(file);
             return Err(SaveError::Failed {
                 path: path.to_path_buf(),
                 what: format!("from there \"{file}\", which the scene names, would not be found"),
@@ -295,7 +295,7 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
 }
 
 fn explain(error: &io::Error, directory: &Path) -> String {
-    let shown = printable(&directory.display().to_string());
+    let shown = sanitized(&directory.display().to_string());
     match error.kind() {
         ErrorKind::NotFound => format!("the directory {shown} does not exist; create it first"),
         ErrorKind::NotADirectory => format!("{shown} is not a directory"),

@@ -25,8 +25,8 @@ pub struct Object {
 
 /// The keys of `[[object]]`.
 pub const OBJECT_FIELDS: &[Field] = &[
-    Field::without("name", ValueType::Text, "", "a number", "Name; no two objects have the same."),
-    Field::without(
+    Field::optional("name", ValueType::Text, "", "a number", "Name; no two objects have the same."),
+    Field::optional(
         "material",
         ValueType::Text,
         "",
@@ -34,7 +34,7 @@ pub const OBJECT_FIELDS: &[Field] = &[
         "Name of one of the `[materials.NAME]`.",
     ),
     Field::required("shape", ValueType::OneOf(KINDS), "", "What it looks like: exactly one kind."),
-    Field::without(
+    Field::optional(
         "transform",
         ValueType::ListOf(TRANSFORM_OP_FIELDS),
         "",
@@ -78,12 +78,12 @@ impl Object {
 
     /// What is wrong with it (its material's name is the scene's business).
     pub fn faults(&self) -> Vec<ValidationError> {
-        let mut checks = Validator::new(OBJECT_FIELDS).inner("shape", self.shape.faults());
+        let mut checks = Validator::new(OBJECT_FIELDS).nested("shape", self.shape.faults());
         for (i, step) in self.transform.iter().enumerate() {
-            checks = checks.inner(&format!("transform.{i}"), step.faults());
+            checks = checks.nested(&format!("transform.{i}"), step.faults());
         }
         let moved =
             if checks.clean() { ill_conditioned(&self.shape, &self.transform) } else { None };
-        checks.and(moved).faults()
+        checks.and(moved).validate()
     }
 }

@@ -219,7 +219,7 @@ impl FilmSettings {
                 format!("at most {MAX_PIXELS} pixels, such as [8192, 8192]"),
             )
         });
-        checks.and(too_many).numbers("rays_per_pixel", &[f64::from(self.rays_per_pixel)]).faults()
+        checks.and(too_many).numbers("rays_per_pixel", &[f64::from(self.rays_per_pixel)]).validate()
     }
 }
 
@@ -229,20 +229,20 @@ impl IntegratorSettings {
         Validator::new(TRACE_FIELDS)
             .numbers("depth", &[f64::from(self.depth)])
             .numbers("min_weight", &[self.min_weight])
-            .faults()
+            .validate()
     }
 }
 
 impl Background {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(BACKGROUND_FIELDS).numbers("color", &self.color.0).faults()
+        Validator::new(BACKGROUND_FIELDS).numbers("color", &self.color.0).validate()
     }
 }
 
 impl Ambient {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(AMBIENT_FIELDS).numbers("color", &self.color.0).faults()
+        Validator::new(AMBIENT_FIELDS).numbers("color", &self.color.0).validate()
     }
 }

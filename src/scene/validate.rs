@@ -4,7 +4,7 @@
 use crate::material::Mapping;
 use crate::scene::Scene;
 use crate::scene::format::suggest::nearest;
-use crate::value::{ValidationError, excerpt};
+use crate::value::{ValidationError, truncated};
 use std::collections::HashMap;
 use std::fmt;
 
@@ -23,11 +23,11 @@ pub struct Problem {
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        use crate::value::printable;
+        use crate::value::sanitized;
         if !self.subject.is_empty() {
-            write!(f, "{}: ", printable(&self.subject))?;
+            write!(f, "{}: ", sanitized(&self.subject))?;
         }
-        write!(f, "{}. {}", printable(&self.found), printable(&self.help))
+        write!(f, "{}. {}", sanitized(&self.found), sanitized(&self.help))
     }
 }
 
@@ -38,12 +38,12 @@ pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<Stri
         [list, index, ..] if list == "object" || list == "light" => {
             let index: usize = index.parse().unwrap_or(0);
             match name(list, index).filter(|n| !n.is_empty()) {
-                Some(name) => format!("{list} \"{}\"", excerpt(&name)),
+                Some(name) => format!("{list} \"{}\"", truncated(&name)),
                 None => format!("{list} {}", index + 1),
             }
         }
-        [list, name, ..] if list == "materials" => format!("material \"{}\"", excerpt(name)),
-        [list, name, ..] if list == "views" => format!("view \"{}\"", excerpt(name)),
+        [list, name, ..] if list == "materials" => format!("material \"{}\"", truncated(name)),
+        [list, name, ..] if list == "views" => format!("view \"{}\"", truncated(name)),
         [first, ..] => first.clone(),
         [] => String::new(),
     }
@@ -136,14 +136,14 @@ impl Scene {
             let lacking = |k: &usize| asking[*k].is_some() && !spaces[*k].has_uv();
             let Some(part) = (0..spaces.len()).find(lacking) else { continue };
             let what = match object.shape.file() {
-                Some(file) => format!("there are none in \"{}\"", excerpt(file)),
+                Some(file) => format!("there are none in \"{}\"", truncated(file)),
                 None if spaces.len() > 1 => format!("parts of a {} have none", object.shape.key()),
                 None => format!("a {} has none", object.shape.key()),
             };
             let found = format!(
                 "the {} of material \"{}\" asks for texture coordinates (mapping = \"uv\"), and {what}",
                 asking[part].unwrap_or_default(),
-                excerpt(materials[part]),
+                truncated(materials[part]),
             );
             let help =
                 "Expected a mesh whose file has them, a rectangle or a platform. On other shapes \
@@ -165,7 +165,7 @@ impl Scene {
                 continue;
             }
             let defined: Vec<_> =
-                self.materials.keys().take(20).map(|n| format!("\"{}\"", excerpt(n))).collect();
+                self.materials.keys().take(20).map(|n| format!("\"{}\"", truncated(n))).collect();
             let mut help = match defined.as_slice() {
                 [] => "No material is defined; one begins with [materials.NAME].".to_string(),
                 names if names.len() < self.materials.len() => {
@@ -175,9 +175,9 @@ impl Scene {
             };
             let known = self.materials.keys().map(String::as_str);
             if let Some(meant) = nearest(name, known) {
-                help += &format!(" Did you mean \"{}\"?", excerpt(meant));
+                help += &format!(" Did you mean \"{}\"?", truncated(meant));
             }
-            let found = format!("material \"{}\" is not defined", excerpt(name));
+            let found = format!("material \"{}\" is not defined", truncated(name));
             findings.push(self.finding(&key.split('.').collect::<Vec<_>>(), found, help));
         }
     }

@@ -8,7 +8,12 @@ use glam::{DAffine3, DMat3, DVec3};
 
 /// The solid around the axis from `base` to `top`, two different points, with these radii there, both
 /// at least 0 and not both 0.
-pub(super) fn between(base: [f64; 3], top: [f64; 3], base_radius: f64, top_radius: f64) -> Form {
+pub(super) fn frustum_between(
+    base: [f64; 3],
+    top: [f64; 3],
+    base_radius: f64,
+    top_radius: f64,
+) -> Form {
     let (base, top) = (DVec3::from_array(base), DVec3::from_array(top));
     // The wider end first: the canonical base has radius 1.
     let (from, to, wide, narrow) = if base_radius >= top_radius {
@@ -29,7 +34,11 @@ pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
 }
 
 /// The fault of an axis of length 0, which ends at the key `name`.
-pub(super) fn no_axis(base: [f64; 3], top: [f64; 3], name: &str) -> Option<ValidationError> {
+pub(super) fn degenerate_axis(
+    base: [f64; 3],
+    top: [f64; 3],
+    name: &str,
+) -> Option<ValidationError> {
     (base == top).then(|| {
         ValidationError::new(
             name,
@@ -54,19 +63,21 @@ mod tests {
     use super::*;
 
     fn ends(form: &Form) -> (DVec3, DVec3, f64) {
-        let Form::ConicalFrustum { scene_from_unit: m, top } = form else { panic!("{form:?}") };
+        let Form::ConicalFrustum { scene_from_unit: m, top_radius: top } = form else {
+            panic!("{form:?}")
+        };
         (m.translation, m.translation + m.matrix3.z_axis, *top)
     }
 
     #[test]
     fn the_wider_end_is_the_base() {
         let (a, b) = ([0.0, 1.0, 0.0], [2.0, 1.0, -3.0]);
-        let narrowing = between(a, b, 2.0, 0.5);
+        let narrowing = frustum_between(a, b, 2.0, 0.5);
         assert_eq!(ends(&narrowing), (a.into(), b.into(), 0.25));
-        let widening = between(a, b, 0.5, 2.0);
+        let widening = frustum_between(a, b, 0.5, 2.0);
         assert_eq!(ends(&widening), (b.into(), a.into(), 0.25));
         let (low, high) = narrowing.bounds().unwrap();
-        let (low2, high2) = between(b, a, 0.5, 2.0).bounds().unwrap();
+        let (low2, high2) = frustum_between(b, a, 0.5, 2.0).bounds().unwrap();
         assert!((low - low2).length() < 1e-15 && (high - high2).length() < 1e-15);
     }
 
@@ -80,7 +91,9 @@ mod tests {
             assert!((low - DVec3::new(1.0 - r, -r, 0.0)).length() < 1e-15, "{s}: {low}");
             assert!((high - DVec3::new(1.0 + r, r, 1.0)).length() < 1e-15, "{s}: {high}");
             // A point of the rim at z = 1, and whether it is at the same distance from the axis.
-            let Form::ConicalFrustum { scene_from_unit: m, top } = form else { panic!("{form:?}") };
+            let Form::ConicalFrustum { scene_from_unit: m, top_radius: top } = form else {
+                panic!("{form:?}")
+            };
             let at_one = if s > 1.0 { DVec3::X } else { DVec3::new(top, 0.0, 1.0) };
             let rim = m.transform_point3(at_one);
             assert!((rim - DVec3::new(1.0 + s, 0.0, 1.0)).length() < 1e-15, "{s}: {rim}");

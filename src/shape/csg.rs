@@ -36,14 +36,14 @@ static PART_FIELDS: [Field; 3] = [
         "",
         "What it looks like: a solid, or a plane for the half-space behind it.",
     ),
-    Field::without(
+    Field::optional(
         "material",
         ValueType::Text,
         "",
         "that of the whole",
         "Name of one of the `[materials.NAME]`.",
     ),
-    Field::without(
+    Field::optional(
         "transform",
         ValueType::ListOf(TRANSFORM_OP_FIELDS),
         "",
@@ -91,15 +91,15 @@ macro_rules! compounds {
                 )]
             }
 
-            fn standing(base: DVec3, size: DVec3) -> Self {
-                Self { of: standing(base, size).map(CsgOperand::new).into() }
+            fn fitted_to(base: DVec3, size: DVec3) -> Self {
+                Self { of: fitted_to(base, size).map(CsgOperand::new).into() }
             }
 
-            fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+            fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
                 Vec::new()
             }
 
-            fn turn(&mut self, _: f64) -> bool {
+            fn rotate_y(&mut self, _: f64) -> bool {
                 false
             }
         }
@@ -129,8 +129,8 @@ compounds! {
 }
 
 /// A block of this size on `base`, and a ball that reaches out of it at its upper right near corner.
-fn standing(base: DVec3, size: DVec3) -> [Shape; 2] {
-    let block = Cuboid::standing(base, size * 0.9);
+fn fitted_to(base: DVec3, size: DVec3) -> [Shape; 2] {
+    let block = Cuboid::fitted_to(base, size * 0.9);
     let radius = 0.4 * size.min_element();
     let corner = base + DVec3::new(0.5 * size.x, size.y, 0.5 * size.z) - radius;
     let ball = Sphere { center: corner.to_array(), radius };
@@ -211,7 +211,7 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
         let inner = match parts_of(&part.shape) {
             Some(of) => part_faults(of, depth + 1)
                 .into_iter()
-                .map(|fault| fault.under(part.shape.key()))
+                .map(|fault| fault.prefixed(part.shape.key()))
                 .collect(),
             None => part.shape.faults(),
         };
@@ -219,13 +219,15 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
             let found = format!("a {} {why}", part.shape.key());
             ValidationError::new("shape", found, "a solid")
         });
-        let mut checks = Validator::new(&PART_FIELDS).inner("shape", inner).and(open);
+        let mut checks = Validator::new(&PART_FIELDS).nested("shape", inner).and(open);
         for (k, step) in part.transform.iter().enumerate() {
-            checks = checks.inner(&format!("transform.{k}"), step.faults());
+            checks = checks.nested(&format!("transform.{k}"), step.faults());
         }
         let moved =
             if checks.clean() { ill_conditioned(&part.shape, &part.transform) } else { None };
-        faults.extend(checks.and(moved).faults().into_iter().map(|f| f.under(&format!("of.{i}"))));
+        faults.extend(
+            checks.and(moved).validate().into_iter().map(|f| f.prefixed(&format!("of.{i}"))),
+        );
     }
     faults
 }

@@ -2,7 +2,7 @@
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::prismoid::{lower_left, upright};
+use crate::shape::prismoid::{corner_of_centered, prismoid};
 use crate::shape::registry::turned_rotation;
 use crate::shape::texture_space::turned_axes;
 use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
@@ -51,7 +51,7 @@ impl ShapeDesc for Cube {
 
     fn form(&self) -> Form {
         let e = self.edge;
-        upright(DVec3::from_array(self.corner), &square(e), e, 1.0, self.rotation)
+        prismoid(DVec3::from_array(self.corner), &square(e), e, 1.0, self.rotation)
     }
 
     fn faults(&self) -> Vec<ValidationError> {
@@ -60,20 +60,20 @@ impl ShapeDesc for Cube {
             .numbers("edge", &[self.edge])
             .numbers("rotation", &[self.rotation])
             .ratio(&[("edge", self.edge)], &self.corner)
-            .faults()
+            .validate()
     }
 
-    fn standing(base: DVec3, size: DVec3) -> Self {
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
         let edge = size.min_element();
-        let corner = lower_left(base, edge, edge);
+        let corner = corner_of_centered(base, edge, edge);
         Self { corner, edge, rotation: 0.0 }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.corner]
     }
 
-    fn turn(&mut self, degrees: f64) -> bool {
+    fn rotate_y(&mut self, degrees: f64) -> bool {
         self.rotation = turned_rotation(self.rotation, degrees);
         true
     }

@@ -5,7 +5,7 @@
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::prismoid::upright;
+use crate::shape::prismoid::prismoid;
 use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
@@ -44,7 +44,7 @@ impl ShapeDesc for Cuboid {
         let [x, y, z] = self.size;
         let corner = DVec3::from_array(self.center) + DVec3::new(-x, -y, z) / 2.0;
         let base = [(0.0, 0.0), (x, 0.0), (x, -z), (0.0, -z)].map(DVec2::from);
-        upright(corner, &base, y, 1.0, 0.0)
+        prismoid(corner, &base, y, 1.0, 0.0)
     }
 
     fn faults(&self) -> Vec<ValidationError> {
@@ -52,18 +52,18 @@ impl ShapeDesc for Cuboid {
             .numbers("center", &self.center)
             .numbers("size", &self.size)
             .ratio(&self.size.map(|s| ("size", s)), &self.center)
-            .faults()
+            .validate()
     }
 
-    fn standing(base: DVec3, size: DVec3) -> Self {
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
         Self { center: [base.x, base.y + size.y / 2.0, base.z], size: size.to_array() }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.center]
     }
 
-    fn turn(&mut self, _: f64) -> bool {
+    fn rotate_y(&mut self, _: f64) -> bool {
         false
     }
 }

@@ -3,7 +3,7 @@
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
 use crate::shape::axial::axes_between;
-use crate::shape::axial::{between, height, is_upright, no_axis};
+use crate::shape::axial::{degenerate_axis, frustum_between, height, is_upright};
 use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -41,7 +41,7 @@ impl ShapeDesc for Cylinder {
     ];
 
     fn form(&self) -> Form {
-        between(self.base, self.top, self.radius, self.radius)
+        frustum_between(self.base, self.top, self.radius, self.radius)
     }
 
     fn faults(&self) -> Vec<ValidationError> {
@@ -50,23 +50,23 @@ impl ShapeDesc for Cylinder {
             .numbers("base", &self.base)
             .numbers("top", &self.top)
             .numbers("radius", &[self.radius])
-            .and(no_axis(self.base, self.top, "top"))
+            .and(degenerate_axis(self.base, self.top, "top"))
             .ratio(&sizes, &[self.base, self.top].concat())
-            .faults()
+            .validate()
     }
 
-    fn standing(base: DVec3, size: DVec3) -> Self {
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
         let top = base + DVec3::Y * size.y;
         let radius = size.x.min(size.z) / 2.0;
         Self { base: base.to_array(), top: top.to_array(), radius }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.base, &mut self.top]
     }
 
     /// Upright it looks the same from all sides.
-    fn turn(&mut self, _: f64) -> bool {
+    fn rotate_y(&mut self, _: f64) -> bool {
         is_upright(self.base, self.top)
     }
 

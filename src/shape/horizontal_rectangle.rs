@@ -51,19 +51,19 @@ impl ShapeDesc for HorizontalRectangle {
             .numbers("center", &self.center)
             .numbers("size", &self.size)
             .ratio(&self.size.map(|s| ("size", s)), &self.center)
-            .faults()
+            .validate()
     }
 
     /// A table top: at the height of the box's upper side.
-    fn standing(base: DVec3, size: DVec3) -> Self {
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
         Self { center: [base.x, base.y + size.y, base.z], size: [size.x, size.z] }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.center]
     }
 
-    fn turn(&mut self, _: f64) -> bool {
+    fn rotate_y(&mut self, _: f64) -> bool {
         false
     }
 

@@ -141,15 +141,15 @@ impl ShapeDesc for MeshDesc {
     }
 
     /// The stand-in at the origin: only a transform places it.
-    fn standing(_: DVec3, _: DVec3) -> Self {
+    fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self { file: String::new(), normals: Normals::Smooth, content: None }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         Vec::new()
     }
 
-    fn turn(&mut self, _: f64) -> bool {
+    fn rotate_y(&mut self, _: f64) -> bool {
         false
     }
 }
@@ -191,7 +191,7 @@ mod tests {
     fn the_stand_in_is_an_icosahedron_on_the_origin() {
         let mesh = PLACEHOLDER.mesh();
         assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 20));
-        let form = MeshDesc::standing(DVec3::ZERO, DVec3::ONE).form();
+        let form = MeshDesc::fitted_to(DVec3::ZERO, DVec3::ONE).form();
         let (low, high) = form.bounds().unwrap();
         assert!((low - DVec3::new(-0.5, 0.0, -0.5)).length() < 1e-6, "{low}");
         assert!((high - DVec3::new(0.5, 1.0, 0.5)).length() < 1e-6, "{high}");

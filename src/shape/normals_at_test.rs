@@ -9,7 +9,7 @@ use glam::DVec3;
 #[test]
 fn points_that_rays_meet_lie_on_a_surface() {
     for (key, _) in EXAMPLES {
-        let shape = Shape::standing(key, DVec3::new(1.0, 0.5, -2.0), DVec3::new(1.0, 1.5, 2.0));
+        let shape = Shape::fitted_to(key, DVec3::new(1.0, 0.5, -2.0), DVec3::new(1.0, 1.5, 2.0));
         let form = shape.unwrap().form();
         let (low, high) = form.bounds().unwrap_or((DVec3::splat(-1.0), DVec3::splat(1.0)));
         let (middle, size) = (0.5 * (low + high), (high - low).length());
@@ -34,13 +34,13 @@ fn points_that_rays_meet_lie_on_a_surface() {
 
 #[test]
 fn corners_and_tips_lie_on_several() {
-    let cube = Shape::standing("cube", DVec3::ZERO, DVec3::ONE).unwrap().form();
+    let cube = Shape::fitted_to("cube", DVec3::ZERO, DVec3::ONE).unwrap().form();
     let at = |p: DVec3| cube.normals_at(p, 1e-9).concat().len();
     assert_eq!(at(DVec3::new(0.5, 1.0, 0.5)), 3);
     assert_eq!(at(DVec3::new(0.5, 1.0, 0.2)), 2);
     assert_eq!(at(DVec3::new(0.1, 1.0, 0.2)), 1);
     assert_eq!(at(DVec3::new(0.1, 0.5, 0.2)), 0);
     assert_eq!(at(DVec3::new(0.6, 1.0, 0.2)), 0);
-    let cone = Shape::standing("cone", DVec3::ZERO, DVec3::ONE).unwrap().form();
+    let cone = Shape::fitted_to("cone", DVec3::ZERO, DVec3::ONE).unwrap().form();
     assert_eq!(cone.normals_at(DVec3::Y, 1e-9).concat().len(), AROUND_TIP as usize);
 }

@@ -40,19 +40,19 @@ impl ShapeDesc for Plane {
         Validator::new(Self::FIELDS)
             .numbers("point", &self.point)
             .numbers("normal", &self.normal)
-            .faults()
+            .validate()
     }
 
     /// The ground, through `base`.
-    fn standing(base: DVec3, _: DVec3) -> Self {
+    fn fitted_to(base: DVec3, _: DVec3) -> Self {
         Self { point: base.to_array(), normal: [0.0, 1.0, 0.0] }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.point]
     }
 
-    fn turn(&mut self, degrees: f64) -> bool {
+    fn rotate_y(&mut self, degrees: f64) -> bool {
         self.normal = turned(self.normal, degrees);
         true
     }

@@ -2,7 +2,7 @@
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::prismoid::{lower_left, upright};
+use crate::shape::prismoid::{corner_of_centered, prismoid};
 use crate::shape::registry::turned_rotation;
 use crate::shape::texture_space::turned_axes;
 use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
@@ -56,7 +56,7 @@ impl ShapeDesc for Prism {
     fn form(&self) -> Form {
         let s = self.side;
         let base = [(0.0, 0.0), (s, 0.0), (s / 2.0, -s * 0.75f64.sqrt())].map(DVec2::from);
-        upright(DVec3::from_array(self.corner), &base, self.height, 1.0, self.rotation)
+        prismoid(DVec3::from_array(self.corner), &base, self.height, 1.0, self.rotation)
     }
 
     fn faults(&self) -> Vec<ValidationError> {
@@ -66,20 +66,20 @@ impl ShapeDesc for Prism {
             .numbers("height", &[self.height])
             .numbers("rotation", &[self.rotation])
             .ratio(&[("side", self.side), ("height", self.height)], &self.corner)
-            .faults()
+            .validate()
     }
 
-    fn standing(base: DVec3, size: DVec3) -> Self {
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
         let side = size.x;
-        let corner = lower_left(base, side, side * 0.75f64.sqrt());
+        let corner = corner_of_centered(base, side, side * 0.75f64.sqrt());
         Self { corner, side, height: size.y, rotation: 0.0 }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.corner]
     }
 
-    fn turn(&mut self, degrees: f64) -> bool {
+    fn rotate_y(&mut self, degrees: f64) -> bool {
         self.rotation = turned_rotation(self.rotation, degrees);
         true
     }

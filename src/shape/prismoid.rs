@@ -1,7 +1,7 @@
 //! Solids that stand on a regular base: what cube, box, pyramid and prism have in common.
 
 use crate::primitive::{Form, HalfSpace};
-use crate::value::{clean, sin_cos_degrees};
+use crate::value::{round_nice, sin_cos_degrees};
 use glam::{DVec2, DVec3};
 
 /// A convex solid over a horizontal base.
@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3};
 ///
 /// The sides' normals come from the base and the heights, never from differences of corners, so
 /// that a tiny top or a place far from the origin costs them no digits.
-pub(super) fn upright(
+pub(super) fn prismoid(
     corner: DVec3,
     base: &[DVec2],
     height: f64,
@@ -55,9 +55,9 @@ pub(super) fn upright(
 
 /// The corner of a base whose middle is `base`, `width` wide and `depth` deep: half of both away
 /// towards -x and +z, in numbers that read well.
-pub(super) fn lower_left(base: DVec3, width: f64, depth: f64) -> [f64; 3] {
+pub(super) fn corner_of_centered(base: DVec3, width: f64, depth: f64) -> [f64; 3] {
     let scale = width.min(depth);
-    [clean(base.x - width / 2.0, scale), base.y, clean(base.z + depth / 2.0, scale)]
+    [round_nice(base.x - width / 2.0, scale), base.y, round_nice(base.z + depth / 2.0, scale)]
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
 use crate::shape::cube::square;
-use crate::shape::prismoid::{lower_left, upright};
+use crate::shape::prismoid::{corner_of_centered, prismoid};
 use crate::shape::registry::turned_rotation;
 use crate::shape::texture_space::turned_axes;
 use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
@@ -71,7 +71,7 @@ impl ShapeDesc for Pyramid {
         let height = self.height.min(self.apex_height);
         let top_over_base = (self.apex_height - height) / self.apex_height;
         let corner = DVec3::from_array(self.corner);
-        upright(corner, &square(self.side), height, top_over_base, self.rotation)
+        prismoid(corner, &square(self.side), height, top_over_base, self.rotation)
     }
 
     fn faults(&self) -> Vec<ValidationError> {
@@ -84,20 +84,20 @@ impl ShapeDesc for Pyramid {
             .numbers("height", &[self.height])
             .numbers("rotation", &[self.rotation])
             .ratio(&sizes, &self.corner)
-            .faults()
+            .validate()
     }
 
-    fn standing(base: DVec3, size: DVec3) -> Self {
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
         let side = size.x.min(size.z);
-        let corner = lower_left(base, side, side);
+        let corner = corner_of_centered(base, side, side);
         Self { corner, side, apex_height: size.y, height: size.y, rotation: 0.0 }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.corner]
     }
 
-    fn turn(&mut self, degrees: f64) -> bool {
+    fn rotate_y(&mut self, degrees: f64) -> bool {
         self.rotation = turned_rotation(self.rotation, degrees);
         true
     }

@@ -10,7 +10,7 @@ use std::f64::consts::FRAC_PI_4;
 fn every_kind_is_met_from_above_its_middle() {
     for (key, _) in EXAMPLES {
         let base = DVec3::new(1.0, 0.5, -2.0);
-        let shape = Shape::standing(key, base, DVec3::new(1.0, 1.5, 2.0)).unwrap();
+        let shape = Shape::fitted_to(key, base, DVec3::new(1.0, 1.5, 2.0)).unwrap();
         let form = shape.form();
         let up = form.bounds().map_or(base, |(low, high)| (low + high) / 2.0);
         let from = up + DVec3::new(0.3, 7.0, 0.2);
@@ -36,7 +36,7 @@ fn known_distances() {
     assert_eq!(ball.cast(DVec3::new(3.0, 5.0, 0.0), DVec3::NEG_Y), None);
     let pressed = ball.transformed(&DAffine3::from_scale(DVec3::new(1.0, 0.5, 1.0)));
     assert_eq!(pressed.cast(DVec3::Y * 5.0, DVec3::NEG_Y), Some(4.0));
-    let cube = Shape::standing("cube", DVec3::ZERO, DVec3::ONE).unwrap().form();
+    let cube = Shape::fitted_to("cube", DVec3::ZERO, DVec3::ONE).unwrap().form();
     assert_eq!(cube.cast(DVec3::Y * 3.0, DVec3::NEG_Y), Some(2.0));
     assert_eq!(cube.cast(DVec3::Y * 0.5, DVec3::NEG_Y), Some(0.5), "from inside");
     assert_eq!(cube.cast(DVec3::new(0.6, 3.0, 0.0), DVec3::NEG_Y), None);

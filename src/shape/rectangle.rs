@@ -90,10 +90,10 @@ impl ShapeDesc for Rectangle {
                     "an `up` across the normal, such as [0.0, 0.0, -1.0] for one that lies flat",
                 )
             }))
-            .faults()
+            .validate()
     }
 
-    fn standing(base: DVec3, size: DVec3) -> Self {
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
         Self {
             center: [base.x, base.y + size.y / 2.0, base.z],
             size: [size.x, size.y],
@@ -102,11 +102,11 @@ impl ShapeDesc for Rectangle {
         }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.center]
     }
 
-    fn turn(&mut self, degrees: f64) -> bool {
+    fn rotate_y(&mut self, degrees: f64) -> bool {
         self.normal = turned(self.normal, degrees);
         self.up = turned(self.up, degrees);
         true

@@ -28,15 +28,15 @@ pub trait ShapeDesc {
 
     /// One of this kind that stands upright on `base`, the middle of its lower side, and fills about
     /// a box with the lengths `size` along x, y and z, all greater than 0.
-    fn standing(base: DVec3, size: DVec3) -> Self;
+    fn fitted_to(base: DVec3, size: DVec3) -> Self;
 
     /// The points that move it: adding a vector to all of them moves the whole shape by that vector.
     /// Empty: only a transform moves it.
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]>;
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]>;
 
     /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen from
     /// above. `false`: it has no key for that, and nothing was done.
-    fn turn(&mut self, degrees: f64) -> bool;
+    fn rotate_y(&mut self, degrees: f64) -> bool;
 
     /// The axes of the space in which textures lie on it ([`TextureSpace`](crate::shape::TextureSpace)), in its
     /// own: right-handed, of unit length.
@@ -47,8 +47,8 @@ pub trait ShapeDesc {
 
 /// The angle `rotation + degrees` as it is written in a file: above -180, at most 180.
 pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
-    let turn = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
-    if turn > 180.0 { rounded_to(turn - 360.0, -6) } else { turn }
+    let rotate_y = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
+    if rotate_y > 180.0 { rounded_to(rotate_y - 360.0, -6) } else { rotate_y }
 }
 
 /// The keys of a kind; those of compounds by the name of their static, since a constant could not
@@ -106,7 +106,7 @@ macro_rules! kinds {
                 let faults = match self {
                     $(Self::$kind(kind) => kind.faults(),)+
                 };
-                faults.into_iter().map(|f| f.under(self.key())).collect()
+                faults.into_iter().map(|f| f.prefixed(self.key())).collect()
             }
 
             /// The axes of the space in which textures lie on it, in its own.
@@ -116,27 +116,27 @@ macro_rules! kinds {
                 }
             }
 
-            /// The kind with this key as [`ShapeDesc::standing`] makes it; `None`: no kind has it.
-            pub fn standing(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
+            /// The kind with this key as [`ShapeDesc::fitted_to`] makes it; `None`: no kind has it.
+            pub fn fitted_to(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
                 match key {
-                    $($key => Some(Self::$kind($kind::standing(base, size))),)+
+                    $($key => Some(Self::$kind($kind::fitted_to(base, size))),)+
                     _ => None,
                 }
             }
 
             /// The points that move it: adding a vector to all of them moves the whole shape by that
             /// vector. Empty: only a transform moves it.
-            pub fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+            pub fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
                 match self {
-                    $(Self::$kind(kind) => kind.anchors(),)+
+                    $(Self::$kind(kind) => kind.anchor_points_mut(),)+
                 }
             }
 
             /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen
             /// from above. `false`: its kind has no key for that, and nothing was done.
-            pub fn turn(&mut self, degrees: f64) -> bool {
+            pub fn rotate_y(&mut self, degrees: f64) -> bool {
                 match self {
-                    $(Self::$kind(kind) => kind.turn(degrees),)+
+                    $(Self::$kind(kind) => kind.rotate_y(degrees),)+
                 }
             }
         }
@@ -164,7 +164,7 @@ kinds! {
 
 impl Shape {
     /// The first of the points that move it; the origin if there is none.
-    pub fn place(&self) -> DVec3 {
-        self.clone().anchors().first().map_or(DVec3::ZERO, |at| DVec3::from_array(**at))
+    pub fn position(&self) -> DVec3 {
+        self.clone().anchor_points_mut().first().map_or(DVec3::ZERO, |at| DVec3::from_array(**at))
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType, clean};
+use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType, round_nice};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -38,20 +38,20 @@ impl ShapeDesc for Sphere {
             .numbers("center", &self.center)
             .numbers("radius", &[self.radius])
             .ratio(&[("radius", self.radius)], &self.center)
-            .faults()
+            .validate()
     }
 
-    fn standing(base: DVec3, size: DVec3) -> Self {
-        let radius = clean(size.min_element() / 2.0, size.min_element());
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
+        let radius = round_nice(size.min_element() / 2.0, size.min_element());
         Self { center: [base.x, base.y + radius, base.z], radius }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.center]
     }
 
     /// It looks the same from all sides.
-    fn turn(&mut self, _: f64) -> bool {
+    fn rotate_y(&mut self, _: f64) -> bool {
         true
     }
 }

@@ -3,7 +3,7 @@
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
 use crate::shape::axial::axes_between;
-use crate::shape::axial::{between, height, is_upright, no_axis};
+use crate::shape::axial::{degenerate_axis, frustum_between, height, is_upright};
 use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -48,7 +48,7 @@ impl ShapeDesc for TaperedCylinder {
     ];
 
     fn form(&self) -> Form {
-        between(self.base, self.top, self.base_radius, self.top_radius)
+        frustum_between(self.base, self.top, self.base_radius, self.top_radius)
     }
 
     fn faults(&self) -> Vec<ValidationError> {
@@ -67,13 +67,13 @@ impl ShapeDesc for TaperedCylinder {
             .numbers("top", &self.top)
             .numbers("base_radius", &[self.base_radius])
             .numbers("top_radius", &[self.top_radius])
-            .and(no_axis(self.base, self.top, "top"))
+            .and(degenerate_axis(self.base, self.top, "top"))
             .and(thin)
             .ratio(&sizes, &[self.base, self.top].concat())
-            .faults()
+            .validate()
     }
 
-    fn standing(base: DVec3, size: DVec3) -> Self {
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
         let top = base + DVec3::Y * size.y;
         let radius = size.x.min(size.z) / 2.0;
         Self {
@@ -84,12 +84,12 @@ impl ShapeDesc for TaperedCylinder {
         }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.base, &mut self.top]
     }
 
     /// Upright it looks the same from all sides.
-    fn turn(&mut self, _: f64) -> bool {
+    fn rotate_y(&mut self, _: f64) -> bool {
         is_upright(self.base, self.top)
     }
 

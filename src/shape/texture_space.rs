@@ -48,7 +48,7 @@ impl TextureSpace {
                 DefaultMapping::Sides
             }
         };
-        let point = texture_from_shape.transform_point3(shape.place());
+        let point = texture_from_shape.transform_point3(shape.position());
         let corners = form.transformed(&texture_from_shape).bounds().unwrap_or((point, point));
         Self { shape_from_texture, corners: corners.into(), unwrapped }
     }

@@ -133,17 +133,17 @@ impl TransformOp {
             Self::RotateX(degrees) => checks.numbers("rotate_x", &[*degrees]),
             Self::RotateY(degrees) => checks.numbers("rotate_y", &[*degrees]),
             Self::RotateZ(degrees) => checks.numbers("rotate_z", &[*degrees]),
-            Self::Rotate(Rotate { axis, degrees }) => checks.inner(
+            Self::Rotate(Rotate { axis, degrees }) => checks.nested(
                 "rotate",
                 Validator::new(ROTATE_FIELDS)
                     .numbers("axis", axis)
                     .numbers("degrees", &[*degrees])
-                    .faults(),
+                    .validate(),
             ),
             Self::Scale(Scale([x, y, z])) if x == y && y == z => checks.numbers("scale", &[*x]),
             Self::Scale(Scale(by)) => checks.numbers("scale", by),
         }
-        .faults()
+        .validate()
     }
 }
 

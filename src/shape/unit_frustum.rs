@@ -33,19 +33,19 @@ impl ShapeDesc for UnitFrustum {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(Self::FIELDS).numbers("s", &[self.s]).faults()
+        Validator::new(Self::FIELDS).numbers("s", &[self.s]).validate()
     }
 
     /// A cylinder at the origin: only a transform places it.
-    fn standing(_: DVec3, _: DVec3) -> Self {
+    fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self { s: 1.0 }
     }
 
-    fn anchors(&mut self) -> Vec<&mut [f64; 3]> {
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         Vec::new()
     }
 
-    fn turn(&mut self, _: f64) -> bool {
+    fn rotate_y(&mut self, _: f64) -> bool {
         false
     }
 

@@ -97,7 +97,7 @@ impl Field {
     }
 
     /// A key that may be left out and has no value then.
-    pub const fn without(
+    pub const fn optional(
         name: &'static str,
         takes: ValueType,
         unit: &'static str,

@@ -18,6 +18,6 @@ pub use direction::unit;
 pub use field::{Choice, DefaultValue, Field, ValueType};
 pub use hash::fnv1a64;
 pub use number_range::{NumberRange, number};
-pub use round::{clean, decade, rounded_to, significant, turned};
-pub use text::{excerpt, printable};
+pub use round::{floor_log10, round_nice, round_significant, rounded_to, turned};
+pub use text::{sanitized, truncated};
 pub use validation::{ValidationError, Validator};

@@ -16,13 +16,13 @@ pub fn rounded_to(x: f64, exponent: i32) -> f64 {
 }
 
 /// `x` rounded to that many significant decimal digits (at least one).
-pub fn significant(x: f64, digits: usize) -> f64 {
+pub fn round_significant(x: f64, digits: usize) -> f64 {
     if x.is_finite() { format!("{x:.*e}", digits.max(1) - 1).parse().unwrap_or(x) } else { x }
 }
 
 /// The exponent of the largest power of ten that is not above |`x`|; 0 for 0 and for what is not
 /// finite.
-pub fn decade(x: f64) -> i32 {
+pub fn floor_log10(x: f64) -> i32 {
     if x == 0.0 || !x.is_finite() {
         return 0;
     }
@@ -32,8 +32,8 @@ pub fn decade(x: f64) -> i32 {
 
 /// `x` rounded to a ten-thousandth of the power of ten at or below `scale`: for a coordinate in a
 /// scene of that size.
-pub fn clean(x: f64, scale: f64) -> f64 {
-    rounded_to(x, decade(scale) - 4)
+pub fn round_nice(x: f64, scale: f64) -> f64 {
+    rounded_to(x, floor_log10(scale) - 4)
 }
 
 /// The direction `v` turned by `degrees` about the vertical, counter-clockwise seen from above, its
@@ -47,7 +47,7 @@ pub fn turned(v: [f64; 3], degrees: f64) -> [f64; 3] {
     }
     let heading = rounded_to((x.atan2(z).to_degrees() + degrees).rem_euclid(360.0), -3);
     let (sin, cos) = crate::value::sin_cos_degrees(heading);
-    let digits = decade(flat) - 6;
+    let digits = floor_log10(flat) - 6;
     [rounded_to(flat * sin, digits), y, rounded_to(flat * cos, digits)]
 }
 
@@ -68,18 +68,18 @@ mod tests {
         }
         assert!(rounded_to(-1e-9, -2).is_sign_positive());
         assert!(rounded_to(f64::NAN, -2).is_nan());
-        assert_eq!(significant(1.0 / 3.0, 3), 0.333);
-        assert_eq!(significant(0.0, 3), 0.0);
-        assert_eq!(significant(-123456.0, 2), -120000.0);
+        assert_eq!(round_significant(1.0 / 3.0, 3), 0.333);
+        assert_eq!(round_significant(0.0, 3), 0.0);
+        assert_eq!(round_significant(-123456.0, 2), -120000.0);
     }
 
     #[test]
     fn decades_are_exact() {
         for e in -300..300 {
             let x: f64 = format!("1e{e}").parse().unwrap();
-            assert_eq!((decade(x), decade(x * 9.99)), (e, e));
+            assert_eq!((floor_log10(x), floor_log10(x * 9.99)), (e, e));
         }
-        assert_eq!((decade(0.0), decade(f64::INFINITY)), (0, 0));
+        assert_eq!((floor_log10(0.0), floor_log10(f64::INFINITY)), (0, 0));
     }
 
     #[test]

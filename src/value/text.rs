@@ -4,14 +4,14 @@ use std::fmt::Write as _;
 
 /// `text` with every character replaced that could steer a terminal or hide: control characters,
 /// line ends, directional and invisible formatting characters become `\u{..}` escapes.
-pub fn printable(text: &str) -> String {
+pub fn sanitized(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
             '\n' => out.push_str("\\n"),
             '\r' => out.push_str("\\r"),
             '\t' => out.push_str("\\t"),
-            _ if c.is_control() || steers(c) => {
+            _ if c.is_control() || controls_terminal(c) => {
                 // Writing into a String cannot fail.
                 let _ = write!(out, "{}", c.escape_unicode());
             }
@@ -23,7 +23,7 @@ pub fn printable(text: &str) -> String {
 
 /// Format characters (Unicode category Cf, and the line and paragraph separators): they reorder or
 /// vanish, so that a name on screen is not the name in the file.
-fn steers(c: char) -> bool {
+fn controls_terminal(c: char) -> bool {
     matches!(c,
         '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
         | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}'
@@ -31,30 +31,30 @@ fn steers(c: char) -> bool {
 }
 
 /// The first 40 characters of `text`, printable, with an ellipsis if there was more.
-pub fn excerpt(text: &str) -> String {
+pub fn truncated(text: &str) -> String {
     let mut rest = text.char_indices().skip(40);
     match rest.next() {
-        Some((end, _)) => printable(&text[..end]) + "…",
-        None => printable(text),
+        Some((end, _)) => sanitized(&text[..end]) + "…",
+        None => sanitized(text),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{excerpt, printable};
+    use super::{sanitized, truncated};
 
     #[test]
     fn nothing_that_steers_a_terminal_passes() {
         assert_eq!(
-            printable("a\x1b[31mé\u{9b}\u{202e}\n\u{7f}"),
+            sanitized("a\x1b[31mé\u{9b}\u{202e}\n\u{7f}"),
             "a\\u{1b}[31mé\\u{9b}\\u{202e}\\n\\u{7f}"
         );
-        assert_eq!(printable("Ölkanne \"x\" 鏡"), "Ölkanne \"x\" 鏡");
+        assert_eq!(sanitized("Ölkanne \"x\" 鏡"), "Ölkanne \"x\" 鏡");
     }
 
     #[test]
     fn excerpts_are_short() {
-        assert_eq!(excerpt("short"), "short");
-        assert_eq!(excerpt(&"ä".repeat(100)).chars().count(), 41);
+        assert_eq!(truncated("short"), "short");
+        assert_eq!(truncated(&"ä".repeat(100)).chars().count(), 41);
     }
 }

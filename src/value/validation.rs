@@ -20,7 +20,7 @@ impl ValidationError {
     }
 
     /// The same fault of a description that stands behind the key `outer` of another.
-    pub fn under(mut self, outer: &str) -> Self {
+    pub fn prefixed(mut self, outer: &str) -> Self {
         self.key =
             if self.key.is_empty() { outer.to_string() } else { format!("{outer}.{}", self.key) };
         self
@@ -31,13 +31,13 @@ impl ValidationError {
 #[derive(Debug)]
 pub struct Validator {
     fields: &'static [Field],
-    faults: Vec<ValidationError>,
+    validate: Vec<ValidationError>,
 }
 
 impl Validator {
     /// None found yet.
     pub fn new(fields: &'static [Field]) -> Self {
-        Self { fields, faults: Vec::new() }
+        Self { fields, validate: Vec::new() }
     }
 
     /// Checks the numbers behind the key `name` against what the table says about it.
@@ -59,13 +59,13 @@ impl Validator {
             _ => true,
         };
         if !right {
-            self.faults.push(ValidationError::new(name, is(name, values), takes.to_string()));
+            self.validate.push(ValidationError::new(name, is(name, values), takes.to_string()));
         }
         self
     }
 
     /// As `numbers`, if there is a value.
-    pub fn maybe(self, name: &str, values: Option<&[f64]>) -> Self {
+    pub fn optional(self, name: &str, values: Option<&[f64]>) -> Self {
         match values {
             Some(values) => self.numbers(name, values),
             None => self,
@@ -83,10 +83,10 @@ impl Validator {
             .chain(coordinates.iter().map(|c| c.abs()))
             .fold(0.0, f64::max);
         if let Some((name, smallest)) = smallest
-            && self.faults.is_empty()
+            && self.validate.is_empty()
             && largest > 1e12 * smallest
         {
-            self.faults.push(ValidationError::new(
+            self.validate.push(ValidationError::new(
                 name,
                 format!(
                     "{name} is {}, too small beside {} in the same shape",
@@ -101,24 +101,24 @@ impl Validator {
 
     /// Adds `fault` if there is one.
     pub fn and(mut self, fault: Option<ValidationError>) -> Self {
-        self.faults.extend(fault);
+        self.validate.extend(fault);
         self
     }
 
     /// Adds the faults of a description behind the key `outer`.
-    pub fn inner(mut self, outer: &str, faults: Vec<ValidationError>) -> Self {
-        self.faults.extend(faults.into_iter().map(|f| f.under(outer)));
+    pub fn nested(mut self, outer: &str, validate: Vec<ValidationError>) -> Self {
+        self.validate.extend(validate.into_iter().map(|f| f.prefixed(outer)));
         self
     }
 
     /// Whether none was found so far.
     pub fn clean(&self) -> bool {
-        self.faults.is_empty()
+        self.validate.is_empty()
     }
 
     /// What was found.
-    pub fn faults(self) -> Vec<ValidationError> {
-        self.faults
+    pub fn validate(self) -> Vec<ValidationError> {
+        self.validate
     }
 }
 

@@ -15,7 +15,9 @@ pub(super) fn clearance(forms: &[Form], point: DVec3) -> f64 {
 pub(super) fn clearance_of(form: &Form, point: DVec3) -> Option<f64> {
     let inside = || match form {
         Form::Ellipsoid { scene_from_unit } => from_ellipsoid(scene_from_unit, point),
-        Form::ConicalFrustum { scene_from_unit, top } => from_tapered(scene_from_unit, *top, point),
+        Form::ConicalFrustum { scene_from_unit, top_radius: top } => {
+            from_tapered(scene_from_unit, *top, point)
+        }
         Form::Mesh { mesh, scene_from_mesh, .. } => from_mesh(mesh, scene_from_mesh, point),
         _ => 0.0,
     };

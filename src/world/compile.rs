@@ -238,7 +238,7 @@ impl<L: SimdFloat> World<L> {
                     CullingMode::Frusta(of)
                 }
             }
-            Acceleration::Projected => CullingMode::ScreenBounds(
+            Acceleration::ScreenBounds => CullingMode::ScreenBounds(
                 forms().map(|form| ScreenBounds::project(form, &view)).collect(),
             ),
             _ => CullingMode::Off,

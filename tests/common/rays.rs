@@ -46,7 +46,8 @@ pub fn surface<L: SimdFloat>(
     ray: &Ray<L>,
     hit: &Hit<L>,
 ) -> SurfacePoint<L> {
-    let mut all = SurfacePoint { point: ray.at(hit.t), normal: Vec3::zero(), reach: L::zero() };
+    let mut all =
+        SurfacePoint { point: ray.at(hit.t), normal: Vec3::zero(), max_coordinate: L::zero() };
     let mut left = hit.t.lt(L::from_f64(L::MAX));
     while left.any() {
         let item = hit.item.id_lane(left.bits().trailing_zeros() as usize);
@@ -54,7 +55,7 @@ pub fn surface<L: SimdFloat>(
         let one = geometry.surface(item, hit.triangle, ray.at(hit.t));
         all.point = Vec3::select(here, one.point, all.point);
         all.normal = Vec3::select(here, one.normal, all.normal);
-        all.reach = L::select(here, one.reach, all.reach);
+        all.max_coordinate = L::select(here, one.max_coordinate, all.max_coordinate);
         left = left.and_not(here);
     }
     all
@@ -83,7 +84,7 @@ pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Opt
 pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64) -> Vec<bool> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
-        let blocked = geometry.blocked(&ray, L::from_f64(limit), L::mask(true), geometry.all());
+        let blocked = geometry.occluded(&ray, L::from_f64(limit), L::mask(true), geometry.all());
         out.extend((0..count).map(|i| blocked.lane(i)));
     }
     out

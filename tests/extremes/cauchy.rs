@@ -79,7 +79,9 @@ fn surface_and_volume(form: &Form) -> Option<(f64, f64)> {
             }
             Some(sums)
         }
-        Form::ConicalFrustum { scene_from_unit: m, top } => Some(tapered(m.matrix3, *top)),
+        Form::ConicalFrustum { scene_from_unit: m, top_radius: top } => {
+            Some(tapered(m.matrix3, *top))
+        }
         // Not convex: measured by their chords in `compound.rs`.
         Form::Csg(_) => None,
         // Not convex in general.

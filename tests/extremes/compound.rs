@@ -129,7 +129,7 @@ fn contains(part: &Form, p: DVec3) -> bool {
             scene_from_unit.inverse().transform_point3(p).length() <= 1.0
         }
         Form::ConvexPolyhedron { faces, .. } => faces.iter().all(|f| f.normal.dot(p) <= f.offset),
-        Form::ConicalFrustum { scene_from_unit, top } => {
+        Form::ConicalFrustum { scene_from_unit, top_radius: top } => {
             let q = scene_from_unit.inverse().transform_point3(p);
             (0.0..=1.0).contains(&q.z) && q.truncate().length() <= 1.0 + (top - 1.0) * q.z
         }

@@ -25,7 +25,7 @@ fn inside(numbers: &mut Numbers, form: &Form) -> DVec3 {
         Form::Ellipsoid { scene_from_unit } => {
             scene_from_unit.transform_point3(numbers.direction() * (0.99 * numbers.unit().cbrt()))
         }
-        Form::ConicalFrustum { scene_from_unit, top } => {
+        Form::ConicalFrustum { scene_from_unit, top_radius: top } => {
             let z = numbers.between(0.01, 0.99);
             let r = 0.99 * (1.0 + (top - 1.0) * z) * numbers.unit().sqrt();
             let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();

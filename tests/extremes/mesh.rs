@@ -104,7 +104,7 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
         let lit: usize = packets::<L>(&lines)
             .map(|(ray, count)| {
                 let blocked =
-                    geometry.blocked(&ray, L::from_f64(L::MAX), L::mask(true), geometry.all());
+                    geometry.occluded(&ray, L::from_f64(L::MAX), L::mask(true), geometry.all());
                 (0..count).filter(|lane| !blocked.lane(*lane)).count()
             })
             .sum();

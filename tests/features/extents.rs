@@ -42,9 +42,9 @@ fn b9_extents() {
         |shown| has_boxes_of_its_own(&meant, shown),
         &[
             ("none", &by(Acceleration::None)),
-            ("rectangles on the screen", &by(Acceleration::Projected)),
-            ("boxes in the scene's space", &by(Acceleration::World)),
-            ("a tree", &by(Acceleration::Hierarchy)),
+            ("rectangles on the screen", &by(Acceleration::ScreenBounds)),
+            ("boxes in the scene's space", &by(Acceleration::Aabb)),
+            ("a tree", &by(Acceleration::Bvh)),
             ("by itself", &by(Acceleration::Auto)),
         ],
     );

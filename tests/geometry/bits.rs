@@ -38,7 +38,7 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
         let met = hit.t.lt(L::from_f64(L::MAX));
         let here = surface(&wide, &packet, &hit);
         let limit = 2.0;
-        let blocked = wide.blocked(&packet, L::from_f64(limit), L::mask(true), wide.all());
+        let blocked = wide.occluded(&packet, L::from_f64(limit), L::mask(true), wide.all());
         for i in 0..count {
             let ray =
                 Ray { origin: lane_of(packet.origin, i), direction: lane_of(packet.direction, i) };
@@ -55,7 +55,7 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
             };
             assert!(same(hit.t.lane(i).to_f64(), one.t.lane(0).to_f64()), "{}", told());
             let limit = <S as SimdFloat>::from_f64(limit);
-            let b = narrow.blocked(&ray, limit, S::mask(true), narrow.all()).any();
+            let b = narrow.occluded(&ray, limit, S::mask(true), narrow.all()).any();
             assert!(blocked.lane(i) == b, "blocked: {}", told());
             if !met.lane(i) {
                 continue;
@@ -64,7 +64,7 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
             let s = surface(&narrow, &ray, &one);
             let equal = same3(here.point, s.point, i)
                 && same3(here.normal, s.normal, i)
-                && same(here.reach.lane(i).to_f64(), s.reach.lane(0).to_f64());
+                && same(here.max_coordinate.lane(i).to_f64(), s.max_coordinate.lane(0).to_f64());
             assert!(equal, "surface {here:?}, not {s:?}: {}", told());
         }
     }

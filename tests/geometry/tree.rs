@@ -36,7 +36,7 @@ fn crowd(numbers: &mut Numbers, count: usize) -> Vec<Form> {
 
 fn compare<L: SimdFloat>(seed: u64, count: usize, forms: &[Form], lines: &[Line]) {
     let list = Aggregate::<L>::with_tree(forms, false);
-    for how in [Acceleration::Hierarchy, Acceleration::Object, Acceleration::World] {
+    for how in [Acceleration::Bvh, Acceleration::Obb, Acceleration::Aabb] {
         let other = Aggregate::<L>::accelerated(forms, how);
         compare_with(seed, (how.name(), count), (&list, &other), lines);
     }
@@ -55,8 +55,8 @@ fn compare_with<L: SimdFloat>(
         let wanted = L::from_fn(|_| L::Scalar::from_f64(numbers.unit())).lt(L::from_f64(0.8));
         let limit = L::from_fn(|i| L::Scalar::from_f64(limits[i]));
         let (c, d) = (
-            list.blocked(&packet, limit, wanted, list.all()) & wanted,
-            tree.blocked(&packet, limit, wanted, tree.all()) & wanted,
+            list.occluded(&packet, limit, wanted, list.all()) & wanted,
+            tree.occluded(&packet, limit, wanted, tree.all()) & wanted,
         );
         for i in 0..lanes {
             let told = || {

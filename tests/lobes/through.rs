@@ -48,7 +48,7 @@ fn check_slab<L: SimdFloat>() -> f64 {
                 let interface =
                     Interface::new(ray.direction, normal, L::from_f64(n_i), L::from_f64(n_t));
                 assert!(interface.tir.bits() & 1 == 0, "{n} {i}");
-                let origin = normal.mul_add(-surface.lift(), surface.point);
+                let origin = normal.mul_add(-surface.ray_offset(), surface.point);
                 ray = Ray { origin, direction: interface.refracted };
             }
             // Beside the way that the ray would have gone.

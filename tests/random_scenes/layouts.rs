@@ -86,7 +86,7 @@ fn floor(numbers: &mut Numbers, stock: &Stock) -> Object {
         _ => ("cylinder", DVec3::new(0.0, -0.5, 0.0), DVec3::new(8.0, 0.5, 8.0)),
     };
     let mut object = untransformed(named(numbers, stock, key, base, size));
-    object.shape = Shape::standing(key, base, size).expect("a registered kind");
+    object.shape = Shape::fitted_to(key, base, size).expect("a registered kind");
     object
 }
 

@@ -135,8 +135,9 @@ fn solids() -> &'static (Vec<&'static Field>, Vec<&'static Field>) {
     SOLIDS.get_or_init(|| {
         let (compounds, simple) = KINDS.iter().partition::<Vec<&Field>, _>(|kind| has_parts(kind));
         let fits = |kind: &&Field| {
-            let [first, second] = ["sphere", kind.name]
-                .map(|key| CsgOperand::new(Shape::standing(key, DVec3::ZERO, DVec3::ONE).unwrap()));
+            let [first, second] = ["sphere", kind.name].map(|key| {
+                CsgOperand::new(Shape::fitted_to(key, DVec3::ZERO, DVec3::ONE).unwrap())
+            });
             compound(compounds[0].name, vec![first, second]).is_some()
         };
         (simple.into_iter().filter(fits).collect(), compounds)
@@ -214,7 +215,7 @@ pub fn combined(
             return shape;
         }
     }
-    Shape::standing(kind.name, base, size).expect("a registered kind")
+    Shape::fitted_to(kind.name, base, size).expect("a registered kind")
 }
 
 fn of_kind(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Shape {
@@ -222,7 +223,7 @@ fn of_kind(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Sha
         0 => None,
         _ => by_keys(numbers, kind, base, size),
     };
-    drawn.unwrap_or_else(|| Shape::standing(kind.name, base, size).expect("a registered kind"))
+    drawn.unwrap_or_else(|| Shape::fitted_to(kind.name, base, size).expect("a registered kind"))
 }
 
 /// Steps that turn, stretch, shear or mirror what stands on `base`, which stays where it is; mostly none.
@@ -266,7 +267,8 @@ pub fn object(numbers: &mut Numbers, stock: &Stock, base: DVec3, size: DVec3) ->
     // What has no end hides all the rest: not too often.
     let kind = loop {
         let kind = &KINDS[numbers.below(KINDS.len())];
-        let drawn = Shape::standing(kind.name, DVec3::ZERO, DVec3::ONE).expect("a registered kind");
+        let drawn =
+            Shape::fitted_to(kind.name, DVec3::ZERO, DVec3::ONE).expect("a registered kind");
         if drawn.form().bounds().is_some() || chance(numbers, 1, 6) {
             break kind;
         }
@@ -293,7 +295,7 @@ fn object_of(
         false => of_kind(numbers, kind, base, size),
     };
     let mut object = Object { name: String::new(), material, shape, transform: Vec::new() };
-    if object.shape.anchors().is_empty() && !has_parts(kind) {
+    if object.shape.anchor_points_mut().is_empty() && !has_parts(kind) {
         fit(&mut object, base, size);
     }
     let placed = object.transform.len();

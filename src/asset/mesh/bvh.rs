@@ -99,7 +99,7 @@ impl Mesh {
     }
 
     /// Number of the first triangle in a leaf; the others follow it.
-    pub fn first(&self, leaf: usize) -> u32 {
+    pub fn first_triangle(&self, leaf: usize) -> u32 {
         self.firsts[leaf]
     }
 
@@ -113,7 +113,7 @@ impl Mesh {
     }
 
     /// The largest `direction . corner` of its triangles' corners.
-    pub fn farthest(&self, direction: [f64; 3]) -> f64 {
+    pub fn support(&self, direction: [f64; 3]) -> f64 {
         let along = |axis: usize, x: f32| direction[axis] * f64::from(x);
         let mut best = f64::NEG_INFINITY;
         let mut todo = vec![(0u32, f64::INFINITY)];

@@ -9,7 +9,7 @@ use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES};
 use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::Builder;
-use crate::value::excerpt;
+use crate::value::truncated;
 use base64::Engine;
 use glam::{DAffine3, DMat4, DVec3};
 use gltf::accessor::{DataType, Dimensions};
@@ -135,7 +135,7 @@ fn buffers<'a>(
                     // Spaces are the only escapes that writers commonly use.
                     let Some(path) = source.resolve_relative(&uri.replace("%20", " ")) else {
                         return wrong(
-                            format!("uri is \"{}\"", excerpt(uri)),
+                            format!("uri is \"{}\"", truncated(uri)),
                             "a relative path without \"..\", to a file in the same folder or below",
                         );
                     };

@@ -7,7 +7,7 @@ use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::Builder;
-use crate::value::excerpt;
+use crate::value::truncated;
 use std::cell::RefCell;
 use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
@@ -70,7 +70,7 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
         }
         for t in mesh.indices.chunks_exact(3) {
             let corners = [t[0], t[1], t[2]].map(|i| i + base as u32);
-            builder.triangle(corners, || FileLocation::Part(excerpt(&model.name)))?;
+            builder.triangle(corners, || FileLocation::Part(truncated(&model.name)))?;
         }
     }
     builder.finish().map_err(|error| locate_vertex(source, error))
@@ -248,7 +248,7 @@ impl<'a> Libraries<'a> {
         let mut found = self.found.borrow_mut();
         let name = name.to_string_lossy();
         let Some(path) = self.source.resolve_relative(&name) else {
-            let what = format!("mtllib names \"{}\"", excerpt(&name));
+            let what = format!("mtllib names \"{}\"", truncated(&name));
             let error = self.source.error(
                 FileLocation::Whole,
                 what,

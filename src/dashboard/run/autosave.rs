@@ -2,7 +2,7 @@
 
 use crate::dashboard::message::{Message, OrphanedEdits};
 use crate::scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, sweep};
-use crate::value::printable;
+use crate::value::sanitized;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
@@ -112,7 +112,7 @@ impl Autosave {
         let mut messages: Vec<_> = unreadable
             .iter()
             .map(|(path, why)| {
-                let path = printable(&path.display().to_string());
+                let path = sanitized(&path.display().to_string());
                 Message::Trouble(format!("unsaved edits in {path} cannot be read: {why}"))
             })
             .collect();

@@ -6,7 +6,7 @@ use crate::dashboard::overlay::Answer;
 use crate::dashboard::update::UpdateContext;
 use crate::scene::edit::Target;
 use crate::scene::{SaveError, Scene, SceneErrors};
-use crate::value::printable;
+use crate::value::sanitized;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -88,7 +88,7 @@ impl UpdateContext<'_> {
                 );
             }
             Err(SaveError::Exists(path)) => {
-                let text = format!("{} exists.", printable(&path.display().to_string()));
+                let text = format!("{} exists.", sanitized(&path.display().to_string()));
                 self.ask(
                     text,
                     &[
@@ -223,7 +223,7 @@ impl UpdateContext<'_> {
             return;
         };
         let shown = path.display().to_string();
-        if printable(&shown) != shown {
+        if sanitized(&shown) != shown {
             // Pasted into a shell it could do what nobody wants.
             self.refuse("The path has characters in it that steer terminals: it is not copied");
             return;

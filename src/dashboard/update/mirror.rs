@@ -2,7 +2,7 @@
 
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::edit::{self, Edit, EditError, Target};
-use crate::value::{excerpt, number};
+use crate::value::{number, truncated};
 
 impl UpdateContext<'_> {
     pub(super) fn roughness(&mut self, steps: f64) {
@@ -32,7 +32,7 @@ impl UpdateContext<'_> {
             .map_or_else(String::new, |row| format!(" · {}", row.value));
         let told = format!(
             "{}: roughness {} · reflection {}{lobe}",
-            excerpt(&name),
+            truncated(&name),
             number(material.roughness),
             number(material.reflection),
         );

@@ -26,7 +26,7 @@ use crate::dashboard::panel_lines::{
 use crate::render::session::State;
 use crate::scene::Scene;
 use crate::scene::edit::{Edit, EditError, Target};
-use crate::value::printable;
+use crate::value::sanitized;
 use files::capital;
 use std::mem::discriminant;
 use std::sync::Arc;
@@ -224,7 +224,7 @@ impl<'a> UpdateContext<'a> {
 
     /// Tells something for some seconds, the longer the more there is to read.
     fn notify(&mut self, tone: Tone, text: impl Into<String>, seconds: Option<f64>) {
-        let text = printable(&text.into());
+        let text = sanitized(&text.into());
         let until = seconds.map(|seconds| {
             let reading = text.chars().count() as f64 * 0.05;
             self.now + Duration::from_secs_f64(seconds.max(reading))
@@ -238,7 +238,7 @@ impl<'a> UpdateContext<'a> {
 
     fn refuse(&mut self, text: &str) {
         if let Some(Overlay::Form(form)) = &mut self.model.overlay {
-            form.problem = Some(printable(text));
+            form.problem = Some(sanitized(text));
         } else {
             self.notify(Tone::Bad, text, Some(5.0));
         }

@@ -7,7 +7,7 @@ use crate::dashboard::overlay::{Overlay, Prompt, PromptFor};
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::render::schedule::Stop;
 use crate::scene::edit::{self, Target};
-use crate::value::{excerpt, number};
+use crate::value::{number, truncated};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -124,7 +124,7 @@ impl UpdateContext<'_> {
         self.record(edit, Coalesce::Single);
         let number = self.scene().views.keys().position(|name| name == text).map_or(0, |at| at + 1);
         let key = if number <= 9 { format!(" · key {number}") } else { String::new() };
-        self.say(format!("viewpoint {} is stored{key}", excerpt(text)));
+        self.say(format!("viewpoint {} is stored{key}", truncated(text)));
         Ok(())
     }
 
@@ -134,10 +134,10 @@ impl UpdateContext<'_> {
         let format = match words.next() {
             None | Some("png") => Format::Png,
             Some("exr") => Format::Exr,
-            Some(other) => return Err(format!("\"{}\" is neither png nor exr.", excerpt(other))),
+            Some(other) => return Err(format!("\"{}\" is neither png nor exr.", truncated(other))),
         };
         if let Some(more) = words.next() {
-            return Err(format!("\"{}\" is too much.", excerpt(more)));
+            return Err(format!("\"{}\" is too much.", truncated(more)));
         }
         let film = edit::set(self.scene(), &Target::Film, "size", size);
         let scene = film.map_err(|refusal| refusal.to_string())?.scene;
@@ -174,11 +174,11 @@ fn parse_stop(text: &str) -> Result<Stop, String> {
             continue;
         }
         let Some(value) = words.next() else {
-            return Err(format!("\"{}\" needs a number, such as noise 0.5.", excerpt(word)));
+            return Err(format!("\"{}\" needs a number, such as noise 0.5.", truncated(word)));
         };
         let positive = value.parse::<f64>().ok().filter(|x| x.is_finite() && *x > 0.0);
         let wrong =
-            |expected: &str| format!("{word} cannot be \"{}\": {expected}.", excerpt(value));
+            |expected: &str| format!("{word} cannot be \"{}\": {expected}.", truncated(value));
         let number = || positive.ok_or_else(|| wrong("expected a number greater than 0"));
         match word.to_ascii_lowercase().as_str() {
             "noise" => stop.noise_codes = Some(number()?),
@@ -190,7 +190,7 @@ fn parse_stop(text: &str) -> Result<Stop, String> {
                     Some(whole.ok_or_else(|| wrong("expected a whole number of at least 1"))?);
             }
             _ => {
-                let word = excerpt(word);
+                let word = truncated(word);
                 return Err(format!("\"{word}\" is not known: noise, rmse, spp, time or none."));
             }
         }

@@ -12,7 +12,7 @@ use crate::dashboard::view::theme::Theme;
 use crate::film::Display;
 use crate::scene::edit::Widget;
 use crate::terminal::Area;
-use crate::value::{number, significant};
+use crate::value::{number, round_significant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::{Modifier, Style};
@@ -200,7 +200,7 @@ fn brief(value: &str) -> Cow<'_, str> {
     /// Longest number shown with all its digits, in characters.
     const SHORT: usize = 9;
     match value.parse::<f64>() {
-        Ok(x) if value.len() > SHORT && x.is_finite() => number(significant(x, 6)).into(),
+        Ok(x) if value.len() > SHORT && x.is_finite() => number(round_significant(x, 6)).into(),
         _ => value.into(),
     }
 }

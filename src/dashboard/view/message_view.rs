@@ -8,7 +8,7 @@ use crate::dashboard::view::theme::Theme;
 use crate::render::session::State;
 use crate::scene::Diagnostic;
 use crate::terminal::Area;
-use crate::value::printable;
+use crate::value::sanitized;
 use ratatui::buffer::Buffer;
 use ratatui::style::{Modifier, Style};
 
@@ -57,12 +57,12 @@ fn told(message: &Diagnostic, width: u16, theme: &Theme) -> Lines {
     }
     let subject = match message.subject.as_str() {
         "" => String::new(),
-        subject => format!("{}: ", printable(subject)),
+        subject => format!("{}: ", sanitized(subject)),
     };
-    let found = format!("{subject}{}.", printable(&message.found));
+    let found = format!("{subject}{}.", sanitized(&message.found));
     lines.extend(wrapped(&found, width).into_iter().map(|line| (line, theme.text())));
     if !message.help.is_empty() {
-        let help = wrapped(&printable(&message.help), width);
+        let help = wrapped(&sanitized(&message.help), width);
         lines.extend(help.into_iter().map(|line| (line, theme.dim())));
     }
     lines
@@ -78,7 +78,7 @@ pub fn failure(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffe
     if let Some(why) = failed {
         let mut lines = vec![("This scene cannot be rendered".to_string(), theme.bad())];
         let width = text_area(layout).width;
-        let why = wrapped(&printable(why), width);
+        let why = wrapped(&sanitized(why), width);
         lines.extend(why.into_iter().map(|line| (line, theme.text())));
         write(&lines, layout, buffer);
     }
@@ -88,7 +88,7 @@ pub fn failure(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffe
         let area = layout.picture;
         let edge = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
         let place = first.place.map_or(String::new(), |(line, column)| format!(":{line}:{column}"));
-        let text = format!(" ✗ {}{place}  {} ", model.file.name, printable(&first.found));
+        let text = format!(" ✗ {}{place}  {} ", model.file.name, sanitized(&first.found));
         Row::new(buffer, edge, area.height.saturating_sub(1)).put(&text, theme.bad());
     }
 }

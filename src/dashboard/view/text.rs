@@ -1,7 +1,7 @@
 //! Text in cells: measured in columns, cut with an ellipsis, never outside its area.
 
 use crate::terminal::Area;
-use crate::value::printable;
+use crate::value::sanitized;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
@@ -133,7 +133,7 @@ impl<'a> Row<'a> {
 /// What the buffer would leave out without a word stands there as an escape.
 fn safe(text: &str) -> Cow<'_, str> {
     if text.chars().any(char::is_control) {
-        Cow::Owned(printable(text))
+        Cow::Owned(sanitized(text))
     } else {
         Cow::Borrowed(text)
     }

@@ -10,7 +10,7 @@ use crate::scene::edit::unique_name::{free_light, free_material, free_object};
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scale, Scene, TransformOp};
 use crate::shape::{KINDS, Shape, compose};
-use crate::value::{Color, clean, number, rounded_to, significant, unit};
+use crate::value::{Color, number, round_nice, round_significant, rounded_to, unit};
 use glam::DVec3;
 
 /// The kinds of object that can be added, with what they are.
@@ -55,7 +55,7 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     let size = usual_size(scene);
     let room = DVec3::splat(size);
     let base = place_for(scene, room);
-    let Some(mut shape) = Shape::standing(kind, base, room) else {
+    let Some(mut shape) = Shape::fitted_to(kind, base, room) else {
         let names: Vec<_> = KINDS.iter().map(|k| k.name).collect();
         let found = format!("there is no kind of object called \"{kind}\"");
         return Err(EditError::new(&found, &format!("Expected one of {}.", names.join(", "))));
@@ -65,8 +65,8 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
         // Under everything, so that it does not lie in a ground that is there already.
         let lows = scene.objects.iter().filter_map(|o| Some(o.form().bounds()?.0.y));
         if let Some(lowest) = lows.reduce(f64::min) {
-            let under = clean(lowest - 0.1 * size, size);
-            shape.anchors().into_iter().for_each(|anchor| anchor[1] = under);
+            let under = round_nice(lowest - 0.1 * size, size);
+            shape.anchor_points_mut().into_iter().for_each(|anchor| anchor[1] = under);
         }
     }
     let mut next = scene.clone();
@@ -79,8 +79,11 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
             own
         }
     };
-    let transform =
-        if shape.anchors().is_empty() { upright_steps(&shape, base, size) } else { Vec::new() };
+    let transform = if shape.anchor_points_mut().is_empty() {
+        upright_steps(&shape, base, size)
+    } else {
+        Vec::new()
+    };
     next.objects.push(Object { name, material, shape, transform });
     let subject = Target::Object(next.objects.len() - 1);
     Edit::checked(next, subject, format!("add {kind}"))
@@ -119,7 +122,7 @@ fn usual_size(scene: &Scene) -> f64 {
         None if scene.objects.is_empty() => 1.0,
         None => 0.25 * radius,
     };
-    significant(0.6 * size, 1)
+    round_significant(0.6 * size, 1)
 }
 
 /// Turns a flat thing that stands upright so that its front is towards the camera.
@@ -131,7 +134,7 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
     }
     let heading = |d: DVec3| d.x.atan2(d.z).to_degrees();
     let toward = -scene.camera.view().unwrap_or(DVec3::NEG_Z);
-    shape.turn(rounded_to((heading(toward) - heading(front)) / 5.0, 0) * 5.0);
+    shape.rotate_y(rounded_to((heading(toward) - heading(front)) / 5.0, 0) * 5.0);
 }
 
 /// Adds a light of the kind `kind`: above the scene, to the side of the camera that has no light yet,
@@ -157,7 +160,8 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let name = match kind {
         "point" => {
             let position = center + from * (1.5 * radius);
-            light.point = Some(Point { position: position.map(|x| clean(x, radius)).to_array() });
+            light.point =
+                Some(Point { position: position.map(|x| round_nice(x, radius)).to_array() });
             "lamp"
         }
         "directional" => {
@@ -179,7 +183,7 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
         // As the others are: the same brightness in the middle, by the inverse square.
         let squared = (from * (1.5 * radius)).length_squared();
         light.falloff = Falloff::InverseSquare;
-        light.intensity = significant(light.intensity * std::f64::consts::PI * squared, 2);
+        light.intensity = round_significant(light.intensity * std::f64::consts::PI * squared, 2);
         let text = number(light.intensity);
         note = Some(format!("It falls off with the square of the distance; intensity {text}."));
     }

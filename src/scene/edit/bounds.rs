@@ -3,7 +3,7 @@
 use crate::primitive::Form;
 use crate::scene::edit::Target;
 use crate::scene::{Object, Scene};
-use crate::value::decade;
+use crate::value::floor_log10;
 use glam::DVec3;
 
 /// A ball around something.
@@ -27,7 +27,7 @@ pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
             Some(match object.form().bounds() {
                 Some(extent) => ball(extent),
                 None => {
-                    let point = object.shape.place();
+                    let point = object.shape.position();
                     let at = object.scene_from_object().transform_point3(point);
                     BoundingSphere { center: at.to_array(), radius: scene_bounds(scene).radius }
                 }
@@ -77,7 +77,7 @@ fn ball((low, high): Extent) -> BoundingSphere {
 /// The coarse step of a coordinate: a power of ten, between a hundredth and a tenth of the diameter of
 /// the scene's solids (0.1 in a room with things a few units apart). A fine step is a tenth of it.
 pub fn step_length(scene: &Scene) -> f64 {
-    let exponent = decade(2.0 * scene_bounds(scene).radius) - 1;
+    let exponent = floor_log10(2.0 * scene_bounds(scene).radius) - 1;
     format!("1e{}", exponent.clamp(-12, 8)).parse().unwrap_or(0.1)
 }
 

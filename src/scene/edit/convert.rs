@@ -9,7 +9,9 @@ use crate::scene::edit::set::{finish, replace};
 use crate::scene::edit::toml_view::{put, read};
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::shape::Shape;
-use crate::value::{Field, NumberRange, ValueType, clean, number, rounded_to, significant, unit};
+use crate::value::{
+    Field, NumberRange, ValueType, number, round_nice, round_significant, rounded_to, unit,
+};
 use glam::DVec3;
 use toml::{Table, Value};
 
@@ -92,7 +94,7 @@ fn reshaped(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
         Some((low, high)) => {
             // A turned shape's box is larger than it; its own is that of the unturned one.
             let mut straight = shape.clone();
-            straight.turn(-rotation(shape));
+            straight.rotate_y(-rotation(shape));
             let (l, h) = straight.form().bounds().unwrap_or((low, high));
             let size = h - l;
             let usual = size.max_element();
@@ -101,13 +103,13 @@ fn reshaped(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
             let base = if is_solid(&form) { low.y } else { middle.y - size.y / 2.0 };
             (DVec3::new(middle.x, base, middle.z), whole)
         }
-        None => (shape.place(), DVec3::splat(scene_bounds(scene).radius / 2.0)),
+        None => (shape.position(), DVec3::splat(scene_bounds(scene).radius / 2.0)),
     };
     let scale = size.min_element();
-    let base = base.map(|x| clean(x, scale));
-    let size = size.map(|x| significant(x, 6));
-    let mut next = Shape::standing(name, base, size)?;
-    next.turn(rotation(shape));
+    let base = base.map(|x| round_nice(x, scale));
+    let size = size.map(|x| round_significant(x, 6));
+    let mut next = Shape::fitted_to(name, base, size)?;
+    next.rotate_y(rotation(shape));
     Some(next)
 }
 
@@ -141,7 +143,7 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
         ("point", _, Some(Directional { direction })) => {
             let along = unit(direction).unwrap_or(DVec3::NEG_Y);
             let at = center - along * (3.0 * ball.radius);
-            let position = at.map(|x| clean(x, ball.radius)).to_array();
+            let position = at.map(|x| round_nice(x, ball.radius)).to_array();
             light.point = Some(Point { position });
             light.directional = None;
             None
@@ -174,7 +176,7 @@ pub(super) fn switch_falloff(
 
 /// Multiplies the intensity and says so.
 fn refit(light: &mut Light, factor: f64) -> String {
-    let fitted = significant(light.intensity * factor, 3);
+    let fitted = round_significant(light.intensity * factor, 3);
     let old = light.intensity;
     if NumberRange::LIGHT.holds(fitted) {
         light.intensity = fitted;
@@ -201,7 +203,7 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
         let [width, height] = scene.film.size.map(f64::from);
         let across = |degrees: f64, ratio: f64| {
             let half = (degrees.to_radians() / 2.0).tan() * ratio;
-            significant(2.0 * half.atan().to_degrees(), 6).min(179.999)
+            round_significant(2.0 * half.atan().to_degrees(), 6).min(179.999)
         };
         camera.view_angle = match (camera.view_angle, name) {
             (ViewAngle::Vertical(v), "horizontal") => {
@@ -236,7 +238,7 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
 
 /// Rounded to about a millionth of `scale`: a direction keeps its aim.
 fn rounded(x: f64, scale: f64) -> f64 {
-    rounded_to(x, crate::value::decade(scale) - 6)
+    rounded_to(x, crate::value::floor_log10(scale) - 6)
 }
 
 /// Adds the step `name` with the value that does nothing to the list behind `key`.

@@ -7,7 +7,7 @@ use crate::scene::edit::placement::place_for;
 use crate::scene::edit::translate::move_object;
 use crate::scene::edit::unique_name::{free_light, free_material, free_object, free_view};
 use crate::scene::edit::{Edit, EditError, Target};
-use crate::value::excerpt;
+use crate::value::truncated;
 use glam::DVec3;
 
 /// A copy, last in its list, under a name of its own (`cube 2`). The copy of an object stands beside
@@ -33,7 +33,7 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
                 let from = DVec3::new((low.x + high.x) / 2.0, low.y, (low.z + high.z) / 2.0);
                 // As high above the ground as the original.
                 let by = DVec3::new(base.x - from.x, 0.0, base.z - from.z);
-                let digits = crate::value::decade(usual) - 3;
+                let digits = crate::value::floor_log10(usual) - 3;
                 let by = by.map(|x| crate::value::rounded_to(x, digits));
                 move_object(&mut copy, by.to_array());
             } else {
@@ -221,7 +221,7 @@ pub fn own_material(scene: &Scene, subject: &Target) -> Result<Edit, EditError> 
     next.objects[*index].material = new.clone();
     let label = format!("own material for {}", subject.label(scene));
     Ok(Edit::checked(next, subject.clone(), label)?
-        .noted(format!("Its material is {} now.", excerpt(&new))))
+        .noted(format!("Its material is {} now.", truncated(&new))))
 }
 
 #[cfg(test)]

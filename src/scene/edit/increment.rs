@@ -9,7 +9,7 @@ use crate::scene::edit::properties::is_material;
 use crate::scene::edit::set::{label, lookup, replace};
 use crate::scene::edit::toml_view::{get, read};
 use crate::scene::edit::{Edit, EditError, Target};
-use crate::value::{DefaultValue, Field, NumberRange, ValueType, decade, rounded_to};
+use crate::value::{DefaultValue, Field, NumberRange, ValueType, floor_log10, rounded_to};
 use toml::Value;
 
 /// Moves the numbers behind `key` by `steps`: a whole number of coarse steps, or otherwise of fine ones
@@ -253,7 +253,7 @@ impl StepRule {
             }
             Self::Direction => {
                 let largest = all.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-                let unit = rounded_to(0.05, -2) * 10f64.powi(decade(largest));
+                let unit = rounded_to(0.05, -2) * 10f64.powi(floor_log10(largest));
                 let moved = added(x, unit, count);
                 if moved.is_finite() { moved } else { x }
             }
@@ -272,7 +272,7 @@ impl StepRule {
 /// x + unit * steps, rounded to a hundredth of a fine step.
 fn added(x: f64, unit: f64, StepCount { steps, fine }: StepCount) -> f64 {
     let width = if fine { unit / 10.0 } else { unit };
-    rounded_to(x + width * steps as f64, decade(unit) - 3)
+    rounded_to(x + width * steps as f64, floor_log10(unit) - 3)
 }
 
 /// `x` brought into the range; if that has no end there, `old`.
@@ -331,7 +331,7 @@ fn climb(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: Step
 
 /// The next rung above or below `x` > 0.
 fn rung(x: f64, up: bool, fine: bool) -> f64 {
-    let e = decade(x);
+    let e = floor_log10(x);
     let scale = format!("1e{}", 2 - e).parse().unwrap_or(1.0);
     let mantissa = x * scale;
     // A number on a rung has been rounded on its way there.
@@ -375,7 +375,7 @@ fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64
     }
     // Its hue cannot be had back from black: the darkest step stays above.
     let next = if next <= 0.0 { largest.min(0.005) } else { next };
-    channels.iter().map(|x| rounded_to(x * next / largest, decade(next) - 3)).collect()
+    channels.iter().map(|x| rounded_to(x * next / largest, floor_log10(next) - 3)).collect()
 }
 
 /// Width and height together, the ratio kept as far as whole numbers can; fine: by 16 pixels of the

@@ -37,7 +37,7 @@ pub use translate::move_by;
 pub use viewpoints::{recall_view, store_view};
 
 use crate::scene::Scene;
-use crate::value::excerpt;
+use crate::value::truncated;
 use std::fmt;
 
 /// A scene after an edit.
@@ -79,8 +79,8 @@ impl EditError {
 
     fn gone(subject: &Target) -> Self {
         let what = match subject {
-            Target::View(name) => format!("there is no view \"{}\"", excerpt(name)),
-            Target::Material(name) => format!("there is no material \"{}\"", excerpt(name)),
+            Target::View(name) => format!("there is no view \"{}\"", truncated(name)),
+            Target::Material(name) => format!("there is no material \"{}\"", truncated(name)),
             Target::Light(i) => format!("there is no light {}", i + 1),
             Target::Object(i) => format!("there is no object {}", i + 1),
             _ => "it cannot be read".to_string(),

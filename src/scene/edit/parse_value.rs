@@ -2,7 +2,7 @@
 
 use crate::scene::edit::EditError;
 use crate::scene::format::suggest::nearest;
-use crate::value::{Color, Field, ValueType, excerpt, number, printable};
+use crate::value::{Color, Field, ValueType, number, sanitized, truncated};
 use toml::Value;
 
 /// The value that `text` stands for behind the key `field`. Says nothing about ranges, except where
@@ -10,7 +10,7 @@ use toml::Value;
 pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
     let text = text.trim();
     let wrong = || {
-        let found = format!("{} cannot be \"{}\"", field.name, excerpt(text));
+        let found = format!("{} cannot be \"{}\"", field.name, truncated(text));
         EditError::new(&found, &format!("Expected {}.", field.takes))
     };
     let list = |n: usize| match numbers(text) {
@@ -80,14 +80,14 @@ pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
 /// As `choose`, with the reason if there is none or more than one.
 pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, EditError> {
     choose(text, words).ok_or_else(|| {
-        let quote = |word: &str| format!("\"{}\"", excerpt(word));
+        let quote = |word: &str| format!("\"{}\"", truncated(word));
         let quoted: Vec<_> = words.iter().take(20).map(|w| quote(w)).collect();
         let more = if quoted.len() < words.len() { ", …" } else { "" };
         let mut help = format!("Expected one of {}{more}.", quoted.join(", "));
         if let Some(meant) = nearest(text, words.iter().copied()) {
             help += &format!(" Did you mean {}?", quote(meant));
         }
-        EditError::new(&format!("{} cannot be \"{}\"", field.name, excerpt(text)), &help)
+        EditError::new(&format!("{} cannot be \"{}\"", field.name, truncated(text)), &help)
     })
 }
 
@@ -95,8 +95,8 @@ pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, E
 pub(super) fn name(what: &str, text: &str) -> Result<String, EditError> {
     let text = text.trim();
     let help = "Expected at most 60 characters, none of them a control character.";
-    if text.chars().count() > 60 || printable(text) != text {
-        return Err(EditError::new(&format!("{what} cannot be \"{}\"", excerpt(text)), help));
+    if text.chars().count() > 60 || sanitized(text) != text {
+        return Err(EditError::new(&format!("{what} cannot be \"{}\"", truncated(text)), help));
     }
     Ok(text.to_string())
 }
@@ -143,7 +143,7 @@ pub(super) fn show(takes: ValueType, value: &Value) -> String {
         Value::Float(x) => number(*x),
         Value::Integer(i) => i.to_string(),
         Value::Boolean(yes) => yes.to_string(),
-        Value::String(text) => printable(text),
+        Value::String(text) => sanitized(text),
         other => other.to_string(),
     }
 }

@@ -5,7 +5,7 @@ use crate::primitive::Form;
 use crate::scene::edit::bounds::{BoundingSphere, Extent, is_solid, scene_bounds};
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scene, TransformOp};
-use crate::value::{decade, rounded_to, significant};
+use crate::value::{floor_log10, round_significant, rounded_to};
 use glam::{DVec2, DVec3};
 
 /// Lowers (or lifts) an object until its lowest point rests on the highest surface below its middle,
@@ -39,7 +39,7 @@ pub fn drop_down(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
             others.iter().filter_map(move |form| {
                 let t = form.cast(from, direction)?;
                 // A rounded difference of two heights would put it next to the surface.
-                Some(significant(from.y + direction.y * t, 13))
+                Some(round_significant(from.y + direction.y * t, 13))
             })
         });
         found.collect::<Vec<_>>()
@@ -67,8 +67,8 @@ fn lift(object: &mut Object, by: f64) {
         return;
     }
     match object.transform.last_mut() {
-        None if !object.shape.anchors().is_empty() => {
-            object.shape.anchors().into_iter().for_each(|anchor| anchor[1] += by);
+        None if !object.shape.anchor_points_mut().is_empty() => {
+            object.shape.anchor_points_mut().into_iter().for_each(|anchor| anchor[1] += by);
         }
         Some(TransformOp::Translate(last)) => last[1] += by,
         _ => object.transform.push(TransformOp::Translate([0.0, by, 0.0])),
@@ -107,11 +107,11 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let walls: Vec<&Form> = forms.iter().filter(|form| !is_solid(form)).collect();
     let floors: Vec<&Form> = walls.iter().copied().filter(|form| is_level(form)).collect();
     // New places are round numbers: of a thing one metre wide, whole centimetres.
-    let grid = decade(size.min_element()) - 2;
+    let grid = floor_log10(size.min_element()) - 2;
     let candidate = |offset: DVec2| {
         let at = DVec3::new(aim.x + offset.x, aim.y, aim.z + offset.y);
         let ground = ground_under(&floors, at).unwrap_or(aim.y - size.y / 2.0);
-        DVec3::new(rounded_to(at.x, grid), significant(ground, 13), rounded_to(at.z, grid))
+        DVec3::new(rounded_to(at.x, grid), round_significant(ground, 13), rounded_to(at.z, grid))
     };
     let spread = size.x.max(size.z);
     let spots = (0..400).map(|i| {

@@ -3,7 +3,7 @@
 use crate::scene::edit::bounds::scene_bounds;
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scene, TransformOp};
-use crate::value::{decade, rounded_to, sin_cos_degrees, turned};
+use crate::value::{floor_log10, rounded_to, sin_cos_degrees, turned};
 use glam::DVec3;
 
 /// Turns by `degrees` about the vertical, counter-clockwise seen from above: an object about its own
@@ -21,7 +21,7 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
     match subject {
         Target::Object(i) => {
             let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
-            if !object.transform.is_empty() || !object.shape.turn(degrees) {
+            if !object.transform.is_empty() || !object.shape.rotate_y(degrees) {
                 turn_by_steps(object, degrees);
             }
         }
@@ -34,7 +34,7 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
                 let pivot = scene_bounds(scene).center;
                 let arm = std::array::from_fn(|i| point.position[i] - pivot[i]);
                 let arm = turned(arm, degrees);
-                let digits = decade(arm[0].hypot(arm[2])) - 6;
+                let digits = floor_log10(arm[0].hypot(arm[2])) - 6;
                 let place = |i| rounded_to(pivot[i] + arm[i], digits);
                 point.position = [place(0), point.position[1], place(2)];
             }
@@ -62,7 +62,7 @@ fn turn_by_steps(object: &mut Object, degrees: f64) {
     let (middle, scale) = match form.bounds() {
         Some((low, high)) => (low + (high - low) / 2.0, (high - low).max_element()),
         None => {
-            let point = object.shape.place();
+            let point = object.shape.position();
             (object.scene_from_object().transform_point3(point), 1.0)
         }
     };
@@ -74,7 +74,7 @@ fn turn_by_steps(object: &mut Object, degrees: f64) {
     let wound = rounded_to((angle + degrees).rem_euclid(360.0), -6);
     let angle = if wound > 180.0 { rounded_to(wound - 360.0, -6) } else { wound };
     let shift = stands - after(angle);
-    let digits = decade(scale.max(middle.x.hypot(middle.z))) - 6;
+    let digits = floor_log10(scale.max(middle.x.hypot(middle.z))) - 6;
     let shift = shift.map(|x| rounded_to(x, digits)).to_array();
     if angle != 0.0 {
         object.transform.push(TransformOp::RotateY(angle));
@@ -112,7 +112,7 @@ mod tests {
     fn turns_are_about_the_middle_and_come_round() {
         for kind in KINDS {
             let base = DVec3::new(3.0, 0.0, -2.0);
-            let shape = Shape::standing(kind.name, base, DVec3::new(1.0, 0.5, 2.0)).unwrap();
+            let shape = Shape::fitted_to(kind.name, base, DVec3::new(1.0, 0.5, 2.0)).unwrap();
             for transform in
                 [vec![], vec![TransformOp::RotateX(20.0)], vec![TransformOp::RotateY(7.0)]]
             {

@@ -1,7 +1,7 @@
 //! What can be selected and edited.
 
 use crate::scene::{Diagnostic, Object, Problem, Scene};
-use crate::value::excerpt;
+use crate::value::truncated;
 
 /// One thing of a scene that can be selected and edited.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -157,9 +157,9 @@ impl Target {
     /// Its name in an outline: `lamp`, `light 2`, `sphere 3` (the third object, without a name).
     /// Names from a file are made printable and cut after 40 characters.
     pub fn label(&self, scene: &Scene) -> String {
-        let named = |name: Option<&String>| name.filter(|n| !n.is_empty()).map(|n| excerpt(n));
+        let named = |name: Option<&String>| name.filter(|n| !n.is_empty()).map(|n| truncated(n));
         match self {
-            Self::View(name) | Self::Material(name) => excerpt(name),
+            Self::View(name) | Self::Material(name) => truncated(name),
             Self::Light(i) => named(scene.lights.get(*i).map(|l| &l.name))
                 .unwrap_or_else(|| format!("light {}", i + 1)),
             Self::Object(i) => {

@@ -4,7 +4,7 @@ use crate::light::{Directional, Light};
 use crate::scene::edit::bounds::scene_bounds;
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scene, TransformOp};
-use crate::value::{decade, rounded_to, unit};
+use crate::value::{floor_log10, rounded_to, unit};
 use glam::DVec3;
 
 /// Moves an object, a light, the camera or a view by the vector `by`, in scene units. An object
@@ -49,14 +49,14 @@ pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, Ed
 pub(super) fn moved(at: [f64; 3], by: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| match by[i] {
         0.0 => at[i],
-        by => rounded_to(at[i] + by, decade(by) - 3),
+        by => rounded_to(at[i] + by, floor_log10(by) - 3),
     })
 }
 
 pub(super) fn move_object(object: &mut Object, by: [f64; 3]) {
     match object.transform.last_mut() {
-        None if !object.shape.anchors().is_empty() => {
-            for anchor in object.shape.anchors() {
+        None if !object.shape.anchor_points_mut().is_empty() => {
+            for anchor in object.shape.anchor_points_mut() {
                 *anchor = moved(*anchor, by);
             }
         }

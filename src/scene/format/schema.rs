@@ -7,7 +7,7 @@ use crate::scene::format::source_map::place;
 use crate::scene::format::suggest::nearest;
 use crate::scene::settings::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, TRACE_FIELDS};
 use crate::scene::validate::subject;
-use crate::value::{Color, DefaultValue, Field, NumberRange, ValueType, excerpt};
+use crate::value::{Color, DefaultValue, Field, NumberRange, ValueType, truncated};
 use crate::{camera, light, material};
 use std::ops;
 use toml::Spanned;
@@ -17,14 +17,14 @@ use toml::de::{DeInteger, DeTable, DeValue};
 pub const FIELDS: &[Field] = &[
     table("film", FILM_FIELDS, "The picture's raster."),
     table("trace", TRACE_FIELDS, "How far paths are followed."),
-    Field::without(
+    Field::optional(
         "camera",
         ValueType::Table(camera::FIELDS),
         "",
         "it stands at [0.0, 1.0, 5.0] and looks at the origin",
         "The view: a pinhole camera.",
     ),
-    Field::without(
+    Field::optional(
         "views",
         ValueType::Named(camera::FIELDS),
         "",
@@ -33,15 +33,15 @@ pub const FIELDS: &[Field] = &[
     ),
     table("background", BACKGROUND_FIELDS, "What a ray sees that meets nothing."),
     table("ambient", AMBIENT_FIELDS, "Light from everywhere, without shadows."),
-    Field::without("light", ValueType::Tables(light::FIELDS), "", "there are none", "The lights."),
-    Field::without(
+    Field::optional("light", ValueType::Tables(light::FIELDS), "", "there are none", "The lights."),
+    Field::optional(
         "materials",
         ValueType::Named(material::FIELDS),
         "",
         "there are none",
         "Finishes by name, for the key `material` of objects.",
     ),
-    Field::without(
+    Field::optional(
         "object",
         ValueType::Tables(OBJECT_FIELDS),
         "",
@@ -51,7 +51,7 @@ pub const FIELDS: &[Field] = &[
 ];
 
 const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) -> Field {
-    Field::without(name, ValueType::Table(fields), "", "its keys have their defaults", doc)
+    Field::optional(name, ValueType::Table(fields), "", "its keys have their defaults", doc)
 }
 
 /// Everything wrong with the form of the scene file `file`, whose `text` is TOML.
@@ -131,9 +131,9 @@ impl SchemaChecker<'_> {
         }
         let place = match self.inner() {
             inner if inner.is_empty() => String::new(),
-            inner => format!(" in {}", excerpt(&inner)),
+            inner => format!(" in {}", truncated(&inner)),
         };
-        let found = format!("unknown key \"{}\"{place}", excerpt(key.get_ref()));
+        let found = format!("unknown key \"{}\"{place}", truncated(key.get_ref()));
         self.add(key.span(), found, help);
         meant
     }
@@ -298,12 +298,12 @@ fn is_number(value: &DeValue) -> bool {
 /// `the string "abc"`, `the number -2`, `a list of 2`.
 fn describe(value: &DeValue) -> String {
     match value {
-        DeValue::String(text) => format!("the string \"{}\"", excerpt(text)),
+        DeValue::String(text) => format!("the string \"{}\"", truncated(text)),
         DeValue::Integer(digits) => match integer(digits) {
             Some(number) => format!("the number {number}"),
-            None => format!("a whole number too large for 64 bits, {}", excerpt(digits.as_str())),
+            None => format!("a whole number too large for 64 bits, {}", truncated(digits.as_str())),
         },
-        DeValue::Float(digits) => format!("the number {}", excerpt(digits.as_str())),
+        DeValue::Float(digits) => format!("the number {}", truncated(digits.as_str())),
         DeValue::Boolean(yes) => format!("{yes}"),
         DeValue::Datetime(_) => "a date or time".to_string(),
         DeValue::Array(list) => describe_list(list),
@@ -319,9 +319,9 @@ fn describe_list(list: &[Spanned<DeValue>]) -> String {
         .iter()
         .take(4)
         .map(|entry| match entry.get_ref() {
-            DeValue::String(text) => format!("\"{}\"", excerpt(text)),
-            DeValue::Integer(digits) => excerpt(digits.as_str()),
-            DeValue::Float(digits) => excerpt(digits.as_str()),
+            DeValue::String(text) => format!("\"{}\"", truncated(text)),
+            DeValue::Integer(digits) => truncated(digits.as_str()),
+            DeValue::Float(digits) => truncated(digits.as_str()),
             DeValue::Boolean(yes) => yes.to_string(),
             DeValue::Datetime(_) => "a date".to_string(),
             DeValue::Array(_) => "a list".to_string(),

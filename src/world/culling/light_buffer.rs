@@ -135,7 +135,7 @@ impl<S: Float> LightBuffer<S> {
         wanted: L::Mask,
         by: &PrimitiveSet,
     ) -> L::Mask {
-        let mut blocked = geometry.blocked_by_listed(ray, limit, wanted, by);
+        let mut blocked = geometry.occluded_linear(ray, limit, wanted, by);
         let mut beyond = wanted.and_not(blocked) & ray.origin.max_abs().gt(L::splat(self.scale));
         let mut left = wanted.and_not(blocked | beyond);
         let (cell, depth) = self.projection.lookup(ray, limit, self.side);
@@ -165,7 +165,7 @@ impl<S: Float> LightBuffer<S> {
                     continue;
                 }
                 let open = wanted.and_not(blocked);
-                let new = geometry.blocked_by_one(thing.number, ray, limit, open);
+                let new = geometry.occluded_by(thing.number, ray, limit, open);
                 blocked = blocked | (new & open);
                 if here.and_not(blocked).none() {
                     break;
@@ -175,7 +175,7 @@ impl<S: Float> LightBuffer<S> {
         }
         beyond = beyond.and_not(blocked);
         if beyond.any() {
-            blocked = blocked | (geometry.blocked(ray, limit, beyond, by) & beyond);
+            blocked = blocked | (geometry.occluded(ray, limit, beyond, by) & beyond);
         }
         blocked
     }
@@ -243,7 +243,7 @@ mod tests {
             let odd = L::from_fn(|i| L::Scalar::from_f64((i % 2) as f64)).gt(L::zero());
             let on = (L::select(odd, second, first), L::mask(round % 6 >= 4));
             let all = geometry.all();
-            let expected = geometry.blocked(&ray, limit, wanted, all) & wanted;
+            let expected = geometry.occluded(&ray, limit, wanted, all) & wanted;
             let found = buffer.occluded(&geometry, &ray, on, limit, wanted, all) & wanted;
             assert_eq!(found.bits(), expected.bits(), "{towards:?}, round {round}");
             count += found.bits().count_ones() as usize;

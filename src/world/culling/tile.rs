@@ -62,7 +62,7 @@ impl CullingMode {
                 Some(TileCandidates { primary: seen, ..TileCandidates::all(geometry, lamps) })
             }
             Self::ScreenGrid(cells) => {
-                let seen = geometry.select_few(&cells.candidates(origin, extent)?);
+                let seen = geometry.select_indices(&cells.candidates(origin, extent)?);
                 Some(TileCandidates { primary: seen, ..TileCandidates::all(geometry, lamps) })
             }
             Self::Off => None,
@@ -101,7 +101,7 @@ impl FrustumCuller {
         // The outside of a convex thing does not see itself, and only paths that begin inside, or are
         // let in, get inside.
         let self_shadowing = |(b, entered): (&BoundingVolume, &bool)| {
-            let holds_eye = || eye.is_none_or(|eye| b.ball().holds(eye));
+            let holds_eye = || eye.is_none_or(|eye| b.ball().contains(eye));
             !b.is_convex() || !b.is_flat() && (*entered || holds_eye())
         };
         let self_shadowing = bounds.iter().zip(entered).map(self_shadowing).collect();
@@ -128,7 +128,7 @@ impl FrustumCuller {
         pencil: Option<&Frustum>,
     ) -> TileCandidates {
         let part = |bound: &BoundingVolume| match pencil {
-            Some(pencil) => bound.part_in(pencil),
+            Some(pencil) => bound.clip_to(pencil),
             None => Some(bound.ball()),
         };
         let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(part).collect();
@@ -137,7 +137,7 @@ impl FrustumCuller {
             let lit = |(other, part): (usize, &Option<BoundingSphere>)| {
                 part.is_some_and(|part| {
                     (other != item || self.self_shadowing[item])
-                        && self.bounds[item].shades(&part, towards)
+                        && self.bounds[item].may_occlude(&part, towards)
                 })
             };
             parts.iter().enumerate().any(lit)

@@ -368,7 +368,7 @@ mod tests {
     fn only_what_touches_is_paired() {
         let ball = |y: f64, radius| Form::Sphere { center: DVec3::new(0.0, y, 0.0), radius };
         let plane = |normal: DVec3, offset| Form::Plane { normal, offset };
-        let cube = Shape::standing("cube", DVec3::ZERO, DVec3::ONE).unwrap().form();
+        let cube = Shape::fitted_to("cube", DVec3::ZERO, DVec3::ONE).unwrap().form();
         let slanted = DVec3::new(0.6, 0.8, 0.0);
         for (a, b, touch) in [
             (ball(1.0, 1.0), plane(DVec3::Y, 0.0), true),

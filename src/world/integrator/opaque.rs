@@ -194,9 +194,9 @@ impl<L: SimdFloat> World<L> {
         loop {
             counts.rays += u64::from(active.bits().count_ones());
             let hit = if SIMPLE {
-                self.geometry.closest_of_listed(&path.ray, &candidates.primary, active)
+                self.geometry.closest_linear(&path.ray, &candidates.primary, active)
             } else {
-                self.geometry.closest_of(&path.ray, &candidates.primary, active)
+                self.geometry.closest_masked(&path.ray, &candidates.primary, active)
             };
             let ended = hit.t.lt(L::from_f64(L::MAX));
             if let Some(group) = self.background {
@@ -285,7 +285,7 @@ impl<L: SimdFloat> World<L> {
             geometric,
             albedo_factor: tint,
             point: surface.point,
-            offset: surface.lift(),
+            offset: surface.ray_offset(),
             front: front & lanes,
             item: hit.item,
             bsdf: L::from_id(number),
@@ -340,12 +340,12 @@ impl<L: SimdFloat> World<L> {
                 };
                 let ray = Ray { origin: start, direction };
                 let blocked = if SIMPLE {
-                    self.geometry.blocked_by_listed(&ray, within, lit, shading)
+                    self.geometry.occluded_linear(&ray, within, lit, shading)
                 } else if let Some(Some(buffer)) = self.light_buffers.get(number) {
                     let on = (met.item, met.front);
                     buffer.occluded(&self.geometry, &ray, on, within, lit, shading)
                 } else {
-                    self.geometry.blocked(&ray, within, lit, shading)
+                    self.geometry.occluded(&ray, within, lit, shading)
                 };
                 lit = lit.and_not(blocked);
                 if lit.none() {

@@ -5,7 +5,7 @@ use crate::material::{
     Bump, BumpMap, CompiledTexture, Mapping, Material, Placement, Projection, TexCoord, Texture,
     TextureMapping,
 };
-use crate::primitive::{Aggregate, PrimitiveId, SurfacePoint, facing};
+use crate::primitive::{Aggregate, PrimitiveId, SurfacePoint, keep_visible};
 use crate::scene::Scene;
 use crate::shape::{DefaultMapping, TextureSpace};
 use crate::world::compile::World;
@@ -179,6 +179,6 @@ impl<L: SimdFloat> World<L> {
         let (along_u, along_v) = heights.gradient((at.u, at.v), points.lanes.bits());
         let gradient = at.grad_u * along_u + at.grad_v * along_v;
         let outward = L::select(front, L::one(), -L::one());
-        facing(projector.bumped(normal, outward, gradient), geometric, direction)
+        keep_visible(projector.bumped(normal, outward, gradient), geometric, direction)
     }
 }

@@ -109,7 +109,7 @@ impl<L: SimdFloat> World<L> {
     ) -> bool {
         let Branch { mut path, inside, bounce, coincident, .. } = *branch;
         counts.rays += u64::from(branch.lanes.bits().count_ones());
-        let mut hit = self.geometry.closest_of(&path.ray, &candidates.primary, branch.lanes);
+        let mut hit = self.geometry.closest_masked(&path.ray, &candidates.primary, branch.lanes);
         let mut behind = None;
         if let Some(contacts) = &nested_dielectrics.contacts
             && (coincident.lanes & branch.lanes).any()

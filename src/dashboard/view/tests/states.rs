@@ -294,7 +294,7 @@ pub const STATES: &[Named] = &[
         let mut scene = built_in();
         scene.objects[0].name = "鏡の部屋\u{1b}[31m\u{202e} with a name that never ends".into();
         scene.lights[0].name = "\t\n\u{7}".into();
-        m.file.name = crate::value::printable("鏡\u{1b}]0;evil\u{7}.toml");
+        m.file.name = crate::value::sanitized("鏡\u{1b}]0;evil\u{7}.toml");
         m.history.record(Arc::new(scene), "names", false);
         m.focus = Focus::Outline;
         m.selection = Target::Object(0);
