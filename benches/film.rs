@@ -15,7 +15,7 @@ fn film(width: usize, height: usize, groups: usize) -> Film {
     let mut state = 1u64;
     for slot in film.slots(&all) {
         let [x0, y0] = slot.origin;
-        let tile = slot.open();
+        let tile = slot.prepare();
         for (replicate, pixel) in (0..2).flat_map(|r| (0..TILE_PIXELS).map(move |p| (r, p))) {
             let (x, y) = (x0 + pixel % 16, y0 + pixel / 16);
             let values: Vec<_> = (0..groups * 3)

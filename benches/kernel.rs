@@ -136,7 +136,7 @@ fn paths<L: SimdFloat>(c: &mut Criterion) {
         b.iter(|| {
             film.restart();
             let go = AtomicBool::new(false);
-            pass::run_in(&world, &mut film, &wave, &SAMPLING, &estimator, &pool, &go)
+            pass::run_typed(&world, &mut film, &wave, &SAMPLING, &estimator, &pool, &go)
         })
     });
 }

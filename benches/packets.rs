@@ -83,7 +83,7 @@ fn renderer<L: SimdFloat>(scene: &Scene) -> impl FnMut() + use<L> {
             let jobs = vec![Job { tile, first: 8, count: 8 }];
             let wave = Wave { replicate: 0, jobs, estimate: false };
             let go = AtomicBool::new(false);
-            pass::run_in(&world, &mut film, &wave, &sampling, &estimator, &pool, &go);
+            pass::run_typed(&world, &mut film, &wave, &sampling, &estimator, &pool, &go);
         }
     }
 }

@@ -69,7 +69,7 @@ fn trace(film: &mut Film, tiles: &[usize], replicate: usize, range: Range<u32>) 
 
 fn trace_slot(slot: TileHandle, replicate: usize, range: Range<u32>) {
     let origin = slot.origin;
-    let tile = slot.open();
+    let tile = slot.prepare();
     let [width, height] = tile.extent();
     for index in range.clone() {
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
@@ -109,7 +109,7 @@ fn trace_lattices(film: &mut Film, steps: &[usize]) {
     for step in steps.iter().copied() {
         for slot in film.slots(&all) {
             let origin = slot.origin;
-            let tile = slot.open();
+            let tile = slot.prepare();
             let [width, height] = tile.extent();
             for pixel in lattice_pixels(before, step) {
                 if pixel % TILE < width && pixel / TILE < height {
@@ -192,7 +192,7 @@ fn extreme_28_milliard_samples() {
     let mut film = film_of(1, 1, &[scale]);
     let white = LightWeights { weights: vec![[1.0; 3]] };
     let of = |value: f64| (value * scale).round() as i64;
-    let tile = film.slots(&[0]).remove(0).open();
+    let tile = film.slots(&[0]).remove(0).prepare();
     // Red: 0.7. Green: 0, 0.0014, ..., 1.3986, of mean 0.6993. Blue: next to nothing.
     for k in 0..1000 {
         let values = [0.7, f64::from(k) * 1.4e-3, 1e-8].map(of);
@@ -216,7 +216,7 @@ fn extreme_28_saturation_is_flagged() {
     // The limit is (2^63 - 1) / 2^28, about 3.4e10 radiance times samples.
     let (scale, white) = (2f64.powi(28), LightWeights { weights: vec![[1.0; 3]] });
     let mut film = film_of(1, 1, &[scale]);
-    let tile = film.slots(&[0]).remove(0).open();
+    let tile = film.slots(&[0]).remove(0).prepare();
     tile.advance(0, 50);
     for _ in 0..49 {
         tile.add(0, 0, &[(7e8 * scale) as i64, 0, 0]);
@@ -227,7 +227,7 @@ fn extreme_28_saturation_is_flagged() {
     assert_eq!(film.pixel(0, 0, &white)[0], i64::MAX as f64 / scale / 50.0);
     // It stays flagged when added to a film, in either order.
     let mut other = film_of(1, 1, &[scale]);
-    let tile = other.slots(&[0]).remove(0).open();
+    let tile = other.slots(&[0]).remove(0).prepare();
     tile.add(0, 0, &[1, 0, 0]);
     tile.advance(0, 1);
     let mut sums = [film_of(1, 1, &[scale]), film_of(1, 1, &[scale])];
@@ -247,7 +247,7 @@ fn dim_and_bright_lights_keep_the_same_bits() {
         let light = 2f64.powi(exponent);
         let scale = 2f64.powi(28) / light;
         let mut film = film_of(16, 16, &[scale]);
-        let tile = film.slots(&[0]).remove(0).open();
+        let tile = film.slots(&[0]).remove(0).prepare();
         for pixel in 0..256 {
             let values = sample(pixel, 0, 0, 1).unwrap_or_default();
             tile.add(0, pixel, &[0, 1, 2].map(|c| (values[c] * light * scale).round() as i64));

@@ -147,7 +147,7 @@ fn what_cannot_be_read_is_told() {
     let marked = "\u{feff}[[object]]\r\nshape.sphere = { center = [0, 0, 0], radius = 1 }\r\n";
     assert!(scene(marked).is_ok());
     let error = scene(&marked.replace("[[object]]", "wrong = 1")).unwrap_err();
-    assert_eq!(error.messages()[0].place, Some((1, 1)));
+    assert_eq!(error.messages()[0].line_column, Some((1, 1)));
     // Without a material, a camera, a light: the defaults.
     let bare = scene(marked).unwrap();
     assert_eq!(bare.objects[0].material, "");

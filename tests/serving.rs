@@ -251,7 +251,7 @@ impl Bench {
     fn holds(&mut self, changed: &Table, what: &str) -> Option<bool> {
         let edited = scene(changed, &self.base.library)?;
         self.tried += 1;
-        if !self.film.adopt(&Arc::new(edited.clone())) {
+        if !self.film.try_reuse(&Arc::new(edited.clone())) {
             return Some(false);
         }
         self.served += 1;
@@ -319,7 +319,7 @@ fn the_finish_of_a_part_is_part_of_the_picture() {
     for name in ["inner", "cut"] {
         let mut edited = bench.base.clone();
         edited.materials.get_mut(name).unwrap().diffuse = 0.125;
-        assert!(!bench.film.adopt(&Arc::new(edited)), "{name}");
+        assert!(!bench.film.try_reuse(&Arc::new(edited)), "{name}");
         let mut renamed = bench.base.clone();
         let material = renamed.materials.remove(name).unwrap();
         renamed.materials.insert("other".into(), material);

@@ -52,7 +52,7 @@ fn finished(session: &Session<RenderState>, generation: u64) -> Report {
     let end = Instant::now() + Duration::from_secs(60);
     while Instant::now() < end {
         let Some(snapshot) = session.wait(Duration::from_millis(100)) else { continue };
-        let resting = matches!(snapshot.report.state, State::Resting(_));
+        let resting = matches!(snapshot.report.state, State::Finished(_));
         if resting && snapshot.report.generation == generation {
             return snapshot.report;
         }
@@ -102,7 +102,7 @@ fn interruptions_and_earlier_scenes_do_not_change_the_film() {
         for _ in 0..20 {
             samples = session.with(|_, report| report.samples).unwrap().max(samples);
             session.pause();
-            session.go_on();
+            session.resume();
         }
         let report = finished(&session, generation);
         assert!(report.samples >= samples);

@@ -2,7 +2,7 @@
 
 use crate::command::args::CheckArgs;
 use crate::command::load_progress::LoadReporter;
-use crate::command::{Failure, say, warn};
+use crate::command::{Failure, print_line, warn};
 use crate::film::{TILE, TILE_PIXELS};
 use crate::scene::Document;
 use crate::world::{self, AnyWorld};
@@ -18,13 +18,13 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let [width, height] = scene.film.size;
     let groups = world.group_names();
     let bytes = film_bytes(scene.film.size, groups.len());
-    say(&format!("{}: valid", args.scene.display()));
-    say(&format!("  contains  {}", world.inventory()));
-    say(&format!("  picture   {width} x {height} pixels"));
-    say(&format!("  lights    {} separate: {}", groups.len(), groups.join(", ")));
-    say(&format!("  memory    {:.0} MB for the samples", (bytes as f64 * 1e-6).max(1.0)));
+    print_line(&format!("{}: valid", args.scene.display()));
+    print_line(&format!("  contains  {}", world.inventory()));
+    print_line(&format!("  picture   {width} x {height} pixels"));
+    print_line(&format!("  lights    {} separate: {}", groups.len(), groups.join(", ")));
+    print_line(&format!("  memory    {:.0} MB for the samples", (bytes as f64 * 1e-6).max(1.0)));
     for bias in world.biases() {
-        say(&format!("  biased    {bias}"));
+        print_line(&format!("  biased    {bias}"));
     }
     Ok(())
 }

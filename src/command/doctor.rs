@@ -2,9 +2,9 @@
 //! what would make it better.
 
 use crate::command::args::DoctorArgs;
-use crate::command::{Failure, say};
+use crate::command::{Failure, print_line};
 use crate::dashboard::overlay_layout::wrapped;
-use crate::dashboard::run::{Colors, TerminalReport, examine};
+use crate::dashboard::run::{Colors, TerminalReport, diagnose};
 use crate::scene::{kept_in, state_folder};
 use crate::terminal::flow::{DEFAULT_RATE, PacingMode};
 use crate::terminal::image::Protocol;
@@ -31,7 +31,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     };
     let examined = match why_not {
         Some(why) => Err(why),
-        None => Ok(examine(surroundings.clone(), args.rate)
+        None => Ok(diagnose(surroundings.clone(), args.rate)
             .map_err(|error| Failure::Failed(format!("the terminal cannot be used: {error}")))?),
     };
     let state = state_folder(|name| env::var_os(name));
@@ -45,7 +45,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
         kept: state.as_deref().map(kept_in).unwrap_or_default(),
         state,
     };
-    say(&found.report());
+    print_line(&found.report());
     Ok(())
 }
 
@@ -306,7 +306,7 @@ mod tests {
             let found = variables.iter().find(|(known, _)| *known == name);
             found.map(|(_, value)| value.to_string())
         });
-        let terminal = Capabilities::unasked(surroundings.clone());
+        let terminal = Capabilities::from_environment(surroundings.clone());
         let examined = TerminalReport {
             terminal,
             mode: PacingMode::Unlimited,

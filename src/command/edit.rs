@@ -3,7 +3,7 @@
 use crate::asset::Assets;
 use crate::command::args::{ColorArg, EditArgs};
 use crate::command::load_progress::LoadReporter;
-use crate::command::{Failure, all_threads, say, warn};
+use crate::command::{Failure, all_threads, print_line, warn};
 use crate::dashboard::message::Exported;
 use crate::dashboard::run::{Colors, DEFAULT_STOP, Setup, run as run_dashboard};
 use crate::film::Display;
@@ -44,7 +44,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         None => SceneFile::untitled(BUILT_IN.to_string(), BUILT_IN_NAME)
             .map_err(|errors| (PathBuf::new(), errors)),
     };
-    reading.hush();
+    reading.mute();
     let setup = Setup {
         file,
         state,
@@ -69,7 +69,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let ended = run_dashboard(setup).map_err(|error| Failure::Failed(error.to_string()))?;
     for exported in &ended.exported {
         match exported {
-            Ok(exported) => say(&told(exported)),
+            Ok(exported) => print_line(&told(exported)),
             Err(why) => warn(why),
         }
     }

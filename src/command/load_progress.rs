@@ -13,14 +13,14 @@ const LARGE: (u64, usize) = (8 << 20, 200_000);
 pub struct LoadReporter {
     /// To be shared by all that read scenes.
     pub assets: Arc<Assets>,
-    aloud: Arc<AtomicBool>,
+    enabled: Arc<AtomicBool>,
 }
 
 impl LoadReporter {
     /// Aloud if somebody looks on.
     pub fn new() -> Self {
-        let aloud = Arc::new(AtomicBool::new(std::io::stderr().is_terminal()));
-        let heard = aloud.clone();
+        let enabled = Arc::new(AtomicBool::new(std::io::stderr().is_terminal()));
+        let heard = enabled.clone();
         let tell = move |stage: &LoadProgress| {
             let large = match stage {
                 LoadProgress::Reading { bytes, .. } => *bytes >= LARGE.0,
@@ -30,11 +30,11 @@ impl LoadReporter {
                 warn(&stage.to_string());
             }
         };
-        Self { assets: Arc::new(Assets::new(tell)), aloud }
+        Self { assets: Arc::new(Assets::new(tell)), enabled }
     }
 
     /// Says no more: the terminal is somebody else's.
-    pub fn hush(&self) {
-        self.aloud.store(false, Ordering::Relaxed);
+    pub fn mute(&self) {
+        self.enabled.store(false, Ordering::Relaxed);
     }
 }

@@ -102,7 +102,7 @@ fn warn(message: &str) {
 }
 
 /// A line on stdout; as [`warn`].
-fn say(message: &str) {
+fn print_line(message: &str) {
     let _ = writeln!(std::io::stdout(), "{}", shown(message));
 }
 

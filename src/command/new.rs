@@ -1,7 +1,7 @@
 //! `zerkalo new`: a scene to start from.
 
 use crate::command::args::NewArgs;
-use crate::command::{Failure, say};
+use crate::command::{Failure, print_line};
 use crate::scene::starter;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -21,6 +21,6 @@ pub fn run(args: &NewArgs) -> Result<(), Failure> {
             _ => format!("cannot write {shown}: {error}"),
         })
     })?;
-    say(&format!("{shown} written; `zerkalo render {shown} -o PICTURE.png` renders it"));
+    print_line(&format!("{shown} written; `zerkalo render {shown} -o PICTURE.png` renders it"));
     Ok(())
 }

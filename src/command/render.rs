@@ -5,7 +5,7 @@ use crate::command::load_progress::LoadReporter;
 use crate::command::progress::Progress;
 use crate::command::signals::Signals;
 use crate::command::stats::{Stats, peak_rss_bytes};
-use crate::command::{Failure, all_threads, say, warn};
+use crate::command::{Failure, all_threads, print_line, warn};
 use crate::film::{Depth, Display, ImageOutput, WriteError};
 use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};
@@ -58,7 +58,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         .ok_or_else(|| Failure::Failed("the renderer has no picture".to_string()))?;
     written.map_err(failed_write)?;
     let write_seconds = writing.elapsed().as_secs_f64();
-    say(&summary(target.path(), size, &report, end));
+    print_line(&summary(target.path(), size, &report, end));
 
     if let Some(path) = &args.stats {
         let stats = Stats {
@@ -121,7 +121,7 @@ fn watch(session: &Session<RenderState>, signals: &Signals) -> Result<End, Failu
         }
         let Some(snapshot) = session.wait(POLL) else { continue };
         match &snapshot.report.state {
-            State::Resting(reason) => break Ok(End::Done(*reason)),
+            State::Finished(reason) => break Ok(End::Done(*reason)),
             State::Failed(why) => break Err(Failure::Failed(why.clone())),
             State::Idle | State::Tracing | State::Paused => progress.show(&snapshot.report),
         }

@@ -46,7 +46,7 @@ pub enum Action {
     /// Moves the eye towards the target, or away.
     Dolly(Direction, StepSize),
     /// Turns the view where the eye stands.
-    Look(Direction),
+    ViewImage(Direction),
     /// Moves eye and target together, along the view's own axes.
     Fly(Direction),
     /// Turns the picture about its centre.
@@ -75,7 +75,7 @@ pub enum Action {
     /// Turns the selection about the vertical.
     Rotate(Direction, StepSize),
     /// Ends the mode.
-    Leave,
+    Cancel,
 
     // Light
     /// Selects the next light.
@@ -105,7 +105,7 @@ pub enum Action {
     /// Asks for a new name.
     Rename,
     /// Puts the selected object on what is below it.
-    Drop,
+    SnapToGround,
     /// Gives the selected object a material of its own.
     OwnMaterial,
 
@@ -115,7 +115,7 @@ pub enum Action {
     /// The panel before.
     PreviousPanel,
     /// Shows or hides everything but the picture.
-    OnlyPicture,
+    ToggleFullscreen,
     /// Moves the cursor of a panel, list or form.
     Cursor(Direction),
     /// The first line of a panel, list or form.

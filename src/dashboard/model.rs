@@ -47,7 +47,7 @@ pub struct File {
     /// Why the file as it is now cannot be read.
     pub broken: Option<SceneErrors>,
     /// Nothing could be read yet: there is nothing to show but `broken`.
-    pub blank: bool,
+    pub unreadable: bool,
 }
 
 /// The inspector's state. Its lines come from `panels::inspector`.
@@ -65,7 +65,7 @@ pub struct Inspector {
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
     /// The kept picture and its mean samples per pixel.
-    pub kept: Option<(Arc<LinearImage>, f64)>,
+    pub pinned: Option<(Arc<LinearImage>, f64)>,
     /// What is shown.
     pub shown: CompareView,
 }
@@ -232,19 +232,19 @@ pub fn short_name(path: &Path) -> String {
 
 impl Model {
     /// The model of a program that has just been started. The run shows its scene
-    /// ([`Model::scene`]) unless [`File::blank`].
+    /// ([`Model::scene`]) unless [`File::unreadable`].
     pub fn new(start: Start) -> Self {
         let (scene, broken) = match start.scene {
             Ok(scene) => (scene, None),
             Err(errors) => (Arc::new(Scene::default()), Some(errors)),
         };
         let name = start.path.as_deref().map_or(sanitized(&start.name), short_name);
-        let blank = broken.is_some();
+        let unreadable = broken.is_some();
         let selection = Target::Camera;
         Self {
             screen: start.screen,
             colors: start.colors,
-            file: File { path: start.path, name, saved: Arc::clone(&scene), broken, blank },
+            file: File { path: start.path, name, saved: Arc::clone(&scene), broken, unreadable },
             history: History::new(scene),
             selection,
             focus: Focus::Picture,
@@ -346,7 +346,7 @@ impl Model {
     }
 
     /// When the screen changes by itself: send a [`Tick`](crate::dashboard::message::Message::Tick) then.
-    pub fn wakes_at(&self) -> Option<Duration> {
+    pub fn next_timeout(&self) -> Option<Duration> {
         self.notice.as_ref().and_then(|notice| notice.until)
     }
 }

@@ -52,7 +52,7 @@ pub(super) struct Coverage {
 }
 
 /// Divides `pixels` into `cells` of equal width.
-pub(super) fn covers(pixels: usize, cells: usize) -> Vec<Coverage> {
+pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     let edge = |cell: usize| cell as f64 * pixels as f64 / cells as f64;
     let cover = |cell: usize| {
         let (from, to) = (edge(cell), edge(cell + 1));
@@ -84,7 +84,7 @@ impl Film {
 
 /// Gives cells without samples the means of the nearest known cell of their row, then rows without
 /// any the means of the nearest row.
-pub(super) fn spread(
+pub(super) fn fill_gaps(
     means: &mut [f32],
     known: &mut [bool],
     cols: usize,
@@ -232,7 +232,7 @@ mod tests {
         let mut film = film(32, 32, &[1.0]);
         for slot in film.slots(&[1, 0]) {
             let value = slot.index as i64 + 3;
-            let tile = slot.open();
+            let tile = slot.prepare();
             (0..256).for_each(|p| tile.add(0, p, &[value; 3]));
             tile.advance(0, 1);
         }

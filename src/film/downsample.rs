@@ -2,7 +2,7 @@
 //! has changed since the last one, not what the film is large.
 
 use crate::film::TILE;
-use crate::film::box_filter::{Coverage, Thumbnail, covers, spread};
+use crate::film::box_filter::{Coverage, Thumbnail, coverage, fill_gaps};
 use crate::film::film::Film;
 use crate::film::light_weights::Replicates;
 use crate::film::tile::Tile;
@@ -59,8 +59,8 @@ impl IncrementalDownsample {
     pub fn new(film: &Film, cols: usize, rows: usize) -> Self {
         let size = [film.width(), film.height()];
         let spans = |pixels: usize, cells: usize| {
-            let covers = covers(pixels, cells);
-            (0..pixels.div_ceil(TILE)).map(|t| Span::new(t * TILE, pixels, &covers)).collect()
+            let coverage = coverage(pixels, cells);
+            (0..pixels.div_ceil(TILE)).map(|t| Span::new(t * TILE, pixels, &coverage)).collect()
         };
         let layout = Layout {
             cols,
@@ -120,22 +120,22 @@ impl IncrementalDownsample {
             let mean = |sum: &f64| if area > 0.0 { (sum / area) as f32 } else { 0.0 };
             means.extend(cell[1..].iter().map(mean));
         }
-        spread(&mut means, &mut known, cols, rows, stride);
+        fill_gaps(&mut means, &mut known, cols, rows, stride);
         Thumbnail::new([cols, rows], means, groups)
     }
 }
 
 impl Span {
     /// Of the tile that begins at pixel `start` of `pixels`.
-    fn new(start: usize, pixels: usize, covers: &[Coverage]) -> Self {
+    fn new(start: usize, pixels: usize, coverage: &[Coverage]) -> Self {
         let end = (start + TILE).min(pixels);
         let touched =
             |cover: &Coverage| cover.first < end && cover.first + cover.parts.len() > start;
-        let first = covers.iter().position(touched).unwrap_or(0);
-        let len = covers[first.min(covers.len())..].iter().take_while(|c| touched(c)).count();
+        let first = coverage.iter().position(touched).unwrap_or(0);
+        let len = coverage[first.min(coverage.len())..].iter().take_while(|c| touched(c)).count();
         let cells_of = |pixel: usize| {
             let part = |i: usize| {
-                let cover = &covers[first + i];
+                let cover = &coverage[first + i];
                 let part = *cover.parts.get(pixel.checked_sub(cover.first)?)?;
                 (part > 0.0).then_some((i, part))
             };
@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(refresh(&mut raster, &film), 15);
         assert_eq!(refresh(&mut raster, &film), 0);
         for slot in film.slots(&[3, 14]) {
-            let tile = slot.open();
+            let tile = slot.prepare();
             tile.add(1, 17, &[500; 6]);
             tile.advance(1, 1);
         }

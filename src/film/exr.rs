@@ -131,7 +131,7 @@ impl<'a> Rows<'a> {
     fn new(picture: &'a ImageData<'a>, sources: Vec<Source>) -> Self {
         Self {
             picture,
-            mixed: picture.mix.per_unit(picture.film.scales()),
+            mixed: picture.mix.radiance_per_step(picture.film.scales()),
             loaded: None,
             bytes: sources.iter().map(|_| Vec::new()).collect(),
             sources,

@@ -30,7 +30,7 @@ pub struct Film {
     tiles: Vec<Tile>,
 }
 
-/// A tile handed to a worker, which makes it ready (allocates or clears it) by [`TileHandle::open`].
+/// A tile handed to a worker, which makes it ready (allocates or clears it) by [`TileHandle::prepare`].
 #[derive(Debug)]
 pub struct TileHandle<'a> {
     /// Number of the tile.
@@ -43,8 +43,8 @@ pub struct TileHandle<'a> {
 
 impl<'a> TileHandle<'a> {
     /// The tile, ready to be added to.
-    pub fn open(self) -> &'a mut Tile {
-        self.tile.touch(self.epoch);
+    pub fn prepare(self) -> &'a mut Tile {
+        self.tile.clear_if_stale(self.epoch);
         self.tile
     }
 }
@@ -96,7 +96,7 @@ impl Film {
         let inside = |size: usize, i: usize| (size - i * TILE).min(TILE);
         let tiles = (0..columns * rows)
             .map(|t| [inside(*width, t % columns), inside(*height, t / columns)])
-            .map(|extent| Tile::untouched(scales.len(), extent))
+            .map(|extent| Tile::cleared(scales.len(), extent))
             .collect();
         Self { epoch: 1, tiles, header }
     }
@@ -105,7 +105,7 @@ impl Film {
     ///
     /// # Panics
     /// As [`Film::new`].
-    pub fn renewed(mut self, header: Header) -> Self {
+    pub fn reuse_for(mut self, header: Header) -> Self {
         if header == self.header {
             self.restart();
             return self;
@@ -250,7 +250,7 @@ impl Film {
         self.check_addable(other)?;
         for (index, theirs) in other.touched() {
             let ours = &mut self.tiles[index];
-            ours.touch(self.epoch);
+            ours.clear_if_stale(self.epoch);
             ours.add_tile(theirs).map_err(|()| Mismatch::Overlap(index))?;
         }
         Ok(())
@@ -299,7 +299,7 @@ mod tests {
         let order: Vec<_> = slots.iter().map(|slot| (slot.index, slot.origin)).collect();
         assert_eq!(order, [(4, [16, 16]), (0, [0, 0]), (5, [32, 16]), (2, [32, 0])]);
         // Only opened tiles are touched.
-        slots.into_iter().nth(2).unwrap().open().advance(0, 3);
+        slots.into_iter().nth(2).unwrap().prepare().advance(0, 3);
         let touched: Vec<_> = film.touched().map(|(i, tile)| (i, tile.counts())).collect();
         assert_eq!(touched, [(5, [3, 0])]);
         assert_eq!(film.samples(), 3 * 256);
@@ -336,7 +336,7 @@ mod tests {
         // Fewer, more and equally many tiles; more and fewer groups.
         for (width, height, groups) in [(20, 20, 1), (70, 30, 3), (70, 30, 2), (40, 40, 1)] {
             let (header, bytes) = wanted(width, height, groups);
-            old = old.renewed(header);
+            old = old.reuse_for(header);
             assert_eq!((old.samples(), old.touched().count()), (0, 0));
             fill(&mut old, 1, |x, _, _| value(x).repeat(groups));
             assert_eq!(old.bytes(), bytes, "{width} x {height}, {groups} groups");
@@ -373,7 +373,7 @@ mod tests {
     fn the_first_sample_is_not_added_twice() {
         let lattice = || {
             let mut film = film(16, 16, &[1.0]);
-            film.slots(&[0]).remove(0).open().set_lattice(8);
+            film.slots(&[0]).remove(0).prepare().set_lattice(8);
             film
         };
         let mut ours = lattice();

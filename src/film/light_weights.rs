@@ -18,7 +18,7 @@ impl LightWeights {
     }
 
     /// The factors that turn sums into radiance times count.
-    pub(super) fn per_unit(&self, scales: &[f64]) -> Vec<f64> {
+    pub(super) fn radiance_per_step(&self, scales: &[f64]) -> Vec<f64> {
         assert_eq!(self.weights.len(), scales.len(), "weights for the groups of the film");
         self.weights.iter().zip(scales).flat_map(|(w, scale)| w.map(|w| w / scale)).collect()
     }
@@ -96,7 +96,7 @@ impl Film {
         assert!(x < self.width() && y < self.height(), "pixel ({x}, {y}) of the film");
         let index = y / TILE * self.tile_columns() + x / TILE;
         let pixel = y % TILE * TILE + x % TILE;
-        let per_unit = mix.per_unit(self.scales());
+        let per_unit = mix.radiance_per_step(self.scales());
         self.tile(index).map_or([0.0; 3], |tile| tile.sums(pixel).mean(Replicates::Both, &per_unit))
     }
 
@@ -104,7 +104,7 @@ impl Film {
     pub fn row(&self, y: usize, part: Replicates, mix: &LightWeights, row: &mut Vec<[f64; 3]>) {
         row.clear();
         row.resize(self.width(), [0.0; 3]);
-        let per_unit = mix.per_unit(self.scales());
+        let per_unit = mix.radiance_per_step(self.scales());
         self.visit_row(y, |x, sums| row[x] = sums.mean(part, &per_unit));
     }
 

@@ -1,6 +1,6 @@
 //! A whole picture in linear light, kept while the film goes on.
 
-use crate::film::box_filter::{Coverage, covers, spread};
+use crate::film::box_filter::{Coverage, coverage, fill_gaps};
 use crate::film::film::Film;
 use crate::film::light_weights::{LightWeights, Replicates};
 
@@ -18,7 +18,7 @@ impl Film {
     /// some, a row without samples like the nearest row.
     pub fn linear(&self, mix: &LightWeights) -> LinearImage {
         let (width, height) = (self.width(), self.height());
-        let per_unit = mix.per_unit(self.scales());
+        let per_unit = mix.radiance_per_step(self.scales());
         let mut pixels = vec![[0.0f32; 3]; width * height];
         let mut known = vec![false; width * height];
         for y in 0..height {
@@ -29,7 +29,7 @@ impl Film {
             });
         }
         if !known.iter().all(|k| *k) {
-            spread(pixels.as_flattened_mut(), &mut known, width, height, 3);
+            fill_gaps(pixels.as_flattened_mut(), &mut known, width, height, 3);
         }
         LinearImage { width, height, pixels }
     }
@@ -53,7 +53,7 @@ impl LinearImage {
     /// The means over `cols` x `rows` cells that together cover the picture, `[row][column]`,
     /// weighted by area as in [`Film::thumbnail`].
     pub fn resampled(&self, cols: usize, rows: usize) -> Vec<[f32; 3]> {
-        let (xs, ys) = (covers(self.width, cols), covers(self.height, rows));
+        let (xs, ys) = (coverage(self.width, cols), coverage(self.height, rows));
         let mut out = Vec::with_capacity(cols * rows);
         let mut sums = vec![[0.0f64; 3]; cols];
         for y in &ys {

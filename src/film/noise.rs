@@ -54,9 +54,9 @@ impl Mse {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileNoise {
     /// To be told: nothing was decided by it.
-    pub told: Mse,
+    pub reported: Mse,
     /// To decide by, from other pixels.
-    pub guide: Mse,
+    pub allocation: Mse,
     /// Sum over the pixels of the square of each one's squared error, which is summed over its channels. Shows in how
     /// many pixels the error sits.
     pub squares: Mse,
@@ -77,7 +77,7 @@ impl Estimator {
     /// For tiles of films with these `scales` (see [`Film::scales`]).
     pub fn new(scales: &[f64], mix: &LightWeights, display: &Display) -> Self {
         Self {
-            per_unit: mix.per_unit(scales),
+            per_unit: mix.radiance_per_step(scales),
             exposure: display.exposure_factor(),
             tone: display.tone,
             curve: SrgbTable::shared(),
@@ -145,7 +145,7 @@ impl Estimator {
         // A single pixel does both.
         let black = over(halves[0], pixels.div_ceil(2));
         let white = if pixels > 1 { over(halves[1], pixels / 2) } else { black };
-        Some(TileNoise { told: white, guide: black, squares, pixels: pixels as u32 })
+        Some(TileNoise { reported: white, allocation: black, squares, pixels: pixels as u32 })
     }
 
     #[inline(always)]
@@ -173,8 +173,8 @@ impl TileNoise {
             (black * black_mse + white * white_mse) / (black + white)
         };
         Mse {
-            linear: mean(self.guide.linear, self.told.linear),
-            codes: mean(self.guide.codes, self.told.codes),
+            linear: mean(self.allocation.linear, self.reported.linear),
+            codes: mean(self.allocation.codes, self.reported.codes),
         }
     }
 }
@@ -204,7 +204,7 @@ impl Noise {
         for tile in tiles {
             let tile = tile?;
             let weight = f64::from(tile.pixels);
-            told.add(weight, tile.told);
+            told.add(weight, tile.reported);
             all.add(weight, tile.of_all());
             squares.add(1.0, tile.squares);
             pixels += weight;

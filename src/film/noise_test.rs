@@ -74,7 +74,7 @@ fn ratios(n: u32, normal: bool, stratified: bool, dark: [f64; 3]) -> Outcome {
         outcome.codes.push(codes.sqrt() / noise.rmse_codes);
         let estimator = Estimator::new(film.scales(), &mix, &display);
         for (index, tile) in film.touched() {
-            tiles[index].push(estimator.tile(tile).unwrap().told.codes.sqrt());
+            tiles[index].push(estimator.tile(tile).unwrap().reported.codes.sqrt());
         }
     }
     let spreads: Vec<_> = tiles
@@ -153,15 +153,15 @@ fn one_pixel_by_hand() {
     let tile = Estimator::new(film.scales(), &mix, &display).tile(film.tile(0).unwrap()).unwrap();
     // Red 0.125 and 0.25, blue 0.25 + 0.25 and 0.25.
     let expected = (0.0625f64.powi(2) + 0.125f64.powi(2)) / 3.0;
-    assert!((tile.told.linear - expected).abs() < 1e-15, "{tile:?}");
+    assert!((tile.reported.linear - expected).abs() < 1e-15, "{tile:?}");
     let code = |x: f64| display.codes([x; 3])[0];
     let apart = |a: f64, b: f64| {
         let m = code(0.5 * (a + b));
         0.5 * ((code(a) - m).powi(2) + (code(b) - m).powi(2))
     };
     let expected = (apart(0.125, 0.25) + apart(0.5, 0.25)) / 3.0;
-    assert!((tile.told.codes / expected - 1.0).abs() < 1e-4, "{tile:?} {expected}");
-    assert_eq!((tile.pixels, tile.guide), (1, tile.told));
+    assert!((tile.reported.codes / expected - 1.0).abs() < 1e-4, "{tile:?} {expected}");
+    assert_eq!((tile.pixels, tile.allocation), (1, tile.reported));
     // Far over white nothing is seen of the difference.
     let bright = Display { exposure_ev: 9.0, tone: Tone::Clip };
     let noise = film.noise(&LightWeights::only(0, 2), &bright).unwrap();
@@ -209,9 +209,9 @@ fn unequal_counts_have_no_noise() {
         effective_pixels: Mse::default(),
     };
     assert_eq!(noise(&film), Some(zero));
-    film.slots(&[1]).remove(0).open().advance(0, 1);
+    film.slots(&[1]).remove(0).prepare().advance(0, 1);
     assert_eq!(noise(&film), None);
-    film.slots(&[1]).remove(0).open().advance(1, 1);
+    film.slots(&[1]).remove(0).prepare().advance(1, 1);
     assert!(noise(&film).is_some());
     film.restart();
     each_tile(&mut film, |tile, _| tile.set_lattice(8));
@@ -240,8 +240,8 @@ fn a_lagging_replicate_still_has_an_estimate() {
         let tile = film.tile(0).unwrap();
         assert_eq!(estimator.tile(tile), None);
         let noise = estimator.tile_so_far(tile).unwrap();
-        estimates += noise.told.linear;
-        codes += noise.told.codes;
+        estimates += noise.reported.linear;
+        codes += noise.reported.codes;
         let truth = display.codes([0.5; 3])[0];
         for pixel in 0..256 {
             let value = film.pixel(pixel % 16, pixel / 16, &white(1));
@@ -257,7 +257,7 @@ fn a_lagging_replicate_still_has_an_estimate() {
 fn the_picture_sums_up_its_tiles() {
     let tile = |codes: f64, pixels| {
         let told = Mse { linear: 0.01, codes: codes * codes };
-        Some(TileNoise { told, guide: told, squares: Mse::SPREAD, pixels })
+        Some(TileNoise { reported: told, allocation: told, squares: Mse::SPREAD, pixels })
     };
     let tiles = (1..=20).map(|i| tile(f64::from(i), 256)).chain([tile(7.0, 0)]);
     let noise = Noise::of_tiles(tiles).unwrap();
@@ -267,8 +267,12 @@ fn the_picture_sums_up_its_tiles() {
     // Of the estimates from half the pixels and from all the larger one counts.
     let of = |told: f64, guide: f64| {
         let mse = |x: f64| Mse { linear: x, codes: x };
-        let tile =
-            TileNoise { told: mse(told), guide: mse(guide), squares: Mse::SPREAD, pixels: 256 };
+        let tile = TileNoise {
+            reported: mse(told),
+            allocation: mse(guide),
+            squares: Mse::SPREAD,
+            pixels: 256,
+        };
         Noise::of_tiles([Some(tile)]).unwrap().rmse_codes
     };
     assert_eq!((of(4.0, 2.0), of(2.0, 6.0)), (2.0, 2.0));

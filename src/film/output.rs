@@ -61,7 +61,7 @@ pub struct ImageOutput {
     path: PathBuf,
     format: usize,
     /// There must be no file yet.
-    fresh: bool,
+    create_new: bool,
 }
 
 /// Why a picture cannot be written: the path, what is wrong, what would help.
@@ -92,7 +92,7 @@ impl ImageOutput {
             .as_ref()
             .and_then(|e| FORMATS.iter().position(|f| e.eq_ignore_ascii_case(f.extension)));
         match known {
-            Some(format) => Ok(Self { path, format, fresh: false }),
+            Some(format) => Ok(Self { path, format, create_new: false }),
             None => {
                 let known: Vec<_> = FORMATS.iter().map(|f| format!(".{}", f.extension)).collect();
                 Err(WriteError {
@@ -109,8 +109,8 @@ impl ImageOutput {
 
     /// The same, but a file that is there, or comes into being before this one is complete, is not
     /// overwritten: writing fails.
-    pub fn fresh(self) -> Self {
-        Self { fresh: true, ..self }
+    pub fn create_new(self) -> Self {
+        Self { create_new: true, ..self }
     }
 
     /// The file that is to be written.
@@ -140,7 +140,7 @@ impl ImageOutput {
         encode(&mut out).and_then(|()| out.flush()).map_err(explain)?;
         let temporary = out.into_inner().map_err(|e| explain(e.into_error()))?;
         temporary.as_file().sync_all().map_err(explain)?;
-        let put = match self.fresh {
+        let put = match self.create_new {
             true => temporary.persist_noclobber(&file),
             false => temporary.persist(&file),
         };
@@ -320,7 +320,7 @@ mod tests {
     fn what_is_to_be_fresh_overwrites_nothing() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
-        let target = ImageOutput::from_path(&path).unwrap().fresh();
+        let target = ImageOutput::from_path(&path).unwrap().create_new();
         target.replace(|sink| sink.write_all(b"new")).unwrap();
         let error = target.replace(|sink| sink.write_all(b"newer")).unwrap_err().to_string();
         assert!(error.contains("such a file already"), "{error}");

@@ -49,7 +49,7 @@ impl Film {
         let Some(tile) = self.tile(y / TILE * self.tile_columns() + x / TILE) else {
             return Some(probe);
         };
-        let per_unit = mix.per_unit(self.scales());
+        let per_unit = mix.radiance_per_step(self.scales());
         let sums = tile.sums(y % TILE * TILE + x % TILE);
         probe.samples = sums.counts;
         probe.radiance = sums.mean(Replicates::Both, &per_unit);

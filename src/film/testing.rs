@@ -42,7 +42,7 @@ pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
     let all: Vec<_> = (0..film.tile_count()).collect();
     for slot in film.slots(&all) {
         let origin = slot.origin;
-        f(slot.open(), origin);
+        f(slot.prepare(), origin);
     }
 }
 

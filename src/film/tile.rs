@@ -45,7 +45,7 @@ pub struct Tile {
 }
 
 impl Tile {
-    pub(super) fn untouched(groups: usize, extent: [usize; 2]) -> Self {
+    pub(super) fn cleared(groups: usize, extent: [usize; 2]) -> Self {
         Self {
             epoch: 0,
             stride: groups * 3,
@@ -71,7 +71,7 @@ impl Tile {
     }
 
     /// Makes the tile one of `epoch`: allocates or clears it if it is not one yet.
-    pub(super) fn touch(&mut self, epoch: u64) {
+    pub(super) fn clear_if_stale(&mut self, epoch: u64) {
         if self.epoch == epoch {
             return;
         }
@@ -299,8 +299,8 @@ mod tests {
     use super::*;
 
     fn tile() -> Tile {
-        let mut tile = Tile::untouched(2, [16, 16]);
-        tile.touch(1);
+        let mut tile = Tile::cleared(2, [16, 16]);
+        tile.clear_if_stale(1);
         tile
     }
 
@@ -357,19 +357,19 @@ mod tests {
         tile.add(0, 0, &[1; 6]);
         tile.advance(0, 1);
         tile.record_saturated(3);
-        tile.touch(1);
+        tile.clear_if_stale(1);
         assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (1, [1, 0]));
         assert_eq!(tile.saturated_samples(), 3);
-        tile.touch(2);
+        tile.clear_if_stale(2);
         assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (0, [0, 0]));
         assert_eq!(tile.saturated_samples(), 0);
         // Also where the first thing that happens is a write, and in memory of another stride.
         tile.add(0, 0, &[2; 6]);
         assert_eq!((tile.pixel(0, 0), tile.pixel(1, 0)), (&[2; 6][..], &[0; 6][..]));
         for groups in [1, 3] {
-            let memory = std::mem::replace(&mut tile, Tile::untouched(groups, [16, 16]));
+            let memory = std::mem::replace(&mut tile, Tile::cleared(groups, [16, 16]));
             tile = tile.with_memory(memory.into_memory());
-            tile.touch(7);
+            tile.clear_if_stale(7);
             tile.add(1, 255, &vec![5; 3 * groups]);
             assert_eq!(tile.pixel(1, 255), vec![5; 3 * groups]);
             assert!((0..255).all(|p| tile.pixel(1, p) == vec![0; 3 * groups]));

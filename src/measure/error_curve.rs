@@ -49,7 +49,7 @@ fn taken(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) -> Option
 
 /// The way of `variation`, with errors, the share of the processors that others took meanwhile, and the
 /// picture at its end.
-pub fn walk(
+pub fn follow(
     variation: &Variant,
     reference: &Reference,
     end: End,

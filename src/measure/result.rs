@@ -42,7 +42,7 @@ pub struct Measured {
     pub points: Vec<Point>,
     /// Of each repetition, the share of the processors' time that other programs took meanwhile; `None`:
     /// nobody knows.
-    pub taken: Vec<Option<f64>>,
+    pub stolen: Vec<Option<f64>>,
     /// Compared with the reference at the end, if its expectation may be another one.
     pub bias: Option<Bias>,
 }
@@ -80,7 +80,7 @@ pub struct Steadiness {
     pub spread: f64,
     /// The greatest share of the processors that others took while those were taken; `None`: nobody
     /// knows.
-    pub taken: Option<f64>,
+    pub stolen: Option<f64>,
 }
 
 /// A repetition counts as undisturbed if others took no more than this share of the processors.
@@ -132,7 +132,7 @@ impl Measured {
     pub fn new(
         variation: &Variant,
         points: Vec<Point>,
-        taken: Option<f64>,
+        stolen: Option<f64>,
         bias: Option<Bias>,
     ) -> Self {
         Self {
@@ -140,7 +140,7 @@ impl Measured {
             name: variation.name.clone(),
             threads: variation.threads,
             points,
-            taken: vec![taken],
+            stolen: vec![stolen],
             bias,
         }
     }
@@ -148,8 +148,8 @@ impl Measured {
     /// The repetitions that count: those in which nobody else took the processors; if they are too few,
     /// the calmest.
     fn counted(&self) -> Vec<usize> {
-        let of = |i: &usize| self.taken[*i].unwrap_or(0.0);
-        let mut all: Vec<usize> = (0..self.taken.len()).collect();
+        let of = |i: &usize| self.stolen[*i].unwrap_or(0.0);
+        let mut all: Vec<usize> = (0..self.stolen.len()).collect();
         all.sort_by(|a, b| of(a).total_cmp(&of(b)));
         let calm = all.iter().filter(|i| of(i) <= CALM).count();
         all.truncate(calm.max(LEAST));
@@ -163,11 +163,11 @@ impl Measured {
 
     /// The greatest share of the processors that others took in the repetitions that count.
     fn most_taken(&self) -> Option<f64> {
-        self.counted().into_iter().filter_map(|i| self.taken[i]).reduce(f64::max)
+        self.counted().into_iter().filter_map(|i| self.stolen[i]).reduce(f64::max)
     }
 
     /// Where the true error came down to `codes`, between points on straight lines of the logarithms.
-    pub fn crossing(&self, codes: f64) -> Option<TimeToTarget> {
+    pub fn time_to(&self, codes: f64) -> Option<TimeToTarget> {
         self.crossing_of(codes, |p| {
             let certain = p.errors.spread <= DOUBTFUL;
             if certain { p.errors.rmse_codes } else { f64::INFINITY }
@@ -175,13 +175,13 @@ impl Measured {
     }
 
     /// The same of the error that the program told, for what is never right.
-    pub fn told_crossing(&self, codes: f64) -> Option<TimeToTarget> {
+    pub fn estimated_time_to(&self, codes: f64) -> Option<TimeToTarget> {
         self.crossing_of(codes, |p| p.told_codes.unwrap_or(f64::INFINITY))
     }
 
     /// The one of them that says when it is as quiet as it gets: of what is never right, what it told.
-    pub fn own_crossing(&self, codes: f64) -> Option<TimeToTarget> {
-        if self.bias.is_some() { self.told_crossing(codes) } else { self.crossing(codes) }
+    pub fn true_time_to(&self, codes: f64) -> Option<TimeToTarget> {
+        if self.bias.is_some() { self.estimated_time_to(codes) } else { self.time_to(codes) }
     }
 
     fn crossing_of(&self, codes: f64, of: impl Fn(&Point) -> f64) -> Option<TimeToTarget> {
@@ -235,15 +235,15 @@ impl Measured {
 impl Measurement {
     /// Of the times that are told: those to the targets, and those that settings are compared by.
     pub fn steadiness(&self) -> Steadiness {
-        let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0, taken: None };
+        let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0, stolen: None };
         for (i, measured) in self.measured.iter().enumerate() {
             let targets = self.targets.iter().filter(|_| i == 0).copied();
             for codes in targets.chain([self.compared_at]) {
-                let Some(crossing) = measured.own_crossing(codes) else { continue };
-                all.spread = all.spread.max(crossing.spread);
+                let Some(time_to) = measured.true_time_to(codes) else { continue };
+                all.spread = all.spread.max(time_to.spread);
                 all.repetitions = all.repetitions.min(measured.counted().len());
             }
-            all.taken = [all.taken, measured.most_taken()].into_iter().flatten().reduce(f64::max);
+            all.stolen = [all.stolen, measured.most_taken()].into_iter().flatten().reduce(f64::max);
         }
         if all.repetitions == usize::MAX {
             all.repetitions = 0;
@@ -252,7 +252,7 @@ impl Measurement {
     }
 
     /// The largest share by which another reference could change the errors that are told.
-    pub fn doubt(&self) -> f64 {
+    pub fn reference_uncertainty(&self) -> f64 {
         let points = self.measured.iter().flat_map(|m| &m.points);
         let told = points.map(|p| p.errors.spread).filter(|spread| *spread <= DOUBTFUL);
         told.fold(0.0, f64::max)
@@ -283,7 +283,7 @@ mod tests {
             name: String::new(),
             threads: 1,
             points: points.iter().enumerate().map(point).collect(),
-            taken: vec![None; 3],
+            stolen: vec![None; 3],
             bias: None,
         }
     }
@@ -292,12 +292,12 @@ mod tests {
     fn crossings_lie_on_the_power_law() {
         // error = 8 / sqrt(spp)
         let way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
-        let at = way.crossing(2f64.sqrt()).unwrap();
+        let at = way.time_to(2f64.sqrt()).unwrap();
         assert!((at.spp - 32.0).abs() < 1e-9 && (at.seconds - 0.064).abs() < 1e-12, "{at:?}");
         assert!(!at.at_most && (at.spread - 1.0).abs() < 1e-12);
-        assert!(way.crossing(3.0).unwrap().at_most);
-        assert_eq!(way.crossing(0.4), None);
-        assert!((way.told_crossing(2.0).unwrap().spp - 64.0).abs() < 1e-9);
+        assert!(way.time_to(3.0).unwrap().at_most);
+        assert_eq!(way.time_to(0.4), None);
+        assert!((way.estimated_time_to(2.0).unwrap().spp - 64.0).abs() < 1e-9);
         assert!((way.slope().unwrap().value + 0.5).abs() < 1e-12);
         assert!((way.samples_per_second().unwrap().0 - 500.0).abs() < 1e-9);
     }
@@ -344,8 +344,8 @@ mod tests {
             let first = point.spp * 1e-3;
             point.seconds = (0..9).map(|i| first * [1.0, 3.0, 1.0, 1.1][i % 4]).collect();
         }
-        way.taken = [0.0, 0.4, 0.01, 0.0].into_iter().cycle().take(9).map(Some).collect();
-        let at = way.crossing(1.0).unwrap();
+        way.stolen = [0.0, 0.4, 0.01, 0.0].into_iter().cycle().take(9).map(Some).collect();
+        let at = way.time_to(1.0).unwrap();
         assert!((at.seconds - 0.064).abs() < 1e-12 && (at.spread - 0.05).abs() < 1e-9, "{at:?}");
         let mut measurement = Measurement {
             size: [1, 1],
@@ -360,11 +360,11 @@ mod tests {
             measured: vec![way],
         };
         let steady = measurement.steadiness();
-        assert_eq!((steady.repetitions, steady.taken), (7, Some(0.01)));
-        measurement.measured[0].taken = (0..9).map(|i| Some(0.1 + 0.1 * f64::from(i))).collect();
+        assert_eq!((steady.repetitions, steady.stolen), (7, Some(0.01)));
+        measurement.measured[0].stolen = (0..9).map(|i| Some(0.1 + 0.1 * f64::from(i))).collect();
         let steady = measurement.steadiness();
         assert_eq!(steady.repetitions, 5);
-        assert!((steady.taken.unwrap() - 0.5).abs() < 1e-12);
+        assert!((steady.stolen.unwrap() - 0.5).abs() < 1e-12);
         assert!((steady.spread - 1.0).abs() < 1e-9, "1, 3, 1, 1.1, 1: {steady:?}");
     }
 
@@ -373,7 +373,7 @@ mod tests {
     fn a_doubtful_error_reaches_no_target() {
         let mut way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
         way.points[2].errors.spread = 0.3;
-        assert!(way.crossing(1.0).is_some());
-        assert_eq!(way.crossing(0.5), None);
+        assert!(way.time_to(1.0).is_some());
+        assert_eq!(way.time_to(0.5), None);
     }
 }

@@ -1,6 +1,6 @@
 //! The measurement itself.
 
-use crate::measure::error_curve::{End, repeat, walk};
+use crate::measure::error_curve::{End, follow, repeat};
 use crate::measure::experiment::{Experiment, Plan, Variant};
 use crate::measure::reference::Reference;
 use crate::measure::result::{Expected, Measured, Measurement, spread};
@@ -77,19 +77,19 @@ pub fn measure(
         go_on &= tell(Progress { what: &variation.name, done: 1 + i, of });
         let codes = if i == 0 { least } else { compared_at };
         let end = End { codes, seconds: longest, told: !variation.topic.unbiased() };
-        let (points, taken, course) = walk(variation, reference, end)?;
+        let (points, taken, course) = follow(variation, reference, end)?;
         let rendering = course.rendering();
         let bias =
             (!variation.topic.unbiased()).then(|| reference.bias(&rendering.film, &rendering.mix));
         let result = Measured::new(variation, points, taken, bias);
         if i == 0 {
-            let missed = plan.targets.iter().filter(|codes| result.crossing(**codes).is_none());
+            let missed = plan.targets.iter().filter(|codes| result.time_to(**codes).is_none());
             expected = missed.filter_map(|codes| expect(&course, *codes)).collect();
             let left = plan.seconds - begun.elapsed().as_secs_f64();
             let ways = plan.repetitions.max(1) * (variations.len() - 1);
             let own = (plan.repetitions.max(1) - 1) as f64 * course.seconds();
             compared_at = level(&result, &plan.targets, (left - own) / (2 * ways.max(1)) as f64);
-            longest = SLOWEST * result.crossing(compared_at).map_or(longest, |c| c.seconds);
+            longest = SLOWEST * result.time_to(compared_at).map_or(longest, |c| c.seconds);
         }
         measured.push(result);
     }
@@ -113,7 +113,7 @@ pub fn measure(
                 break;
             }
             let taken = repeat(variation, &mut result.points)?;
-            result.taken.push(taken);
+            result.stolen.push(taken);
         }
         round_seconds = begun.elapsed().as_secs_f64() - passed;
         round += 1;
@@ -144,7 +144,7 @@ fn level(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     let mut levels: Vec<f64> = targets.iter().copied().chain([0.5, 1.0, 2.0, 4.0, 8.0]).collect();
     levels.retain(|codes| *codes >= COMPARED_AT);
     levels.sort_by(f64::total_cmp);
-    let reached: Vec<_> = levels.iter().filter_map(|codes| default.crossing(*codes)).collect();
+    let reached: Vec<_> = levels.iter().filter_map(|codes| default.time_to(*codes)).collect();
     let in_time = reached.iter().find(|c| c.seconds <= seconds && !c.at_most);
     let any = || reached.iter().rev().find(|c| !c.at_most).or(reached.first());
     let end = || default.points.last().map_or(COMPARED_AT, |p| p.errors.rmse_codes);
@@ -154,7 +154,7 @@ fn level(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
 /// Whether a way's time to `codes`, or to its end, needs no more repetitions.
 fn is_steady(measured: &Measured, codes: f64) -> bool {
     let end = || measured.points.last().map_or(0.0, |p| spread(&measured.seconds(p)));
-    measured.own_crossing(codes).map_or_else(end, |c| c.spread) <= STEADY
+    measured.true_time_to(codes).map_or_else(end, |c| c.spread) <= STEADY
 }
 
 fn warm_up(variation: &Variant) -> io::Result<()> {
@@ -209,7 +209,7 @@ mod tests {
             name: String::new(),
             threads: 1,
             points: points.iter().map(point).collect(),
-            taken: vec![None; 3],
+            stolen: vec![None; 3],
             bias: None,
         }
     }

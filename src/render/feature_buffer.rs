@@ -14,7 +14,7 @@ pub struct FeatureBuffer {
     /// Rows of cells.
     pub rows: usize,
     /// `[row][column]`.
-    sights: Vec<FirstHit>,
+    texels: Vec<FirstHit>,
 }
 
 impl FeatureBuffer {
@@ -26,20 +26,20 @@ impl FeatureBuffer {
         look: impl Fn(&[[f64; 2]], &mut [FirstHit]) + Sync,
         pool: &rayon::ThreadPool,
     ) -> Self {
-        let mut sights = vec![FirstHit::MISS; columns * rows];
+        let mut texels = vec![FirstHit::MISS; columns * rows];
         let center = |cell: usize, cells: usize, pixels: usize| {
             (cell as f64 + 0.5) * pixels as f64 / cells as f64
         };
         pool.install(|| {
-            sights.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, sights)| {
-                let cells = chunk * CHUNK..chunk * CHUNK + sights.len();
+            texels.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, texels)| {
+                let cells = chunk * CHUNK..chunk * CHUNK + texels.len();
                 let point = |i: usize| {
                     [center(i % columns, columns, width), center(i / columns, rows, height)]
                 };
-                look(&cells.map(point).collect::<Vec<_>>(), sights);
+                look(&cells.map(point).collect::<Vec<_>>(), texels);
             });
         });
-        Self { columns, rows, sights }
+        Self { columns, rows, texels }
     }
 
     /// What is seen in a cell; `None`: there is no such cell.
@@ -47,11 +47,11 @@ impl FeatureBuffer {
         if column >= self.columns {
             return None;
         }
-        self.sights.get(row * self.columns + column)
+        self.texels.get(row * self.columns + column)
     }
 
     /// All cells, `[row][column]`.
-    pub fn sights(&self) -> &[FirstHit] {
-        &self.sights
+    pub fn texels(&self) -> &[FirstHit] {
+        &self.texels
     }
 }

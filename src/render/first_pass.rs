@@ -22,8 +22,12 @@ pub fn run(
     shown: &mut dyn FnMut(&Film),
 ) -> Option<WaveReport> {
     match world {
-        AnyWorld::Single(w) => first_in(w, film, wave, sampling, pool, abandon, shown),
-        AnyWorld::Double(w) => first_in(w, film, wave, sampling, pool, abandon, shown),
+        AnyWorld::Single(w) => {
+            trace_first_pass_typed(w, film, wave, sampling, pool, abandon, shown)
+        }
+        AnyWorld::Double(w) => {
+            trace_first_pass_typed(w, film, wave, sampling, pool, abandon, shown)
+        }
     }
 }
 
@@ -33,7 +37,7 @@ const STRIP_TILES: usize = 8;
 /// They do while the lattice's step is larger than this \[pixels\]; then the tiles' own pixels fill packets.
 const SHARED_ABOVE: usize = 2;
 
-fn first_in<L: SimdFloat>(
+fn trace_first_pass_typed<L: SimdFloat>(
     world: &World<L>,
     film: &mut Film,
     wave: &Wave,
@@ -80,7 +84,8 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
     /// The first sample of the pixels that a lattice of `step` pixels adds to one of `before` (0:
     /// none) in tiles side by side, whose pixels share packets while they are few.
     fn lattice(&self, slots: Vec<TileHandle>, before: usize, step: usize, counts: &mut [Counts]) {
-        let mut tiles: Vec<_> = slots.into_iter().map(|slot| (slot.origin, slot.open())).collect();
+        let mut tiles: Vec<_> =
+            slots.into_iter().map(|slot| (slot.origin, slot.prepare())).collect();
         if step > SHARED_ABOVE {
             self.add_pixels(&mut tiles, None, (before, step), counts);
         } else {

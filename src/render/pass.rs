@@ -22,13 +22,13 @@ pub fn run(
     cancel: &AtomicBool,
 ) -> WaveReport {
     match world {
-        AnyWorld::Single(w) => run_in(w, film, wave, sampling, estimator, pool, cancel),
-        AnyWorld::Double(w) => run_in(w, film, wave, sampling, estimator, pool, cancel),
+        AnyWorld::Single(w) => run_typed(w, film, wave, sampling, estimator, pool, cancel),
+        AnyWorld::Double(w) => run_typed(w, film, wave, sampling, estimator, pool, cancel),
     }
 }
 
 /// The same for one lane type.
-pub fn run_in<L: SimdFloat>(
+pub fn run_typed<L: SimdFloat>(
     world: &World<L>,
     film: &mut Film,
     wave: &Wave,
@@ -45,7 +45,7 @@ pub fn run_in<L: SimdFloat>(
             return None;
         }
         let origin = slot.origin;
-        let tile = slot.open();
+        let tile = slot.prepare();
         let counts = tracer.job(tile, origin, wave.replicate, job);
         let error = if wave.estimate { estimator.tile(tile) } else { None };
         Some(JobReport { rays: counts.rays, glossy: counts.glossy, error })
@@ -108,7 +108,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         let sites = self.sites(replicate, pixels.iter().map(place));
         let (mut index, end) = (job.first, job.first + job.count);
         while index < end {
-            let count = together(index, end, L::WIDTH);
+            let count = samples_per_packet(index, end, L::WIDTH);
             match count {
                 _ if count == L::WIDTH => {
                     let points = self.sampler.block(index, count);
@@ -119,10 +119,10 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
                         });
                     }
                 }
-                1 => self.share::<1>(tile, &mut work, &sites, pixels, index),
-                2 => self.share::<2>(tile, &mut work, &sites, pixels, index),
-                4 => self.share::<4>(tile, &mut work, &sites, pixels, index),
-                8 => self.share::<8>(tile, &mut work, &sites, pixels, index),
+                1 => self.trace_shared::<1>(tile, &mut work, &sites, pixels, index),
+                2 => self.trace_shared::<2>(tile, &mut work, &sites, pixels, index),
+                4 => self.trace_shared::<4>(tile, &mut work, &sites, pixels, index),
+                8 => self.trace_shared::<8>(tile, &mut work, &sites, pixels, index),
                 _ => unreachable!("packets are narrower than 32"),
             }
             index += count as u32;
@@ -135,7 +135,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
 
     /// The samples `first..first + COUNT` of all pixels of a tile, in packets that hold as many of several.
     #[inline(never)]
-    fn share<const COUNT: usize>(
+    fn trace_shared<const COUNT: usize>(
         &self,
         tile: &mut Tile,
         work: &mut PacketScratch<L>,
@@ -173,7 +173,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         i: usize,
         first: u32,
     ) {
-        let (key, toward) = sites.one(i);
+        let (key, toward) = sites.broadcast(i);
         let draws = points.for_pixel(key);
         let rays = self.world.view().rays(toward, self.jitter(&draws));
         work.trace(self.world, rays, &draws, L::mask(true));
@@ -191,7 +191,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         packet: Range<usize>,
         first: u32,
     ) {
-        let (keys, toward) = sites.several::<L, COUNT>(packet.start);
+        let (keys, toward) = sites.gather::<L, COUNT>(packet.start);
         let draws = points.for_pixels(keys);
         let rays = self.world.view().rays(toward, self.jitter(&draws));
         work.trace(self.world, rays, &draws, first_lanes::<L>(packet.len() * COUNT));
@@ -314,7 +314,7 @@ impl<L: SimdFloat> PacketScratch<L> {
 
 /// How many of the samples `first..end` of a pixel come next in one packet: a power of two that divides `first`, at
 /// most `width`.
-fn together(first: u32, end: u32, width: usize) -> usize {
+fn samples_per_packet(first: u32, end: u32, width: usize) -> usize {
     let aligned = first | width as u32;
     1 << aligned.trailing_zeros().min((end - first).ilog2())
 }
@@ -384,7 +384,7 @@ mod tests {
         ] {
             let (scales, precision) = (world.scales().to_vec(), "single".to_string());
             let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
-            let tile = film.slots(&[0]).remove(0).open();
+            let tile = film.slots(&[0]).remove(0).prepare();
             let mut work = PacketScratch::<Single>::new(0, None);
             work.radiance.groups[0].x =
                 Single::from_fn(|i| Float::from_f64(if i == 3 { odd } else { 0.5 }));

@@ -16,7 +16,7 @@ pub(super) struct PixelBlock<S> {
     /// Keys of their random numbers.
     keys: [u32; TILE_PIXELS],
     /// From the eye to their corners, on the plane at unit distance, axis by axis.
-    toward: [[S; TILE_PIXELS]; 3],
+    corner_direction: [[S; TILE_PIXELS]; 3],
 }
 
 impl<S: Float> PixelBlock<S> {
@@ -32,7 +32,7 @@ impl<S: Float> PixelBlock<S> {
             x: [0; TILE_PIXELS],
             y: [0; TILE_PIXELS],
             keys: [0; TILE_PIXELS],
-            toward: [[S::default(); TILE_PIXELS]; 3],
+            corner_direction: [[S::default(); TILE_PIXELS]; 3],
         };
         for ((x, y), at) in out.x.iter_mut().zip(&mut out.y).zip(pixels.by_ref()) {
             (*x, *y) = at;
@@ -48,7 +48,7 @@ impl<S: Float> PixelBlock<S> {
         for (key, at) in out.keys.iter_mut().zip(at()) {
             *key = sampler.key(at, replicate);
         }
-        let [x, y, z] = &mut out.toward;
+        let [x, y, z] = &mut out.corner_direction;
         for (((x, y), z), at) in x.iter_mut().zip(y).zip(z).zip(at()) {
             [*x, *y, *z] = view.pixel_corner_direction(at);
         }
@@ -62,20 +62,20 @@ impl<S: Float> PixelBlock<S> {
 
     /// The key of pixel `i`, and from the eye to its corner, in all lanes.
     #[inline(always)]
-    pub fn one<L: SimdFloat<Scalar = S>>(&self, i: usize) -> (u32, Vec3<L>) {
-        (self.keys[i], Vec3::splat(self.toward.each_ref().map(|axis| axis[i])))
+    pub fn broadcast<L: SimdFloat<Scalar = S>>(&self, i: usize) -> (u32, Vec3<L>) {
+        (self.keys[i], Vec3::splat(self.corner_direction.each_ref().map(|axis| axis[i])))
     }
 
     /// The same for the pixels `first ..`, each in COUNT lanes side by side; COUNT is a power of two, and
     /// `first` a multiple of WIDTH / COUNT.
     #[inline(always)]
-    pub fn several<L: SimdFloat<Scalar = S>, const COUNT: usize>(
+    pub fn gather<L: SimdFloat<Scalar = S>, const COUNT: usize>(
         &self,
         first: usize,
     ) -> (L::SimdU32, Vec3<L>) {
         let those = first..first + L::WIDTH / COUNT;
         let keys = &self.keys[those.clone()];
-        let [x, y, z] = self.toward.each_ref().map(|axis| {
+        let [x, y, z] = self.corner_direction.each_ref().map(|axis| {
             let axis = &axis[those.clone()];
             L::from_fn(|lane| axis[lane / COUNT])
         });

@@ -57,7 +57,7 @@ impl RenderState {
         let mix = LightWeights { weights: world.mix(&scene) };
         let estimator = Estimator::new(&header.scales, &mix, &options.display);
         let film = match before {
-            Some(before) => before.film.renewed(header),
+            Some(before) => before.film.reuse_for(header),
             None => Film::new(header),
         };
         let lighting = Relighting::new(Arc::clone(&scene), world.light_groups().clone());
@@ -99,7 +99,7 @@ impl RenderBackend for RenderState {
         }
     }
 
-    fn adopt(&mut self, scene: &Arc<Scene>) -> bool {
+    fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let Some(mix) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
             return false;
         };

@@ -41,7 +41,7 @@ impl SyncRender {
     pub fn step(&mut self) -> Option<StoppedBy> {
         loop {
             let wave = match self.schedule.next(self.seconds) {
-                Step::Rest(reason) => return Some(reason),
+                Step::Finished(reason) => return Some(reason),
                 Step::Trace(wave) => wave,
             };
             let start = Instant::now();

@@ -9,7 +9,7 @@ pub struct Diagnostic {
     /// The file, as the user named it.
     pub file: String,
     /// Line and column, from 1; columns count characters. `None`: the file as a whole.
-    pub place: Option<(usize, usize)>,
+    pub line_column: Option<(usize, usize)>,
     /// What it is about: `object "queen"`; empty: the scene.
     pub subject: String,
     /// What was found, as a phrase.
@@ -24,7 +24,7 @@ const MAX_INDENT: usize = 24;
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let mut head = sanitized(&self.file);
-        if let Some((line, column)) = self.place {
+        if let Some((line, column)) = self.line_column {
             head += &format!(":{line}:{column}");
         }
         head += "  ";
@@ -54,7 +54,7 @@ impl SceneErrors {
     /// Sorts `messages` by place; there is at least one.
     pub(super) fn new(mut messages: Vec<Diagnostic>) -> Self {
         debug_assert!(!messages.is_empty(), "errors without a message");
-        messages.sort_by_key(|m| m.place);
+        messages.sort_by_key(|m| m.line_column);
         messages.dedup();
         Self { messages }
     }
@@ -67,7 +67,15 @@ impl SceneErrors {
     /// About one place in the file.
     pub(super) fn at(file: &str, place: Option<(usize, usize)>, found: String, help: &str) -> Self {
         let (file, help) = (file.to_string(), help.to_string());
-        Self { messages: vec![Diagnostic { file, place, subject: String::new(), found, help }] }
+        Self {
+            messages: vec![Diagnostic {
+                file,
+                line_column: place,
+                subject: String::new(),
+                found,
+                help,
+            }],
+        }
     }
 
     /// The messages, in the order of the file.

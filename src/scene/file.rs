@@ -1,7 +1,7 @@
 //! A scene and the file that it is kept in: opening, saving without harm, noticing other writers.
 
 use crate::asset::Assets;
-use crate::scene::recovery::{TEMPORARY, claim};
+use crate::scene::recovery::{TEMPORARY, lock};
 use crate::scene::{Document, Scene, SceneErrors};
 use crate::value::{fnv1a64, sanitized};
 use std::fmt;
@@ -271,7 +271,7 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     let written = builder.tempfile_in(directory).and_then(|mut temporary| {
-        claim(&temporary);
+        lock(&temporary);
         if let Some(existing) = &existing {
             temporary.as_file().set_permissions(existing.permissions())?;
         }

@@ -24,7 +24,7 @@ pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};
 pub use history::History;
 pub use object::{OBJECT_FIELDS, Object};
-pub use recovery::{Orphan, Recovery, RecoveryFile, kept_in, state_folder, sweep};
+pub use recovery::{Orphan, Recovery, RecoveryFile, kept_in, remove_stale, state_folder};
 pub use reference::reference;
 pub use settings::{
     AMBIENT_FIELDS, Ambient, BACKGROUND_FIELDS, Background, BelowHorizon, FILM_FIELDS,

@@ -219,7 +219,7 @@ fn numbered(name: &OsStr, number: u32) -> OsString {
 }
 
 /// Marks a temporary file as somebody's who is alive. Where files cannot be locked that is not known.
-pub(super) fn claim(temporary: &NamedTempFile) {
+pub(super) fn lock(temporary: &NamedTempFile) {
     let _ = temporary.as_file().try_lock();
 }
 
@@ -227,7 +227,7 @@ pub(super) fn claim(temporary: &NamedTempFile) {
 fn filled(folder: &Path, text: &str) -> io::Result<NamedTempFile> {
     let [prefix, suffix] = TEMPORARY;
     let mut file = tempfile::Builder::new().prefix(prefix).suffix(suffix).tempfile_in(folder)?;
-    claim(&file);
+    lock(&file);
     file.write_all(text.as_bytes())?;
     file.as_file().sync_data()?;
     Ok(file)
@@ -315,7 +315,7 @@ pub fn kept_in(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Removes what programs have left half-written in `folder` that were killed.
-pub fn sweep(folder: &Path) {
+pub fn remove_stale(folder: &Path) {
     let [prefix, suffix] = TEMPORARY;
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();

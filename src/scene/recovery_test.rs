@@ -1,7 +1,7 @@
 //! Unsaved edits on a real file system. Two of these in one process are to each other what two
 //! processes are: a lock belongs to an open file.
 
-use crate::scene::{Recovery, RecoveryFile, state_folder, sweep};
+use crate::scene::{Recovery, RecoveryFile, remove_stale, state_folder};
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -213,10 +213,10 @@ fn only_old_leftovers_are_swept_away() {
     let busy = file(".zerkalo-busy.tmp");
     busy.try_lock().unwrap();
     File::create(folder.path().join(".zerkalo-new.tmp")).unwrap();
-    sweep(folder.path());
+    remove_stale(folder.path());
     assert_eq!(
         names(folder.path()),
         [".zerkalo-busy.tmp", ".zerkalo-new.tmp", ".zerkalo-notes", "scene.tmp"]
     );
-    sweep(&folder.path().join("nowhere"));
+    remove_stale(&folder.path().join("nowhere"));
 }

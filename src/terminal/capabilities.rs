@@ -110,7 +110,7 @@ impl Environment {
 
 impl Capabilities {
     /// Of a terminal that has not been asked.
-    pub fn unasked(surroundings: Environment) -> Self {
+    pub fn from_environment(surroundings: Environment) -> Self {
         Self {
             colors: surroundings.colors(),
             surroundings,

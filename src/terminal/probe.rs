@@ -60,7 +60,7 @@ pub fn probe(
     ending: &dyn Fn() -> bool,
 ) -> io::Result<Capabilities> {
     let patience = if surroundings.ssh.is_some() { PATIENCE_OVER_SSH } else { PATIENCE };
-    let mut found = Capabilities::unasked(surroundings);
+    let mut found = Capabilities::from_environment(surroundings);
     let asked = Instant::now();
     let few = ["linux", "vt"].iter().any(|term| found.surroundings.term.starts_with(term));
     let through = match found.surroundings.multiplexer {

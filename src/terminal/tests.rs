@@ -152,7 +152,7 @@ fn replies_say_what_they_say() {
 
 #[test]
 fn answers_make_capabilities() {
-    let mut found = Capabilities::unasked(Environment::default());
+    let mut found = Capabilities::from_environment(Environment::default());
     assert_eq!(found.colors, Colors::Indexed);
     let answers = "\x1bP1$r0;48:2::1:2:3m\x1b\\\x1bP>|XTerm(379)\x1b\\\x1b]11;rgb:ff/ff/ff\x07\
                    \x1b[?2026;2$y\x1b_Gi=31;OK\x1b\\\x1b[6;20;10t\x1b[?62;4c";
@@ -169,7 +169,7 @@ fn answers_make_capabilities() {
         kitty_graphics: true,
         sixel: true,
         cell_px: Some([10, 20]),
-        ..Capabilities::unasked(Environment::default())
+        ..Capabilities::from_environment(Environment::default())
     };
     assert_eq!(found, expected);
     // Of what answers through tmux only some show pictures among text.
@@ -181,14 +181,15 @@ fn answers_make_capabilities() {
         ("ghostty 1.2", true),
     ] {
         let tmux = Environment { multiplexer, ..Environment::default() };
-        let mut behind = Capabilities::unasked(tmux);
+        let mut behind = Capabilities::from_environment(tmux);
         behind.learn(&Reply::Version("tmux 3.3a".into()));
         behind.learn(&Reply::Version(version.into()));
         assert_eq!(behind.placeholders, expected, "{version}");
         assert_eq!(behind.version.as_deref(), Some("tmux 3.3a"));
     }
     // What the user has forbidden no answer brings back.
-    let mut without = Capabilities::unasked(Environment { no_color: true, ..Default::default() });
+    let mut without =
+        Capabilities::from_environment(Environment { no_color: true, ..Default::default() });
     without.learn(&Reply::Setting("48;2;1;2;3m".into()));
     assert_eq!(without.colors, Colors::Mono);
 }

@@ -130,7 +130,7 @@ impl Tty {
     }
 
     /// From now on `bytes` are sent first when the terminal is given back.
-    pub fn owe(&self, bytes: &[u8]) {
+    pub fn set_exit_sequence(&self, bytes: &[u8]) {
         let mut owed = self.owed.lock().unwrap_or_else(PoisonError::into_inner);
         owed.clear();
         owed.extend(bytes);
@@ -233,8 +233,8 @@ mod tests {
         let paper = Paper::default();
         let screen = Screen::over(Box::new(paper.clone()), None).unwrap();
         let tty = screen.tty();
-        tty.owe(b"old");
-        tty.owe(b"the picture goes");
+        tty.set_exit_sequence(b"old");
+        tty.set_exit_sequence(b"the picture goes");
         tty.suspend();
         tty.resume().unwrap();
         drop(screen);

@@ -156,7 +156,7 @@ impl Desk {
         while Instant::now() < end {
             let Some(snapshot) = self.session.wait(Duration::from_millis(100)) else { continue };
             let report = &snapshot.report;
-            if matches!(report.state, State::Resting(_)) && report.generation == generation {
+            if matches!(report.state, State::Finished(_)) && report.generation == generation {
                 return self.session.with(|r, _| picture(r, Replicates::Both)).expect("a film");
             }
         }

@@ -220,7 +220,7 @@ fn judge(rendering: &RenderState, truth: &[[f64; 3]]) -> Outcome {
     let codes: f64 = tiles.iter().map(|t| t.1).sum();
     for (index, tile) in tiles.iter_mut().enumerate() {
         let estimate = estimator.tile(film.tile(index).unwrap()).unwrap();
-        (tile.0, tile.1) = (estimate.told.codes, tile.1 / tile.2 as f64);
+        (tile.0, tile.1) = (estimate.reported.codes, tile.1 / tile.2 as f64);
     }
     let codes = (codes / values as f64).sqrt();
     Outcome {

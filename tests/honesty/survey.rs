@@ -55,7 +55,7 @@ fn run(
     let mut schedule = rendering.schedule(settings(adaptive, 0, stop));
     loop {
         match schedule.next(0.0) {
-            Step::Rest(reason) => return (rendering, schedule, Some(reason)),
+            Step::Finished(reason) => return (rendering, schedule, Some(reason)),
             Step::Trace(wave) => {
                 let report = trace(&mut rendering, &wave, &pool);
                 schedule.complete(&wave, &report);

@@ -74,7 +74,7 @@ impl Line {
         while self.now < end {
             self.now += STEP;
             self.arrive();
-            self.link.look(self.now);
+            self.link.expire(self.now);
             if self.acting {
                 self.link.act(self.now);
             }
@@ -122,13 +122,13 @@ impl Line {
         while self.coming.front().is_some_and(|(at, _)| *at <= self.now) {
             let (at, bytes) = self.coming.pop_front().unwrap();
             self.parser.process(&bytes);
-            if self.answering && self.link.question().is_some() {
+            if self.answering && self.link.ack_request().is_some() {
                 self.answers.push_back(at + self.one_way);
             }
         }
         while self.answers.front().is_some_and(|at| *at <= self.now) {
             let at = self.answers.pop_front().unwrap();
-            self.link.answered(at);
+            self.link.on_ack(at);
         }
     }
 }

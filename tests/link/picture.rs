@@ -55,7 +55,7 @@ impl Work {
     /// Traces one wave; afterwards it may be done.
     pub fn wave(&mut self) {
         match self.schedule.next(0.0) {
-            Step::Rest(_) => self.done = true,
+            Step::Finished(_) => self.done = true,
             Step::Trace(wave) => {
                 let report = support::trace(&mut self.rendering, &wave, &self.pool);
                 self.schedule.complete(&wave, &report);

@@ -92,7 +92,7 @@ fn finish(session: &mut Session<RenderState>, scene: &Scene) -> Snapshot {
 
 fn resting(session: &Session<RenderState>, generation: u64) -> Snapshot {
     let done = |s: &Snapshot| {
-        s.report.generation == generation && matches!(s.report.state, State::Resting(_))
+        s.report.generation == generation && matches!(s.report.state, State::Finished(_))
     };
     wait(session, done)
 }
@@ -182,13 +182,13 @@ fn no_sample_is_lost_to_another_light() {
 fn a_mix_that_is_too_noisy_wakes_a_session_at_rest() {
     let mut session = session(noise(0.15), true);
     let dim = finish(&mut session, &scene()).report;
-    assert_eq!(dim.state, State::Resting(StoppedBy::Noise));
+    assert_eq!(dim.state, State::Finished(StoppedBy::Noise));
     let mut bright = scene();
     bright.lights[0].intensity = 2.0;
     let generation = session.set_scene(Arc::new(bright.clone()));
     let report = wait(&session, |s| {
         assert!(s.report.samples >= dim.samples, "nothing is lost");
-        s.report.generation == generation && matches!(s.report.state, State::Resting(_))
+        s.report.generation == generation && matches!(s.report.state, State::Finished(_))
     })
     .report;
     assert!(report.samples > dim.samples, "the target was not met: {:?}", dim.noise);
@@ -240,12 +240,12 @@ fn aims_display_and_threads_change_without_losing_samples() {
     let more =
         wait(&session, |s| s.report.spp.min == 96 && s.report.state != State::Tracing).report;
     assert_eq!((more.threads, more.generation), (1, first.generation));
-    assert_eq!(more.state, State::Resting(StoppedBy::Spp));
+    assert_eq!(more.state, State::Finished(StoppedBy::Spp));
     assert!(bytes(&session) == bytes(&plain));
 
     // An aim that is met already changes nothing.
     session.set_stop(noise(1000.0));
-    let met = |s: &Snapshot| s.report.state == State::Resting(StoppedBy::Noise);
+    let met = |s: &Snapshot| s.report.state == State::Finished(StoppedBy::Noise);
     assert_eq!(wait(&session, met).report.samples, more.samples);
 
     let display = Display { exposure_ev: 3.0, tone: Tone::Neutral };

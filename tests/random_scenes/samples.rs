@@ -57,7 +57,7 @@ fn shot(scene: &Scene, seed: u64, adaptive: bool, stop: Stop, most: u64) -> Shot
     let (mut schedule, pool) = (rendering.schedule(settings(adaptive, 0, stop)), pool(1));
     let ended = loop {
         match schedule.next(0.0) {
-            Step::Rest(_) => break true,
+            Step::Finished(_) => break true,
             Step::Trace(_) if schedule.rays() > most => break false,
             Step::Trace(wave) => {
                 let report = trace(&mut rendering, &wave, &pool);

@@ -28,7 +28,7 @@ fn end(scene: &Scene, threads: usize) -> End {
     let (pool, mut waves) = (pool(threads), 0);
     loop {
         match schedule.next(0.0) {
-            Step::Rest(reason) => {
+            Step::Finished(reason) => {
                 let (noise, rays) = (schedule.noise(), schedule.rays());
                 return End { bytes: rendering.film.bytes(), noise, waves, rays, reason };
             }

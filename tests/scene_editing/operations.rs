@@ -62,7 +62,7 @@ fn perform(
         }
         8 => ("move", edit::move_by(scene, &subject, by)),
         9 => ("turn", edit::turn(scene, &subject, amount)),
-        10 => ("drop", edit::drop_down(scene, &subject)),
+        10 => ("drop", edit::snap_to_ground(scene, &subject)),
         11 if subjects.len() < 30 => ("duplicate", edit::duplicate(scene, &subject)),
         12 => ("delete", edit::delete(scene, &subject)),
         13 => {
@@ -72,7 +72,7 @@ fn perform(
         14 => ("own material", edit::own_material(scene, &subject)),
         15 => ("store view", edit::store_view(scene, (at % 2 == 0).then_some("left"))),
         16 => ("recall view", edit::recall_view(scene, "left")),
-        17 => ("roughen", edit::roughen(scene, Some(&subject), amount.trunc())),
+        17 => ("roughen", edit::adjust_roughness(scene, Some(&subject), amount.trunc())),
         18 => ("reflect", edit::reflect(scene, Some(&subject), amount.trunc())),
         19 => ("next lobe", edit::next_lobe(scene, None, amount > 0.0)),
         _ => ("add material", edit::add_material(scene)),

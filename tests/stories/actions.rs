@@ -115,16 +115,16 @@ fn camera_stories() -> Vec<Story> {
         story(Dolly(Direction::Out, StepSize::Fine), c(), "Shift-PageDown", |_, d| {
             eye(d.scene())[2] > 5.0 && eye(d.scene())[2] < 5.1
         }),
-        story(Look(Direction::Left), c(), "Ctrl-Left", |a, d| {
+        story(ViewImage(Direction::Left), c(), "Ctrl-Left", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[0] < 0.0
         }),
-        story(Look(Direction::Right), c(), "w Right", |a, d| {
+        story(ViewImage(Direction::Right), c(), "w Right", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[0] > 0.0
         }),
-        story(Look(Direction::Up), c(), "Ctrl-Up", |a, d| {
+        story(ViewImage(Direction::Up), c(), "Ctrl-Up", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[1] > 1.0
         }),
-        story(Look(Direction::Down), c(), "w Down", |a, d| {
+        story(ViewImage(Direction::Down), c(), "w Down", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[1] < 1.0
         }),
         story(Roll(Direction::Left), c(), "Alt-Left", |_, d| camera(d.scene()).up[0] != 0.0),
@@ -257,7 +257,7 @@ fn object_stories() -> Vec<Story> {
         story(Rotate(Direction::Right, StepSize::Fine), GLASS, "r Shift-Right", |_, d| {
             (0.01..0.02).contains(&normal(d.scene())[0])
         }),
-        story(Drop, BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),
+        story(SnapToGround, BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),
         story(OwnMaterial, BALL, "M", |a, d| {
             let own = &d.scene().objects[1].material;
             own != "red" && d.scene().materials[own] == a.materials["red"]
@@ -270,7 +270,7 @@ fn panel_stories() -> Vec<Story> {
     vec![
         story(NextPanel, c(), "Tab", |_, d| d.model.focus == Focus::Outline),
         story(PreviousPanel, c(), "Shift-Tab", |_, d| d.model.focus == Focus::Inspector),
-        story(Leave, BALL, "m Esc", |_, d| d.model.mode == Mode::Orbit),
+        story(Cancel, BALL, "m Esc", |_, d| d.model.mode == Mode::Orbit),
         story(Open, BALL, "Enter", |_, d| d.model.focus == Focus::Inspector),
         story(Cursor(Direction::Down), c(), "Tab Down", |_, d| {
             d.model.selection == Target::View("v1".into())
@@ -303,7 +303,7 @@ fn panel_stories() -> Vec<Story> {
         story(ClearField, c(), "Enter `7` Enter Down Backspace", |_, d| {
             eye(d.scene()) == [0.0, 1.0, 5.0]
         }),
-        story(OnlyPicture, c(), "z", |_, d| {
+        story(ToggleFullscreen, c(), "z", |_, d| {
             d.model.only_picture && d.model.layout().unwrap().outline.is_none()
         }),
     ]
@@ -375,7 +375,7 @@ fn picture_stories() -> Vec<Story> {
         fine(Direction::Right, "i Shift-Right", [33, 24]),
         fine(Direction::Up, "i Shift-Up", [32, 23]),
         fine(Direction::Down, "i Shift-Down", [32, 25]),
-        story(Keep, c(), "k", |_, d| d.model.comparison.kept.is_some()),
+        story(Keep, c(), "k", |_, d| d.model.comparison.pinned.is_some()),
         story(Flip, c(), "k c", |_, d| d.model.comparison.shown == CompareView::Pinned),
         story(Difference, c(), "k C", |_, d| d.model.comparison.shown == CompareView::Difference),
         story(Pause, c(), "Space", |_, d| d.model.paused && d.asked(|e| *e == Effect::Pause(true))),

@@ -141,7 +141,7 @@ fn a_broken_file_is_told_and_work_begins_when_it_is_mended() {
     let mut model = start(Some(FILE), &broken);
     let begun = begin(&mut model);
     assert!(begun.iter().all(|e| !matches!(e, Effect::Show(_))), "{begun:?}");
-    assert!(model.file.blank);
+    assert!(model.file.unreadable);
     let told = model.file.broken.as_ref().unwrap().to_string();
     assert!(told.contains("room.toml:33") && told.contains("radius is -1"), "{told}");
     let effects = press(&mut model, "Left a ] x m Ctrl-s Enter Tab Down Right p");
@@ -152,7 +152,7 @@ fn a_broken_file_is_told_and_work_begins_when_it_is_mended() {
     let loaded = Message::Loaded(Box::new(Ok(Arc::clone(&scene))));
     let effects = update(&mut model, loaded, Duration::ZERO);
     assert!(effects.contains(&Effect::Show(scene)));
-    assert!(!model.file.blank && model.file.broken.is_none() && !model.is_unsaved());
+    assert!(!model.file.unreadable && model.file.broken.is_none() && !model.is_unsaved());
     assert!(!press(&mut model, "Left").is_empty());
     let mut model = start(Some(FILE), &broken);
     begin(&mut model);
@@ -209,7 +209,7 @@ fn edits_bring_back_a_scene_whose_file_is_spoilt() {
     let effects = press(&mut model, "r");
     assert!(effects.contains(&Effect::Show(Arc::clone(&scene))), "{effects:?}");
     assert!(effects.contains(&Effect::TakeUp) && effects.contains(&Effect::KeepEdits(Some(scene))));
-    assert!(model.is_unsaved() && !model.file.blank);
+    assert!(model.is_unsaved() && !model.file.unreadable);
     // What stands in the file is not overwritten unasked.
     let effects = press(&mut model, "Ctrl-s");
     assert!(effects.is_empty() && matches!(model.overlay, Some(Overlay::Question(_))));

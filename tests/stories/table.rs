@@ -49,7 +49,7 @@ fn every_action() -> Vec<Action> {
         Orbit(Direction::Left),
         Pan(Direction::Left),
         Dolly(Direction::In, StepSize::Fine),
-        Look(Direction::Left),
+        ViewImage(Direction::Left),
         Fly(Direction::In),
         Roll(Direction::Left),
         ViewAngle(Delta::Up),
@@ -62,7 +62,7 @@ fn every_action() -> Vec<Action> {
         FlyMode,
         Move(Direction::In, StepSize::Fine),
         Rotate(Direction::Left, StepSize::Fine),
-        Leave,
+        Cancel,
         NextLight,
         Intensity(Delta::Up, StepSize::Fine),
         SwitchLight,
@@ -74,11 +74,11 @@ fn every_action() -> Vec<Action> {
         Duplicate,
         Delete,
         Rename,
-        Drop,
+        SnapToGround,
         OwnMaterial,
         NextPanel,
         PreviousPanel,
-        OnlyPicture,
+        ToggleFullscreen,
         Cursor(Direction::Up),
         First,
         Last,
@@ -125,7 +125,7 @@ fn every_action() -> Vec<Action> {
         match action {
             Orbit(_) => ways.map(Orbit).into(),
             Pan(_) => ways.map(Pan).into(),
-            Look(_) => ways.map(Look).into(),
+            ViewImage(_) => ways.map(ViewImage).into(),
             Dolly(..) => [Direction::In, Direction::Out]
                 .iter()
                 .flat_map(|w| paces.map(|p| Dolly(*w, p)))
@@ -152,14 +152,14 @@ fn every_action() -> Vec<Action> {
             Intensity(..) => both(Intensity),
             Roughness(..) => both(Roughness),
             Step(..) => both(Step),
-            Frame | ResetCamera | StoreView | MoveMode | TurnMode | FlyMode | Leave | NextLight
-            | SwitchLight | AddLight | NextLobe | AddObject | Duplicate | Delete | Rename
-            | Drop | OwnMaterial | NextPanel | PreviousPanel | OnlyPicture | First | Last
-            | Open | ClearField | Undo | Redo | Save | SaveAs | Reload | Recover | Suspend
-            | Quit | Pause | Restart | StopAt | Quality | ExportPng | ExportExr | CopyPath
-            | ShowExport | ExportSized | CancelExport | ResetExposure | NextTone | NextChannel
-            | PreviousChannel | Probe | Keep | Flip | Difference | Priority | NextColors | Help
-            | Palette | Inventory => {
+            Frame | ResetCamera | StoreView | MoveMode | TurnMode | FlyMode | Cancel
+            | NextLight | SwitchLight | AddLight | NextLobe | AddObject | Duplicate | Delete
+            | Rename | SnapToGround | OwnMaterial | NextPanel | PreviousPanel
+            | ToggleFullscreen | First | Last | Open | ClearField | Undo | Redo | Save | SaveAs
+            | Reload | Recover | Suspend | Quit | Pause | Restart | StopAt | Quality
+            | ExportPng | ExportExr | CopyPath | ShowExport | ExportSized | CancelExport
+            | ResetExposure | NextTone | NextChannel | PreviousChannel | Probe | Keep | Flip
+            | Difference | Priority | NextColors | Help | Palette | Inventory => {
                 vec![action]
             }
         }

@@ -119,7 +119,7 @@ pub fn follow(
     let mut schedule = rendering.schedule(settings);
     loop {
         match schedule.next(0.0) {
-            Step::Rest(reason) => return reason,
+            Step::Finished(reason) => return reason,
             Step::Trace(wave) => {
                 let report = trace(rendering, &wave, pool);
                 schedule.complete(&wave, &report);

@@ -111,7 +111,7 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
     let speed = measured.samples_per_second();
     let slope = measured.slope();
     let crossing = |codes: &f64| {
-        let c = measured.crossing(*codes)?;
+        let c = measured.time_to(*codes)?;
         Some(TimeToTarget {
             codes: *codes,
             seconds: c.seconds,
@@ -158,9 +158,9 @@ pub fn json(about: &About) -> Vec<u8> {
         reference_linear: m.reference_linear,
         reference_seconds: m.reference_seconds,
         compared_at_codes: m.compared_at,
-        errors_spread: m.doubt(),
+        errors_spread: m.reference_uncertainty(),
         times_spread: steadiness.spread,
-        taken_by_others: steadiness.taken,
+        taken_by_others: steadiness.stolen,
         expected: m.expected.iter().map(expected).collect(),
         variations: m.measured.iter().map(|v| variation(v, &m.targets)).collect(),
     };

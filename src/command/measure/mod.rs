@@ -5,7 +5,7 @@ mod table;
 
 use crate::command::args::MeasureArgs;
 use crate::command::signals::Signals;
-use crate::command::{Failure, say, warn};
+use crate::command::{Failure, print_line, warn};
 use crate::film::{self, Display};
 use crate::measure::{self, Experiment, Plan, Reference};
 use crate::scene::Document;
@@ -76,7 +76,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
 
     let about =
         table::About { scene: &args.scene, threads, lanes, single, measurement: &measurement };
-    say(&about.to_string());
+    print_line(&about.to_string());
     if let Some(path) = &args.json {
         write(path, &data::json(&about))?;
     }

@@ -77,7 +77,7 @@ const TAKEN: f64 = 0.03;
 
 /// What is to be said about times that are apart so far; `None`: nothing.
 fn caution(steadiness: &Steadiness) -> Option<String> {
-    let Steadiness { spread, taken, .. } = steadiness;
+    let Steadiness { spread, stolen: taken, .. } = steadiness;
     let others = taken.filter(|share| *share > TAKEN).map(|share| {
         format!("other programs used up to {:.0} % of the processors meanwhile", 100.0 * share)
     });
@@ -123,7 +123,7 @@ impl fmt::Display for About<'_> {
                 m.reference_spp,
                 m.reference_codes,
                 time(m.reference_seconds),
-                (100.0 * m.doubt()).max(0.1)
+                (100.0 * m.reference_uncertainty()).max(0.1)
             )?;
         }
         let steadiness = m.steadiness();
@@ -140,7 +140,7 @@ impl fmt::Display for About<'_> {
         writeln!(f, "  {:>7}  {:>18}  {:>18}", "codes", "time", "samples per pixel")?;
         for target in &m.targets {
             let expected = m.expected.iter().find(|e| e.codes == *target);
-            match (default.crossing(*target), expected) {
+            match (default.time_to(*target), expected) {
                 (Some(c), _) => writeln!(f, "  {target:>7}  {:>18}  {:>18.0}", reached(&c), c.spp)?,
                 (None, Some(e)) => writeln!(
                     f,
@@ -202,8 +202,8 @@ impl About<'_> {
 
     fn row(&self, f: &mut fmt::Formatter, name: &str, measured: &Measured) -> fmt::Result {
         let codes = self.measurement.compared_at;
-        let default = self.measurement.measured[0].crossing(codes);
-        let own = measured.own_crossing(codes);
+        let default = self.measurement.measured[0].time_to(codes);
+        let own = measured.true_time_to(codes);
         let followed = || measured.points.last().map_or(0.0, |p| median(&measured.seconds(p)));
         let (time, speed) = match (&own, &default) {
             (Some(own), Some(default)) => {
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn unsteady_times_are_told_with_the_reason() {
-        let told = |spread, taken| caution(&Steadiness { repetitions: 3, spread, taken });
+        let told = |spread, taken| caution(&Steadiness { repetitions: 3, spread, stolen: taken });
         assert_eq!(told(0.04, Some(0.01)), None);
         assert_eq!(told(0.1, None), None);
         let words = told(0.04, Some(0.5)).unwrap();

@@ -1,16 +1,16 @@
 //! Unsaved edits on their way to where the next start finds them: soon after the last, not after each.
 
 use crate::dashboard::message::{Message, OrphanedEdits};
-use crate::scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, sweep};
+use crate::scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, remove_stale};
 use crate::value::sanitized;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 /// Edits are written when none has come for so long,
-const QUIET: Duration = Duration::from_millis(400);
+const DEBOUNCE: Duration = Duration::from_millis(400);
 /// and while they go on coming, when the oldest has waited for so long.
-const LONGEST: Duration = Duration::from_secs(1);
+const MAX_DELAY: Duration = Duration::from_secs(1);
 
 /// Unsaved edits of one scene after another, and those that were found at the start.
 pub struct Autosave {
@@ -74,7 +74,7 @@ impl Autosave {
 
     /// When to write; `None`: there is nothing to.
     pub fn due(&self) -> Option<Instant> {
-        self.pending.as_ref().map(|p| (p.last + QUIET).min(p.first + LONGEST))
+        self.pending.as_ref().map(|p| (p.last + DEBOUNCE).min(p.first + MAX_DELAY))
     }
 
     /// Writes what `file` would be with the edits; what there is to tell about that.
@@ -107,7 +107,10 @@ impl Autosave {
         // Half-written scenes lie beside them, half-written pictures in the working directory.
         let beside = file.map_or_else(Some, SceneFile::path).and_then(Path::parent);
         let beside = beside.filter(|folder| !folder.as_os_str().is_empty());
-        [Some(Path::new(".")), beside, self.state.as_deref()].into_iter().flatten().for_each(sweep);
+        [Some(Path::new(".")), beside, self.state.as_deref()]
+            .into_iter()
+            .flatten()
+            .for_each(remove_stale);
         let RecoveryFile { mut lost, unreadable, elsewhere } = self.recovery.find();
         let mut messages: Vec<_> = unreadable
             .iter()

@@ -1,6 +1,6 @@
 //! The terminal and the line to it, looked at without showing anything.
 
-use crate::dashboard::run::signals::{expect, watch};
+use crate::dashboard::run::signals::{block, watch};
 use crate::terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
 use crate::terminal::{
     Capabilities, Environment, Event, Keyboard, Multiplexer, Reply, Screen, Tty, cell_px,
@@ -39,10 +39,10 @@ pub struct TerminalReport {
 ///
 /// # Errors
 /// If there is no terminal, or it is gone.
-pub fn examine(surroundings: Environment, measure: bool) -> io::Result<TerminalReport> {
+pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<TerminalReport> {
     // On a screen of its own, which goes with whatever a terminal shows of questions that it does not
     // understand.
-    let signals = expect()?;
+    let signals = block()?;
     let screen = Screen::enter()?;
     let tty = screen.tty();
     watch(signals, screen.tty(), Duration::ZERO)?;

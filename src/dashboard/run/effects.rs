@@ -88,7 +88,7 @@ impl EffectRunner {
         self.results.clone()
     }
 
-    /// What was done, as messages; pass them through [`EffectRunner::note`].
+    /// What was done, as messages; pass them through [`EffectRunner::observe`].
     pub fn done(&self) -> &Receiver<Message> {
         &self.done
     }
@@ -100,7 +100,7 @@ impl EffectRunner {
 
     /// Does what is asked for. What it leads to comes as messages. The number of the scene if the
     /// renderer has a new one to show.
-    pub fn perform(&mut self, effect: Effect) -> Option<u64> {
+    pub fn run_effect(&mut self, effect: Effect) -> Option<u64> {
         match effect {
             Effect::Show(scene) => return Some(self.show(scene)),
             Effect::Restart => return Some(self.session.restart()),
@@ -118,7 +118,7 @@ impl EffectRunner {
                 self.session.set_view(self.view);
             }
             Effect::Pause(true) => self.session.pause(),
-            Effect::Pause(false) => self.session.go_on(),
+            Effect::Pause(false) => self.session.resume(),
             Effect::Threads(threads) => {
                 self.threads = threads;
                 self.set_threads();
@@ -171,15 +171,15 @@ impl EffectRunner {
     }
 
     /// Takes note of what was done, before the model does.
-    pub fn note(&mut self, message: &Message) {
+    pub fn observe(&mut self, message: &Message) {
         if let Message::Saved(_, Ok(path)) = message {
             self.studio.stem = stem(Some(path), "");
         }
     }
 
     /// Unsaved edits are written now, whatever comes. Waits for that at most as long as `patience`.
-    pub fn secure(&self, patience: Duration) {
-        self.files.secure(patience);
+    pub fn flush(&self, patience: Duration) {
+        self.files.flush(patience);
     }
 
     /// Ends the work, but waits for what is being written: returns what was done meanwhile, and where

@@ -53,7 +53,7 @@ impl Exporter {
         };
         let display = rendering.display();
         let write = |path: &Path| {
-            let target = ImageOutput::from_path(path)?.fresh();
+            let target = ImageOutput::from_path(path)?.create_new();
             rendering.write(report, &origin, display, Depth::Eight, &target)
         };
         let path = paths::numbered(&self.folder, &self.stem, format.extension(), write)
@@ -160,7 +160,7 @@ fn render(
         }
         let Some(snapshot) = session.wait(LOOK) else { continue };
         match snapshot.report.state {
-            State::Resting(_) => break,
+            State::Finished(_) => break,
             State::Failed(why) => return Some(Err(why)),
             State::Idle | State::Tracing | State::Paused => {
                 tell(snapshot.report.progress.unwrap_or(0.0));

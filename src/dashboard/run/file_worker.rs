@@ -89,7 +89,7 @@ impl Files {
     }
 
     /// Unsaved edits are written now. Waits for that at most as long as `patience`.
-    pub fn secure(&self, patience: Duration) {
+    pub fn flush(&self, patience: Duration) {
         let (done, told) = bounded(1);
         self.give(Job::Secure(done));
         let _ = told.recv_timeout(patience);
@@ -389,7 +389,7 @@ mod tests {
         assert!(fs::read_to_string(&path).unwrap().contains("64"));
         let (files, _inbox) = opened(&path);
         files.journal(Some(Arc::new(Scene::parse(starter(), "a").unwrap())));
-        files.secure(PATIENCE);
+        files.flush(PATIENCE);
         assert!(hidden.exists());
         files.journal(None);
         assert_eq!(files.finish(), None);

@@ -141,7 +141,7 @@ impl FramePipeline {
         };
         if !sending.has_begun() {
             // Whatever happens from here on.
-            self.tty.owe(&sending.any_removal());
+            self.tty.set_exit_sequence(&sending.any_removal());
             self.removing = false;
         }
         let mut bytes = self.writer.buffer();
@@ -150,7 +150,7 @@ impl FramePipeline {
         if sending.is_open() {
             self.link.sent_unasked(now, bytes.len());
         } else {
-            if let Some(through) = self.link.question() {
+            if let Some(through) = self.link.ack_request() {
                 bytes.extend(cursor_question(through).as_bytes());
             }
             self.link.sent(now, bytes.len(), true, 0);
@@ -181,7 +181,7 @@ impl FramePipeline {
 
     /// The terminal has answered the question after a frame.
     pub fn answered(&mut self, at: Duration) {
-        self.link.answered(at);
+        self.link.on_ack(at);
     }
 
     /// How long to wait for answers at the end; nothing if there are none.
@@ -196,14 +196,14 @@ impl FramePipeline {
 
     /// Takes note of how things stand with the line.
     pub fn look(&mut self, now: Duration) {
-        self.link.look(now);
+        self.link.expire(now);
         if self.link.asks_kernel(now) {
             self.link.held_back(now, self.queue.as_ref().and_then(TcpSendQueue::bytes));
         }
     }
 
     /// When a new picture could be sent, or at least a text about it.
-    pub fn hungry_at(&self, now: Duration, answers: bool) -> Duration {
+    pub fn snapshot_due(&self, now: Duration, answers: bool) -> Duration {
         match self.link.allowance(now, answers) {
             Some(_) => now,
             None => self.link.wakes_at(now, true),
@@ -296,7 +296,7 @@ impl FramePipeline {
         }
         self.removing |= !std::mem::take(&mut self.removal).is_empty();
         bytes.extend(std::mem::take(&mut self.copied).as_bytes());
-        if let Some(through) = self.link.question() {
+        if let Some(through) = self.link.ack_request() {
             bytes.extend(cursor_question(through).as_bytes());
         }
         self.sent += bytes.len() as u64;
@@ -313,7 +313,7 @@ impl FramePipeline {
     /// Takes note that the frame on its way has been written; when that was.
     pub fn written_at(&mut self, frame: Written) -> io::Result<Instant> {
         if std::mem::take(&mut self.removing) {
-            self.tty.owe(&[]);
+            self.tty.set_exit_sequence(&[]);
         }
         self.writer.done(frame)
     }

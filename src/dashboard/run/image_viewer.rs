@@ -45,9 +45,9 @@ impl Dashboard {
             Some(Overlay::ViewerImage(looked)) => looked.sent,
             _ => return,
         };
-        if sent != known && (sent == 1.0 || self.told + TELL_INTERVAL <= now) {
-            self.told = now;
-            self.take(Message::StillSent(sent));
+        if sent != known && (sent == 1.0 || self.status_sent_at + TELL_INTERVAL <= now) {
+            self.status_sent_at = now;
+            self.dispatch(Message::StillSent(sent));
         }
     }
 }

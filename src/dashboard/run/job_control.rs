@@ -50,7 +50,7 @@ impl ResizeDebounce {
 
 impl Dashboard {
     /// Does what a signal says; the exit status if that is to end.
-    pub(super) fn heed(&mut self, told: SignalEvent, line: &TerminalIo) -> Option<u8> {
+    pub(super) fn handle_signal(&mut self, told: SignalEvent, line: &TerminalIo) -> Option<u8> {
         match told {
             SignalEvent::End(status) => Some(status),
             SignalEvent::Resized => {
@@ -67,7 +67,7 @@ impl Dashboard {
     /// program is to end instead.
     pub(super) fn suspend(&mut self, whom: StopTarget, line: &TerminalIo) -> Option<u8> {
         // It may never go on.
-        self.hands.secure(SECURED_WITHIN);
+        self.hands.flush(SECURED_WITHIN);
         self.await_answers(&line.input);
         line.tty.suspend();
         let mut stopped = stop(whom).is_ok();
@@ -81,7 +81,7 @@ impl Dashboard {
         }
         let end = self.resume(line);
         if !stopped {
-            self.take(Message::Trouble("there is no shell to go back to".to_string()));
+            self.dispatch(Message::Trouble("there is no shell to go back to".to_string()));
         }
         end
     }
@@ -101,7 +101,7 @@ impl Dashboard {
         self.frames.forget();
         // Whether there is a terminal at all the next frame will tell.
         let screen = size().unwrap_or(self.model.screen);
-        self.take(Message::Resize(screen));
+        self.dispatch(Message::Resize(screen));
     }
 }
 

@@ -70,7 +70,7 @@ impl LatencyRecorder {
     }
 
     /// Whether a frame that shows the picture of `scene` would answer somebody.
-    pub fn answers(&self, scene: u64) -> bool {
+    pub fn replies(&self, scene: u64) -> bool {
         self.awaiting.iter().any(|waiting| waiting.answered_by(scene))
     }
 
@@ -144,7 +144,7 @@ impl LatencyRecorder {
             ))
         };
         let kinds = [(true, "event to picture"), (false, "event to screen")];
-        let answers = kinds.into_iter().filter_map(|(picture, name)| of(picture, name));
+        let replies = kinds.into_iter().filter_map(|(picture, name)| of(picture, name));
         let Load { waited, bytes, .. } = self.load;
         let load = (self.answered.is_some() && !waited.is_zero()).then(|| {
             let seconds = waited.as_secs_f64();
@@ -152,7 +152,7 @@ impl LatencyRecorder {
                 "visible differences waited for {seconds:.3} s, in which {bytes} bytes were sent"
             )
         });
-        answers.chain(load).collect()
+        replies.chain(load).collect()
     }
 }
 
@@ -180,30 +180,30 @@ mod tests {
         let mut trace = LatencyRecorder::new(true);
         let start = trace.began;
         let at = |ms| start + Duration::from_millis(ms);
-        assert!(!trace.answers(0));
+        assert!(!trace.replies(0));
         trace.event(at(0), Some(1));
         trace.event(at(5), Some(2));
         trace.event(at(6), None);
-        assert!(trace.answers(0));
+        assert!(trace.replies(0));
         trace.sent(0);
         trace.written(at(7));
-        assert!(!trace.answers(0));
-        assert!(trace.answers(1));
+        assert!(!trace.replies(0));
+        assert!(trace.replies(1));
         trace.sent(1);
-        assert!(!trace.answers(1), "it is on its way");
+        assert!(!trace.replies(1), "it is on its way");
         // Read while the frame is on its way: not answered by it.
         trace.event(at(9), None);
         trace.written(at(20));
         trace.sent(7);
         trace.written(at(30));
-        let answers: Vec<_> = trace
+        let replies: Vec<_> = trace
             .answered
             .as_ref()
             .unwrap()
             .iter()
             .map(|a| (a.read.as_millis(), a.picture, a.after.as_millis()))
             .collect();
-        assert_eq!(answers, [(6, false, 1), (0, true, 20), (5, true, 25), (9, false, 21)]);
+        assert_eq!(replies, [(6, false, 1), (0, true, 20), (5, true, 25), (9, false, 21)]);
         assert_eq!(
             trace.summary(),
             [

@@ -40,7 +40,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 pub use crate::dashboard::model::Colors;
-pub use diagnose::{TerminalReport, examine};
+pub use diagnose::{TerminalReport, diagnose};
 
 /// What a dashboard is started with.
 pub struct Setup {
@@ -97,7 +97,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         // While the terminal is asked what it can do.
         hands.show(Arc::clone(scene));
     }
-    let signals = signals::expect()?;
+    let signals = signals::block()?;
     let screen = Screen::enter()?;
     let signals = signals::watch(signals, screen.tty(), signals::PATIENCE)?;
     let mut keyboard = Keyboard::new(&surroundings);
@@ -123,21 +123,21 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         trace: LatencyRecorder::new(trace.is_some()),
         began: Instant::now(),
         shown: 0,
-        subject: 0,
+        image_epoch: 0,
         resizing: ResizeDebounce::default(),
-        told: Duration::ZERO,
+        status_sent_at: Duration::ZERO,
         changed: true,
         suspend: false,
         quit: false,
     };
     // So that the renderer learns how large the picture is.
-    dashboard.take(Message::Resize(dashboard.model.screen));
+    dashboard.dispatch(Message::Resize(dashboard.model.screen));
     let input = input::read(keyboard)?;
     let line =
         TerminalIo { tty: screen.tty(), input, signals: signals.told, left: screen.left().clone() };
     let result = dashboard.watch(&line);
     // First of all, and whatever else there is to write.
-    dashboard.hands.secure(Duration::ZERO);
+    dashboard.hands.flush(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
         dashboard.await_answers(&line.input);
     }
@@ -168,11 +168,11 @@ struct Dashboard {
     /// The scene whose picture the model has: its number.
     shown: u64,
     /// Counts up when the picture is another one than the same with more samples.
-    subject: u64,
+    image_epoch: u64,
     /// The terminal's size may change again at once.
     resizing: ResizeDebounce,
     /// When the line was told about last.
-    told: Duration,
+    status_sent_at: Duration,
     /// The screen may have to change.
     changed: bool,
     suspend: bool,
@@ -182,32 +182,32 @@ struct Dashboard {
 impl Dashboard {
     /// Lets things happen until the end; the exit status of a signal.
     fn watch(&mut self, line: &TerminalIo) -> io::Result<Option<u8>> {
-        let bell = self.hands.session().bell().clone();
+        let bell = self.hands.session().wakeup().clone();
         let done = self.hands.done().clone();
         let written = self.frames.written().clone();
         let silence = never();
         let mut waiting = Vec::new();
         // Who was told to end while the terminal was asked draws nothing any more.
         while let Ok(told) = line.signals.try_recv() {
-            if let Some(status) = self.heed(told, line) {
+            if let Some(status) = self.handle_signal(told, line) {
                 return Ok(Some(status));
             }
         }
         while !self.quit {
             let wait = self.draw();
             // A picture is made when the last one has been taken: not before it can be shown.
-            let (bell, hungry) = match self.hungry() {
+            let (bell, wants_snapshot) = match self.wants_snapshot() {
                 None => (&silence, None),
                 Some(Duration::ZERO) => (&bell, None),
                 wait => (&silence, wait),
             };
-            let timer = match wait.into_iter().chain(hungry).min() {
+            let timer = match wait.into_iter().chain(wants_snapshot).min() {
                 Some(wait) => after(wait),
                 None => never(),
             };
             select! {
                 recv(line.input) -> came => match came {
-                    Ok(Ok(came)) => self.note(came, &mut waiting),
+                    Ok(Ok(came)) => self.enqueue(came, &mut waiting),
                     // The terminal is gone.
                     Ok(Err(_)) | Err(_) => return Ok(Some(HUNG_UP)),
                 },
@@ -226,7 +226,7 @@ impl Dashboard {
                     }
                 }
                 recv(line.signals) -> told => {
-                    if let Some(status) = told.ok().and_then(|told| self.heed(told, line)) {
+                    if let Some(status) = told.ok().and_then(|told| self.handle_signal(told, line)) {
                         return Ok(Some(status));
                     }
                 }
@@ -234,11 +234,11 @@ impl Dashboard {
                 recv(timer) -> _ => self.wake(),
             }
             while let Ok(Ok(came)) = line.input.try_recv() {
-                self.note(came, &mut waiting);
+                self.enqueue(came, &mut waiting);
             }
             for Input { at, message } in waiting.drain(..) {
                 self.frames.act(self.began.elapsed());
-                let scene = self.take(message);
+                let scene = self.dispatch(message);
                 self.trace.event(at, scene);
             }
             while let Ok(message) = done.try_recv() {
@@ -254,7 +254,7 @@ impl Dashboard {
     }
 
     /// Something came from the terminal: an answer counts at once, what the user did is `waiting`.
-    fn note(&mut self, Timed { at, event }: Timed, waiting: &mut Vec<Input>) {
+    fn enqueue(&mut self, Timed { at, event }: Timed, waiting: &mut Vec<Input>) {
         let message = match event {
             Event::Key(key) => Message::Key(key),
             Event::Mouse(mouse) => Message::Mouse(mouse),
@@ -278,7 +278,7 @@ impl Dashboard {
         let end = self.frames.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
             match input.recv_timeout(left) {
-                Ok(Ok(came)) => self.note(came, &mut Vec::new()),
+                Ok(Ok(came)) => self.enqueue(came, &mut Vec::new()),
                 _ => break,
             }
             if !self.frames.is_waiting() {
@@ -289,7 +289,7 @@ impl Dashboard {
 
     /// Takes what happened into the model and does what that asks for; the number of the scene if the
     /// answer needs a new picture.
-    fn take(&mut self, message: Message) -> Option<u64> {
+    fn dispatch(&mut self, message: Message) -> Option<u64> {
         let mut awaited = None;
         let is_snapshot = matches!(message, Message::Snapshot(_));
         let version = self.model.picture_version;
@@ -306,7 +306,7 @@ impl Dashboard {
             if let Effect::Look { path, display, screen } = &effect {
                 self.prepare_still(path, *display, *screen);
             }
-            let number = self.hands.perform(effect);
+            let number = self.hands.run_effect(effect);
             // A change of light is seen at once in the picture that is there.
             let snapshot = self.model.snapshot.as_deref();
             let mixed = scene.is_some_and(|s| snapshot.is_some_and(|n| n.mix_for(&s).is_some()));
@@ -315,15 +315,15 @@ impl Dashboard {
             }
         }
         if version != self.model.picture_version && awaited.is_none() && !is_snapshot {
-            self.subject += 1;
+            self.image_epoch += 1;
         }
         self.changed = true;
         awaited
     }
 
     fn take_done(&mut self, message: Message) {
-        self.hands.note(&message);
-        self.take(message);
+        self.hands.observe(&message);
+        self.dispatch(message);
     }
 
     fn take_snapshot(&mut self) {
@@ -333,25 +333,25 @@ impl Dashboard {
             if snapshot.picture.is_some() || failed {
                 let old = self.model.snapshot.as_deref().and_then(raster);
                 let another = self.shown != snapshot.report.generation;
-                self.subject += u64::from(another || old != raster(&snapshot));
+                self.image_epoch += u64::from(another || old != raster(&snapshot));
                 self.shown = snapshot.report.generation;
             }
-            self.take(Message::Snapshot(Box::new(snapshot)));
+            self.dispatch(Message::Snapshot(Box::new(snapshot)));
         }
     }
 
     /// How long to wait before the next picture could be shown; `None`: until the terminal has taken
     /// the last one.
-    fn hungry(&self) -> Option<Duration> {
+    fn wants_snapshot(&self) -> Option<Duration> {
         let now = self.began.elapsed();
-        let due = self.frames.hungry_at(now, self.trace.answers(u64::MAX));
+        let due = self.frames.snapshot_due(now, self.trace.replies(u64::MAX));
         self.frames.ready().then(|| due.saturating_sub(now))
     }
 
     /// Time has passed: the model is told if it wanted to be.
     fn wake(&mut self) {
-        if self.model.wakes_at().is_some_and(|at| at <= self.began.elapsed()) {
-            self.take(Message::Tick);
+        if self.model.next_timeout().is_some_and(|at| at <= self.began.elapsed()) {
+            self.dispatch(Message::Tick);
         }
     }
 
@@ -369,18 +369,19 @@ impl Dashboard {
         let reading = self.frames.reading();
         let mode = |line: &Option<LinkStatus>| line.as_ref().map(|line| line.mode);
         let other = mode(&reading) != mode(&self.model.line);
-        if other || self.changed && self.told + TELL_INTERVAL <= now {
-            self.told = now;
-            self.take(Message::LinkStatus(reading));
+        if other || self.changed && self.status_sent_at + TELL_INTERVAL <= now {
+            self.status_sent_at = now;
+            self.dispatch(Message::LinkStatus(reading));
         }
         self.tell_of_still(now);
         self.frames.follow(&self.model);
         let mut due = None;
         if self.frames.ready() && !self.quit {
-            let answers = self.trace.answers(self.shown);
+            let answers = self.trace.replies(self.shown);
             due = self.frames.due(now, self.changed, answers);
             if due.is_some_and(|at| at <= now) {
-                let drawn = self.frames.draw(&self.model, now, self.changed, answers, self.subject);
+                let drawn =
+                    self.frames.draw(&self.model, now, self.changed, answers, self.image_epoch);
                 let (waits, sent) = self.frames.load();
                 self.trace.line(now, waits, sent);
                 self.changed &= matches!(drawn, DrawOutcome::Nothing | DrawOutcome::Slice);
@@ -395,7 +396,7 @@ impl Dashboard {
                     DrawOutcome::Text => self.trace.sent(0),
                     DrawOutcome::Picture => self.trace.sent(self.shown),
                 }
-                let answers = self.trace.answers(self.shown);
+                let answers = self.trace.replies(self.shown);
                 due = if self.frames.ready() {
                     self.frames.due(now, self.changed, answers)
                 } else {
@@ -403,7 +404,7 @@ impl Dashboard {
                 };
             }
         }
-        let next = self.model.wakes_at().into_iter().chain(due).min();
+        let next = self.model.next_timeout().into_iter().chain(due).min();
         next.map(|at| at.saturating_sub(now))
     }
 }

@@ -60,7 +60,7 @@ pub(super) enum StopTarget {
 
 /// Signals that come from here on wait to be heeded: to be called before the terminal is taken, which a
 /// signal that nobody waits for would not give back.
-pub(super) fn expect() -> io::Result<iterator::Signals> {
+pub(super) fn block() -> io::Result<iterator::Signals> {
     iterator::Signals::new([SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])
 }
 

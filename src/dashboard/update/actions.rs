@@ -29,7 +29,7 @@ fn needs_no_scene(action: Action) -> bool {
             | Suspend
             | Recover
             | Reload
-            | Leave
+            | Cancel
             | Cursor(_)
             | First
             | Last
@@ -43,7 +43,9 @@ impl UpdateContext<'_> {
     pub(super) fn act(&mut self, action: Action, typed: Option<char>) {
         let in_list =
             matches!(self.model.overlay, Some(Overlay::Palette(_) | Overlay::Question(_)));
-        if self.model.file.blank && !needs_no_scene(action) && !(in_list && action == Action::Open)
+        if self.model.file.unreadable
+            && !needs_no_scene(action)
+            && !(in_list && action == Action::Open)
         {
             self.refuse("There is no scene to work on until its file can be read: mend it");
             return;
@@ -52,7 +54,7 @@ impl UpdateContext<'_> {
             Action::Orbit(way) => self.orbit(way),
             Action::Pan(way) => self.pan(way),
             Action::Dolly(way, pace) => self.dolly(way, pace),
-            Action::Look(way) => self.look(way),
+            Action::ViewImage(way) => self.look(way),
             Action::Fly(way) => self.fly(way),
             Action::Roll(way) => self.roll(way),
             Action::ViewAngle(change) => self.view_angle(change),
@@ -65,7 +67,7 @@ impl UpdateContext<'_> {
             Action::FlyMode => self.enter_mode(Mode::Fly),
             Action::Move(way, pace) => self.move_selection(way, pace),
             Action::Rotate(way, pace) => self.turn_selection(way, pace),
-            Action::Leave => self.leave(),
+            Action::Cancel => self.leave(),
             Action::NextLight => self.next_light(),
             Action::Intensity(change, pace) => self.intensity(steps(change, pace)),
             Action::SwitchLight => self.switch_light(),
@@ -77,11 +79,11 @@ impl UpdateContext<'_> {
             Action::Duplicate => self.duplicate(),
             Action::Delete => self.delete(),
             Action::Rename => self.ask_name(),
-            Action::Drop => self.drop_down(),
+            Action::SnapToGround => self.drop_down(),
             Action::OwnMaterial => self.own_material(),
             Action::NextPanel => self.next_panel(1),
             Action::PreviousPanel => self.next_panel(-1),
-            Action::OnlyPicture => self.only_picture(),
+            Action::ToggleFullscreen => self.only_picture(),
             Action::Cursor(way) => self.walk(if way == Direction::Up { -1 } else { 1 }),
             Action::First => self.walk(isize::MIN / 2),
             Action::Last => self.walk(isize::MAX / 2),
@@ -128,7 +130,7 @@ impl UpdateContext<'_> {
 
     /// Whether an action itself deals with a value being typed.
     pub(super) fn ends_typing(&self, action: Action) -> bool {
-        matches!(action, Action::Open | Action::Leave)
+        matches!(action, Action::Open | Action::Cancel)
     }
 
     /// Gives the focus to the picture and lets its keys act on something else.

@@ -95,14 +95,14 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn kept(&mut self, picture: Arc<LinearImage>, spp: f64) {
-        self.model.comparison.kept = Some((picture, spp));
+        self.model.comparison.pinned = Some((picture, spp));
         self.repaint();
         self.say(format!("kept at {spp:.0} spp · c flips · C shows the difference"));
     }
 
     /// Shows the kept picture or the difference; the live one if it is that already.
     pub(super) fn compare(&mut self, what: CompareView) {
-        if self.model.comparison.kept.is_none() {
+        if self.model.comparison.pinned.is_none() {
             self.say("No picture is kept yet · k keeps one");
             return;
         }

@@ -149,7 +149,7 @@ impl UpdateContext<'_> {
                 self.end_mode();
                 self.model.file.saved = Arc::clone(&scene);
                 self.model.file.broken = None;
-                self.model.file.blank = false;
+                self.model.file.unreadable = false;
                 self.model.history.restart(scene);
                 let outline = crate::scene::edit::outline(self.scene());
                 let same = |(_, subject): &(_, Target)| subject.title(self.scene()) == title;
@@ -164,7 +164,7 @@ impl UpdateContext<'_> {
                 let first = errors.messages().first().map(ToString::to_string).unwrap_or_default();
                 let text = first.lines().map(str::trim).collect::<Vec<_>>().join(" ");
                 self.model.file.broken = Some(errors);
-                if !self.model.file.blank {
+                if !self.model.file.unreadable {
                     self.notify(Tone::Bad, text, None);
                 }
             }
@@ -172,7 +172,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn quit(&mut self) {
-        if self.model.is_unsaved() && !self.model.file.blank {
+        if self.model.is_unsaved() && !self.model.file.unreadable {
             let text = format!("{} has unsaved edits.", self.model.file.name);
             self.ask(
                 text,

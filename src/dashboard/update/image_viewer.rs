@@ -34,7 +34,7 @@ impl UpdateContext<'_> {
     }
 
     /// Back to the panels.
-    pub(super) fn look_away(&mut self) {
+    pub(super) fn close_viewer(&mut self) {
         self.model.overlay = None;
         self.repaint();
     }
@@ -55,7 +55,7 @@ impl UpdateContext<'_> {
             Ok(_) => {}
             Err(why) => {
                 let name = short_name(path);
-                self.look_away();
+                self.close_viewer();
                 self.refuse(&format!("{name} cannot be shown: {why}"));
             }
         }

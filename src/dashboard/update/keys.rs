@@ -38,7 +38,7 @@ impl UpdateContext<'_> {
         if let Some(Overlay::ViewerImage(_)) = self.model.overlay {
             match lookup(Context::Overlay, key) {
                 Some(action @ (Action::Suspend | Action::Quit)) => self.act(action, None),
-                _ => self.look_away(),
+                _ => self.close_viewer(),
             }
             return;
         }

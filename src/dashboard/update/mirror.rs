@@ -6,7 +6,7 @@ use crate::value::{number, truncated};
 
 impl UpdateContext<'_> {
     pub(super) fn roughness(&mut self, steps: f64) {
-        let edit = edit::roughen(self.scene(), Some(&self.model.selection), steps);
+        let edit = edit::adjust_roughness(self.scene(), Some(&self.model.selection), steps);
         self.commit_mirror(edit, Coalesce::Repeat);
     }
 

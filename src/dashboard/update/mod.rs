@@ -40,10 +40,10 @@ const REPEAT_WINDOW: Duration = Duration::from_millis(700);
 pub fn begin(model: &mut Model) -> Vec<Effect> {
     let mut turn = UpdateContext::new(model, Duration::ZERO);
     turn.emit(Effect::Stop(turn.model.stop));
-    if !turn.model.file.blank {
+    if !turn.model.file.unreadable {
         turn.show();
     }
-    turn.settle();
+    turn.normalize();
     turn.effects
 }
 
@@ -52,7 +52,7 @@ pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect>
     let mut turn = UpdateContext::new(model, now);
     turn.forget_notice();
     turn.take(message);
-    turn.settle();
+    turn.normalize();
     turn.effects
 }
 
@@ -254,7 +254,7 @@ impl<'a> UpdateContext<'a> {
 
     /// Leaves the model sound: the selection exists, cursors are in their lists and in view, and the
     /// renderer knows the raster.
-    fn settle(&mut self) {
+    fn normalize(&mut self) {
         if !self.model.selection.exists(self.model.scene()) {
             let last = |len: usize, of: fn(usize) -> Target| len.checked_sub(1).map(of);
             let scene = self.model.scene();

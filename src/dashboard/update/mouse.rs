@@ -34,7 +34,7 @@ impl UpdateContext<'_> {
 
     fn press(&mut self, button: Button, mouse: Mouse) {
         self.model.drag = None;
-        if self.model.file.blank {
+        if self.model.file.unreadable {
             return;
         }
         if self.model.overlay.is_some() {
@@ -120,7 +120,7 @@ impl UpdateContext<'_> {
                 }
                 return;
             }
-            Some(Overlay::ViewerImage(_)) => return self.look_away(),
+            Some(Overlay::ViewerImage(_)) => return self.close_viewer(),
             _ => return,
         };
         if let Some(at) = line_at(place.list, scroll, mouse).filter(|at| *at < len) {
@@ -211,7 +211,9 @@ impl UpdateContext<'_> {
             self.walk(if over_list { lines } else { -(ticks.clamp(-100, 100) as isize) });
             return;
         }
-        let Some(layout) = self.model.layout().filter(|_| !self.model.file.blank) else { return };
+        let Some(layout) = self.model.layout().filter(|_| !self.model.file.unreadable) else {
+            return;
+        };
         let over = |area: Option<Area>| area.is_some_and(|a| a.contains(mouse.column, mouse.row));
         if over(Some(layout.picture)) {
             self.dolly_by_wheel(ticks);

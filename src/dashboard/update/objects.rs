@@ -102,7 +102,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn drop_down(&mut self) {
-        let edit = edit::drop_down(self.scene(), &self.model.selection);
+        let edit = edit::snap_to_ground(self.scene(), &self.model.selection);
         self.commit(edit, Coalesce::Single);
     }
 

@@ -30,7 +30,7 @@ impl UpdateContext<'_> {
             self.model.file.name,
             ago(left.age)
         );
-        if self.model.file.blank {
+        if self.model.file.unreadable {
             text += " The file has been spoilt since.";
         } else if left.changed {
             text += " The file has been changed since.";
@@ -49,7 +49,7 @@ impl UpdateContext<'_> {
         let Some(left) = self.model.left_behind.take() else { return };
         let scene = left.scene;
         self.end_gesture();
-        if std::mem::take(&mut self.model.file.blank) {
+        if std::mem::take(&mut self.model.file.unreadable) {
             self.model.history.restart(Arc::clone(&scene));
             // What the file holds is no scene, so not this one.
             self.model.history.mark_saved(Arc::default());
@@ -75,7 +75,7 @@ impl UpdateContext<'_> {
     /// is not kept.
     pub(super) fn journal(&mut self) {
         let quit = self.effects.iter().position(|effect| *effect == Effect::Quit);
-        let unsaved = quit.is_none() && !self.model.file.blank && self.model.is_unsaved();
+        let unsaved = quit.is_none() && !self.model.file.unreadable && self.model.is_unsaved();
         let scene = unsaved.then(|| Arc::clone(self.model.history.scene()));
         let same = match (&scene, &self.model.journaled) {
             (Some(now), Some(before)) => Arc::ptr_eq(now, before),

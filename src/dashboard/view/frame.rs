@@ -107,7 +107,7 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
     let mut chips = Vec::new();
     match (model.comparison.shown, model.channel) {
         (CompareView::Pinned, _) => {
-            let spp = model.comparison.kept.as_ref().map_or(0.0, |(_, spp)| *spp);
+            let spp = model.comparison.pinned.as_ref().map_or(0.0, |(_, spp)| *spp);
             chips.push((format!("kept picture, {spp:.0} spp"), true));
         }
         (CompareView::Difference, _) => chips.push(("live − kept".to_string(), true)),

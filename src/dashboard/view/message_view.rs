@@ -52,7 +52,7 @@ pub fn broken(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer
 /// One message: where, what, the remedy.
 fn told(message: &Diagnostic, width: u16, theme: &Theme) -> Lines {
     let mut lines = Vec::new();
-    if let Some((line, column)) = message.place {
+    if let Some((line, column)) = message.line_column {
         lines.push((format!("line {line}, column {column}"), theme.accent()));
     }
     let subject = match message.subject.as_str() {
@@ -87,7 +87,8 @@ pub fn failure(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffe
     {
         let area = layout.picture;
         let edge = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
-        let place = first.place.map_or(String::new(), |(line, column)| format!(":{line}:{column}"));
+        let place =
+            first.line_column.map_or(String::new(), |(line, column)| format!(":{line}:{column}"));
         let text = format!(" ✗ {}{place}  {} ", model.file.name, sanitized(&first.found));
         Row::new(buffer, edge, area.height.saturating_sub(1)).put(&text, theme.bad());
     }

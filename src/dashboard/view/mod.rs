@@ -70,7 +70,7 @@ impl View {
         if let Some(Overlay::ViewerImage(looked)) = &model.overlay {
             let shown = image_viewer::draw(model, looked, &theme, buffer);
             (self.place, self.uncovered) = match (shown, &looked.still) {
-                (Some(cells), Some(still)) => picture::uncovered(&cells, still.place, buffer),
+                (Some(cells), Some(still)) => picture::visible_mask(&cells, still.place, buffer),
                 _ => (Rect::ZERO, Vec::new()),
             };
             return None;
@@ -82,7 +82,7 @@ impl View {
         };
         self.picture(model, &layout);
         frame::draw(model, &layout, self.imager.legend(), &theme, buffer);
-        if model.file.blank {
+        if model.file.unreadable {
             message_view::broken(model, &layout, &theme, buffer);
         } else {
             picture::paint(&self.picture, layout.image, buffer);
@@ -101,8 +101,9 @@ impl View {
         if model.overlay.is_some() {
             cursor = overlay::draw(model, &theme, buffer);
         }
-        if !model.file.blank {
-            (self.place, self.uncovered) = picture::uncovered(&self.picture, layout.image, buffer);
+        if !model.file.unreadable {
+            (self.place, self.uncovered) =
+                picture::visible_mask(&self.picture, layout.image, buffer);
         }
         cursor
     }

@@ -35,7 +35,7 @@ pub fn is_settled(model: &Model) -> bool {
     if let Some(Overlay::ViewerImage(_)) = model.overlay {
         return true;
     }
-    let resting = |s: &Snapshot| matches!(s.report.state, State::Resting(_) | State::Paused);
+    let resting = |s: &Snapshot| matches!(s.report.state, State::Finished(_) | State::Paused);
     model.snapshot.as_ref().is_some_and(|s| resting(s))
         || model.comparison.shown == CompareView::Pinned
 }
@@ -80,7 +80,7 @@ impl PictureView {
             }
             DisplayChannel::Objects | DisplayChannel::Normals | DisplayChannel::Depth => {
                 let guide = snapshot.guide.as_deref()?;
-                let (columns, rows, sights) = (guide.columns, guide.rows, guide.sights());
+                let (columns, rows, sights) = (guide.columns, guide.rows, guide.texels());
                 let hit = |i: usize| sights.get(i).filter(|s| s.object.is_some());
                 let all = columns * rows;
                 let raster = match channel {
@@ -134,7 +134,7 @@ impl PictureView {
     }
 
     fn kept(&mut self, model: &Model, size: [usize; 2]) -> Option<&[[f32; 3]]> {
-        let (picture, _) = model.comparison.kept.as_ref()?;
+        let (picture, _) = model.comparison.pinned.as_ref()?;
         let same = |kept: &PinnedCache| Arc::ptr_eq(&kept.of, picture) && kept.size == size;
         if !self.kept.as_ref().is_some_and(same) {
             let radiance = picture.resampled(size[0], size[1]);
@@ -212,18 +212,18 @@ pub fn paint(cells: &PictureCells, area: Area, buffer: &mut Buffer) {
 }
 
 /// Where cells that were painted into `area` are now, and which of them nothing else was drawn over.
-pub fn uncovered(cells: &PictureCells, area: Area, buffer: &Buffer) -> (Rect, Vec<bool>) {
+pub fn visible_mask(cells: &PictureCells, area: Area, buffer: &Buffer) -> (Rect, Vec<bool>) {
     let Area { x, y, width, height } = area;
     let (width, height) = (width.min(cells.columns), height.min(cells.rows));
     let place = Rect { x, y, width, height }.intersection(buffer.area);
-    let uncovered = place.positions().map(|at| {
+    let visible_mask = place.positions().map(|at| {
         let (Some(cell), now) = (cells.cell(at.x - x, at.y - y), &buffer[at]) else {
             return false;
         };
         let same_glyph = now.symbol().chars().eq([cell.glyph]);
         same_glyph && [now.fg, now.bg] == colors(cell) && now.modifier.is_empty()
     });
-    (place, uncovered.collect())
+    (place, visible_mask.collect())
 }
 
 fn colors(cell: &PictureCell) -> [Color; 2] {

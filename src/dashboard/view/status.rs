@@ -52,7 +52,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         parts.push(part(0, vec![(text, theme.accent())]));
     }
     let Some(snapshot) = &model.snapshot else {
-        let text = if model.file.blank { "nothing to trace" } else { "compiling" };
+        let text = if model.file.unreadable { "nothing to trace" } else { "compiling" };
         parts.push(part(0, vec![dim(text)]));
         return parts;
     };
@@ -121,13 +121,13 @@ fn state(model: &Model, report: &Report, theme: &Theme) -> (String, Style) {
         State::Paused => ("‖ paused", theme.warn()),
         State::Tracing if model.paused => ("‖ paused", theme.warn()),
         State::Tracing => ("● tracing", theme.accent()),
-        State::Resting(StoppedBy::Noise | StoppedBy::Rmse) => {
+        State::Finished(StoppedBy::Noise | StoppedBy::Rmse) => {
             ("✓ converged, resting", theme.good())
         }
-        State::Resting(StoppedBy::Spp) => ("✓ samples reached, resting", theme.good()),
-        State::Resting(StoppedBy::Time) => ("✓ time over, resting", theme.good()),
-        State::Resting(StoppedBy::RaysPerPixel) => ("✓ rays per pixel reached", theme.good()),
-        State::Resting(StoppedBy::Full) => ("✓ no more samples fit", theme.good()),
+        State::Finished(StoppedBy::Spp) => ("✓ samples reached, resting", theme.good()),
+        State::Finished(StoppedBy::Time) => ("✓ time over, resting", theme.good()),
+        State::Finished(StoppedBy::RaysPerPixel) => ("✓ rays per pixel reached", theme.good()),
+        State::Finished(StoppedBy::Full) => ("✓ no more samples fit", theme.good()),
     };
     (text.to_string(), style)
 }

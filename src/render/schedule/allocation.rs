@@ -7,7 +7,7 @@
 //! estimate that is high by chance draws few samples that others should have.
 
 use crate::render::schedule::tile::Tile;
-use crate::render::schedule::{Criterion, FULL, PACKET, Schedule, to_packet};
+use crate::render::schedule::{Criterion, MAX_SAMPLES, SAMPLE_ALIGNMENT, Schedule, to_packet};
 use crate::render::wave::Job;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -88,11 +88,11 @@ type Class = (u32, Option<i32>);
 /// of two and at least a packet, so that blocks stay aligned to what makes the sequence even; or what is missing
 /// to such a block; before the first packet is full, as many again.
 fn block(count: u32) -> u32 {
-    if count < PACKET {
+    if count < SAMPLE_ALIGNMENT {
         return (count + 1).next_power_of_two() - count;
     }
     match to_packet(count) {
-        0 => 1 << (count / 4).max(PACKET).ilog2(),
+        0 => 1 << (count / 4).max(SAMPLE_ALIGNMENT).ilog2(),
         rest => rest,
     }
 }
@@ -111,7 +111,8 @@ impl Allocation<'_> {
     /// Samples of the block that `tile` could get next; 0 where a cap or the mean count leaves none.
     fn next_block(&self, tile: usize) -> u32 {
         let (t, count) = (&self.schedule.tiles[tile], self.counts[tile]);
-        let affordable = u32::try_from(self.samples_left / u64::from(t.pixels)).unwrap_or(FULL);
+        let affordable =
+            u32::try_from(self.samples_left / u64::from(t.pixels)).unwrap_or(MAX_SAMPLES);
         block(count).min(self.schedule.cap(t).saturating_sub(count)).min(affordable)
     }
 
@@ -160,7 +161,7 @@ impl Allocation<'_> {
 
 impl Schedule {
     /// The jobs for the next decision once the floors are reached.
-    pub(super) fn by_gain(&self) -> Vec<Job> {
+    pub(super) fn highest_gain(&self) -> Vec<Job> {
         let criterion = self.settings.criterion;
         let pooled = [self.pooled_slope(false), self.pooled_slope(true)];
         let models: Vec<TileModels> =

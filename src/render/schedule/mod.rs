@@ -24,22 +24,22 @@ use tile::{Tile, clamp_slope};
 /// Samples per replicate that every tile gets before samples go where the noise is. Estimates begin here:
 /// below, they say little and cost as much as the samples. Sixteen would spend a third of the mirror
 /// room's samples, and two thirds of the reflecting tracks', on tiles without any noise.
-const FLOOR: u32 = 4;
+const MIN_SAMPLES: u32 = 4;
 /// The same while the estimate of the picture's error rests on fewer than [`FEW_PIXELS`] effective pixels: such a picture
 /// is sparse or clean, and its features are found by samples, not by estimates.
-const SPARSE_FLOOR: u32 = PACKET;
+const SPARSE_FLOOR: u32 = SAMPLE_ALIGNMENT;
 /// Effective pixels below which an estimate says little: with 16 its RMSE is uncertain by 18 % (1 / sqrt(2 k)).
 const FEW_PIXELS: f64 = 16.0;
 /// From so many on, samples are given in multiples of this, the width of the widest packets; only a tile's last block
 /// may be shorter. The same where packets are narrower: which samples a picture has must not depend on the processor.
-pub const PACKET: u32 = 16;
+pub const SAMPLE_ALIGNMENT: u32 = 16;
 /// Samples per replicate at which a tile is full: the most whose double, the count of both replicates, fits 32 bits.
-const FULL: u32 = (1 << 31) - PACKET;
+const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
 
 /// Samples that make `count` a multiple of a packet, if it is more than one: a picture that was to
 /// have fewer samples may have stopped inside one.
 fn to_packet(count: u32) -> u32 {
-    if count < PACKET { 0 } else { count.next_multiple_of(PACKET) - count }
+    if count < SAMPLE_ALIGNMENT { 0 } else { count.next_multiple_of(SAMPLE_ALIGNMENT) - count }
 }
 
 /// What comes next.
@@ -48,7 +48,7 @@ pub enum Step {
     /// Trace this.
     Trace(Wave),
     /// Nothing: the work is done.
-    Rest(StoppedBy),
+    Finished(StoppedBy),
 }
 
 /// Samples per pixel over the picture, A and B together.
@@ -108,11 +108,11 @@ impl Schedule {
                 self.replicate = 1;
             } else {
                 if let Some(reason) = self.reason_to_stop(seconds) {
-                    return Step::Rest(reason);
+                    return Step::Finished(reason);
                 }
                 self.decided = self.decide();
                 if self.decided.is_empty() {
-                    return Step::Rest(self.reason_without_work());
+                    return Step::Finished(self.reason_without_work());
                 }
                 self.replicate = 0;
             }
@@ -205,9 +205,9 @@ impl Schedule {
     /// The most samples per replicate that `tile` may get.
     fn cap(&self, tile: &Tile) -> u32 {
         match self.settings.rays_per_pixel {
-            0 => FULL,
-            _ if !tile.glossy => FULL,
-            cap => (cap / 2).clamp(1, FULL),
+            0 => MAX_SAMPLES,
+            _ if !tile.glossy => MAX_SAMPLES,
+            cap => (cap / 2).clamp(1, MAX_SAMPLES),
         }
     }
 
@@ -234,20 +234,20 @@ impl Schedule {
         if common < self.floor() || !self.settings.adaptive {
             self.uniform(common)
         } else {
-            self.by_gain()
+            self.highest_gain()
         }
     }
 
     /// Samples per replicate that every tile gets before an estimate is believed.
     fn floor(&self) -> u32 {
         let sparse = |noise: Noise| self.settings.criterion.effective_pixels(noise) < FEW_PIXELS;
-        if self.noise.is_some_and(sparse) { SPARSE_FLOOR } else { FLOOR }
+        if self.noise.is_some_and(sparse) { SPARSE_FLOOR } else { MIN_SAMPLES }
     }
 
     /// Samples per replicate of the tiles that no cap holds back (of all if every one is capped).
     fn common_count(&self) -> u32 {
         let open = self.tiles.iter().filter(|t| t.done < self.cap(t));
-        open.map(|t| t.done).min().unwrap_or(FULL)
+        open.map(|t| t.done).min().unwrap_or(MAX_SAMPLES)
     }
 
     /// The same indices for every tile that is not capped.
@@ -255,15 +255,19 @@ impl Schedule {
         let grown = match common {
             // To the next power of two; a picture that was to have fewer samples may have stopped
             // between two of them.
-            n if n < PACKET => (n + 1).next_power_of_two() - n,
-            n => (self.uniform_growth(n) / PACKET * PACKET).max(PACKET) + to_packet(n),
+            n if n < SAMPLE_ALIGNMENT => (n + 1).next_power_of_two() - n,
+            n => {
+                (self.uniform_growth(n) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT).max(SAMPLE_ALIGNMENT)
+                    + to_packet(n)
+            }
         };
-        let limit = self.settings.stop.spp.map_or(FULL, |spp| spp.div_ceil(2)).min(FULL);
+        let limit =
+            self.settings.stop.spp.map_or(MAX_SAMPLES, |spp| spp.div_ceil(2)).min(MAX_SAMPLES);
         let count = grown.min(limit.saturating_sub(common));
         let after = common + count;
         let last = after == limit;
         let aims = self.target().is_some() || self.settings.stop.seconds.is_some();
-        let due = if aims { after >= FLOOR } else { after / 2 >= self.estimated_at.max(2) };
+        let due = if aims { after >= MIN_SAMPLES } else { after / 2 >= self.estimated_at.max(2) };
         self.estimate = due || last;
         if self.estimate {
             self.estimated_at = after;

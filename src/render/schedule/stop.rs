@@ -1,7 +1,7 @@
 //! When the work is done, and how long it will take.
 
 use crate::render::schedule::tile::Tile;
-use crate::render::schedule::{Criterion, FULL, Schedule, StoppedBy};
+use crate::render::schedule::{Criterion, MAX_SAMPLES, Schedule, StoppedBy};
 
 impl Schedule {
     /// A lower and an upper guess of the seconds left until the first of the targets, `seconds` after
@@ -90,7 +90,7 @@ impl Schedule {
     /// Why there is nothing left to give out.
     pub(super) fn reason_without_work(&self) -> StoppedBy {
         let open = || self.tiles.iter().filter(|t| t.done < self.cap(t));
-        if self.tiles.iter().all(|t| t.done == FULL) {
+        if self.tiles.iter().all(|t| t.done == MAX_SAMPLES) {
             StoppedBy::Full
         } else if self.settings.stop.spp.is_some() && open().next().is_some() {
             StoppedBy::Spp

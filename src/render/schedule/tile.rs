@@ -70,7 +70,7 @@ impl Tile {
 
     /// Latest mean squared error, as it is told; 0 before the first estimate.
     pub fn mse(&self, criterion: Criterion) -> f64 {
-        self.error.map_or(0.0, |(_, e)| criterion.of(e.told))
+        self.error.map_or(0.0, |(_, e)| criterion.of(e.reported))
     }
 
     /// The estimates on record and the latest: counts, and mean squared errors of the pixels for allocation and of those
@@ -78,13 +78,15 @@ impl Tile {
     pub fn estimates(&self, criterion: Criterion) -> impl Iterator<Item = (f64, [f64; 2])> {
         let latest = self.error.filter(|e| self.history.last() != Some(e));
         let all = self.history.iter().copied().chain(latest);
-        all.map(move |(n, e)| (f64::from(n), [e.guide, e.told].map(|mse| criterion.of(mse))))
+        all.map(move |(n, e)| {
+            (f64::from(n), [e.allocation, e.reported].map(|mse| criterion.of(mse)))
+        })
     }
 
     /// The last doubling on record: counts and errors before and after.
     pub fn last_doubling(&self, criterion: Criterion) -> Option<[(f64, f64); 2]> {
         let [.., before, after] = self.history.as_slice() else { return None };
-        Some([before, after].map(|(n, e)| (f64::from(*n), criterion.of(e.guide))))
+        Some([before, after].map(|(n, e)| (f64::from(*n), criterion.of(e.allocation))))
     }
 
     /// The slope p of RMSE ~ n^-p.
@@ -95,7 +97,7 @@ impl Tile {
     pub fn slope(&self, criterion: Criterion, pooled: f64) -> f64 {
         const PRIOR_DOUBLINGS: f64 = 2.0;
         let [(n0, first), .., (n1, last)] = self.history.as_slice() else { return pooled };
-        let (before, after) = (criterion.of(first.guide), criterion.of(last.guide));
+        let (before, after) = (criterion.of(first.allocation), criterion.of(last.allocation));
         if !(before > 0.0 && after > 0.0) {
             return pooled;
         }

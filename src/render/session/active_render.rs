@@ -2,7 +2,7 @@
 
 use crate::film::{IncrementalDownsample, TileNoise};
 use crate::render::feature_buffer::FeatureBuffer;
-use crate::render::schedule::{PACKET, Schedule, Settings};
+use crate::render::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings};
 use crate::render::session::report::{QUALITIES, Report, State};
 use crate::render::session::snapshot::{Frame, Snapshot, View};
 use crate::render::session::throughput::Throughput;
@@ -30,7 +30,7 @@ const GUIDE_RAY_SECONDS: f64 = 5e-8;
 pub(super) struct WorkContext<'a> {
     pub pool: &'a rayon::ThreadPool,
     pub shared: &'a Shared,
-    pub ring: &'a Sender<()>,
+    pub notify: &'a Sender<()>,
     pub view: View,
     pub generation: u64,
 }
@@ -38,14 +38,14 @@ pub(super) struct WorkContext<'a> {
 impl WorkContext<'_> {
     /// Whether a snapshot is wanted. Between waves (`newest`: false) the guest first has to take the
     /// last picture: the new one would only be replaced before it is seen, and making it costs time.
-    fn wants(&self, newest: bool) -> bool {
+    fn snapshot_wanted(&self, newest: bool) -> bool {
         newest || self.view == View::default() || self.shared.slot.is_empty()
     }
 
     pub fn put(&self, snapshot: Snapshot) {
         self.shared.slot.put(snapshot);
         // A bell that is ringing already will do.
-        let _ = self.ring.try_send(());
+        let _ = self.notify.try_send(());
     }
 }
 
@@ -103,20 +103,20 @@ impl<T: RenderBackend> ActiveRender<T> {
     }
 
     /// Goes on with `scene` if the samples serve it, too.
-    pub fn adopt(&mut self, scene: &Arc<Scene>) -> bool {
+    pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let mix = self.traced.mix().clone();
-        if !self.traced.adopt(scene) {
+        if !self.traced.try_reuse(scene) {
             return false;
         }
         self.schedule.set_rays_per_pixel(scene.film.rays_per_pixel);
         if *self.traced.mix() != mix {
-            self.misjudge();
+            self.invalidate_estimates();
         }
         true
     }
 
     /// The same samples look otherwise now.
-    pub fn misjudge(&mut self) {
+    pub fn invalidate_estimates(&mut self) {
         self.schedule.forget_estimates();
         self.misjudged = true;
     }
@@ -127,7 +127,7 @@ impl<T: RenderBackend> ActiveRender<T> {
     }
 
     /// Estimates the errors of all tiles. False: it was interrupted, and nothing has changed.
-    pub fn judge(&mut self, pool: &rayon::ThreadPool, interrupt: &AtomicBool) -> bool {
+    pub fn reestimate(&mut self, pool: &rayon::ThreadPool, cancel_wave: &AtomicBool) -> bool {
         let (film, estimator) = (self.traced.film(), self.traced.estimator());
         let estimate = |tile: usize| -> Option<(u32, TileNoise)> {
             let tile = film.tile(tile)?;
@@ -136,7 +136,7 @@ impl<T: RenderBackend> ActiveRender<T> {
         };
         let estimates: Option<Vec<_>> = pool.install(|| {
             let tiles = (0..film.tile_count()).into_par_iter().with_min_len(16);
-            tiles.map(|t| (!interrupt.load(Ordering::Relaxed)).then(|| estimate(t))).collect()
+            tiles.map(|t| (!cancel_wave.load(Ordering::Relaxed)).then(|| estimate(t))).collect()
         });
         if let Some(estimates) = &estimates {
             self.schedule.set_estimates(estimates);
@@ -151,7 +151,7 @@ impl<T: RenderBackend> ActiveRender<T> {
         if self.first_picture.is_some() {
             let wave = self.piece(wave, site);
             let start = Instant::now();
-            let report = self.traced.run(&wave, site.pool, &marks.interrupt);
+            let report = self.traced.run(&wave, site.pool, &marks.cancel_wave);
             self.traced_for += start.elapsed();
             self.schedule.complete(&wave, &report);
             self.pace.note(self.seconds(), self.schedule.samples());
@@ -162,8 +162,8 @@ impl<T: RenderBackend> ActiveRender<T> {
         let (frame, raster) = (self.frame(site), &mut self.raster);
         let start = Instant::now();
         let mut first = true;
-        let report = self.traced.first(&wave, site.pool, &marks.abandon, &mut |film| {
-            if !std::mem::take(&mut first) && !site.wants(false) {
+        let report = self.traced.first(&wave, site.pool, &marks.cancel_first_pass, &mut |film| {
+            if !std::mem::take(&mut first) && !site.snapshot_wanted(false) {
                 return;
             }
             site.put(frame.snapshot(film, Vec::new(), coarse.clone(), raster, site.pool));
@@ -187,8 +187,9 @@ impl<T: RenderBackend> ActiveRender<T> {
             return wave;
         };
         let of_thread = speed / site.pool.current_num_threads() as f64;
-        let longest = (JOB_SECONDS * of_thread / PIXELS) as u32 / PACKET * PACKET;
-        wave.cut((speed * seconds) as u64, longest.max(PACKET))
+        let longest =
+            (JOB_SECONDS * of_thread / PIXELS) as u32 / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT;
+        wave.cut((speed * seconds) as u64, longest.max(SAMPLE_ALIGNMENT))
     }
 
     fn mean_speed(&self) -> Option<f64> {
@@ -226,10 +227,10 @@ impl<T: RenderBackend> ActiveRender<T> {
         }
     }
 
-    /// Shows where the work stands; see [`WorkContext::wants`].
+    /// Shows where the work stands; see [`WorkContext::snapshot_wanted`].
     pub fn publish(&mut self, site: &WorkContext, state: State, newest: bool) {
         // A film that was emptied for another start has nothing to show; its first picture was shown.
-        if !site.wants(newest) || self.first_picture.is_none() {
+        if !site.snapshot_wanted(newest) || self.first_picture.is_none() {
             return;
         }
         self.look(site, f64::INFINITY);

@@ -53,7 +53,7 @@ pub trait RenderBackend: Sized + Send + Sync + 'static {
 
     /// Takes `scene` over if the samples at hand are samples of it, too; else changes nothing and
     /// returns false.
-    fn adopt(&mut self, scene: &Arc<Scene>) -> bool;
+    fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool;
 
     /// The display in the options.
     fn display_of(options: &mut Self::Options) -> &mut Display;
@@ -65,18 +65,23 @@ pub trait RenderBackend: Sized + Send + Sync + 'static {
     fn restart(&mut self);
 
     /// Traces the wave that holds the first sample of every pixel, coarse to fine, and calls `shown`
-    /// whenever the picture has become finer. Once `abandon` is raised the work ends, but not before
+    /// whenever the picture has become finer. Once `cancel_first_pass` is raised the work ends, but not before
     /// `shown` has been called once; then the answer is `None`, and the film is only to be looked at.
     fn first(
         &mut self,
         wave: &Wave,
         pool: &rayon::ThreadPool,
-        abandon: &AtomicBool,
+        cancel_first_pass: &AtomicBool,
         shown: &mut dyn FnMut(&Film),
     ) -> Option<WaveReport>;
 
-    /// Traces a wave. Once raised, `interrupt` keeps further jobs from being begun.
-    fn run(&mut self, wave: &Wave, pool: &rayon::ThreadPool, interrupt: &AtomicBool) -> WaveReport;
+    /// Traces a wave. Once raised, `cancel_wave` keeps further jobs from being begun.
+    fn run(
+        &mut self,
+        wave: &Wave,
+        pool: &rayon::ThreadPool,
+        cancel_wave: &AtomicBool,
+    ) -> WaveReport;
 
     /// The film.
     fn film(&self) -> &Film;
@@ -124,9 +129,9 @@ enum Command<T> {
 #[derive(Default)]
 struct Shared {
     /// The running wave should end: there are commands.
-    interrupt: AtomicBool,
+    cancel_wave: AtomicBool,
     /// The first picture should end too: there is a newer scene.
-    abandon: AtomicBool,
+    cancel_first_pass: AtomicBool,
     slot: Slot,
 }
 
@@ -134,7 +139,7 @@ struct Shared {
 pub struct Session<T: RenderBackend> {
     commands: Sender<Command<T>>,
     shared: Arc<Shared>,
-    bell: Receiver<()>,
+    wakeup: Receiver<()>,
     generations: u64,
     thread: Option<JoinHandle<()>>,
 }
@@ -145,11 +150,11 @@ impl<T: RenderBackend> Session<T> {
         let pool = threads::pool(threads, 0)?;
         let (commands, inbox) = unbounded();
         // One place: a bell that has not been heard yet need not ring twice.
-        let (ring, bell) = bounded(1);
+        let (notify, wakeup) = bounded(1);
         let shared = Arc::new(Shared::default());
-        let worker = Worker::new(inbox, ring, Arc::clone(&shared), pool, options, settings);
+        let worker = Worker::new(inbox, notify, Arc::clone(&shared), pool, options, settings);
         let thread = std::thread::Builder::new().name("session".into()).spawn(|| worker.run())?;
-        Ok(Self { commands, shared, bell, generations: 0, thread: Some(thread) })
+        Ok(Self { commands, shared, wakeup, generations: 0, thread: Some(thread) })
     }
 
     /// Renders `scene` from now on, whatever was rendered before. The number returned comes back in
@@ -158,7 +163,7 @@ impl<T: RenderBackend> Session<T> {
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> u64 {
         self.generations += 1;
         self.send(Command::Scene(self.generations, scene));
-        self.shared.abandon.store(true, Ordering::Release);
+        self.shared.cancel_first_pass.store(true, Ordering::Release);
         self.generations
     }
 
@@ -167,7 +172,7 @@ impl<T: RenderBackend> Session<T> {
     pub fn restart(&mut self) -> u64 {
         self.generations += 1;
         self.send(Command::Restart(self.generations));
-        self.shared.abandon.store(true, Ordering::Release);
+        self.shared.cancel_first_pass.store(true, Ordering::Release);
         self.generations
     }
 
@@ -189,13 +194,13 @@ impl<T: RenderBackend> Session<T> {
         Ok(())
     }
 
-    /// Stops tracing until [`Session::go_on`].
+    /// Stops tracing until [`Session::resume`].
     pub fn pause(&self) {
         self.send(Command::Pause(true));
     }
 
     /// Goes on after a pause.
-    pub fn go_on(&self) {
+    pub fn resume(&self) {
         self.send(Command::Pause(false));
     }
 
@@ -227,8 +232,8 @@ impl<T: RenderBackend> Session<T> {
     }
 
     /// Rings (receives a message) whenever there is a new snapshot to take.
-    pub fn bell(&self) -> &Receiver<()> {
-        &self.bell
+    pub fn wakeup(&self) -> &Receiver<()> {
+        &self.wakeup
     }
 
     /// Waits for the bell, at most for `limit`, and takes the snapshot.
@@ -236,7 +241,7 @@ impl<T: RenderBackend> Session<T> {
     /// # Panics
     /// If the rendering thread has panicked.
     pub fn wait(&self, limit: Duration) -> Option<Snapshot> {
-        match self.bell.recv_timeout(limit) {
+        match self.wakeup.recv_timeout(limit) {
             Ok(()) => self.take(),
             Err(RecvTimeoutError::Timeout) => None,
             Err(RecvTimeoutError::Disconnected) => panic!("the rendering thread has ended"),
@@ -252,14 +257,14 @@ impl<T: RenderBackend> Session<T> {
     fn send(&self, command: Command<T>) {
         // The worker ends only when it is told to, or by a panic that `drop` passes on.
         let _ = self.commands.send(command);
-        self.shared.interrupt.store(true, Ordering::Release);
+        self.shared.cancel_wave.store(true, Ordering::Release);
     }
 }
 
 impl<T: RenderBackend> Drop for Session<T> {
     fn drop(&mut self) {
         self.send(Command::Quit);
-        self.shared.abandon.store(true, Ordering::Release);
+        self.shared.cancel_first_pass.store(true, Ordering::Release);
         if let Some(Err(panic)) = self.thread.take().map(JoinHandle::join)
             && !std::thread::panicking()
         {

@@ -15,7 +15,7 @@ pub enum State {
     /// Samples are being added.
     Tracing,
     /// The work is done.
-    Resting(StoppedBy),
+    Finished(StoppedBy),
     /// A guest asked for a pause.
     Paused,
     /// The newest scene cannot be rendered, and why.

@@ -41,11 +41,11 @@ impl Double {
         self.log.jobs.fetch_add(1, Ordering::SeqCst);
         let job = wave.jobs[index];
         let slot = self.film.slots(&[job.tile as usize]).remove(0);
-        let tile = slot.open();
+        let tile = slot.prepare();
         assert_eq!(tile.counts()[wave.replicate], job.first, "each index once, in order");
         tile.advance(wave.replicate, job.count);
         let mse = Mse { codes: 1.0 / f64::from(job.first + 1), linear: 0.0 };
-        let error = TileNoise { told: mse, guide: mse, squares: Mse::SPREAD, pixels: 256 };
+        let error = TileNoise { reported: mse, allocation: mse, squares: Mse::SPREAD, pixels: 256 };
         JobReport { rays: 1, glossy: false, error: wave.estimate.then_some(error) }
     }
 }
@@ -77,7 +77,7 @@ impl RenderBackend for Double {
         Ok(Self { film, lighting, mix, estimator, log: log.clone(), job: *job, display: *display })
     }
 
-    fn adopt(&mut self, scene: &Arc<Scene>) -> bool {
+    fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let Some(mix) = self.lighting.mix(scene) else { return false };
         self.mix = mix;
         true
@@ -129,13 +129,13 @@ impl RenderBackend for Double {
         &mut self,
         wave: &Wave,
         _: &rayon::ThreadPool,
-        abandon: &AtomicBool,
+        cancel_first_pass: &AtomicBool,
         shown: &mut dyn FnMut(&Film),
     ) -> Option<WaveReport> {
         shown(&self.film);
         let mut reports = Vec::new();
         for i in 0..wave.jobs.len() {
-            if abandon.load(Ordering::Acquire) {
+            if cancel_first_pass.load(Ordering::Acquire) {
                 return None;
             }
             reports.push(Some(self.job(wave, i)));
@@ -143,8 +143,8 @@ impl RenderBackend for Double {
         Some(WaveReport { reports })
     }
 
-    fn run(&mut self, wave: &Wave, _: &rayon::ThreadPool, interrupt: &AtomicBool) -> WaveReport {
-        let job = |i| (!interrupt.load(Ordering::Acquire)).then(|| self.job(wave, i));
+    fn run(&mut self, wave: &Wave, _: &rayon::ThreadPool, cancel_wave: &AtomicBool) -> WaveReport {
+        let job = |i| (!cancel_wave.load(Ordering::Acquire)).then(|| self.job(wave, i));
         WaveReport { reports: (0..wave.jobs.len()).map(job).collect() }
     }
 
@@ -242,9 +242,9 @@ fn a_pause_stops_the_work_and_loses_nothing() {
     assert_eq!(log.jobs.load(Ordering::SeqCst), jobs, "nothing is traced in a pause");
     // Work on the film is possible in a pause; the next report says that it still is one.
     assert_eq!(session.with(|_, report| report.samples), Some(paused.report.samples));
-    session.go_on();
-    let end = wait_for(&session, |s| matches!(s.report.state, State::Resting(_)));
-    assert_eq!(end.report.state, State::Resting(StoppedBy::Spp));
+    session.resume();
+    let end = wait_for(&session, |s| matches!(s.report.state, State::Finished(_)));
+    assert_eq!(end.report.state, State::Finished(StoppedBy::Spp));
     assert_eq!(end.report.spp, Spp { min: 64, mean: 64.0, max: 64 });
     let counts = session.with(|d, _| d.film.touched().map(|(_, t)| t.counts()).collect::<Vec<_>>());
     assert_eq!(counts, Some(vec![[32, 32]; 64]));

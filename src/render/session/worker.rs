@@ -14,7 +14,7 @@ use std::sync::atomic::Ordering;
 
 pub(super) struct Worker<T: RenderBackend> {
     inbox: Receiver<Command<T>>,
-    ring: Sender<()>,
+    notify: Sender<()>,
     shared: Arc<Shared>,
     pool: rayon::ThreadPool,
     options: T::Options,
@@ -38,7 +38,7 @@ pub(super) struct Worker<T: RenderBackend> {
 impl<T: RenderBackend> Worker<T> {
     pub fn new(
         inbox: Receiver<Command<T>>,
-        ring: Sender<()>,
+        notify: Sender<()>,
         shared: Arc<Shared>,
         pool: rayon::ThreadPool,
         options: T::Options,
@@ -46,7 +46,7 @@ impl<T: RenderBackend> Worker<T> {
     ) -> Self {
         Self {
             inbox,
-            ring,
+            notify,
             shared,
             pool,
             options,
@@ -66,7 +66,7 @@ impl<T: RenderBackend> Worker<T> {
     pub fn run(mut self) {
         while self.listen().is_continue() {
             if std::mem::take(&mut self.pending) {
-                self.take_up();
+                self.start_newest();
             }
             self.run_tasks();
             self.advance();
@@ -76,8 +76,8 @@ impl<T: RenderBackend> Worker<T> {
     /// Takes in all commands; waits for one if there is nothing to do.
     fn listen(&mut self) -> ControlFlow<()> {
         // The marks first, then the inbox: see the module's description.
-        self.shared.interrupt.swap(false, Ordering::AcqRel);
-        self.shared.abandon.swap(false, Ordering::AcqRel);
+        self.shared.cancel_wave.swap(false, Ordering::AcqRel);
+        self.shared.cancel_first_pass.swap(false, Ordering::AcqRel);
         if self.idle {
             match self.inbox.recv() {
                 Ok(command) => self.apply(command)?,
@@ -131,16 +131,16 @@ impl<T: RenderBackend> Worker<T> {
             && work.traced.display() != display
         {
             work.traced.set_display(display);
-            work.misjudge();
+            work.invalidate_estimates();
         }
     }
 
-    fn take_up(&mut self) {
+    fn start_newest(&mut self) {
         let Some((_, scene)) = &self.newest else { return };
         let afresh = std::mem::take(&mut self.afresh);
         if let Ok(Some(work)) = &mut self.work
             && !afresh
-            && work.adopt(scene)
+            && work.try_reuse(scene)
         {
             return;
         }
@@ -170,7 +170,7 @@ impl<T: RenderBackend> Worker<T> {
         WorkContext {
             pool: &self.pool,
             shared: &self.shared,
-            ring: &self.ring,
+            notify: &self.notify,
             view: self.view,
             generation: self.generation(),
         }
@@ -182,7 +182,7 @@ impl<T: RenderBackend> Worker<T> {
         let site = WorkContext {
             pool: &self.pool,
             shared: &self.shared,
-            ring: &self.ring,
+            notify: &self.notify,
             view: self.view,
             generation,
         };
@@ -204,7 +204,7 @@ impl<T: RenderBackend> Worker<T> {
             // The new look is shown at once, its noise as soon as it is known.
             self.state = if paused { State::Paused } else { State::Tracing };
             work.publish(&site, self.state.clone(), true);
-            if !work.judge(&self.pool, &self.shared.interrupt) {
+            if !work.reestimate(&self.pool, &self.shared.cancel_wave) {
                 self.idle = false;
                 return;
             }
@@ -213,7 +213,7 @@ impl<T: RenderBackend> Worker<T> {
             State::Paused
         } else {
             match work.schedule.next(work.seconds()) {
-                Step::Rest(reason) => State::Resting(reason),
+                Step::Finished(reason) => State::Finished(reason),
                 Step::Trace(wave) => {
                     work.trace(wave, &site);
                     self.idle = false;

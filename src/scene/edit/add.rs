@@ -193,7 +193,7 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let subject = Target::Light(next.lights.len() - 1);
     let edit = Edit::checked(next, subject, label)?;
     Ok(match note {
-        Some(note) => edit.noted(note),
+        Some(note) => edit.with_note(note),
         None => edit,
     })
 }

@@ -6,7 +6,7 @@ use crate::material::{Bump, Material, Texture};
 use crate::scene::Scene;
 use crate::scene::edit::bounds::{is_solid, scene_bounds};
 use crate::scene::edit::set::{finish, replace};
-use crate::scene::edit::toml_view::{put, read};
+use crate::scene::edit::toml_view::{insert_value, read};
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::shape::Shape;
 use crate::value::{
@@ -39,7 +39,7 @@ pub(super) const AIM: Field = Field::required(
 
 /// Which of the two a light or a camera is.
 pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
-    crate::scene::edit::toml_view::rivals(subject)
+    crate::scene::edit::toml_view::exclusive_keys(subject)
         .iter()
         .copied()
         .find(|key| values.contains_key(*key))
@@ -67,7 +67,7 @@ pub(super) fn switch(
         Target::Object(i) => {
             let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
             if object.shape.key() != name
-                && let Some(shape) = reshaped(&object.shape, name, scene)
+                && let Some(shape) = convert_shape(&object.shape, name, scene)
             {
                 object.shape = shape;
             }
@@ -82,13 +82,13 @@ pub(super) fn switch(
     let values = read(&next, subject)?;
     let edit = finish(&next, subject, key, values)?;
     Ok(match note {
-        Some(note) => edit.noted(note),
+        Some(note) => edit.with_note(note),
         None => edit,
     })
 }
 
 /// A shape of the kind `name` with place, size and rotation of `shape`.
-fn reshaped(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
+fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let form = shape.form();
     let (base, size) = match form.bounds() {
         Some((low, high)) => {
@@ -258,7 +258,7 @@ pub(super) fn append_step(object: &mut Table, key: &str, name: &str) {
     match object.get_mut(key).and_then(Value::as_array_mut) {
         Some(steps) => steps.push(step),
         None => {
-            put(object, key, Some(Value::Array(vec![step])));
+            insert_value(object, key, Some(Value::Array(vec![step])));
         }
     }
 }

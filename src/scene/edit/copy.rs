@@ -113,7 +113,7 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     };
     let edit = Edit::checked(next, select.unwrap_or(Target::Camera), label)?;
     Ok(match note {
-        Some(note) => edit.noted(note),
+        Some(note) => edit.with_note(note),
         None => edit,
     })
 }
@@ -221,7 +221,7 @@ pub fn own_material(scene: &Scene, subject: &Target) -> Result<Edit, EditError> 
     next.objects[*index].material = new.clone();
     let label = format!("own material for {}", subject.label(scene));
     Ok(Edit::checked(next, subject.clone(), label)?
-        .noted(format!("Its material is {} now.", truncated(&new))))
+        .with_note(format!("Its material is {} now.", truncated(&new))))
 }
 
 #[cfg(test)]

@@ -240,9 +240,9 @@ impl StepRule {
     fn stepped(self, x: f64, all: &[f64], count: StepCount) -> f64 {
         let StepCount { steps, fine } = count;
         match self {
-            Self::Rungs { floor, range } => climb(x, floor, range, count),
+            Self::Rungs { floor, range } => next_nice(x, floor, range, count),
             Self::Units { unit, range } if range == NumberRange::COEFFICIENT && x > 2.0 => {
-                climb(x, unit, range, count)
+                next_nice(x, unit, range, count)
             }
             Self::Units { unit, range } => within(added(x, unit, count), range, x),
             Self::Degrees { range } => {
@@ -259,7 +259,7 @@ impl StepRule {
             }
             Self::Factor => {
                 let range = NumberRange::closed(1e-6, 1e6);
-                climb(x.abs(), 0.0, range, count) * x.signum()
+                next_nice(x.abs(), 0.0, range, count) * x.signum()
             }
             Self::Tens { range } => {
                 within(x + (if fine { 1 } else { 10 } * steps) as f64, range, x)
@@ -314,11 +314,11 @@ fn fine_width(hundredths: i64) -> i64 {
 }
 
 /// `x` > 0 (or 0) after that many rungs: always on the ladder, so that up and down lead back.
-fn climb(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
+fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let up = steps > 0;
     let mut x = x;
     for _ in 0..steps.unsigned_abs() {
-        let next = if x == 0.0 { if up { floor } else { 0.0 } } else { rung(x, up, fine) };
+        let next = if x == 0.0 { if up { floor } else { 0.0 } } else { nice_step(x, up, fine) };
         let next = if next < floor && !up { 0.0 } else { next };
         let held = within(next, range, x);
         if held == x {
@@ -330,7 +330,7 @@ fn climb(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: Step
 }
 
 /// The next rung above or below `x` > 0.
-fn rung(x: f64, up: bool, fine: bool) -> f64 {
+fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     let e = floor_log10(x);
     let scale = format!("1e{}", 2 - e).parse().unwrap_or(1.0);
     let mantissa = x * scale;
@@ -367,7 +367,7 @@ fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64
     let largest = channels.iter().fold(0.0f64, |m, x| m.max(*x));
     let rule = StepRule::Units { unit: 0.05, range };
     let next = match largest > 2.0 {
-        true => climb(largest, 0.0, range, count),
+        true => next_nice(largest, 0.0, range, count),
         false => rule.stepped(largest, channels, count),
     };
     if largest == 0.0 {

@@ -43,7 +43,7 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     chosen.or_else(|| all.find(|i| rectangle(i) && named(i)).and_then(name))
 }
 
-fn the_mirror(scene: &Scene, selected: Option<&Target>) -> Result<Target, EditError> {
+fn find_mirror(scene: &Scene, selected: Option<&Target>) -> Result<Target, EditError> {
     mirror(scene, selected).map(Target::Material).ok_or_else(|| {
         let help = "Give an object's material a reflection first.";
         EditError::new("nothing in this scene reflects", help)
@@ -54,8 +54,12 @@ fn the_mirror(scene: &Scene, selected: Option<&Target>) -> Result<Target, EditEr
 ///
 /// # Errors
 /// If nothing in the scene reflects.
-pub fn roughen(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<Edit, EditError> {
-    step(scene, &the_mirror(scene, selected)?, "roughness", None, steps)
+pub fn adjust_roughness(
+    scene: &Scene,
+    selected: Option<&Target>,
+    steps: f64,
+) -> Result<Edit, EditError> {
+    step(scene, &find_mirror(scene, selected)?, "roughness", None, steps)
 }
 
 /// Changes the mirror's reflection coefficient by `steps`, as [`step`] counts them.
@@ -63,7 +67,7 @@ pub fn roughen(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<E
 /// # Errors
 /// If there is nothing in the scene to be a mirror.
 pub fn reflect(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<Edit, EditError> {
-    step(scene, &the_mirror(scene, selected)?, "reflection", None, steps)
+    step(scene, &find_mirror(scene, selected)?, "reflection", None, steps)
 }
 
 /// Gives the mirror the next (or previous) lobe, round and round.
@@ -75,7 +79,7 @@ pub fn next_lobe(
     selected: Option<&Target>,
     forward: bool,
 ) -> Result<Edit, EditError> {
-    toggle(scene, &the_mirror(scene, selected)?, "lobe", forward)
+    toggle(scene, &find_mirror(scene, selected)?, "lobe", forward)
 }
 
 #[cfg(test)]
@@ -102,7 +106,7 @@ mod tests {
         assert_eq!(at(&scene, Some(Target::Object(3))), "green");
         scene.objects.clear();
         assert_eq!(mirror(&scene, None), None);
-        assert!(roughen(&scene, None, 1.0).unwrap_err().found.contains("nothing"));
+        assert!(adjust_roughness(&scene, None, 1.0).unwrap_err().found.contains("nothing"));
     }
 
     #[test]
@@ -132,18 +136,18 @@ mod tests {
         let start = scene.clone();
         let mut seen = vec![0.0];
         for _ in 0..60 {
-            scene = roughen(&scene, None, 1.0).unwrap().scene;
+            scene = adjust_roughness(&scene, None, 1.0).unwrap().scene;
             seen.push(scene.materials["mirror"].roughness);
         }
         assert!(seen.is_sorted_by(|a, b| a < b), "{seen:?}");
         assert!(seen.contains(&0.3) && seen.contains(&0.001) && seen.contains(&0.05), "{seen:?}");
         for expected in seen.iter().rev().skip(1) {
-            scene = roughen(&scene, None, -1.0).unwrap().scene;
+            scene = adjust_roughness(&scene, None, -1.0).unwrap().scene;
             assert_eq!(scene.materials["mirror"].roughness, *expected);
         }
         assert_eq!(scene, start);
-        assert_eq!(roughen(&scene, None, -1.0).unwrap().scene, start, "0 is the end");
-        let fine = roughen(&scene, None, 0.1).unwrap().scene;
+        assert_eq!(adjust_roughness(&scene, None, -1.0).unwrap().scene, start, "0 is the end");
+        let fine = adjust_roughness(&scene, None, 0.1).unwrap().scene;
         assert_eq!(fine.materials["mirror"].roughness, 0.001);
     }
 

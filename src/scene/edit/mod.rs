@@ -27,8 +27,8 @@ pub use add::{add_light, add_material, add_object, light_kinds, object_kinds};
 pub use bounds::{BoundingSphere, bounds, focus_distance, scene_bounds, step_length};
 pub use copy::{delete, duplicate, own_material, rename};
 pub use increment::{step, toggle};
-pub use mirror::{mirror, next_lobe, reflect, roughen};
-pub use placement::drop_down;
+pub use mirror::{adjust_roughness, mirror, next_lobe, reflect};
+pub use placement::snap_to_ground;
 pub use properties::{Property, Widget, Word, rows};
 pub use rotate::turn;
 pub use set::{set, set_component};
@@ -99,7 +99,7 @@ impl Edit {
         }
     }
 
-    fn noted(mut self, note: impl Into<String>) -> Self {
+    fn with_note(mut self, note: impl Into<String>) -> Self {
         self.note = Some(note.into());
         self
     }

@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3};
 ///
 /// # Errors
 /// For what is no object, has no lowest point, or if nothing is under or above it.
-pub fn drop_down(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
+pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {
         return Err(EditError::new("only objects can be dropped", "Select an object."));
     };
@@ -31,9 +31,9 @@ pub fn drop_down(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
         .map(|(_, object)| object.form())
         .collect();
     let level = (low.y + high.y) / 2.0;
-    let feet = feet(&form, (low, high));
+    let support_points = support_points(&form, (low, high));
     let heights = |down: bool| {
-        let found = feet.iter().flat_map(|foot| {
+        let found = support_points.iter().flat_map(|foot| {
             let from = DVec3::new(foot.x, level, foot.y);
             let direction = if down { DVec3::NEG_Y } else { DVec3::Y };
             others.iter().filter_map(move |form| {
@@ -76,10 +76,10 @@ fn lift(object: &mut Object, by: f64) {
 }
 
 /// The points (x, z) that an object stands on: its middle and its lowest corners.
-fn feet(form: &Form, (low, high): Extent) -> Vec<DVec2> {
+fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let flat = |p: DVec3| DVec2::new(p.x, p.z);
     let middle = flat(low + (high - low) / 2.0);
-    let mut feet = vec![middle];
+    let mut support_points = vec![middle];
     let corners = match form {
         Form::ConvexPolyhedron { corners, .. } => corners.clone(),
         Form::Parallelogram { corner, u, v } => {
@@ -90,8 +90,8 @@ fn feet(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let near = 1e-9 * (high - low).max_element();
     let lowest = corners.iter().filter(|c| c.y - low.y <= near).map(|c| flat(*c));
     // Just inside, so that neighbours that only touch carry nothing.
-    feet.extend(lowest.map(|c| middle + (c - middle) * (1.0 - 1e-6)));
-    feet
+    support_points.extend(lowest.map(|c| middle + (c - middle) * (1.0 - 1e-6)));
+    support_points
 }
 
 /// The middle of the underside of a new thing with the lengths `size`: in the middle of what the
@@ -123,7 +123,7 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let free = spots.take_while(|offset| offset.length() <= reach).map(candidate).filter(|base| {
         let half = DVec3::new(spread / 2.0, 0.0, spread / 2.0);
         let room = (*base - half, *base + half + DVec3::Y * size.y);
-        !walls.iter().any(|wall| cuts(wall, room))
+        !walls.iter().any(|wall| intersects(wall, room))
             && !solids.iter().any(|solid| overlap(*solid, room))
     });
     // In full view, else hidden but in the picture, else anywhere.
@@ -159,7 +159,7 @@ fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
 }
 
 /// Whether a flat thing (a wall) goes through the inside of a box.
-fn cuts(form: &Form, (low, high): Extent) -> bool {
+fn intersects(form: &Form, (low, high): Extent) -> bool {
     let shrink = (high - low) * 1e-6;
     let (low, high) = (low + shrink, high - shrink);
     let edge = high - low;
@@ -209,7 +209,7 @@ mod tests {
             for by in [[0.0, 1.23, 0.0], [0.0, -0.217, 0.0], [0.1, 0.777, 0.1]] {
                 let subject = Target::Object(i);
                 let up = move_by(&scene, &subject, by).unwrap().scene;
-                let down = drop_down(&up, &subject).unwrap();
+                let down = snap_to_ground(&up, &subject).unwrap();
                 assert_eq!(lowest(&down.scene, i), 0.0, "object {i} {by:?}");
             }
         }
@@ -223,18 +223,18 @@ mod tests {
                     transform = [{ rotate_y = 30.0 }]\n";
         let scene = Scene::parse(text, "text").unwrap();
         let cube = Target::Object(2);
-        let on_table = drop_down(&scene, &cube).unwrap().scene;
+        let on_table = snap_to_ground(&scene, &cube).unwrap().scene;
         assert!((lowest(&on_table, 2) - 0.25).abs() < 1e-15);
         let aside = move_by(&scene, &cube, [5.0, 0.0, 0.0]).unwrap().scene;
-        assert!((lowest(&drop_down(&aside, &cube).unwrap().scene, 2) + 1.0).abs() < 1e-15);
+        assert!((lowest(&snap_to_ground(&aside, &cube).unwrap().scene, 2) + 1.0).abs() < 1e-15);
         let corner = move_by(&scene, &cube, [1.3, 0.0, 0.0]).unwrap().scene;
-        assert!((lowest(&drop_down(&corner, &cube).unwrap().scene, 2) - 0.25).abs() < 1e-15);
+        assert!((lowest(&snap_to_ground(&corner, &cube).unwrap().scene, 2) - 0.25).abs() < 1e-15);
         let sunk = move_by(&aside, &cube, [0.0, -9.0, 0.0]).unwrap().scene;
-        assert!((lowest(&drop_down(&sunk, &cube).unwrap().scene, 2) + 1.0).abs() < 1e-15);
-        let refusal = drop_down(&scene, &Target::Object(0)).unwrap_err();
+        assert!((lowest(&snap_to_ground(&sunk, &cube).unwrap().scene, 2) + 1.0).abs() < 1e-15);
+        let refusal = snap_to_ground(&scene, &Target::Object(0)).unwrap_err();
         assert!(refusal.found.contains("no lowest point"), "{refusal}");
         let alone = Scene { objects: vec![scene.objects[2].clone()], ..Scene::default() };
-        let refusal = drop_down(&alone, &Target::Object(0)).unwrap_err();
+        let refusal = snap_to_ground(&alone, &Target::Object(0)).unwrap_err();
         assert!(refusal.found.contains("nothing is under it"), "{refusal}");
     }
 }

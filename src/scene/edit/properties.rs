@@ -3,7 +3,7 @@
 use crate::scene::Scene;
 use crate::scene::edit::convert::{AIM, KIND, chosen};
 use crate::scene::edit::parse_value::{color, floats, show};
-use crate::scene::edit::toml_view::{fields, get, read, rivals};
+use crate::scene::edit::toml_view::{exclusive_keys, fields, get, read};
 use crate::scene::edit::{EditError, Target};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, number};
 use toml::{Table, Value};
@@ -83,10 +83,10 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
     };
     for field in fields(subject) {
         if let Some(kind) = virtual_kind
-            && rivals(subject).contains(&field.name)
+            && exclusive_keys(subject).contains(&field.name)
         {
             // One row to choose which of the two it is, then only the one that is given.
-            if rivals(subject)[0] == field.name {
+            if exclusive_keys(subject)[0] == field.name {
                 walk.kind(kind, chosen(subject, &values), kind.name.to_string(), 0);
             }
             if values.contains_key(field.name) {

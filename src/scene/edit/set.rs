@@ -5,7 +5,9 @@ use crate::scene::edit::convert;
 use crate::scene::edit::convert::{AIM, KIND};
 use crate::scene::edit::parse_value::{floats, parse, word};
 use crate::scene::edit::properties::is_material;
-use crate::scene::edit::toml_view::{field, fields, get, put, read, rivals, write};
+use crate::scene::edit::toml_view::{
+    exclusive_keys, field, fields, get, insert_value, read, write,
+};
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, ValueType};
 use toml::{Table, Value};
@@ -106,17 +108,17 @@ pub(super) fn replace(
 ) -> Result<Edit, EditError> {
     let mut gone = None;
     let first = key.split('.').next().unwrap_or(key);
-    if rivals(subject).contains(&first) {
-        for rival in rivals(subject).iter().filter(|rival| **rival != first) {
+    if exclusive_keys(subject).contains(&first) {
+        for rival in exclusive_keys(subject).iter().filter(|rival| **rival != first) {
             gone = values.remove(*rival).map(|_| *rival).or(gone);
         }
     }
-    if !put(&mut values, key, Some(value)) {
+    if !insert_value(&mut values, key, Some(value)) {
         return Err(EditError::new(&format!("there is no place for {key} here"), ""));
     }
     let edit = finish(scene, subject, key, values)?;
     Ok(match gone {
-        Some(rival) => edit.noted(format!("{rival} is gone: {first} stands in its place.")),
+        Some(rival) => edit.with_note(format!("{rival} is gone: {first} stands in its place.")),
         None => edit,
     })
 }
@@ -140,7 +142,7 @@ fn clear(
         let found = format!("{} must not be left out", field.name);
         return Err(EditError::new(&found, &format!("Expected {}.", field.takes)));
     } else {
-        put(&mut values, key, None);
+        insert_value(&mut values, key, None);
     }
     finish(scene, subject, key, values)
 }

@@ -223,7 +223,7 @@ mod tests {
             assert_eq!(Target::of_path(&subject.path()).as_ref(), Some(&subject));
             let message = Diagnostic {
                 file: String::new(),
-                place: None,
+                line_column: None,
                 subject: subject.title(&scene),
                 found: String::new(),
                 help: String::new(),

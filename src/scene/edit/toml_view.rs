@@ -25,7 +25,7 @@ pub(super) fn fields(subject: &Target) -> &'static [Field] {
 }
 
 /// Keys of which at most one is given.
-pub(super) fn rivals(subject: &Target) -> &'static [&'static str] {
+pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],
         Target::Light(_) => &["point", "directional"],
@@ -121,7 +121,7 @@ pub(super) fn get<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
 
 /// Puts `value` behind the dotted `key`, whose tables are there; nothing (`None`) removes the key.
 /// Whether there was a place for it.
-pub(super) fn put(table: &mut Table, key: &str, value: Option<Value>) -> bool {
+pub(super) fn insert_value(table: &mut Table, key: &str, value: Option<Value>) -> bool {
     let (outer, last) = match key.rsplit_once('.') {
         Some((outer, last)) => (Some(outer), last),
         None => (None, key),

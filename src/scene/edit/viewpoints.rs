@@ -23,7 +23,7 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
     let label = format!("store view {kept}");
     let edit = Edit::checked(next, Target::View(kept.clone()), label)?;
     let replaced = old.is_some_and(|old| old != scene.camera);
-    Ok(if replaced { edit.noted(format!("View {kept} was replaced.")) } else { edit })
+    Ok(if replaced { edit.with_note(format!("View {kept} was replaced.")) } else { edit })
 }
 
 /// Makes the view with this name the camera.

@@ -2,7 +2,7 @@
 
 use crate::scene::diagnostic::SceneErrors;
 use crate::scene::format::schema;
-use crate::scene::format::source_map::{located, place};
+use crate::scene::format::source_map::{line_column, located};
 use crate::scene::{AssetResolver, Scene};
 use std::fs::File;
 use std::io::Read;
@@ -43,7 +43,7 @@ impl Scene {
         let (root, syntax) = DeTable::parse_recoverable(text);
         let at = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
         if let Some(error) = syntax.iter().min_by_key(|e| at(e)) {
-            let place = Some(place(text, at(error)));
+            let place = Some(line_column(text, at(error)));
             let found = format!("this is not TOML: {}", error.message());
             return Err(SceneErrors::at(name, place, found, ""));
         }
@@ -60,7 +60,7 @@ impl Scene {
             return Err(SceneErrors::new(form));
         }
         let mut scene: Self = toml::from_str(text).map_err(|error| {
-            let place = error.span().map(|span| place(text, span.start));
+            let place = error.span().map(|span| line_column(text, span.start));
             SceneErrors::at(name, place, error.message().to_string(), "")
         })?;
         scene.library = library;
@@ -105,7 +105,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, SceneErrors> {
         let text = String::from_utf8_lossy(&bytes[..good]);
         SceneErrors::at(
             &name,
-            Some(place(&text, good)),
+            Some(line_column(&text, good)),
             format!("this is not UTF-8 text: byte 0x{:02x}", bytes[good]),
             "Expected a scene file (TOML), saved as UTF-8.",
         )

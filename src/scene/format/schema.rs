@@ -3,7 +3,7 @@
 
 use crate::scene::OBJECT_FIELDS;
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::format::source_map::place;
+use crate::scene::format::source_map::line_column;
 use crate::scene::format::suggest::nearest;
 use crate::scene::settings::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, TRACE_FIELDS};
 use crate::scene::validate::subject;
@@ -95,8 +95,14 @@ impl SchemaChecker<'_> {
             let entry = self.root.get(list)?.get_ref().as_array()?.get(index)?;
             entry.get_ref().as_table()?.get("name")?.get_ref().as_str().map(str::to_string)
         });
-        let place = Some(place(self.text, span.start));
-        self.messages.push(Diagnostic { file: self.file.to_string(), place, subject, found, help });
+        let place = Some(line_column(self.text, span.start));
+        self.messages.push(Diagnostic {
+            file: self.file.to_string(),
+            line_column: place,
+            subject,
+            found,
+            help,
+        });
     }
 
     /// The keys below the thing that the subject names: `shape.sphere`.

@@ -7,7 +7,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Line and column of the byte `at` of `text`, both from 1; columns count characters.
-pub(crate) fn place(text: &str, at: usize) -> (usize, usize) {
+pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {
         at -= 1;
@@ -22,12 +22,12 @@ pub(crate) fn place(text: &str, at: usize) -> (usize, usize) {
 fn span(root: &DeTable, path: &[String]) -> Range<usize> {
     let Some((first, rest)) = path.split_first() else { return 0..0 };
     match root.get(first.as_str()) {
-        Some(value) => deepest(value, rest),
+        Some(value) => deepest_span(value, rest),
         None => 0..0,
     }
 }
 
-fn deepest(value: &Spanned<DeValue>, path: &[String]) -> Range<usize> {
+fn deepest_span(value: &Spanned<DeValue>, path: &[String]) -> Range<usize> {
     let inner = path.split_first().and_then(|(first, rest)| {
         let next = match value.get_ref() {
             DeValue::Table(table) => table.get(first.as_str()),
@@ -37,7 +37,7 @@ fn deepest(value: &Spanned<DeValue>, path: &[String]) -> Range<usize> {
         next.map(|next| (next, rest))
     });
     match inner {
-        Some((next, rest)) => deepest(next, rest),
+        Some((next, rest)) => deepest_span(next, rest),
         None => value.span(),
     }
 }
@@ -49,27 +49,29 @@ pub(crate) fn located(file: &str, text: &str, findings: Vec<Problem>) -> Vec<Dia
         .into_iter()
         .map(|finding| Diagnostic {
             file: file.to_string(),
-            place: root.as_ref().map(|r| place(text, span(r.get_ref(), &finding.path).start)),
+            line_column: root
+                .as_ref()
+                .map(|r| line_column(text, span(r.get_ref(), &finding.path).start)),
             subject: finding.subject,
             found: finding.found,
             help: finding.help,
         })
         .collect();
-    messages.sort_by_key(|m| m.place);
+    messages.sort_by_key(|m| m.line_column);
     messages
 }
 
 #[cfg(test)]
 mod tests {
-    use super::place;
+    use super::line_column;
 
     #[test]
     fn columns_count_characters_and_skip_a_byte_order_mark() {
         let text = "\u{feff}a = 1\nöäü = 2\n";
-        assert_eq!(place(text, 3), (1, 1));
-        assert_eq!(place(text, text.find('=').unwrap()), (1, 3));
-        assert_eq!(place(text, text.rfind('=').unwrap()), (2, 5));
-        assert_eq!(place(text, 1), (1, 1), "inside a character");
-        assert_eq!(place(text, 10_000), (3, 1));
+        assert_eq!(line_column(text, 3), (1, 1));
+        assert_eq!(line_column(text, text.find('=').unwrap()), (1, 3));
+        assert_eq!(line_column(text, text.rfind('=').unwrap()), (2, 5));
+        assert_eq!(line_column(text, 1), (1, 1), "inside a character");
+        assert_eq!(line_column(text, 10_000), (3, 1));
     }
 }

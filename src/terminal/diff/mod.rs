@@ -251,10 +251,14 @@ impl FrameDiff {
             frame.picture = !part.cells.is_empty();
             self.send(wanted, part, out);
             self.rest.visible = self.sight.has_visible();
-        } else if visible.is_empty() && allowance.picture && idle_at <= now && allowance.flush > 0 {
+        } else if visible.is_empty()
+            && allowance.picture
+            && idle_at <= now
+            && allowance.refinement > 0
+        {
             let mut hidden = self.sight.hidden();
             let exact = |at: usize| &wanted.cells[position(area, at)];
-            let room = allowance.flush.min(allowance.bytes);
+            let room = allowance.refinement.min(allowance.bytes);
             let part = self.fitting(area, &mut hidden, room, exact);
             frame = Frame { picture: !part.cells.is_empty(), flushed: part.bytes.len() };
             self.send(wanted, part, out);

@@ -6,14 +6,15 @@ use std::num::NonZeroU16;
 const AREA: Rect = Rect { x: 0, y: 0, width: 40, height: 12 };
 const PICTURE: Rect = Rect { x: 2, y: 1, width: 30, height: 8 };
 const THRESHOLD: f32 = 0.02;
-const EVERYTHING: FrameBudget = FrameBudget { bytes: usize::MAX, picture: true, flush: usize::MAX };
+const EVERYTHING: FrameBudget =
+    FrameBudget { bytes: usize::MAX, picture: true, refinement: usize::MAX };
 
 fn ms(n: u64) -> Duration {
     Duration::from_millis(n)
 }
 
 fn within(bytes: usize) -> FrameBudget {
-    FrameBudget { bytes, picture: true, flush: bytes / 2 }
+    FrameBudget { bytes, picture: true, refinement: bytes / 2 }
 }
 
 /// A screen with a picture, a terminal, and what goes between.
@@ -153,7 +154,7 @@ fn text_goes_before_the_picture_and_frames_stay_within_their_budget() {
 fn beside_other_frames_only_text_goes() {
     let mut desk = Desk::new();
     desk.say(10, "words");
-    let beside = FrameBudget { bytes: 1500, picture: false, flush: 0 };
+    let beside = FrameBudget { bytes: 1500, picture: false, refinement: 0 };
     let (frame, _) = desk.frame(0, beside);
     assert_eq!((frame, desk.exact()), (Frame::default(), 0));
     assert!(desk.parser.screen().contents().contains("words"));
@@ -210,7 +211,7 @@ fn differences_that_nobody_sees_wait_for_rest() {
     assert!(frame.flushed > 500 && frame.flushed <= 2000 && bytes.len() <= 2000, "{frame:?}");
     // When the picture is done they go at once; but not before the line has time for them.
     desk.settled = true;
-    assert_eq!(desk.frame(2300, FrameBudget { flush: 0, ..within(4000) }).1, b"");
+    assert_eq!(desk.frame(2300, FrameBudget { refinement: 0, ..within(4000) }).1, b"");
     while desk.pacing.rest().hidden.is_some() {
         assert!(desk.frame(2400, within(4000)).0.flushed > 0);
     }

@@ -36,7 +36,7 @@ impl FramesInFlight {
     }
 
     /// The oldest has arrived; with when the one before it had.
-    pub fn answered(&mut self, at: Duration) -> Option<(Acked, Option<Duration>)> {
+    pub fn on_ack(&mut self, at: Duration) -> Option<(Acked, Option<Duration>)> {
         let (InFlight { sent, bytes, .. }, alone) = self.queue.pop_front()?;
         Some((Acked { sent, bytes, alone }, self.arrived.replace(at)))
     }

@@ -75,7 +75,7 @@ pub struct FrameBudget {
     /// Whether parts of the picture may be among them.
     pub picture: bool,
     /// Of them, bytes of differences that cannot be seen.
-    pub flush: usize,
+    pub refinement: usize,
 }
 
 /// What the user is told about the line.
@@ -166,7 +166,7 @@ impl FlowControl {
     }
 
     /// How the question after a frame is asked; `None`: it is not.
-    pub fn question(&self) -> Option<Option<Multiplexer>> {
+    pub fn ack_request(&self) -> Option<Option<Multiplexer>> {
         match self.mode {
             PacingMode::AckClocked(through) => Some(through),
             _ => None,
@@ -186,13 +186,13 @@ impl FlowControl {
         let bytes = if self.is_learning(now) { SMALL } else { self.budget() };
         let due = |interval| self.last_frame.is_none_or(|last| answers || last + interval <= now);
         if due(FRAME_INTERVAL) && self.has_room(now, answers) {
-            let flush = if self.flush_at <= now { bytes / 2 } else { 0 };
-            return Some(FrameBudget { bytes, picture: true, flush });
+            let refinement = if self.flush_at <= now { bytes / 2 } else { 0 };
+            return Some(FrameBudget { bytes, picture: true, refinement });
         }
         let beside = BESIDE.saturating_sub(self.flights.text_bytes());
         let may_beside = self.mode != PacingMode::FixedRate || self.free_at <= now + 2 * FRAME_SPAN;
         let due = due(TEXT_INTERVAL) && may_beside && beside >= BESIDE / 4;
-        due.then_some(FrameBudget { bytes: beside, picture: false, flush: 0 })
+        due.then_some(FrameBudget { bytes: beside, picture: false, refinement: 0 })
     }
 
     /// When to ask for an [`FlowControl::allowance`] again if it is not given now, by time alone. `text`:
@@ -261,7 +261,7 @@ impl FlowControl {
     }
 
     /// The terminal has answered. Whether something may have become possible by that.
-    pub fn answered(&mut self, at: Duration) -> bool {
+    pub fn on_ack(&mut self, at: Duration) -> bool {
         if let Some(mode) = self.silent.take() {
             // After a tunnel: the answers have come after all.
             self.mode = mode;
@@ -270,7 +270,7 @@ impl FlowControl {
             self.losses = 0;
             return true;
         }
-        let Some((flight, arrived)) = self.flights.answered(at) else { return false };
+        let Some((flight, arrived)) = self.flights.on_ack(at) else { return false };
         self.losses = 0;
         if self.flights.is_empty() {
             self.clear_at = self.clear_at.min(at);
@@ -304,34 +304,34 @@ impl FlowControl {
         };
         let held = &mut self.held_back;
         let gone = held.sent - bytes as f64;
-        let before = held.asked.replace(now).map(|asked| (asked, held.gone));
-        (held.bytes, held.gone) = (bytes as f64, gone);
-        let (since, at_first) = match (before, held.busy) {
+        let before = held.asked.replace(now).map(|asked| (asked, held.drained));
+        (held.bytes, held.drained) = (bytes as f64, gone);
+        let (since, at_first) = match (before, held.busy_since) {
             // The line has nothing to do: it is at least as fast as what it has taken.
             (Some(before), _) if bytes == 0 => before,
             (_, Some(busy)) => busy,
             _ => {
-                held.busy = Some((now, gone));
+                held.busy_since = Some((now, gone));
                 return;
             }
         };
         let span = now.saturating_sub(since);
         let rate = (gone - at_first) / span.as_secs_f64().max(1e-3);
         if bytes == 0 {
-            held.busy = None;
+            held.busy_since = None;
             if rate <= self.rate {
                 return;
             }
         } else if span < FRAME_SPAN {
             return;
         } else {
-            held.busy = Some((now, gone));
+            held.busy_since = Some((now, gone));
         }
         self.rate = (1.0 - NEWEST) * self.rate + NEWEST * rate.max(BUDGET[0]);
     }
 
     /// Time has passed: answers that have not come by now are not waited for.
-    pub fn look(&mut self, now: Duration) {
+    pub fn expire(&mut self, now: Duration) {
         if self.lost_at().is_none_or(|at| at > now) {
             return;
         }

@@ -10,9 +10,9 @@ pub struct SendQueueEstimate {
     /// When it was asked last.
     pub asked: Option<Duration>,
     /// Bytes that it had got rid of then.
-    pub gone: f64,
+    pub drained: f64,
     /// Since when it has always held something back, and what it had got rid of before.
-    pub busy: Option<(Duration, f64)>,
+    pub busy_since: Option<(Duration, f64)>,
     /// Bytes that were sent in all.
     pub sent: f64,
 }

@@ -37,9 +37,9 @@ fn saturate(
     for at in 0..seconds * 1000 {
         let now = ms(at);
         while answers.front().is_some_and(|at| *at <= now) {
-            link.answered(answers.pop_front().unwrap());
+            link.on_ack(answers.pop_front().unwrap());
         }
-        link.look(now);
+        link.expire(now);
         if acting && at % 50 == 0 {
             link.act(now);
         }
@@ -91,7 +91,7 @@ fn who_acts_waits_for_one_frame_only() {
     assert!(answer.picture);
     link.sent(now + ms(1), answer.bytes, true, 0);
     let beside = link.allowance(now + ms(2), true).unwrap();
-    assert_eq!(beside, FrameBudget { bytes: BESIDE, picture: false, flush: 0 });
+    assert_eq!(beside, FrameBudget { bytes: BESIDE, picture: false, refinement: 0 });
     link.sent(now + ms(2), BESIDE, false, 0);
     assert_eq!(link.allowance(now + ms(3), true), None);
 }
@@ -113,14 +113,14 @@ fn the_first_answer_does_not_wait_for_what_was_sent_before() {
 #[test]
 fn a_terminal_that_is_here_takes_everything() {
     let mut link = FlowControl::new(start(PacingMode::Unlimited));
-    let all = FrameBudget { bytes: usize::MAX, picture: true, flush: usize::MAX / 2 };
+    let all = FrameBudget { bytes: usize::MAX, picture: true, refinement: usize::MAX / 2 };
     assert_eq!(link.allowance(ms(5), false), Some(all));
     link.sent(ms(5), 100_000, true, 0);
     assert_eq!(link.allowance(ms(6), true), Some(all));
     assert_eq!(link.allowance(ms(6), false), None);
     assert_eq!(link.wakes_at(ms(6), false), ms(38));
     assert_eq!(link.allowance(ms(38), false), Some(all));
-    assert_eq!((link.question(), link.reading(), link.threshold()), (None, None, 0.0));
+    assert_eq!((link.ack_request(), link.reading(), link.threshold()), (None, None, 0.0));
 }
 
 #[test]
@@ -128,28 +128,28 @@ fn lost_answers_end_the_questions_and_late_ones_bring_them_back() {
     let mut link = FlowControl::new(start(PacingMode::AckClocked(None)));
     let mut now = ms(0);
     for _ in 0..MOST_LOSSES {
-        assert!(link.question().is_some());
+        assert!(link.ack_request().is_some());
         link.sent(now, 4000, true, 0);
         link.sent(now, 4000, true, 0);
         assert!(link.wakes_at(now, false) <= now + LOST_AFTER);
         now += LOST_AFTER;
-        link.look(now);
+        link.expire(now);
     }
     let reading = link.reading().unwrap();
     assert_eq!((reading.mode, reading.rate), (PacingMode::FixedRate, DEFAULT_RATE));
-    assert_eq!(link.question(), None);
+    assert_eq!(link.ack_request(), None);
     // It goes on at that rate.
     let mut sent = 0;
     for _ in 0..10_000 {
         now += ms(1);
-        link.look(now);
+        link.expire(now);
         if let Some(allowance) = link.allowance(now, false) {
             link.sent(now, allowance.bytes, true, 0);
             sent += allowance.bytes;
         }
     }
     assert!((0.9..1.1).contains(&(sent as f64 / 10.0 / DEFAULT_RATE)), "{sent}");
-    assert!(link.answered(now));
+    assert!(link.on_ack(now));
     assert_eq!(link.reading().unwrap().mode, PacingMode::AckClocked(None));
 }
 
@@ -159,7 +159,7 @@ fn the_kernel_is_the_second_choice() {
         FlowControl::new(InitialLink { queue: true, ..start(PacingMode::AckClocked(None)) });
     for i in 0..u64::from(MOST_LOSSES) {
         link.sent(LOST_AFTER * i as u32, 4000, true, 0);
-        link.look(LOST_AFTER * (i as u32 + 1));
+        link.expire(LOST_AFTER * (i as u32 + 1));
     }
     assert_eq!(link.reading().unwrap().mode, PacingMode::SendQueue);
     // A line of 100 kB/s: the rate is learned from what the kernel holds back.
@@ -190,9 +190,9 @@ fn differences_that_nobody_sees_take_a_quarter_of_the_line() {
     let mut flushed = 0;
     for at in 0..20_000 {
         let Some(allowance) = link.allowance(ms(at), false) else { continue };
-        if allowance.flush > 0 {
-            link.sent(ms(at), allowance.flush, true, allowance.flush);
-            flushed += allowance.flush;
+        if allowance.refinement > 0 {
+            link.sent(ms(at), allowance.refinement, true, allowance.refinement);
+            flushed += allowance.refinement;
         }
     }
     let share = flushed as f64 / 20.0 / DEFAULT_RATE;
@@ -215,7 +215,7 @@ fn who_answers_is_found_out() {
             multiplexer,
             ..Environment::default()
         };
-        let asked = Capabilities::unasked(surroundings);
+        let asked = Capabilities::from_environment(surroundings);
         Capabilities { round_trip, passthrough, ..asked }
     };
     let tmux = Some(Multiplexer::Tmux);
@@ -228,7 +228,12 @@ fn who_answers_is_found_out() {
         (ssh(tmux, Some(ms(1)), None), true, None, PacingMode::SendQueue),
         (ssh(tmux, Some(ms(1)), None), false, None, PacingMode::FixedRate),
         (ssh(None, Some(ms(100)), None), true, Some(5e3), PacingMode::FixedRate),
-        (Capabilities::unasked(Environment::default()), false, None, PacingMode::Unlimited),
+        (
+            Capabilities::from_environment(Environment::default()),
+            false,
+            None,
+            PacingMode::Unlimited,
+        ),
     ] {
         let start = InitialLink::of(&terminal, queue, rate);
         assert_eq!(start.mode, expected, "{terminal:?}");

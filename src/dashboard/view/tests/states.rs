@@ -119,7 +119,7 @@ fn typing(model: &mut Model, text: &str, problem: Option<&str>) {
 
 fn resting(model: &mut Model, by: StoppedBy) {
     let snapshot = model.snapshot.as_mut().unwrap();
-    snapshot.report.state = State::Resting(by);
+    snapshot.report.state = State::Finished(by);
     snapshot.report.eta_seconds = None;
     snapshot.report.noise.as_mut().unwrap().rmse_codes = 0.49;
 }
@@ -286,7 +286,7 @@ pub const STATES: &[Named] = &[
     ("file-became-unreadable", broken),
     ("broken-file", |m| {
         broken(m);
-        m.file.blank = true;
+        m.file.unreadable = true;
         m.snapshot = None;
         m.convergence = Default::default();
     }),

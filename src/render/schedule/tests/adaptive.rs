@@ -11,7 +11,7 @@ fn adaptive_spp_is_the_mean_and_goes_where_the_noise_is() {
     let spp = schedule.spp();
     assert!(spp.mean <= 200.0 && spp.mean > 199.9, "{spp:?}");
     // The calm tiles share what exploration gives: 200 * EXPLORATION / 0.7 samples each, in whole blocks.
-    assert!((2 * FLOOR..=40).contains(&spp.min), "{spp:?}");
+    assert!((2 * MIN_SAMPLES..=40).contains(&spp.min), "{spp:?}");
     assert!(spp.max > 500, "{spp:?}");
 }
 
@@ -48,7 +48,8 @@ fn a_target_is_reached_without_overshoot() {
             let reached = schedule.noise().unwrap().rmse_codes;
             assert!(reached <= target, "{reached} > {target}");
             // A uniform picture cannot stop between packets of 8.
-            let packet = if adaptive { 0.0 } else { f64::from(2 * PACKET) / schedule.spp().mean };
+            let packet =
+                if adaptive { 0.0 } else { f64::from(2 * SAMPLE_ALIGNMENT) / schedule.spp().mean };
             let least = (0.98 - 0.5 * packet) * target;
             assert!(reached > least, "adaptive {adaptive}: {reached} far below {target}");
         }
@@ -133,19 +134,20 @@ fn chance_in_estimates_of_equal_tiles_draws_no_samples() {
 fn full_tiles_have_a_count_that_can_be_reported() {
     let mut model = Model::exact(vec![CALM; 2]);
     let mut schedule = model.schedule(until(Stop::default(), false));
-    schedule.tiles.iter_mut().for_each(|t| t.done = FULL - PACKET);
-    model.counts = [vec![FULL - PACKET; 2], vec![FULL - PACKET; 2]];
+    schedule.tiles.iter_mut().for_each(|t| t.done = MAX_SAMPLES - SAMPLE_ALIGNMENT);
+    model.counts =
+        [vec![MAX_SAMPLES - SAMPLE_ALIGNMENT; 2], vec![MAX_SAMPLES - SAMPLE_ALIGNMENT; 2]];
     loop {
         match schedule.next(0.0) {
-            Step::Rest(reason) => break assert_eq!(reason, StoppedBy::Full),
+            Step::Finished(reason) => break assert_eq!(reason, StoppedBy::Full),
             Step::Trace(wave) => {
                 let report = model.run(&wave);
                 schedule.complete(&wave, &report);
             }
         }
     }
-    assert_eq!(schedule.spp().max, 2 * FULL);
-    assert_eq!(u64::from(schedule.spp().max), 2 * u64::from(FULL));
+    assert_eq!(schedule.spp().max, 2 * MAX_SAMPLES);
+    assert_eq!(u64::from(schedule.spp().max), 2 * u64::from(MAX_SAMPLES));
 }
 
 #[test]

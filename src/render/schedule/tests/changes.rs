@@ -6,7 +6,7 @@ use crate::render::schedule::tests::*;
 fn in_pieces(model: &mut Model, schedule: &mut Schedule, tiles: u64, longest: u32) -> StoppedBy {
     loop {
         match schedule.next(0.0) {
-            Step::Rest(reason) => return reason,
+            Step::Finished(reason) => return reason,
             Step::Trace(wave) => {
                 let piece = wave.cut(tiles * u64::from(longest) * u64::from(PIXELS), longest);
                 assert!(piece.jobs.iter().all(|job| job.count <= longest));
@@ -26,7 +26,9 @@ fn pieces_decide_nothing() {
     for adaptive in [false, true] {
         let settings = until(noise(0.6), adaptive);
         let (whole, reason) = Model::exact(mixed()).finish(settings);
-        for (tiles, longest) in [(1, PACKET), (5, 2 * PACKET), (100, 3 * PACKET)] {
+        for (tiles, longest) in
+            [(1, SAMPLE_ALIGNMENT), (5, 2 * SAMPLE_ALIGNMENT), (100, 3 * SAMPLE_ALIGNMENT)]
+        {
             let mut model = Model::exact(mixed());
             let mut schedule = model.schedule(settings);
             assert_eq!(in_pieces(&mut model, &mut schedule, tiles, longest), reason);
@@ -44,7 +46,7 @@ fn a_higher_aim_goes_on_where_the_lower_one_ended() {
         for low in [2, 6, 22, 50, 150] {
             let mut model = Model::exact(mixed());
             let mut schedule = model.schedule(until(spp(low), adaptive));
-            assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);
+            assert_eq!(in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
             assert_eq!(schedule.spp().mean, f64::from(low));
             schedule.set_stop(spp(2000));
             // The model refuses samples twice or out of order.
@@ -53,7 +55,8 @@ fn a_higher_aim_goes_on_where_the_lower_one_ended() {
             while let Step::Trace(wave) = schedule.next(0.0) {
                 let even = |j: &Job| {
                     let end = j.first + j.count;
-                    end.is_multiple_of(PACKET) || (end < PACKET && end.is_power_of_two())
+                    end.is_multiple_of(SAMPLE_ALIGNMENT)
+                        || (end < SAMPLE_ALIGNMENT && end.is_power_of_two())
                 };
                 ends.push(wave.jobs.iter().all(even));
                 let report = model.run(&wave);
@@ -64,9 +67,9 @@ fn a_higher_aim_goes_on_where_the_lower_one_ended() {
             assert_eq!(schedule.spp().mean, 2000.0);
             // And back: it rests at once.
             schedule.set_stop(spp(low));
-            assert_eq!(schedule.next(0.0), Step::Rest(StoppedBy::Spp));
+            assert_eq!(schedule.next(0.0), Step::Finished(StoppedBy::Spp));
             schedule.set_stop(noise(1e6));
-            assert_eq!(schedule.next(0.0), Step::Rest(StoppedBy::Noise));
+            assert_eq!(schedule.next(0.0), Step::Finished(StoppedBy::Noise));
         }
     }
 }
@@ -75,7 +78,7 @@ fn a_higher_aim_goes_on_where_the_lower_one_ended() {
 fn estimates_made_anew_replace_the_old_ones() {
     let mut model = Model::exact(mixed());
     let mut schedule = model.schedule(until(noise(0.6), true));
-    in_pieces(&mut model, &mut schedule, 100, FULL);
+    in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES);
     let (before, samples) = (schedule.noise().unwrap(), schedule.samples());
     schedule.forget_estimates();
     assert_eq!((schedule.noise(), schedule.eta_seconds(1.0)), (None, None));
@@ -91,7 +94,7 @@ fn estimates_made_anew_replace_the_old_ones() {
     let (low, high) = schedule.eta_seconds(1.0).unwrap();
     assert!(high > 2.0 * low, "{low}..{high}");
     let rays = schedule.rays() as f64;
-    assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Noise);
+    assert_eq!(in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Noise);
     assert!((model.rmse() / 0.6 - 1.0).abs() < 0.1);
     let needed = schedule.rays() as f64 / rays - 1.0;
     assert!((low..high).contains(&needed), "{needed} not in {low}..{high}");
@@ -102,11 +105,11 @@ fn a_cap_may_rise_and_fall() {
     let mut model = Model::exact(mixed());
     let mut schedule = model.schedule(until(spp(100), false));
     schedule.set_rays_per_pixel(40);
-    assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);
+    assert_eq!(in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
     assert_eq!((schedule.spp().min, schedule.spp().max), (40, 100));
     schedule.set_rays_per_pixel(0);
     // The cap of 20 per replicate ended inside a packet.
     model.aligned = false;
-    assert_eq!(in_pieces(&mut model, &mut schedule, 100, FULL), StoppedBy::Spp);
+    assert_eq!(in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
     assert_eq!((schedule.spp().min, schedule.spp().max), (100, 100));
 }

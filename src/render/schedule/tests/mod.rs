@@ -92,7 +92,7 @@ impl Model {
         if self.hidden.contains(&tile) {
             (guide, told) = (mse(0.0), mse(2.0 * told.codes));
         }
-        TileNoise { told, guide, squares: Mse::SPREAD, pixels: PIXELS }
+        TileNoise { reported: told, allocation: guide, squares: Mse::SPREAD, pixels: PIXELS }
     }
 
     /// The squared error that the picture (A + B) / 2 really has.
@@ -122,8 +122,8 @@ impl Model {
         let count = &mut self.counts[wave.replicate][tile];
         assert_eq!(*count, job.first, "tile {tile}: every index once, in order");
         assert!(job.count > 0);
-        let packets = job.first.is_multiple_of(PACKET);
-        let early = job.first < PACKET && job.first.is_power_of_two();
+        let packets = job.first.is_multiple_of(SAMPLE_ALIGNMENT);
+        let early = job.first < SAMPLE_ALIGNMENT && job.first.is_power_of_two();
         assert!(packets || early || !self.aligned, "{job:?}");
         *count += job.count;
         let truth = self.truth[tile];
@@ -147,7 +147,7 @@ impl Model {
         let mut schedule = self.schedule(settings);
         for _ in 0..100_000 {
             match schedule.next(schedule.rays() as f64 * 1e-9) {
-                Step::Rest(reason) => return (schedule, reason),
+                Step::Finished(reason) => return (schedule, reason),
                 Step::Trace(wave) => {
                     let report = self.run(&wave);
                     schedule.complete(&wave, &report);

@@ -16,7 +16,7 @@ fn waves_count_as_the_sequence_likes_it() {
     let blocks = [(0, 1), (1, 1), (2, 2), (4, 4), (8, 8), (16, 16), (32, 16), (48, 2)];
     let expected: Vec<_> = blocks.iter().flat_map(|(f, c)| [(0, *f, *c), (1, *f, *c)]).collect();
     assert_eq!(seen, expected);
-    assert_eq!(schedule.next(0.0), Step::Rest(StoppedBy::Spp));
+    assert_eq!(schedule.next(0.0), Step::Finished(StoppedBy::Spp));
     assert_eq!(schedule.spp(), Spp { min: 100, mean: 100.0, max: 100 });
     assert_eq!(schedule.samples(), 100 * 4 * 256);
     assert!(schedule.noise().is_some(), "the last wave ends with an estimate");
