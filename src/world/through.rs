@@ -4,7 +4,7 @@ use super::compile::World;
 use super::contact::{Contacts, Layer, Seam};
 use super::media::{Crossing, Inside, Media};
 use super::outlook::Outlook;
-use super::path::{Counts, Met, Path, Radiance, first_tag};
+use super::path::{Counts, Met, Path, Radiance};
 use crate::lanes::{Lanes, Mask, V3};
 use crate::material::{Interface, Spread};
 use crate::sampling::Draws;
@@ -23,8 +23,8 @@ struct Arm<L: Lanes> {
     inside: Inside<L>,
     /// Surfaces met before.
     bounce: u32,
-    /// Where the rays begin on surfaces that lie on others.
-    seam: Seam<L>,
+    /// Where the rays begin on surfaces that lie on others; `None`: nowhere.
+    seam: Option<Seam<L>>,
 }
 
 /// Arms that wait until those that left the same surfaces are done.
@@ -73,7 +73,7 @@ impl<L: Lanes> World<L> {
         let inside = media.at_start(&ray);
         let path = Path { ray, weight: V3::of([1.0; 3]) };
         let mut waiting = Waiting { arms: [None; BOTH] };
-        let mut arm = Arm { path, lanes, inside, bounce: 0, seam: Seam::none() };
+        let mut arm = Arm { path, lanes, inside, bounce: 0, seam: None };
         loop {
             let outlook = if arm.bounce == 0 { outlook } else { &self.panorama };
             if !self.follow(media, &mut arm, outlook, draws, &mut waiting, out, &mut counts) {
@@ -98,14 +98,14 @@ impl<L: Lanes> World<L> {
         out: &mut Radiance<L>,
         counts: &mut Counts,
     ) -> bool {
-        let Arm { mut path, inside, bounce, seam, .. } = *arm;
+        let Arm { mut path, inside, bounce, .. } = *arm;
         counts.rays += u64::from(arm.lanes.bits().count_ones());
         let mut hit = self.geometry.closest_of(&path.ray, &outlook.seen, arm.lanes);
         let mut behind = None;
-        if let Some(contacts) = &media.contacts
+        if let (Some(contacts), Some(seam)) = (&media.contacts, &arm.seam)
             && (seam.lanes & arm.lanes).any()
         {
-            let seam = Seam { lanes: seam.lanes & arm.lanes, ..seam };
+            let seam = Seam { lanes: seam.lanes & arm.lanes, ..*seam };
             let next = contacts.next(&self.geometry, &seam, &inside);
             let origin = V3::select(next.lanes, seam.point, path.ray.origin);
             path.ray.origin = origin;
@@ -118,10 +118,14 @@ impl<L: Lanes> World<L> {
         }
         let lanes = arm.lanes & ended;
         let Some(mut met) = self.meet::<false>(&path.ray, &hit, lanes) else { return false };
-        let mut seam = Seam::none();
+        let mut seam = None;
         if let Some(contacts) = &media.contacts {
-            seam =
-                self.seam(contacts, &path, (&mut hit, &mut met), lanes, behind.as_ref(), &inside);
+            let among = behind.as_ref().map_or(L::mask(false), |next| next.lanes);
+            let fresh = contacts.near(met.item, met.point, lanes.and_not(among));
+            if behind.is_some() || fresh.any() {
+                let (behind, ended) = (behind.as_ref(), (lanes, fresh));
+                seam = self.seam(contacts, &path, (&mut hit, &mut met), ended, behind, &inside);
+            }
         }
         let crossing = self.crossing(media, &met, lanes, &inside);
         if let Some(crossing) = &crossing {
@@ -135,7 +139,7 @@ impl<L: Lanes> World<L> {
         let Some(crossing) = crossing else {
             arm.lanes = self.bounce::<false>(&mut arm.path, &met, draws, bounce - 1, counts);
             arm.bounce = bounce;
-            arm.seam = seam.reversed();
+            arm.seam = seam.as_ref().map(Seam::reversed);
             return arm.lanes.any();
         };
         let ways = self.ways(&path, &met, &crossing, draws, bounce - 1, counts);
@@ -154,7 +158,7 @@ impl<L: Lanes> World<L> {
             lanes: both,
             inside: Inside::select(crossing.lanes, &crossing.before, &inside),
             bounce,
-            seam: seam.reversed(),
+            seam: seam.as_ref().map(Seam::reversed),
         };
         // Lanes that go through, and what their paths and those of the others count.
         let (mut through, mut mirrored_weight, mut passed_weight) =
@@ -181,23 +185,24 @@ impl<L: Lanes> World<L> {
             weight: V3::select(through, passed_weight, mirrored_weight),
         };
         let inside = Inside::select(through, &crossing.behind, &mirrored.inside);
-        let seam = Seam::select(through, &seam, &mirrored.seam);
+        let seam = seam.map(|seam| Seam::select(through, &seam, &seam.reversed()));
         *arm = Arm { path, lanes, inside, bounce, seam };
         lanes.any()
     }
 
     /// Where the rays of `lanes` ended on surfaces that lie on others, on which side they go on when they
-    /// pass. Of such surfaces it puts those into `hit` and `met` that come first; `behind`: those that
-    /// were found behind the ones that the rays left.
+    /// pass; `None`: nowhere. Of such surfaces it puts those into `hit` and `met` that come first; `behind`:
+    /// those that were found behind the ones that the rays left; `fresh`: lanes where others may be.
+    #[inline(never)]
     fn seam(
         &self,
         contacts: &Contacts<L::Scalar>,
         path: &Path<L>,
         (hit, met): (&mut Hit<L>, &mut Met<L>),
-        lanes: L::Mask,
+        (lanes, fresh): (L::Mask, L::Mask),
         behind: Option<&Layer<L>>,
         inside: &Inside<L>,
-    ) -> Seam<L> {
+    ) -> Option<Seam<L>> {
         let (mut layer, mut lift, mut among) = (L::zero(), met.lift, L::mask(false));
         if let Some(next) = behind {
             // Light that comes from the side of the rays is blocked by what they left.
@@ -206,14 +211,6 @@ impl<L: Lanes> World<L> {
             }
             (layer, among) = (next.layer, next.lanes);
             lift = lift.max(next.lift.only(among));
-        }
-        let mut fresh = L::mask(false);
-        let mut left = lanes.and_not(among);
-        while let Some((item, here)) = first_tag(met.item, left) {
-            if contacts.touches(item) {
-                fresh = fresh | here;
-            }
-            left = left.and_not(here);
         }
         if fresh.any() {
             let (item, point, axis) = (met.item, met.point, -met.geometric);
@@ -234,7 +231,9 @@ impl<L: Lanes> World<L> {
             lift = lift.max(first.lift.only(first.touching));
         }
         met.lift = L::select(among, lift, met.lift);
-        Seam { lanes: among, item: met.item, point: met.point, axis: -met.geometric, layer }
+        let seam =
+            Seam { lanes: among, item: met.item, point: met.point, axis: -met.geometric, layer };
+        among.any().then_some(seam)
     }
 
     /// Where the rays of `lanes` meet surfaces that let light through; `None`: none of them does.
