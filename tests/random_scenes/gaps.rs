@@ -18,6 +18,23 @@ const SAMPLES: u32 = 4;
 /// What the gap itself may change in the mean of a block, in codes.
 const FLOOR: f64 = 1.0;
 
+/// Lamps on the surfaces of things go out: such a lamp shines on both sides, and a gap leaves it outside.
+fn without_lamps_on_surfaces(scene: &mut Scene) {
+    let forms: Vec<_> = scene.objects.iter().map(|object| object.form()).collect();
+    let touches = |position: DVec3| {
+        forms.iter().any(|form| {
+            form.bounds().is_some_and(|(low, high)| {
+                let gap = 5.0 * GAP * (high - low).max_element();
+                !form.normals_at(position, gap).is_empty()
+            })
+        })
+    };
+    for light in &mut scene.lights {
+        let on = light.point.as_ref().is_some_and(|point| touches(DVec3::from(point.position)));
+        light.on &= !on;
+    }
+}
+
 /// Every bounded thing a little smaller, about its middle; `None`: what is little for one thing is much for another.
 /// The eye steps `aside` by a gap.
 fn apart(mut scene: Scene, numbers: &mut Numbers, aside: DVec3) -> Option<Scene> {
@@ -48,6 +65,7 @@ fn apart(mut scene: Scene, numbers: &mut Numbers, aside: DVec3) -> Option<Scene>
 fn same_with_gaps(scene: &Scene) -> Verdict {
     let mut scene = scene.clone();
     scene.film.filter = Filter::Box;
+    without_lamps_on_surfaces(&mut scene);
     let size = scene.film.size;
     let mut numbers = Numbers::new(1);
     let aside = numbers.direction();

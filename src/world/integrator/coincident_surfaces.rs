@@ -48,6 +48,40 @@ struct Contact<S> {
     item: u32,
     /// Half the width within which surfaces lie on each other.
     tie: S,
+    /// A box around it, endless where it is.
+    low: [S; 3],
+    high: [S; 3],
+}
+
+impl<S: Float> Contact<S> {
+    fn new(item: u32, form: &Form, tie: f64) -> Self {
+        let (low, high) = extent(form);
+        let [low, high] = [low, high].map(|corner| corner.to_array().map(S::from_f64));
+        Self { item, tie: S::from_f64(tie), low, high }
+    }
+
+    /// Half the width within which surfaces lie on each other at points that are rounded to `rounding` / `TIE`.
+    #[inline(always)]
+    fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
+        rounding.max(L::splat(self.tie))
+    }
+
+    /// SimdFloat whose point may be on it. What is found within one tie of a point is itself found to some roundings,
+    /// far less than the other tie.
+    #[inline(always)]
+    fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
+        let beyond =
+            |p: L, axis: usize| (L::splat(self.low[axis]) - p).max(p - L::splat(self.high[axis]));
+        let beyond = beyond(point.x, 0).max(beyond(point.y, 1)).max(beyond(point.z, 2));
+        let tie = self.tie(rounding);
+        beyond.le(tie + tie)
+    }
+}
+
+/// Rounding of the coordinates of points, `TIE` times.
+#[inline(always)]
+fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
+    point.max_abs() * L::from_f64(TIE * L::EPSILON)
 }
 
 /// The things of a world that may touch.
@@ -87,13 +121,6 @@ pub(crate) struct CoincidentQuery<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> CoincidentState<L> {
-    /// Nowhere.
-    pub fn none() -> Self {
-        let zero = Vec3::zero();
-        let item = L::from_id(0);
-        Self { lanes: L::mask(false), item, point: zero, axis: zero, layer: L::zero() }
-    }
-
     /// The rays turn back.
     pub fn reversed(&self) -> Self {
         Self { axis: -self.axis, layer: -self.layer, ..*self }
@@ -133,9 +160,9 @@ impl<S: Float> Contacts<S> {
         for (a, b) in pairs(forms, |a, b| lets_through[a] || lets_through[b]) {
             let rounding = (epsilon * reach(&forms[a]).max(reach(&forms[b]))).max(given);
             if may_touch(&forms[a], &forms[b], 4.0 * TIE * rounding) {
-                let tie = S::from_f64(TIE * rounding);
-                touching[a].push(Contact { item: first[b], tie });
-                touching[b].push(Contact { item: first[a], tie });
+                let tie = TIE * rounding;
+                touching[a].push(Contact::new(first[b], &forms[b], tie));
+                touching[b].push(Contact::new(first[a], &forms[a], tie));
             }
         }
         if touching.iter().all(Vec::is_empty) {
@@ -159,10 +186,24 @@ impl<S: Float> Contacts<S> {
         Some(Self { of, kinds })
     }
 
-    /// Whether anything may lie on `item`.
+    /// Of `lanes`, with a `point` of one of the `items` each, those where anything may lie on it. Most surfaces touch
+    /// others in few places masked: the boxes of these tell.
     #[inline(always)]
-    pub fn touches(&self, item: u32) -> bool {
-        !self.of[item as usize].is_empty()
+    pub fn near<L: SimdFloat<Scalar = S>>(
+        &self,
+        items: L,
+        point: Vec3<L>,
+        lanes: L::Mask,
+    ) -> L::Mask {
+        let rounding = rounding(point);
+        let (mut near, mut left) = (L::mask(false), lanes);
+        while let Some((item, here)) = next_distinct(items, left) {
+            for contact in &self.of[item as usize] {
+                near = near | (here & contact.is_near(point, rounding));
+            }
+            left = left.and_not(here);
+        }
+        near
     }
 
     /// The layer of `item` for rays that come to it from `before`; `leaves`: those that go where its
@@ -235,13 +276,17 @@ impl<S: Float> Contacts<S> {
         inside: &MediumStack<L>,
         out: &mut CoincidentQuery<L>,
     ) {
-        let rounding = coincident.point.max_abs() * L::from_f64(TIE * L::EPSILON);
+        let rounding = rounding(coincident.point);
         let mut left = coincident.lanes;
         while let Some((item, here)) = next_distinct(coincident.item, left) {
             left = left.and_not(here);
             for contact in &self.of[item as usize] {
+                let here = here & contact.is_near(coincident.point, rounding);
+                if here.none() {
+                    continue;
+                }
                 // Along the normal, through the point: so the angle of the ray does not matter.
-                let tie = rounding.max(L::splat(contact.tie));
+                let tie = contact.tie(rounding);
                 let origin = coincident.axis.mul_add(-tie, coincident.point);
                 let limit = L::select(here, tie + tie, L::from_f64(-1.0));
                 let ray = Ray { origin, direction: coincident.axis };
@@ -277,6 +322,22 @@ fn reach(form: &Form) -> f64 {
     match form {
         Form::Plane { offset, .. } => offset.abs(),
         _ => form.bounds().map_or(0.0, |(low, high)| low.abs().max(high.abs()).max_element()),
+    }
+}
+
+/// The box around a form, endless where the form is; of a plane across an axis its place there.
+fn extent(form: &Form) -> (DVec3, DVec3) {
+    let (low, high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
+    match form {
+        Form::Plane { normal, offset } => {
+            let at = *normal * *offset;
+            let across = |axis: &DVec3| normal.dot(*axis).abs() == 1.0;
+            DVec3::AXES.iter().find(|axis| across(axis)).map_or((low, high), |axis| {
+                let here = axis.cmpne(DVec3::ZERO);
+                (DVec3::select(here, at, low), DVec3::select(here, at, high))
+            })
+        }
+        _ => form.bounds().unwrap_or((low, high)),
     }
 }
 

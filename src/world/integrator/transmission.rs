@@ -8,7 +8,7 @@ use crate::world::compile::World;
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState, Contacts};
 use crate::world::integrator::nested_dielectrics::{InterfaceHit, MediumStack, NestedDielectrics};
-use crate::world::integrator::opaque::{Counts, Path, Radiance, SurfaceInteraction, next_distinct};
+use crate::world::integrator::opaque::{Counts, Path, Radiance, SurfaceInteraction};
 
 /// At so many surfaces, counted from the eye, a path follows both the reflected and the transmitted ray;
 /// from then on one of them, by chance.
@@ -23,8 +23,8 @@ struct Branch<L: SimdFloat> {
     inside: MediumStack<L>,
     /// Surfaces met before.
     bounce: u32,
-    /// Where the rays begin on surfaces that lie on others.
-    coincident: CoincidentState<L>,
+    /// Where the rays begin on surfaces that lie on others; `None`: nowhere.
+    coincident: Option<CoincidentState<L>>,
 }
 
 /// Arms that wait until those that left the same surfaces are done.
@@ -73,8 +73,7 @@ impl<L: SimdFloat> World<L> {
         let inside = nested_dielectrics.at_start(&ray);
         let path = Path { ray, throughput: Vec3::of([1.0; 3]) };
         let mut waiting = BranchStack { branches: [None; SPLIT_DEPTH] };
-        let mut branch =
-            Branch { path, lanes, inside, bounce: 0, coincident: CoincidentState::none() };
+        let mut branch = Branch { path, lanes, inside, bounce: 0, coincident: None };
         loop {
             let candidates = if branch.bounce == 0 { candidates } else { &self.all_candidates };
             if !self.advance(
@@ -107,15 +106,16 @@ impl<L: SimdFloat> World<L> {
         out: &mut Radiance<L>,
         counts: &mut Counts,
     ) -> bool {
-        let Branch { mut path, inside, bounce, coincident, .. } = *branch;
+        let Branch { mut path, inside, bounce, .. } = *branch;
         counts.rays += u64::from(branch.lanes.bits().count_ones());
         let mut hit = self.geometry.closest_masked(&path.ray, &candidates.primary, branch.lanes);
         let mut behind = None;
-        if let Some(contacts) = &nested_dielectrics.contacts
+        if let (Some(contacts), Some(coincident)) =
+            (&nested_dielectrics.contacts, &branch.coincident)
             && (coincident.lanes & branch.lanes).any()
         {
             let coincident =
-                CoincidentState { lanes: coincident.lanes & branch.lanes, ..coincident };
+                CoincidentState { lanes: coincident.lanes & branch.lanes, ..*coincident };
             let next = contacts.next(&self.geometry, &coincident, &inside);
             let origin = Vec3::select(next.lanes, coincident.point, path.ray.origin);
             path.ray.origin = origin;
@@ -128,16 +128,15 @@ impl<L: SimdFloat> World<L> {
         }
         let lanes = branch.lanes & ended;
         let Some(mut met) = self.interact::<false>(&path.ray, &hit, lanes) else { return false };
-        let mut coincident = CoincidentState::none();
+        let mut coincident = None;
         if let Some(contacts) = &nested_dielectrics.contacts {
-            coincident = self.coincident(
-                contacts,
-                &path,
-                (&mut hit, &mut met),
-                lanes,
-                behind.as_ref(),
-                &inside,
-            );
+            let among = behind.as_ref().map_or(L::mask(false), |next| next.lanes);
+            let fresh = contacts.near(met.item, met.point, lanes.and_not(among));
+            if behind.is_some() || fresh.any() {
+                let (behind, ended) = (behind.as_ref(), (lanes, fresh));
+                coincident =
+                    self.coincident(contacts, &path, (&mut hit, &mut met), ended, behind, &inside);
+            }
         }
         let interface_hit = self.interface_hit(nested_dielectrics, &met, lanes, &inside);
         if let Some(interface_hit) = &interface_hit {
@@ -152,7 +151,7 @@ impl<L: SimdFloat> World<L> {
             branch.lanes =
                 self.sample_reflection::<false>(&mut branch.path, &met, draws, bounce - 1, counts);
             branch.bounce = bounce;
-            branch.coincident = coincident.reversed();
+            branch.coincident = coincident.as_ref().map(CoincidentState::reversed);
             return branch.lanes.any();
         };
         let split_directions =
@@ -177,7 +176,7 @@ impl<L: SimdFloat> World<L> {
                 &inside,
             ),
             bounce,
-            coincident: coincident.reversed(),
+            coincident: coincident.as_ref().map(CoincidentState::reversed),
         };
         // Lanes that go through, and what their paths and those of the others count.
         let (mut through, mut reflected_weight, mut transmitted_weight) =
@@ -210,23 +209,26 @@ impl<L: SimdFloat> World<L> {
         };
         let inside =
             MediumStack::select(through, &interface_hit.medium_transmitted, &reflected.inside);
-        let coincident = CoincidentState::select(through, &coincident, &reflected.coincident);
+        let coincident = coincident.map(|coincident| {
+            CoincidentState::select(through, &coincident, &coincident.reversed())
+        });
         *branch = Branch { path, lanes, inside, bounce, coincident };
         lanes.any()
     }
 
     /// Where the rays of `lanes` ended on surfaces that lie on others, on which side they go on when they
-    /// pass. Of such surfaces it puts those into `hit` and `met` that come first; `behind`: those that
-    /// were found behind the ones that the rays left.
+    /// pass; `None`: nowhere. Of such surfaces it puts those into `hit` and `met` that come first; `behind`:
+    /// those that were found behind the ones that the rays left; `fresh`: lanes where others may be.
+    #[inline(never)]
     fn coincident(
         &self,
         contacts: &Contacts<L::Scalar>,
         path: &Path<L>,
         (hit, met): (&mut Hit<L>, &mut SurfaceInteraction<L>),
-        lanes: L::Mask,
+        (lanes, fresh): (L::Mask, L::Mask),
         behind: Option<&CoincidentQuery<L>>,
         inside: &MediumStack<L>,
-    ) -> CoincidentState<L> {
+    ) -> Option<CoincidentState<L>> {
         let (mut layer, mut lift, mut among) = (L::zero(), met.offset, L::mask(false));
         if let Some(next) = behind {
             // Light that comes from the side of the rays is blocked by what they left.
@@ -235,14 +237,6 @@ impl<L: SimdFloat> World<L> {
             }
             (layer, among) = (next.layer, next.lanes);
             lift = lift.max(next.lift.masked(among));
-        }
-        let mut fresh = L::mask(false);
-        let mut left = lanes.and_not(among);
-        while let Some((item, here)) = next_distinct(met.item, left) {
-            if contacts.touches(item) {
-                fresh = fresh | here;
-            }
-            left = left.and_not(here);
         }
         if fresh.any() {
             let (item, point, axis) = (met.item, met.point, -met.geometric);
@@ -263,13 +257,14 @@ impl<L: SimdFloat> World<L> {
             lift = lift.max(first.lift.masked(first.touching));
         }
         met.offset = L::select(among, lift, met.offset);
-        CoincidentState {
+        let coincident = CoincidentState {
             lanes: among,
             item: met.item,
             point: met.point,
             axis: -met.geometric,
             layer,
-        }
+        };
+        among.any().then_some(coincident)
     }
 
     /// Where the rays of `lanes` meet surfaces that let light through; `None`: none of them does.

@@ -31,7 +31,9 @@ fn gain(share: f64) -> f64 {
 
 #[test]
 fn adaptive_order_pays() {
-    for (share, least) in [(0.05, 8.4), (0.3, 2.6), (0.9, 1.1)] {
+    // Where noise is nearly everywhere at most 1 / 0.9, less 2 % for an RMSE that ends 1 % below the target and 0.5 %
+    // for counts in whole blocks of a quarter.
+    for (share, least) in [(0.05, 8.4), (0.3, 2.6), (0.9, 1.08)] {
         // The share of exploration does not go where the noise is known to be.
         let (gain, least) = (gain(share), (1.0 - EXPLORATION) * least);
         assert!(gain >= least, "{share}: {gain}");
