@@ -2,9 +2,9 @@
 
 use crate::asset::Assets;
 use crate::scene::diagnostic::{Diagnostic, SceneErrors};
+use crate::scene::format::migrate::{FormerWord, write_present};
 use crate::scene::format::patch::rewrite;
-use crate::scene::format::read::read_text;
-use crate::scene::format::source_map::located;
+use crate::scene::format::read::{SourceScene, read_text};
 use crate::scene::{AssetResolver, Scene};
 use std::path::Path;
 use std::sync::Arc;
@@ -17,6 +17,10 @@ pub struct Document {
     name: String,
     /// As read. Every edit starts from here, so that what is undone comes back with its comments.
     origin: (String, Scene),
+    /// Words of earlier versions in the text as read.
+    former_words: Vec<FormerWord>,
+    /// Warnings about the text as read.
+    warnings: Vec<Diagnostic>,
     text: String,
     scene: Scene,
 }
@@ -49,16 +53,27 @@ impl Document {
     }
 
     fn parse_in(text: String, name: &str, library: AssetResolver) -> Result<Self, SceneErrors> {
-        let scene = Scene::parse_in(&text, name, library)?;
-        Ok(Self { name: name.to_string(), origin: (text.clone(), scene.clone()), text, scene })
+        let source = SourceScene::parse(&text, name, library)?;
+        let warnings = source.warnings();
+        let (scene, former_words) = (source.scene, source.former_words);
+        Ok(Self {
+            name: name.to_string(),
+            origin: (text.clone(), scene.clone()),
+            former_words,
+            warnings,
+            text,
+            scene,
+        })
     }
 
     /// A new file for `scene`, which has no faults; messages call it `name`.
     pub fn new(scene: &Scene, name: &str) -> Self {
-        let text = new_text(String::new(), &Scene::default(), scene);
+        let text = new_text(String::new(), &[], &Scene::default(), scene);
         Self {
             name: name.to_string(),
             origin: (text.clone(), scene.clone()),
+            former_words: Vec::new(),
+            warnings: Vec::new(),
             text,
             scene: scene.clone(),
         }
@@ -67,7 +82,11 @@ impl Document {
     /// Makes the text describe `scene`, which has no faults.
     pub fn apply(&mut self, scene: &Scene) {
         let (text, old) = &self.origin;
-        self.text = if scene == old { text.clone() } else { new_text(text.clone(), old, scene) };
+        self.text = if scene == old && self.former_words.is_empty() {
+            text.clone()
+        } else {
+            new_text(text.clone(), &self.former_words, old, scene)
+        };
         self.scene = scene.clone();
     }
 
@@ -92,16 +111,17 @@ impl Document {
         &self.text
     }
 
-    /// [`Scene::warnings`] with file, line and column, in the order of the file.
-    pub fn warnings(&self) -> Vec<Diagnostic> {
-        located(&self.name, &self.text, self.scene.warnings())
+    /// Warnings about the file as it was read, in its order: [`Scene::warnings`] with file, line and
+    /// column, and one about words of earlier versions.
+    pub fn warnings(&self) -> &[Diagnostic] {
+        &self.warnings
     }
 }
 
 /// `text`, which describes `old`, made to describe `new`. Line ends stay what they are if they are
 /// all alike (a mixture becomes LF); a byte order mark and a missing line end at the end of the
 /// file stay.
-fn new_text(text: String, old: &Scene, new: &Scene) -> String {
+fn new_text(text: String, former_words: &[FormerWord], old: &Scene, new: &Scene) -> String {
     let (mark, body) = match text.strip_prefix('\u{feff}') {
         Some(body) => ("\u{feff}", body),
         None => ("", text.as_str()),
@@ -111,6 +131,7 @@ fn new_text(text: String, old: &Scene, new: &Scene) -> String {
     // The text was read as a scene, and a scene has no value that TOML lacks: neither can fail.
     let mut document: DocumentMut = body.replace("\r\n", "\n").parse().expect("text that was read");
     let tree = |scene| toml::Table::try_from(scene).expect("a scene is a TOML table");
+    write_present(&mut document, former_words);
     rewrite(&mut document, &tree(old), &tree(new));
     let mut body = document.to_string();
     if body.starts_with("\n[") {

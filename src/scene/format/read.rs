@@ -1,14 +1,18 @@
 //! From a file to a checked scene.
 
-use crate::scene::diagnostic::SceneErrors;
+use crate::scene::diagnostic::{Diagnostic, SceneErrors};
+use crate::scene::format::migrate::{self, FormerWord, migrate};
 use crate::scene::format::schema;
-use crate::scene::format::source_map::{line_column, located};
+use crate::scene::format::source_map::{line_column, with_locations};
 use crate::scene::{AssetResolver, Scene};
+use serde::Deserialize;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
-use toml::de::DeTable;
+
+use toml::Spanned;
+use toml::de::{DeTable, Deserializer};
 
 /// Largest file that is read [bytes]: some hundred thousand objects.
 const MAX_BYTES: u64 = 64 << 20;
@@ -40,12 +44,35 @@ impl Scene {
         name: &str,
         library: AssetResolver,
     ) -> Result<Self, SceneErrors> {
-        let (root, syntax) = DeTable::parse_recoverable(text);
-        let at = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
-        if let Some(error) = syntax.iter().min_by_key(|e| at(e)) {
-            let place = Some(line_column(text, at(error)));
+        SourceScene::parse(text, name, library).map(|source| source.scene)
+    }
+}
+
+/// A valid scene and the parsed text that describes it: each is parsed and validated once.
+pub(crate) struct SourceScene<'a> {
+    pub scene: Scene,
+    pub former_words: Vec<FormerWord>,
+    name: &'a str,
+    text: &'a str,
+    root: Spanned<DeTable<'a>>,
+}
+
+impl<'a> SourceScene<'a> {
+    /// Reads and validates a scene from `text`; diagnostics call it `name`.
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub(crate) fn parse(
+        text: &'a str,
+        name: &'a str,
+        library: AssetResolver,
+    ) -> Result<Self, SceneErrors> {
+        let (mut root, syntax) = DeTable::parse_recoverable(text);
+        let start = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
+        if let Some(error) = syntax.iter().min_by_key(|error| start(error)) {
+            let line_column = Some(line_column(text, start(error)));
             let found = format!("this is not TOML: {}", error.message());
-            return Err(SceneErrors::at(name, place, found, ""));
+            return Err(SceneErrors::at(name, line_column, found, ""));
         }
         if root.get_ref().is_empty() {
             return Err(SceneErrors::at(
@@ -55,20 +82,30 @@ impl Scene {
                 "Expected at least one [[object]]; `zerkalo new FILE` writes a scene to start from.",
             ));
         }
-        let form = schema::check(name, text, &root);
-        if !form.is_empty() {
-            return Err(SceneErrors::new(form));
+        let (former_words, mut errors) = migrate(name, text, root.get_mut());
+        errors.extend(schema::check(name, text, &root));
+        if !errors.is_empty() {
+            return Err(SceneErrors::new(errors));
         }
-        let mut scene: Self = toml::from_str(text).map_err(|error| {
-            let place = error.span().map(|span| line_column(text, span.start));
-            SceneErrors::at(name, place, error.message().to_string(), "")
+        let mut scene = Scene::deserialize(Deserializer::from(root.clone())).map_err(|error| {
+            let line_column = error.span().map(|span| line_column(text, span.start));
+            SceneErrors::at(name, line_column, error.message().to_string(), "")
         })?;
         scene.library = library;
         scene.resolve();
         match scene.faults() {
-            faults if faults.is_empty() => Ok(scene),
-            faults => Err(SceneErrors::new(located(name, text, faults))),
+            problems if problems.is_empty() => Ok(Self { scene, former_words, name, text, root }),
+            problems => Err(SceneErrors::new(with_locations(name, text, root.get_ref(), problems))),
         }
+    }
+
+    /// Lints of the scene and the warning about former words, in the order of the file.
+    pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
+        let (name, text, root) = (self.name, self.text, self.root.get_ref());
+        let mut warnings = with_locations(name, text, root, self.scene.warnings());
+        warnings.extend(migrate::warning(name, text, root, &self.former_words));
+        warnings.sort_by_key(|warning| warning.line_column);
+        warnings
     }
 }
 

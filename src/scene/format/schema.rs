@@ -3,10 +3,9 @@
 
 use crate::scene::OBJECT_FIELDS;
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::format::source_map::line_column;
+use crate::scene::format::source_map::{line_column, subject_in};
 use crate::scene::format::suggest::nearest;
 use crate::scene::settings::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, TRACE_FIELDS};
-use crate::scene::validate::subject;
 use crate::value::{Color, DefaultValue, Field, NumberRange, ValueType, truncated};
 use crate::{camera, light, material};
 use std::ops;
@@ -91,10 +90,7 @@ struct SchemaChecker<'a> {
 
 impl SchemaChecker<'_> {
     fn add(&mut self, span: ops::Range<usize>, found: String, help: String) {
-        let subject = subject(&self.path, |list, index| {
-            let entry = self.root.get(list)?.get_ref().as_array()?.get(index)?;
-            entry.get_ref().as_table()?.get("name")?.get_ref().as_str().map(str::to_string)
-        });
+        let subject = subject_in(self.root, &self.path);
         let place = Some(line_column(self.text, span.start));
         self.messages.push(Diagnostic {
             file: self.file.to_string(),

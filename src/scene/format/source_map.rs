@@ -1,7 +1,7 @@
 //! From keys to lines and columns.
 
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::validate::Problem;
+use crate::scene::validate::{Problem, subject};
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -42,23 +42,29 @@ fn deepest_span(value: &Spanned<DeValue>, path: &[String]) -> Range<usize> {
     }
 }
 
-/// Messages for `findings` about the scene in `text`, in the order of the file.
-pub(crate) fn located(file: &str, text: &str, findings: Vec<Problem>) -> Vec<Diagnostic> {
-    let root = DeTable::parse(text).ok();
-    let mut messages: Vec<_> = findings
-        .into_iter()
-        .map(|finding| Diagnostic {
-            file: file.to_string(),
-            line_column: root
-                .as_ref()
-                .map(|r| line_column(text, span(r.get_ref(), &finding.path).start)),
-            subject: finding.subject,
-            found: finding.found,
-            help: finding.help,
-        })
-        .collect();
-    messages.sort_by_key(|m| m.line_column);
-    messages
+/// Diagnostics for `problems` of the scene in `text`, which was parsed to `root`.
+pub(crate) fn with_locations(
+    file: &str,
+    text: &str,
+    root: &DeTable,
+    problems: Vec<Problem>,
+) -> Vec<Diagnostic> {
+    let diagnostic = |problem: Problem| Diagnostic {
+        file: file.to_string(),
+        line_column: Some(line_column(text, span(root, &problem.path).start)),
+        subject: problem.subject,
+        found: problem.found,
+        help: problem.help,
+    };
+    problems.into_iter().map(diagnostic).collect()
+}
+
+/// The name that diagnostics use for the table at `path`: `object "queen"`.
+pub(crate) fn subject_in(root: &DeTable, path: &[String]) -> String {
+    subject(path, |list, index| {
+        let entry = root.get(list)?.get_ref().as_array()?.get(index)?;
+        entry.get_ref().as_table()?.get("name")?.get_ref().as_str().map(str::to_string)
+    })
 }
 
 #[cfg(test)]
