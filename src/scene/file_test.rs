@@ -4,7 +4,7 @@ use crate::scene::{BUILT_IN, DiskState, SaveError, Scene, SceneFile};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The built-in scene in a file of its own.
+/// Writes the built-in scene to a file and opens it.
 fn opened(directory: &Path) -> (PathBuf, SceneFile) {
     let path = directory.join("scene.toml");
     fs::write(&path, BUILT_IN).unwrap();
@@ -12,7 +12,7 @@ fn opened(directory: &Path) -> (PathBuf, SceneFile) {
     (path, file)
 }
 
-/// What is there with another depth.
+/// Returns the scene of `file` with another `max_depth`.
 fn edited(file: &SceneFile, depth: u32) -> Scene {
     let mut scene = file.document().scene().clone();
     scene.trace.max_depth = depth;

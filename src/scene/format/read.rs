@@ -1,4 +1,4 @@
-//! From a file to a checked scene.
+//! Reading of scene files: text to validated scene.
 
 use crate::scene::diagnostic::{Diagnostic, SceneErrors};
 use crate::scene::format::migrate::{self, FormerWord, migrate};
@@ -14,23 +14,23 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, Deserializer};
 
-/// Largest file that is read [bytes]: some hundred thousand objects.
+/// Largest file that is read [bytes], which holds some hundred thousand objects.
 const MAX_BYTES: u64 = 64 << 20;
 
 impl Scene {
-    /// Reads and checks the scene file at `path`.
+    /// Reads and validates the scene file at `path`.
     ///
     /// # Errors
-    /// Everything wrong with it, with line and column: unreadable, no UTF-8, no TOML, unknown keys,
-    /// wrong types, values out of range, names that lead nowhere. What is wrong with the form hides
-    /// what is wrong with the values.
+    /// All errors, with line and column: not readable, not UTF-8, not TOML, unknown keys, wrong
+    /// types, values out of range, undefined names. Values are validated only if keys and types are
+    /// right.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
         let library = AssetResolver::of(path, Arc::default());
         read_text(path).and_then(|t| Self::parse_in(&t, &path.display().to_string(), library))
     }
 
-    /// Reads and checks a scene from `text`; messages call it `name`, and names of files start from
-    /// that path's folder.
+    /// Reads and validates a scene from `text`; diagnostics call it `name`, and file names are
+    /// relative to that path's folder.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -38,7 +38,7 @@ impl Scene {
         Self::parse_in(text, name, AssetResolver::of(Path::new(name), Arc::default()))
     }
 
-    /// As [`Scene::parse`], with the files that the scene names in `library`.
+    /// Does the same as [`Scene::parse`], with the files that the scene names in `library`.
     pub(crate) fn parse_in(
         text: &str,
         name: &str,
@@ -48,7 +48,8 @@ impl Scene {
     }
 }
 
-/// A valid scene and the parsed text that describes it: each is parsed and validated once.
+/// A valid scene and the parsed text that describes it. The text is parsed once and the scene
+/// validated once.
 pub(crate) struct SourceScene<'a> {
     pub scene: Scene,
     pub former_words: Vec<FormerWord>,
@@ -58,7 +59,7 @@ pub(crate) struct SourceScene<'a> {
 }
 
 impl<'a> SourceScene<'a> {
-    /// Reads and validates a scene from `text`; diagnostics call it `name`.
+    /// Parses and validates a scene from `text`; diagnostics call it `name`.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -99,7 +100,7 @@ impl<'a> SourceScene<'a> {
         }
     }
 
-    /// Lints of the scene and the warning about former words, in the order of the file.
+    /// Returns the lints of the scene and the warning about former words, in the order of the file.
     pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
         let (name, text, root) = (self.name, self.text, self.root.get_ref());
         let mut warnings = with_locations(name, text, root, self.scene.warnings());
@@ -109,7 +110,7 @@ impl<'a> SourceScene<'a> {
     }
 }
 
-/// The text of the scene file at `path`.
+/// Returns the text of the scene file at `path`.
 pub(crate) fn read_text(path: &Path) -> Result<String, SceneErrors> {
     let name = path.display().to_string();
     let fail = |found: &str, help: &str| SceneErrors::of_file(&name, found.to_string(), help);
@@ -128,7 +129,8 @@ pub(crate) fn read_text(path: &Path) -> Result<String, SceneErrors> {
         return Err(fail("this is a directory", "Expected a scene file (TOML)."));
     }
     let mut bytes = Vec::new();
-    // One byte more than allowed tells; a device without end is not read to its end.
+    // One byte more than the limit shows that a file is too large; a device without end is not read
+    // to its end.
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(fail(
