@@ -1,19 +1,19 @@
-//! Where the files are that a scene names.
+//! Resolution of the mesh and image files that a scene names.
 
 use crate::asset::{AssetError, Assets, Image, Mesh};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// The folder that a scene's names of files start from, and the files that were read. All scenes that
-/// come from one another by edits share it, so that a file is read once.
+/// Folder to which file names in a scene are relative, and a cache of the files that were read.
+/// Scenes derived from one another by edits share both, so that a file is read once.
 #[derive(Clone, Debug, Default)]
 pub struct AssetResolver {
     folder: Arc<RwLock<PathBuf>>,
     assets: Arc<Assets>,
 }
 
-/// It is no part of what a scene says.
+/// Always equal: two scenes with the same description are equal wherever their files are.
 impl PartialEq for AssetResolver {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -21,34 +21,36 @@ impl PartialEq for AssetResolver {
 }
 
 impl AssetResolver {
-    /// Of a scene that is kept in the file `scene`; what is read is remembered in `assets`.
+    /// Creates the resolver of a scene that is stored in the file `scene`; `assets` caches what is
+    /// read.
     pub fn of(scene: &Path, assets: Arc<Assets>) -> Self {
         let out = Self { folder: Arc::default(), assets };
         out.move_to(scene);
         out
     }
 
-    /// What was read, to be shared with other scenes.
+    /// Returns the cache, to be shared with other scenes.
     pub fn assets(&self) -> Arc<Assets> {
         self.assets.clone()
     }
 
-    /// The scene is kept in the file `scene` from now on.
+    /// Makes names relative to the folder of the file `scene`.
     pub(super) fn move_to(&self, scene: &Path) {
         *self.folder.write().unwrap_or_else(PoisonError::into_inner) = folder_of(scene);
     }
 
-    /// The mesh in the file that a scene calls `name`.
+    /// Returns the mesh in the file `name`.
     pub(super) fn mesh(&self, name: &str) -> Result<Arc<Mesh>, AssetError> {
         self.assets.mesh(&self.folder().join(name))
     }
 
-    /// The image in the file that a scene calls `name`.
+    /// Returns the image in the file `name`.
     pub(super) fn image(&self, name: &str) -> Result<Arc<Image>, AssetError> {
         self.assets.image(&self.folder().join(name))
     }
 
-    /// Whether `name`, which leads to a file from here, would not lead to it from the file `scene`.
+    /// Returns `true` if `name` leads to a file from the present folder, but not to the same file
+    /// from the folder of `scene`.
     pub(super) fn loses(&self, name: &str, scene: &Path) -> bool {
         let there = fs::canonicalize(folder_of(scene).join(name));
         fs::canonicalize(self.folder().join(name))

@@ -1,16 +1,16 @@
-//! Scenes that are part of the program.
+//! Scenes that are compiled into the program.
 
 use crate::scene::Scene;
 
-/// The text of the built-in scene, the mirror room: `scenes/mirror-room.toml`.
+/// Text of the built-in scene, the mirror room: `scenes/mirror-room.toml`.
 pub const BUILT_IN: &str = include_str!("../../scenes/mirror-room.toml");
 
-/// The built-in scene: the mirror room.
+/// Returns the built-in scene, the mirror room.
 pub fn built_in() -> Scene {
     Scene::parse(BUILT_IN, "mirror-room.toml").expect("the built-in scene is tested")
 }
 
-/// The commented text of a small scene to start from.
+/// Returns the commented text of a small scene to start from.
 pub fn starter() -> &'static str {
     include_str!("starter.toml")
 }

@@ -1,20 +1,20 @@
-//! What people read when something about a scene file is wrong or dubious.
+//! Diagnostics: errors and warnings about a scene file, as users read them.
 
 use crate::value::sanitized;
 use std::fmt;
 
-/// One message: where, about what, what was found, what would be right.
+/// One error or warning about a scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
     /// The file, as the user named it.
     pub file: String,
-    /// Line and column, from 1; columns count characters. `None`: the file as a whole.
+    /// Line and column, from 1; columns count characters. `None` means the file as a whole.
     pub line_column: Option<(usize, usize)>,
-    /// What it is about: `object "queen"`; empty: the scene.
+    /// Table in question: `object "queen"`; empty means the scene.
     pub subject: String,
-    /// What was found, as a phrase.
+    /// Finding, as a phrase.
     pub found: String,
-    /// What would be right, and the remedy, in sentences; may be empty.
+    /// Remedy, in sentences; may be empty.
     pub help: String,
 }
 
@@ -41,17 +41,17 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// Everything wrong with a scene file: one message at least, in the order of the file.
+/// Errors in a scene file: at least one, in the order of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneErrors {
     messages: Vec<Diagnostic>,
 }
 
-/// More messages than this help nobody at once.
+/// Largest number of diagnostics that are printed at once.
 const MAX_SHOWN: usize = 20;
 
 impl SceneErrors {
-    /// Sorts `messages` by place; there is at least one.
+    /// Creates the errors from `messages`, at least one, and sorts them by location.
     pub(super) fn new(mut messages: Vec<Diagnostic>) -> Self {
         debug_assert!(!messages.is_empty(), "errors without a message");
         messages.sort_by_key(|m| m.line_column);
@@ -59,12 +59,12 @@ impl SceneErrors {
         Self { messages }
     }
 
-    /// About the file as a whole.
+    /// Creates an error about the file as a whole.
     pub(super) fn of_file(file: &str, found: String, help: &str) -> Self {
         Self::at(file, None, found, help)
     }
 
-    /// About one place in the file.
+    /// Creates an error about one location in the file.
     pub(super) fn at(file: &str, place: Option<(usize, usize)>, found: String, help: &str) -> Self {
         let (file, help) = (file.to_string(), help.to_string());
         Self {
@@ -78,7 +78,7 @@ impl SceneErrors {
         }
     }
 
-    /// The messages, in the order of the file.
+    /// Returns the diagnostics, in the order of the file.
     pub fn messages(&self) -> &[Diagnostic] {
         &self.messages
     }

@@ -1,28 +1,33 @@
-//! A scene file as text with its comments, beside the scene that it describes.
+//! Scene documents: the text of a scene file with its comments, and the scene that it describes.
 
 use crate::asset::Assets;
 use crate::scene::diagnostic::{Diagnostic, SceneErrors};
+use crate::scene::format::migrate::{FormerWord, write_present};
 use crate::scene::format::patch::rewrite;
-use crate::scene::format::read::read_text;
-use crate::scene::format::source_map::located;
+use crate::scene::format::read::{SourceScene, read_text};
 use crate::scene::{AssetResolver, Scene};
 use std::path::Path;
 use std::sync::Arc;
 use toml_edit::DocumentMut;
 
-/// A scene file: its text, and the scene that it describes. Edits of the scene change only those
-/// values in the text that differ; comments, order and layout of everything else stay.
+/// The text of a scene file and the scene that it describes. Edits of the scene change only the
+/// values that differ; comments, order and layout of the rest of the text stay.
 #[derive(Clone, Debug)]
 pub struct Document {
     name: String,
-    /// As read. Every edit starts from here, so that what is undone comes back with its comments.
+    /// Text and scene as read. Every edit starts from these, so that undone changes come back with
+    /// their comments.
     origin: (String, Scene),
+    /// Words of earlier versions in the text as read.
+    former_words: Vec<FormerWord>,
+    /// Warnings about the text as read.
+    warnings: Vec<Diagnostic>,
     text: String,
     scene: Scene,
 }
 
 impl Document {
-    /// Reads and checks the scene file at `path`.
+    /// Reads and validates the scene file at `path`.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -30,7 +35,7 @@ impl Document {
         Self::read_with(path, Arc::default())
     }
 
-    /// As [`Document::read`]; what the files hold that the scene names is remembered in `assets`.
+    /// Does the same as [`Document::read`]; `assets` caches the files that the scene names.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -40,7 +45,7 @@ impl Document {
             .and_then(|text| Self::parse_in(text, &name, AssetResolver::of(path, assets)))
     }
 
-    /// Reads and checks a scene from `text`; messages call it `name`.
+    /// Reads and validates a scene from `text`; diagnostics call it `name`.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -49,68 +54,84 @@ impl Document {
     }
 
     fn parse_in(text: String, name: &str, library: AssetResolver) -> Result<Self, SceneErrors> {
-        let scene = Scene::parse_in(&text, name, library)?;
-        Ok(Self { name: name.to_string(), origin: (text.clone(), scene.clone()), text, scene })
+        let source = SourceScene::parse(&text, name, library)?;
+        let warnings = source.warnings();
+        let (scene, former_words) = (source.scene, source.former_words);
+        Ok(Self {
+            name: name.to_string(),
+            origin: (text.clone(), scene.clone()),
+            former_words,
+            warnings,
+            text,
+            scene,
+        })
     }
 
-    /// A new file for `scene`, which has no faults; messages call it `name`.
+    /// Creates a document for the valid `scene`; diagnostics call it `name`.
     pub fn new(scene: &Scene, name: &str) -> Self {
-        let text = new_text(String::new(), &Scene::default(), scene);
+        let text = new_text(String::new(), &[], &Scene::default(), scene);
         Self {
             name: name.to_string(),
             origin: (text.clone(), scene.clone()),
+            former_words: Vec::new(),
+            warnings: Vec::new(),
             text,
             scene: scene.clone(),
         }
     }
 
-    /// Makes the text describe `scene`, which has no faults.
+    /// Makes the text describe the valid `scene`.
     pub fn apply(&mut self, scene: &Scene) {
         let (text, old) = &self.origin;
-        self.text = if scene == old { text.clone() } else { new_text(text.clone(), old, scene) };
+        self.text = if scene == old && self.former_words.is_empty() {
+            text.clone()
+        } else {
+            new_text(text.clone(), &self.former_words, old, scene)
+        };
         self.scene = scene.clone();
     }
 
-    /// The same document under another name.
+    /// Returns the document under another name.
     pub(super) fn renamed(mut self, name: &str) -> Self {
         self.name = name.to_string();
         self
     }
 
-    /// What messages call the file.
+    /// Returns the name that diagnostics use.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The scene that the text describes.
+    /// Returns the scene that the text describes.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// The text, as it stands in the file.
+    /// Returns the text.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// [`Scene::warnings`] with file, line and column, in the order of the file.
-    pub fn warnings(&self) -> Vec<Diagnostic> {
-        located(&self.name, &self.text, self.scene.warnings())
+    /// Returns the warnings about the file as it was read, in its order: [`Scene::warnings`] with
+    /// line and column, and one about words of earlier versions.
+    pub fn warnings(&self) -> &[Diagnostic] {
+        &self.warnings
     }
 }
 
-/// `text`, which describes `old`, made to describe `new`. Line ends stay what they are if they are
-/// all alike (a mixture becomes LF); a byte order mark and a missing line end at the end of the
-/// file stay.
-fn new_text(text: String, old: &Scene, new: &Scene) -> String {
+/// Returns `text`, which describes `old`, changed to describe `new`. Uniform line ends are kept (a
+/// mixture becomes LF), as are a byte order mark and a missing line end at the end of the file.
+fn new_text(text: String, former_words: &[FormerWord], old: &Scene, new: &Scene) -> String {
     let (mark, body) = match text.strip_prefix('\u{feff}') {
         Some(body) => ("\u{feff}", body),
         None => ("", text.as_str()),
     };
     let crlf = body.contains('\n') && body.matches('\n').count() == body.matches("\r\n").count();
     let open_end = !body.is_empty() && !body.ends_with('\n');
-    // The text was read as a scene, and a scene has no value that TOML lacks: neither can fail.
+    // Neither can fail: the text was parsed before, and TOML can express every scene.
     let mut document: DocumentMut = body.replace("\r\n", "\n").parse().expect("text that was read");
     let tree = |scene| toml::Table::try_from(scene).expect("a scene is a TOML table");
+    write_present(&mut document, former_words);
     rewrite(&mut document, &tree(old), &tree(new));
     let mut body = document.to_string();
     if body.starts_with("\n[") {

@@ -1,4 +1,4 @@
-//! A scene and the file that it is kept in: opening, saving without harm, noticing other writers.
+//! Scene files on disk: opening, atomic saving, detection of changes by other programs.
 
 use crate::asset::Assets;
 use crate::scene::recovery::{TEMPORARY, lock};
@@ -10,40 +10,40 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A scene's document and where it is kept.
+/// A scene document and the path of its file.
 #[derive(Clone, Debug)]
 pub struct SceneFile {
     path: Option<PathBuf>,
     document: Document,
-    /// Of the bytes that this program last read from or wrote to the file.
+    /// Hash of the bytes that this program last read from or wrote to the file.
     fingerprint: u64,
 }
 
-/// What is in the file now, compared with what this program last read or wrote.
+/// State of the file, compared with the bytes that this program last read or wrote.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DiskState {
-    /// The same; or there is no file yet to differ.
+    /// Equal, or there is no file yet.
     Unchanged,
-    /// Somebody else has written it, or it cannot be read any more.
+    /// Written by another program, or no longer readable.
     Changed,
-    /// It is not there.
+    /// Deleted or moved.
     Missing,
 }
 
-/// Why a scene was not saved.
+/// Reason why a scene was not saved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SaveError {
-    /// It has no file yet.
+    /// The scene has no file yet.
     Untitled,
-    /// Somebody else has written the file since it was read.
+    /// Another program has written the file since it was read.
     Changed(PathBuf),
-    /// The file exists and was not to be overwritten.
+    /// The file exists, and overwriting was not requested.
     Exists(PathBuf),
-    /// It cannot be written.
+    /// The file cannot be written.
     Failed {
         /// The file.
         path: PathBuf,
-        /// What is wrong, as a clause.
+        /// Cause, as a clause.
         what: String,
     },
 }
@@ -70,7 +70,7 @@ impl fmt::Display for SaveError {
 impl std::error::Error for SaveError {}
 
 impl SceneFile {
-    /// Reads and checks the scene file at `path`.
+    /// Reads and validates the scene file at `path`.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -78,7 +78,7 @@ impl SceneFile {
         Self::open_with(path, Arc::default())
     }
 
-    /// As [`SceneFile::open`]; what the files hold that the scene names is remembered in `assets`.
+    /// Does the same as [`SceneFile::open`]; `assets` caches the files that the scene names.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -88,7 +88,7 @@ impl SceneFile {
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }
 
-    /// A scene that is in no file yet; messages call it `name`.
+    /// Creates a scene without a file; diagnostics call it `name`.
     ///
     /// # Errors
     /// As [`Scene::parse`].
@@ -96,8 +96,8 @@ impl SceneFile {
         Ok(Self { path: None, document: Document::parse(text, name)?, fingerprint: 0 })
     }
 
-    /// A scene that was begun from the file at `path`, where something else is now; saving it puts
-    /// `text` in the place of that.
+    /// Creates a scene from the recovered `text` of the file at `path`, which has other content
+    /// now. Saving replaces that content.
     ///
     /// # Errors
     /// As [`Scene::parse`].
@@ -107,7 +107,8 @@ impl SceneFile {
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }
 
-    /// Reads `text`, which would stand in this file, as a scene; messages call it `name`.
+    /// Reads `text` as a scene, with this file's folder for the files that it names; diagnostics
+    /// call it `name`.
     ///
     /// # Errors
     /// As [`Scene::parse`].
@@ -115,14 +116,14 @@ impl SceneFile {
         Scene::parse_in(text, name, self.document.scene().library.clone())
     }
 
-    /// A hash of the bytes that this program last read from or wrote to the file; `None`: there is
-    /// none yet.
+    /// Returns the hash of the bytes that this program last read from or wrote to the file; `None`
+    /// without a file.
     pub fn fingerprint(&self) -> Option<u64> {
         self.path.as_ref().map(|_| self.fingerprint)
     }
 
-    /// Whether `text` is what the file held when this program last read or wrote it; without a file,
-    /// what the scene was begun with.
+    /// Returns `true` if `text` is what this program last read from or wrote to the file; without a
+    /// file, if it is the text that the scene started from.
     pub fn holds(&self, text: &str) -> bool {
         match self.path {
             Some(_) => fnv1a64(text.as_bytes()) == self.fingerprint,
@@ -130,24 +131,24 @@ impl SceneFile {
         }
     }
 
-    /// What saving `scene`, which has no faults, would write.
+    /// Returns the text that saving the valid `scene` would write.
     pub fn text_of(&self, scene: &Scene) -> String {
         let mut document = self.document.clone();
         document.apply(scene);
         document.text().to_string()
     }
 
-    /// Where it is kept.
+    /// Returns the path of the file.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()
     }
 
-    /// The document as it was last read or saved.
+    /// Returns the document as it was last read or saved.
     pub fn document(&self) -> &Document {
         &self.document
     }
 
-    /// Reads the file and compares it with what this program last read or wrote.
+    /// Reads the file and compares it with the bytes that this program last read or wrote.
     pub fn on_disk(&self) -> DiskState {
         match self.path.as_deref().map(content) {
             None => DiskState::Unchanged,
@@ -160,8 +161,8 @@ impl SceneFile {
     /// Reads the file again.
     ///
     /// # Errors
-    /// As [`Scene::read`]; the document stays what it was. What was read counts as seen all the same,
-    /// so that a broken file is told once and not at every look.
+    /// As [`Scene::read`]; the document stays unchanged. The fingerprint is updated all the same,
+    /// so that a broken file is reported once and not at every check.
     pub fn reload(&mut self) -> Result<(), SceneErrors> {
         let Some(path) = self.path.clone() else { return Ok(()) };
         if let Ok(Some(found)) = content(&path) {
@@ -171,13 +172,12 @@ impl SceneFile {
         Ok(())
     }
 
-    /// Writes `scene`, which has no faults, to its file: comments, order and layout of what has not
-    /// changed stay. The old file is replaced in one step or stays as it was; a link stays a link, and
-    /// permissions stay.
+    /// Writes the valid `scene` to its file. Comments, order and layout of unchanged parts stay.
+    /// The file is replaced atomically; a symbolic link stays a link, and permissions stay.
     ///
     /// # Errors
-    /// If there is no file yet, if another program wrote it meanwhile (unless `overwrite`), if it cannot
-    /// be written.
+    /// If there is no file yet, if another program has written it (unless `overwrite`), or if it
+    /// cannot be written.
     pub fn save(&mut self, scene: &Scene, overwrite: bool) -> Result<(), SaveError> {
         let Some(path) = self.path.clone() else { return Err(SaveError::Untitled) };
         if !overwrite && self.on_disk() == DiskState::Changed {
@@ -191,10 +191,10 @@ impl SceneFile {
         Ok(())
     }
 
-    /// Writes `scene`, which has no faults, to another file, which becomes its own.
+    /// Writes the valid `scene` to another file, which becomes the scene's file.
     ///
     /// # Errors
-    /// If the file exists (unless `overwrite`), if it cannot be written.
+    /// If the file exists (unless `overwrite`), or if it cannot be written.
     pub fn save_as(
         &mut self,
         path: &Path,
@@ -222,7 +222,7 @@ impl SceneFile {
     }
 }
 
-/// The fingerprint of what is in the file; `None`: there is no file.
+/// Returns the fingerprint of the file's content; `None` if there is no file.
 fn content(path: &Path) -> io::Result<Option<u64>> {
     match File::open(path) {
         Ok(file) if file.metadata()?.is_file() => {
@@ -236,10 +236,10 @@ fn content(path: &Path) -> io::Result<Option<u64>> {
     }
 }
 
-/// Puts `text` at `path`, complete and on the disk, or leaves what is there.
+/// Replaces the content of `path` by `text` atomically and durably.
 fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
     let failed = |what: String| SaveError::Failed { path: path.to_path_buf(), what };
-    // A link stays a link: what it points to is replaced.
+    // A symbolic link stays a link: its target is replaced.
     let is_link = path.symlink_metadata().is_ok_and(|m| m.file_type().is_symlink());
     let file = match is_link.then(|| fs::canonicalize(path)) {
         Some(Ok(real)) => real,
@@ -264,7 +264,7 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
     let mut builder = tempfile::Builder::new();
     let [prefix, suffix] = TEMPORARY;
     builder.prefix(prefix).suffix(suffix);
-    // An existing file keeps its permissions; a new one gets those that the user's umask leaves.
+    // An existing file keeps its permissions; a new one gets those that the umask leaves.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -281,13 +281,13 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
     });
     let explained = |error: io::Error| failed(explain(&error, directory));
     let temporary = written.map_err(explained)?;
-    // A file that came into being a moment ago is not overwritten unasked either.
+    // A file that was created in the meantime is not overwritten either.
     let put = if overwrite { temporary.persist(&file) } else { temporary.persist_noclobber(&file) };
     put.map_err(|e| match e.error.kind() {
         ErrorKind::AlreadyExists => SaveError::Exists(path.to_path_buf()),
         _ => explained(e.error),
     })?;
-    // Makes the new name durable; not every system lets a directory be synced.
+    // Makes the new name durable. Not every system allows a directory to be synced.
     if let Ok(directory) = File::open(directory) {
         let _ = directory.sync_all();
     }

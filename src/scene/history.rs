@@ -7,21 +7,21 @@ use crate::scene::{Object, Scene, TransformOp};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Most memory for scenes to go back to [bytes], roughly counted.
+/// Largest memory of the scenes in the history [bytes], estimated.
 const MAX_BYTES: usize = 64 << 20;
-/// Most steps to go back.
+/// Largest number of steps that can be undone.
 const MAX_STEPS: usize = 10_000;
 
-/// The scenes that an editor has been through. Each step has a label; the steps of one gesture (a drag,
-/// a held key) become one.
+/// Undo history of an editor. Each step has a label; the steps of one gesture (a drag, a held key)
+/// are coalesced.
 #[derive(Clone, Debug)]
 pub struct History {
-    /// What was before each step that can be undone, the oldest first.
+    /// Scenes before each step that can be undone, the oldest first.
     past: VecDeque<HistoryEntry>,
     now: Arc<Scene>,
-    /// What was after each step that can be done again, the next one last.
+    /// Scenes after each step that can be redone, the next one last.
     future: Vec<HistoryEntry>,
-    /// Whether the last step may still grow.
+    /// `true` while the next step of the same gesture is coalesced with the last one.
     open: bool,
     saved: Arc<Scene>,
 }
@@ -41,20 +41,20 @@ impl HistoryEntry {
 }
 
 impl History {
-    /// No steps yet; `scene` is what is saved.
+    /// Creates a history without steps; `scene` is the saved one.
     pub fn new(scene: Arc<Scene>) -> Self {
         let saved = Arc::clone(&scene);
         Self { past: VecDeque::new(), now: scene, future: Vec::new(), open: false, saved }
     }
 
-    /// The scene as it is now.
+    /// Returns the current scene.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.now
     }
 
-    /// Makes `scene` the scene of now. `held`: a step of a gesture, which becomes one with the step
-    /// before if that was of the same gesture and has the same label. `false`: nothing has changed, and
-    /// nothing is recorded.
+    /// Makes `scene` the current scene. `held` is `true` for a step of a gesture, which is
+    /// coalesced with the previous step if that belongs to the same gesture and has the same label.
+    /// Returns `false`, and records nothing, if the scene has not changed.
     pub fn record(&mut self, scene: Arc<Scene>, label: &str, held: bool) -> bool {
         if *scene == *self.now {
             return false;
@@ -64,7 +64,7 @@ impl History {
         let before = std::mem::replace(&mut self.now, scene);
         self.open = held;
         if grows {
-            // A gesture that led back to where it began leaves no step.
+            // A gesture that ends at its start leaves no step.
             if self.past.back().is_some_and(|last| *last.scene == *self.now) {
                 self.now = self.past.pop_back().map_or(before, |last| last.scene);
                 self.open = false;
@@ -76,12 +76,12 @@ impl History {
         true
     }
 
-    /// Ends a gesture: the next step is one of its own.
+    /// Ends a gesture: the next step is separate.
     pub fn end_gesture(&mut self) {
         self.open = false;
     }
 
-    /// Goes back one step and returns its label; `None`: there is none.
+    /// Goes back one step and returns its label; `None` if there is none.
     pub fn undo(&mut self) -> Option<String> {
         self.open = false;
         let HistoryEntry { scene, label, .. } = self.past.pop_back()?;
@@ -90,7 +90,7 @@ impl History {
         Some(label)
     }
 
-    /// Goes forward one step that was undone and returns its label; `None`: there is none.
+    /// Goes forward one undone step and returns its label; `None` if there is none.
     pub fn redo(&mut self) -> Option<String> {
         self.open = false;
         let HistoryEntry { scene, label, .. } = self.future.pop()?;
@@ -99,33 +99,33 @@ impl History {
         Some(label)
     }
 
-    /// What `undo` would undo.
+    /// Returns the label of the step that [`History::undo`] would undo.
     pub fn undo_label(&self) -> Option<&str> {
         self.past.back().map(|entry| entry.label.as_str())
     }
 
-    /// What `redo` would do again.
+    /// Returns the label of the step that [`History::redo`] would redo.
     pub fn redo_label(&self) -> Option<&str> {
         self.future.last().map(|entry| entry.label.as_str())
     }
 
-    /// `scene`, the one of now or an earlier one, has been written to the file.
+    /// Records that `scene`, the current or an earlier one, has been written to the file.
     pub fn mark_saved(&mut self, scene: Arc<Scene>) {
         self.saved = scene;
         self.open = false;
     }
 
-    /// Whether the scene of now is the one in the file, however it came to be that.
+    /// Returns `true` if the current scene equals the saved one, whatever steps led to it.
     pub fn is_saved(&self) -> bool {
         Arc::ptr_eq(&self.saved, &self.now) || *self.saved == *self.now
     }
 
-    /// Forgets all steps: `scene` is what the file holds now.
+    /// Drops all steps; `scene` is the current and the saved one.
     pub fn restart(&mut self, scene: Arc<Scene>) {
         *self = Self::new(scene);
     }
 
-    /// Drops the oldest steps beyond the memory allowed.
+    /// Drops the oldest steps beyond the memory limit.
     fn forget(&mut self) {
         let mut total: usize = self.past.iter().map(|entry| entry.bytes).sum();
         while self.past.len() > 1 && (total > MAX_BYTES || self.past.len() > MAX_STEPS) {
@@ -134,7 +134,7 @@ impl History {
     }
 }
 
-/// About how much memory a scene takes.
+/// Returns the estimated memory of a scene [bytes].
 fn bytes(scene: &Scene) -> usize {
     let objects: usize = scene
         .objects
@@ -146,7 +146,7 @@ fn bytes(scene: &Scene) -> usize {
         + scene.objects.len() * size_of::<Object>()
         + scene.lights.len() * (size_of::<Light>() + 16)
         + scene.materials.len() * (size_of::<Material>() + 32)
-        + scene.views.len() * (size_of::<Camera>() + 32)
+        + scene.cameras.len() * (size_of::<Camera>() + 32)
 }
 
 #[cfg(test)]
@@ -155,12 +155,12 @@ mod tests {
 
     fn scene(depth: u32) -> Arc<Scene> {
         let mut scene = Scene::default();
-        scene.trace.depth = depth;
+        scene.trace.max_depth = depth;
         Arc::new(scene)
     }
 
     fn depth(history: &History) -> u32 {
-        history.scene().trace.depth
+        history.scene().trace.max_depth
     }
 
     #[test]
@@ -226,7 +226,7 @@ mod tests {
         large.objects = vec![ball; 20_000];
         let mut history = History::new(Arc::new(large.clone()));
         for depth in 1..100 {
-            large.trace.depth = depth;
+            large.trace.max_depth = depth;
             history.record(Arc::new(large.clone()), "deeper", false);
         }
         let held: usize = history.past.iter().map(|entry| entry.bytes).sum();

@@ -1,4 +1,4 @@
-//! What is legal but probably not meant.
+//! Lints: legal values of a scene that are probably mistakes.
 
 use crate::material::{Fresnel, Highlight, Material};
 use crate::scene::Scene;
@@ -6,8 +6,8 @@ use crate::scene::validate::Problem;
 use crate::value::{Color, number};
 
 impl Scene {
-    /// What is legal but dubious, one finding per kind of doubt: the first case, and how many more.
-    /// [`Document::warnings`](crate::scene::Document::warnings) adds file, line and column.
+    /// Returns one warning for each kind of doubtful value: the first case, and the number of
+    /// others. [`Document::warnings`](crate::scene::Document::warnings) adds file, line and column.
     pub fn warnings(&self) -> Vec<Problem> {
         let materials = |dubious: &dyn Fn(&Material) -> Option<(&'static str, String)>| {
             let mut cases = self.materials.iter().filter_map(|(n, m)| Some((n, dubious(m)?)));
@@ -86,15 +86,14 @@ impl Scene {
     }
 }
 
-/// The parts of a material that answer one and the same ray of light: diffuse, highlight,
-/// reflection. A Cook-Torrance highlight is the reflection of a light in the surface, not a part
-/// beside it.
+/// Finds responses to the same light that add up to more than 1: diffuse, highlight, reflection. A
+/// Cook-Torrance highlight is the reflection of a light in the surface and is not added to it.
 fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     let mirrored = match m.highlight {
         Highlight::Phong => m.specular + m.reflection,
         Highlight::CookTorrance => m.specular.max(m.reflection),
     };
-    let f0 = m.metal.map(|metal| metal.f0()).or(m.reflectance).unwrap_or(Color::WHITE).largest();
+    let f0 = m.metal.map(|metal| metal.f0()).or(m.f0).unwrap_or(Color::WHITE).largest();
     let passed = match m.fresnel_mode() {
         // F and 1 - F of the same light.
         Fresnel::Dielectric => mirrored.max(m.transmission),

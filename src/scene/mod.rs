@@ -1,4 +1,9 @@
-//! The scene: what the user wrote, checked, in double precision, editable.
+//! The scene: the user's description, validated, in double precision, editable.
+//!
+//! Reading a file parses and validates once ([`Document`]), and so does every edit ([`edit::Edit`]).
+//! The fields of [`Scene`] are public and may be set to invalid values in between, so that a render
+//! session validates the scene that it is given.
+
 mod asset_resolver;
 mod builtin;
 mod diagnostic;
@@ -38,31 +43,31 @@ use crate::material::Material;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A whole scene.
+/// A whole scene, valid or not: see [`Scene::faults`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Default)]
 #[serde(default, deny_unknown_fields)]
 pub struct Scene {
-    /// The picture's raster.
+    /// Film settings.
     pub film: FilmSettings,
-    /// How far paths are followed.
+    /// Integrator settings.
     pub trace: IntegratorSettings,
-    /// The view.
+    /// Camera that the picture is taken from.
     pub camera: Camera,
-    /// Other viewpoints by name, to come back to. The picture is taken from `camera`.
-    pub views: BTreeMap<String, Camera>,
-    /// What a ray sees that meets nothing.
+    /// Stored cameras by name.
+    pub cameras: BTreeMap<String, Camera>,
+    /// Radiance of rays that hit no surface.
     pub background: Background,
-    /// Light from everywhere.
+    /// Ambient light.
     pub ambient: Ambient,
     /// Lights.
     #[serde(rename = "light")]
     pub lights: Vec<Light>,
-    /// Finishes by name.
+    /// Materials by name.
     pub materials: BTreeMap<String, Material>,
-    /// Things.
+    /// Objects.
     #[serde(rename = "object")]
     pub objects: Vec<Object>,
-    /// Where the files are that it names.
+    /// Resolver of the files that the scene names.
     #[serde(skip)]
     pub library: AssetResolver,
 }

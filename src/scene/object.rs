@@ -1,4 +1,4 @@
-//! Objects: a shape, where it stands, what it is made of.
+//! Objects: a shape with a transform and a material.
 
 use crate::primitive::Form;
 use crate::shape::{KINDS, Shape, TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
@@ -6,24 +6,24 @@ use crate::value::{Field, ValidationError, Validator, ValueType};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 
-/// A thing: a shape, where it stands, what it is made of.
+/// An object: a shape with a transform and a material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Object {
-    /// Name, unique in the scene; empty: none.
+    /// Name, unique in the scene; empty if it has none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
-    /// Key of `materials`; empty: the default finish.
+    /// Key of `materials`; empty means the default material.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub material: String,
-    /// What it looks like.
+    /// Shape, in the object's space.
     pub shape: Shape,
-    /// Steps that move, turn and scale it, the first step first.
+    /// Transform from the object's space to the scene's: steps, the first one applied first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub transform: Vec<TransformOp>,
 }
 
-/// The keys of `[[object]]`.
+/// Keys of `[[object]]`.
 pub const OBJECT_FIELDS: &[Field] = &[
     Field::optional("name", ValueType::Text, "", "a number", "Name; no two objects have the same."),
     Field::optional(
@@ -44,18 +44,18 @@ pub const OBJECT_FIELDS: &[Field] = &[
 ];
 
 impl Object {
-    /// The material of each part of its form; a simple object has one part.
+    /// Returns the material of each part of the compiled form; a simple object has one part.
     pub fn materials(&self) -> Vec<&str> {
         self.shape.part_materials(&self.material)
     }
 
-    /// Whether it or a part of it carries the name of this material.
+    /// Returns `true` if the object or a part of it has the material `name`.
     pub fn names_material(&self, name: &str) -> bool {
         self.material == name || self.shape.named_materials().iter().any(|(_, own)| *own == name)
     }
 
-    /// Gives it and its parts the material `new` where they name `old`. An empty name stands for the default finish,
-    /// in a part for the material of the whole.
+    /// Replaces the material `old` of the object and its parts by `new`. An empty name means the
+    /// default material, in a part the material of the whole.
     pub fn rename_material(&mut self, old: &str, new: &str) {
         let names = self.shape.part_names_mut().into_iter().chain([&mut self.material]);
         for name in names.filter(|name| *name == old) {
@@ -63,12 +63,12 @@ impl Object {
         }
     }
 
-    /// The transform's steps in order, as one map.
+    /// Returns the transform as one affine map.
     pub fn scene_from_object(&self) -> DAffine3 {
         compose(&self.transform)
     }
 
-    /// Its geometry where it stands, in double precision. Of an object without faults.
+    /// Returns the geometry in the scene's space, in double precision. The object must be valid.
     pub fn form(&self) -> Form {
         match self.transform.is_empty() {
             true => self.shape.form(),
@@ -76,7 +76,8 @@ impl Object {
         }
     }
 
-    /// What is wrong with it (its material's name is the scene's business).
+    /// Validates the object, except that its material exists, which
+    /// [`Scene::faults`](crate::scene::Scene::faults) checks.
     pub fn faults(&self) -> Vec<ValidationError> {
         let mut checks = Validator::new(OBJECT_FIELDS).nested("shape", self.shape.faults());
         for (i, step) in self.transform.iter().enumerate() {

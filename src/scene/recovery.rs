@@ -1,10 +1,10 @@
-//! Unsaved edits, kept where the next start finds them.
+//! Recovery files: unsaved edits on disk, as vim's swap files.
 //!
-//! A program that is killed loses what only its memory holds. So the text that saving would write is
-//! put into a hidden file beside the scene, complete or not at all, and taken away when the scene is
-//! saved or left on purpose. Whoever keeps such a file holds a lock on it, which ends with the process,
-//! however that ends: a file that nobody has locked was left behind. The lock is taken before the file
-//! gets its name, so that no file of somebody alive is ever seen without it.
+//! The text that saving would write is kept in a hidden file beside the scene. It is replaced
+//! atomically, and removed when the scene is saved or closed deliberately. The process that writes
+//! the file holds a lock on it, which ends with the process: an unlocked recovery file is an orphan
+//! of a process that was killed. The lock is taken before the file gets its name, so that other
+//! processes never see the file of a running process unlocked.
 
 use crate::value::fnv1a64;
 use std::ffi::{OsStr, OsString};
@@ -14,62 +14,63 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 use tempfile::NamedTempFile;
 
-/// Files of one scene in one folder: so many sessions can be lost one after another, or run side by
-/// side.
+/// Largest number of recovery files of one scene in one folder, from crashed or concurrent
+/// sessions.
 const MOST: u32 = 9;
-/// A larger file is no scene [bytes].
+/// Size above which a file is not read [bytes].
 const MAX_BYTES: u64 = 64 << 20;
-/// How the first line begins; the fingerprint of the scene's file follows.
+/// Start of the first line; the fingerprint of the scene's file follows.
 const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
-/// In the place of the fingerprint if there was no file.
+/// Replaces the fingerprint if there was no file.
 const NO_FILE: &str = "none";
-/// What temporary files are called, before and after what makes them different.
+/// Prefix and suffix of the names of temporary files.
 pub(super) const TEMPORARY: [&str; 2] = [".zerkalo-", ".tmp"];
-/// A temporary file that nobody has locked for so long was left behind.
+/// Age above which an unlocked temporary file is removed.
 const SWEPT_AFTER: Duration = Duration::from_secs(60);
 
-/// Where the unsaved edits of a scene are kept.
+/// Writer and finder of the recovery files of one scene.
 #[derive(Debug)]
 pub struct Recovery {
-    /// Folder and first name, in the order in which they are tried.
+    /// Candidate folders and file names, in order of preference.
     homes: Vec<(PathBuf, OsString)>,
     own: Option<Saved>,
 }
 
-/// A file with a lock on it.
+/// A recovery file and the handle that holds its lock.
 #[derive(Debug)]
 struct Saved {
     path: PathBuf,
     file: File,
 }
 
-/// What was found at the start.
+/// Recovery files found at the start.
 #[derive(Debug, Default)]
 pub struct RecoveryFile {
-    /// Edits that were left behind, the newest first.
+    /// Orphaned edits, the newest first.
     pub lost: Vec<Orphan>,
-    /// Files that cannot be read, and why. They stay.
+    /// Files that cannot be read, and the reason. They stay on disk.
     pub unreadable: Vec<(PathBuf, String)>,
-    /// Somebody who is alive has unsaved edits.
+    /// `true` if another running process has unsaved edits of the scene.
     pub elsewhere: bool,
 }
 
-/// Edits that were left behind. Nobody else finds them while this exists.
+/// Edits of a process that was killed. The file is locked while this exists, so that no other
+/// process finds it.
 #[derive(Debug)]
 pub struct Orphan {
     kept: Saved,
-    /// The scene's file as it would have been saved.
+    /// Text of the scene file, as saving would have written it.
     pub text: String,
-    /// [`crate::scene::SceneFile::fingerprint`] of what was edited; `None`: it was in no file, or it is not
-    /// known.
+    /// [`crate::scene::SceneFile::fingerprint`] of the edited file; `None` if there was no file or
+    /// the fingerprint cannot be read.
     pub base: Option<u64>,
-    /// When they were written.
+    /// Time of writing.
     pub written: SystemTime,
 }
 
-/// The user's folder for what programs remember (XDG Base Directory Specification), by the `variable`s
-/// of the environment: where the edits are kept of scenes that have no file, or one in a folder that
-/// cannot be written.
+/// Returns the user's state folder (XDG Base Directory Specification) from the environment
+/// `variable`s. It holds the recovery files of scenes that have no file, or whose folder is not
+/// writable.
 pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     let absolute = |name| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let folder = absolute("XDG_STATE_HOME");
@@ -78,13 +79,13 @@ pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathB
 }
 
 impl Recovery {
-    /// Of the scene in the file at `path`; without one, of the scene called `name`. `state`:
-    /// [`state_folder`].
+    /// Creates the recovery of the scene in the file at `path`, or, without a file, of the scene
+    /// called `name`. `state` is [`state_folder`].
     pub fn of(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
         let mut homes = Vec::new();
         let called = match path {
             Some(path) => {
-                // However it is named, it is the same file.
+                // Every path to the same file gives the same name.
                 let real = fs::canonicalize(path).or_else(|_| std::path::absolute(path));
                 let real = real.unwrap_or_else(|_| path.to_path_buf());
                 let name = real.file_name().unwrap_or(OsStr::new("scene")).to_os_string();
@@ -103,15 +104,15 @@ impl Recovery {
         Self { homes, own: None }
     }
 
-    /// The file that these edits are kept in.
+    /// Returns the path of the recovery file, if there is one.
     pub fn path(&self) -> Option<&Path> {
         self.own.as_ref().map(|own| own.path.as_path())
     }
 
-    /// Keeps `text`, what saving would write over a file with the fingerprint `base`.
+    /// Writes `text`, the file that saving would write over one with the fingerprint `base`.
     ///
     /// # Errors
-    /// If it can be written nowhere; what was kept before stays.
+    /// If no candidate folder is writable; the previous recovery file stays.
     pub fn keep(&mut self, text: &str, base: Option<u64>) -> io::Result<()> {
         let base = base.map_or(NO_FILE.to_string(), |base| format!("{base:016x}"));
         let text = format!("{HEAD}{base}.\n{text}");
@@ -134,14 +135,14 @@ impl Recovery {
         Err(failed)
     }
 
-    /// Nothing is unsaved any more.
+    /// Removes the recovery file, since no edits are unsaved.
     pub fn forget(&mut self) {
         if let Some(own) = self.own.take() {
             own.remove();
         }
     }
 
-    /// Looks for what was left behind. What is empty is removed.
+    /// Finds the orphaned edits of the scene. Empty files are removed.
     pub fn find(&self) -> RecoveryFile {
         let mut found = RecoveryFile::default();
         for (folder, name) in &self.homes {
@@ -163,7 +164,7 @@ impl Recovery {
         found
     }
 
-    /// These edits are the ones of this session from now on.
+    /// Makes the orphaned edits those of this session.
     pub fn take_up(&mut self, lost: Orphan) {
         self.forget();
         self.own = Some(lost.kept);
@@ -171,28 +172,28 @@ impl Recovery {
 }
 
 impl Orphan {
-    /// The file that holds them.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.kept.path
     }
 
-    /// They are not wanted any more.
+    /// Removes the file.
     pub fn discard(self) {
         self.kept.remove();
     }
 }
 
 impl Saved {
-    /// Whether the file still has its name.
+    /// Returns `true` if the path still leads to the locked file.
     fn is_there(&self) -> bool {
         let named = fs::symlink_metadata(&self.path);
         self.file.metadata().is_ok_and(|own| named.is_ok_and(|named| is_same(&own, &named)))
     }
 
-    /// Removes it, before the lock goes.
+    /// Removes the file before its lock is released.
     fn remove(self) {
         if self.is_there() {
-            // What cannot be removed is found again, and told, at the next start.
+            // A file that cannot be removed is found, and reported, at the next start.
             let _ = fs::remove_file(&self.path);
         }
     }
@@ -209,7 +210,7 @@ fn is_same(a: &Metadata, b: &Metadata) -> bool {
     a.created().ok() == b.created().ok()
 }
 
-/// `name`, `name-2`, `name-3`.
+/// Returns `name`, `name-2`, `name-3`.
 fn numbered(name: &OsStr, number: u32) -> OsString {
     let mut name = name.to_os_string();
     if number > 1 {
@@ -218,12 +219,12 @@ fn numbered(name: &OsStr, number: u32) -> OsString {
     name
 }
 
-/// Marks a temporary file as somebody's who is alive. Where files cannot be locked that is not known.
+/// Locks a temporary file for the life of this process. File systems without locks are tolerated.
 pub(super) fn lock(temporary: &NamedTempFile) {
     let _ = temporary.as_file().try_lock();
 }
 
-/// A file in `folder` that has no name yet, with `text` in it, locked, for the user's eyes only.
+/// Creates a locked temporary file in `folder` with the content `text`, readable by the user only.
 fn filled(folder: &Path, text: &str) -> io::Result<NamedTempFile> {
     let [prefix, suffix] = TEMPORARY;
     let mut file = tempfile::Builder::new().prefix(prefix).suffix(suffix).tempfile_in(folder)?;
@@ -233,7 +234,7 @@ fn filled(folder: &Path, text: &str) -> io::Result<NamedTempFile> {
     Ok(file)
 }
 
-/// Puts `text` into a new file under the first name that is free.
+/// Writes `text` to a new file under the first free name.
 fn begun(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved> {
     let mut folders = DirBuilder::new();
     folders.recursive(true);
@@ -253,19 +254,19 @@ fn begun(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved> {
     Err(io::Error::new(ErrorKind::AlreadyExists, format!("{MOST} files {name} are there already")))
 }
 
-/// Also for writing, without which some file systems lock nothing.
+/// Opens for writing as well, without which some file systems grant no lock.
 fn open(path: &Path) -> io::Result<File> {
     File::options().read(true).write(true).open(path)
 }
 
-/// What is in the file at `path`; `None`: there is no such file.
+/// Returns the orphaned edits in the file at `path`; `None` if there is no such file.
 ///
 /// # Errors
-/// [`ErrorKind::WouldBlock`] if somebody alive has it; or if it cannot be read.
+/// [`ErrorKind::WouldBlock`] if a running process holds the lock; otherwise if it cannot be read.
 fn left_behind(path: &Path) -> io::Result<Option<Orphan>> {
-    // In a moment somebody may replace the file that was opened: then there is another one to look at.
+    // Another process may replace the file after it was opened: then the new one is read.
     for _ in 0..5 {
-        // Looked at before it is opened: to open a pipe, say, could take for ever.
+        // The type is checked before opening, since opening a pipe can block forever.
         match fs::symlink_metadata(path) {
             Ok(metadata) if metadata.is_file() => {}
             Ok(_) => return Err(io::Error::other("it is not a regular file")),
@@ -279,7 +280,7 @@ fn left_behind(path: &Path) -> io::Result<Option<Orphan>> {
         };
         match kept.file.try_lock() {
             Err(TryLockError::WouldBlock) => return Err(ErrorKind::WouldBlock.into()),
-            // Where files cannot be locked nobody has.
+            // File systems without locks report an error: the file counts as unlocked.
             Ok(()) | Err(TryLockError::Error(_)) => {}
         }
         if kept.is_there() {
@@ -305,7 +306,7 @@ fn read(kept: Saved) -> io::Result<Orphan> {
     Ok(Orphan { kept, text, base, written })
 }
 
-/// Files in `folder` that hold unsaved edits.
+/// Returns the recovery files in `folder`.
 pub fn kept_in(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let is_kept = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().contains(".unsaved");
@@ -314,7 +315,7 @@ pub fn kept_in(folder: &Path) -> Vec<PathBuf> {
     kept
 }
 
-/// Removes what programs have left half-written in `folder` that were killed.
+/// Removes the half-written temporary files of killed processes in `folder`.
 pub fn remove_stale(folder: &Path) {
     let [prefix, suffix] = TEMPORARY;
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {

@@ -1,5 +1,5 @@
-//! Unsaved edits on a real file system. Two of these in one process are to each other what two
-//! processes are: a lock belongs to an open file.
+//! Recovery files on a real file system. Two instances in one process behave as two processes do,
+//! since a lock belongs to an open file.
 
 use crate::scene::{Recovery, RecoveryFile, remove_stale, state_folder};
 use std::ffi::OsString;
@@ -40,7 +40,7 @@ fn what_is_kept_is_found_once_its_keeper_is_gone() {
     let found = seeker.find();
     assert_eq!(texts(&found), ["three\r\nwithout end"]);
     assert_eq!((found.lost[0].base, found.elsewhere), (Some(0xabc), false));
-    // While somebody decides about it, nobody else is asked.
+    // A pending orphan is hidden from other sessions.
     assert!(of(&path).find().elsewhere);
     drop(found);
     let mut heir = of(&path);
@@ -67,7 +67,7 @@ fn sessions_side_by_side_have_files_of_their_own() {
     let mut late = of(&path);
     late.keep("late", None).unwrap();
     assert!(late.path().unwrap().ends_with(".a.toml.unsaved-5"));
-    // Others are not disturbed by what a keeper rewrites, nor by what it takes away.
+    // Writing and removing one recovery file leaves those of other sessions alone.
     keepers[3].keep("3 again", None).unwrap();
     keepers.truncate(2);
     let found = of(&path).find();
@@ -93,7 +93,7 @@ fn a_file_that_others_take_away_is_made_anew() {
     let mut found = texts(&found);
     found.sort_unstable();
     assert_eq!(found, ["other", "two"]);
-    // Forgetting takes away what is its own, and nothing else.
+    // Forgetting removes only the session's own file.
     let mut keeper = of(&folder.path().join("b.toml"));
     keeper.keep("one", None).unwrap();
     let hidden = keeper.path().unwrap().to_path_buf();
@@ -158,7 +158,7 @@ fn links_lead_to_the_same_edits_and_nothing_is_read_through_a_planted_one() {
 fn where_the_scene_cannot_have_them_beside_it_the_state_folder_has() {
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("deep/state");
-    // Its folder does not exist, so nothing can be written there.
+    // The folder does not exist, so that it cannot be written.
     let gone = PathBuf::from("/proc/nowhere/a.toml");
     let with = |path: Option<&Path>| Recovery::of(path, "mirror/room.toml", Some(&state));
     let mut keeper = with(Some(&gone));
@@ -193,7 +193,7 @@ fn the_state_folder_is_where_the_user_wants_it() {
         })
     };
     assert_eq!(with(Some("/s"), Some("/h")), Some("/s/zerkalo".into()));
-    // The specification: relative paths are to be ignored.
+    // The specification requires relative paths to be ignored.
     assert_eq!(with(Some("s"), Some("/h")), Some("/h/.local/state/zerkalo".into()));
     assert_eq!(with(None, None), None);
 }

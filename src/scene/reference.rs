@@ -1,4 +1,4 @@
-//! The reference of the scene file format, generated from the tables of fields.
+//! Reference of the scene format, generated from the field tables.
 
 use crate::scene::format::schema::FIELDS;
 use crate::shape::{EXAMPLES, KINDS, TRANSFORM_OP_FIELDS};
@@ -23,7 +23,7 @@ and every key with a default may be left out. Unknown keys are errors.
   x colour x cosine plus `specular` x highlight, `reflection` x what is mirrored, and
   `transmission` x what shows through. The parts are not weighted against each other, and the sum
   may exceed 1; it is clipped only when it is shown.
-- A solid with `transmission` is filled with what has its `index` of refraction: light is bent by
+- A solid with `transmission` is filled with what has its index of refraction `ior`: light is bent by
   Snell's law where it enters and leaves, and totally reflected past the critical angle. Where such
   solids overlap, the one listed last fills the space and the surfaces of the others are not there:
   a bubble is listed after its ball. At most four at one point are told apart. A compound is one
@@ -72,7 +72,7 @@ and every key with a default may be left out. Unknown keys are errors.
 with one.
 ";
 
-/// The reference of the scene file format, as Markdown.
+/// Returns the reference of the scene format, as Markdown.
 pub fn reference() -> String {
     let mut out = INTRODUCTION.to_string();
     for field in FIELDS {
@@ -99,13 +99,13 @@ fn push(out: &mut String, text: &str) {
     out.push_str(text);
 }
 
-/// What does not fit into the table's row of `field`: its words, or its own keys.
+/// Appends what the row of `field` refers to: its words, or its own keys.
 fn nested(out: &mut String, field: &Field) {
     match field.takes {
         ValueType::Choice(choices) => {
             let mut words = format!("\n`{}`:\n\n", field.name);
             for choice in choices {
-                // Writing into a String cannot fail.
+                // Writing into a `String` cannot fail.
                 let _ = writeln!(words, "- `\"{}\"`: {}", choice.name, choice.doc);
             }
             // Several tables may have the same words.
@@ -160,7 +160,7 @@ fn steps(out: &mut String) {
     }
 }
 
-/// Keys of which exactly one is given: no defaults.
+/// Appends keys of which exactly one is given; they have no defaults.
 fn kinds(out: &mut String, fields: &[Field]) {
     push(out, "| key | value | unit | meaning |\n|---|---|---|---|\n");
     for field in fields {
@@ -204,7 +204,7 @@ fn row(out: &mut String, cells: &[&str]) {
 mod tests {
     use super::*;
 
-    /// In the section where a row refers to what is below, it is below.
+    /// Rows that say "see below" refer to a later part of the same section.
     #[test]
     fn what_is_said_to_be_below_is_there() {
         let text = reference();

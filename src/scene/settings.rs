@@ -1,70 +1,71 @@
-//! What holds for the whole picture: raster, tracing, background, ambient light.
+//! Settings of the whole picture: film, integrator, background, ambient light.
 
 use crate::primitive::Acceleration;
 use crate::value::{Choice, Color, Field, NumberRange, ValidationError, Validator, ValueType};
 use serde::{Deserialize, Serialize};
 
-/// The picture's raster.
+/// Film settings: size, pixel filter, sample limit of glossy pixels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FilmSettings {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// How samples spread over a pixel.
+    /// Pixel filter.
     pub filter: Filter,
-    /// The most samples that a pixel with a glossy reflection gets; 0: no cap.
+    /// Largest number of samples per pixel spent on glossy pictures; 0 is no cap.
     pub rays_per_pixel: u32,
 }
 
-/// How samples spread over a pixel.
+/// Pixel filter: distribution of samples over a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {
-    /// Evenly over the pixel's square.
+    /// Uniform over the pixel's square.
     Box,
-    /// All in its centre: no anti-aliasing.
-    Center,
+    /// All samples at the pixel's centre, without anti-aliasing.
+    Point,
 }
 
-/// How far paths are followed.
+/// Integrator settings, the table `[trace]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IntegratorSettings {
-    /// What is traced at all.
-    pub level: RayTypes,
-    /// The most surfaces that a path meets after the first: 0 is no reflection and no transmission.
-    pub depth: u32,
-    /// A path ends when what it could still add is weighted by less than this.
-    pub min_weight: f64,
-    /// What becomes of a reflected ray that would dip under the surface.
-    pub horizon: BelowHorizon,
-    /// How rays are kept from things that they cannot meet.
+    /// Kinds of rays that are traced.
+    pub ray_types: RayTypes,
+    /// Largest number of surfaces that a path hits after the first; 0 disables reflection and
+    /// transmission.
+    pub max_depth: u32,
+    /// Paths with a smaller throughput end.
+    pub min_throughput: f64,
+    /// Treatment of sampled reflections below the surface's horizon.
+    pub below_horizon: BelowHorizon,
+    /// Acceleration structure. Every choice renders the same image; only speed differs.
     pub acceleration: Acceleration,
 }
 
-/// What is traced.
+/// Kinds of rays that are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RayTypes {
-    /// Camera rays only: no shadows, no reflections.
+    /// Camera rays only, without shadows and reflections.
     Primary,
     /// Camera rays and shadow rays.
     Shadows,
-    /// Everything.
+    /// Camera, shadow, reflected and transmitted rays.
     Full,
 }
 
-/// What becomes of a reflected ray that would dip under the surface.
+/// Treatment of sampled reflections below the surface's horizon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BelowHorizon {
-    /// It is mirrored at the surface: no light is lost.
+    /// Mirrored at the surface, which conserves energy.
     Fold,
-    /// It is lost.
+    /// Dropped, which loses energy.
     Absorb,
 }
 
-/// What a ray sees that meets nothing.
+/// Radiance of rays that hit no surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Background {
@@ -72,11 +73,11 @@ pub struct Background {
     pub color: Color,
 }
 
-/// Light from everywhere, without shadows.
+/// Ambient light: uniform, without shadows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Ambient {
-    /// i_a of k_a i_a.
+    /// Intensity i_a in k_a i_a.
     pub color: Color,
 }
 
@@ -89,10 +90,10 @@ impl Default for FilmSettings {
 impl Default for IntegratorSettings {
     fn default() -> Self {
         Self {
-            level: RayTypes::Full,
-            depth: 16,
-            min_weight: 0.0,
-            horizon: BelowHorizon::Fold,
+            ray_types: RayTypes::Full,
+            max_depth: 16,
+            min_throughput: 0.0,
+            below_horizon: BelowHorizon::Fold,
             acceleration: Acceleration::Auto,
         }
     }
@@ -110,10 +111,10 @@ impl Default for Ambient {
     }
 }
 
-/// The most pixels of a picture: 8192 x 8192.
+/// Largest number of pixels: 8192 x 8192.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// The keys of `[film]`.
+/// Keys of `[film]`.
 pub const FILM_FIELDS: &[Field] = &[
     Field::preset(
         "size",
@@ -125,78 +126,78 @@ pub const FILM_FIELDS: &[Field] = &[
     Field::preset(
         "filter",
         ValueType::Choice(&[
-            Choice { name: "box", doc: "evenly over the pixel's square" },
-            Choice { name: "center", doc: "all in its centre: no anti-aliasing" },
+            Choice { name: "box", doc: "uniform over the pixel's square" },
+            Choice { name: "point", doc: "all at the pixel's centre: no anti-aliasing" },
         ]),
         "",
         "\"box\"",
-        "How samples spread over a pixel.",
+        "Distribution of samples over a pixel.",
     ),
     Field::preset(
         "rays_per_pixel",
         ValueType::Whole(NumberRange::closed(0.0, 1e9)),
         "samples",
         "0",
-        "The most samples that a pixel with a glossy reflection gets; 0: no cap.",
+        "Largest number of samples per pixel spent on glossy pictures; 0 is no cap.",
     ),
 ];
 
-/// The keys of `[trace]`.
+/// Keys of `[trace]`.
 pub const TRACE_FIELDS: &[Field] = &[
     Field::preset(
-        "level",
+        "ray_types",
         ValueType::Choice(&[
             Choice { name: "primary", doc: "camera rays only: no shadows, no reflections" },
             Choice { name: "shadows", doc: "camera rays and shadow rays" },
-            Choice { name: "full", doc: "everything" },
+            Choice { name: "full", doc: "camera, shadow, reflected and transmitted rays" },
         ]),
         "",
         "\"full\"",
-        "What is traced at all.",
+        "Kinds of rays that are traced.",
     ),
     Field::preset(
-        "depth",
+        "max_depth",
         ValueType::Whole(NumberRange::closed(0.0, 10000.0)),
         "surfaces",
         "16",
-        "The most surfaces that a path meets after the first; 0: no reflection, no transmission.",
+        "Largest number of surfaces that a path hits after the first; 0: no reflection, no transmission.",
     ),
     Field::preset(
-        "min_weight",
+        "min_throughput",
         ValueType::Number(NumberRange::SHARE),
         "",
         "0.0",
-        "A path ends when what it could still add is weighted by less than this.",
+        "Paths whose throughput is smaller end.",
     ),
     Field::preset(
-        "horizon",
+        "below_horizon",
         ValueType::Choice(&[
-            Choice { name: "fold", doc: "it is mirrored at the surface: no light is lost" },
-            Choice { name: "absorb", doc: "it is lost" },
+            Choice { name: "fold", doc: "mirrored at the surface: no light is lost" },
+            Choice { name: "absorb", doc: "dropped: its light is lost" },
         ]),
         "",
         "\"fold\"",
-        "What becomes of a reflected ray that would dip under the surface.",
+        "Treatment of sampled reflections below the surface's horizon.",
     ),
     Field::preset(
         "acceleration",
         ValueType::Choice(Acceleration::CHOICES),
         "",
         "\"auto\"",
-        "How rays are kept from things that they cannot meet. It changes the time, never the picture.",
+        "Acceleration structure. Every choice renders the same image; only speed differs.",
     ),
 ];
 
-/// The keys of `[background]`.
+/// Keys of `[background]`.
 pub const BACKGROUND_FIELDS: &[Field] = &[Field::preset(
     "color",
     ValueType::Color(NumberRange::LIGHT),
     "radiance",
     "[0.0, 0.0, 0.0]",
-    "What a ray sees that meets nothing.",
+    "Radiance of rays that hit no surface.",
 )];
 
-/// The keys of `[ambient]`.
+/// Keys of `[ambient]`.
 pub const AMBIENT_FIELDS: &[Field] = &[Field::preset(
     "color",
     ValueType::Color(NumberRange::LIGHT),
@@ -206,7 +207,7 @@ pub const AMBIENT_FIELDS: &[Field] = &[Field::preset(
 )];
 
 impl FilmSettings {
-    /// What is wrong with it.
+    /// Returns the errors in the film settings.
     pub fn faults(&self) -> Vec<ValidationError> {
         let [width, height] = self.size;
         let checks =
@@ -224,24 +225,24 @@ impl FilmSettings {
 }
 
 impl IntegratorSettings {
-    /// What is wrong with it.
+    /// Returns the errors in the integrator settings.
     pub fn faults(&self) -> Vec<ValidationError> {
         Validator::new(TRACE_FIELDS)
-            .numbers("depth", &[f64::from(self.depth)])
-            .numbers("min_weight", &[self.min_weight])
+            .numbers("max_depth", &[f64::from(self.max_depth)])
+            .numbers("min_throughput", &[self.min_throughput])
             .validate()
     }
 }
 
 impl Background {
-    /// What is wrong with it.
+    /// Returns the errors in the background.
     pub fn faults(&self) -> Vec<ValidationError> {
         Validator::new(BACKGROUND_FIELDS).numbers("color", &self.color.0).validate()
     }
 }
 
 impl Ambient {
-    /// What is wrong with it.
+    /// Returns the errors in the ambient light.
     pub fn faults(&self) -> Vec<ValidationError> {
         Validator::new(AMBIENT_FIELDS).numbers("color", &self.color.0).validate()
     }

@@ -1,4 +1,4 @@
-//! The tables of fields against what serde really reads and writes.
+//! Field tables compared with what serde reads and writes.
 
 use crate::material::{Bump, Checker, HeightImage, ImageTexture, Texture};
 use crate::scene::*;
@@ -7,7 +7,7 @@ use crate::value::{DefaultValue, Field, ValueType};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// The keys that serde names when it meets one that it does not know.
+/// Returns the keys that serde lists when it reads an unknown one.
 fn keys_of<T: DeserializeOwned>() -> Vec<String> {
     let error = match toml::from_str::<T>("\"no such key\" = 0") {
         Ok(_) => panic!("an unknown key was taken"),
@@ -25,7 +25,7 @@ fn same_keys<T: DeserializeOwned>(what: &str, fields: &[Field]) {
     assert_eq!(real, told, "{what}");
 }
 
-/// Documented defaults against what is read when only the keys in `needed` are given.
+/// Compares documented defaults with what is read when only the keys in `needed` are given.
 fn same_defaults<T: DeserializeOwned + Serialize>(what: &str, fields: &[Field], needed: &str) {
     let read: T = toml::from_str(needed).unwrap_or_else(|e| panic!("{what}: {e}"));
     let written = toml::Table::try_from(&read).unwrap();
@@ -60,7 +60,7 @@ fn inner(fields: &[Field], name: &str) -> &'static [Field] {
     }
 }
 
-/// The keys of a kind of texture or bump.
+/// Returns the keys of a kind of texture or bump.
 fn texture(key: &str, kind: &str) -> &'static [Field] {
     inner(inner(crate::material::FIELDS, key), kind)
 }
@@ -140,7 +140,7 @@ fn every_word_is_read() {
     words::<HeightImage>(texture("bump", "image"));
 }
 
-/// The example of each shape as a table of its own keys.
+/// Returns the example of a shape as a table of its own keys.
 fn example(kind: &Field, text: &str) -> toml::Table {
     let table: toml::Table = text.parse().unwrap();
     table["shape"][kind.name].as_table().unwrap().clone()
@@ -206,7 +206,7 @@ fn every_number_of_every_shape_is_checked() {
                         .collect()
                 }
                 ValueType::Direction => vec![vec![0.0; 3].into()],
-                // Parts: their faults are tested below.
+                // Errors in parts are tested below.
                 ValueType::Tables(_) => continue,
                 ValueType::Text | ValueType::Choice(_) => continue,
                 other => panic!("{key}.{} takes {other:?}: test it", field.name),
@@ -226,7 +226,7 @@ fn every_number_of_every_shape_is_checked() {
     }
 }
 
-/// The faults of a union of a ball and `part`.
+/// Returns the errors of a union of a ball and `part`.
 fn faults_of(part: &str) -> Vec<(String, String)> {
     let ball = "{ shape.sphere = { center = [0, 0, 0], radius = 1 } }";
     let shape: Shape = toml::from_str(&format!("union.of = [{ball}, {part}]")).unwrap();
@@ -255,9 +255,9 @@ fn faults_of_parts_say_which_part() {
             "one part",
         ),
         (
-            "{ shape.intersection.of = [{ shape.unit_cylinder = { s = 1 } }, \
-               { shape.unit_cylinder = { s = -1 } }] }",
-            "shape.intersection.of.1.shape.unit_cylinder.s",
+            "{ shape.intersection.of = [{ shape.unit_frustum = { s = 1 } }, \
+               { shape.unit_frustum = { s = -1 } }] }",
+            "shape.intersection.of.1.shape.unit_frustum.s",
             "-1",
         ),
     ] {
@@ -266,7 +266,7 @@ fn faults_of_parts_say_which_part() {
         assert_eq!(faults[0].0, format!("union.of.1.{key}"), "{part}");
         assert!(faults[0].1.contains(words), "{part}: {faults:?}");
     }
-    // A half-space is no part of a union, unless something gives it an end.
+    // A half-space is no part of a union unless an intersection or difference bounds it.
     let plane = "{ shape.plane = { point = [0, 0, 0], normal = [0, 1, 0] } }";
     let faults = faults_of(plane);
     assert!(faults.len() == 1 && faults[0].0 == "union.of", "{faults:?}");

@@ -1,5 +1,4 @@
-//! What is wrong with a scene beyond the form of its file: values out of range, names that lead
-//! nowhere or to two places.
+//! Semantic validation of a scene: values out of range, names that are undefined or not unique.
 
 use crate::material::Mapping;
 use crate::scene::Scene;
@@ -8,16 +7,16 @@ use crate::value::{ValidationError, truncated};
 use std::collections::HashMap;
 use std::fmt;
 
-/// Something wrong or dubious in a scene, without file and line.
+/// An error or a warning about a scene, without file and line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// The keys (and positions in lists, from 0) that lead to it: `object`, `3`, `shape`, `sphere`.
+    /// Path to the value, keys and positions in lists (from 0): `object`, `3`, `shape`, `sphere`.
     pub path: Vec<String>,
-    /// What it is about: `object "queen"`; empty: the scene.
+    /// Table in question: `object "queen"`; empty means the scene.
     pub subject: String,
-    /// What was found, as a phrase.
+    /// Finding, as a phrase.
     pub found: String,
-    /// What would be right, and the remedy, in sentences.
+    /// Remedy, in sentences.
     pub help: String,
 }
 
@@ -31,8 +30,8 @@ impl fmt::Display for Problem {
     }
 }
 
-/// How messages name what stands behind the first keys of a path: `object "queen"`, `light 2`.
-/// `name` gives the name of an entry of a list, if it has one.
+/// Returns the name that diagnostics use for the table at `path`: `object "queen"`, `light 2`.
+/// `name` returns the name of a list entry, if it has one.
 pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<String>) -> String {
     match path {
         [list, index, ..] if list == "object" || list == "light" => {
@@ -43,7 +42,7 @@ pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<Stri
             }
         }
         [list, name, ..] if list == "materials" => format!("material \"{}\"", truncated(name)),
-        [list, name, ..] if list == "views" => format!("view \"{}\"", truncated(name)),
+        [list, name, ..] if list == "cameras" => format!("camera \"{}\"", truncated(name)),
         [first, ..] => first.clone(),
         [] => String::new(),
     }
@@ -54,7 +53,7 @@ fn keys(parts: &[&str]) -> Vec<String> {
 }
 
 impl Scene {
-    /// How messages name the thing at `path`.
+    /// Returns the name that diagnostics use for the table at `path`.
     pub(super) fn subject(&self, path: &[String]) -> String {
         subject(path, |list, index| match list {
             "object" => self.objects.get(index).map(|o| o.name.clone()),
@@ -67,8 +66,8 @@ impl Scene {
         Problem { subject: self.subject(&path), path, found, help }
     }
 
-    /// Looks for the files that it names, those that have not been looked for yet. What is wrong with
-    /// them is among the faults from then on.
+    /// Loads the files that the scene names, unless they are loaded already. Errors in them are
+    /// found by the next validation.
     pub fn resolve(&mut self) {
         let library = &self.library;
         for object in &mut self.objects {
@@ -79,7 +78,7 @@ impl Scene {
         }
     }
 
-    /// Everything wrong with the scene; a scene that was read has nothing wrong, an edited one may.
+    /// Validates the scene. A scene that was read is valid; an edited one may not be.
     pub fn faults(&self) -> Vec<Problem> {
         let mut findings = Vec::new();
         let mut add = |path: &[&str], faults: Vec<ValidationError>| {
@@ -92,8 +91,8 @@ impl Scene {
         add(&["film"], self.film.faults());
         add(&["trace"], self.trace.faults());
         add(&["camera"], self.camera.faults());
-        for (name, view) in &self.views {
-            add(&["views", name], view.faults());
+        for (name, view) in &self.cameras {
+            add(&["cameras", name], view.faults());
         }
         add(&["background"], self.background.faults());
         add(&["ambient"], self.ambient.faults());
@@ -115,8 +114,8 @@ impl Scene {
         findings
     }
 
-    /// Materials whose textures ask for coordinates that the object's shape does not have. Shapes have no
-    /// faults.
+    /// Finds materials whose textures need coordinates that the object's shape does not have. The
+    /// shapes must be valid.
     fn missing_coordinates(&self, findings: &mut Vec<Problem>) {
         let asks = |name: &str| {
             let material = self.materials.get(name)?;

@@ -20,7 +20,7 @@ pub struct UnitFrustum {
 impl ShapeDesc for UnitFrustum {
     const DOC: &'static str = "The canonical tapered cylinder, to be placed by `transform`: its axis runs from the \
          origin to z = 1; its radius is 1 at z = 0 and `s` at z = 1.";
-    const EXAMPLE: &'static str = "shape.unit_cylinder = { s = 0.5 }";
+    const EXAMPLE: &'static str = "shape.unit_frustum = { s = 0.5 }";
     const FIELDS: &'static [Field] = &[Field::required(
         "s",
         ValueType::Number(NumberRange::closed(0.0, 1e6)),

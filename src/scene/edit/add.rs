@@ -1,4 +1,4 @@
-//! New things, with defaults that fit the scene at hand.
+//! Adding objects, lights and materials, with defaults that fit the scene.
 
 use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::Material;
@@ -13,12 +13,12 @@ use crate::shape::{KINDS, Shape, compose};
 use crate::value::{Color, number, round_nice, round_significant, rounded_to, unit};
 use glam::DVec3;
 
-/// The kinds of object that can be added, with what they are.
+/// Returns the kinds of object that can be added, with descriptions.
 pub fn object_kinds() -> Vec<Word> {
     KINDS.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
 }
 
-/// The kinds of light that can be added, with what they are.
+/// Returns the kinds of light that can be added, with descriptions.
 pub fn light_kinds() -> Vec<Word> {
     let words = [
         ("point", "Light from one point, such as a lamp."),
@@ -27,7 +27,7 @@ pub fn light_kinds() -> Vec<Word> {
     words.map(|(name, doc)| Word { name: name.into(), doc: doc.into() }).to_vec()
 }
 
-/// Body colours of new materials, one after the other.
+/// Body colours of new materials, used in turn.
 const PALETTE: [[f64; 3]; 6] = [
     [0.85, 0.16, 0.11],
     [0.13, 0.28, 0.8],
@@ -37,7 +37,7 @@ const PALETTE: [[f64; 3]; 6] = [
     [0.1, 0.6, 0.65],
 ];
 
-/// A material with a colour that the scene does not have yet, if the palette has one left.
+/// Returns a material with a palette colour that no material of the scene has, if one is left.
 fn fresh_material(scene: &Scene) -> Material {
     let used = |color: &[f64; 3]| scene.materials.values().any(|m| m.color.0 == *color);
     let free = PALETTE.iter().find(|color| !used(color));
@@ -46,8 +46,9 @@ fn fresh_material(scene: &Scene) -> Material {
     Material { color: Color(color), diffuse, specular, exponent, ..Material::default() }
 }
 
-/// Adds an object of the kind `kind`, standing on what is there in the middle of what the camera sees,
-/// as large as the things around it. `material`: one that it shares; `None`: a new one of its own.
+/// Adds an object of the kind `kind`. It rests on the surface in the middle of the camera's view
+/// and is about as large as the objects around it. `material` is a material to share; `None`
+/// creates a new one.
 ///
 /// # Errors
 /// If there is no such kind or material.
@@ -62,7 +63,7 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     };
     face_camera(&mut shape, scene);
     if let Form::Plane { .. } = shape.form() {
-        // Under everything, so that it does not lie in a ground that is there already.
+        // Below everything, so that it does not coincide with an existing ground.
         let lows = scene.objects.iter().filter_map(|o| Some(o.form().bounds()?.0.y));
         if let Some(lowest) = lows.reduce(f64::min) {
             let under = round_nice(lowest - 0.1 * size, size);
@@ -89,9 +90,9 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     Edit::checked(next, subject, format!("add {kind}"))
 }
 
-/// Steps that put a shape which has no place of its own upright on `base`, `size` large.
+/// Returns steps that put a shape without a position of its own upright on `base`, `size` large.
 fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
-    // The canonical cylinder stands along z; meshes and compounds have y upwards as scenes have.
+    // The canonical cylinder has its axis along z; meshes and compounds have y up, as scenes do.
     let mut steps = match shape {
         Shape::UnitFrustum(_) => vec![TransformOp::RotateX(-90.0)],
         _ => Vec::new(),
@@ -106,8 +107,8 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     steps
 }
 
-/// The length of a new thing: somewhat less than that of the solids that are there (the middle one of
-/// them), and than half of the scene's; 1 in an empty scene.
+/// Returns the length of a new object: somewhat less than the median length of the solids and than
+/// half of the scene's; 1 in an empty scene.
 fn usual_size(scene: &Scene) -> f64 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let solid = |object: &Object| {
@@ -125,7 +126,7 @@ fn usual_size(scene: &Scene) -> f64 {
     round_significant(0.6 * size, 1)
 }
 
-/// Turns a flat thing that stands upright so that its front is towards the camera.
+/// Turns an upright flat shape so that its front faces the camera.
 fn face_camera(shape: &mut Shape, scene: &Scene) {
     let Form::Parallelogram { u, v, .. } = shape.form() else { return };
     let front = u.cross(v).normalize();
@@ -137,8 +138,8 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
     shape.rotate_y(rounded_to((heading(toward) - heading(front)) / 5.0, 0) * 5.0);
 }
 
-/// Adds a light of the kind `kind`: above the scene, to the side of the camera that has no light yet,
-/// about as bright as a scene's only light should be.
+/// Adds a light of the kind `kind` above the scene, on the side of the camera that has no light
+/// yet, about as bright as a scene's only light should be.
 ///
 /// # Errors
 /// If there is no such kind.
@@ -175,12 +176,12 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
         }
     };
     light.name = free_light(scene, name);
-    // A second light adds to the first: half as much.
+    // A second light adds to the first, so that it gets half the intensity.
     light.intensity = if scene.lights.iter().any(|l| l.on) { 0.5 } else { 1.0 };
     let physical = scene.lights.iter().all(|l| l.falloff == Falloff::InverseSquare);
     let mut note = None;
     if physical && !scene.lights.is_empty() && kind == "point" {
-        // As the others are: the same brightness in the middle, by the inverse square.
+        // Falloff as the other lights: with the inverse square the same brightness in the middle.
         let squared = (from * (1.5 * radius)).length_squared();
         light.falloff = Falloff::InverseSquare;
         light.intensity = round_significant(light.intensity * std::f64::consts::PI * squared, 2);
@@ -198,10 +199,10 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     })
 }
 
-/// Adds a material that no object has yet.
+/// Adds a material that no object uses yet.
 ///
 /// # Errors
-/// None that is known: the result is checked as every edit is.
+/// None is known: the result is validated as that of every edit.
 pub fn add_material(scene: &Scene) -> Result<Edit, EditError> {
     let mut next = scene.clone();
     let name = free_material(scene, "material");

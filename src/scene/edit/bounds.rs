@@ -1,4 +1,4 @@
-//! How large things are and where: for framing, for steps, for placing.
+//! Bounds of objects and scenes, for framing, step lengths and placement.
 
 use crate::primitive::Form;
 use crate::scene::edit::Target;
@@ -6,20 +6,20 @@ use crate::scene::{Object, Scene};
 use crate::value::floor_log10;
 use glam::DVec3;
 
-/// A ball around something.
+/// A bounding sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundingSphere {
-    /// Its centre, in scene units.
+    /// Centre, in scene units.
     pub center: [f64; 3],
-    /// Its radius, in scene units; greater than 0.
+    /// Radius, in scene units; greater than 0.
     pub radius: f64,
 }
 
-/// An axis-parallel box: its lowest and its highest corner.
+/// Lowest and highest corner of an axis-parallel box.
 pub(super) type Extent = (DVec3, DVec3);
 
-/// A ball around an object (of a plane: around the point that places it), a point light, or what a
-/// camera looks at; `None` for what is nowhere in particular.
+/// Returns the bounding sphere of an object (for a plane: around the point that places it), a point
+/// light, or the region that a camera looks at; `None` for targets without a position.
 pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     match subject {
         Target::Object(i) => {
@@ -45,20 +45,20 @@ pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     }
 }
 
-/// A ball around the solids of the scene; without solids around whatever has an end; in an empty
-/// scene around the origin with radius 1.
+/// Returns the bounding sphere of the scene's solids; without solids, of all finite objects; in an
+/// empty scene, the unit sphere about the origin.
 pub fn scene_bounds(scene: &Scene) -> BoundingSphere {
     middle(scene).map_or(BoundingSphere { center: [0.0; 3], radius: 1.0 }, ball)
 }
 
-/// The box around the solids, or else around whatever has an end.
+/// Returns the box around the solids, or else around all finite objects.
 fn middle(scene: &Scene) -> Option<Extent> {
     let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
     let solids = forms.iter().filter(|form| is_solid(form)).filter_map(Form::bounds);
     solids.reduce(union).or_else(|| forms.iter().filter_map(Form::bounds).reduce(union))
 }
 
-/// Whether a form fills space.
+/// Returns `true` if a form encloses space.
 pub(super) fn is_solid(form: &Form) -> bool {
     !matches!(form, Form::Parallelogram { .. } | Form::Plane { .. })
 }
@@ -67,22 +67,23 @@ pub(super) fn union(a: Extent, b: Extent) -> Extent {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
-/// The ball through the corners of a box.
+/// Returns the sphere through the corners of a box.
 fn ball((low, high): Extent) -> BoundingSphere {
     let radius = (high - low).length() / 2.0;
     let center = low + (high - low) / 2.0;
     BoundingSphere { center: center.to_array(), radius: radius.max(f64::MIN_POSITIVE) }
 }
 
-/// The coarse step of a coordinate: a power of ten, between a hundredth and a tenth of the diameter of
-/// the scene's solids (0.1 in a room with things a few units apart). A fine step is a tenth of it.
+/// Returns the coarse step of a coordinate: a power of ten between a hundredth and a tenth of the
+/// diameter of the scene's solids (0.1 in a room with objects a few units apart). A fine step is a
+/// tenth of it.
 pub fn step_length(scene: &Scene) -> f64 {
     let exponent = floor_log10(2.0 * scene_bounds(scene).radius) - 1;
     format!("1e{}", exponent.clamp(-12, 8)).parse().unwrap_or(0.1)
 }
 
-/// How far from the eye the camera's pivot is: its target, or, if it only has a direction, the point
-/// of the view axis nearest to the scene's middle. Greater than 0.
+/// Returns the distance from the eye to the camera's pivot: its target, or, if it has only a
+/// direction, the point of the view axis nearest to the middle of the scene. Greater than 0.
 pub fn focus_distance(scene: &Scene) -> f64 {
     let eye = DVec3::from_array(scene.camera.eye);
     if let Some(target) = scene.camera.target {

@@ -1,4 +1,4 @@
-//! Switching between kinds so that what can be kept is kept: place, size, direction, brightness.
+//! Conversion between kinds; position, size, direction and brightness are kept where possible.
 
 use crate::camera::{Camera, ViewAngle};
 use crate::light::{Directional, Falloff, Light, Point};
@@ -15,7 +15,7 @@ use crate::value::{
 use glam::DVec3;
 use toml::{Table, Value};
 
-/// The choice between a light's kinds, a row that only an inspector has.
+/// The choice between a light's kinds, a row of the inspector that files do not have.
 pub(super) const KIND: Field = Field::required(
     "kind",
     ValueType::OneOf(&[
@@ -26,7 +26,8 @@ pub(super) const KIND: Field = Field::required(
     "Where the light comes from.",
 );
 
-/// The choice between a camera's target and direction, a row that only an inspector has.
+/// The choice between a camera's target and direction, a row of the inspector that files do not
+/// have.
 pub(super) const AIM: Field = Field::required(
     "aim",
     ValueType::OneOf(&[
@@ -37,7 +38,7 @@ pub(super) const AIM: Field = Field::required(
     "Whether the camera looks at a point or in a direction.",
 );
 
-/// Which of the two a light or a camera is.
+/// Returns which of the two exclusive kinds a light or a camera has.
 pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
     crate::scene::edit::toml_view::exclusive_keys(subject)
         .iter()
@@ -45,7 +46,7 @@ pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
         .find(|key| values.contains_key(*key))
 }
 
-/// Makes what stands behind `key` of the kind `name`. To what it is already: no change.
+/// Converts the value of `key` to the kind `name`. The present kind causes no change.
 pub(super) fn switch(
     scene: &Scene,
     subject: &Target,
@@ -61,7 +62,7 @@ pub(super) fn switch(
         }
         Target::Camera => switch_camera(&mut next.camera, scene, key, name),
         Target::View(view) => {
-            let camera = next.views.get_mut(view).ok_or_else(|| EditError::gone(subject))?;
+            let camera = next.cameras.get_mut(view).ok_or_else(|| EditError::gone(subject))?;
             switch_camera(camera, scene, key, name);
         }
         Target::Object(i) => {
@@ -87,12 +88,13 @@ pub(super) fn switch(
     })
 }
 
-/// A shape of the kind `name` with place, size and rotation of `shape`.
+/// Returns a shape of the kind `name` with position, size and rotation of `shape`.
 fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let form = shape.form();
     let (base, size) = match form.bounds() {
         Some((low, high)) => {
-            // A turned shape's box is larger than it; its own is that of the unturned one.
+            // The box of a rotated shape is larger than the shape; the box of the unrotated one is
+            // measured.
             let mut straight = shape.clone();
             straight.rotate_y(-rotation(shape));
             let (l, h) = straight.form().bounds().unwrap_or((low, high));
@@ -113,7 +115,7 @@ fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     Some(next)
 }
 
-/// The angle of a shape that has one.
+/// Returns the angle of a shape that has one.
 fn rotation(shape: &Shape) -> f64 {
     match shape {
         Shape::Cube(cube) => cube.rotation,
@@ -123,7 +125,7 @@ fn rotation(shape: &Shape) -> f64 {
     }
 }
 
-/// A light stays as bright as it was in the middle of the scene and shines from the same side.
+/// Converts a light; its brightness in the middle of the scene and its direction there are kept.
 fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> {
     let ball = scene_bounds(scene);
     let center = DVec3::from_array(ball.center);
@@ -152,7 +154,7 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     }
 }
 
-/// A point light with another falloff stays as bright as it was in the middle of the scene.
+/// Changes the falloff of a point light; its brightness in the middle of the scene is kept.
 pub(super) fn switch_falloff(
     scene: &Scene,
     index: usize,
@@ -174,7 +176,7 @@ pub(super) fn switch_falloff(
     Ok(edit)
 }
 
-/// Multiplies the intensity and says so.
+/// Multiplies the intensity and returns a note about it.
 fn refit(light: &mut Light, factor: f64) -> String {
     let fitted = round_significant(light.intensity * factor, 3);
     let old = light.intensity;
@@ -185,7 +187,7 @@ fn refit(light: &mut Light, factor: f64) -> String {
     format!("Intensity {old} became {new}: as bright as before in the middle of the scene.")
 }
 
-/// A texture of another kind lies as the one before it.
+/// Converts a texture; its placement is kept.
 fn switch_texture(material: &mut Material, key: &str, name: &str) {
     match (key, &material.texture, &material.bump) {
         ("texture", None, _) => material.texture = Texture::new(name),
@@ -197,7 +199,7 @@ fn switch_texture(material: &mut Material, key: &str, name: &str) {
     }
 }
 
-/// The picture stays (almost) what it was.
+/// Converts a camera; the picture stays (almost) the same.
 fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     if key == "view_angle" {
         let [width, height] = scene.film.size.map(f64::from);
@@ -236,12 +238,12 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     }
 }
 
-/// Rounded to about a millionth of `scale`: a direction keeps its aim.
+/// Rounds `x` to about a millionth of `scale`, which keeps the aim of a direction.
 fn rounded(x: f64, scale: f64) -> f64 {
     rounded_to(x, crate::value::floor_log10(scale) - 6)
 }
 
-/// Adds the step `name` with the value that does nothing to the list behind `key`.
+/// Appends the step `name` with its neutral value to the list `key`.
 pub(super) fn append_step(object: &mut Table, key: &str, name: &str) {
     let zero = || Value::Array(vec![Value::Float(0.0); 3]);
     let value = match name {
@@ -276,7 +278,7 @@ mod tests {
         for object in 0..scene.objects.len() {
             let subject = Target::Object(object);
             // The canonical cylinder and meshes are placed by a transform alone.
-            let unplaced = ["unit_cylinder", "mesh"];
+            let unplaced = ["unit_frustum", "mesh"];
             for kind in KINDS.iter().filter(|kind| !unplaced.contains(&kind.name)) {
                 let edit = set(&scene, &subject, "shape", kind.name);
                 let edit = edit.unwrap_or_else(|e| panic!("{object} -> {}: {e}", kind.name));

@@ -1,4 +1,4 @@
-//! Copying, deleting, renaming.
+//! Duplicating, deleting and renaming.
 
 use crate::scene::Scene;
 use crate::scene::edit::bounds::bounds;
@@ -10,11 +10,11 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::truncated;
 use glam::DVec3;
 
-/// A copy, last in its list, under a name of its own (`cube 2`). The copy of an object stands beside
+/// Appends a copy with a unique name (`cube 2`) to its list. The copy of an object is placed beside
 /// it, where there is room and the camera sees it; that of a light beside the light.
 ///
 /// # Errors
-/// For what a scene has only once.
+/// For targets that every scene has exactly once.
 pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -31,7 +31,7 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
                 let usual = size.max_element();
                 let base = place_for(scene, size.map(|s| s.max(1e-3 * usual)));
                 let from = DVec3::new((low.x + high.x) / 2.0, low.y, (low.z + high.z) / 2.0);
-                // As high above the ground as the original.
+                // At the same height above the ground as the original.
                 let by = DVec3::new(base.x - from.x, 0.0, base.z - from.z);
                 let digits = crate::value::floor_log10(usual) - 3;
                 let by = by.map(|x| crate::value::rounded_to(x, digits));
@@ -63,7 +63,7 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
         }
         Target::View(old) => {
             let new = free_view(scene, old);
-            next.views.insert(new.clone(), scene.views[old].clone());
+            next.cameras.insert(new.clone(), scene.cameras[old].clone());
             Target::View(new)
         }
         _ => {
@@ -74,11 +74,11 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     Edit::checked(next, copy, format!("duplicate {}", subject.label(scene)))
 }
 
-/// Takes an object, a light, a view or a material away. Objects whose material goes get the default
-/// finish, parts whose own one goes that of the whole; the note names them.
+/// Deletes an object, a light, a stored camera or a material. Objects that lose their material get
+/// the default one, parts that of the whole; the note names them.
 ///
 /// # Errors
-/// For what a scene always has.
+/// For targets that every scene has.
 pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -86,7 +86,7 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let label = format!("delete {}", subject.label(scene));
     let mut next = scene.clone();
     let mut note = None;
-    // What comes next in the list, else what came before.
+    // Position of the next entry, else of the previous one.
     let neighbour = |i: usize, left: usize| if i < left { Some(i) } else { left.checked_sub(1) };
     let select = match subject {
         Target::Object(i) => {
@@ -98,8 +98,8 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
             neighbour(*i, next.lights.len()).map(Target::Light)
         }
         Target::View(name) => {
-            next.views.remove(name);
-            following(next.views.keys(), name).map(Target::View)
+            next.cameras.remove(name);
+            following(next.cameras.keys(), name).map(Target::View)
         }
         Target::Material(name) => {
             next.materials.remove(name);
@@ -118,13 +118,13 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     })
 }
 
-/// The name after `gone` in a sorted list, else the last one.
+/// Returns the name after `gone` in a sorted list, else the last one.
 fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) -> Option<String> {
     names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
 }
 
-/// Gives every object of the material `name` the default finish, and every part of it the material of the whole;
-/// says which.
+/// Gives every object of the material `name` the default material, and every part that of the
+/// whole. Returns a note that names them.
 fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     let (mut whole, mut parts) = (Vec::new(), Vec::new());
     for i in 0..scene.objects.len() {
@@ -157,10 +157,11 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     (!notes.is_empty()).then(|| notes.join(" "))
 }
 
-/// Gives a new name. Objects and parts follow their material's name; an object or a light may have none.
+/// Renames a target. Objects and parts follow the name of their material; an object or a light may
+/// have an empty name.
 ///
 /// # Errors
-/// For what has no name, and for a name that is taken or cannot be shown.
+/// For targets without a name, and for a name that is taken or not printable.
 pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -189,11 +190,11 @@ pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditEr
             Target::Material(new.clone())
         }
         Target::View(old) => {
-            if old != &new && next.views.contains_key(&new) {
+            if old != &new && next.cameras.contains_key(&new) {
                 return Err(taken("view"));
             }
-            let moved = next.views.remove(old);
-            next.views.extend(moved.map(|view| (new.clone(), view)));
+            let moved = next.cameras.remove(old);
+            next.cameras.extend(moved.map(|view| (new.clone(), view)));
             Target::View(new.clone())
         }
         _ => {
@@ -207,7 +208,7 @@ pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditEr
 /// Gives an object a copy of its material that no other object has.
 ///
 /// # Errors
-/// For what is no object.
+/// For targets other than objects.
 pub fn own_material(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {
         return Err(EditError::new("only objects have a material", "Select an object."));

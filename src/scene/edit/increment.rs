@@ -1,4 +1,4 @@
-//! Arrow steps: the next clean value up or down, whatever the kind of number, and the next word.
+//! Arrow steps: the next round value up or down for every kind of number, and the next choice.
 
 use crate::scene::Scene;
 use crate::scene::edit::bounds::step_length;
@@ -12,15 +12,15 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, floor_log10, rounded_to};
 use toml::Value;
 
-/// Moves the numbers behind `key` by `steps`: a whole number of coarse steps, or otherwise of fine ones
-/// (0.1 is one, -0.3 three back). `component`: only that number, from 0; `None`: all together, of a
-/// colour its brightness. Sizes, intensities and roughness go by about a tenth (fine: a hundredth),
-/// coordinates by [`step_length`], angles by 5 degrees, shares by 0.05. At the end of a range, and
-/// where other keys forbid the value (the note says so then), the scene stays as it is. A key without
-/// numbers goes to the next or previous word ([`toggle`]).
+/// Changes the numbers of `key` by `steps`: a whole number of coarse steps, or otherwise of fine
+/// ones (0.1 is one, -0.3 three back). `component` selects one number, from 0; `None` changes all
+/// together, and of a colour the brightness. Sizes, intensities and roughness change by about a
+/// tenth (fine: a hundredth), coordinates by [`step_length`], angles by 5 degrees, shares by 0.05.
+/// At the end of a range, and where other keys forbid the value (stated by the note), the scene
+/// stays unchanged. A key without numbers changes to the next or previous choice ([`toggle`]).
 ///
 /// # Errors
-/// If there is no such key or number, or it has no value to start from.
+/// If there is no such key or number, or no value to start from.
 pub fn step(
     scene: &Scene,
     subject: &Target,
@@ -54,7 +54,7 @@ pub fn step(
             numbers.iter().enumerate().map(moved).collect()
         }
     };
-    // A direction of zeros would be a fault: such a step is left out.
+    // A direction of zeros is invalid: such a step is dropped.
     let lost = matches!(field.takes, ValueType::Direction) && next.iter().all(|x| *x == 0.0);
     let next = if lost { numbers.clone() } else { next };
     let whole = matches!(field.takes, ValueType::Whole(_) | ValueType::Wholes(..));
@@ -70,11 +70,11 @@ pub fn step(
     })
 }
 
-/// Goes to the next word behind `key` (or the previous one), round and round: of a choice, a switch, a
-/// kind, an object's material. A choice without a value has that as a place in the round.
+/// Changes `key` to the next (or previous) choice, cyclically: an enumeration, a switch, a kind, an
+/// object's material. A key without a value counts as one more choice.
 ///
 /// # Errors
-/// If there is no such key or no words behind it.
+/// If there is no such key, or it has no choices.
 pub fn toggle(
     scene: &Scene,
     subject: &Target,
@@ -125,7 +125,8 @@ pub fn toggle(
     crate::scene::edit::set(scene, subject, key, text)
 }
 
-/// The place after (or before) `at` in a round of `n` words; with `optional` one more place, `None`.
+/// Returns the index after (or before) `at` in a cycle of `n` choices; `optional` adds the choice
+/// `None`.
 fn next(at: Option<usize>, n: usize, forward: bool, optional: bool) -> Option<usize> {
     match (at, forward) {
         _ if n == 0 => None,
@@ -139,7 +140,7 @@ fn next(at: Option<usize>, n: usize, forward: bool, optional: bool) -> Option<us
     }
 }
 
-/// The value from which a key that is left out takes its first step.
+/// Returns the value from which a key that is left out takes its first step.
 fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<Value> {
     let material = match subject {
         Target::Material(name) => scene.materials.get(name),
@@ -149,14 +150,12 @@ fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<Value> {
         ("alpha", Some(material)) => {
             Some(Value::Float(rounded_to(material.microfacet_alpha(), -4)))
         }
-        ("reflectance", Some(material)) => {
-            Some(Value::Array(material.f0().0.map(Value::Float).to_vec()))
-        }
+        ("f0", Some(material)) => Some(Value::Array(material.f0().0.map(Value::Float).to_vec())),
         _ => None,
     }
 }
 
-/// How many steps, of which width.
+/// Number of steps, and their width.
 #[derive(Clone, Copy)]
 struct StepCount {
     steps: i64,
@@ -174,7 +173,7 @@ impl StepCount {
     }
 }
 
-/// How a number goes up and down.
+/// Rule by which a number is incremented.
 #[derive(Clone, Copy)]
 enum StepRule {
     /// By rungs of about a tenth. Below `floor` the next rung is 0, and from 0 it is `floor`.
@@ -194,7 +193,7 @@ enum StepRule {
 }
 
 impl StepRule {
-    /// `None`: no numbers.
+    /// Returns the rule for `field`; `None` if it has no numbers.
     fn of(field: &Field, scene: &Scene) -> Option<Self> {
         Some(match field.takes {
             ValueType::Number(range) | ValueType::Numbers(_, range) => {
@@ -210,10 +209,10 @@ impl StepRule {
                 } else if field.name == "offset" {
                     Self::Units { unit: 0.05, range }
                 } else if field.name == "height" {
-                    // Of a bump: a hundredth of what it stands on, or less.
+                    // Of a bump: at most a hundredth of the size of its surface.
                     Self::Units { unit: 0.005, range }
                 } else if matches!(field.name, "roughness" | "alpha") {
-                    // From 0 to what can just be told from it at the far end of a room.
+                    // From 0 to the smallest value that is visible at the far end of a room.
                     Self::Rungs { floor: 0.001, range }
                 } else if range == NumberRange::SHARE || range == NumberRange::COEFFICIENT {
                     Self::Units { unit: 0.05, range }
@@ -236,7 +235,7 @@ impl StepRule {
         })
     }
 
-    /// `x` after the steps; `all`: the numbers beside it.
+    /// Returns `x` after `count` steps; `all` holds the other numbers of the value.
     fn stepped(self, x: f64, all: &[f64], count: StepCount) -> f64 {
         let StepCount { steps, fine } = count;
         match self {
@@ -247,7 +246,7 @@ impl StepRule {
             Self::Units { unit, range } => within(added(x, unit, count), range, x),
             Self::Degrees { range } => {
                 let moved = added(x, 5.0, count);
-                // An opening angle has no room for its last 5 degrees.
+                // An opening angle ends before its last 5 degrees.
                 let ends = NumberRange::closed(range.low + 0.5, range.high - 0.5);
                 if range.low.is_finite() { within(moved, ends, x) } else { moved }
             }
@@ -269,13 +268,13 @@ impl StepRule {
     }
 }
 
-/// x + unit * steps, rounded to a hundredth of a fine step.
+/// Returns x + unit * steps, rounded to a hundredth of a fine step.
 fn added(x: f64, unit: f64, StepCount { steps, fine }: StepCount) -> f64 {
     let width = if fine { unit / 10.0 } else { unit };
     rounded_to(x + width * steps as f64, floor_log10(unit) - 3)
 }
 
-/// `x` brought into the range; if that has no end there, `old`.
+/// Returns `x` clamped to the range; at an open end of the range, `old`.
 fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     if range.holds(x) {
         x
@@ -288,7 +287,7 @@ fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     }
 }
 
-/// Twice or half as much per step, or one more or less.
+/// Doubles or halves per coarse step; adds or subtracts one per fine step.
 fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let moved = match steps {
         _ if fine => x + steps as f64,
@@ -298,13 +297,14 @@ fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> 
     within(moved, range, x)
 }
 
-/// The rungs of a decade in hundredths, about a tenth apart, every digit among them.
+/// Rungs of a decade in hundredths, about a tenth apart, with every digit among them.
 const RUNGS: [i64; 23] = [
     100, 110, 120, 130, 140, 160, 180, 200, 220, 250, 280, 300, 330, 360, 400, 450, 500, 550, 600,
     650, 700, 800, 900,
 ];
 
-/// The rung of a fine ladder above `hundredths`: 1.00, 1.01 ... 2.00, 2.02 ... 5.00, 5.05 ...
+/// Returns the distance to the next rung of the fine ladder above `hundredths`: 1.00, 1.01 ...
+/// 2.00, 2.02 ... 5.00, 5.05 ...
 fn fine_width(hundredths: i64) -> i64 {
     match hundredths {
         ..200 => 1,
@@ -313,7 +313,8 @@ fn fine_width(hundredths: i64) -> i64 {
     }
 }
 
-/// `x` > 0 (or 0) after that many rungs: always on the ladder, so that up and down lead back.
+/// Returns `x` > 0 (or 0) after `steps` rungs. The result is always on the ladder, so that up and
+/// down are inverse.
 fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let up = steps > 0;
     let mut x = x;
@@ -329,7 +330,7 @@ fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: 
     x
 }
 
-/// The next rung above or below `x` > 0.
+/// Returns the next rung above or below `x` > 0.
 fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     let e = floor_log10(x);
     let scale = format!("1e{}", 2 - e).parse().unwrap_or(1.0);
@@ -346,7 +347,7 @@ fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
         (false, true) => {
             let reach = if on { below - 1 } else { below };
             let width = fine_width(reach.max(100));
-            // Below 1.00 the next decade's 9.95 comes.
+            // Below 1.00 follows 9.95 of the next lower decade.
             if reach < 100 {
                 return rounded_to(9.95 * 10f64.powi(e - 1), e - 3);
             } else {
@@ -362,7 +363,7 @@ fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     format!("{hundredths}e{}", e - 2).parse().unwrap_or(x)
 }
 
-/// A colour brighter or darker as a whole; black becomes a dark grey.
+/// Scales the brightness of a colour; black becomes a dark grey.
 fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let largest = channels.iter().fold(0.0f64, |m, x| m.max(*x));
     let rule = StepRule::Units { unit: 0.05, range };
@@ -373,13 +374,13 @@ fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64
     if largest == 0.0 {
         return vec![next; channels.len()];
     }
-    // Its hue cannot be had back from black: the darkest step stays above.
+    // Black has no hue to come back to: the darkest step stays above it.
     let next = if next <= 0.0 { largest.min(0.005) } else { next };
     channels.iter().map(|x| rounded_to(x * next / largest, floor_log10(next) - 3)).collect()
 }
 
-/// Width and height together, the ratio kept as far as whole numbers can; fine: by 16 pixels of the
-/// width.
+/// Scales width and height together and keeps their ratio as far as whole numbers allow; a fine
+/// step is 16 pixels of the width.
 fn resized(sides: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let width = sides[0];
     let next = match count.fine {

@@ -1,9 +1,9 @@
-//! Arrow steps: clean values, there and back, never beyond an end.
+//! Arrow steps: round values, inverse steps, limits.
 
 use crate::scene::edit::{Property, Target, Widget, outline, rows, set, step, toggle};
 use crate::scene::{Scene, built_in};
 
-/// The value behind `key` after `steps`.
+/// Returns the value of `key` after `steps`.
 fn after(scene: &Scene, subject: &Target, key: &str, steps: f64) -> String {
     let edit = step(scene, subject, key, None, steps).unwrap_or_else(|e| panic!("{key}: {e}"));
     value(&edit.scene, subject, key)
@@ -62,9 +62,9 @@ fn each_kind_of_number_has_a_step_that_makes_sense() {
         (&lamp, "intensity", "0", 1.0, "0.01"),
         (&lamp, "intensity", "0.01", -1.0, "0"),
         (&lamp, "color", "4 2 1", 1.0, "4.5, 2.25, 1.125"),
-        (&Target::IntegratorSettings, "depth", "16", 0.1, "17"),
-        (&Target::IntegratorSettings, "depth", "16", 1.0, "26"),
-        (&Target::IntegratorSettings, "depth", "3", -1.0, "0"),
+        (&Target::IntegratorSettings, "max_depth", "16", 0.1, "17"),
+        (&Target::IntegratorSettings, "max_depth", "16", 1.0, "26"),
+        (&Target::IntegratorSettings, "max_depth", "3", -1.0, "0"),
         (&Target::Film, "rays_per_pixel", "0", 1.0, "1"),
         (&Target::Film, "rays_per_pixel", "64", 1.0, "128"),
         (&Target::Film, "rays_per_pixel", "1", -1.0, "0"),
@@ -127,10 +127,10 @@ fn a_key_that_is_left_out_starts_from_what_holds() {
     let scene = with(&red, "roughness", "0.2");
     // 0.2 / (2 sqrt 2) is 0.0707.
     assert_eq!(after(&scene, &red, "alpha", 1.0), "0.08");
-    assert_eq!(after(&scene, &red, "reflectance", -1.0), "0.95, 0.95, 0.95");
+    assert_eq!(after(&scene, &red, "f0", -1.0), "0.95, 0.95, 0.95");
 }
 
-/// Every number of every row, many steps up and down: never refused, never a fault.
+/// Many steps up and down for every number of every row leave the scene valid.
 #[test]
 fn no_step_is_refused_at_an_end() {
     let scene = built_in();
@@ -177,7 +177,7 @@ fn words_go_round() {
     assert!(edit.scene.camera.direction.is_some());
     let edit = toggle(&scene, &Target::Light(0), "on", true).unwrap();
     assert!(!edit.scene.lights[0].on);
-    // A step on words is the same.
+    // A step on a choice is a toggle.
     let edit = step(&scene, &Target::Light(0), "falloff", None, 1.0).unwrap();
     assert_eq!(value(&edit.scene, &Target::Light(0), "falloff"), "inverse-square");
     assert!(toggle(&scene, &ball, "name", true).is_err());

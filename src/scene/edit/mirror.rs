@@ -1,14 +1,14 @@
-//! The keys that act on the scene's mirror.
+//! Commands that act on the scene's mirror.
 
 use crate::primitive::Form;
 use crate::scene::Scene;
 use crate::scene::edit::target::mirror_of;
 use crate::scene::edit::{Edit, EditError, Target, step, toggle};
 
-/// The material that the mirror keys act on: that of the selected object (or the selected material) if
-/// it reflects; else that of the first rectangle that reflects; else the one that reflects most among
-/// those of objects and their parts. If nothing reflects: the selected one, else that of the first rectangle,
-/// so that a mirror that was turned down to nothing can be turned up again. `None`: there is none of all these.
+/// Returns the material that the mirror commands act on: that of the selected object, or the
+/// selected material, if it reflects; else that of the first reflecting rectangle; else the most
+/// reflecting one of all objects and parts. If no material reflects, the selected one, else that of
+/// the first rectangle, so that the reflection can be turned up from 0 again.
 pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
     let chosen = selected.and_then(|subject| match subject.material(scene) {
@@ -25,7 +25,7 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     {
         return Some(part);
     }
-    // A rectangle of any orientation, not the ground.
+    // A rectangle of any orientation; the ground (`platform`) does not count.
     let rectangle = |i: &usize| {
         let object = &scene.objects[*i];
         object.shape.key() == "rectangle" && matches!(object.form(), Form::Parallelogram { .. })
@@ -50,7 +50,7 @@ fn find_mirror(scene: &Scene, selected: Option<&Target>) -> Result<Target, EditE
     })
 }
 
-/// Changes the mirror's roughness by `steps`, as [`step`] counts them: from 0 up and back to 0.
+/// Changes the mirror's roughness by `steps`, as [`step`] counts them.
 ///
 /// # Errors
 /// If nothing in the scene reflects.
@@ -65,12 +65,12 @@ pub fn adjust_roughness(
 /// Changes the mirror's reflection coefficient by `steps`, as [`step`] counts them.
 ///
 /// # Errors
-/// If there is nothing in the scene to be a mirror.
+/// If no material can be the mirror.
 pub fn reflect(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<Edit, EditError> {
     step(scene, &find_mirror(scene, selected)?, "reflection", None, steps)
 }
 
-/// Gives the mirror the next (or previous) lobe, round and round.
+/// Gives the mirror the next (or previous) lobe, cyclically.
 ///
 /// # Errors
 /// If nothing in the scene reflects.

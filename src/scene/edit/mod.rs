@@ -1,8 +1,8 @@
-//! Everything that can be done to a scene, as functions from a scene to a scene. Text in, text out;
-//! no terminal, no clock, and no file but those that a scene names, each looked for when it is named.
+//! Edits of scenes, as pure functions from a scene to a scene. They use no terminal and no clock,
+//! and read no files except those that a scene names, once each.
 //!
-//! Every function leaves the given scene as it was and either returns an [`Edit`] whose scene has no
-//! faults, or a [`EditError`] that says why not. The given scene must have no faults.
+//! Every function takes a valid scene and returns an [`Edit`] whose scene is valid, or an
+//! [`EditError`] with the reason.
 
 mod add;
 mod bounds;
@@ -43,23 +43,23 @@ use std::fmt;
 /// A scene after an edit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Edit {
-    /// The edited scene; without faults.
+    /// The edited scene, which is valid.
     pub scene: Scene,
-    /// What to select now: what was edited, added, or stands where something was deleted.
+    /// Target to select next: the edited or added one, or the neighbour of a deleted one.
     pub subject: Target,
-    /// What was done, in a few words: `move cube`, `radius of ball`. The same words for every step of
-    /// one gesture.
+    /// Short description for the undo history: `move cube`, `radius of ball`. The steps of one
+    /// gesture have the same label.
     pub label: String,
-    /// What else happened, in a sentence, if there is something to say.
+    /// Side effect, as a sentence, if there is one to report.
     pub note: Option<String>,
 }
 
-/// Why something was not done; the scene stays as it was.
+/// Reason why an edit was refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EditError {
-    /// What was found, as a phrase.
+    /// Finding, as a phrase.
     pub found: String,
-    /// What is expected, or would help, in sentences; may be empty.
+    /// Expectation or remedy, in sentences; may be empty.
     pub help: String,
 }
 
@@ -79,7 +79,7 @@ impl EditError {
 
     fn gone(subject: &Target) -> Self {
         let what = match subject {
-            Target::View(name) => format!("there is no view \"{}\"", truncated(name)),
+            Target::View(name) => format!("there is no camera \"{}\"", truncated(name)),
             Target::Material(name) => format!("there is no material \"{}\"", truncated(name)),
             Target::Light(i) => format!("there is no light {}", i + 1),
             Target::Object(i) => format!("there is no object {}", i + 1),
@@ -90,7 +90,7 @@ impl EditError {
 }
 
 impl Edit {
-    /// `scene` as an edit if it has no faults, otherwise the first of them.
+    /// Creates the edit if `scene` is valid; otherwise returns its first error.
     fn checked(mut scene: Scene, subject: Target, label: String) -> Result<Self, EditError> {
         scene.resolve();
         match scene.faults().into_iter().next() {

@@ -1,12 +1,12 @@
-//! Values as people type and read them.
+//! Parsing and printing of values as users type and read them.
 
 use crate::scene::edit::EditError;
 use crate::scene::format::suggest::nearest;
 use crate::value::{Color, Field, ValueType, number, sanitized, truncated};
 use toml::Value;
 
-/// The value that `text` stands for behind the key `field`. Says nothing about ranges, except where
-/// the number would have no place at all.
+/// Parses `text` as a value of `field`. Ranges are left to validation, except where the type cannot
+/// hold the number.
 pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
     let text = text.trim();
     let wrong = || {
@@ -63,7 +63,7 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
     }
 }
 
-/// The position of the one of `words` that `text` means: it, or the only one that begins with it.
+/// Returns the position of `text` in `words`, or of the only word that begins with it.
 pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     let text = text.to_lowercase();
     if let Some(at) = words.iter().position(|word| word.to_lowercase() == text) {
@@ -77,7 +77,7 @@ pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     }
 }
 
-/// As `choose`, with the reason if there is none or more than one.
+/// Does the same as [`choose`], with the reason if no word or more than one matches.
 pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, EditError> {
     choose(text, words).ok_or_else(|| {
         let quote = |word: &str| format!("\"{}\"", truncated(word));
@@ -91,7 +91,7 @@ pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, E
     })
 }
 
-/// `text` as a name that a file, an outline and a terminal can show.
+/// Validates `text` as a name that files, outline and terminals can show.
 pub(super) fn name(what: &str, text: &str) -> Result<String, EditError> {
     let text = text.trim();
     let help = "Expected at most 60 characters, none of them a control character.";
@@ -105,8 +105,8 @@ fn unquoted(text: &str) -> &str {
     text.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(text)
 }
 
-/// Numbers between commas, semicolons or spaces (or the `x` of `640x480` and `640 x 480`), brackets
-/// around them or not.
+/// Parses numbers between commas, semicolons or spaces (or the `x` of `640x480` and `640 x 480`),
+/// with or without brackets.
 fn numbers(text: &str) -> Option<Vec<f64>> {
     let inner = match text.strip_prefix('[') {
         Some(rest) => rest.strip_suffix(']')?,
@@ -123,14 +123,14 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
     parts.map(|part| digits(part).then(|| part.parse().ok())?).collect()
 }
 
-/// Whether a word is a number in digits: `inf` and `nan` are words that no field takes.
+/// Returns `true` if a word is a number in digits; `inf` and `nan` are words that no field takes.
 fn digits(part: &str) -> bool {
     part.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b))
         && part.bytes().any(|b| b.is_ascii_digit())
 }
 
-/// A value as it is shown: shortest digits, lists without brackets, colours as `#rrggbb` where that
-/// is exact and shorter.
+/// Prints a value: shortest digits, lists without brackets, colours as `#rrggbb` where that is
+/// exact and shorter.
 pub(super) fn show(takes: ValueType, value: &Value) -> String {
     if let (ValueType::Color(_), Some(color)) = (takes, color(value)) {
         let channels = join(&color.0.map(number));
@@ -152,7 +152,7 @@ fn join(parts: &[String]) -> String {
     parts.join(", ")
 }
 
-/// The numbers of a value: one, or those of a list.
+/// Returns the numbers of a value: one, or those of a list.
 pub(super) fn floats(value: &Value) -> Option<Vec<f64>> {
     let one = |value: &Value| match value {
         Value::Float(x) => Some(*x),
@@ -165,7 +165,7 @@ pub(super) fn floats(value: &Value) -> Option<Vec<f64>> {
     }
 }
 
-/// A value that is a colour.
+/// Returns a value that is a colour.
 pub(super) fn color(value: &Value) -> Option<Color> {
     floats(value)?.try_into().ok().map(Color)
 }

@@ -1,4 +1,4 @@
-//! What things stand on, and room to stand.
+//! Placement: support surfaces and free positions for objects.
 
 use crate::camera::Camera;
 use crate::primitive::Form;
@@ -8,12 +8,13 @@ use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{floor_log10, round_significant, rounded_to};
 use glam::{DVec2, DVec3};
 
-/// Lowers (or lifts) an object until its lowest point rests on the highest surface below its middle,
-/// or, if nothing is below, on the lowest above. What stands under it is looked for under its middle
-/// and under its lowest corners.
+/// Lowers (or lifts) an object until its lowest point rests on the highest surface below it, or, if
+/// there is none, on the lowest surface above. Surfaces are searched below its middle and below its
+/// lowest corners.
 ///
 /// # Errors
-/// For what is no object, has no lowest point, or if nothing is under or above it.
+/// For targets other than objects, for objects without a lowest point, and without a surface below
+/// or above.
 pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {
         return Err(EditError::new("only objects can be dropped", "Select an object."));
@@ -38,7 +39,8 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
             let direction = if down { DVec3::NEG_Y } else { DVec3::Y };
             others.iter().filter_map(move |form| {
                 let t = form.cast(from, direction)?;
-                // A rounded difference of two heights would put it next to the surface.
+                // Removes the rounding error of a difference of two heights, which would leave a
+                // gap.
                 Some(round_significant(from.y + direction.y * t, 13))
             })
         });
@@ -52,7 +54,7 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
     };
     let mut next = scene.clone();
     let dropped = &mut next.objects[*index];
-    // A second and third time for what rounding left over.
+    // Repeated to remove what rounding left over.
     for _ in 0..3 {
         let lowest = dropped.form().bounds().map_or(rest, |(low, _)| low.y);
         lift(dropped, rest - lowest);
@@ -75,7 +77,7 @@ fn lift(object: &mut Object, by: f64) {
     }
 }
 
-/// The points (x, z) that an object stands on: its middle and its lowest corners.
+/// Returns the points (x, z) that support an object: its middle and its lowest corners.
 fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let flat = |p: DVec3| DVec2::new(p.x, p.z);
     let middle = flat(low + (high - low) / 2.0);
@@ -89,13 +91,13 @@ fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     };
     let near = 1e-9 * (high - low).max_element();
     let lowest = corners.iter().filter(|c| c.y - low.y <= near).map(|c| flat(*c));
-    // Just inside, so that neighbours that only touch carry nothing.
+    // Slightly inside, so that neighbours that only touch give no support.
     support_points.extend(lowest.map(|c| middle + (c - middle) * (1.0 - 1e-6)));
     support_points
 }
 
-/// The middle of the underside of a new thing with the lengths `size`: in the middle of what the
-/// camera sees, on what is there, and free of what stands there already.
+/// Returns the middle of the underside for a new object with the lengths `size`: near the middle of
+/// the camera's view, on a surface, and clear of other objects.
 pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let eye = DVec3::from_array(scene.camera.eye);
@@ -106,7 +108,7 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
         forms.iter().filter(|f| is_solid(f)).filter_map(Form::bounds).collect();
     let walls: Vec<&Form> = forms.iter().filter(|form| !is_solid(form)).collect();
     let floors: Vec<&Form> = walls.iter().copied().filter(|form| is_level(form)).collect();
-    // New places are round numbers: of a thing one metre wide, whole centimetres.
+    // New positions are round numbers: whole centimetres for an object of one metre.
     let grid = floor_log10(size.min_element()) - 2;
     let candidate = |offset: DVec2| {
         let at = DVec3::new(aim.x + offset.x, aim.y, aim.z + offset.y);
@@ -115,7 +117,7 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     };
     let spread = size.x.max(size.z);
     let spots = (0..400).map(|i| {
-        // A sunflower spiral: the area is covered evenly from the middle outwards.
+        // A sunflower spiral covers the area evenly from the middle outwards.
         let angle = f64::from(i) * 2.399_963_229_728_653;
         DVec2::from_angle(angle) * (0.45 * spread * f64::from(i).sqrt())
     });
@@ -126,7 +128,7 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
         !walls.iter().any(|wall| intersects(wall, room))
             && !solids.iter().any(|solid| overlap(*solid, room))
     });
-    // In full view, else hidden but in the picture, else anywhere.
+    // In full view, else hidden but inside the picture, else anywhere.
     let (mut hidden, mut outside) = (None, None);
     for base in free {
         let middle = base + DVec3::Y * (size.y / 2.0);
@@ -141,7 +143,7 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     hidden.or(outside).unwrap_or_else(|| candidate(DVec2::ZERO))
 }
 
-/// Whether a flat thing is level within 60 degrees, so that something can stand on it.
+/// Returns `true` if a flat form is level within 60 degrees and can carry objects.
 fn is_level(form: &Form) -> bool {
     match form {
         Form::Plane { normal, .. } => normal.y.abs() > 0.5,
@@ -150,7 +152,7 @@ fn is_level(form: &Form) -> bool {
     }
 }
 
-/// Height of the highest of `floors` below `at`, else of the lowest above it.
+/// Returns the height of the highest of `floors` below `at`, else of the lowest above it.
 fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     let heights = |direction: DVec3| {
         floors.iter().filter_map(move |form| Some(at.y + direction.y * form.cast(at, direction)?))
@@ -158,7 +160,7 @@ fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     heights(DVec3::NEG_Y).reduce(f64::max).or_else(|| heights(DVec3::Y).reduce(f64::min))
 }
 
-/// Whether a flat thing (a wall) goes through the inside of a box.
+/// Returns `true` if a flat form (a wall) intersects the inside of a box.
 fn intersects(form: &Form, (low, high): Extent) -> bool {
     let shrink = (high - low) * 1e-6;
     let (low, high) = (low + shrink, high - shrink);
@@ -176,7 +178,7 @@ fn overlap(a: Extent, b: Extent) -> bool {
     a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()
 }
 
-/// Whether a point is well inside the picture.
+/// Returns `true` if a point is well inside the picture.
 fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
     let [right, up, forward] = camera.frame();
     let to = point - DVec3::from_array(camera.eye);
@@ -187,7 +189,7 @@ fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
         && to.dot(up).abs() < 0.85 * half_height * depth
 }
 
-/// Whether nothing stands between the eye and a point.
+/// Returns `true` if no form occludes a point from the eye.
 fn is_visible(forms: &[Form], eye: DVec3, point: DVec3) -> bool {
     !forms.iter().any(|form| form.cast(eye, point - eye).is_some_and(|t| t < 1.0))
 }

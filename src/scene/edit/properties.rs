@@ -1,4 +1,4 @@
-//! What an inspector shows of a subject: one row a key, from the tables of fields.
+//! Properties of a target, as an inspector shows them: one row per key, from the field tables.
 
 use crate::scene::Scene;
 use crate::scene::edit::convert::{AIM, KIND, chosen};
@@ -8,16 +8,16 @@ use crate::scene::edit::{EditError, Target};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, number};
 use toml::{Table, Value};
 
-/// A word that may stand in a row.
+/// A choice of a property.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// The word; the name of a material may hold any character that a file may.
+    /// Name; a material's name may contain any character that files allow.
     pub name: String,
-    /// What it means; may be empty.
+    /// Meaning; may be empty.
     pub doc: String,
 }
 
-/// What kind of value a row holds.
+/// Kind of value of a property.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Widget {
     /// Any text: a name.
@@ -26,9 +26,9 @@ pub enum Widget {
     Switch,
     /// One of [`Property::words`].
     Choice,
-    /// One of [`Property::words`]; other rows below depend on it. A shape's kind, a light's kind.
+    /// One of [`Property::words`], on which other rows depend: the kind of a shape or a light.
     Kind,
-    /// A list of steps; each of [`Property::words`], typed here, adds one at the end.
+    /// A list of steps; each of [`Property::words`], typed here, appends one.
     List,
     /// One or more numbers.
     Numbers,
@@ -39,40 +39,41 @@ pub enum Widget {
 /// One row of an inspector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Property {
-    /// The key to set it by, dotted: `shape.sphere.radius`, `transform.0.rotate_y`.
+    /// Dotted key for [`set`](crate::scene::edit::set): `shape.sphere.radius`,
+    /// `transform.0.rotate_y`.
     pub key: String,
-    /// The last part of the key, in words.
+    /// Last part of the key, with spaces.
     pub label: String,
-    /// How deep it stands below other rows: 0, 1, 2.
+    /// Nesting depth: 0, 1, 2.
     pub depth: usize,
-    /// What kind of value it holds.
+    /// Kind of value.
     pub entry: Widget,
-    /// The value as it can be typed again, printable; empty: none is given.
+    /// Value as it can be typed, printable; empty if none is given.
     pub value: String,
-    /// The numbers of the value one by one, as text; empty unless it holds numbers or a colour. A
-    /// colour always has three.
+    /// Numbers of the value as text; empty unless it holds numbers or a colour. A colour always has
+    /// three.
     pub components: Vec<String>,
-    /// The value if it is a colour: linear red, green, blue.
+    /// Value of a colour: linear red, green, blue.
     pub color: Option<[f64; 3]>,
-    /// Unit of its numbers; may be empty.
+    /// Unit of the numbers; may be empty.
     pub unit: &'static str,
-    /// What may be written, as a phrase: `a number from 0 to 1`.
+    /// Accepted values, as a phrase: `a number from 0 to 1`.
     pub expected: String,
-    /// The words that may stand here; empty: not a choice.
+    /// Accepted words; empty unless it is a choice.
     pub words: Vec<Word>,
-    /// What it is, in a sentence.
+    /// Description, as a sentence.
     pub doc: &'static str,
-    /// Whether the value is the one that holds when the key is left out (or it is left out).
+    /// `true` if the value equals the default or is left out.
     pub is_default: bool,
-    /// What holds when the key is left out, as text; `None`: it must be given.
+    /// Default as text; `None` if the key is required.
     pub default: Option<String>,
 }
 
-/// The rows of `subject` in the order of its table. An object's material has rows of its own
-/// ([`Target::material`]).
+/// Returns the rows of `subject` in the order of its field table. An object's material has rows of
+/// its own ([`Target::material`]).
 ///
 /// # Errors
-/// If the scene has no such subject.
+/// If the scene has no such target.
 pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError> {
     let values = read(scene, subject)?;
     let mut walk = PropertyWalker { scene, subject, rows: Vec::new() };
@@ -85,7 +86,7 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
         if let Some(kind) = virtual_kind
             && exclusive_keys(subject).contains(&field.name)
         {
-            // One row to choose which of the two it is, then only the one that is given.
+            // One row chooses between the two; only the given one follows.
             if exclusive_keys(subject)[0] == field.name {
                 walk.kind(kind, chosen(subject, &values), kind.name.to_string(), 0);
             }
@@ -223,12 +224,12 @@ impl PropertyWalker<'_> {
     }
 }
 
-/// Whether `field` of `subject` names a material.
+/// Returns `true` if `field` of `subject` names a material.
 pub(super) fn is_material(subject: &Target, field: &Field) -> bool {
     matches!(subject, Target::Object(_)) && field.name == "material"
 }
 
-/// The value that a default stands for.
+/// Parses the text of a default.
 pub(super) fn preset(text: &str) -> Option<Value> {
     format!("value = {text}").parse::<Table>().ok()?.remove("value")
 }
@@ -237,7 +238,7 @@ fn words(kinds: &[Field]) -> Vec<Word> {
     kinds.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
 }
 
-/// As the reference says it, without what belongs to files only.
+/// Returns the accepted values as the reference states them, without the notation of files.
 fn expected(takes: ValueType) -> String {
     match takes {
         ValueType::Text => "text".to_string(),
@@ -298,7 +299,7 @@ mod tests {
         assert_eq!((material.entry, material.words.len()), (Widget::Choice, 6));
     }
 
-    /// Whatever a row shows can be typed back without a change.
+    /// Every shown value can be typed back without a change.
     #[test]
     fn every_value_can_be_typed_again() {
         let mut scene = built_in();
@@ -307,7 +308,7 @@ mod tests {
             "[[object]]\nshape.plane = {{ point = [0, -9, 0], normal = [0, 1, 0] }}\ntransform = {steps}\n"
         );
         scene.objects.extend(Scene::parse(&text, "").unwrap().objects);
-        scene.views.insert("left".into(), scene.camera.clone());
+        scene.cameras.insert("left".into(), scene.camera.clone());
         for (_, subject) in outline(&scene) {
             for row in rows(&scene, &subject).unwrap() {
                 if row.entry == Widget::List || row.value.is_empty() {

@@ -1,4 +1,4 @@
-//! Turning things about the vertical.
+//! Rotation about the vertical.
 
 use crate::scene::edit::bounds::scene_bounds;
 use crate::scene::edit::{Edit, EditError, Target};
@@ -6,13 +6,13 @@ use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{floor_log10, rounded_to, sin_cos_degrees, turned};
 use glam::DVec3;
 
-/// Turns by `degrees` about the vertical, counter-clockwise seen from above: an object about its own
-/// middle, a light about the scene's. An object without a transform is turned by its shape's own keys,
-/// if it has any; otherwise two steps at the end of its transform, a turn and a translation, do it, and
-/// later turns change these two.
+/// Rotates by `degrees` about the vertical, counter-clockwise seen from above: an object about its
+/// own middle, a light about the scene's. An object without a transform is rotated by its shape's
+/// own keys, if it has any; otherwise by two steps at the end of its transform, a rotation and a
+/// translation, which later rotations change.
 ///
 /// # Errors
-/// For what cannot be turned.
+/// For targets that cannot be rotated.
 pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditError> {
     if !degrees.is_finite() {
         return Err(EditError::new("that is no angle to turn by", ""));
@@ -48,8 +48,8 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Makes the object's last steps `rotate_y`, `translate` (or what is left of them), so that it stands
-/// turned about the vertical through its middle.
+/// Makes `rotate_y` and `translate` (unless neutral) the last steps of the object, so that it is
+/// rotated about the vertical through its middle.
 fn turn_by_steps(object: &mut Object, degrees: f64) {
     let (angle, shift, own) = match object.transform[..] {
         [.., TransformOp::RotateY(angle), TransformOp::Translate(shift)] => (angle, shift, 2),
@@ -106,8 +106,8 @@ mod tests {
         assert_eq!(mirror.normal, [1.0, 0.0, 0.0]);
     }
 
-    /// Every kind, with and without a transform: it stays where it is, and a whole turn in small
-    /// steps leads back.
+    /// Every kind, with and without a transform, keeps its position, and a full turn in small steps
+    /// is the identity.
     #[test]
     fn turns_are_about_the_middle_and_come_round() {
         for kind in KINDS {
@@ -134,7 +134,7 @@ mod tests {
                     assert!((a - b).length() < 1e-5, "{}: {a} {b}", kind.name);
                     let half = turn(&start, &Target::Object(0), 180.0).unwrap().scene;
                     let c = middle(&half.objects[0]);
-                    // The box around what is uneven does not turn with it.
+                    // The box around an irregular object does not rotate with it.
                     let uneven = ["prism", "union", "intersection", "difference"];
                     let slack = if uneven.contains(&kind.name) { 0.5 } else { 1e-5 };
                     assert!((a - c).length() < slack, "{}: {a} {c}", kind.name);

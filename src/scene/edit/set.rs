@@ -12,11 +12,11 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, ValueType};
 use toml::{Table, Value};
 
-/// Sets what stands behind `key` (of a [`Property`](crate::scene::edit::Property)) to what `text` says. Empty text takes the
-/// key away where it may be left out, so that its default holds; an empty step of a transform goes.
+/// Sets `key` (of a [`Property`](crate::scene::edit::Property)) to the value in `text`. Empty text
+/// removes an optional key, so that its default applies, or a step of a transform.
 ///
 /// # Errors
-/// What was found and what is expected, if `text` cannot be read or the scene would have a fault.
+/// Finding and expectation, if `text` cannot be parsed or the scene would be invalid.
 pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edit, EditError> {
     let text = text.trim();
     let values = read(scene, subject)?;
@@ -59,7 +59,7 @@ pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edi
     replace(scene, subject, key, values, value)
 }
 
-/// Sets one number of those behind `key`, from 0.
+/// Sets one number of the value of `key`; `component` counts from 0.
 ///
 /// # Errors
 /// As [`set`].
@@ -76,7 +76,7 @@ pub fn set_component(
         return Err(EditError::new(&format!("{key} has no number {}", component + 1), ""));
     }
     let text = text.trim();
-    // The same reading and the same words of refusal as for the whole list.
+    // Parsed with the same rules and errors as the whole list.
     let parts: Vec<_> = list
         .iter()
         .enumerate()
@@ -89,7 +89,7 @@ pub fn set_component(
     set(scene, subject, key, &parts.join(" "))
 }
 
-/// The field behind `key`, also of the keys that only an inspector has.
+/// Returns the field of `key`, including the keys that only an inspector has.
 pub(super) fn lookup(subject: &Target, key: &str) -> Option<&'static Field> {
     match (subject, key) {
         (Target::Light(_), "kind") => Some(&KIND),
@@ -98,7 +98,7 @@ pub(super) fn lookup(subject: &Target, key: &str) -> Option<&'static Field> {
     }
 }
 
-/// Puts `value` behind `key`, takes rivals of the key away, checks.
+/// Sets `key` to `value`, removes exclusive keys and validates.
 pub(super) fn replace(
     scene: &Scene,
     subject: &Target,
@@ -123,7 +123,7 @@ pub(super) fn replace(
     })
 }
 
-/// Takes `key` away.
+/// Removes `key`.
 fn clear(
     scene: &Scene,
     subject: &Target,
@@ -147,7 +147,7 @@ fn clear(
     finish(scene, subject, key, values)
 }
 
-/// The scene with these values, checked.
+/// Returns the edit with these values, validated.
 pub(super) fn finish(
     scene: &Scene,
     subject: &Target,
@@ -158,7 +158,7 @@ pub(super) fn finish(
     Edit::checked(next, subject.clone(), label(scene, subject, key))
 }
 
-/// `radius of ball`.
+/// Returns the label of the edit: `radius of ball`.
 pub(super) fn label(scene: &Scene, subject: &Target, key: &str) -> String {
     let last = key.rsplit('.').next().unwrap_or(key).replace('_', " ");
     format!("{last} of {}", subject.label(scene))
@@ -240,7 +240,7 @@ mod tests {
         let scene = built_in();
         let red = Target::Material("red".into());
         let gold = set(&scene, &red, "metal", "gold").unwrap().scene;
-        let edit = set(&gold, &red, "reflectance", "0.5 0.5 0.5").unwrap();
+        let edit = set(&gold, &red, "f0", "0.5 0.5 0.5").unwrap();
         assert!(edit.scene.materials["red"].metal.is_none());
         assert!(edit.note.unwrap().contains("metal is gone"));
         let edit = set(&scene, &Target::Camera, "direction", "0 0 -1").unwrap();

@@ -1,52 +1,52 @@
-//! What can be selected and edited.
+//! Edit targets: parts of a scene that can be selected and edited.
 
 use crate::scene::{Diagnostic, Object, Problem, Scene};
 use crate::value::truncated;
 
-/// One thing of a scene that can be selected and edited.
+/// A part of a scene that can be selected and edited.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Target {
     /// The camera that the picture is taken from.
     Camera,
-    /// A viewpoint kept by name.
+    /// A stored camera, by name.
     View(String),
-    /// Light from everywhere.
+    /// Ambient light.
     Ambient,
-    /// What a ray sees that meets nothing.
+    /// Radiance of rays that hit no surface.
     Background,
     /// A light, by its position in the scene from 0.
     Light(usize),
     /// An object, by its position in the scene from 0.
     Object(usize),
-    /// A finish, by name.
+    /// A material, by name.
     Material(String),
-    /// The picture's raster.
+    /// Film settings.
     Film,
-    /// How far paths are followed.
+    /// Integrator settings.
     IntegratorSettings,
 }
 
-/// A part of the outline.
+/// A section of the outline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Section {
-    /// The camera and the kept viewpoints.
+    /// The camera and the stored ones.
     Camera,
     /// Ambient light and background.
     Surroundings,
     /// Lights.
     Lights,
-    /// Objects that reflect, or a part of which does.
+    /// Objects with a reflecting material, on the whole or on a part.
     Mirrors,
     /// All other objects.
     Objects,
-    /// Finishes.
+    /// Materials.
     Materials,
-    /// Film and tracing.
+    /// Film and integrator.
     Picture,
 }
 
 impl Section {
-    /// The heading above it.
+    /// Returns the heading of the section.
     pub fn title(self) -> &'static str {
         match self {
             Self::Camera => "camera",
@@ -60,10 +60,10 @@ impl Section {
     }
 }
 
-/// Every subject of the scene, each once, in the order in which an outline shows them.
+/// Returns every target of the scene once, in the order of the outline.
 pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     let mut list = vec![(Section::Camera, Target::Camera)];
-    list.extend(scene.views.keys().map(|name| (Section::Camera, Target::View(name.clone()))));
+    list.extend(scene.cameras.keys().map(|name| (Section::Camera, Target::View(name.clone()))));
     list.push((Section::Surroundings, Target::Ambient));
     list.push((Section::Surroundings, Target::Background));
     list.extend((0..scene.lights.len()).map(|i| (Section::Lights, Target::Light(i))));
@@ -78,13 +78,13 @@ pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     list
 }
 
-/// Whether the object at `index`, or a part of it, has a material that reflects.
+/// Returns `true` if the object at `index`, or a part of it, has a reflecting material.
 pub(super) fn reflects(scene: &Scene, index: usize) -> bool {
     mirror_of(scene, index).is_some()
 }
 
-/// Of the materials of the object at `index` and its parts the one that reflects most, with its
-/// coefficient; `None`: none reflects.
+/// Returns the most reflecting material of the object at `index` and its parts, with its
+/// coefficient; `None` if none reflects.
 pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
     let names = scene.objects.get(index).map(Object::materials).unwrap_or_default();
     let known =
@@ -93,10 +93,10 @@ pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
 }
 
 impl Target {
-    /// Whether the scene (still) has it.
+    /// Returns `true` if the scene has the target.
     pub fn exists(&self, scene: &Scene) -> bool {
         match self {
-            Self::View(name) => scene.views.contains_key(name),
+            Self::View(name) => scene.cameras.contains_key(name),
             Self::Light(i) => *i < scene.lights.len(),
             Self::Object(i) => *i < scene.objects.len(),
             Self::Material(name) => scene.materials.contains_key(name),
@@ -108,7 +108,7 @@ impl Target {
         }
     }
 
-    /// The keys that lead to it in the file.
+    /// Returns the path to the target in the file.
     pub(super) fn path(&self) -> Vec<String> {
         let keys: &[&str] = match self {
             Self::Camera => &["camera"],
@@ -116,7 +116,7 @@ impl Target {
             Self::Background => &["background"],
             Self::Film => &["film"],
             Self::IntegratorSettings => &["trace"],
-            Self::View(name) => &["views", name],
+            Self::View(name) => &["cameras", name],
             Self::Material(name) => &["materials", name],
             Self::Light(i) => &["light", &i.to_string()],
             Self::Object(i) => &["object", &i.to_string()],
@@ -124,12 +124,12 @@ impl Target {
         keys.iter().map(|key| key.to_string()).collect()
     }
 
-    /// What a path of keys (of a [`Problem`]) leads to; `None`: the scene as a whole.
+    /// Returns the target at a path (of a [`Problem`]); `None` means the scene as a whole.
     pub fn of_path(path: &[String]) -> Option<Self> {
         let index = || path.get(1)?.parse().ok();
         match path.first()?.as_str() {
             "camera" => Some(Self::Camera),
-            "views" => path.get(1).cloned().map(Self::View),
+            "cameras" => path.get(1).cloned().map(Self::View),
             "ambient" => Some(Self::Ambient),
             "background" => Some(Self::Background),
             "light" => index().map(Self::Light),
@@ -141,21 +141,21 @@ impl Target {
         }
     }
 
-    /// What a finding about the scene is about, and the key in it; the key may be empty.
+    /// Returns the target of a problem and the key in it, which may be empty.
     pub fn of_finding(finding: &Problem) -> Option<(Self, String)> {
         let subject = Self::of_path(&finding.path)?;
         let rest = finding.path.get(subject.path().len()..).unwrap_or_default();
         Some((subject, rest.join(".")))
     }
 
-    /// What a message about the scene's file is about.
+    /// Returns the target of a diagnostic.
     pub fn of_message(scene: &Scene, message: &Diagnostic) -> Option<Self> {
         let subjects = outline(scene).into_iter().map(|(_, subject)| subject);
         subjects.into_iter().find(|subject| subject.title(scene) == message.subject)
     }
 
-    /// Its name in an outline: `lamp`, `light 2`, `sphere 3` (the third object, without a name).
-    /// Names from a file are made printable and cut after 40 characters.
+    /// Returns the name in the outline: `lamp`, `light 2`, `sphere 3` (the third object, without a
+    /// name). Names from a file are made printable and cut after 40 characters.
     pub fn label(&self, scene: &Scene) -> String {
         let named = |name: Option<&String>| name.filter(|n| !n.is_empty()).map(|n| truncated(n));
         match self {
@@ -175,12 +175,12 @@ impl Target {
         }
     }
 
-    /// What messages call it: `object "queen"`, `light 2`, `camera`.
+    /// Returns the name in diagnostics: `object "queen"`, `light 2`, `camera`.
     pub fn title(&self, scene: &Scene) -> String {
         scene.subject(&self.path())
     }
 
-    /// The object's material; a material's is itself.
+    /// Returns the material of an object; for a material, itself.
     pub fn material(&self, scene: &Scene) -> Option<Self> {
         match self {
             Self::Material(_) => self.exists(scene).then(|| self.clone()),
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn the_outline_has_everything_once_and_in_order() {
         let mut scene = built_in();
-        scene.views.insert("left".into(), scene.camera.clone());
+        scene.cameras.insert("left".into(), scene.camera.clone());
         let list = outline(&scene);
         let once: HashSet<_> = list.iter().map(|(_, subject)| subject).collect();
         assert_eq!(once.len(), list.len());
@@ -218,7 +218,7 @@ mod tests {
     fn findings_and_messages_lead_to_their_subject() {
         let mut scene = built_in();
         scene.lights[0].name.clear();
-        scene.views.insert("left".into(), scene.camera.clone());
+        scene.cameras.insert("left".into(), scene.camera.clone());
         for (_, subject) in outline(&scene) {
             assert_eq!(Target::of_path(&subject.path()).as_ref(), Some(&subject));
             let message = Diagnostic {

@@ -1,5 +1,5 @@
-//! One subject as a tree of values behind the keys of its table of fields. Only that subject is
-//! taken apart, never the whole scene.
+//! One target as a TOML table with the keys of its field table. Only the target is serialised,
+//! never the whole scene.
 
 use crate::scene::Scene;
 use crate::scene::edit::{EditError, Target};
@@ -10,7 +10,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
-/// The keys that `subject` may have.
+/// Returns the fields of `subject`.
 pub(super) fn fields(subject: &Target) -> &'static [Field] {
     match subject {
         Target::Camera | Target::View(_) => camera::FIELDS,
@@ -24,24 +24,24 @@ pub(super) fn fields(subject: &Target) -> &'static [Field] {
     }
 }
 
-/// Keys of which at most one is given.
+/// Returns the keys of which at most one is given.
 pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],
         Target::Light(_) => &["point", "directional"],
-        Target::Material(_) => &["reflectance", "metal"],
+        Target::Material(_) => &["f0", "metal"],
         _ => &[],
     }
 }
 
-/// The values of `subject`, those that hold because nothing else is said among them.
+/// Returns the values of `subject`, including the defaults.
 pub(super) fn read(scene: &Scene, subject: &Target) -> Result<Table, EditError> {
     fn table<T: Serialize>(part: Option<&T>) -> Option<Table> {
         part.and_then(|part| Table::try_from(part).ok())
     }
     let read = match subject {
         Target::Camera => table(Some(&scene.camera)),
-        Target::View(name) => table(scene.views.get(name)),
+        Target::View(name) => table(scene.cameras.get(name)),
         Target::Ambient => table(Some(&scene.ambient)),
         Target::Background => table(Some(&scene.background)),
         Target::Light(i) => table(scene.lights.get(*i)),
@@ -53,12 +53,13 @@ pub(super) fn read(scene: &Scene, subject: &Target) -> Result<Table, EditError> 
     read.ok_or_else(|| EditError::gone(subject))
 }
 
-/// A copy of `scene` with the values of `subject` replaced.
+/// Returns a copy of `scene` with the values of `subject` replaced.
 pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Scene, EditError> {
     fn fill<T: DeserializeOwned>(part: Option<&mut T>, values: Table) -> Result<(), EditError> {
         let wrong = |e: toml::de::Error| EditError::new(e.message(), "The scene stays as it was.");
         if let Some(part) = part {
-            // As text: the readers of files serve, and no second set of them is compiled.
+            // By way of text, so that the deserialiser of files is used and no second one is
+            // compiled.
             *part = toml::from_str(&values.to_string()).map_err(wrong)?;
         }
         Ok(())
@@ -66,7 +67,7 @@ pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Sc
     let mut next = scene.clone();
     match subject {
         Target::Camera => fill(Some(&mut next.camera), values)?,
-        Target::View(name) => fill(next.views.get_mut(name), values)?,
+        Target::View(name) => fill(next.cameras.get_mut(name), values)?,
         Target::Ambient => fill(Some(&mut next.ambient), values)?,
         Target::Background => fill(Some(&mut next.background), values)?,
         Target::Light(i) => fill(next.lights.get_mut(*i), values)?,
@@ -89,7 +90,7 @@ pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Sc
     Ok(next)
 }
 
-/// The field that the dotted `key` leads to.
+/// Returns the field of the dotted `key`.
 pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Field> {
     let (first, rest) = match key.split_once('.') {
         Some((first, rest)) => (first, Some(rest)),
@@ -108,7 +109,7 @@ pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Fiel
     }
 }
 
-/// What stands behind the dotted `key`.
+/// Returns the value of the dotted `key`.
 pub(super) fn get<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     let mut keys = key.split('.');
     let first = table.get(keys.next()?)?;
@@ -119,8 +120,8 @@ pub(super) fn get<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     })
 }
 
-/// Puts `value` behind the dotted `key`, whose tables are there; nothing (`None`) removes the key.
-/// Whether there was a place for it.
+/// Sets the dotted `key`, whose tables exist, to `value`, or removes it if that is `None`. Returns
+/// `false` if a table is missing.
 pub(super) fn insert_value(table: &mut Table, key: &str, value: Option<Value>) -> bool {
     let (outer, last) = match key.rsplit_once('.') {
         Some((outer, last)) => (Some(outer), last),

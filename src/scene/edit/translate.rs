@@ -1,4 +1,4 @@
-//! Moving things by a vector.
+//! Translation by a vector.
 
 use crate::light::{Directional, Light};
 use crate::scene::edit::bounds::scene_bounds;
@@ -7,12 +7,13 @@ use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{floor_log10, rounded_to, unit};
 use glam::DVec3;
 
-/// Moves an object, a light, the camera or a view by the vector `by`, in scene units. An object
-/// without a transform is moved by its shape's own key, another one by a translation behind its last
-/// step. A directional light turns as a lamp would that keeps pointing at the middle of the scene.
+/// Moves an object, a light, the camera or a stored camera by the vector `by`, in scene units. An
+/// object without a transform is moved by its shape's own key, another one by a translation after
+/// its last step. A directional light rotates as a lamp would that stays directed at the middle of
+/// the scene.
 ///
 /// # Errors
-/// For what cannot be moved, and at the end of the coordinates.
+/// For targets that cannot be moved, and beyond the largest coordinate.
 pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, EditError> {
     if by.iter().any(|x| !x.is_finite()) {
         return Err(EditError::new("that is no distance to move by", ""));
@@ -29,7 +30,7 @@ pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, Ed
         }
         Target::Camera | Target::View(_) => {
             let camera = match subject {
-                Target::View(name) => next.views.get_mut(name),
+                Target::View(name) => next.cameras.get_mut(name),
                 _ => Some(&mut next.camera),
             };
             let camera = camera.ok_or_else(|| EditError::gone(subject))?;
@@ -45,7 +46,7 @@ pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, Ed
     Edit::checked(next, subject.clone(), label)
 }
 
-/// `at + by`; a coordinate that changes is rounded to a thousandth of the digits of the change.
+/// Returns `at + by`; a changed coordinate is rounded to a thousandth of the digits of the change.
 pub(super) fn moved(at: [f64; 3], by: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| match by[i] {
         0.0 => at[i],
@@ -79,7 +80,7 @@ fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
         let reach = 3.0 * scene_bounds(scene).radius;
         let lamp = -unit(*direction).unwrap_or(DVec3::NEG_Y) * reach;
         let lamp = lamp + DVec3::from_array(by);
-        // Through the middle there is no direction left: it stays.
+        // At the middle there is no direction: it stays unchanged.
         if let Some(aimed) = unit(-lamp) {
             *direction = aimed.map(|x| rounded_to(x, -4)).to_array();
         }

@@ -1,9 +1,9 @@
-//! Names that are free.
+//! Unique names.
 
 use crate::scene::Scene;
 
-/// `wanted`, or with the smallest number from 2 behind it that makes it free: `cube`, `cube 2`,
-/// `cube 3`. A number that `wanted` ends with is replaced.
+/// Returns `wanted`, or `wanted` with the smallest free number from 2: `cube`, `cube 2`, `cube 3`.
+/// A number at the end of `wanted` is replaced.
 pub(super) fn free_name(wanted: &str, taken: impl Fn(&str) -> bool) -> String {
     if !wanted.is_empty() && !taken(wanted) {
         return wanted.to_string();
@@ -12,7 +12,7 @@ pub(super) fn free_name(wanted: &str, taken: impl Fn(&str) -> bool) -> String {
         Some((stem, number)) if number.parse::<u32>().is_ok() => stem,
         _ => wanted,
     };
-    // Names are at most 60 characters: room for the number.
+    // Names have at most 60 characters: leaves room for the number.
     let stem: String = stem.chars().take(54).collect();
     (2u32..).map(|n| format!("{stem} {n}")).find(|name| !taken(name)).unwrap_or(stem)
 }
@@ -30,7 +30,7 @@ pub(super) fn free_material(scene: &Scene, wanted: &str) -> String {
 }
 
 pub(super) fn free_view(scene: &Scene, wanted: &str) -> String {
-    free_name(wanted, |name| scene.views.contains_key(name))
+    free_name(wanted, |name| scene.cameras.contains_key(name))
 }
 
 #[cfg(test)]

@@ -1,15 +1,15 @@
-//! Viewpoints kept by name.
+//! Stored cameras.
 
 use crate::scene::Scene;
 use crate::scene::edit::parse_value::name;
 use crate::scene::edit::unique_name::free_view;
 use crate::scene::edit::{Edit, EditError, Target};
 
-/// Keeps the camera as a view with the given name, in place of one that has it already; without a
-/// name as `view`, `view 2` and so on.
+/// Stores the camera under the given name and replaces one with that name; without a name as
+/// `view`, `view 2` and so on.
 ///
 /// # Errors
-/// If the name cannot be shown.
+/// If the name is not printable.
 pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError> {
     let kept = match given {
         Some(given) => name("name", given)?,
@@ -19,20 +19,20 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
         return Err(EditError::new("a view needs a name", ""));
     }
     let mut next = scene.clone();
-    let old = next.views.insert(kept.clone(), scene.camera.clone());
+    let old = next.cameras.insert(kept.clone(), scene.camera.clone());
     let label = format!("store view {kept}");
     let edit = Edit::checked(next, Target::View(kept.clone()), label)?;
     let replaced = old.is_some_and(|old| old != scene.camera);
     Ok(if replaced { edit.with_note(format!("View {kept} was replaced.")) } else { edit })
 }
 
-/// Makes the view with this name the camera.
+/// Makes the stored camera `name` the camera of the picture.
 ///
 /// # Errors
-/// If there is none.
+/// If there is none with that name.
 pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
     let subject = Target::View(name.to_string());
-    let view = scene.views.get(name).ok_or_else(|| EditError::gone(&subject))?;
+    let view = scene.cameras.get(name).ok_or_else(|| EditError::gone(&subject))?;
     let next = Scene { camera: view.clone(), ..scene.clone() };
     Edit::checked(next, Target::Camera, format!("recall view {}", subject.label(scene)))
 }
@@ -54,7 +54,7 @@ mod tests {
         let back = recall_view(&moved, "view").unwrap();
         assert_eq!((back.scene.camera, back.subject), (scene.camera.clone(), Target::Camera));
         let edit = store_view(&moved, Some(" view ")).unwrap();
-        assert_eq!(edit.scene.views["view"], moved.camera);
+        assert_eq!(edit.scene.cameras["view"], moved.camera);
         assert!(edit.note.is_some());
         assert!(recall_view(&scene, "view").is_err() && store_view(&scene, Some(" ")).is_err());
     }

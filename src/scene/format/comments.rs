@@ -2,15 +2,15 @@
 
 use toml_edit::{DocumentMut, Item, Table};
 
-/// Remembers comments of removed tables that stand apart from them.
+/// Keeps comments of removed tables that an empty line separates from the table.
 #[derive(Default)]
 pub(crate) struct CommentKeeper {
-    /// Where the removed table stood, and the comment.
+    /// Position of the removed table, and the comment.
     kept: Vec<(isize, String)>,
 }
 
 impl CommentKeeper {
-    /// Takes note of what stands above the tables of a removed item.
+    /// Records the separate comments above the tables of a removed item.
     pub(crate) fn removed(&mut self, item: &Item) {
         match item {
             Item::Table(table) => {
@@ -31,7 +31,7 @@ impl CommentKeeper {
         }
     }
 
-    /// Puts what was kept above the next table that is left, or at the end of the file.
+    /// Restores the comments above the next remaining table, or at the end of the file.
     pub(crate) fn put_back(self, document: &mut DocumentMut) {
         let mut kept = self.kept;
         kept.sort_by_key(|(position, _)| -position);
@@ -60,7 +60,7 @@ impl CommentKeeper {
     }
 }
 
-/// Every table with a header that has a place in the file.
+/// Calls `act` for every table with a header and a position in the file.
 fn each(table: &mut Table, act: &mut dyn FnMut(&mut Table)) {
     for (_, item) in table.iter_mut() {
         match item {
@@ -85,8 +85,8 @@ fn prefix(table: &Table) -> &str {
     table.decor().prefix().and_then(|p| p.as_str()).unwrap_or_default()
 }
 
-/// What stands above a table, cut after its last empty line: what stands apart, and what belongs to
-/// the table.
+/// Splits the text above a table after its last empty line: the separate comment, and that of the
+/// table.
 fn split(above: &str) -> (&str, &str) {
     let mut cut = 0;
     let mut at = 0;
@@ -106,8 +106,8 @@ fn put_above(table: &mut Table, comment: &str) {
     table.decor_mut().set_prefix(joined);
 }
 
-/// Gives `tables`, entry by entry the old ones `from` (or new), places in the file that follow
-/// their order. Nothing happens if the old ones kept theirs and the new ones come last.
+/// Gives `tables`, which come from the old entries `from` or are new, positions in the file that
+/// follow their order. Nothing changes if the old ones kept their order and the new ones come last.
 pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     let old: Vec<usize> = from.iter().flatten().copied().collect();
     let tail_only = from.iter().skip_while(|i| i.is_some()).all(Option::is_none);
@@ -131,7 +131,7 @@ pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     tables[0].set_position(first);
 }
 
-/// A table without a place follows the one before it.
+/// Removes the position of a table, which then follows the one before it.
 fn forget_place(table: &mut Table) {
     table.set_position(None);
     each(table, &mut |inner| inner.set_position(None));

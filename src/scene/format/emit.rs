@@ -1,10 +1,11 @@
-//! New pieces of a scene file: only what differs from the defaults, in the layout of the reference.
+//! New parts of a scene file: only values that differ from the defaults, in the layout of the
+//! reference.
 
 use crate::value::{Color, DefaultValue, Field, ValueType};
 use toml::Value;
 use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table};
 
-/// What is written for `value`. `headers`: whether tables may have `[headers]`.
+/// Returns the item for `value`. `headers` is `true` if tables may have `[headers]`.
 pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
     match (takes, value) {
         (ValueType::Table(fields), Value::Table(table)) if headers => {
@@ -49,19 +50,20 @@ pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
     }
 }
 
-/// A colour: three numbers, or `#rrggbb` where that stands for it and the numbers would be long.
+/// Returns a colour as three numbers, or as `#rrggbb` where that is exact and the numbers would be
+/// long.
 fn color_leaf(value: &Value) -> toml_edit::Value {
     let code = color(value).filter(|c| c.0.iter().any(|x| x.fract() != 0.0));
     code.and_then(Color::to_hex).map_or_else(|| leaf(value), toml_edit::Value::from)
 }
 
-/// Three numbers.
+/// Returns a value of three numbers as a colour.
 pub(crate) fn color(value: &Value) -> Option<Color> {
     let channels: Vec<f64> = value.as_array()?.iter().filter_map(Value::as_float).collect();
     channels.try_into().ok().map(Color)
 }
 
-/// An entry of a list that takes `list`, as a table that can become an inline one.
+/// Returns an entry of a list of the type `list` as a table that can become an inline one.
 pub(crate) fn fresh_entry(list: ValueType, value: &Value) -> Table {
     match (list, value) {
         (ValueType::Tables(fields) | ValueType::ListOf(fields), Value::Table(table)) => {
@@ -71,7 +73,7 @@ pub(crate) fn fresh_entry(list: ValueType, value: &Value) -> Table {
     }
 }
 
-/// A table with those keys of `values` that differ from their defaults. Kinds (`shape`,
+/// Returns a table with the keys of `values` that differ from their defaults. Kinds (`shape`,
 /// `view_angle`) become dotted keys, all other tables inline ones.
 pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Table {
     let mut table = Table::new();
@@ -85,7 +87,7 @@ pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Tab
     table
 }
 
-/// Whether `value` is what holds without the key.
+/// Returns `true` if `value` is the default of `field`.
 fn is_default(field: &Field, value: &Value) -> bool {
     match field.preset {
         DefaultValue::Is(text) => {
@@ -96,7 +98,7 @@ fn is_default(field: &Field, value: &Value) -> bool {
     }
 }
 
-/// A value that is no table, in the layout `[1.0, 2.0]`.
+/// Returns a value that is no table, in the layout `[1.0, 2.0]`.
 pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
     match value {
         Value::String(text) => text.as_str().into(),
@@ -115,7 +117,7 @@ pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
     }
 }
 
-/// The shortest digits that read back as `number`, with an exponent where zeros would be many.
+/// Returns the shortest digits that read back as `number`, with an exponent instead of many zeros.
 fn float(number: f64) -> toml_edit::Value {
     let size = number.abs();
     let zeros = number.is_finite() && size != 0.0 && !(1e-5..1e16).contains(&size);

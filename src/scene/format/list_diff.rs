@@ -1,10 +1,10 @@
-//! Which entry of an edited list was which entry before.
+//! Alignment of the entries of an edited list with those before the edit.
 
 use toml::{Table, Value};
 
-/// For each entry of `new` the position of the entry of `old` that it was; none twice. Entries are
-/// the same if they have the same name, else if they are equal, else if they stand between the same
-/// neighbours and are alike.
+/// Returns for each entry of `new` the position of its origin in `old`; no position occurs twice.
+/// Entries match if they have the same name, else if they are equal, else if they lie between the
+/// same neighbours and are alike.
 pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     let mut free = vec![true; old.len()];
     let mut from = vec![None; new.len()];
@@ -39,7 +39,7 @@ fn name(entry: &Value) -> Option<&str> {
     entry.get("name").and_then(Value::as_str)
 }
 
-/// Whether one may be an edit of the other: both without a name, or renamed only.
+/// Returns `true` if one entry may be an edit of the other: both without a name, or only renamed.
 fn alike(a: &Value, b: &Value) -> bool {
     let rest = |entry: &Value| {
         let mut table: Table = entry.as_table().cloned().unwrap_or_default();
@@ -54,7 +54,7 @@ mod tests {
     use super::align;
     use toml::Value;
 
-    /// Entries `name/value`.
+    /// Parses entries `name/value`.
     fn list(text: &str) -> Vec<Value> {
         let entry = |word: &str| {
             let (name, value) = word.split_once('/').unwrap();

@@ -1,8 +1,10 @@
-//! Carries the difference between two scenes into the text of a scene file, and nothing else.
+//! Patches the text of a scene file by the difference between two scenes.
 //!
-//! Scenes are compared as trees of TOML values. Where both trees agree the text is not touched. A
-//! key that is not in the text has its default; it is written only when its value differs from
-//! that.
+//! Scenes are compared as trees of TOML values; text of equal values is not touched. A key that is
+//! not in the text has its default; it is written only when its value differs from that.
+//!
+//! Patching by the key path of an edit would need no comparison, but saving has no such path: undo,
+//! redo and recovered edits restore whole scenes, and one save covers any number of them.
 
 use crate::scene::format::comments::CommentKeeper;
 use crate::scene::format::emit::{color, fresh, fresh_entry, leaf};
@@ -18,7 +20,7 @@ pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml:
     rewriter.table(document.as_table_mut(), true, old, new, &Keys::These(schema::FIELDS));
     rewriter.keeper.put_back(document);
     if document.as_table().iter().all(|(_, item)| is_nothing(item)) {
-        // A file without any key would not be read as a scene.
+        // A file without any key is not a scene.
         if let Some(size) = new.get("film").and_then(|film| film.get("size")) {
             let mut film = toml_edit::Table::new();
             film.insert("size", Item::Value(leaf(size)));
@@ -27,7 +29,7 @@ pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml:
     }
 }
 
-/// Whether an item leaves no trace in the text.
+/// Returns `true` if an item leaves no trace in the text.
 fn is_nothing(item: &Item) -> bool {
     match item {
         Item::None => true,
@@ -37,16 +39,16 @@ fn is_nothing(item: &Item) -> bool {
     }
 }
 
-/// Which keys a table may have, and what stands behind them.
+/// Keys of a table and the types of their values.
 enum Keys {
-    /// These.
+    /// Keys of these fields.
     These(&'static [Field]),
-    /// Any; behind each a table with these keys.
+    /// Any keys; each holds a table with these fields.
     Any(&'static [Field]),
 }
 
 impl Keys {
-    /// The keys of `old` and `new` in the order in which new ones are written.
+    /// Returns the keys of `old` and `new` in the order in which new ones are written.
     fn of(&self, old: &toml::Table, new: &toml::Table) -> Vec<(String, ValueType)> {
         match self {
             Self::These(fields) => fields.iter().map(|f| (f.name.to_string(), f.takes)).collect(),
@@ -63,7 +65,7 @@ struct Rewriter {
 }
 
 impl Rewriter {
-    /// `headers`: whether tables inside may have `[headers]` of their own.
+    /// Patches one table. `headers` is `true` if tables inside may have `[headers]` of their own.
     fn table(
         &mut self,
         table: &mut dyn TableLike,
@@ -92,8 +94,8 @@ impl Rewriter {
                 _ => {}
             }
         }
-        // One key in another's place (a shape of another kind, a direction instead of a target)
-        // takes over its comments.
+        // A key that replaces another one (a shape of another kind, a direction instead of a
+        // target) takes over its comments.
         let heir = if gone.len() == 1 { come.first().map(|(key, ..)| key.clone()) } else { None };
         for key in gone {
             let decor = table.key(&key).map(|k| k.leaf_decor().clone());
@@ -216,8 +218,8 @@ impl Rewriter {
     }
 }
 
-/// Gives named tables their new names, in their place and with their comments: one that is gone and one
-/// that has come are the same if their values are. Returns `old` under the new names.
+/// Renames named tables in place and with their comments: a removed and an added one match if their
+/// values are equal. Returns `old` under the new names.
 fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
     let mut renamed = old.clone();
     for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {
@@ -238,7 +240,8 @@ fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> to
     renamed
 }
 
-/// Takes away the comment behind the last entry of `list`, if another one comes behind that.
+/// Removes and returns the comment after the last entry of `list` if another entry follows
+/// (`comes`).
 fn comment_of_the_last(list: &mut toml_edit::Array, comes: bool) -> String {
     let trailing = list.trailing().as_str().unwrap_or_default();
     match trailing.rfind('\n') {
@@ -251,7 +254,7 @@ fn comment_of_the_last(list: &mut toml_edit::Array, comes: bool) -> String {
     }
 }
 
-/// The white space before a value in a list, without comments.
+/// Returns the white space before a value in a list, without comments.
 fn spaces_before(value: &toml_edit::Value) -> String {
     let prefix = value.decor().prefix().and_then(|p| p.as_str()).unwrap_or_default();
     match prefix.rfind('\n') {
@@ -260,7 +263,7 @@ fn spaces_before(value: &toml_edit::Value) -> String {
     }
 }
 
-/// A value that is no table: replaced; of a list of numbers only those that differ.
+/// Replaces a value that is no table; in a list of numbers only those that differ.
 fn edit_leaf(item: &mut Item, old: Option<&Value>, new: &Value) {
     let Some(value) = item.as_value_mut() else {
         *item = Item::Value(leaf(new));
@@ -279,12 +282,12 @@ fn edit_leaf(item: &mut Item, old: Option<&Value>, new: &Value) {
         }
         return;
     }
-    // A colour that is written `#rrggbb` stays so as long as a code stands for it.
+    // A colour written as `#rrggbb` stays so as long as that is exact.
     let code = if value.is_str() { color(new).and_then(Color::to_hex) } else { None };
     replace(value, code.map_or_else(|| leaf(new), toml_edit::Value::from));
 }
 
-/// Puts `new` where `place` is, with the comments and spaces around it.
+/// Replaces `place` by `new` and keeps the comments and spaces around it.
 fn replace(place: &mut toml_edit::Value, mut new: toml_edit::Value) {
     *new.decor_mut() = place.decor().clone();
     *place = new;

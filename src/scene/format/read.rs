@@ -1,32 +1,36 @@
-//! From a file to a checked scene.
+//! Reading of scene files: text to validated scene.
 
-use crate::scene::diagnostic::SceneErrors;
+use crate::scene::diagnostic::{Diagnostic, SceneErrors};
+use crate::scene::format::migrate::{self, FormerWord, migrate};
 use crate::scene::format::schema;
-use crate::scene::format::source_map::{line_column, located};
+use crate::scene::format::source_map::{line_column, with_locations};
 use crate::scene::{AssetResolver, Scene};
+use serde::Deserialize;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
-use toml::de::DeTable;
 
-/// Largest file that is read [bytes]: some hundred thousand objects.
+use toml::Spanned;
+use toml::de::{DeTable, Deserializer};
+
+/// Largest file that is read [bytes], which holds some hundred thousand objects.
 const MAX_BYTES: u64 = 64 << 20;
 
 impl Scene {
-    /// Reads and checks the scene file at `path`.
+    /// Reads and validates the scene file at `path`.
     ///
     /// # Errors
-    /// Everything wrong with it, with line and column: unreadable, no UTF-8, no TOML, unknown keys,
-    /// wrong types, values out of range, names that lead nowhere. What is wrong with the form hides
-    /// what is wrong with the values.
+    /// All errors, with line and column: not readable, not UTF-8, not TOML, unknown keys, wrong
+    /// types, values out of range, undefined names. Values are validated only if keys and types are
+    /// right.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
         let library = AssetResolver::of(path, Arc::default());
         read_text(path).and_then(|t| Self::parse_in(&t, &path.display().to_string(), library))
     }
 
-    /// Reads and checks a scene from `text`; messages call it `name`, and names of files start from
-    /// that path's folder.
+    /// Reads and validates a scene from `text`; diagnostics call it `name`, and file names are
+    /// relative to that path's folder.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -34,18 +38,42 @@ impl Scene {
         Self::parse_in(text, name, AssetResolver::of(Path::new(name), Arc::default()))
     }
 
-    /// As [`Scene::parse`], with the files that the scene names in `library`.
+    /// Does the same as [`Scene::parse`], with the files that the scene names in `library`.
     pub(crate) fn parse_in(
         text: &str,
         name: &str,
         library: AssetResolver,
     ) -> Result<Self, SceneErrors> {
-        let (root, syntax) = DeTable::parse_recoverable(text);
-        let at = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
-        if let Some(error) = syntax.iter().min_by_key(|e| at(e)) {
-            let place = Some(line_column(text, at(error)));
+        SourceScene::parse(text, name, library).map(|source| source.scene)
+    }
+}
+
+/// A valid scene and the parsed text that describes it. The text is parsed once and the scene
+/// validated once.
+pub(crate) struct SourceScene<'a> {
+    pub scene: Scene,
+    pub former_words: Vec<FormerWord>,
+    name: &'a str,
+    text: &'a str,
+    root: Spanned<DeTable<'a>>,
+}
+
+impl<'a> SourceScene<'a> {
+    /// Parses and validates a scene from `text`; diagnostics call it `name`.
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub(crate) fn parse(
+        text: &'a str,
+        name: &'a str,
+        library: AssetResolver,
+    ) -> Result<Self, SceneErrors> {
+        let (mut root, syntax) = DeTable::parse_recoverable(text);
+        let start = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
+        if let Some(error) = syntax.iter().min_by_key(|error| start(error)) {
+            let line_column = Some(line_column(text, start(error)));
             let found = format!("this is not TOML: {}", error.message());
-            return Err(SceneErrors::at(name, place, found, ""));
+            return Err(SceneErrors::at(name, line_column, found, ""));
         }
         if root.get_ref().is_empty() {
             return Err(SceneErrors::at(
@@ -55,24 +83,34 @@ impl Scene {
                 "Expected at least one [[object]]; `zerkalo new FILE` writes a scene to start from.",
             ));
         }
-        let form = schema::check(name, text, &root);
-        if !form.is_empty() {
-            return Err(SceneErrors::new(form));
+        let (former_words, mut errors) = migrate(name, text, root.get_mut());
+        errors.extend(schema::check(name, text, &root));
+        if !errors.is_empty() {
+            return Err(SceneErrors::new(errors));
         }
-        let mut scene: Self = toml::from_str(text).map_err(|error| {
-            let place = error.span().map(|span| line_column(text, span.start));
-            SceneErrors::at(name, place, error.message().to_string(), "")
+        let mut scene = Scene::deserialize(Deserializer::from(root.clone())).map_err(|error| {
+            let line_column = error.span().map(|span| line_column(text, span.start));
+            SceneErrors::at(name, line_column, error.message().to_string(), "")
         })?;
         scene.library = library;
         scene.resolve();
         match scene.faults() {
-            faults if faults.is_empty() => Ok(scene),
-            faults => Err(SceneErrors::new(located(name, text, faults))),
+            problems if problems.is_empty() => Ok(Self { scene, former_words, name, text, root }),
+            problems => Err(SceneErrors::new(with_locations(name, text, root.get_ref(), problems))),
         }
+    }
+
+    /// Returns the lints of the scene and the warning about former words, in the order of the file.
+    pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
+        let (name, text, root) = (self.name, self.text, self.root.get_ref());
+        let mut warnings = with_locations(name, text, root, self.scene.warnings());
+        warnings.extend(migrate::warning(name, text, root, &self.former_words));
+        warnings.sort_by_key(|warning| warning.line_column);
+        warnings
     }
 }
 
-/// The text of the scene file at `path`.
+/// Returns the text of the scene file at `path`.
 pub(crate) fn read_text(path: &Path) -> Result<String, SceneErrors> {
     let name = path.display().to_string();
     let fail = |found: &str, help: &str| SceneErrors::of_file(&name, found.to_string(), help);
@@ -91,7 +129,8 @@ pub(crate) fn read_text(path: &Path) -> Result<String, SceneErrors> {
         return Err(fail("this is a directory", "Expected a scene file (TOML)."));
     }
     let mut bytes = Vec::new();
-    // One byte more than allowed tells; a device without end is not read to its end.
+    // One byte more than the limit shows that a file is too large; a device without end is not read
+    // to its end.
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(fail(

@@ -1,45 +1,44 @@
-//! The form of a scene file, checked against the tables of fields: unknown keys, values of a wrong
-//! type, keys that are missing. Everything wrong is found in one walk.
+//! Schema validation of a scene file against the field tables: unknown keys, values of a wrong
+//! type, missing keys. One pass finds all errors.
 
 use crate::scene::OBJECT_FIELDS;
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::format::source_map::line_column;
+use crate::scene::format::source_map::{line_column, subject_in};
 use crate::scene::format::suggest::nearest;
 use crate::scene::settings::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, TRACE_FIELDS};
-use crate::scene::validate::subject;
 use crate::value::{Color, DefaultValue, Field, NumberRange, ValueType, truncated};
 use crate::{camera, light, material};
 use std::ops;
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
 
-/// The keys of a scene file.
+/// Keys of a scene file.
 pub const FIELDS: &[Field] = &[
-    table("film", FILM_FIELDS, "The picture's raster."),
-    table("trace", TRACE_FIELDS, "How far paths are followed."),
+    table("film", FILM_FIELDS, "Film: size of the picture, pixel filter, sample limit."),
+    table("trace", TRACE_FIELDS, "Integrator: kinds of rays, depth, acceleration structure."),
     Field::optional(
         "camera",
         ValueType::Table(camera::FIELDS),
         "",
-        "it stands at [0.0, 1.0, 5.0] and looks at the origin",
+        "at [0.0, 1.0, 5.0], directed at the origin",
         "The view: a pinhole camera.",
     ),
     Field::optional(
-        "views",
+        "cameras",
         ValueType::Named(camera::FIELDS),
         "",
         "there are none",
-        "Other viewpoints by name, to come back to. The picture is taken from `[camera]`.",
+        "Stored cameras by name. The picture is taken from `[camera]`.",
     ),
-    table("background", BACKGROUND_FIELDS, "What a ray sees that meets nothing."),
-    table("ambient", AMBIENT_FIELDS, "Light from everywhere, without shadows."),
+    table("background", BACKGROUND_FIELDS, "Radiance of rays that hit no surface."),
+    table("ambient", AMBIENT_FIELDS, "Ambient light: uniform, without shadows."),
     Field::optional("light", ValueType::Tables(light::FIELDS), "", "there are none", "The lights."),
     Field::optional(
         "materials",
         ValueType::Named(material::FIELDS),
         "",
         "there are none",
-        "Finishes by name, for the key `material` of objects.",
+        "Materials by name, for the key `material` of objects.",
     ),
     Field::optional(
         "object",
@@ -54,7 +53,7 @@ const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) 
     Field::optional(name, ValueType::Table(fields), "", "its keys have their defaults", doc)
 }
 
-/// Everything wrong with the form of the scene file `file`, whose `text` is TOML.
+/// Returns all schema errors in the scene file `file`, whose `text` was parsed to `root`.
 pub(crate) fn check(file: &str, text: &str, root: &Spanned<DeTable>) -> Vec<Diagnostic> {
     let mut walk =
         SchemaChecker { file, text, root: root.get_ref(), path: Vec::new(), messages: Vec::new() };
@@ -62,7 +61,7 @@ pub(crate) fn check(file: &str, text: &str, root: &Spanned<DeTable>) -> Vec<Diag
     walk.messages
 }
 
-/// Keys as people name them: `shape.sphere`, `step 2 of transform`, `shape.cube of part 1 of
+/// Returns a path in words: `shape.sphere`, `step 2 of transform`, `shape.cube of part 1 of
 /// shape.union`.
 fn phrase(keys: &[String]) -> String {
     let number = |position: &String| position.parse().map_or(0, |i: usize| i + 1);
@@ -91,10 +90,7 @@ struct SchemaChecker<'a> {
 
 impl SchemaChecker<'_> {
     fn add(&mut self, span: ops::Range<usize>, found: String, help: String) {
-        let subject = subject(&self.path, |list, index| {
-            let entry = self.root.get(list)?.get_ref().as_array()?.get(index)?;
-            entry.get_ref().as_table()?.get("name")?.get_ref().as_str().map(str::to_string)
-        });
+        let subject = subject_in(self.root, &self.path);
         let place = Some(line_column(self.text, span.start));
         self.messages.push(Diagnostic {
             file: self.file.to_string(),
@@ -105,16 +101,16 @@ impl SchemaChecker<'_> {
         });
     }
 
-    /// The keys below the thing that the subject names: `shape.sphere`.
+    /// Returns the path below the table that the subject names: `shape.sphere`.
     fn inner(&self) -> String {
         let above = match self.path.first().map(String::as_str) {
-            Some("object" | "light" | "materials" | "views") => 2,
+            Some("object" | "light" | "materials" | "cameras") => 2,
             _ => 1,
         };
         phrase(self.path.get(above..).unwrap_or_default())
     }
 
-    /// `radius`, or `shape.sphere` for what has no key of its own.
+    /// Adds an error about a value of a wrong type.
     fn wrong(&mut self, span: ops::Range<usize>, value: &DeValue, expected: &str) {
         let name = match self.inner() {
             inner if inner.is_empty() => "it".to_string(),
@@ -123,7 +119,7 @@ impl SchemaChecker<'_> {
         self.add(span, format!("{name} is {}", describe(value)), format!("Expected {expected}."));
     }
 
-    /// Returns the key that was probably meant.
+    /// Adds an error about an unknown key. Returns the key that was probably meant.
     fn unknown(
         &mut self,
         key: &Spanned<toml::de::DeString>,
@@ -198,7 +194,7 @@ impl SchemaChecker<'_> {
         self.path.pop();
     }
 
-    /// Each entry of a list, with its position in the path.
+    /// Validates each entry of a list with `each`, with its position in the path.
     fn entries(
         &mut self,
         list: &[Spanned<DeValue>],
@@ -258,8 +254,9 @@ impl SchemaChecker<'_> {
     }
 }
 
-/// Whether a value that is no table has the right type. Ranges of whole numbers are checked here,
-/// since what lies outside has no place in an unsigned integer; all other ranges in `faults`.
+/// Returns `true` if a value that is no table has the right type. Ranges of whole numbers are
+/// checked here, since an unsigned integer cannot hold values outside; all other ranges in
+/// [`Scene::faults`](crate::scene::Scene::faults).
 fn fits(takes: ValueType, value: &DeValue) -> bool {
     let list = |n: usize, each: &dyn Fn(&DeValue) -> bool| match value {
         DeValue::Array(list) => list.len() == n && list.iter().all(|v| each(v.get_ref())),
@@ -301,7 +298,7 @@ fn is_number(value: &DeValue) -> bool {
     value.is_float() || value.as_integer().and_then(integer).is_some()
 }
 
-/// `the string "abc"`, `the number -2`, `a list of 2`.
+/// Describes a value: `the string "abc"`, `the number -2`, `a list of 2`.
 fn describe(value: &DeValue) -> String {
     match value {
         DeValue::String(text) => format!("the string \"{}\"", truncated(text)),

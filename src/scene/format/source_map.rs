@@ -1,12 +1,12 @@
-//! From keys to lines and columns.
+//! Source map: lines and columns of keys and values.
 
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::validate::Problem;
+use crate::scene::validate::{Problem, subject};
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Line and column of the byte `at` of `text`, both from 1; columns count characters.
+/// Returns line and column of the byte `at` of `text`, both from 1; columns count characters.
 pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {
@@ -18,7 +18,7 @@ pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
     (before.matches('\n').count() + 1, shown.chars().count() + 1)
 }
 
-/// The span of the value behind `path`, or of the nearest part of the path that is in the file.
+/// Returns the span of the value at `path`, or of its nearest ancestor in the file.
 fn span(root: &DeTable, path: &[String]) -> Range<usize> {
     let Some((first, rest)) = path.split_first() else { return 0..0 };
     match root.get(first.as_str()) {
@@ -42,23 +42,29 @@ fn deepest_span(value: &Spanned<DeValue>, path: &[String]) -> Range<usize> {
     }
 }
 
-/// Messages for `findings` about the scene in `text`, in the order of the file.
-pub(crate) fn located(file: &str, text: &str, findings: Vec<Problem>) -> Vec<Diagnostic> {
-    let root = DeTable::parse(text).ok();
-    let mut messages: Vec<_> = findings
-        .into_iter()
-        .map(|finding| Diagnostic {
-            file: file.to_string(),
-            line_column: root
-                .as_ref()
-                .map(|r| line_column(text, span(r.get_ref(), &finding.path).start)),
-            subject: finding.subject,
-            found: finding.found,
-            help: finding.help,
-        })
-        .collect();
-    messages.sort_by_key(|m| m.line_column);
-    messages
+/// Returns diagnostics for `problems` of the scene in `text`, which was parsed to `root`.
+pub(crate) fn with_locations(
+    file: &str,
+    text: &str,
+    root: &DeTable,
+    problems: Vec<Problem>,
+) -> Vec<Diagnostic> {
+    let diagnostic = |problem: Problem| Diagnostic {
+        file: file.to_string(),
+        line_column: Some(line_column(text, span(root, &problem.path).start)),
+        subject: problem.subject,
+        found: problem.found,
+        help: problem.help,
+    };
+    problems.into_iter().map(diagnostic).collect()
+}
+
+/// Returns the name that diagnostics use for the table at `path`: `object "queen"`.
+pub(crate) fn subject_in(root: &DeTable, path: &[String]) -> String {
+    subject(path, |list, index| {
+        let entry = root.get(list)?.get_ref().as_array()?.get(index)?;
+        entry.get_ref().as_table()?.get("name")?.get_ref().as_str().map(str::to_string)
+    })
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
-//! "Did you mean": the nearest of the words that would have been right.
+//! Suggestions ("Did you mean"): the nearest known word.
 
-/// The one of `words` that is near enough to `given` to be what was meant.
+/// Returns the one of `words` that is near enough to `given` to be a typing error.
 pub(crate) fn nearest<'a>(
     given: &str,
     words: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
-    // Longer than any key by far: nobody mistyped that.
+    // Longer than any key by far: no typing error.
     if given.len() > 100 {
         return None;
     }
@@ -15,8 +15,8 @@ pub(crate) fn nearest<'a>(
     (distance <= 1 + length / 4 && distance < length).then_some(word)
 }
 
-/// Damerau-Levenshtein distance (optimal string alignment), letters' case ignored: insertions,
-/// deletions, replacements and exchanges of neighbours that lead from `a` to `b`.
+/// Returns the Damerau-Levenshtein distance (optimal string alignment) regardless of case: the
+/// number of insertions, deletions, replacements and transpositions of neighbours from `a` to `b`.
 fn distance(a: &str, b: &str) -> usize {
     let [a, b]: [Vec<char>; 2] = [a, b].map(|s| s.to_lowercase().chars().collect());
     let mut rows = vec![vec![0; b.len() + 1]; a.len() + 1];

@@ -1,0 +1,383 @@
+//! Words of earlier versions in scene files: reading takes them for the present ones, saving writes
+//! the present ones.
+
+use crate::primitive::Acceleration;
+use crate::scene::diagnostic::Diagnostic;
+use crate::scene::format::source_map::{line_column, subject_in};
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+use toml_edit::{DocumentMut, InlineTable, Item, Key, Table};
+
+/// A former word and the present one.
+type Pair = (&'static str, &'static str);
+
+const SCENE: &[Pair] = &[("views", "cameras")];
+const TRACE: &[Pair] = &[
+    ("depth", "max_depth"),
+    ("min_weight", "min_throughput"),
+    ("level", "ray_types"),
+    ("horizon", "below_horizon"),
+];
+const MATERIAL: &[Pair] = &[("index", "ior"), ("reflectance", "f0")];
+const SHAPE: &[Pair] = &[("unit_cylinder", "unit_frustum")];
+
+/// Renamed keys of the table at `path`.
+fn keys_at(path: &[String]) -> &'static [Pair] {
+    match path {
+        [] => SCENE,
+        [trace] if trace == "trace" => TRACE,
+        [materials, _] if materials == "materials" => MATERIAL,
+        [object, .., shape] if object == "object" && shape == "shape" => SHAPE,
+        _ => &[],
+    }
+}
+
+/// The key whose values were renamed in the table at `path`, and these values.
+fn values_at(path: &[String]) -> Option<(&'static str, Vec<Pair>)> {
+    match path {
+        [film] if film == "film" => Some(("filter", vec![("center", "point")])),
+        [trace] if trace == "trace" => {
+            let pair = |a: Acceleration| Some((a.former_name()?, a.name()));
+            Some(("acceleration", Acceleration::ALL.into_iter().filter_map(pair).collect()))
+        }
+        _ => None,
+    }
+}
+
+/// A former word in a scene file.
+#[derive(Clone, Debug)]
+pub(crate) struct FormerWord {
+    /// Its first byte in the file.
+    start: usize,
+    /// Keys that lead to the table that holds it, in present words.
+    table: Vec<String>,
+    /// The key whose value it is; `None` if it is a key itself.
+    key: Option<&'static str>,
+    former: &'static str,
+    present: &'static str,
+}
+
+/// A former key and the present one in one table.
+struct Conflict {
+    table: Vec<String>,
+    former: (&'static str, Range<usize>),
+    present: (&'static str, Range<usize>),
+}
+
+/// Replaces the former words in a parsed file, whose spans stay. Returns them, and an error for each
+/// table that has a key under both names.
+pub(crate) fn migrate(
+    file: &str,
+    text: &str,
+    root: &mut DeTable,
+) -> (Vec<FormerWord>, Vec<Diagnostic>) {
+    let mut migration = Migration::default();
+    migration.table(root);
+    let error = |conflict: &Conflict| {
+        let (former, at) = &conflict.former;
+        let (present, other) = &conflict.present;
+        let (line, column) = line_column(text, other.start);
+        Diagnostic {
+            file: file.to_string(),
+            line_column: Some(line_column(text, at.start)),
+            subject: subject_in(root, &conflict.table),
+            found: format!("`{former}` is the former name of `{present}`, which is given, too"),
+            help: format!("Expected only `{present}`, at {line}:{column}."),
+        }
+    };
+    let errors = migration.conflicts.iter().map(error).collect();
+    (migration.words, errors)
+}
+
+#[derive(Default)]
+struct Migration {
+    path: Vec<String>,
+    words: Vec<FormerWord>,
+    conflicts: Vec<Conflict>,
+}
+
+impl Migration {
+    fn table(&mut self, table: &mut DeTable) {
+        for (former, present) in keys_at(&self.path) {
+            self.key(table, former, present);
+        }
+        if let Some((key, pairs)) = values_at(&self.path) {
+            self.value(table, key, &pairs);
+        }
+        for (key, value) in table.iter_mut() {
+            if matches!(value.get_ref(), DeValue::Table(_) | DeValue::Array(_)) {
+                self.path.push(key.get_ref().to_string());
+                match value.get_mut() {
+                    DeValue::Table(table) => self.table(table),
+                    DeValue::Array(list) => self.entries(list),
+                    _ => {}
+                }
+                self.path.pop();
+            }
+        }
+    }
+
+    fn entries(&mut self, list: &mut [Spanned<DeValue>]) {
+        for (i, entry) in list.iter_mut().enumerate() {
+            if let DeValue::Table(table) = entry.get_mut() {
+                self.path.push(i.to_string());
+                self.table(table);
+                self.path.pop();
+            }
+        }
+    }
+
+    fn key(&mut self, table: &mut DeTable, former: &'static str, present: &'static str) {
+        let Some((key, value)) = table.remove_entry(former) else { return };
+        let span = key.span();
+        if let Some((other, _)) = table.get_key_value(present) {
+            self.conflicts.push(Conflict {
+                table: self.path.clone(),
+                former: (former, span),
+                present: (present, other.span()),
+            });
+            return;
+        }
+        self.words.push(FormerWord {
+            start: span.start,
+            table: self.path.clone(),
+            key: None,
+            former,
+            present,
+        });
+        table.insert(Spanned::new(span, present.into()), value);
+    }
+
+    fn value(&mut self, table: &mut DeTable, key: &'static str, pairs: &[Pair]) {
+        let Some(value) = table.get_mut(key) else { return };
+        let start = value.span().start;
+        if let DeValue::String(word) = value.get_mut()
+            && let Some(&(former, present)) = pairs.iter().find(|(former, _)| former == word)
+        {
+            *word = present.into();
+            let table = self.path.clone();
+            self.words.push(FormerWord { start, table, key: Some(key), former, present });
+        }
+    }
+}
+
+/// The warning about the former words of a file: the first of them, and their number.
+pub(crate) fn warning(
+    file: &str,
+    text: &str,
+    root: &DeTable,
+    words: &[FormerWord],
+) -> Option<Diagnostic> {
+    let first = words.iter().min_by_key(|word| word.start)?;
+    let FormerWord { former, present, .. } = first;
+    let name = match first.key {
+        Some(key) => format!("`{key} = \"{former}\"` is now called `{key} = \"{present}\"`"),
+        None => format!("`{former}` is now called `{present}`"),
+    };
+    let (count, help) = match words.len() {
+        1 => (String::new(), "Saving writes the new name."),
+        n => (format!(" ({n} former names in this file)"), "Saving writes the new names."),
+    };
+    Some(Diagnostic {
+        file: file.to_string(),
+        line_column: Some(line_column(text, first.start)),
+        subject: subject_in(root, &first.table),
+        found: name + &count,
+        help: help.to_string(),
+    })
+}
+
+/// Writes the present words in place of `words`; order, layout and comments stay.
+pub(crate) fn write_present(document: &mut DocumentMut, words: &[FormerWord]) {
+    for word in words {
+        let table = word.table.iter().try_fold(document.as_item_mut(), |item, key| {
+            if item.is_table_like() {
+                item.get_mut(key)
+            } else {
+                item.get_mut(key.parse::<usize>().ok()?)
+            }
+        });
+        let Some(table) = table else { continue };
+        match word.key {
+            None => rename_key(table, word.former, word.present),
+            Some(key) => {
+                if let Some(value) = table.get_mut(key).and_then(Item::as_value_mut) {
+                    let decor = value.decor().clone();
+                    *value = word.present.into();
+                    *value.decor_mut() = decor;
+                }
+            }
+        }
+    }
+}
+
+/// Renames the key `former` of `table`; entries keep their order.
+fn rename_key(table: &mut Item, former: &str, present: &str) {
+    let renamed = |key: Key| {
+        if key.get() != former {
+            return key;
+        }
+        let decor = (key.leaf_decor().clone(), key.dotted_decor().clone());
+        Key::new(present).with_leaf_decor(decor.0).with_dotted_decor(decor.1)
+    };
+    fn names<'a, T>(entries: impl Iterator<Item = (&'a str, T)>) -> Vec<String> {
+        entries.map(|(name, _)| name.to_string()).collect()
+    }
+    if let Some(table) = table.as_table_mut() {
+        let table: &mut Table = table;
+        for name in names(table.iter()) {
+            if let Some((key, value)) = table.remove_entry(&name) {
+                table.insert_formatted(&renamed(key), value);
+            }
+        }
+    } else if let Some(table) = table.as_inline_table_mut() {
+        let table: &mut InlineTable = table;
+        for name in names(table.iter()) {
+            if let Some((key, value)) = table.remove_entry(&name) {
+                table.insert_formatted(&renamed(key), value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::{Document, Scene};
+
+    /// Every word that was renamed, in every layout.
+    const FORMER: &str = r##"# A scene of an earlier version.
+film = { filter = "center", size = [64, 48] } # small
+ambient.color = [0.5, 0.5, 0.5]
+
+[trace] # how far
+depth = 7 # deep
+min_weight = 0.01
+level = "shadows"
+# What dips.
+horizon = "absorb"
+acceleration = "hierarchy" # a tree
+
+[views.left] # from the left
+eye = [1.0, 2.0, 3.0]
+target = [0.0, 0.0, 0.0]
+
+# The other side.
+[views.right]
+eye = [4.0, 2.0, 3.0]
+target = [0.0, 0.0, 0.0]
+
+[materials]
+glass = { diffuse = 0.0, transmission = 1.0, index = 1.3, roughness = 0.1 } # bends
+[materials.index]
+reflectance = [0.5, 0.25, 0.125] # a name, and a key
+color = "#804020"
+
+[[object]]
+shape.unit_cylinder.s = 0.5 # narrow
+material = "index"
+
+[[object]]
+material = "glass"
+shape.union.of = [
+    # first
+    { shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 } },
+    { shape.unit_cylinder = { s = 0.25 }, material = "index" }, # second
+]
+"##;
+
+    const PAIRS: [(&str, &str); 10] = [
+        ("views", "cameras"),
+        ("\ndepth", "\nmax_depth"),
+        ("min_weight", "min_throughput"),
+        ("\nlevel", "\nray_types"),
+        ("\nhorizon", "\nbelow_horizon"),
+        ("\"hierarchy\"", "\"bvh\""),
+        ("\"center\"", "\"point\""),
+        ("index = 1.3", "ior = 1.3"),
+        ("reflectance", "f0"),
+        ("unit_cylinder", "unit_frustum"),
+    ];
+
+    fn present() -> String {
+        PAIRS
+            .iter()
+            .fold(FORMER.to_string(), |text, (former, present)| text.replace(former, present))
+    }
+
+    #[test]
+    fn former_words_read_as_the_present_ones() {
+        let former = Document::parse(FORMER.to_string(), "old.toml").unwrap();
+        assert_eq!(former.text(), FORMER, "reading leaves the text alone");
+        let present = Document::parse(present(), "new.toml").unwrap();
+        assert_eq!(former.scene(), present.scene());
+        assert_eq!(present.warnings(), []);
+        let warnings: Vec<_> = former.warnings().iter().map(|w| w.to_string()).collect();
+        let expected = "old.toml:2:19  film: `filter = \"center\"` is now called \
+                        `filter = \"point\"` (11 former names in this file).\n\
+                        \x20              Saving writes the new names.";
+        assert_eq!(warnings, [expected]);
+    }
+
+    #[test]
+    fn saving_writes_present_words_and_keeps_comments_and_order() {
+        let mut document = Document::parse(FORMER.to_string(), "old.toml").unwrap();
+        let scene: Scene = document.scene().clone();
+        document.apply(&scene);
+        assert_eq!(document.text(), present());
+        let mut edited = scene.clone();
+        edited.trace.max_depth = 3;
+        document.apply(&edited);
+        assert_eq!(document.text(), present().replace("max_depth = 7", "max_depth = 3"));
+        document.apply(&scene);
+        assert_eq!(document.text(), present());
+    }
+
+    #[test]
+    fn one_former_word_is_named_alone() {
+        let text = "ambient.color = [1, 1, 1]\n[[object]]\nname = \"glass\"\nshape.unit_cylinder = { s = 0.5 }\n";
+        let document = Document::parse(text.to_string(), "old.toml").unwrap();
+        assert_eq!(
+            document.warnings()[0].to_string(),
+            "old.toml:4:7  object \"glass\": `unit_cylinder` is now called `unit_frustum`.\n\
+             \x20             Saving writes the new name."
+        );
+    }
+
+    #[test]
+    fn former_and_present_key_together_are_an_error() {
+        for (text, expected) in [
+            (
+                "[materials.glass]\nior = 1.5\nroughness = 0.1\nindex = 1.3\n",
+                "old.toml:4:1  material \"glass\": `index` is the former name of `ior`, which is \
+                 given, too.\n              Expected only `ior`, at 2:1.",
+            ),
+            (
+                "[views.a]\ntarget = [0, 0, 0]\n[cameras.b]\ntarget = [0, 0, 0]\n",
+                "old.toml:1:2  `views` is the former name of `cameras`, which is given, too.\n\
+                 \x20             Expected only `cameras`, at 3:2.",
+            ),
+        ] {
+            let errors = Document::parse(text.to_string(), "old.toml").unwrap_err();
+            assert_eq!(errors.to_string(), expected);
+        }
+    }
+
+    #[test]
+    fn diagnostics_point_into_the_file_as_it_is() {
+        let text = "materials.glass = { index = 1.5, roughness = -1.0 }\n";
+        let errors = Document::parse(text.to_string(), "old.toml").unwrap_err();
+        assert!(errors.to_string().starts_with("old.toml:1:46  material \"glass\""), "{errors}");
+    }
+
+    #[test]
+    fn acceleration_opens_under_every_former_name() {
+        for (former, present) in super::values_at(&["trace".to_string()]).unwrap().1 {
+            let read = |name: &str| {
+                let text = format!("trace.acceleration = \"{name}\"\n");
+                Scene::parse(&text, "old.toml").unwrap()
+            };
+            assert_eq!(read(former), read(present), "{former}");
+        }
+    }
+}
