@@ -8,7 +8,7 @@ use crate::primitive::csg_tree::{CsgSolid, CsgTree};
 use crate::shape::registry::KIND_TABLE;
 use crate::shape::transform::{TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
-use crate::value::{Field, ValidationError, Validator, ValueType};
+use crate::value::{Description, Field, ValidationError, Validator, ValueType};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -70,17 +70,25 @@ macro_rules! compounds {
             pub of: Vec<CsgOperand>,
         }
 
-        impl ShapeDesc for $kind {
+        impl Description for $kind {
             const DOC: &'static str = $doc;
-            const EXAMPLE: &'static str = $example;
             const FIELDS: &'static [Field] = &OF_FIELDS;
+
+            fn validator(&self) -> Validator {
+                let errors = part_faults(&self.of, 1).into_iter().map(Some);
+                errors.fold(Validator::new(Self::FIELDS), Validator::and)
+            }
+        }
+
+        impl ShapeDesc for $kind {
+            const EXAMPLE: &'static str = $example;
 
             fn form(&self) -> Form {
                 Form::Csg(combined(&self.of, CsgTree::$kind))
             }
 
             fn faults(&self) -> Vec<ValidationError> {
-                let faults = part_faults(&self.of, 1);
+                let faults = self.validator().validate();
                 if !faults.is_empty() || self.form().bounds().is_some() {
                     return faults;
                 }

@@ -1,7 +1,7 @@
 //! Tables of what may be written: one [`Field`] a key. Reading, messages, range checks, the
 //! generated reference and every form that edits a description use the same tables.
 
-use crate::value::NumberRange;
+use crate::value::{NumberRange, ValidationError, number};
 use std::fmt;
 
 /// One key of a description.
@@ -105,6 +105,59 @@ impl Field {
         doc: &'static str,
     ) -> Self {
         Self { name, takes, unit, preset: DefaultValue::Without(instead), doc }
+    }
+
+    /// The key with the default `value`, given as TOML text.
+    pub const fn with_default(self, value: &'static str) -> Self {
+        Self { preset: DefaultValue::Is(value), ..self }
+    }
+
+    /// The key without a value by default; `instead` says what holds then.
+    pub const fn or(self, instead: &'static str) -> Self {
+        Self { preset: DefaultValue::Without(instead), ..self }
+    }
+
+    /// Checks numbers against the value type.
+    pub fn check(&self, values: &[f64]) -> Option<ValidationError> {
+        let each = |range: NumberRange| values.iter().all(|x| range.holds(*x));
+        let valid = match self.takes {
+            ValueType::Number(range)
+            | ValueType::Numbers(_, range)
+            | ValueType::Whole(range)
+            | ValueType::Wholes(_, range)
+            | ValueType::Color(range) => each(range),
+            ValueType::Direction => each(NumberRange::FINITE) && values.iter().any(|x| *x != 0.0),
+            ValueType::Factor => each(NumberRange::FINITE) && values.iter().all(|x| *x != 0.0),
+            _ => true,
+        };
+        let name = self.name;
+        let found = || match values {
+            [x] => format!("{name} is {}", number(*x)),
+            list => {
+                let list: Vec<_> = list.iter().map(|x| number(*x)).collect();
+                format!("{name} is [{}]", list.join(", "))
+            }
+        };
+        (!valid).then(|| ValidationError::new(name, found(), self.takes.to_string()))
+    }
+}
+
+impl ValueType {
+    /// The value type with numbers in `range`.
+    pub const fn within(self, range: NumberRange) -> Self {
+        match self {
+            Self::Whole(_) => Self::Whole(range),
+            Self::Wholes(n, _) => Self::Wholes(n, range),
+            Self::Number(_) => Self::Number(range),
+            Self::Numbers(n, _) => Self::Numbers(n, range),
+            Self::Color(_) => Self::Color(range),
+            other => other,
+        }
+    }
+
+    /// `other`: a declaration overrides the value type of a Rust type.
+    pub(crate) const fn replaced(self, other: Self) -> Self {
+        other
     }
 }
 

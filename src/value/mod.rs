@@ -4,6 +4,7 @@
 
 mod angle;
 mod color;
+mod description;
 mod direction;
 mod field;
 mod hash;
@@ -14,6 +15,8 @@ mod validation;
 
 pub use angle::sin_cos_degrees;
 pub use color::{Color, linear_from_srgb};
+pub use description::{Description, FieldValue};
+pub(crate) use description::{choices, description, doc_text, is_absent};
 pub use direction::unit;
 pub use field::{Choice, DefaultValue, Field, ValueType};
 pub use hash::fnv1a64;

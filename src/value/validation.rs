@@ -1,6 +1,6 @@
 //! What is wrong with a value, before anybody knows where in the file it stands.
 
-use crate::value::{Field, NumberRange, ValueType, number};
+use crate::value::{Field, FieldValue, number};
 
 /// One thing wrong in a description. The scene room adds file, line, column and object.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,13 +31,13 @@ impl ValidationError {
 #[derive(Debug)]
 pub struct Validator {
     fields: &'static [Field],
-    validate: Vec<ValidationError>,
+    errors: Vec<ValidationError>,
 }
 
 impl Validator {
     /// None found yet.
     pub fn new(fields: &'static [Field]) -> Self {
-        Self { fields, validate: Vec::new() }
+        Self { fields, errors: Vec::new() }
     }
 
     /// Checks the numbers behind the key `name` against what the table says about it.
@@ -45,23 +45,24 @@ impl Validator {
     /// # Panics
     /// If the table has no such key: an error of the program, found by the first test of the kind.
     pub fn numbers(mut self, name: &str, values: &[f64]) -> Self {
-        let field = self.fields.iter().find(|f| f.name == name);
-        let takes = field.unwrap_or_else(|| panic!("no field `{name}` in its table")).takes;
-        let each = |range: NumberRange| values.iter().all(|x| range.holds(*x));
-        let right = match takes {
-            ValueType::Number(range)
-            | ValueType::Numbers(_, range)
-            | ValueType::Whole(range)
-            | ValueType::Wholes(_, range)
-            | ValueType::Color(range) => each(range),
-            ValueType::Direction => each(NumberRange::FINITE) && values.iter().any(|x| *x != 0.0),
-            ValueType::Factor => each(NumberRange::FINITE) && values.iter().all(|x| *x != 0.0),
-            _ => true,
-        };
-        if !right {
-            self.validate.push(ValidationError::new(name, is(name, values), takes.to_string()));
-        }
+        let error = self.find(name).check(values);
+        self.errors.extend(error);
         self
+    }
+
+    /// Checks the value of the key `name`.
+    ///
+    /// # Panics
+    /// If the table has no such key.
+    pub fn field(mut self, name: &str, value: &impl FieldValue) -> Self {
+        let errors = value.errors(self.find(name));
+        self.errors.extend(errors);
+        self
+    }
+
+    fn find(&self, name: &str) -> &'static Field {
+        let field = self.fields.iter().find(|field| field.name == name);
+        field.unwrap_or_else(|| panic!("no field `{name}` in its table"))
     }
 
     /// As `numbers`, if there is a value.
@@ -83,10 +84,10 @@ impl Validator {
             .chain(coordinates.iter().map(|c| c.abs()))
             .fold(0.0, f64::max);
         if let Some((name, smallest)) = smallest
-            && self.validate.is_empty()
+            && self.errors.is_empty()
             && largest > 1e12 * smallest
         {
-            self.validate.push(ValidationError::new(
+            self.errors.push(ValidationError::new(
                 name,
                 format!(
                     "{name} is {}, too small beside {} in the same shape",
@@ -101,34 +102,23 @@ impl Validator {
 
     /// Adds `fault` if there is one.
     pub fn and(mut self, fault: Option<ValidationError>) -> Self {
-        self.validate.extend(fault);
+        self.errors.extend(fault);
         self
     }
 
     /// Adds the faults of a description behind the key `outer`.
-    pub fn nested(mut self, outer: &str, validate: Vec<ValidationError>) -> Self {
-        self.validate.extend(validate.into_iter().map(|f| f.prefixed(outer)));
+    pub fn nested(mut self, outer: &str, errors: Vec<ValidationError>) -> Self {
+        self.errors.extend(errors.into_iter().map(|f| f.prefixed(outer)));
         self
     }
 
     /// Whether none was found so far.
     pub fn clean(&self) -> bool {
-        self.validate.is_empty()
+        self.errors.is_empty()
     }
 
     /// What was found.
     pub fn validate(self) -> Vec<ValidationError> {
-        self.validate
-    }
-}
-
-/// `radius is -1`, `center is [NaN, 0, 0]`.
-fn is(name: &str, values: &[f64]) -> String {
-    match values {
-        [x] => format!("{name} is {}", number(*x)),
-        many => {
-            let list: Vec<_> = many.iter().map(|x| number(*x)).collect();
-            format!("{name} is [{}]", list.join(", "))
-        }
+        self.errors
     }
 }
