@@ -41,7 +41,7 @@ fn random(seed: u64) -> (Scene, f64) {
     let least = [0.0, 0.0, 0.01, 0.2][n.below(4)];
     let eye = n.direction() * [0.3, 1.2, 4.0, 4.0][n.below(4)];
     let mut text = format!(
-        "film = {{ size = [10, 8] }}\ntrace = {{ depth = {depth}, min_weight = {least:?} }}
+        "film = {{ size = [10, 8] }}\ntrace = {{ max_depth = {depth}, min_throughput = {least:?} }}
         camera = {{ eye = {:?}, target = [0.01, 0.3, 0.02], near = {near:?}, view_angle.vertical = {:?} }}
         background.color = [1.0, 0.5, 0.25]\nambient.color = [1.0, 1.0, 1.0]
         [[light]]\npoint = {{ position = {:?} }}\nintensity = 0.5\n",
@@ -63,11 +63,11 @@ fn random(seed: u64) -> (Scene, f64) {
         }
         if n.below(3) == 0 {
             lines.push(format!("transmission = {:?}", [0.05, 0.4, 1.0, 1.2][n.below(4)]));
-            lines.push(format!("index = {:?}", [1.0, 1.5, 0.7][n.below(3)]));
+            lines.push(format!("ior = {:?}", [1.0, 1.5, 0.7][n.below(3)]));
         }
         match n.below(4) {
             0 => lines.push("fresnel = \"dielectric\"".into()),
-            1 => lines.push("fresnel = \"schlick\"\nreflectance = [0.1, 0.5, 0.2]".into()),
+            1 => lines.push("fresnel = \"schlick\"\nf0 = [0.1, 0.5, 0.2]".into()),
             2 => lines.push("metal = \"copper\"".into()),
             _ => {}
         }
@@ -112,7 +112,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 
 fn deeper(scene: &Scene) -> Scene {
     let mut deeper = scene.clone();
-    deeper.trace.depth = 2 * scene.trace.depth + 7;
+    deeper.trace.max_depth = 2 * scene.trace.max_depth + 7;
     deeper
 }
 
@@ -122,8 +122,8 @@ fn checked(seeds: std::ops::Range<u64>) {
         let (scene, brightest) = random(seed);
         let picture = values(&scene);
         let mut unweighted = scene.clone();
-        unweighted.trace.min_weight = 0.0;
-        let others = [("depth", deeper(&scene)), ("min_weight", unweighted)];
+        unweighted.trace.min_throughput = 0.0;
+        let others = [("max_depth", deeper(&scene)), ("min_throughput", unweighted)];
         for (row, (limit, other)) in others.iter().enumerate() {
             let off = apart(&picture, &values(other));
             match told(&scene, limit) {
@@ -140,7 +140,7 @@ fn checked(seeds: std::ops::Range<u64>) {
             }
         }
     }
-    println!("nothing, bound, no bound: depth {:?}, min_weight {:?}", counts[0], counts[1]);
+    println!("nothing, bound, no bound: max_depth {:?}, min_throughput {:?}", counts[0], counts[1]);
     assert!(counts[0][0] > 20 && counts[0][1] > 20 && counts[1][1] > 10, "{counts:?}");
 }
 
@@ -160,7 +160,7 @@ fn what_is_said_of_the_limits_holds_in_many_more_scenes() {
 fn a_lone_glass_ball_is_cut_by_depth() {
     let text = |more: &str, camera: &str| {
         format!(
-            "film = {{ size = [24, 18], filter = \"center\" }}\ntrace.depth = 2
+            "film = {{ size = [24, 18], filter = \"point\" }}\ntrace.max_depth = 2
             background.color = [1.0, 1.0, 1.0]\nambient.color = [1.0, 1.0, 1.0]
             [camera]\n{camera}
             [materials.glass]\ndiffuse = 0.0\ncolor = [0.1, 0.1, 0.1]\ntransmission = 0.9\n{more}
@@ -172,7 +172,7 @@ fn a_lone_glass_ball_is_cut_by_depth() {
     let whole = "eye = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]";
     let bumped = parsed(&text(bump, whole));
     let off = apart(&values(&bumped), &values(&deeper(&bumped)));
-    assert!(off > 0.01 && told(&bumped, "depth") == Told::NoBound, "{off}");
+    assert!(off > 0.01 && told(&bumped, "max_depth") == Told::NoBound, "{off}");
     // The rim as seen from the eye: at cos = 1/5 from the axis. There rounding decides whether light gets out.
     let mut numbers = Numbers::new(4);
     let (mut cut, rounds) = (0, 240);
@@ -189,8 +189,8 @@ fn a_lone_glass_ball_is_cut_by_depth() {
             axis.cross(across).to_array()
         );
         let rim =
-            parsed(&text(&format!("index = {index:?}"), &camera).replace("\"center\"", "\"box\""));
-        assert!(told(&rim, "depth") == Told::NoBound);
+            parsed(&text(&format!("ior = {index:?}"), &camera).replace("\"point\"", "\"box\""));
+        assert!(told(&rim, "max_depth") == Told::NoBound);
         cut += u32::from(apart(&values(&rim), &values(&deeper(&rim))) > 0.0);
     }
     println!("at the rim depth 2 cuts something in {cut} of {rounds} pictures");
@@ -209,7 +209,7 @@ fn a_lone_mirror_is_met_once() {
         let lobe = ["mirror", "cone", "square", "ggx"][(round / kinds.len()) % 4];
         let up = numbers.direction();
         let text = format!(
-            "film = {{ size = [24, 18] }}\ntrace.depth = 1
+            "film = {{ size = [24, 18] }}\ntrace.max_depth = 1
             background.color = [1.0, 1.0, 1.0]\nambient.color = [1.0, 1.0, 1.0]
             [camera]\neye = [0.0, 0.0, 4.0]\ntarget = [0.0, 0.0, 0.0]\nview_angle.vertical = 40.0
             [materials.m]\ncolor = [0.5, 0.5, 0.5]\nreflection = 0.9\nlobe = \"{lobe}\"\nroughness = 0.5
@@ -219,7 +219,7 @@ fn a_lone_mirror_is_met_once() {
             numbers.between(0.0, 180.0)
         );
         let mut scene = parsed(&text);
-        if told(&scene, "depth") != Told::Nothing {
+        if told(&scene, "max_depth") != Told::Nothing {
             continue;
         }
         // Along the surface: its plane, seen at a grazing angle and so narrowly that all pixels graze.

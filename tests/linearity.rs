@@ -218,14 +218,14 @@ fn levels_add_shadows_and_reflections() {
         let [primary, shadows, full] =
             ["primary", "shadows", "full"].map(|l| small(&format!("level-{l}.toml")));
         let mut unreflected = full.clone();
-        unreflected.trace.depth = 0;
-        assert_eq!(primary.trace.level, RayTypes::Primary);
+        unreflected.trace.max_depth = 0;
+        assert_eq!(primary.trace.ray_types, RayTypes::Primary);
         let [lit, shadowed, reflected] = [&primary, &shadows, &full].map(|s| values(s, precision));
         // Shadows only take light away, reflections only add it.
         assert!(shadowed.iter().zip(&lit).all(|(s, l)| s <= l));
         assert!(shadowed.iter().zip(&reflected).all(|(s, r)| s <= r));
         assert!(difference(&shadowed, &lit) > 0.1 && difference(&shadowed, &reflected) > 0.1);
-        assert!(values(&unreflected, precision) == shadowed, "depth 0 is level `shadows`");
+        assert!(values(&unreflected, precision) == shadowed, "max_depth 0 is ray_types `shadows`");
     }
     let [primary, shadows, full] =
         ["primary", "shadows", "full"].map(|l| small(&format!("level-{l}.toml")));
@@ -241,7 +241,7 @@ fn depth_is_honoured_and_what_it_cuts_is_bounded() {
     const RHO: f64 = 0.9;
     let with_depth = |depth: u32| {
         let mut scene = small("facing-mirrors.toml");
-        (scene.trace.depth, scene.trace.min_weight) = (depth, 0.0);
+        (scene.trace.max_depth, scene.trace.min_throughput) = (depth, 0.0);
         scene
     };
     let all = values(&with_depth(400), Precision::Double);
@@ -260,16 +260,16 @@ fn depth_is_honoured_and_what_it_cuts_is_bounded() {
         before = sum;
         let world = AnyWorld::compile(&scene, &world::Options::default());
         let told = world.biases().concat();
-        assert!(told.contains(&format!("depth {depth} cuts longer paths")), "{told}");
+        assert!(told.contains(&format!("max_depth {depth} cuts longer paths")), "{told}");
     }
 }
 
 #[test]
-fn min_weight_is_honoured_and_what_it_cuts_is_bounded() {
+fn min_throughput_is_honoured_and_what_it_cuts_is_bounded() {
     const RHO: f64 = 0.9;
     let with_least = |least: f64| {
         let mut scene = small("facing-mirrors.toml");
-        (scene.trace.depth, scene.trace.min_weight) = (400, least);
+        (scene.trace.max_depth, scene.trace.min_throughput) = (400, least);
         scene
     };
     let all = values(&with_least(0.0), Precision::Double);
@@ -277,14 +277,14 @@ fn min_weight_is_honoured_and_what_it_cuts_is_bounded() {
         // Paths of up to K reflections weigh at least as much: the same as this depth.
         let depth = (f64::ln(least) / RHO.ln()).floor() as u32;
         let mut by_depth = with_least(0.0);
-        by_depth.trace.depth = depth;
+        by_depth.trace.max_depth = depth;
         let scene = with_least(least);
         let cut = values(&scene, Precision::Double);
         assert!(cut == values(&by_depth, Precision::Double), "{least} is depth {depth}");
         let missing = cut.iter().zip(&all).map(|(cut, all)| all - cut).fold(0.0, f64::max);
         assert!(missing > 0.0 && missing <= 1.2 * least / (1.0 - RHO), "{least}: {missing}");
         let world = AnyWorld::compile(&scene, &world::Options::default());
-        assert!(world.biases().concat().contains(&format!("min_weight {least} cuts")));
+        assert!(world.biases().concat().contains(&format!("min_throughput {least} cuts")));
     }
 }
 
@@ -295,7 +295,10 @@ fn the_horizon_folds_or_absorbs() {
         assert!(has(&absorb, "absorbing horizon") && !has(&fold, "absorbing horizon"));
         assert_eq!(
             fold.trace,
-            zerkalo::scene::IntegratorSettings { horizon: BelowHorizon::Fold, ..absorb.trace }
+            zerkalo::scene::IntegratorSettings {
+                below_horizon: BelowHorizon::Fold,
+                ..absorb.trace
+            }
         );
         // The rays that do not dip are the same: absorbing only takes light away.
         let [kept, lost] = [&fold, &absorb].map(|s| values(s, precision));

@@ -169,7 +169,7 @@ fn the_tracks_are_where_their_formula_puts_them() {
         let mirror = &scene.materials[&scene.objects[0].material];
         assert_eq!(scene.objects[0].shape.form(), ball([20.0, 0.0, -40.0], 15.0));
         assert_eq!((mirror.color.0, mirror.reflection), ([0.6, 0.6, 0.4], 1.0));
-        assert_eq!((mirror.transmission, mirror.index), (0.2, 1.4286));
+        assert_eq!((mirror.transmission, mirror.ior), (0.2, 1.4286));
         for (n, object) in scene.objects[1..].iter().enumerate() {
             let (i, j) = ((n / 10) as f64, (n % 10) as f64);
             let center = [i - 9.0, 7.0 - 5.0 * i.sqrt(), 6.0 - j * j];

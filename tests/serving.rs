@@ -29,9 +29,9 @@ const SAMPLES: u32 = 2;
 fn base() -> Scene {
     let mut text = "
         film = { size = [30, 20], rays_per_pixel = 64 }
-        trace = { depth = 3 }
+        trace = { max_depth = 3 }
         camera = { eye = [0.0, 1.0, 14.0], target = [0.0, 0.0, 0.0] }
-        views.left = { eye = [-3.0, 1.0, 9.0], direction = [0.3, 0.0, -1.0] }
+        cameras.left = { eye = [-3.0, 1.0, 9.0], direction = [0.3, 0.0, -1.0] }
         background.color = [0.1, 0.2, 0.3]
         ambient.color = [0.3, 0.25, 0.2]
         [materials.matte]
@@ -307,7 +307,8 @@ fn what_is_served_is_the_picture_of_the_edited_scene() {
     let Bench { tried, served, by_key: [refused, accepted], .. } = &bench;
     println!("{} keys, {tried} scenes, {served} served; {accepted:?}; not {refused:?}", all.len());
     assert!(*tried > 900 && *served > 150, "{tried} {served}");
-    for key in ["intensity", "color", "on", "name", "rays_per_pixel", "eye", "material", "views"] {
+    for key in ["intensity", "color", "on", "name", "rays_per_pixel", "eye", "material", "cameras"]
+    {
         assert!(accepted.contains(key), "no edit of {key} was served");
     }
 }

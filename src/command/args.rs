@@ -5,7 +5,7 @@ use crate::measure::Experiment;
 use crate::sampling::SamplerKind;
 use crate::scene::Acceleration;
 use crate::world::Precision;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -136,7 +136,7 @@ pub struct MeasureArgs {
     /// Noise levels to reach, in 8-bit codes
     #[arg(long, value_name = "CODES,..", value_parser = positive, value_delimiter = ',', default_value = "2,1,0.5,0.25")]
     pub noise: Vec<f64>,
-    /// Compare only these settings, such as: adaptivity,precision,threads,sampler,lobe,level,depth,min-weight,rays-per-pixel,acceleration
+    /// Compare only these settings, such as: adaptivity,precision,threads,sampler,lobe,ray-types,max-depth,min-throughput,rays-per-pixel,acceleration
     #[arg(long, value_name = "SETTING,..", value_delimiter = ',', conflicts_with = "full")]
     pub only: Vec<Experiment>,
     /// Compare all settings, which takes about five minutes
@@ -268,11 +268,10 @@ fn tone() -> impl TypedValueParser<Value = Tone> {
 
 /// Parses the name of an acceleration.
 fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
-    let names = PossibleValuesParser::new(Acceleration::ALL.map(Acceleration::name));
-    names.map(|given| {
-        let named = Acceleration::ALL.into_iter().find(|a| a.name() == given);
-        named.unwrap_or_default()
-    })
+    let names = Acceleration::ALL
+        .map(|structure| PossibleValue::new(structure.name()).aliases(structure.former_name()));
+    PossibleValuesParser::new(names)
+        .map(|given| Acceleration::from_name(&given).unwrap_or_default())
 }
 
 /// `640x480`; what a size may be is the scene's to say.

@@ -213,7 +213,7 @@ mod tests {
     #[test]
     fn every_subject_has_its_line_and_every_field_its_place() {
         let mut scene = built_in();
-        scene.views.insert("left".into(), scene.camera.clone());
+        scene.cameras.insert("left".into(), scene.camera.clone());
         scene.lights[0].on = false;
         let lines = outline(&scene);
         for (_, subject) in subjects(&scene) {

@@ -156,7 +156,7 @@ impl<S: Float> Bsdf<S> {
         let dielectric = material.fresnel_mode() == Fresnel::Dielectric;
         let transmission = (reflects && k_t > 0.0).then(|| Transmission {
             strength: S::from_f64(k_t),
-            index: S::from_f64(material.index),
+            index: S::from_f64(material.ior),
             dielectric,
         });
         let reflectance = Reflectance::new(material);

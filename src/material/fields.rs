@@ -34,17 +34,17 @@ pub const FIELDS: &[Field] = &[
         COEFFICIENT,
         "",
         "0.0",
-        "Reflection coefficient k_r: weight of what the surface mirrors.",
+        "Weight k_r of the traced reflection; not energy-conserving with the other coefficients.",
     ),
     Field::preset(
         "transmission",
         COEFFICIENT,
         "",
         "0.0",
-        "Transmission coefficient k_t: weight of what shows through the surface; 0 is opaque.",
+        "Weight k_t of the transmitted light, not energy-conserving with the other coefficients; 0 is opaque.",
     ),
     Field::preset(
-        "index",
+        "ior",
         ValueType::Number(NumberRange::closed(0.1, 1e4)),
         "",
         "1.5",
@@ -55,7 +55,7 @@ pub const FIELDS: &[Field] = &[
         ValueType::Number(NumberRange::closed(0.0, 1e6)),
         "",
         "0.0",
-        "Blur of the reflection: radius of the cone's base at unit distance; 0 is a perfect mirror.",
+        "Tangent of the half-angle of the reflection cone, not a microfacet alpha; 0 is a perfect mirror.",
     ),
     Field::preset(
         "lobe",
@@ -86,7 +86,7 @@ pub const FIELDS: &[Field] = &[
         "How the reflectance depends on the angle.",
     ),
     Field::optional(
-        "reflectance",
+        "f0",
         ValueType::Color(NumberRange::SHARE),
         "",
         "white",
@@ -97,7 +97,7 @@ pub const FIELDS: &[Field] = &[
         ValueType::Choice(METALS),
         "",
         "no metal",
-        "A metal, for its reflectance. Not together with `reflectance`.",
+        "A metal, for its reflectance. Not together with `f0`.",
     ),
     Field::preset(
         "two_sided",
@@ -120,7 +120,7 @@ pub const FIELDS: &[Field] = &[
         ValueType::OneOf(BUMP_KINDS),
         "",
         "as smooth as the shape",
-        "BumpMap that light sees on the surface; its outline stays as it is.",
+        "Heights that light sees on the surface; its outline stays as it is.",
     ),
 ];
 
@@ -153,7 +153,7 @@ const FRESNELS: &[Choice] = &[
     },
     Choice {
         name: "dielectric",
-        doc: "Fresnel's equations for `index`: `reflection` weighs the share F that is reflected, \
+        doc: "Fresnel's equations for `ior`: `reflection` weighs the share F that is reflected, \
               `transmission` the share 1 - F that is not",
     },
 ];
@@ -191,10 +191,10 @@ mod tests {
             exponent: -1.0,
             reflection: -0.1,
             transmission: -0.1,
-            index: 0.0,
+            ior: 0.0,
             roughness: -1e-9,
             alpha: Some(-1.0),
-            reflectance: Some(Color([1.1, 0.0, 0.0])),
+            f0: Some(Color([1.1, 0.0, 0.0])),
             ..Material::default()
         };
         let keys: Vec<_> = bad.faults().into_iter().map(|f| f.key).collect();
@@ -206,22 +206,22 @@ mod tests {
             "exponent",
             "reflection",
             "transmission",
-            "index",
+            "ior",
             "roughness",
             "alpha",
-            "reflectance",
+            "f0",
         ];
         assert_eq!(keys, numbers);
         assert_eq!(FIELDS.len(), numbers.len() + 8, "a new field? Check its range here");
         bad = Material { metal: Some(Metal::Gold), ..Material::default() };
         assert!(bad.faults().is_empty());
-        bad.reflectance = Some(Color::WHITE);
+        bad.f0 = Some(Color::WHITE);
         assert_eq!(bad.faults()[0].key, "metal");
         let dielectric = Material { fresnel: Some(Fresnel::Dielectric), ..Material::default() };
         assert!(dielectric.faults().is_empty());
         bad = Material { metal: Some(Metal::Gold), ..dielectric.clone() };
         assert_eq!(bad.faults()[0].key, "fresnel");
-        bad = Material { reflectance: Some(Color::WHITE), ..dielectric };
+        bad = Material { f0: Some(Color::WHITE), ..dielectric };
         assert_eq!(bad.faults()[0].key, "fresnel");
     }
 }

@@ -40,7 +40,7 @@ impl<S: Float> Reflectance<S> {
         let f0 = material.f0().0;
         let law = material.fresnel_mode();
         let index2 = match law {
-            Fresnel::Dielectric => [material.index.powi(2) - 1.0; 3],
+            Fresnel::Dielectric => [material.ior.powi(2) - 1.0; 3],
             _ => f0.map(|f| index_from_f0(f).powi(2) - 1.0),
         };
         let total = f0.map(|f| f >= 1.0 - f64::powi(2.0, -24));
@@ -106,7 +106,7 @@ mod tests {
 
     fn exact(f0: f64) -> Reflectance<f64> {
         Reflectance::new(&Material {
-            reflectance: Some(Color([f0; 3])),
+            f0: Some(Color([f0; 3])),
             fresnel: Some(Fresnel::Exact),
             ..Material::default()
         })
@@ -119,7 +119,7 @@ mod tests {
         for f0 in [0.0, 1e-9, 0.04, 0.349, 0.989, 1.0 - 2f64.powi(-24), 1.0] {
             for law in [Fresnel::Constant, Fresnel::Schlick, Fresnel::Exact] {
                 let material = Material {
-                    reflectance: Some(Color([f0; 3])),
+                    f0: Some(Color([f0; 3])),
                     fresnel: Some(law),
                     ..Material::default()
                 };

@@ -46,13 +46,14 @@ pub struct Material {
     pub exponent: f64,
     /// Which formula gives the highlight of a light.
     pub highlight: Highlight,
-    /// Reflection coefficient k_r of the traced reflection.
+    /// Weight k_r of the traced reflection; not energy-conserving with the other coefficients.
     pub reflection: f64,
-    /// Transmission coefficient k_t of what shows through the surface.
+    /// Weight k_t of the transmitted light; not energy-conserving with the other coefficients.
     pub transmission: f64,
     /// Index of refraction n of what the surface encloses; 1 outside of everything.
-    pub index: f64,
-    /// Radius of the reflection cone's base at unit distance; 0: a perfect mirror.
+    pub ior: f64,
+    /// Tangent of the half-angle of the reflection cone, not a microfacet alpha; 0 is a perfect
+    /// mirror.
     pub roughness: f64,
     /// How the reflected ray is spread.
     pub lobe: Lobe,
@@ -66,8 +67,8 @@ pub struct Material {
     pub fresnel: Option<Fresnel>,
     /// Reflectance F0 at normal incidence, per channel; without it white.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub reflectance: Option<Color>,
-    /// A metal's F0 instead of `reflectance`.
+    pub f0: Option<Color>,
+    /// A metal's F0 instead of `f0`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metal: Option<Metal>,
     /// Whether the back of a surface is finished like its front; otherwise the back is black.
@@ -169,13 +170,13 @@ impl Default for Material {
             highlight: Highlight::Phong,
             reflection: 0.0,
             transmission: 0.0,
-            index: 1.5,
+            ior: 1.5,
             roughness: 0.0,
             lobe: Lobe::Cone,
             alpha: None,
             masking: Masking::VCavity,
             fresnel: None,
-            reflectance: None,
+            f0: None,
             metal: None,
             two_sided: true,
             texture: None,
@@ -188,10 +189,10 @@ impl Material {
     /// Reflectance at normal incidence: the metal's, the given one, that of a dielectric, or white.
     pub fn f0(&self) -> Color {
         let own = match self.fresnel_mode() {
-            Fresnel::Dielectric => Color([f0_from_index(self.index); 3]),
+            Fresnel::Dielectric => Color([f0_from_index(self.ior); 3]),
             _ => Color::WHITE,
         };
-        self.metal.map(Metal::f0).or(self.reflectance).unwrap_or(own)
+        self.metal.map(Metal::f0).or(self.f0).unwrap_or(own)
     }
 
     /// How reflectance depends on the angle.
@@ -213,10 +214,10 @@ impl Material {
 
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
-        let both = self.reflectance.is_some() && self.metal.is_some();
+        let both = self.f0.is_some() && self.metal.is_some();
         let dielectric = self.fresnel == Some(Fresnel::Dielectric);
-        let other = if self.metal.is_some() { "metal" } else { "reflectance" };
-        let twice = dielectric && (self.metal.is_some() || self.reflectance.is_some());
+        let other = if self.metal.is_some() { "metal" } else { "f0" };
+        let twice = dielectric && (self.metal.is_some() || self.f0.is_some());
         Validator::new(FIELDS)
             .numbers("color", &self.color.0)
             .numbers("ambient", &[self.ambient])
@@ -225,22 +226,24 @@ impl Material {
             .numbers("exponent", &[self.exponent])
             .numbers("reflection", &[self.reflection])
             .numbers("transmission", &[self.transmission])
-            .numbers("index", &[self.index])
+            .numbers("ior", &[self.ior])
             .numbers("roughness", &[self.roughness])
             .optional("alpha", self.alpha.as_ref().map(std::slice::from_ref))
-            .optional("reflectance", self.reflectance.as_ref().map(|c| &c.0[..]))
+            .optional("f0", self.f0.as_ref().map(|c| &c.0[..]))
             .and(both.then(|| {
                 ValidationError::new(
                     "metal",
-                    "both metal and reflectance are given",
-                    "only one of them: a metal stands for its reflectance",
+                    "both metal and f0 are given",
+                    "only one of them: a metal stands for its f0",
                 )
             }))
             .and(twice.then(|| {
                 ValidationError::new(
                     "fresnel",
                     format!("`dielectric` together with {other}"),
-                    format!("no {other}: the index of refraction gives a dielectric's reflectance"),
+                    format!(
+                        "no {other}: `ior` gives a dielectric's reflectance at normal incidence"
+                    ),
                 )
             }))
             .nested("texture", self.texture.as_ref().map(Texture::faults).unwrap_or_default())

@@ -18,7 +18,7 @@ pub(super) const BUMP_KINDS: &[Field] = &[Field::required(
     "image",
     ValueType::Table(BUMP_FIELDS),
     "",
-    "BumpMap from a PNG or JPEG image: black is low, white is high.",
+    "Heights from a PNG or JPEG image: black is low, white is high.",
 )];
 
 /// The keys of `texture.image`.

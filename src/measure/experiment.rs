@@ -47,9 +47,9 @@ impl Experiment {
         (Self::Threads, "threads", "How many threads pay"),
         (Self::Sampler, "sampler", "What Sobol's points give over independent random numbers"),
         (Self::Lobe, "lobe", "What the square gives over the cone, and gets wrong"),
-        (Self::Level, "level", "What less tracing gives, and gets wrong"),
-        (Self::Depth, "depth", "What fewer reflections give, and get wrong"),
-        (Self::MinWeight, "min-weight", "What ending weak paths gives, and gets wrong"),
+        (Self::Level, "ray-types", "What less tracing gives, and gets wrong"),
+        (Self::Depth, "max-depth", "What fewer reflections give, and get wrong"),
+        (Self::MinWeight, "min-throughput", "What ending weak paths gives, and gets wrong"),
         (Self::RaysPerPixel, "rays-per-pixel", "What a cap on glossy pixels gives, and leaves"),
         (Self::Acceleration, "acceleration", "What boxes, rectangles and trees cost and save"),
     ];
@@ -95,6 +95,13 @@ impl FromStr for Experiment {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        // Names of earlier versions.
+        let text = match text {
+            "level" => "ray-types",
+            "depth" => "max-depth",
+            "min-weight" => "min-throughput",
+            current => current,
+        };
         let found = Self::ALL.iter().find(|(_, name, _)| *name == text);
         found.map(|(topic, ..)| *topic).ok_or_else(|| {
             let names: Vec<_> = Self::ALL.iter().map(|(_, name, _)| *name).collect();
@@ -186,8 +193,8 @@ impl Plan {
             edit(&mut scene);
             Variant { topic, name, scene: Arc::new(scene), ..base.clone() }
         };
-        let reflects = scene.trace.level == RayTypes::Full
-            && scene.trace.depth > 0
+        let reflects = scene.trace.ray_types == RayTypes::Full
+            && scene.trace.max_depth > 0
             && scene
                 .objects
                 .iter()
@@ -237,18 +244,20 @@ impl Plan {
             }
             Experiment::Level => [("primary", RayTypes::Primary), ("shadows", RayTypes::Shadows)]
                 .into_iter()
-                .filter(|(_, level)| *level < scene.trace.level)
-                .map(|(name, level)| edited(name.to_string(), &|s| s.trace.level = level))
+                .filter(|(_, level)| *level < scene.trace.ray_types)
+                .map(|(name, level)| edited(name.to_string(), &|s| s.trace.ray_types = level))
                 .collect(),
             Experiment::Depth => [0, 1, 2, 4, 8]
                 .into_iter()
-                .filter(|depth| reflects && *depth < scene.trace.depth)
-                .map(|depth| edited(format!("depth {depth}"), &|s| s.trace.depth = depth))
+                .filter(|depth| reflects && *depth < scene.trace.max_depth)
+                .map(|depth| edited(format!("depth {depth}"), &|s| s.trace.max_depth = depth))
                 .collect(),
             Experiment::MinWeight => [0.001, 0.01, 0.1]
                 .into_iter()
-                .filter(|weight| reflects && *weight > scene.trace.min_weight)
-                .map(|weight| edited(format!("weight {weight}"), &|s| s.trace.min_weight = weight))
+                .filter(|weight| reflects && *weight > scene.trace.min_throughput)
+                .map(|weight| {
+                    edited(format!("weight {weight}"), &|s| s.trace.min_throughput = weight)
+                })
                 .collect(),
             Experiment::RaysPerPixel => [64, 256, 1024]
                 .into_iter()

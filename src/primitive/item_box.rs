@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// How rays are kept from things that they cannot meet. No way changes a picture, only its time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Acceleration {
     /// What has been measured to be fastest: a tree for many things, else for each part of the picture
     /// the things that its rays may meet.
@@ -37,15 +37,35 @@ impl Acceleration {
     pub const CHOICES: &'static [Choice] = &[
         Choice { name: "auto", doc: "the fastest, by measurement" },
         Choice { name: "none", doc: "every ray meets everything" },
-        Choice { name: "projected", doc: "a rectangle on the screen per thing, for camera rays" },
-        Choice { name: "object", doc: "a box per thing, in its own space" },
-        Choice { name: "world", doc: "a box per thing, in the scene's space" },
-        Choice { name: "hierarchy", doc: "a tree of boxes" },
+        Choice {
+            name: "screen-bounds",
+            doc: "a rectangle on the screen per thing, for camera rays",
+        },
+        Choice { name: "obb", doc: "a box per thing, in its own space" },
+        Choice { name: "aabb", doc: "a box per thing, in the scene's space" },
+        Choice { name: "bvh", doc: "a tree of boxes" },
     ];
 
     /// Its name.
     pub fn name(self) -> &'static str {
         Self::CHOICES[self as usize].name
+    }
+
+    /// Its name in earlier versions, which scene files and the command line still accept; `None` if
+    /// that is the same.
+    pub fn former_name(self) -> Option<&'static str> {
+        match self {
+            Self::Auto | Self::None => None,
+            Self::ScreenBounds => Some("projected"),
+            Self::Obb => Some("object"),
+            Self::Aabb => Some("world"),
+            Self::Bvh => Some("hierarchy"),
+        }
+    }
+
+    /// The structure with this name or former name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|s| s.name() == name || s.former_name() == Some(name))
     }
 }
 

@@ -15,7 +15,7 @@ fn opened(directory: &Path) -> (PathBuf, SceneFile) {
 /// What is there with another depth.
 fn edited(file: &SceneFile, depth: u32) -> Scene {
     let mut scene = file.document().scene().clone();
-    scene.trace.depth = depth;
+    scene.trace.max_depth = depth;
     scene
 }
 
@@ -30,7 +30,7 @@ fn saving_there_and_back_gives_the_same_bytes() {
     let start = file.document().scene().clone();
     file.save(&edited(&file, 3), false).unwrap();
     let text = fs::read_to_string(&path).unwrap();
-    assert_eq!(text, BUILT_IN.to_string() + "\n[trace]\ndepth = 3\n");
+    assert_eq!(text, BUILT_IN.to_string() + "\n[trace]\nmax_depth = 3\n");
     assert_eq!(file.on_disk(), DiskState::Unchanged);
     file.save(&start, false).unwrap();
     assert_eq!(fs::read_to_string(&path).unwrap(), BUILT_IN);

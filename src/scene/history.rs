@@ -146,7 +146,7 @@ fn bytes(scene: &Scene) -> usize {
         + scene.objects.len() * size_of::<Object>()
         + scene.lights.len() * (size_of::<Light>() + 16)
         + scene.materials.len() * (size_of::<Material>() + 32)
-        + scene.views.len() * (size_of::<Camera>() + 32)
+        + scene.cameras.len() * (size_of::<Camera>() + 32)
 }
 
 #[cfg(test)]
@@ -155,12 +155,12 @@ mod tests {
 
     fn scene(depth: u32) -> Arc<Scene> {
         let mut scene = Scene::default();
-        scene.trace.depth = depth;
+        scene.trace.max_depth = depth;
         Arc::new(scene)
     }
 
     fn depth(history: &History) -> u32 {
-        history.scene().trace.depth
+        history.scene().trace.max_depth
     }
 
     #[test]
@@ -226,7 +226,7 @@ mod tests {
         large.objects = vec![ball; 20_000];
         let mut history = History::new(Arc::new(large.clone()));
         for depth in 1..100 {
-            large.trace.depth = depth;
+            large.trace.max_depth = depth;
             history.record(Arc::new(large.clone()), "deeper", false);
         }
         let held: usize = history.past.iter().map(|entry| entry.bytes).sum();

@@ -94,7 +94,7 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
         Highlight::Phong => m.specular + m.reflection,
         Highlight::CookTorrance => m.specular.max(m.reflection),
     };
-    let f0 = m.metal.map(|metal| metal.f0()).or(m.reflectance).unwrap_or(Color::WHITE).largest();
+    let f0 = m.metal.map(|metal| metal.f0()).or(m.f0).unwrap_or(Color::WHITE).largest();
     let passed = match m.fresnel_mode() {
         // F and 1 - F of the same light.
         Fresnel::Dielectric => mirrored.max(m.transmission),

@@ -49,7 +49,7 @@ pub struct Scene {
     /// The view.
     pub camera: Camera,
     /// Other viewpoints by name, to come back to. The picture is taken from `camera`.
-    pub views: BTreeMap<String, Camera>,
+    pub cameras: BTreeMap<String, Camera>,
     /// What a ray sees that meets nothing.
     pub background: Background,
     /// Light from everywhere.

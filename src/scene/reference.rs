@@ -23,7 +23,7 @@ and every key with a default may be left out. Unknown keys are errors.
   x colour x cosine plus `specular` x highlight, `reflection` x what is mirrored, and
   `transmission` x what shows through. The parts are not weighted against each other, and the sum
   may exceed 1; it is clipped only when it is shown.
-- A solid with `transmission` is filled with what has its `index` of refraction: light is bent by
+- A solid with `transmission` is filled with what has its index of refraction `ior`: light is bent by
   Snell's law where it enters and leaves, and totally reflected past the critical angle. Where such
   solids overlap, the one listed last fills the space and the surfaces of the others are not there:
   a bubble is listed after its ball. At most four at one point are told apart. A compound is one

@@ -12,7 +12,7 @@ pub struct FilmSettings {
     pub size: [u32; 2],
     /// How samples spread over a pixel.
     pub filter: Filter,
-    /// The most samples that a pixel with a glossy reflection gets; 0: no cap.
+    /// Largest number of samples per pixel spent on glossy pictures; 0 is no cap.
     pub rays_per_pixel: u32,
 }
 
@@ -23,21 +23,21 @@ pub enum Filter {
     /// Evenly over the pixel's square.
     Box,
     /// All in its centre: no anti-aliasing.
-    Center,
+    Point,
 }
 
 /// How far paths are followed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IntegratorSettings {
-    /// What is traced at all.
-    pub level: RayTypes,
+    /// Kinds of rays that are traced.
+    pub ray_types: RayTypes,
     /// The most surfaces that a path meets after the first: 0 is no reflection and no transmission.
-    pub depth: u32,
+    pub max_depth: u32,
     /// A path ends when what it could still add is weighted by less than this.
-    pub min_weight: f64,
+    pub min_throughput: f64,
     /// What becomes of a reflected ray that would dip under the surface.
-    pub horizon: BelowHorizon,
+    pub below_horizon: BelowHorizon,
     /// How rays are kept from things that they cannot meet.
     pub acceleration: Acceleration,
 }
@@ -89,10 +89,10 @@ impl Default for FilmSettings {
 impl Default for IntegratorSettings {
     fn default() -> Self {
         Self {
-            level: RayTypes::Full,
-            depth: 16,
-            min_weight: 0.0,
-            horizon: BelowHorizon::Fold,
+            ray_types: RayTypes::Full,
+            max_depth: 16,
+            min_throughput: 0.0,
+            below_horizon: BelowHorizon::Fold,
             acceleration: Acceleration::Auto,
         }
     }
@@ -126,7 +126,7 @@ pub const FILM_FIELDS: &[Field] = &[
         "filter",
         ValueType::Choice(&[
             Choice { name: "box", doc: "evenly over the pixel's square" },
-            Choice { name: "center", doc: "all in its centre: no anti-aliasing" },
+            Choice { name: "point", doc: "all in its centre: no anti-aliasing" },
         ]),
         "",
         "\"box\"",
@@ -137,14 +137,14 @@ pub const FILM_FIELDS: &[Field] = &[
         ValueType::Whole(NumberRange::closed(0.0, 1e9)),
         "samples",
         "0",
-        "The most samples that a pixel with a glossy reflection gets; 0: no cap.",
+        "Largest number of samples per pixel spent on glossy pictures; 0 is no cap.",
     ),
 ];
 
 /// The keys of `[trace]`.
 pub const TRACE_FIELDS: &[Field] = &[
     Field::preset(
-        "level",
+        "ray_types",
         ValueType::Choice(&[
             Choice { name: "primary", doc: "camera rays only: no shadows, no reflections" },
             Choice { name: "shadows", doc: "camera rays and shadow rays" },
@@ -155,21 +155,21 @@ pub const TRACE_FIELDS: &[Field] = &[
         "What is traced at all.",
     ),
     Field::preset(
-        "depth",
+        "max_depth",
         ValueType::Whole(NumberRange::closed(0.0, 10000.0)),
         "surfaces",
         "16",
         "The most surfaces that a path meets after the first; 0: no reflection, no transmission.",
     ),
     Field::preset(
-        "min_weight",
+        "min_throughput",
         ValueType::Number(NumberRange::SHARE),
         "",
         "0.0",
         "A path ends when what it could still add is weighted by less than this.",
     ),
     Field::preset(
-        "horizon",
+        "below_horizon",
         ValueType::Choice(&[
             Choice { name: "fold", doc: "it is mirrored at the surface: no light is lost" },
             Choice { name: "absorb", doc: "it is lost" },
@@ -227,8 +227,8 @@ impl IntegratorSettings {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
         Validator::new(TRACE_FIELDS)
-            .numbers("depth", &[f64::from(self.depth)])
-            .numbers("min_weight", &[self.min_weight])
+            .numbers("max_depth", &[f64::from(self.max_depth)])
+            .numbers("min_throughput", &[self.min_throughput])
             .validate()
     }
 }

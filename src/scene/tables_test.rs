@@ -255,9 +255,9 @@ fn faults_of_parts_say_which_part() {
             "one part",
         ),
         (
-            "{ shape.intersection.of = [{ shape.unit_cylinder = { s = 1 } }, \
-               { shape.unit_cylinder = { s = -1 } }] }",
-            "shape.intersection.of.1.shape.unit_cylinder.s",
+            "{ shape.intersection.of = [{ shape.unit_frustum = { s = 1 } }, \
+               { shape.unit_frustum = { s = -1 } }] }",
+            "shape.intersection.of.1.shape.unit_frustum.s",
             "-1",
         ),
     ] {

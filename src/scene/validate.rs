@@ -43,7 +43,7 @@ pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<Stri
             }
         }
         [list, name, ..] if list == "materials" => format!("material \"{}\"", truncated(name)),
-        [list, name, ..] if list == "views" => format!("view \"{}\"", truncated(name)),
+        [list, name, ..] if list == "cameras" => format!("camera \"{}\"", truncated(name)),
         [first, ..] => first.clone(),
         [] => String::new(),
     }
@@ -92,8 +92,8 @@ impl Scene {
         add(&["film"], self.film.faults());
         add(&["trace"], self.trace.faults());
         add(&["camera"], self.camera.faults());
-        for (name, view) in &self.views {
-            add(&["views", name], view.faults());
+        for (name, view) in &self.cameras {
+            add(&["cameras", name], view.faults());
         }
         add(&["background"], self.background.faults());
         add(&["ambient"], self.ambient.faults());

@@ -150,7 +150,7 @@ kinds! {
     "cylinder" => Cylinder,
     "cone" => Cone,
     "tapered_cylinder" => TaperedCylinder,
-    "unit_cylinder" => UnitFrustum,
+    "unit_frustum" => UnitFrustum,
     "platform" => HorizontalRectangle,
     "rectangle" => Rectangle,
     "plane" => Plane,

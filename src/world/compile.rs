@@ -126,8 +126,8 @@ impl<L: SimdFloat> World<L> {
     }
 
     fn compile(scene: &Scene, placed: RecenteredGeometry) -> Self {
-        let level = scene.trace.level;
-        let reflects = level == RayTypes::Full && scene.trace.depth > 0;
+        let level = scene.trace.ray_types;
+        let reflects = level == RayTypes::Full && scene.trace.max_depth > 0;
         let default = Material::default();
         let mut used: Vec<&Material> = Vec::new();
         let mut finish_of_object = Vec::new();
@@ -260,9 +260,9 @@ impl<L: SimdFloat> World<L> {
             simple: !smooth && !colored && geometry.has_no_tree(),
             surface_textures,
             shadows: level >= RayTypes::Shadows && !geometry.is_empty(),
-            depth: if going_on { scene.trace.depth } else { 0 },
-            min_weight: scene.trace.min_weight,
-            fold: scene.trace.horizon == BelowHorizon::Fold,
+            depth: if going_on { scene.trace.max_depth } else { 0 },
+            min_weight: scene.trace.min_throughput,
+            fold: scene.trace.below_horizon == BelowHorizon::Fold,
             view,
             names: groups.names(scene),
             jitter: scene.film.filter == Filter::Box,

@@ -52,7 +52,7 @@ impl Inventory {
         };
         say(through(false), "transmission");
         say(through(true), "dielectric");
-        let absorbs = scene.trace.horizon == BelowHorizon::Absorb;
+        let absorbs = scene.trace.below_horizon == BelowHorizon::Absorb;
         say(absorbs && spread(|s| !matches!(s, ReflectionLobe::Mirror)), "absorbing horizon");
         let count = |n: usize, what: &str| match n {
             0 => None,
@@ -82,9 +82,9 @@ impl Inventory {
         say(shared, "shared light group");
         say(members.contains(&LightGroupSource::Ambient), "ambient");
         say(members.contains(&LightGroupSource::Background), "background");
-        say(scene.trace.level == RayTypes::Primary, "no shadows");
-        say(scene.trace.level == RayTypes::Shadows && lamps > 0, "shadows only");
-        say(scene.film.filter == Filter::Center, "no anti-aliasing");
+        say(scene.trace.ray_types == RayTypes::Primary, "no shadows");
+        say(scene.trace.ray_types == RayTypes::Shadows && lamps > 0, "shadows only");
+        say(scene.film.filter == Filter::Point, "no anti-aliasing");
         parts.push(format!("{precision} precision"));
         Self { parts }
     }

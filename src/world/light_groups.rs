@@ -236,7 +236,7 @@ mod tests {
         assert!(!serves(|s| s.lights.push(s.lights[0].clone())));
         assert!(!serves(|s| s.camera.eye[0] += 0.5));
         assert!(!serves(|s| s.film.size = [641, 480]));
-        assert!(!serves(|s| s.trace.depth = 3));
+        assert!(!serves(|s| s.trace.max_depth = 3));
         assert!(!serves(|s| s.materials.get_mut("red").unwrap().ambient = 0.5));
         assert!(!serves(|s| s.objects[0].material = "spare".to_string()));
         assert!(!serves(|s| s.objects.push(s.objects[0].clone())));

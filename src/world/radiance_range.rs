@@ -179,7 +179,7 @@ impl<'a> SceneDistances<'a> {
         let responses = (0..forms.len()).map(of_form).collect();
         let materials: Vec<&Material> = (0..forms.len()).flat_map(&materials_of).collect();
         let ambient = materials.iter().flat_map(|m| m.color.0.map(|c| c * m.ambient)).collect();
-        let reflects = scene.trace.level == RayTypes::Full && scene.trace.depth > 0;
+        let reflects = scene.trace.ray_types == RayTypes::Full && scene.trace.max_depth > 0;
         let passed_on = |m: &Material| {
             let mirrored = m.f0().0.map(|f0| f0 * m.reflection);
             reflects.then_some(mirrored.into_iter().chain([m.transmission]))
@@ -192,7 +192,7 @@ impl<'a> SceneDistances<'a> {
             _ => m.reflection + m.transmission,
         });
         let gain = match reflects {
-            true => strongest.fold(1.0, f64::max).powf(f64::from(scene.trace.depth)),
+            true => strongest.fold(1.0, f64::max).powf(f64::from(scene.trace.max_depth)),
             false => 1.0,
         };
         Self {

@@ -22,7 +22,7 @@ impl LightGroups {
             film,
             trace,
             camera,
-            views: _,
+            cameras: _,
             background,
             ambient,
             lights: _,

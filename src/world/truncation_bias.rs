@@ -139,7 +139,7 @@ impl Reach {
 /// equal there, but at the rim rounding decides whether the critical angle is passed, and bumps change them.
 pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
     let reach = Reach::new(scene);
-    if scene.trace.level < RayTypes::Full || reach.first == 0.0 {
+    if scene.trace.ray_types < RayTypes::Full || reach.first == 0.0 {
         return Vec::new();
     }
     let bound = |sum: f64| {
@@ -150,16 +150,16 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
         }
     };
     let mut out = Vec::new();
-    let depth = scene.trace.depth;
+    let depth = scene.trace.max_depth;
     let cut = reach.from(depth.saturating_add(1));
     if cut > 0.0 {
-        out.push(format!("depth {depth} cuts longer paths ({})", bound(cut)));
+        out.push(format!("max_depth {depth} cuts longer paths ({})", bound(cut)));
     }
-    let least = scene.trace.min_weight;
+    let least = scene.trace.min_throughput;
     // At depth 0 nothing goes on that could end.
     if least > 0.0 && depth > 0 {
         let ended = reach.ended(least, depth) * reach.from(0);
-        out.push(format!("min_weight {least} cuts weaker paths ({})", bound(ended)));
+        out.push(format!("min_throughput {least} cuts weaker paths ({})", bound(ended)));
     }
     out
 }
@@ -198,24 +198,24 @@ mod tests {
         // 0.9^17 / (1 - 0.9)
         assert_eq!(
             inside,
-            ["depth 16 cuts longer paths (at most 1.67e0 of the brightest surface)"]
+            ["max_depth 16 cuts longer paths (at most 1.67e0 of the brightest surface)"]
         );
         let mut one = scene("[0.0, 0.0, 5.0]", &[(0.9, BALL)]);
-        one.trace.depth = 0;
+        one.trace.max_depth = 0;
         assert_eq!(
             truncation_bounds(&one),
-            ["depth 0 cuts longer paths (at most 9.00e-1 of the brightest surface)"]
+            ["max_depth 0 cuts longer paths (at most 9.00e-1 of the brightest surface)"]
         );
     }
 
     #[test]
     fn a_weak_partner_makes_long_paths_weak() {
         let mut two = scene("[0.0, 0.0, 5.0]", &[(0.9, BALL), (0.1, FLOOR)]);
-        two.trace.depth = 3;
+        two.trace.max_depth = 3;
         // Four reflections: 0.09^2 (1 + 0.9) / (1 - 0.09)
         assert_eq!(
             truncation_bounds(&two),
-            ["depth 3 cuts longer paths (at most 1.70e-2 of the brightest surface)"]
+            ["max_depth 3 cuts longer paths (at most 1.70e-2 of the brightest surface)"]
         );
         let full =
             truncation_bounds(&scene("[0.0, 0.0, 5.0]", &[(1.0, BALL), (1.0, FLOOR)])).concat();
@@ -242,7 +242,7 @@ mod tests {
         // 0.5^17 / (1 - 0.5)
         assert_eq!(
             truncation_bounds(&with(0.4, Fresnel::Dielectric, outside, BALL)),
-            ["depth 16 cuts longer paths (at most 1.53e-5 of the brightest surface)"]
+            ["max_depth 16 cuts longer paths (at most 1.53e-5 of the brightest surface)"]
         );
         // A pane alone is met once.
         assert_eq!(truncation_bounds(&with(0.4, Fresnel::Dielectric, outside, FLOOR)), [""; 0]);
@@ -265,23 +265,23 @@ mod tests {
     #[test]
     fn least_weights_end_paths_that_divide_more_than_once() {
         let mut opaque = scene("[0.0, 0.0, 5.0]", &[(0.5, BALL), (0.5, FLOOR)]);
-        opaque.trace.min_weight = 0.01;
+        opaque.trace.min_throughput = 0.01;
         // 0.01 (1 + 0.5) / (1 - 0.25)
         assert_eq!(
             truncation_bounds(&opaque)[1],
-            "min_weight 0.01 cuts weaker paths (at most 2.00e-2 of the brightest surface)"
+            "min_throughput 0.01 cuts weaker paths (at most 2.00e-2 of the brightest surface)"
         );
         let mut glass = opaque.clone();
         let m0 = glass.materials.get_mut("m0").unwrap();
         (m0.transmission, m0.fresnel) = (0.5, Some(Fresnel::Dielectric));
         let told = truncation_bounds(&glass).concat();
         // 0.08, 0.08, 0.08, 1/16, 1/32, ..., 2^-16: 0.365 in all, times 2.
-        assert!(told.contains("min_weight 0.01 cuts weaker paths (at most 7.3"), "{told}");
+        assert!(told.contains("min_throughput 0.01 cuts weaker paths (at most 7.3"), "{told}");
     }
 
     #[test]
     fn an_eye_that_rounding_puts_inside_begins_inside() {
         let just = truncation_bounds(&scene("[0.0, 0.0, 1.00000001]", &[(0.9, BALL)])).concat();
-        assert!(just.contains("depth 16 cuts"), "{just}");
+        assert!(just.contains("max_depth 16 cuts"), "{just}");
     }
 }

@@ -19,7 +19,7 @@ fn fresnel(material: &Material, c: f64) -> DVec3 {
         Fresnel::Exact | Fresnel::Dielectric => {
             // The mean of both polarisations (Fresnel), for light from a vacuum.
             let n = match material.fresnel_mode() {
-                Fresnel::Dielectric => material.index,
+                Fresnel::Dielectric => material.ior,
                 _ => (1.0 + f0.sqrt()) / (1.0 - f0.sqrt()),
             };
             let sin_t = (1.0 - c * c).max(0.0).sqrt() / n;

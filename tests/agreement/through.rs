@@ -41,7 +41,7 @@ impl Tracer<'_> {
         bodies
             .filter_map(|(i, body)| Some((i, body, self.transparent(body)?)))
             .find(|(_, body, _)| body.holds(point))
-            .map_or((None, 1.0), |(i, _, material)| (Some(i), material.index))
+            .map_or((None, 1.0), |(i, _, material)| (Some(i), material.ior))
     }
 
     /// From `hit`, whose material lets light through, one way by chance.
@@ -51,7 +51,7 @@ impl Tracer<'_> {
         let (before, n_i) = self.medium(hit.point + hit.normal * ASIDE);
         let (behind, mut n_t) = self.medium(hit.point - hit.normal * ASIDE);
         if open {
-            n_t = material.index;
+            n_t = material.ior;
         } else if before == behind {
             return Way::Straight;
         }
@@ -83,7 +83,7 @@ impl Tracer<'_> {
         };
         let plain = Material { fresnel: None, ..material.clone() };
         let own = if dielectric { &plain } else { material };
-        let horizon = self.scene.trace.horizon;
+        let horizon = self.scene.trace.below_horizon;
         let mirrored = if !dielectric && !open && t.is_none() {
             Some((direction - 2.0 * direction.dot(n) * n, DVec3::ONE))
         } else if mirrors && material.reflection > 0.0 {

@@ -111,7 +111,7 @@ impl<'a> Tracer<'a> {
     fn sample(&self, x: u32, y: u32, numbers: &mut Numbers) -> DVec3 {
         let (dx, dy) = match self.scene.film.filter {
             Filter::Box => (numbers.unit(), numbers.unit()),
-            Filter::Center => (0.5, 0.5),
+            Filter::Point => (0.5, 0.5),
         };
         let (mut origin, mut direction) = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy);
         let trace = &self.scene.trace;
@@ -121,8 +121,8 @@ impl<'a> Tracer<'a> {
             let Some(hit) = self.meet(origin, direction) else {
                 return radiance + weight * DVec3::from(self.scene.background.color.0);
             };
-            let through = trace.level == RayTypes::Full && hit.material.transmission > 0.0;
-            if through && trace.depth > 0 {
+            let through = trace.ray_types == RayTypes::Full && hit.material.transmission > 0.0;
+            if through && trace.max_depth > 0 {
                 let way = self.through(&hit, direction, numbers);
                 if matches!(way, Way::On(_)) && !hit.bare {
                     radiance += weight * self.shade(&hit, -direction);
@@ -131,7 +131,7 @@ impl<'a> Tracer<'a> {
                     Way::Straight => Some((direction, DVec3::ONE)),
                     Way::On(next) => next,
                 };
-                let Some((next, factor)) = next.filter(|_| bounce < trace.depth) else {
+                let Some((next, factor)) = next.filter(|_| bounce < trace.max_depth) else {
                     return radiance;
                 };
                 weight *= factor;
@@ -142,17 +142,23 @@ impl<'a> Tracer<'a> {
                 return radiance;
             }
             radiance += weight * self.shade(&hit, -direction);
-            let reflects = hit.material.reflection > 0.0 && trace.level == RayTypes::Full;
-            if !reflects || bounce == trace.depth {
+            let reflects = hit.material.reflection > 0.0 && trace.ray_types == RayTypes::Full;
+            if !reflects || bounce == trace.max_depth {
                 return radiance;
             }
-            let turned =
-                reflect(hit.material, hit.seen, -direction, trace.horizon, self.mutation, numbers);
+            let turned = reflect(
+                hit.material,
+                hit.seen,
+                -direction,
+                trace.below_horizon,
+                self.mutation,
+                numbers,
+            );
             let Some((mut next, factor)) = turned else { return radiance };
             // What would go into the surface goes as steeply out of it.
             next -= 2.0 * next.dot(hit.normal).min(0.0) * hit.normal;
             weight *= factor;
-            if weight.max_element() <= 0.0 || weight.max_element() < trace.min_weight {
+            if weight.max_element() <= 0.0 || weight.max_element() < trace.min_throughput {
                 return radiance;
             }
             (origin, direction) = (hit.point, next);
@@ -243,7 +249,7 @@ impl<'a> Tracer<'a> {
     }
 
     fn in_shadow(&self, point: DVec3, towards: DVec3, distance: f64) -> bool {
-        if self.scene.trace.level == RayTypes::Primary {
+        if self.scene.trace.ray_types == RayTypes::Primary {
             return false;
         }
         let offset = if self.mutation == Mutation::ShadowOffset { 1e-3 } else { 0.0 };
@@ -280,13 +286,13 @@ const KNOWN: [&str; 19] = [
     "highlight",
     "reflection",
     "transmission",
-    "index",
+    "ior",
     "roughness",
     "lobe",
     "alpha",
     "masking",
     "fresnel",
-    "reflectance",
+    "f0",
     "metal",
     "two_sided",
     "texture",

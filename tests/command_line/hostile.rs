@@ -81,7 +81,7 @@ fn what_a_scene_says_steers_no_terminal() {
         ("a material", SCENE.replace("\"red\"", &evil)),
         ("materials", SCENE.replace("[materials.red]", &format!("[materials.{evil}]"))),
         ("a key", format!("{SCENE}\n[trace]\n{evil} = 1\n")),
-        ("a word", format!("{SCENE}\n[trace]\nlevel = {evil}\n")),
+        ("a word", format!("{SCENE}\n[trace]\nray_types = {evil}\n")),
         (
             "a mesh",
             format!(
@@ -90,7 +90,7 @@ fn what_a_scene_says_steers_no_terminal() {
         ),
         (
             "a view",
-            format!("{SCENE}\n[views.{evil}]\neye = [0.0, 1.0, 0.0]\ntarget = [0.0, 0.0, 0.0]\n"),
+            format!("{SCENE}\n[cameras.{evil}]\neye = [0.0, 1.0, 0.0]\ntarget = [0.0, 0.0, 0.0]\n"),
         ),
         (
             "a doubt",

@@ -167,7 +167,7 @@ fn samples_that_were_changed_are_told_everywhere() {
              size = [9.0, 9.0], normal = [0.0, 0.0, 1.0] }}\n"
         )
     };
-    let scene = "trace = { depth = 60 }\ncamera = { eye = [0.0, 0.0, 0.0], direction = [0.0, 0.0, -1.0] }\n\
+    let scene = "trace = { max_depth = 60 }\ncamera = { eye = [0.0, 0.0, 0.0], direction = [0.0, 0.0, -1.0] }\n\
                  background = { color = [1.0, 1.0, 1.0] }\n\
                  [materials.mirror]\ndiffuse = 0.0\nreflection = 3.0\n";
     fs::write(desk.path("scene.toml"), format!("{scene}{}{}", wall(-1.0), wall(1.0))).unwrap();

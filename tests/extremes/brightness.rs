@@ -169,7 +169,7 @@ fn bright_colours_do_not_fill_the_sums() {
 fn mirrors_that_amplify_are_white() {
     let text = |k: f64, depth: u32| {
         format!(
-            "film = {{ size = [12, 9] }}\ntrace = {{ depth = {depth} }}\n\
+            "film = {{ size = [12, 9] }}\ntrace = {{ max_depth = {depth} }}\n\
              camera = {{ eye = [0.0, 0.0, 0.0], direction = [0.05, 0.02, -1.0] }}\n\
              background = {{ color = [1.0, 0.5, 0.25] }}\n\
              light = [{{ point = {{ position = [0.0, 0.3, 0.0] }} }}]\n\

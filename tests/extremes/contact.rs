@@ -88,7 +88,7 @@ impl Setting<'_> {
         let placed = |p: DVec3| at(self.place.transform_point3(p));
         let text = format!(
             "background.color = [0.2, 0.5, 0.9]\nambient.color = [1, 1, 1]\n\
-             trace.depth = 6\n[camera]\neye = {}\ntarget = {}\n\
+             trace.max_depth = 6\n[camera]\neye = {}\ntarget = {}\n\
              [[light]]\npoint.position = {}\nfalloff = \"none\"\n\
              [materials.matte]\ncolor = [0.9, 0.6, 0.3]\nambient = 0.5\n\
              [materials.mirror]\ncolor = [0.9, 0.6, 0.3]\nambient = 0.2\nreflection = 0.7\n\

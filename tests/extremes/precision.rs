@@ -91,7 +91,7 @@ fn narrow_gap(g: f64) -> String {
         + FLOOR
         + &format!(
             "[materials.glass]\nambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\n\
-             index = 1.5\nfresnel = \"dielectric\"\n[[object]]\nmaterial = \"glass\"\n\
+             ior = 1.5\nfresnel = \"dielectric\"\n[[object]]\nmaterial = \"glass\"\n\
              shape.box = {{ center = [0.0, {:e}, 0.0], size = [2.0, 0.1, 2.0] }}\n",
             0.05 + g
         )

@@ -26,7 +26,7 @@ pub fn agrees(meant: &Scene, shown: &Scene, samples: u32) -> Verdict {
 /// Every pixel of a picture without chance: one ray through each centre.
 pub fn without_chance(scene: &Scene) -> Vec<DVec3> {
     let mut scene = sized(scene.clone(), RASTER);
-    scene.film.filter = Filter::Center;
+    scene.film.filter = Filter::Point;
     let rendering = rendered(&scene, 1, Precision::Double, 1);
     picture(&rendering, Replicates::Both).into_iter().map(DVec3::from).collect()
 }
@@ -34,7 +34,7 @@ pub fn without_chance(scene: &Scene) -> Vec<DVec3> {
 /// Whether both programs agree on every pixel of scenes in which nothing is left to chance.
 pub fn exactly(meant: &Scene, shown: &Scene) -> Verdict {
     let mut meant = sized(meant.clone(), RASTER);
-    meant.film.filter = Filter::Center;
+    meant.film.filter = Filter::Point;
     let tracer =
         Tracer::new(&meant, Mutation::None).expect("the plain tracer knows everything in it");
     let mut numbers = Numbers::new(1);

@@ -110,7 +110,7 @@ fn a8_point_light() {
             ("another place", &|s| warm(s).point = Some(Point { position: [-2.2, 2.1, 1.2] })),
             ("half the intensity", &|s| warm(s).intensity *= 0.5),
             ("white", &|s| warm(s).color = Color::WHITE),
-            ("without shadows", &|s| s.trace.level = RayTypes::Primary),
+            ("without shadows", &|s| s.trace.ray_types = RayTypes::Primary),
         ],
     );
 }
@@ -124,7 +124,7 @@ fn a10_phong_lighting() {
             ("no diffuse part", &|s| material(s, "wide").diffuse = 0.0),
             ("no highlight", &|s| material(s, "narrow").specular = 0.0),
             ("another exponent", &|s| material(s, "middle").exponent = 21.0),
-            ("no shadow rays", &|s| s.trace.level = RayTypes::Primary),
+            ("no shadow rays", &|s| s.trace.ray_types = RayTypes::Primary),
             ("one of two lights", &|s| s.lights[1].on = false),
             ("Cook-Torrance", &|s| material(s, "narrow").highlight = Highlight::CookTorrance),
         ],
@@ -173,7 +173,7 @@ fn b12_metals() {
         ("iron", [0.530, 0.505, 0.480]),
     ] {
         let own = material(&mut meant, name);
-        (own.metal, own.reflectance, own.fresnel) = (None, Some(Color(f0)), Some(Fresnel::Exact));
+        (own.metal, own.f0, own.fresnel) = (None, Some(Color(f0)), Some(Fresnel::Exact));
     }
     let instead =
         |name: &'static str, metal| move |s: &mut Scene| material(s, name).metal = Some(metal);
@@ -270,7 +270,7 @@ fn a18_background() {
             ("as ambient light", &|s| {
                 s.ambient.color = std::mem::replace(&mut s.background.color, Color::BLACK);
             }),
-            ("not in mirrors", &|s| s.trace.level = RayTypes::Shadows),
+            ("not in mirrors", &|s| s.trace.ray_types = RayTypes::Shadows),
         ],
     );
 }

@@ -130,7 +130,7 @@ struct Footprint {
 fn footprints(meant: &Scene, shown: &Scene) -> Vec<Footprint> {
     let meant = sized(meant.clone(), FINE);
     let mut shown = sized(shown.clone(), FINE);
-    shown.film.filter = Filter::Center;
+    shown.film.filter = Filter::Point;
     let rendering = rendered(&shown, 1, Precision::Double, 512);
     let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
     let seen = sights(&meant);

@@ -15,9 +15,9 @@ use zerkalo::world::Precision;
 #[test]
 fn b1_tracing_depth() {
     let levels: [(&str, crate::row::Change); 3] = [
-        ("camera rays only", &|s| s.trace.level = RayTypes::Primary),
-        ("shadows", &|s| s.trace.level = RayTypes::Shadows),
-        ("everything", &|s| s.trace.level = RayTypes::Full),
+        ("camera rays only", &|s| s.trace.ray_types = RayTypes::Primary),
+        ("shadows", &|s| s.trace.ray_types = RayTypes::Shadows),
+        ("everything", &|s| s.trace.ray_types = RayTypes::Full),
     ];
     let [primary, shadows, full] = levels;
     for (file, others) in
@@ -77,7 +77,7 @@ fn grows_the_whole_tree(meant: &Scene, shown: &Scene) -> Verdict {
     let panes: Vec<Pane> = meant.objects.iter().map(pane).collect();
     let background = DVec3::from(meant.background.color.0);
     let mut shown = sized(shown.clone(), RASTER);
-    shown.film.filter = Filter::Center;
+    shown.film.filter = Filter::Point;
     let rendering = rendered(&shown, 1, Precision::Double, 256);
     let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
     // By bands of rows, so that errors of both signs do not cancel.
@@ -86,7 +86,8 @@ fn grows_the_whole_tree(meant: &Scene, shown: &Scene) -> Verdict {
         let first = band * 6 * RASTER[0] as usize;
         for (i, center) in (first..).zip(centers) {
             let ray = sighting(&meant.camera, RASTER, *center);
-            let expected = tree(&panes, background, ray.origin, ray.direction, meant.trace.depth);
+            let expected =
+                tree(&panes, background, ray.origin, ray.direction, meant.trace.max_depth);
             let [a, b] = [DVec3::from(a[i]), DVec3::from(b[i])];
             sum += (a + b) / 2.0 - expected;
             variance += ((a - b) / 2.0).powf(2.0) + DVec3::splat(1e-14);
@@ -134,11 +135,11 @@ fn b2_ray_tree() {
         "ray-tree.toml",
         |shown| grows_the_whole_tree(&meant, shown),
         &[
-            ("one surface less", &|s| s.trace.depth -= 1),
-            ("one surface more", &|s| s.trace.depth += 1),
+            ("one surface less", &|s| s.trace.max_depth -= 1),
+            ("one surface more", &|s| s.trace.max_depth += 1),
             ("no reflected arm", &|s| material(s, "middle").reflection = 0.0),
             ("no transmitted arm", &|s| material(s, "middle").transmission = 0.0),
-            ("no tree", &|s| s.trace.level = RayTypes::Shadows),
+            ("no tree", &|s| s.trace.ray_types = RayTypes::Shadows),
         ],
     );
     // 0.9^28 is the last power above 0.05; after 40 reflections depth would end it.
@@ -148,9 +149,9 @@ fn b2_ray_tree() {
         "facing-mirrors.toml",
         |shown| glows_between(shown, ["front mirror", "back mirror"], powers()),
         &[
-            ("no least weight", &|s| s.trace.min_weight = 0.0),
-            ("a larger least weight", &|s| s.trace.min_weight = 0.055),
-            ("a smaller depth", &|s| s.trace.depth = 27),
+            ("no least weight", &|s| s.trace.min_throughput = 0.0),
+            ("a larger least weight", &|s| s.trace.min_throughput = 0.055),
+            ("a smaller depth", &|s| s.trace.max_depth = 27),
             ("a smaller coefficient", &|s| material(s, "mirror").reflection = 0.89),
         ],
     );
@@ -177,9 +178,9 @@ fn c2_refraction() {
         "transmission.toml",
         |shown| agrees(&fixed, shown, 96),
         &[
-            ("no bending", &|s| material(s, "clear").index = 1.0),
-            ("the ratio the wrong way round", &|s| material(s, "clear").index = 0.7),
-            ("a smaller index", &|s| material(s, "clear").index = 1.3),
+            ("no bending", &|s| material(s, "clear").ior = 1.0),
+            ("the ratio the wrong way round", &|s| material(s, "clear").ior = 0.7),
+            ("a smaller index", &|s| material(s, "clear").ior = 1.3),
         ],
     );
     let glass = shipped("glass.toml");
@@ -188,8 +189,8 @@ fn c2_refraction() {
         |shown| agrees(&glass, shown, 96),
         &[
             ("fixed coefficients", &|s| material(s, "glass").fresnel = Some(Fresnel::Constant)),
-            ("a bubble of glass", &|s| material(s, "air").index = 1.5),
-            ("no depth", &|s| s.trace.depth = 2),
+            ("a bubble of glass", &|s| material(s, "air").ior = 1.5),
+            ("no depth", &|s| s.trace.max_depth = 2),
         ],
     );
     let two_fifths = |s: &mut Scene| material(s, "mirror").transmission = 0.4;
@@ -222,8 +223,8 @@ fn c4_old_faults() {
                 };
                 ball.center[1] = 1.6;
             }),
-            ("fewer reflections between the mirrors", &|s| s.trace.depth = 11),
-            ("glass bent as elsewhere", &|s| material(s, "glass").index = 1.2),
+            ("fewer reflections between the mirrors", &|s| s.trace.max_depth = 11),
+            ("glass bent as elsewhere", &|s| material(s, "glass").ior = 1.2),
         ],
     );
 }

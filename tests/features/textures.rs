@@ -20,7 +20,7 @@ fn image(name: &str) -> Pixels {
 /// Only camera rays, and no highlights.
 fn plain(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
-    scene.trace.level = RayTypes::Primary;
+    scene.trace.ray_types = RayTypes::Primary;
     scene.materials.values_mut().for_each(|m| m.specular = 0.0);
     scene
 }

@@ -41,7 +41,7 @@ fn c1_reflecting_tracks() {
     assert_eq!(meant.objects.len(), 401);
     let without_rays_by_chance = |scene: &Scene| {
         let mut scene = scene.clone();
-        scene.trace.level = RayTypes::Shadows;
+        scene.trace.ray_types = RayTypes::Shadows;
         scene
     };
     let check = |shown: &Scene| {

@@ -137,7 +137,7 @@ fn truth(filter: Filter) -> Vec<[f64; 3]> {
         })
         .collect();
     let mean = |x: f64, y: f64| match filter {
-        Filter::Center => sheet_share(x + 0.5, y + 0.5),
+        Filter::Point => sheet_share(x + 0.5, y + 0.5),
         Filter::Box => nodes
             .iter()
             .flat_map(|a| nodes.iter().map(move |b| (a, b)))
@@ -156,7 +156,7 @@ fn truth(filter: Filter) -> Vec<[f64; 3]> {
 /// many samples agrees, and the picture has all shares from none to all.
 #[test]
 fn the_closed_form_describes_the_scene() {
-    for filter in [Filter::Center, Filter::Box] {
+    for filter in [Filter::Point, Filter::Box] {
         let truth = truth(filter);
         let rendering = rendered(&closed_form(filter), 7, Precision::Double, 1024);
         assert_eq!(rendering.film.bad_samples().count, 0);
@@ -297,7 +297,7 @@ fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
 
 /// The claims, for both filters and few and many samples.
 fn assert_always_honest(adaptive: bool) {
-    let ways = [Filter::Center, Filter::Box].into_iter();
+    let ways = [Filter::Point, Filter::Box].into_iter();
     let ways = ways.flat_map(|filter| [32, 128, 1024].map(|spp| (filter, spp)));
     let ratios: Vec<f64> = ways.map(|(f, spp)| assert_honest(f, adaptive, spp)).collect();
     let (low, high) = ratios.iter().fold((f64::INFINITY, 0f64), |(l, h), r| (l.min(*r), h.max(*r)));
@@ -317,7 +317,7 @@ fn extreme_30_adaptive_estimates_are_honest() {
 
 #[test]
 fn extreme_30_a_noise_target_is_reached() {
-    for (filter, target) in [(Filter::Box, 2.0), (Filter::Center, 0.5)] {
+    for (filter, target) in [(Filter::Box, 2.0), (Filter::Point, 0.5)] {
         let stop = Stop { noise_codes: Some(target), ..Stop::default() };
         let outcomes = outcomes(filter, true, stop, StoppedBy::Noise);
         let achieved = mean(outcomes.iter().map(|o| o.codes * o.codes)).sqrt();

@@ -46,7 +46,7 @@ fn transparent_surfaces_keep_what_they_claim() {
         let (mut lost, mut lopsided) = (0f64, 0f64);
         for i in 0..900 {
             let (sin, cos) = (0.1 * f64::from(i)).to_radians().sin_cos();
-            for (n_i, n_t) in [(1.0, material.index), (material.index, 1.0)] {
+            for (n_i, n_t) in [(1.0, material.ior), (material.ior, 1.0)] {
                 let incident = Vec3::new(sin, 0.0, -cos);
                 let there = Interface::new(incident, n, n_i, n_t);
                 let split = there.split(&transmission, n_i == 1.0);
@@ -128,14 +128,14 @@ fn closed_form_13_reciprocity_is_as_claimed() {
             let name = format!("{lobe:?} {masking:?} {roughness}");
             let mut material = reflector(lobe, masking, roughness);
             material.fresnel = Some(Fresnel::Schlick);
-            material.reflectance = Some(Color([0.3; 3]));
+            material.f0 = Some(Color([0.3; 3]));
             if lobe == Lobe::Mirror {
                 mirror_is_reciprocal(&material);
                 continue;
             }
             if !has_facets(lobe) {
                 // Its own property, without that of the reflectance.
-                material.reflectance = None;
+                material.f0 = None;
             }
             check_reciprocity(&name, lobe.claims(), asymmetry(|v, l| lobe_f(&material, v, l)));
         }
@@ -184,7 +184,7 @@ fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
         let eye = combine(&[(5.0, v)]);
         let text = format!(
             "camera = {{ eye = {eye:?}, target = [0.0, 0.0, 0.0], up = [0.1, 1.0, 0.2] }}
-             film = {{ size = [1, 1], filter = \"center\" }}
+             film = {{ size = [1, 1], filter = \"point\" }}
              light = [{{ directional = {{ direction = {:?} }}, intensity = 1.0 }}]
              materials.m = {{ color = [0.5, 0.5, 0.5], ambient = 0.0 }}
              [[object]]
@@ -284,7 +284,7 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
                 let mut material = reflector(lobe, masking, 0.0);
                 material.alpha = Some(alpha);
                 material.fresnel = Some(Fresnel::Exact);
-                material.reflectance = Some(Color([0.9, 0.5, 0.04]));
+                material.f0 = Some(Color([0.9, 0.5, 0.04]));
                 let finish = Bsdf::<f64>::new(&material, true);
                 let (_, spread) = finish.reflection.unwrap();
                 let v = at_angle(n, degrees.to_radians(), 2.0);

@@ -83,8 +83,8 @@ fn extreme_27_slab_displacement() {
 /// A red wall behind a slab, a green one behind the camera.
 fn between_walls(slab: &str) -> Scene {
     scene(&format!(
-        "film = {{ size = [1, 1], filter = \"center\" }}
-        trace.depth = 10000
+        "film = {{ size = [1, 1], filter = \"point\" }}
+        trace.max_depth = 10000
         ambient.color = [1.0, 1.0, 1.0]
         camera = {{ eye = [0.0, 0.0, 0.0], target = [0.0, 0.0, -1.0] }}
         [materials]
@@ -109,7 +109,7 @@ fn closed_form_11_a_slab_with_all_orders() {
     for n in [1.0, 1.5, 4.0, 1e3] {
         let f = ((n - 1.0) / (n + 1.0f64)).powi(2);
         let slab = format!(
-            "index = {n:?}\n[[object]]\nmaterial = \"glass\"\n\
+            "ior = {n:?}\n[[object]]\nmaterial = \"glass\"\n\
              shape.box = {{ center = [0.0, 0.0, -2.0], size = [9.0, 9.0, 1.0] }}"
         );
         let count = 1 << 14;
@@ -133,7 +133,7 @@ fn closed_form_11_a_slab_with_all_orders() {
 fn ball_in_front(background: &str, depth: u32, inner: &str, objects: &str) -> Scene {
     scene(&format!(
         "film = {{ size = [24, 24] }}
-        trace.depth = {depth}
+        trace.max_depth = {depth}
         ambient.color = [0.5, 0.5, 0.5]
         background.color = {background}
         camera = {{ eye = [0.0, 0.0, 3.0], target = [0.0, 0.0, 0.0], view_angle.vertical = 45.0 }}
@@ -157,7 +157,7 @@ fn a_white_furnace_does_not_see_glass() {
         shape.sphere = { center = [0.3, 0.2, 0.1], radius = 0.4 }\n\
         [materials.air]\nindex = 1.0\n";
     for index in [0.7, 1.0, 1.5, 1e3] {
-        let inner = format!("{GLASS}index = {index:?}\n");
+        let inner = format!("{GLASS}ior = {index:?}\n");
         // Light that a bubble turns in glass of index 1000 does not come out: its way is too narrow.
         let bubble = if index < 100.0 { format!("{nested}{GLASS}") } else { String::new() };
         for more in [String::new(), bubble] {
@@ -175,7 +175,7 @@ fn a_white_furnace_does_not_see_glass() {
 /// Index 1 bends nothing and reflects nothing.
 #[test]
 fn index_1_is_invisible() {
-    let inner = format!("{GLASS}index = 1.0\n");
+    let inner = format!("{GLASS}ior = 1.0\n");
     let background = "[0.3, 0.6, 0.9]";
     let with = ball_in_front(background, 16, &inner, &format!("{BALL}{TILES}"));
     let without = ball_in_front(background, 16, &inner, TILES);
@@ -192,8 +192,8 @@ fn a_camera_inside_knows_what_it_is_in() {
     let look = |degrees: f64, near: f64, fresnel: &str, more: &str| {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let text = format!(
-            "film = {{ size = [1, 1], filter = \"center\" }}
-            trace.depth = 2
+            "film = {{ size = [1, 1], filter = \"point\" }}
+            trace.max_depth = 2
             background.color = [1.0, 1.0, 1.0]
             camera = {{ eye = [0.0, 0.0, 0.0], direction = [{sin}, 0.0, -{cos}], near = {near:?} }}
             [materials.m]

@@ -70,7 +70,7 @@ fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
 fn parallel_mirrors(depth: u32) -> Scene {
     scene(&format!(
         "film = {{ size = [4, 4] }}
-        trace.depth = {depth}
+        trace.max_depth = {depth}
         camera = {{ eye = [0.0, 0.0, 0.0], target = [0.3, 0.2, -1.0] }}
         ambient.color = [1.0, 1.0, 1.0]
         [materials.m]
@@ -101,7 +101,7 @@ fn extreme_26_parallel_mirrors() {
         let cut = first / (1.0 - rho);
         let told = double.biases();
         assert_eq!(told.len(), 1, "{told:?}");
-        assert!(told[0].contains(&format!("depth {depth} ")), "{told:?}");
+        assert!(told[0].contains(&format!("max_depth {depth} ")), "{told:?}");
         // Three digits, rounded up.
         let (_, bound) = told[0].split_once("at most ").expect("a bound");
         let bound: f64 = bound.split(' ').next().unwrap().parse().expect("a number");

@@ -13,7 +13,7 @@ fn names_in_the_dashboard_steer_nothing() {
     let scene = BUILT_IN
         .replace("\"ball\"", &format!("\"ball{escaped}\""))
         .replace("name = \"lamp\"", &format!("name = \"{escaped}\""))
-        + &format!("\n[views.\"{escaped}\"]\neye = [0.0, 1.0, 3.0]\ntarget = [0.0, 0.0, 0.0]\n");
+        + &format!("\n[cameras.\"{escaped}\"]\neye = [0.0, 1.0, 3.0]\ntarget = [0.0, 0.0, 0.0]\n");
     let name = format!("evil{EVIL}.toml");
     fs::write(desk.path(&name), scene).unwrap();
     let mut terminal = desk.open(&[&name], [140, 40]);

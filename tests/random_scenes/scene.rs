@@ -95,7 +95,7 @@ fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
         ..Scene::default()
     };
     if chance(numbers, 1, 4) {
-        scene.film.filter = zerkalo::scene::Filter::Center;
+        scene.film.filter = zerkalo::scene::Filter::Point;
     }
     if chance(numbers, 1, 8) {
         scene.film.rays_per_pixel = 8;
@@ -128,11 +128,11 @@ fn film_size(numbers: &mut Numbers, layout: Layout) -> [u32; 2] {
 
 fn trace(numbers: &mut Numbers) -> IntegratorSettings {
     let own: Own = &|numbers: &mut Numbers, field: &Field| match field.name {
-        "level" => Some(Value::String(
+        "ray_types" => Some(Value::String(
             pick(numbers, &["full", "full", "full", "full", "shadows", "primary"]).to_string(),
         )),
-        "depth" => Some(Value::Integer(pick(numbers, &[0, 1, 2, 3, 4, 8, 16, 40]))),
-        "min_weight" => Some(Value::Float(pick(numbers, &[0.0, 0.01, 0.1]))),
+        "max_depth" => Some(Value::Integer(pick(numbers, &[0, 1, 2, 3, 4, 8, 16, 40]))),
+        "min_throughput" => Some(Value::Float(pick(numbers, &[0.0, 0.01, 0.1]))),
         _ => None,
     };
     let keys: Table = table(numbers, TRACE_FIELDS, 0.5, own);

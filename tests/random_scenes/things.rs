@@ -63,7 +63,7 @@ fn material_key(numbers: &mut Numbers, field: &Field) -> Option<Value> {
             0 => log(numbers, 1.0, 1e9),
             _ => numbers.between(0.0, 200.0),
         }),
-        "index" => Value::Float(index(numbers)),
+        "ior" => Value::Float(index(numbers)),
         "roughness" | "alpha" => Value::Float(match numbers.below(4) {
             0 => 0.0,
             _ => log(numbers, 1e-4, 3.0),
@@ -95,7 +95,7 @@ pub fn material(numbers: &mut Numbers, finish: Finish) -> Material {
             Finish::Any => {}
             Finish::Glass => {
                 set("transmission", Value::Float(pick(numbers, &[0.5, 0.9, 1.0])));
-                set("index", Value::Float(index(numbers)));
+                set("ior", Value::Float(index(numbers)));
                 if chance(numbers, 1, 2) {
                     set("fresnel", Value::String("dielectric".to_string()));
                     set("reflection", Value::Float(1.0));

@@ -183,20 +183,20 @@ fn renamed_materials_and_views_keep_their_comments_and_their_place() {
 #[test]
 fn views_are_written_as_tables_of_their_own() {
     let after = edited(LAYOUTS[0], |s| *s = store_view(s, Some("from the left")).unwrap().scene);
-    let written = "[views.\"from the left\"]\ntarget = [0.0, 0.0, 0.0]\n";
+    let written = "[cameras.\"from the left\"]\ntarget = [0.0, 0.0, 0.0]\n";
     let (new, gone) = difference(LAYOUTS[0], &after);
     assert!(after.contains(written), "{after}");
     assert_eq!(gone, [] as [&str; 0], "{new:?}");
-    let named = after.replace("[views.", "# Where the window is.\n[views.");
-    let back = edited(&named, |s| s.views.clear());
-    assert!(!back.contains("views") && !back.contains("window"), "{back}");
-    let moved = edited(&named, |s| s.views.get_mut("from the left").unwrap().eye[0] = 2.0);
-    assert!(moved.contains("# Where the window is.\n[views"), "{moved}");
+    let named = after.replace("[cameras.", "# Where the window is.\n[cameras.");
+    let back = edited(&named, |s| s.cameras.clear());
+    assert!(!back.contains("cameras") && !back.contains("window"), "{back}");
+    let moved = edited(&named, |s| s.cameras.get_mut("from the left").unwrap().eye[0] = 2.0);
+    assert!(moved.contains("# Where the window is.\n[cameras"), "{moved}");
     assert!(moved.contains("eye = [2.0, 1.0, 5.0]"), "{moved}");
     for (broken, words) in [
-        ("[views.x]\neye = [0, 1, 5]\n", "view \"x\": neither target nor direction is given"),
-        ("[views.x]\ntarget = [0, 0, 0]\nfov = 3\n", "view \"x\": unknown key \"fov\""),
-        ("views = 3\n", "tables that begin with [views.NAME]"),
+        ("[cameras.x]\neye = [0, 1, 5]\n", "camera \"x\": neither target nor direction is given"),
+        ("[cameras.x]\ntarget = [0, 0, 0]\nfov = 3\n", "camera \"x\": unknown key \"fov\""),
+        ("cameras = 3\n", "tables that begin with [cameras.NAME]"),
     ] {
         let errors = Scene::parse(broken, "scene.toml").unwrap_err().to_string();
         assert!(errors.contains(words), "{errors}");
@@ -228,8 +228,8 @@ fn the_emptiest_scene_can_be_written() {
     let document = Document::new(&Scene::default(), "empty.toml");
     assert_eq!(document.text(), "[film]\nsize = [640, 480]\n");
     assert_eq!(self::document(document.text()).scene(), &Scene::default());
-    let after = edited("film.size = [640, 480]\n", |s| s.trace.depth = 3);
-    assert_eq!(after, "film.size = [640, 480]\n\n[trace]\ndepth = 3\n");
+    let after = edited("film.size = [640, 480]\n", |s| s.trace.max_depth = 3);
+    assert_eq!(after, "film.size = [640, 480]\n\n[trace]\nmax_depth = 3\n");
 }
 
 proptest! {

@@ -255,12 +255,13 @@ pub fn scene() -> impl Strategy<Value = Scene> {
         proptest::collection::btree_map("\\PC{1,6}", material(), 0..4),
         proptest::collection::vec(object(), 0..6),
     );
-    let views = proptest::collection::btree_map("\\PC{1,6}", camera(), 0..3);
-    (camera(), views, [1u32..2000, 1..2000], any::<bool>(), color(), lists).prop_map(
-        |(camera, views, size, center, background, (lights, materials, objects))| {
-            let mut scene = Scene { camera, views, lights, materials, objects, ..Scene::default() };
+    let cameras = proptest::collection::btree_map("\\PC{1,6}", camera(), 0..3);
+    (camera(), cameras, [1u32..2000, 1..2000], any::<bool>(), color(), lists).prop_map(
+        |(camera, cameras, size, point, background, (lights, materials, objects))| {
+            let mut scene =
+                Scene { camera, cameras, lights, materials, objects, ..Scene::default() };
             scene.film.size = size;
-            scene.film.filter = if center { Filter::Center } else { Filter::Box };
+            scene.film.filter = if point { Filter::Point } else { Filter::Box };
             scene.background.color = background;
             tidy(scene)
         },
@@ -310,10 +311,10 @@ pub fn edit(scene: &mut Scene, other: &Scene, (what, at): (u8, usize)) {
             }
         }
         15 => *scene = other.clone(),
-        16 => scene.views = other.views.clone(),
+        16 => scene.cameras = other.cameras.clone(),
         17 => {
-            if let Some((name, view)) = scene.views.pop_first() {
-                scene.views.insert(name + "'", view);
+            if let Some((name, view)) = scene.cameras.pop_first() {
+                scene.cameras.insert(name + "'", view);
             }
         }
         _ => {}

@@ -44,7 +44,7 @@ fn story(
 /// Nine viewpoints, each a unit farther to the right.
 fn room_with_views() -> String {
     let view =
-        |n: i32| format!("\n[views.v{n}]\neye = [{n}.0, 1.0, 5.0]\ntarget = [0.0, 1.0, 0.0]\n");
+        |n: i32| format!("\n[cameras.v{n}]\neye = [{n}.0, 1.0, 5.0]\ntarget = [0.0, 1.0, 0.0]\n");
     (1..=9).fold(ROOM.to_string(), |text, n| text + &view(n))
 }
 
@@ -150,7 +150,9 @@ fn camera_stories() -> Vec<Story> {
             target(d.scene()) == [0.0, 1.0, 0.0] && eye(d.scene())[2] < 3.0
         }),
         story(ResetCamera, c(), "Left Up Home", |a, d| camera(a) == camera(d.scene())),
-        story(StoreView, c(), "n Ctrl-u `door` Enter", |a, d| d.scene().views["door"] == a.camera),
+        story(StoreView, c(), "n Ctrl-u `door` Enter", |a, d| {
+            d.scene().cameras["door"] == a.camera
+        }),
     ];
     for n in 1..=9 {
         stories.push(story(RecallView(n), c(), &n.to_string(), move |_, d| {

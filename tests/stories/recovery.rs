@@ -19,7 +19,7 @@ fn kept(desk: &mut Desk) -> Vec<Option<Arc<Scene>>> {
 
 fn left_behind(desk: &Desk, changed: bool) -> OrphanedEdits {
     let mut scene = desk.scene().clone();
-    scene.trace.depth = 7;
+    scene.trace.max_depth = 7;
     OrphanedEdits { scene: Arc::new(scene), age: Duration::from_secs(720), changed }
 }
 
@@ -68,7 +68,7 @@ fn edits_that_were_left_behind_are_offered_and_taken_up() {
     desk.keys("u");
     assert_eq!(desk.text(), ROOM, "undo leads back to the file");
     desk.keys("U Ctrl-s");
-    assert!(desk.text().contains("depth = 7") && !desk.model.is_unsaved());
+    assert!(desk.text().contains("max_depth = 7") && !desk.model.is_unsaved());
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn whoever_is_busy_is_not_interrupted() {
     assert!(desk.notice().contains("recover"));
     desk.keys("Esc");
     desk.palette("recover edits of a broken session").keys("`r`");
-    assert_eq!(desk.scene().trace.depth, 7);
+    assert_eq!(desk.scene().trace.max_depth, 7);
 }
 
 #[test]

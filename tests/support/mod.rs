@@ -101,11 +101,11 @@ pub fn accelerated(
 /// Takes from a scene all that is left to chance: anti-aliasing, lobes, and beyond two surfaces that let
 /// light through the choice of one of two rays.
 pub fn without_chance(scene: &mut Scene) {
-    scene.film.filter = Filter::Center;
+    scene.film.filter = Filter::Point;
     for material in scene.materials.values_mut() {
         (material.roughness, material.alpha) = (0.0, None);
         if material.transmission > 0.0 {
-            scene.trace.depth = scene.trace.depth.min(2);
+            scene.trace.max_depth = scene.trace.max_depth.min(2);
         }
     }
 }

@@ -132,7 +132,7 @@ impl Case {
             write!(steps, "{{ translate = {} }}", v(self.far)).unwrap();
         }
         format!(
-            "[film]\nsize = {SIZE:?}\nfilter = \"center\"\n[trace]\nlevel = \"primary\"\n\
+            "[film]\nsize = {SIZE:?}\nfilter = \"point\"\n[trace]\nray_types = \"primary\"\n\
              [camera]\neye = {eye}\ntarget = {target}\nview_angle.vertical = 40\n\
              [background]\ncolor = [0, 0, 0]\n[ambient]\ncolor = [0, 0, 0]\n\
              [[light]]\ndirectional = {{ direction = {} }}\nfalloff = \"none\"\nintensity = 1\n\

@@ -52,7 +52,7 @@ fn a_ramp_leans_by_the_angle_of_its_slope() {
     let leaning = DVec3::new(-slope, 0.0, 1.0).normalize();
     let towards = |light: DVec3| {
         let text = format!(
-            "[film]\nsize = [16, 16]\nfilter = \"center\"\n[trace]\nlevel = \"primary\"\n\
+            "[film]\nsize = [16, 16]\nfilter = \"point\"\n[trace]\nray_types = \"primary\"\n\
              [camera]\neye = [0, 0, 3]\ntarget = [0, 0, 0]\nview_angle.vertical = 20\n\
              [[light]]\ndirectional = {{ direction = {:?} }}\nfalloff = \"none\"\nintensity = 1\n\
              [materials.m]\ncolor = [1, 1, 1]\n\

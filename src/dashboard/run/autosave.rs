@@ -188,7 +188,7 @@ mod tests {
 
     fn scene(depth: u32) -> Arc<Scene> {
         let mut scene = Scene::parse(starter(), "starter").unwrap();
-        scene.trace.depth = depth;
+        scene.trace.max_depth = depth;
         Arc::new(scene)
     }
 

@@ -119,7 +119,7 @@ impl UpdateContext<'_> {
 
     pub(super) fn recall_view(&mut self, number: u8) {
         let index = usize::from(number).saturating_sub(1);
-        match self.scene().views.keys().nth(index).cloned() {
+        match self.scene().cameras.keys().nth(index).cloned() {
             Some(name) => {
                 let edit = recall_view(self.scene(), &name);
                 if self.commit(edit, Coalesce::Single) {

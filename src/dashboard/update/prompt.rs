@@ -54,9 +54,9 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn ask_view_name(&mut self) {
-        let count = self.scene().views.len();
+        let count = self.scene().cameras.len();
         let free = (count + 1..).map(|n| format!("view {n}"));
-        let name = free.into_iter().find(|name| !self.scene().views.contains_key(name));
+        let name = free.into_iter().find(|name| !self.scene().cameras.contains_key(name));
         let help = "A name for this viewpoint; keys 1 to 9 go back to it.";
         self.prompt(PromptFor::StoreView, "store this viewpoint", help, name.unwrap_or_default());
     }
@@ -122,7 +122,8 @@ impl UpdateContext<'_> {
     fn store_view(&mut self, text: &str) -> Result<(), String> {
         let edit = edit::store_view(self.scene(), Some(text)).map_err(|e| e.to_string())?;
         self.record(edit, Coalesce::Single);
-        let number = self.scene().views.keys().position(|name| name == text).map_or(0, |at| at + 1);
+        let number =
+            self.scene().cameras.keys().position(|name| name == text).map_or(0, |at| at + 1);
         let key = if number <= 9 { format!(" · key {number}") } else { String::new() };
         self.say(format!("viewpoint {} is stored{key}", truncated(text)));
         Ok(())

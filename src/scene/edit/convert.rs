@@ -61,7 +61,7 @@ pub(super) fn switch(
         }
         Target::Camera => switch_camera(&mut next.camera, scene, key, name),
         Target::View(view) => {
-            let camera = next.views.get_mut(view).ok_or_else(|| EditError::gone(subject))?;
+            let camera = next.cameras.get_mut(view).ok_or_else(|| EditError::gone(subject))?;
             switch_camera(camera, scene, key, name);
         }
         Target::Object(i) => {
@@ -276,7 +276,7 @@ mod tests {
         for object in 0..scene.objects.len() {
             let subject = Target::Object(object);
             // The canonical cylinder and meshes are placed by a transform alone.
-            let unplaced = ["unit_cylinder", "mesh"];
+            let unplaced = ["unit_frustum", "mesh"];
             for kind in KINDS.iter().filter(|kind| !unplaced.contains(&kind.name)) {
                 let edit = set(&scene, &subject, "shape", kind.name);
                 let edit = edit.unwrap_or_else(|e| panic!("{object} -> {}: {e}", kind.name));

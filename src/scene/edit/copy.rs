@@ -63,7 +63,7 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
         }
         Target::View(old) => {
             let new = free_view(scene, old);
-            next.views.insert(new.clone(), scene.views[old].clone());
+            next.cameras.insert(new.clone(), scene.cameras[old].clone());
             Target::View(new)
         }
         _ => {
@@ -98,8 +98,8 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
             neighbour(*i, next.lights.len()).map(Target::Light)
         }
         Target::View(name) => {
-            next.views.remove(name);
-            following(next.views.keys(), name).map(Target::View)
+            next.cameras.remove(name);
+            following(next.cameras.keys(), name).map(Target::View)
         }
         Target::Material(name) => {
             next.materials.remove(name);
@@ -189,11 +189,11 @@ pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditEr
             Target::Material(new.clone())
         }
         Target::View(old) => {
-            if old != &new && next.views.contains_key(&new) {
+            if old != &new && next.cameras.contains_key(&new) {
                 return Err(taken("view"));
             }
-            let moved = next.views.remove(old);
-            next.views.extend(moved.map(|view| (new.clone(), view)));
+            let moved = next.cameras.remove(old);
+            next.cameras.extend(moved.map(|view| (new.clone(), view)));
             Target::View(new.clone())
         }
         _ => {

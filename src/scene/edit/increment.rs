@@ -149,9 +149,7 @@ fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<Value> {
         ("alpha", Some(material)) => {
             Some(Value::Float(rounded_to(material.microfacet_alpha(), -4)))
         }
-        ("reflectance", Some(material)) => {
-            Some(Value::Array(material.f0().0.map(Value::Float).to_vec()))
-        }
+        ("f0", Some(material)) => Some(Value::Array(material.f0().0.map(Value::Float).to_vec())),
         _ => None,
     }
 }

@@ -62,9 +62,9 @@ fn each_kind_of_number_has_a_step_that_makes_sense() {
         (&lamp, "intensity", "0", 1.0, "0.01"),
         (&lamp, "intensity", "0.01", -1.0, "0"),
         (&lamp, "color", "4 2 1", 1.0, "4.5, 2.25, 1.125"),
-        (&Target::IntegratorSettings, "depth", "16", 0.1, "17"),
-        (&Target::IntegratorSettings, "depth", "16", 1.0, "26"),
-        (&Target::IntegratorSettings, "depth", "3", -1.0, "0"),
+        (&Target::IntegratorSettings, "max_depth", "16", 0.1, "17"),
+        (&Target::IntegratorSettings, "max_depth", "16", 1.0, "26"),
+        (&Target::IntegratorSettings, "max_depth", "3", -1.0, "0"),
         (&Target::Film, "rays_per_pixel", "0", 1.0, "1"),
         (&Target::Film, "rays_per_pixel", "64", 1.0, "128"),
         (&Target::Film, "rays_per_pixel", "1", -1.0, "0"),
@@ -127,7 +127,7 @@ fn a_key_that_is_left_out_starts_from_what_holds() {
     let scene = with(&red, "roughness", "0.2");
     // 0.2 / (2 sqrt 2) is 0.0707.
     assert_eq!(after(&scene, &red, "alpha", 1.0), "0.08");
-    assert_eq!(after(&scene, &red, "reflectance", -1.0), "0.95, 0.95, 0.95");
+    assert_eq!(after(&scene, &red, "f0", -1.0), "0.95, 0.95, 0.95");
 }
 
 /// Every number of every row, many steps up and down: never refused, never a fault.

@@ -79,7 +79,7 @@ impl EditError {
 
     fn gone(subject: &Target) -> Self {
         let what = match subject {
-            Target::View(name) => format!("there is no view \"{}\"", truncated(name)),
+            Target::View(name) => format!("there is no camera \"{}\"", truncated(name)),
             Target::Material(name) => format!("there is no material \"{}\"", truncated(name)),
             Target::Light(i) => format!("there is no light {}", i + 1),
             Target::Object(i) => format!("there is no object {}", i + 1),

@@ -307,7 +307,7 @@ mod tests {
             "[[object]]\nshape.plane = {{ point = [0, -9, 0], normal = [0, 1, 0] }}\ntransform = {steps}\n"
         );
         scene.objects.extend(Scene::parse(&text, "").unwrap().objects);
-        scene.views.insert("left".into(), scene.camera.clone());
+        scene.cameras.insert("left".into(), scene.camera.clone());
         for (_, subject) in outline(&scene) {
             for row in rows(&scene, &subject).unwrap() {
                 if row.entry == Widget::List || row.value.is_empty() {

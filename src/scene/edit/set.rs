@@ -240,7 +240,7 @@ mod tests {
         let scene = built_in();
         let red = Target::Material("red".into());
         let gold = set(&scene, &red, "metal", "gold").unwrap().scene;
-        let edit = set(&gold, &red, "reflectance", "0.5 0.5 0.5").unwrap();
+        let edit = set(&gold, &red, "f0", "0.5 0.5 0.5").unwrap();
         assert!(edit.scene.materials["red"].metal.is_none());
         assert!(edit.note.unwrap().contains("metal is gone"));
         let edit = set(&scene, &Target::Camera, "direction", "0 0 -1").unwrap();

@@ -63,7 +63,7 @@ impl Section {
 /// Every subject of the scene, each once, in the order in which an outline shows them.
 pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     let mut list = vec![(Section::Camera, Target::Camera)];
-    list.extend(scene.views.keys().map(|name| (Section::Camera, Target::View(name.clone()))));
+    list.extend(scene.cameras.keys().map(|name| (Section::Camera, Target::View(name.clone()))));
     list.push((Section::Surroundings, Target::Ambient));
     list.push((Section::Surroundings, Target::Background));
     list.extend((0..scene.lights.len()).map(|i| (Section::Lights, Target::Light(i))));
@@ -96,7 +96,7 @@ impl Target {
     /// Whether the scene (still) has it.
     pub fn exists(&self, scene: &Scene) -> bool {
         match self {
-            Self::View(name) => scene.views.contains_key(name),
+            Self::View(name) => scene.cameras.contains_key(name),
             Self::Light(i) => *i < scene.lights.len(),
             Self::Object(i) => *i < scene.objects.len(),
             Self::Material(name) => scene.materials.contains_key(name),
@@ -116,7 +116,7 @@ impl Target {
             Self::Background => &["background"],
             Self::Film => &["film"],
             Self::IntegratorSettings => &["trace"],
-            Self::View(name) => &["views", name],
+            Self::View(name) => &["cameras", name],
             Self::Material(name) => &["materials", name],
             Self::Light(i) => &["light", &i.to_string()],
             Self::Object(i) => &["object", &i.to_string()],
@@ -129,7 +129,7 @@ impl Target {
         let index = || path.get(1)?.parse().ok();
         match path.first()?.as_str() {
             "camera" => Some(Self::Camera),
-            "views" => path.get(1).cloned().map(Self::View),
+            "cameras" => path.get(1).cloned().map(Self::View),
             "ambient" => Some(Self::Ambient),
             "background" => Some(Self::Background),
             "light" => index().map(Self::Light),
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn the_outline_has_everything_once_and_in_order() {
         let mut scene = built_in();
-        scene.views.insert("left".into(), scene.camera.clone());
+        scene.cameras.insert("left".into(), scene.camera.clone());
         let list = outline(&scene);
         let once: HashSet<_> = list.iter().map(|(_, subject)| subject).collect();
         assert_eq!(once.len(), list.len());
@@ -218,7 +218,7 @@ mod tests {
     fn findings_and_messages_lead_to_their_subject() {
         let mut scene = built_in();
         scene.lights[0].name.clear();
-        scene.views.insert("left".into(), scene.camera.clone());
+        scene.cameras.insert("left".into(), scene.camera.clone());
         for (_, subject) in outline(&scene) {
             assert_eq!(Target::of_path(&subject.path()).as_ref(), Some(&subject));
             let message = Diagnostic {

@@ -29,7 +29,7 @@ pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],
         Target::Light(_) => &["point", "directional"],
-        Target::Material(_) => &["reflectance", "metal"],
+        Target::Material(_) => &["f0", "metal"],
         _ => &[],
     }
 }
@@ -41,7 +41,7 @@ pub(super) fn read(scene: &Scene, subject: &Target) -> Result<Table, EditError> 
     }
     let read = match subject {
         Target::Camera => table(Some(&scene.camera)),
-        Target::View(name) => table(scene.views.get(name)),
+        Target::View(name) => table(scene.cameras.get(name)),
         Target::Ambient => table(Some(&scene.ambient)),
         Target::Background => table(Some(&scene.background)),
         Target::Light(i) => table(scene.lights.get(*i)),
@@ -66,7 +66,7 @@ pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Sc
     let mut next = scene.clone();
     match subject {
         Target::Camera => fill(Some(&mut next.camera), values)?,
-        Target::View(name) => fill(next.views.get_mut(name), values)?,
+        Target::View(name) => fill(next.cameras.get_mut(name), values)?,
         Target::Ambient => fill(Some(&mut next.ambient), values)?,
         Target::Background => fill(Some(&mut next.background), values)?,
         Target::Light(i) => fill(next.lights.get_mut(*i), values)?,

@@ -29,7 +29,7 @@ pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, Ed
         }
         Target::Camera | Target::View(_) => {
             let camera = match subject {
-                Target::View(name) => next.views.get_mut(name),
+                Target::View(name) => next.cameras.get_mut(name),
                 _ => Some(&mut next.camera),
             };
             let camera = camera.ok_or_else(|| EditError::gone(subject))?;

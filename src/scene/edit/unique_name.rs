@@ -30,7 +30,7 @@ pub(super) fn free_material(scene: &Scene, wanted: &str) -> String {
 }
 
 pub(super) fn free_view(scene: &Scene, wanted: &str) -> String {
-    free_name(wanted, |name| scene.views.contains_key(name))
+    free_name(wanted, |name| scene.cameras.contains_key(name))
 }
 
 #[cfg(test)]

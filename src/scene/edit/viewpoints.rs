@@ -19,7 +19,7 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
         return Err(EditError::new("a view needs a name", ""));
     }
     let mut next = scene.clone();
-    let old = next.views.insert(kept.clone(), scene.camera.clone());
+    let old = next.cameras.insert(kept.clone(), scene.camera.clone());
     let label = format!("store view {kept}");
     let edit = Edit::checked(next, Target::View(kept.clone()), label)?;
     let replaced = old.is_some_and(|old| old != scene.camera);
@@ -32,7 +32,7 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
 /// If there is none.
 pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
     let subject = Target::View(name.to_string());
-    let view = scene.views.get(name).ok_or_else(|| EditError::gone(&subject))?;
+    let view = scene.cameras.get(name).ok_or_else(|| EditError::gone(&subject))?;
     let next = Scene { camera: view.clone(), ..scene.clone() };
     Edit::checked(next, Target::Camera, format!("recall view {}", subject.label(scene)))
 }
@@ -54,7 +54,7 @@ mod tests {
         let back = recall_view(&moved, "view").unwrap();
         assert_eq!((back.scene.camera, back.subject), (scene.camera.clone(), Target::Camera));
         let edit = store_view(&moved, Some(" view ")).unwrap();
-        assert_eq!(edit.scene.views["view"], moved.camera);
+        assert_eq!(edit.scene.cameras["view"], moved.camera);
         assert!(edit.note.is_some());
         assert!(recall_view(&scene, "view").is_err() && store_view(&scene, Some(" ")).is_err());
     }

@@ -25,7 +25,7 @@ pub const FIELDS: &[Field] = &[
         "The view: a pinhole camera.",
     ),
     Field::optional(
-        "views",
+        "cameras",
         ValueType::Named(camera::FIELDS),
         "",
         "there are none",
@@ -108,7 +108,7 @@ impl SchemaChecker<'_> {
     /// The keys below the thing that the subject names: `shape.sphere`.
     fn inner(&self) -> String {
         let above = match self.path.first().map(String::as_str) {
-            Some("object" | "light" | "materials" | "views") => 2,
+            Some("object" | "light" | "materials" | "cameras") => 2,
             _ => 1,
         };
         phrase(self.path.get(above..).unwrap_or_default())
