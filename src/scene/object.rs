@@ -1,47 +1,26 @@
 //! Objects: a shape, where it stands, what it is made of.
 
 use crate::primitive::Form;
-use crate::shape::{KINDS, Shape, TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
-use crate::value::{Field, ValidationError, Validator, ValueType};
+use crate::shape::{Shape, TransformOp, compose, ill_conditioned};
+use crate::value::{Description, Field, ValidationError, description};
 use glam::DAffine3;
-use serde::{Deserialize, Serialize};
 
-/// A thing: a shape, where it stands, what it is made of.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Object {
-    /// Name, unique in the scene; empty: none.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub name: String,
-    /// Key of `materials`; empty: the default finish.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub material: String,
-    /// What it looks like.
-    pub shape: Shape,
-    /// Steps that move, turn and scale it, the first step first.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub transform: Vec<TransformOp>,
+description! {
+    /// A shape, where it stands, what it is made of.
+    pub struct Object {
+        /// Name; no two objects have the same.
+        name: String, or "a number";
+        /// Name of one of the `[materials.NAME]`.
+        material: String, or "a matt light grey, the default of every material key";
+        /// What it looks like: exactly one kind.
+        shape: Shape;
+        /// Steps that move, turn and scale it, the first step first.
+        transform: Vec<TransformOp>, or "it stays as its shape says";
+    }
 }
 
-/// The keys of `[[object]]`.
-pub const OBJECT_FIELDS: &[Field] = &[
-    Field::optional("name", ValueType::Text, "", "a number", "Name; no two objects have the same."),
-    Field::optional(
-        "material",
-        ValueType::Text,
-        "",
-        "a matt light grey, the default of every material key",
-        "Name of one of the `[materials.NAME]`.",
-    ),
-    Field::required("shape", ValueType::OneOf(KINDS), "", "What it looks like: exactly one kind."),
-    Field::optional(
-        "transform",
-        ValueType::ListOf(TRANSFORM_OP_FIELDS),
-        "",
-        "it stays as its shape says",
-        "Steps that move, turn and scale it, the first step first.",
-    ),
-];
+/// Keys of `[[object]]`.
+pub const OBJECT_FIELDS: &[Field] = Object::FIELDS;
 
 impl Object {
     /// The material of each part of its form; a simple object has one part.
@@ -78,10 +57,7 @@ impl Object {
 
     /// What is wrong with it (its material's name is the scene's business).
     pub fn faults(&self) -> Vec<ValidationError> {
-        let mut checks = Validator::new(OBJECT_FIELDS).nested("shape", self.shape.faults());
-        for (i, step) in self.transform.iter().enumerate() {
-            checks = checks.nested(&format!("transform.{i}"), step.faults());
-        }
+        let checks = self.validator();
         let moved =
             if checks.clean() { ill_conditioned(&self.shape, &self.transform) } else { None };
         checks.and(moved).validate()

@@ -1,112 +1,97 @@
 //! What holds for the whole picture: raster, tracing, background, ambient light.
 
 use crate::primitive::Acceleration;
-use crate::value::{Choice, Color, Field, NumberRange, ValidationError, Validator, ValueType};
-use serde::{Deserialize, Serialize};
+use crate::value::{Color, Description, Field, FieldValue, ValidationError, ValueType};
+use crate::value::{choices, description};
 
-/// The picture's raster.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FilmSettings {
-    /// Width and height in pixels.
-    pub size: [u32; 2],
-    /// How samples spread over a pixel.
-    pub filter: Filter,
-    /// Largest number of samples per pixel spent on glossy pictures; 0 is no cap.
-    pub rays_per_pixel: u32,
+description! {
+    /// The picture's raster.
+    pub struct FilmSettings: Default {
+        /// Width and height of the picture; together at most 67108864 pixels.
+        size: [u32; 2] = [640, 480], in closed(1.0, 16384.0) "pixels";
+        /// How samples spread over a pixel.
+        filter: Filter = "box";
+        /// Largest number of samples per pixel spent on glossy pictures; 0 is no cap.
+        rays_per_pixel: u32 = 0, in closed(0.0, 1e9) "samples";
+    }
 }
 
-/// How samples spread over a pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Filter {
-    /// Evenly over the pixel's square.
-    Box,
-    /// All in its centre: no anti-aliasing.
-    Point,
+choices! {
+    /// Distribution of samples over a pixel.
+    pub enum Filter {
+        /// evenly over the pixel's square
+        Box = "box",
+        /// all in its centre: no anti-aliasing
+        Point = "point",
+    }
 }
 
-/// How far paths are followed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct IntegratorSettings {
+description! {
+    /// How far paths are followed.
+    pub struct IntegratorSettings: Default {
+        /// What is traced at all.
+        ray_types: RayTypes = "full";
+        /// The most surfaces that a path meets after the first; 0: no reflection, no transmission.
+        max_depth: u32 = 16, in closed(0.0, 10000.0) "surfaces";
+        /// A path ends when what it could still add is weighted by less than this.
+        min_throughput: f64 = 0.0, in SHARE;
+        /// What becomes of a reflected ray that would dip under the surface.
+        below_horizon: BelowHorizon = "fold";
+        /// How rays are kept from things that they cannot meet. It changes the time, never the picture.
+        acceleration: Acceleration = "auto";
+    }
+}
+
+choices! {
     /// Kinds of rays that are traced.
-    pub ray_types: RayTypes,
-    /// The most surfaces that a path meets after the first: 0 is no reflection and no transmission.
-    pub max_depth: u32,
-    /// A path ends when what it could still add is weighted by less than this.
-    pub min_throughput: f64,
-    /// What becomes of a reflected ray that would dip under the surface.
-    pub below_horizon: BelowHorizon,
-    /// How rays are kept from things that they cannot meet.
-    pub acceleration: Acceleration,
-}
-
-/// What is traced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum RayTypes {
-    /// Camera rays only: no shadows, no reflections.
-    Primary,
-    /// Camera rays and shadow rays.
-    Shadows,
-    /// Everything.
-    Full,
-}
-
-/// What becomes of a reflected ray that would dip under the surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum BelowHorizon {
-    /// It is mirrored at the surface: no light is lost.
-    Fold,
-    /// It is lost.
-    Absorb,
-}
-
-/// What a ray sees that meets nothing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Background {
-    /// Radiance.
-    pub color: Color,
-}
-
-/// Light from everywhere, without shadows.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Ambient {
-    /// i_a of k_a i_a.
-    pub color: Color,
-}
-
-impl Default for FilmSettings {
-    fn default() -> Self {
-        Self { size: [640, 480], filter: Filter::Box, rays_per_pixel: 0 }
+    #[derive(PartialOrd, Ord)]
+    pub enum RayTypes {
+        /// camera rays only: no shadows, no reflections
+        Primary = "primary",
+        /// camera rays and shadow rays
+        Shadows = "shadows",
+        /// everything
+        Full = "full",
     }
 }
 
-impl Default for IntegratorSettings {
-    fn default() -> Self {
-        Self {
-            ray_types: RayTypes::Full,
-            max_depth: 16,
-            min_throughput: 0.0,
-            below_horizon: BelowHorizon::Fold,
-            acceleration: Acceleration::Auto,
-        }
+choices! {
+    /// Treatment of a reflected ray that would dip under the surface.
+    pub enum BelowHorizon {
+        /// it is mirrored at the surface: no light is lost
+        Fold = "fold",
+        /// it is lost
+        Absorb = "absorb",
     }
 }
 
-impl Default for Background {
-    fn default() -> Self {
-        Self { color: Color::BLACK }
+description! {
+    /// What a ray sees that meets nothing.
+    pub struct Background: Default {
+        /// What a ray sees that meets nothing.
+        color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
     }
 }
 
-impl Default for Ambient {
-    fn default() -> Self {
-        Self { color: Color::BLACK }
+description! {
+    /// Light from everywhere, without shadows.
+    pub struct Ambient: Default {
+        /// Light from everywhere, without shadows: i_a of k_a i_a.
+        color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
+    }
+}
+
+impl FieldValue for Acceleration {
+    type Written = &'static str;
+    const TYPE: ValueType = ValueType::Choice(Self::CHOICES);
+
+    fn from_written(written: &'static str) -> Self {
+        let named = |choice: &Self| choice.name() == written;
+        Self::ALL.into_iter().find(named).unwrap_or_default()
+    }
+
+    fn errors(&self, _: &Field) -> Vec<ValidationError> {
+        Vec::new()
     }
 }
 
@@ -114,135 +99,49 @@ impl Default for Ambient {
 pub const MAX_PIXELS: u64 = 1 << 26;
 
 /// The keys of `[film]`.
-pub const FILM_FIELDS: &[Field] = &[
-    Field::preset(
-        "size",
-        ValueType::Wholes(2, NumberRange::closed(1.0, 16384.0)),
-        "pixels",
-        "[640, 480]",
-        "Width and height of the picture; together at most 67108864 pixels.",
-    ),
-    Field::preset(
-        "filter",
-        ValueType::Choice(&[
-            Choice { name: "box", doc: "evenly over the pixel's square" },
-            Choice { name: "point", doc: "all in its centre: no anti-aliasing" },
-        ]),
-        "",
-        "\"box\"",
-        "How samples spread over a pixel.",
-    ),
-    Field::preset(
-        "rays_per_pixel",
-        ValueType::Whole(NumberRange::closed(0.0, 1e9)),
-        "samples",
-        "0",
-        "Largest number of samples per pixel spent on glossy pictures; 0 is no cap.",
-    ),
-];
-
+pub const FILM_FIELDS: &[Field] = FilmSettings::FIELDS;
 /// The keys of `[trace]`.
-pub const TRACE_FIELDS: &[Field] = &[
-    Field::preset(
-        "ray_types",
-        ValueType::Choice(&[
-            Choice { name: "primary", doc: "camera rays only: no shadows, no reflections" },
-            Choice { name: "shadows", doc: "camera rays and shadow rays" },
-            Choice { name: "full", doc: "everything" },
-        ]),
-        "",
-        "\"full\"",
-        "What is traced at all.",
-    ),
-    Field::preset(
-        "max_depth",
-        ValueType::Whole(NumberRange::closed(0.0, 10000.0)),
-        "surfaces",
-        "16",
-        "The most surfaces that a path meets after the first; 0: no reflection, no transmission.",
-    ),
-    Field::preset(
-        "min_throughput",
-        ValueType::Number(NumberRange::SHARE),
-        "",
-        "0.0",
-        "A path ends when what it could still add is weighted by less than this.",
-    ),
-    Field::preset(
-        "below_horizon",
-        ValueType::Choice(&[
-            Choice { name: "fold", doc: "it is mirrored at the surface: no light is lost" },
-            Choice { name: "absorb", doc: "it is lost" },
-        ]),
-        "",
-        "\"fold\"",
-        "What becomes of a reflected ray that would dip under the surface.",
-    ),
-    Field::preset(
-        "acceleration",
-        ValueType::Choice(Acceleration::CHOICES),
-        "",
-        "\"auto\"",
-        "How rays are kept from things that they cannot meet. It changes the time, never the picture.",
-    ),
-];
-
+pub const TRACE_FIELDS: &[Field] = IntegratorSettings::FIELDS;
 /// The keys of `[background]`.
-pub const BACKGROUND_FIELDS: &[Field] = &[Field::preset(
-    "color",
-    ValueType::Color(NumberRange::LIGHT),
-    "radiance",
-    "[0.0, 0.0, 0.0]",
-    "What a ray sees that meets nothing.",
-)];
-
+pub const BACKGROUND_FIELDS: &[Field] = Background::FIELDS;
 /// The keys of `[ambient]`.
-pub const AMBIENT_FIELDS: &[Field] = &[Field::preset(
-    "color",
-    ValueType::Color(NumberRange::LIGHT),
-    "radiance",
-    "[0.0, 0.0, 0.0]",
-    "Light from everywhere, without shadows: i_a of k_a i_a.",
-)];
+pub const AMBIENT_FIELDS: &[Field] = Ambient::FIELDS;
 
 impl FilmSettings {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
         let [width, height] = self.size;
-        let checks =
-            Validator::new(FILM_FIELDS).numbers("size", &[f64::from(width), f64::from(height)]);
+        let errors = self.validator().validate();
         let pixels = u64::from(width) * u64::from(height);
-        let too_many = (checks.clean() && pixels > MAX_PIXELS).then(|| {
-            ValidationError::new(
-                "size",
-                format!("size is [{width}, {height}], {pixels} pixels"),
-                format!("at most {MAX_PIXELS} pixels, such as [8192, 8192]"),
-            )
-        });
-        checks.and(too_many).numbers("rays_per_pixel", &[f64::from(self.rays_per_pixel)]).validate()
+        let too_many = (errors.iter().all(|error| error.key != "size") && pixels > MAX_PIXELS)
+            .then(|| {
+                ValidationError::new(
+                    "size",
+                    format!("size is [{width}, {height}], {pixels} pixels"),
+                    format!("at most {MAX_PIXELS} pixels, such as [8192, 8192]"),
+                )
+            });
+        errors.into_iter().chain(too_many).collect()
     }
 }
 
 impl IntegratorSettings {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(TRACE_FIELDS)
-            .numbers("max_depth", &[f64::from(self.max_depth)])
-            .numbers("min_throughput", &[self.min_throughput])
-            .validate()
+        self.validator().validate()
     }
 }
 
 impl Background {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(BACKGROUND_FIELDS).numbers("color", &self.color.0).validate()
+        self.validator().validate()
     }
 }
 
 impl Ambient {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(AMBIENT_FIELDS).numbers("color", &self.color.0).validate()
+        self.validator().validate()
     }
 }

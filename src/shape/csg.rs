@@ -29,6 +29,8 @@ pub struct CsgOperand {
     pub transform: Vec<TransformOp>,
 }
 
+// A `description!` would have constants, and a constant cannot be part of a table that refers to
+// itself: shapes have parts, parts have shapes.
 static PART_FIELDS: [Field; 3] = [
     Field::required(
         "shape",
@@ -227,10 +229,10 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
             let found = format!("a {} {why}", part.shape.key());
             ValidationError::new("shape", found, "a solid")
         });
-        let mut checks = Validator::new(&PART_FIELDS).nested("shape", inner).and(open);
-        for (k, step) in part.transform.iter().enumerate() {
-            checks = checks.nested(&format!("transform.{k}"), step.faults());
-        }
+        let checks = Validator::new(&PART_FIELDS)
+            .nested("shape", inner)
+            .and(open)
+            .field("transform", &part.transform);
         let moved =
             if checks.clean() { ill_conditioned(&part.shape, &part.transform) } else { None };
         faults.extend(

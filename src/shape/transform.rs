@@ -3,8 +3,8 @@
 use crate::primitive::Form;
 use crate::shape::Shape;
 use crate::value::{
-    Description, Field, NumberRange, ValidationError, Validator, ValueType, description,
-    sin_cos_degrees, unit,
+    Description, Field, FieldValue, NumberRange, ValidationError, Validator, ValueType,
+    description, sin_cos_degrees, unit,
 };
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -121,15 +121,36 @@ impl TransformOp {
     pub fn faults(&self) -> Vec<ValidationError> {
         let checks = Validator::new(TRANSFORM_OP_FIELDS);
         match self {
-            Self::Translate(by) => checks.numbers("translate", by),
-            Self::RotateX(degrees) => checks.numbers("rotate_x", &[*degrees]),
-            Self::RotateY(degrees) => checks.numbers("rotate_y", &[*degrees]),
-            Self::RotateZ(degrees) => checks.numbers("rotate_z", &[*degrees]),
+            Self::Translate(by) => checks.field("translate", by),
+            Self::RotateX(degrees) => checks.field("rotate_x", degrees),
+            Self::RotateY(degrees) => checks.field("rotate_y", degrees),
+            Self::RotateZ(degrees) => checks.field("rotate_z", degrees),
             Self::Rotate(rotate) => checks.field("rotate", rotate),
-            Self::Scale(Scale([x, y, z])) if x == y && y == z => checks.numbers("scale", &[*x]),
-            Self::Scale(Scale(by)) => checks.numbers("scale", by),
+            Self::Scale(Scale([x, y, z])) if x == y && y == z => checks.field("scale", x),
+            Self::Scale(Scale(by)) => checks.field("scale", by),
         }
         .validate()
+    }
+}
+
+impl FieldValue for Vec<TransformOp> {
+    type Written = Self;
+    const TYPE: ValueType = ValueType::ListOf(TRANSFORM_OP_FIELDS);
+
+    fn from_written(written: Self) -> Self {
+        written
+    }
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        let errors = |(i, step): (usize, &TransformOp)| {
+            let key = format!("{}.{i}", field.name);
+            step.faults().into_iter().map(move |error| error.prefixed(&key))
+        };
+        self.iter().enumerate().flat_map(errors).collect()
+    }
+
+    fn is_absent(&self) -> bool {
+        self.is_empty()
     }
 }
 

@@ -85,17 +85,6 @@ impl Field {
         Self { name, takes, unit, preset: DefaultValue::Required, doc }
     }
 
-    /// A key with a default, given as TOML text.
-    pub const fn preset(
-        name: &'static str,
-        takes: ValueType,
-        unit: &'static str,
-        value: &'static str,
-        doc: &'static str,
-    ) -> Self {
-        Self { name, takes, unit, preset: DefaultValue::Is(value), doc }
-    }
-
     /// A key that may be left out and has no value then.
     pub const fn optional(
         name: &'static str,

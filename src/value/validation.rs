@@ -40,16 +40,6 @@ impl Validator {
         Self { fields, errors: Vec::new() }
     }
 
-    /// Checks the numbers behind the key `name` against what the table says about it.
-    ///
-    /// # Panics
-    /// If the table has no such key: an error of the program, found by the first test of the kind.
-    pub fn numbers(mut self, name: &str, values: &[f64]) -> Self {
-        let error = self.find(name).check(values);
-        self.errors.extend(error);
-        self
-    }
-
     /// Checks the value of the key `name`.
     ///
     /// # Panics
@@ -63,14 +53,6 @@ impl Validator {
     fn find(&self, name: &str) -> &'static Field {
         let field = self.fields.iter().find(|field| field.name == name);
         field.unwrap_or_else(|| panic!("no field `{name}` in its table"))
-    }
-
-    /// As `numbers`, if there is a value.
-    pub fn optional(self, name: &str, values: Option<&[f64]>) -> Self {
-        match values {
-            Some(values) => self.numbers(name, values),
-            None => self,
-        }
     }
 
     /// Checks that no number here is more than 1e12 times as large as the smallest of `sizes`:
