@@ -86,7 +86,7 @@ impl FieldValue for ViewAngle {
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         let (key, degrees) = self.key_degrees();
-        let mut errors = Validator::new(VIEW_ANGLES).field(key, &degrees).validate();
+        let mut errors = Validator::new(VIEW_ANGLES).field(key, &degrees).errors();
         for error in &mut errors {
             error.found = format!("{}.{}", field.name, error.found);
         }
@@ -132,8 +132,8 @@ impl Camera {
             _ => None,
         };
         let checks = self.validator().and(given);
-        let lost = if checks.clean() { self.lost() } else { None };
-        checks.and(lost).validate()
+        let lost = if checks.is_clean() { self.lost() } else { None };
+        checks.and(lost).errors()
     }
 
     /// What makes a picture impossible although every number is in its range.

@@ -79,7 +79,7 @@ impl Light {
                 )
             }),
         };
-        self.validator().and(kinds).validate()
+        self.validator().and(kinds).errors()
     }
 }
 

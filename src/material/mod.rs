@@ -204,7 +204,7 @@ impl Material {
                     ),
                 )
             }))
-            .validate()
+            .errors()
     }
 }
 

@@ -312,7 +312,7 @@ impl FieldValue for Texture {
             Self::Image(image) => image.validator().and(image.content.fault()),
             Self::Checker(checker) => checker.validator(),
         };
-        let errors = validator.validate().into_iter();
+        let errors = validator.errors().into_iter();
         errors.map(|error| error.prefixed(self.key()).prefixed(field.name)).collect()
     }
 }
@@ -327,7 +327,7 @@ impl FieldValue for Bump {
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         let Self::Image(image) = self;
-        let errors = image.validator().and(image.content.fault()).validate().into_iter();
+        let errors = image.validator().and(image.content.fault()).errors().into_iter();
         errors.map(|error| error.prefixed("image").prefixed(field.name)).collect()
     }
 }

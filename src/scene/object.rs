@@ -59,7 +59,7 @@ impl Object {
     pub fn faults(&self) -> Vec<ValidationError> {
         let checks = self.validator();
         let moved =
-            if checks.clean() { ill_conditioned(&self.shape, &self.transform) } else { None };
-        checks.and(moved).validate()
+            if checks.is_clean() { ill_conditioned(&self.shape, &self.transform) } else { None };
+        checks.and(moved).errors()
     }
 }

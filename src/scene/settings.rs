@@ -111,7 +111,7 @@ impl FilmSettings {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
         let [width, height] = self.size;
-        let errors = self.validator().validate();
+        let errors = self.validator().errors();
         let pixels = u64::from(width) * u64::from(height);
         let too_many = (errors.iter().all(|error| error.key != "size") && pixels > MAX_PIXELS)
             .then(|| {
@@ -128,20 +128,20 @@ impl FilmSettings {
 impl IntegratorSettings {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
-        self.validator().validate()
+        self.validator().errors()
     }
 }
 
 impl Background {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
-        self.validator().validate()
+        self.validator().errors()
     }
 }
 
 impl Ambient {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
-        self.validator().validate()
+        self.validator().errors()
     }
 }

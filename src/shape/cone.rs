@@ -32,7 +32,7 @@ impl ShapeDesc for Cone {
         self.validator()
             .and(degenerate_axis(self.base, self.apex, "apex"))
             .ratio(&sizes, &[self.base, self.apex].concat())
-            .validate()
+            .errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -90,7 +90,7 @@ macro_rules! compounds {
             }
 
             fn faults(&self) -> Vec<ValidationError> {
-                let faults = self.validator().validate();
+                let faults = self.validator().errors();
                 if !faults.is_empty() || self.form().bounds().is_some() {
                     return faults;
                 }
@@ -234,9 +234,9 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
             .and(open)
             .field("transform", &part.transform);
         let moved =
-            if checks.clean() { ill_conditioned(&part.shape, &part.transform) } else { None };
+            if checks.is_clean() { ill_conditioned(&part.shape, &part.transform) } else { None };
         faults.extend(
-            checks.and(moved).validate().into_iter().map(|f| f.prefixed(&format!("of.{i}"))),
+            checks.and(moved).errors().into_iter().map(|f| f.prefixed(&format!("of.{i}"))),
         );
     }
     faults

@@ -30,7 +30,7 @@ impl ShapeDesc for Cube {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        self.validator().ratio(&[("edge", self.edge)], &self.corner).validate()
+        self.validator().ratio(&[("edge", self.edge)], &self.corner).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -31,7 +31,7 @@ impl ShapeDesc for Cuboid {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).validate()
+        self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -32,7 +32,7 @@ impl ShapeDesc for Cylinder {
         self.validator()
             .and(degenerate_axis(self.base, self.top, "top"))
             .ratio(&sizes, &[self.base, self.top].concat())
-            .validate()
+            .errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -30,7 +30,7 @@ impl ShapeDesc for HorizontalRectangle {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).validate()
+        self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).errors()
     }
 
     /// A table top: at the height of the box's upper side.

@@ -36,7 +36,7 @@ impl ShapeDesc for Prism {
     fn faults(&self) -> Vec<ValidationError> {
         self.validator()
             .ratio(&[("side", self.side), ("height", self.height)], &self.corner)
-            .validate()
+            .errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

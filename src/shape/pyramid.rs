@@ -40,7 +40,7 @@ impl ShapeDesc for Pyramid {
     fn faults(&self) -> Vec<ValidationError> {
         let sizes =
             [("side", self.side), ("apex_height", self.apex_height), ("height", self.height)];
-        self.validator().ratio(&sizes, &self.corner).validate()
+        self.validator().ratio(&sizes, &self.corner).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -50,7 +50,7 @@ impl ShapeDesc for Rectangle {
 
     fn faults(&self) -> Vec<ValidationError> {
         let checks = self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center);
-        let parallel = checks.clean() && self.frame().is_none();
+        let parallel = checks.is_clean() && self.frame().is_none();
         checks
             .and(parallel.then(|| {
                 ValidationError::new(
@@ -59,7 +59,7 @@ impl ShapeDesc for Rectangle {
                     "an `up` across the normal, such as [0.0, 0.0, -1.0] for one that lies flat",
                 )
             }))
-            .validate()
+            .errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

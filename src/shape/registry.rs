@@ -21,7 +21,7 @@ pub trait ShapeDesc: Description {
 
     /// What is wrong with it.
     fn faults(&self) -> Vec<ValidationError> {
-        self.validator().validate()
+        self.validator().errors()
     }
 
     /// One of this kind that stands upright on `base`, the middle of its lower side, and fills about

@@ -23,7 +23,7 @@ impl ShapeDesc for Sphere {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        self.validator().ratio(&[("radius", self.radius)], &self.center).validate()
+        self.validator().ratio(&[("radius", self.radius)], &self.center).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

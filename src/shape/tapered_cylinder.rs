@@ -44,7 +44,7 @@ impl ShapeDesc for TaperedCylinder {
             .and(degenerate_axis(self.base, self.top, "top"))
             .and(thin)
             .ratio(&sizes, &[self.base, self.top].concat())
-            .validate()
+            .errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -129,7 +129,7 @@ impl TransformOp {
             Self::Scale(Scale([x, y, z])) if x == y && y == z => checks.field("scale", x),
             Self::Scale(Scale(by)) => checks.field("scale", by),
         }
-        .validate()
+        .errors()
     }
 }
 

@@ -145,7 +145,7 @@ impl<T: Description> FieldValue for T {
     }
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        self.validator().validate().into_iter().map(|error| error.prefixed(field.name)).collect()
+        self.validator().errors().into_iter().map(|error| error.prefixed(field.name)).collect()
     }
 }
 
@@ -195,7 +195,7 @@ macro_rules! choices {
             fn from_written(written: &'static str) -> Self {
                 match written {
                     $($word => Self::$variant,)+
-                    _ => panic!("`{written}` is no word of {}", stringify!($name)),
+                    _ => panic!("`{written}` is not a word of {}", stringify!($name)),
                 }
             }
 

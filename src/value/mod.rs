@@ -1,6 +1,6 @@
-//! What users write, as values: colours, the faults that a value can have, and the tables that say
-//! what may be written. Known to every description (shape, material, light, camera, scene) and
-//! knowing none of them.
+//! Values of scene files: colours, number ranges, validation errors, and the tables of keys that
+//! describe them. Every description (shape, material, light, camera, scene) uses this module; it
+//! depends on none of them.
 
 mod angle;
 mod color;

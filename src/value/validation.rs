@@ -1,25 +1,26 @@
-//! What is wrong with a value, before anybody knows where in the file it stands.
+//! Validation errors of a description, before they have a place in a file.
 
 use crate::value::{Field, FieldValue, number};
 
-/// One thing wrong in a description. The scene room adds file, line, column and object.
+/// One error in a description. The module `scene` adds file, line, column and object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ValidationError {
-    /// The key inside the description, dotted (`center`, `shape.sphere.radius`); empty: the whole.
+    /// Dotted key inside the description (`center`, `shape.sphere.radius`); empty for the whole
+    /// description.
     pub key: String,
-    /// What was found, as a phrase: `radius is -1`.
+    /// Phrase that states the error: `radius is -1`.
     pub found: String,
-    /// What would be right, as a phrase: `a number greater than 0`.
+    /// Phrase that states the valid values: `a number greater than 0`.
     pub expected: String,
 }
 
 impl ValidationError {
-    /// From its three parts.
+    /// Creates an error from its three parts.
     pub fn new(key: &str, found: impl Into<String>, expected: impl Into<String>) -> Self {
         Self { key: key.to_string(), found: found.into(), expected: expected.into() }
     }
 
-    /// The same fault of a description that stands behind the key `outer` of another.
+    /// Returns the error with `outer` before its key: the description is the value of that key.
     pub fn prefixed(mut self, outer: &str) -> Self {
         self.key =
             if self.key.is_empty() { outer.to_string() } else { format!("{outer}.{}", self.key) };
@@ -27,7 +28,7 @@ impl ValidationError {
     }
 }
 
-/// Collects the faults of one description against its table of fields.
+/// Collects the errors of one description against its table of fields.
 #[derive(Debug)]
 pub struct Validator {
     fields: &'static [Field],
@@ -35,7 +36,7 @@ pub struct Validator {
 }
 
 impl Validator {
-    /// None found yet.
+    /// Creates a validator without errors.
     pub fn new(fields: &'static [Field]) -> Self {
         Self { fields, errors: Vec::new() }
     }
@@ -55,9 +56,8 @@ impl Validator {
         field.unwrap_or_else(|| panic!("no field `{name}` in its table"))
     }
 
-    /// Checks that no number here is more than 1e12 times as large as the smallest of `sizes`:
-    /// beyond that a coordinate has no digits left for the size. Says nothing about values found
-    /// wrong above.
+    /// Checks that no number is more than 1e12 times as large as the smallest of `sizes`: beyond that
+    /// a coordinate has no digits left for the size. Skipped if there are errors already.
     pub fn ratio(mut self, sizes: &[(&str, f64)], coordinates: &[f64]) -> Self {
         let smallest = sizes.iter().copied().reduce(|a, b| if b.1 < a.1 { b } else { a });
         let largest = sizes
@@ -82,25 +82,25 @@ impl Validator {
         self
     }
 
-    /// Adds `fault` if there is one.
-    pub fn and(mut self, fault: Option<ValidationError>) -> Self {
-        self.errors.extend(fault);
+    /// Adds `error` if there is one.
+    pub fn and(mut self, error: Option<ValidationError>) -> Self {
+        self.errors.extend(error);
         self
     }
 
-    /// Adds the faults of a description behind the key `outer`.
+    /// Adds the errors of the description that is the value of the key `outer`.
     pub fn nested(mut self, outer: &str, errors: Vec<ValidationError>) -> Self {
         self.errors.extend(errors.into_iter().map(|f| f.prefixed(outer)));
         self
     }
 
-    /// Whether none was found so far.
-    pub fn clean(&self) -> bool {
+    /// Returns `true` if there are no errors so far.
+    pub fn is_clean(&self) -> bool {
         self.errors.is_empty()
     }
 
-    /// What was found.
-    pub fn validate(self) -> Vec<ValidationError> {
+    /// Returns the errors.
+    pub fn errors(self) -> Vec<ValidationError> {
         self.errors
     }
 }
