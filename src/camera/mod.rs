@@ -5,32 +5,29 @@ mod pinhole;
 
 pub use pinhole::PinholeCamera;
 
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType, unit};
+use crate::value::{
+    Description, Field, FieldValue, NumberRange, ValidationError, Validator, ValueType,
+    description, unit,
+};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// Where the picture is taken from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Camera {
-    /// The eye.
-    #[serde(default = "eye")]
-    pub eye: [f64; 3],
-    /// The point looked at; exactly one of `target` and `direction`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub target: Option<[f64; 3]>,
-    /// The direction looked in.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub direction: Option<[f64; 3]>,
-    /// What is up in the picture.
-    #[serde(default = "up")]
-    pub up: [f64; 3],
-    /// Opening angle; exactly one of its keys.
-    #[serde(default = "view_angle")]
-    pub view_angle: ViewAngle,
-    /// Nothing nearer than this, measured along the view direction, is seen.
-    #[serde(default)]
-    pub near: f64,
+description! {
+    /// Pinhole camera.
+    pub struct Camera {
+        /// Where the picture is taken from.
+        eye: [f64; 3] => "eye" "[0.0, 1.0, 5.0]", in COORDINATE "scene units";
+        /// The point looked at. Exactly one of `target` and `direction` is given.
+        target: Option<[f64; 3]>, or "`direction` is needed", in COORDINATE "scene units";
+        /// The direction looked in.
+        direction: Option<[f64; 3]>, or "`target` is needed", as Direction;
+        /// What is up in the picture; not parallel to the view direction.
+        up: [f64; 3] => "up" "[0.0, 1.0, 0.0]", as Direction;
+        /// Opening angle, across the height or across the width of the picture.
+        view_angle: ViewAngle => "view_angle" "{ vertical = 40.0 }";
+        /// Nothing nearer than this, measured along the view direction, is seen.
+        near: f64 = 0.0, in closed(0.0, 1e9) "scene units";
+    }
 }
 
 /// Opening angle of the picture in degrees, between 0 and 180.
@@ -70,57 +67,32 @@ impl Default for Camera {
     }
 }
 
-/// The keys of `[camera]`.
-pub const FIELDS: &[Field] = &[
-    Field::preset(
-        "eye",
-        ValueType::Numbers(3, NumberRange::COORDINATE),
-        "scene units",
-        "[0.0, 1.0, 5.0]",
-        "Where the picture is taken from.",
-    ),
-    Field::optional(
-        "target",
-        ValueType::Numbers(3, NumberRange::COORDINATE),
-        "scene units",
-        "`direction` is needed",
-        "The point looked at. Exactly one of `target` and `direction` is given.",
-    ),
-    Field::optional(
-        "direction",
-        ValueType::Direction,
-        "",
-        "`target` is needed",
-        "The direction looked in.",
-    ),
-    Field::preset(
-        "up",
-        ValueType::Direction,
-        "",
-        "[0.0, 1.0, 0.0]",
-        "What is up in the picture; not parallel to the view direction.",
-    ),
-    Field::preset(
-        "view_angle",
-        ValueType::OneOf(VIEW_ANGLES),
-        "",
-        "{ vertical = 40.0 }",
-        "Opening angle, across the height or across the width of the picture.",
-    ),
-    Field::preset(
-        "near",
-        ValueType::Number(NumberRange::closed(0.0, 1e9)),
-        "scene units",
-        "0.0",
-        "Nothing nearer than this, measured along the view direction, is seen.",
-    ),
-];
+/// Keys of `[camera]`.
+pub const FIELDS: &[Field] = Camera::FIELDS;
 
 const ANGLE: ValueType = ValueType::Number(NumberRange::between(0.0, 180.0));
 const VIEW_ANGLES: &[Field] = &[
     Field::required("vertical", ANGLE, "degrees", "Across the picture's height."),
     Field::required("horizontal", ANGLE, "degrees", "Across the picture's width."),
 ];
+
+impl FieldValue for ViewAngle {
+    type Written = Self;
+    const TYPE: ValueType = ValueType::OneOf(VIEW_ANGLES);
+
+    fn from_written(written: Self) -> Self {
+        written
+    }
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        let (key, degrees) = self.key_degrees();
+        let mut errors = Validator::new(VIEW_ANGLES).field(key, &degrees).errors();
+        for error in &mut errors {
+            error.found = format!("{}.{}", field.name, error.found);
+        }
+        errors.into_iter().map(|error| error.prefixed(field.name)).collect()
+    }
+}
 
 impl ViewAngle {
     /// Its key and its angle in degrees.
@@ -146,11 +118,6 @@ impl Camera {
 
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
-        let (key, degrees) = self.view_angle.key_degrees();
-        let mut angle = Validator::new(VIEW_ANGLES).numbers(key, &[degrees]).validate();
-        for fault in &mut angle {
-            fault.found = format!("view_angle.{}", fault.found);
-        }
         let given = match (&self.target, &self.direction) {
             (None, None) => Some(ValidationError::new(
                 "",
@@ -164,16 +131,9 @@ impl Camera {
             )),
             _ => None,
         };
-        let checks = Validator::new(FIELDS)
-            .numbers("eye", &self.eye)
-            .optional("target", self.target.as_ref().map(|t| &t[..]))
-            .optional("direction", self.direction.as_ref().map(|d| &d[..]))
-            .numbers("up", &self.up)
-            .nested("view_angle", angle)
-            .numbers("near", &[self.near])
-            .and(given);
-        let lost = if checks.clean() { self.lost() } else { None };
-        checks.and(lost).validate()
+        let checks = self.validator().and(given);
+        let lost = if checks.is_clean() { self.lost() } else { None };
+        checks.and(lost).errors()
     }
 
     /// What makes a picture impossible although every number is in its range.

@@ -4,145 +4,61 @@ mod delta;
 
 pub use delta::{DeltaLight, LightSample};
 
-use crate::value::{Choice, Color, Field, NumberRange, ValidationError, Validator, ValueType};
-use serde::{Deserialize, Serialize};
+use crate::value::{Color, Description, Field, ValidationError, choices, description};
 
-/// One light: exactly one of `point` and `directional`, a colour, an intensity.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Light {
-    /// Name, for messages and the outline.
-    #[serde(skip_serializing_if = "String::is_empty")]
-    pub name: String,
-    /// Emits from a point.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub point: Option<Point>,
-    /// Arrives along one direction everywhere.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub directional: Option<Directional>,
-    /// Colour; multiplies the intensity.
-    pub color: Color,
-    /// With falloff `inverse-square` the radiant intensity [W/sr]; otherwise normal irradiance /
-    /// pi.
-    pub intensity: f64,
-    /// How a point light weakens with distance.
-    pub falloff: Falloff,
-    /// Whether it shines.
-    pub on: bool,
-}
-
-/// Light from one point.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Point {
-    /// Where it stands.
-    pub position: [f64; 3],
-}
-
-/// Light from infinitely far away.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Directional {
-    /// The direction in which the light travels; any length but 0.
-    pub direction: [f64; 3],
-}
-
-/// How a point light weakens with distance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Falloff {
-    /// Not at all.
-    None,
-    /// With the square of the distance.
-    InverseSquare,
-}
-
-impl Default for Light {
-    fn default() -> Self {
-        Self {
-            name: String::new(),
-            point: None,
-            directional: None,
-            color: Color::WHITE,
-            intensity: 1.0,
-            falloff: Falloff::None,
-            on: true,
-        }
+description! {
+    /// One light: exactly one of `point` and `directional`, a colour, an intensity.
+    pub struct Light: Default {
+        /// Name; no two lights have the same.
+        name: String, or "a number";
+        /// Light from one point. Exactly one of `point` and `directional` is given.
+        point: Option<Point>, or "`directional` is needed";
+        /// Light from infinitely far away.
+        directional: Option<Directional>, or "`point` is needed";
+        /// Colour; multiplies the intensity.
+        color: Color = [1.0, 1.0, 1.0], in LIGHT;
+        /// With falloff `inverse-square` the radiant intensity [W/sr]. With `none`, and for a
+        /// directional light, the brightness of a white matt surface that faces the light.
+        intensity: f64 = 1.0, in LIGHT "W/sr, or irradiance / π";
+        /// How a point light weakens with distance.
+        falloff: Falloff = "none";
+        /// Whether it shines.
+        on: bool = true;
     }
 }
 
-/// The keys of `[[light]]`.
-pub const FIELDS: &[Field] = &[
-    Field::optional("name", ValueType::Text, "", "a number", "Name; no two lights have the same."),
-    Field::optional(
-        "point",
-        ValueType::Table(POINT),
-        "",
-        "`directional` is needed",
-        "Light from one point. Exactly one of `point` and `directional` is given.",
-    ),
-    Field::optional(
-        "directional",
-        ValueType::Table(DIRECTIONAL),
-        "",
-        "`point` is needed",
-        "Light from infinitely far away.",
-    ),
-    Field::preset(
-        "color",
-        ValueType::Color(NumberRange::LIGHT),
-        "",
-        "[1.0, 1.0, 1.0]",
-        "Colour; multiplies the intensity.",
-    ),
-    Field::preset(
-        "intensity",
-        ValueType::Number(NumberRange::LIGHT),
-        "W/sr, or irradiance / π",
-        "1.0",
-        "With falloff `inverse-square` the radiant intensity [W/sr]. With `none`, and for a \
-         directional light, the brightness of a white matt surface that faces the light.",
-    ),
-    Field::preset(
-        "falloff",
-        ValueType::Choice(FALLOFFS),
-        "",
-        "\"none\"",
-        "How a point light weakens with distance.",
-    ),
-    Field::preset("on", ValueType::Switch, "", "true", "Whether it shines."),
-];
+description! {
+    /// Light from one point.
+    pub struct Point: Copy {
+        /// Where it stands.
+        position: [f64; 3], in COORDINATE "scene units";
+    }
+}
 
-const POINT: &[Field] = &[Field::required(
-    "position",
-    ValueType::Numbers(3, NumberRange::COORDINATE),
-    "scene units",
-    "Where it stands.",
-)];
+description! {
+    /// Light from infinitely far away.
+    pub struct Directional: Copy {
+        /// Direction in which the light travels.
+        direction: [f64; 3], as Direction;
+    }
+}
 
-const DIRECTIONAL: &[Field] = &[Field::required(
-    "direction",
-    ValueType::Direction,
-    "",
-    "Direction in which the light travels.",
-)];
+choices! {
+    /// Dependence of a point light on the distance.
+    pub enum Falloff {
+        /// not at all
+        None = "none",
+        /// with the square of the distance
+        InverseSquare = "inverse-square",
+    }
+}
 
-const FALLOFFS: &[Choice] = &[
-    Choice { name: "none", doc: "not at all" },
-    Choice { name: "inverse-square", doc: "with the square of the distance" },
-];
+/// Keys of `[[light]]`.
+pub const FIELDS: &[Field] = Light::FIELDS;
 
 impl Light {
     /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
-        let point = self
-            .point
-            .map(|p| Validator::new(POINT).numbers("position", &p.position).validate())
-            .unwrap_or_default();
-        let directional = self
-            .directional
-            .map(|d| Validator::new(DIRECTIONAL).numbers("direction", &d.direction).validate())
-            .unwrap_or_default();
         let kinds = match (&self.point, &self.directional) {
             (Some(_), None) => None,
             (None, None) => Some(ValidationError::new(
@@ -163,13 +79,7 @@ impl Light {
                 )
             }),
         };
-        Validator::new(FIELDS)
-            .nested("point", point)
-            .nested("directional", directional)
-            .numbers("color", &self.color.0)
-            .numbers("intensity", &[self.intensity])
-            .and(kinds)
-            .validate()
+        self.validator().and(kinds).errors()
     }
 }
 

@@ -2,21 +2,18 @@
 
 mod bsdf;
 mod bsdf_eval;
-mod fields;
 mod fresnel;
 mod mapping;
 mod properties;
 mod refraction;
 mod texture;
 mod texture_eval;
-mod texture_fields;
 
 pub use bsdf::{
     Bsdf, MicrofacetDistribution, ReflectionLobe, SMOOTH_ALPHA, SpecularModel, Transmission,
     one_minus_cos_of_tan,
 };
 pub use bsdf_eval::BsdfSample;
-pub use fields::FIELDS;
 pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
 pub use mapping::{Projection, TexCoord, TextureMapping};
 pub use properties::{BsdfProperties, Energy};
@@ -27,124 +24,122 @@ pub use texture::{
 };
 pub use texture_eval::{BumpMap, CompiledTexture};
 
-use crate::value::{Color, ValidationError, Validator};
-use serde::{Deserialize, Serialize};
+use crate::value::{Color, Description, Field, ValidationError, choices, description};
 
-/// A surface's finish. Every key may be left out.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Material {
-    /// Body colour: multiplies the ambient and the diffuse part.
-    pub color: Color,
-    /// Ambient coefficient k_a.
-    pub ambient: f64,
-    /// Diffuse coefficient k_d.
-    pub diffuse: f64,
-    /// Highlight coefficient k_s.
-    pub specular: f64,
-    /// Phong exponent alpha of (R.V)^alpha.
-    pub exponent: f64,
-    /// Which formula gives the highlight of a light.
-    pub highlight: Highlight,
-    /// Weight k_r of the traced reflection; not energy-conserving with the other coefficients.
-    pub reflection: f64,
-    /// Weight k_t of the transmitted light; not energy-conserving with the other coefficients.
-    pub transmission: f64,
-    /// Index of refraction n of what the surface encloses; 1 outside of everything.
-    pub ior: f64,
-    /// Tangent of the half-angle of the reflection cone, not a microfacet alpha; 0 is a perfect
-    /// mirror.
-    pub roughness: f64,
-    /// How the reflected ray is spread.
-    pub lobe: Lobe,
-    /// Microfacet slope; without it roughness / (2 sqrt 2).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub alpha: Option<f64>,
-    /// Masking and shadowing of microfacets.
-    pub masking: Masking,
-    /// How reflectance depends on the angle; without it `exact` for a metal, else `constant`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub fresnel: Option<Fresnel>,
-    /// Reflectance F0 at normal incidence, per channel; without it white.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub f0: Option<Color>,
-    /// A metal's F0 instead of `f0`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub metal: Option<Metal>,
-    /// Whether the back of a surface is finished like its front; otherwise the back is black.
-    pub two_sided: bool,
-    /// What multiplies the body colour.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub texture: Option<Texture>,
-    /// What turns the normals that light is computed with.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bump: Option<Bump>,
+description! {
+    /// A surface's finish. Every key may be left out.
+    pub struct Material: Default {
+        /// Body colour: multiplies the ambient and the diffuse part.
+        color: Color = [0.8, 0.8, 0.8], in COEFFICIENT;
+        /// Ambient coefficient k_a.
+        ambient: f64 = 1.0, in COEFFICIENT;
+        /// Diffuse coefficient k_d.
+        diffuse: f64 = 1.0, in COEFFICIENT;
+        /// Highlight coefficient k_s.
+        specular: f64 = 0.0, in COEFFICIENT;
+        /// Phong exponent alpha of (R.V)^alpha: the larger, the smaller the highlight.
+        exponent: f64 = 32.0, in closed(0.0, 1e9);
+        /// Formula of a light's highlight.
+        highlight: Highlight = "phong";
+        /// Weight k_r of the traced reflection; not energy-conserving with the other coefficients.
+        reflection: f64 = 0.0, in COEFFICIENT;
+        /// Weight k_t of the transmitted light, not energy-conserving with the other coefficients; 0 is
+        /// opaque.
+        transmission: f64 = 0.0, in COEFFICIENT;
+        /// Index of refraction n of the inside; outside of everything it is 1.
+        ior: f64 = 1.5, in closed(0.1, 1e4);
+        /// Tangent of the half-angle of the reflection cone, not a microfacet alpha; 0 is a perfect
+        /// mirror.
+        roughness: f64 = 0.0, in closed(0.0, 1e6);
+        /// How the reflected ray is spread; the same roughness means a comparable blur in each.
+        lobe: Lobe = "cone";
+        /// Slope parameter of the microfacets.
+        alpha: Option<f64>, or "roughness / (2 √2)", in closed(0.0, 1e6);
+        /// Masking and shadowing between microfacets.
+        masking: Masking = "v-cavity";
+        /// How the reflectance depends on the angle.
+        fresnel: Option<Fresnel>, or "`exact` for a metal, otherwise `constant`";
+        /// Reflectance F0 at normal incidence. Not together with `metal`.
+        f0: Option<Color>, or "white", in SHARE;
+        /// A metal, for its reflectance. Not together with `f0`.
+        metal: Option<Metal>, or "no metal";
+        /// Whether the back of a surface is finished like its front; otherwise the back is black: of its
+        /// finish only `transmission` is left there, and total reflection past the critical angle unless
+        /// `fresnel` is `dielectric`.
+        two_sided: bool = true;
+        /// What multiplies `color`, from place to place.
+        texture: Option<Texture>, or "one colour all over";
+        /// Heights that light sees on the surface; its outline stays as it is.
+        bump: Option<Bump>, or "as smooth as the shape";
+    }
 }
 
-/// The formula of a light's highlight.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Highlight {
-    /// k_s (R.V)^alpha.
-    Phong,
-    /// k_s D G F / (4 N.L N.V): microfacets with the lobe's distribution (Beckmann unless the lobe
-    /// is ggx).
-    CookTorrance,
+/// Keys of `[materials.NAME]`.
+pub const FIELDS: &[Field] = Material::FIELDS;
+
+choices! {
+    /// Formula of a light's highlight.
+    pub enum Highlight {
+        /// k_s (R.V)^alpha
+        Phong = "phong",
+        /// microfacets with the distribution of the lobe
+        CookTorrance = "cook-torrance",
+    }
 }
 
-/// The spread of the reflected ray.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Lobe {
-    /// No spread, whatever the roughness.
-    Mirror,
-    /// Uniform in a cone.
-    Cone,
-    /// Uniform on a square perpendicular to the mirror direction: the cheap stand-in for the cone.
-    Square,
-    /// Microfacets, Beckmann distribution.
-    Beckmann,
-    /// Microfacets, GGX (Trowbridge-Reitz) distribution.
-    Ggx,
+choices! {
+    /// Spread of the reflected ray.
+    pub enum Lobe {
+        /// no spread, whatever the roughness
+        Mirror = "mirror",
+        /// uniform in a cone
+        Cone = "cone",
+        /// uniform on a square across the mirror direction: cheaper
+        Square = "square",
+        /// microfacets, Beckmann distribution
+        Beckmann = "beckmann",
+        /// microfacets, GGX (Trowbridge-Reitz) distribution
+        Ggx = "ggx",
+    }
 }
 
-/// Masking and shadowing between microfacets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Masking {
-    /// Torrance-Sparrow's V-shaped grooves.
-    VCavity,
-    /// Smith, height-correlated.
-    Smith,
+choices! {
+    /// Masking and shadowing between microfacets.
+    pub enum Masking {
+        /// V-shaped grooves (Torrance-Sparrow)
+        VCavity = "v-cavity",
+        /// Smith, height-correlated
+        Smith = "smith",
+    }
 }
 
-/// Reflectance against angle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Fresnel {
-    /// F0 at every angle.
-    Constant,
-    /// Schlick's approximation.
-    Schlick,
-    /// The Fresnel equations for the index of refraction that F0 stands for.
-    Exact,
-    /// The Fresnel equations for the indices of refraction on both sides, F reflected and 1 - F
-    /// transmitted.
-    Dielectric,
+choices! {
+    /// Reflectance against angle.
+    pub enum Fresnel {
+        /// the same at every angle
+        Constant = "constant",
+        /// Schlick's approximation
+        Schlick = "schlick",
+        /// Fresnel's equations for the index of refraction that F0 stands for
+        Exact = "exact",
+        /// Fresnel's equations for `ior`: `reflection` weighs the share F that is reflected,
+        /// `transmission` the share 1 - F that is not
+        Dielectric = "dielectric",
+    }
 }
 
-/// Metals by reflectance at normal incidence.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Metal {
-    /// 0.989 0.876 0.349
-    Gold,
-    /// 0.950 0.930 0.880
-    Silver,
-    /// 0.755 0.490 0.095
-    Copper,
-    /// 0.530 0.505 0.480
-    Iron,
+choices! {
+    /// Metals by reflectance at normal incidence.
+    pub enum Metal {
+        /// 0.989 0.876 0.349
+        Gold = "gold",
+        /// 0.950 0.930 0.880
+        Silver = "silver",
+        /// 0.755 0.490 0.095
+        Copper = "copper",
+        /// 0.530 0.505 0.480
+        Iron = "iron",
+    }
 }
 
 impl Metal {
@@ -156,32 +151,6 @@ impl Metal {
             Self::Copper => [0.755, 0.490, 0.095],
             Self::Iron => [0.530, 0.505, 0.480],
         })
-    }
-}
-
-impl Default for Material {
-    fn default() -> Self {
-        Self {
-            color: Color([0.8; 3]),
-            ambient: 1.0,
-            diffuse: 1.0,
-            specular: 0.0,
-            exponent: 32.0,
-            highlight: Highlight::Phong,
-            reflection: 0.0,
-            transmission: 0.0,
-            ior: 1.5,
-            roughness: 0.0,
-            lobe: Lobe::Cone,
-            alpha: None,
-            masking: Masking::VCavity,
-            fresnel: None,
-            f0: None,
-            metal: None,
-            two_sided: true,
-            texture: None,
-            bump: None,
-        }
     }
 }
 
@@ -218,18 +187,7 @@ impl Material {
         let dielectric = self.fresnel == Some(Fresnel::Dielectric);
         let other = if self.metal.is_some() { "metal" } else { "f0" };
         let twice = dielectric && (self.metal.is_some() || self.f0.is_some());
-        Validator::new(FIELDS)
-            .numbers("color", &self.color.0)
-            .numbers("ambient", &[self.ambient])
-            .numbers("diffuse", &[self.diffuse])
-            .numbers("specular", &[self.specular])
-            .numbers("exponent", &[self.exponent])
-            .numbers("reflection", &[self.reflection])
-            .numbers("transmission", &[self.transmission])
-            .numbers("ior", &[self.ior])
-            .numbers("roughness", &[self.roughness])
-            .optional("alpha", self.alpha.as_ref().map(std::slice::from_ref))
-            .optional("f0", self.f0.as_ref().map(|c| &c.0[..]))
+        self.validator()
             .and(both.then(|| {
                 ValidationError::new(
                     "metal",
@@ -246,8 +204,66 @@ impl Material {
                     ),
                 )
             }))
-            .nested("texture", self.texture.as_ref().map(Texture::faults).unwrap_or_default())
-            .nested("bump", self.bump.as_ref().map(Bump::faults).unwrap_or_default())
-            .validate()
+            .errors()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FIELDS, Fresnel, Material, Metal};
+    use crate::value::Color;
+
+    #[test]
+    fn documented_reflectances_are_the_ones_in_use() {
+        for metal in Metal::CHOICES {
+            let text = format!("metal = \"{}\"", metal.name);
+            let metal_read: Metal = toml::from_str::<Material>(&text).unwrap().metal.unwrap();
+            let documented: Vec<f64> = metal.doc.split(' ').map(|n| n.parse().unwrap()).collect();
+            assert_eq!(metal_read.f0().0.to_vec(), documented, "{}", metal.name);
+        }
+    }
+
+    #[test]
+    fn every_number_is_checked() {
+        let mut bad = Material {
+            color: Color([-1.0, 0.0, 0.0]),
+            ambient: f64::NAN,
+            diffuse: -1.0,
+            specular: f64::INFINITY,
+            exponent: -1.0,
+            reflection: -0.1,
+            transmission: -0.1,
+            ior: 0.0,
+            roughness: -1e-9,
+            alpha: Some(-1.0),
+            f0: Some(Color([1.1, 0.0, 0.0])),
+            ..Material::default()
+        };
+        let keys: Vec<_> = bad.faults().into_iter().map(|f| f.key).collect();
+        let numbers = [
+            "color",
+            "ambient",
+            "diffuse",
+            "specular",
+            "exponent",
+            "reflection",
+            "transmission",
+            "ior",
+            "roughness",
+            "alpha",
+            "f0",
+        ];
+        assert_eq!(keys, numbers);
+        assert_eq!(FIELDS.len(), numbers.len() + 8, "a new field? Check its range here");
+        bad = Material { metal: Some(Metal::Gold), ..Material::default() };
+        assert!(bad.faults().is_empty());
+        bad.f0 = Some(Color::WHITE);
+        assert_eq!(bad.faults()[0].key, "metal");
+        let dielectric = Material { fresnel: Some(Fresnel::Dielectric), ..Material::default() };
+        assert!(dielectric.faults().is_empty());
+        bad = Material { metal: Some(Metal::Gold), ..dielectric.clone() };
+        assert_eq!(bad.faults()[0].key, "fresnel");
+        bad = Material { f0: Some(Color::WHITE), ..dielectric };
+        assert_eq!(bad.faults()[0].key, "fresnel");
     }
 }

@@ -1,6 +1,6 @@
 //! What each model of reflection promises, so that tests can hold it to that.
 
-use crate::material::{Fresnel, Highlight, Lobe, Masking};
+use crate::material::{Fresnel, Highlight, Lobe};
 
 /// How much of the light that a model gets it gives back, at coefficient 1 and reflectance 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,9 +29,6 @@ impl BsdfProperties {
 }
 
 impl Lobe {
-    /// Every lobe, in the order of the field table.
-    pub const ALL: [Self; 5] = [Self::Mirror, Self::Cone, Self::Square, Self::Beckmann, Self::Ggx];
-
     /// What the reflection by this lobe promises.
     ///
     /// Cone and square spread light evenly about the mirror direction: the density is symmetric, so
@@ -50,9 +47,6 @@ impl Lobe {
 }
 
 impl Highlight {
-    /// Every formula, in the order of the field table.
-    pub const ALL: [Self; 2] = [Self::Phong, Self::CookTorrance];
-
     /// What the formula promises.
     pub fn claims(self) -> BsdfProperties {
         match self {
@@ -62,15 +56,7 @@ impl Highlight {
     }
 }
 
-impl Masking {
-    /// Every formula, in the order of the field table.
-    pub const ALL: [Self; 2] = [Self::VCavity, Self::Smith];
-}
-
 impl Fresnel {
-    /// Every law, in the order of the field table.
-    pub const ALL: [Self; 4] = [Self::Constant, Self::Schlick, Self::Exact, Self::Dielectric];
-
     /// What a transparent surface with this law promises of what it reflects and transmits together.
     pub fn claims_of_transmission(self) -> BsdfProperties {
         match self {

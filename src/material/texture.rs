@@ -8,8 +8,8 @@
 //! ```
 
 use crate::asset::{AssetError, Image};
-use crate::material::texture_fields::{BUMP_FIELDS, CHECKER_FIELDS, IMAGE_FIELDS};
-use crate::value::{Color, Field, ValidationError, Validator};
+use crate::value::{Color, Description, Field, FieldValue, ValidationError, ValueType};
+use crate::value::{choices, description};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::sync::Arc;
@@ -32,122 +32,119 @@ pub enum Bump {
     Image(HeightImage),
 }
 
-/// An image, wrapped on the surface.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ImageTexture {
-    /// Name of the file, as the scene's author wrote it; empty: white.
-    pub file: String,
-    /// Where coordinates come from.
-    pub mapping: Mapping,
-    /// The axis of the mapping; without it the shape's own.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub axis: Option<Axis>,
-    /// Repeats per unit of u and v.
-    pub scale: [f64; 2],
-    /// Added to the scaled coordinates, in repeats.
-    pub offset: [f64; 2],
-    /// What lies beyond the edges.
-    pub wrap: Wrap,
-    /// What lies between the pixels.
-    pub filter: TextureFilter,
-    #[serde(skip)]
-    content: Loaded,
+description! {
+    /// A PNG or JPEG image.
+    pub struct ImageTexture: Default {
+        /// Name of the file, relative to the folder of the scene file. Empty: white.
+        file: String = "";
+        /// Where the coordinates u (to the right) and v (up) come from.
+        mapping: Mapping = "auto";
+        /// What those mappings turn around, or look along.
+        axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
+        /// Repeats per unit of u and of v: the larger, the smaller the picture.
+        scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
+        /// Added to the scaled u and v, in repeats: moves the picture to the left and down.
+        offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
+        /// What lies beyond the edges of the image.
+        wrap: Wrap = "repeat";
+        /// What lies between the middles of the pixels.
+        filter: TextureFilter = "bilinear";
+        skip content: Loaded;
+    }
 }
 
-/// Two colours in squares, two by two a repeat.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Checker {
-    /// Colour of the square at u = v = 0.
-    pub even: Color,
-    /// Colour of its neighbours.
-    pub odd: Color,
-    /// Where coordinates come from.
-    pub mapping: Mapping,
-    /// The axis of the mapping; without it the shape's own.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub axis: Option<Axis>,
-    /// Repeats per unit of u and v.
-    pub scale: [f64; 2],
-    /// Added to the scaled coordinates, in repeats.
-    pub offset: [f64; 2],
+description! {
+    /// Squares of two colours, two by two a repeat.
+    pub struct Checker: Default {
+        /// Colour of the square that begins at u = v = 0.
+        even: Color = [1.0, 1.0, 1.0], in COEFFICIENT;
+        /// Colour of its neighbours.
+        odd: Color = [0.1, 0.1, 0.1], in COEFFICIENT;
+        /// Where the coordinates u (to the right) and v (up) come from.
+        mapping: Mapping = "auto";
+        /// What those mappings turn around, or look along.
+        axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
+        /// Repeats per unit of u and of v: the larger, the smaller the picture.
+        scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
+        /// Added to the scaled u and v, in repeats: moves the picture to the left and down.
+        offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
+    }
 }
 
-/// Heights from an image.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct HeightImage {
-    /// Name of the file, as the scene's author wrote it; empty: flat.
-    pub file: String,
-    /// Height of white above black, in lengths of the shape's own space.
-    pub height: f64,
-    /// Where coordinates come from.
-    pub mapping: Mapping,
-    /// The axis of the mapping; without it the shape's own.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub axis: Option<Axis>,
-    /// Repeats per unit of u and v.
-    pub scale: [f64; 2],
-    /// Added to the scaled coordinates, in repeats.
-    pub offset: [f64; 2],
-    /// What lies beyond the edges.
-    pub wrap: Wrap,
-    #[serde(skip)]
-    content: Loaded,
+description! {
+    /// Heights from a PNG or JPEG image: black is low, white is high.
+    pub struct HeightImage: Default {
+        /// Name of the file, relative to the folder of the scene file. Empty: flat.
+        file: String = "";
+        /// How far white rises above black, before the object's transform; negative: how far it sinks.
+        height: f64 = 0.02, in closed(-1e3, 1e3) "scene units";
+        /// Where the coordinates u (to the right) and v (up) come from.
+        mapping: Mapping = "auto";
+        /// What those mappings turn around, or look along.
+        axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
+        /// Repeats per unit of u and of v: the larger, the smaller the picture.
+        scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
+        /// Added to the scaled u and v, in repeats: moves the picture to the left and down.
+        offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
+        /// What lies beyond the edges of the image.
+        wrap: Wrap = "repeat";
+        skip content: Loaded;
+    }
 }
 
-/// Where the coordinates u and v of a texture come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Mapping {
-    /// As it suits the shape.
-    #[default]
-    Auto,
-    /// Seen along an axis, in lengths.
-    Planar,
-    /// Around an axis and from pole to pole, each once.
-    Spherical,
-    /// Around an axis and along it, each once.
-    Cylindrical,
-    /// Each side as it is seen from outside, in lengths from its lower left corner.
-    Box,
-    /// Those of a mesh, or from edge to edge of a flat shape.
-    Uv,
+choices! {
+    /// Source of the coordinates u and v of a texture.
+    pub enum Mapping {
+        /// as it suits the shape: `spherical` on spheres, `cylindrical` on all that is round about an
+        /// axis, `box` on solids with flat faces, `planar` on what is flat, `uv` on a mesh whose file has
+        /// texture coordinates, `box` on any other
+        Auto = "auto",
+        /// seen along the axis; one repeat a scene unit, from the lower left corner of the box around the
+        /// shape (of a plane, from its `point`)
+        Planar = "planar",
+        /// u once around the axis, v once from pole to pole, seen from the middle of the box around the
+        /// shape; the middle of the image looks to the front
+        Spherical = "spherical",
+        /// u once around the axis, v once along the shape; the ends show the colours of their rims
+        Cylindrical = "cylindrical",
+        /// each side as it is seen from outside; one repeat a scene unit, from the side's lower left
+        /// corner
+        Box = "box",
+        /// the texture coordinates in a mesh's file; on rectangles and platforms once from edge to edge
+        Uv = "uv",
+    }
 }
 
-/// An axis of the space that textures lie in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Axis {
-    /// To the right.
-    X,
-    /// Up.
-    Y,
-    /// To the front.
-    Z,
+choices! {
+    /// Axis of the space that textures lie in.
+    pub enum Axis {
+        /// to the right
+        X = "x",
+        /// up, or along the axis of a cylinder or cone
+        Y = "y",
+        /// to the front, or along the normal of what is flat
+        Z = "z",
+    }
 }
 
-/// What lies beyond the edges of an image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Wrap {
-    /// The image again.
-    #[default]
-    Repeat,
-    /// Its outermost pixels.
-    Clamp,
+choices! {
+    /// Continuation of an image beyond its edges.
+    pub enum Wrap {
+        /// the image again and again
+        Repeat = "repeat",
+        /// its outermost pixels
+        Clamp = "clamp",
+    }
 }
 
-/// What lies between the middles of an image's pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum TextureFilter {
-    /// Even transitions.
-    #[default]
-    Bilinear,
-    /// The nearest pixel.
-    Nearest,
+choices! {
+    /// Interpolation between the middles of an image's pixels.
+    pub enum TextureFilter {
+        /// even transitions
+        Bilinear = "bilinear",
+        /// none: every pixel is a square
+        Nearest = "nearest",
+    }
 }
 
 /// How a texture lies on shapes.
@@ -199,49 +196,6 @@ impl Loaded {
     }
 }
 
-impl Default for ImageTexture {
-    fn default() -> Self {
-        Self {
-            file: String::new(),
-            mapping: Mapping::Auto,
-            axis: None,
-            scale: [1.0; 2],
-            offset: [0.0; 2],
-            wrap: Wrap::Repeat,
-            filter: TextureFilter::Bilinear,
-            content: Loaded(None),
-        }
-    }
-}
-
-impl Default for Checker {
-    fn default() -> Self {
-        Self {
-            even: Color::WHITE,
-            odd: Color([0.1; 3]),
-            mapping: Mapping::Auto,
-            axis: None,
-            scale: [1.0; 2],
-            offset: [0.0; 2],
-        }
-    }
-}
-
-impl Default for HeightImage {
-    fn default() -> Self {
-        Self {
-            file: String::new(),
-            height: 0.02,
-            mapping: Mapping::Auto,
-            axis: None,
-            scale: [1.0; 2],
-            offset: [0.0; 2],
-            wrap: Wrap::Repeat,
-            content: Loaded(None),
-        }
-    }
-}
-
 /// The image of a description with a file; how it lies.
 macro_rules! laid {
     ($($kind:ident),+) => {$(
@@ -250,10 +204,6 @@ macro_rules! laid {
             pub fn placement(&self) -> Placement {
                 let Self { mapping, axis, scale, offset, .. } = *self;
                 Placement { mapping, axis, scale, offset }
-            }
-
-            fn checks(&self, fields: &'static [Field]) -> Validator {
-                Validator::new(fields).numbers("scale", &self.scale).numbers("offset", &self.offset)
             }
         }
     )+};
@@ -319,18 +269,6 @@ impl Texture {
             Self::Checker(_) => true,
         }
     }
-
-    pub(super) fn faults(&self) -> Vec<ValidationError> {
-        let faults = match self {
-            Self::Image(image) => image.checks(IMAGE_FIELDS).and(image.content.fault()).validate(),
-            Self::Checker(checker) => checker
-                .checks(CHECKER_FIELDS)
-                .numbers("even", &checker.even.0)
-                .numbers("odd", &checker.odd.0)
-                .validate(),
-        };
-        faults.into_iter().map(|f| f.prefixed(self.key())).collect()
-    }
 }
 
 impl Bump {
@@ -350,12 +288,47 @@ impl Bump {
         let Self::Image(image) = self;
         image.height != 0.0 && image.image().is_some()
     }
+}
 
-    pub(super) fn faults(&self) -> Vec<ValidationError> {
+/// Kinds of `texture`.
+const TEXTURE_KINDS: &[Field] = &[
+    Field::required("image", ImageTexture::TYPE, "", ImageTexture::DOC),
+    Field::required("checker", Checker::TYPE, "", Checker::DOC),
+];
+
+/// Kinds of `bump`.
+const BUMP_KINDS: &[Field] = &[Field::required("image", HeightImage::TYPE, "", HeightImage::DOC)];
+
+impl FieldValue for Texture {
+    type Written = Self;
+    const TYPE: ValueType = ValueType::OneOf(TEXTURE_KINDS);
+
+    fn from_written(written: Self) -> Self {
+        written
+    }
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        let validator = match self {
+            Self::Image(image) => image.validator().and(image.content.fault()),
+            Self::Checker(checker) => checker.validator(),
+        };
+        let errors = validator.errors().into_iter();
+        errors.map(|error| error.prefixed(self.key()).prefixed(field.name)).collect()
+    }
+}
+
+impl FieldValue for Bump {
+    type Written = Self;
+    const TYPE: ValueType = ValueType::OneOf(BUMP_KINDS);
+
+    fn from_written(written: Self) -> Self {
+        written
+    }
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
         let Self::Image(image) = self;
-        let checks = image.checks(BUMP_FIELDS).numbers("height", &[image.height]);
-        let faults = checks.and(image.content.fault()).validate();
-        faults.into_iter().map(|f| f.prefixed("image")).collect()
+        let errors = image.validator().and(image.content.fault()).errors().into_iter();
+        errors.map(|error| error.prefixed("image").prefixed(field.name)).collect()
     }
 }
 

@@ -1,47 +1,26 @@
 //! Objects: a shape with a transform and a material.
 
 use crate::primitive::Form;
-use crate::shape::{KINDS, Shape, TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
-use crate::value::{Field, ValidationError, Validator, ValueType};
+use crate::shape::{Shape, TransformOp, compose, ill_conditioned};
+use crate::value::{Description, Field, ValidationError, description};
 use glam::DAffine3;
-use serde::{Deserialize, Serialize};
 
-/// An object: a shape with a transform and a material.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Object {
-    /// Name, unique in the scene; empty if it has none.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub name: String,
-    /// Key of `materials`; empty means the default material.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub material: String,
-    /// Shape, in the object's space.
-    pub shape: Shape,
-    /// Transform from the object's space to the scene's: steps, the first one applied first.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub transform: Vec<TransformOp>,
+description! {
+    /// An object: a shape with a transform and a material.
+    pub struct Object {
+        /// Name; no two objects have the same.
+        name: String, or "a number";
+        /// Name of one of the `[materials.NAME]`.
+        material: String, or "a matt light grey, the default of every material key";
+        /// What it looks like: exactly one kind.
+        shape: Shape;
+        /// Steps that move, turn and scale it, the first step first.
+        transform: Vec<TransformOp>, or "it stays as its shape says";
+    }
 }
 
 /// Keys of `[[object]]`.
-pub const OBJECT_FIELDS: &[Field] = &[
-    Field::optional("name", ValueType::Text, "", "a number", "Name; no two objects have the same."),
-    Field::optional(
-        "material",
-        ValueType::Text,
-        "",
-        "a matt light grey, the default of every material key",
-        "Name of one of the `[materials.NAME]`.",
-    ),
-    Field::required("shape", ValueType::OneOf(KINDS), "", "What it looks like: exactly one kind."),
-    Field::optional(
-        "transform",
-        ValueType::ListOf(TRANSFORM_OP_FIELDS),
-        "",
-        "it stays as its shape says",
-        "Steps that move, turn and scale it, the first step first.",
-    ),
-];
+pub const OBJECT_FIELDS: &[Field] = Object::FIELDS;
 
 impl Object {
     /// Returns the material of each part of the compiled form; a simple object has one part.
@@ -79,12 +58,9 @@ impl Object {
     /// Validates the object, except that its material exists, which
     /// [`Scene::faults`](crate::scene::Scene::faults) checks.
     pub fn faults(&self) -> Vec<ValidationError> {
-        let mut checks = Validator::new(OBJECT_FIELDS).nested("shape", self.shape.faults());
-        for (i, step) in self.transform.iter().enumerate() {
-            checks = checks.nested(&format!("transform.{i}"), step.faults());
-        }
+        let checks = self.validator();
         let moved =
-            if checks.clean() { ill_conditioned(&self.shape, &self.transform) } else { None };
-        checks.and(moved).validate()
+            if checks.is_clean() { ill_conditioned(&self.shape, &self.transform) } else { None };
+        checks.and(moved).errors()
     }
 }

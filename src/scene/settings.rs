@@ -1,249 +1,147 @@
 //! Settings of the whole picture: film, integrator, background, ambient light.
 
 use crate::primitive::Acceleration;
-use crate::value::{Choice, Color, Field, NumberRange, ValidationError, Validator, ValueType};
-use serde::{Deserialize, Serialize};
+use crate::value::{Color, Description, Field, FieldValue, ValidationError, ValueType};
+use crate::value::{choices, description};
 
-/// Film settings: size, pixel filter, sample limit of glossy pixels.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FilmSettings {
-    /// Width and height in pixels.
-    pub size: [u32; 2],
-    /// Pixel filter.
-    pub filter: Filter,
-    /// Largest number of samples per pixel spent on glossy pictures; 0 is no cap.
-    pub rays_per_pixel: u32,
+description! {
+    /// Film settings: size, pixel filter, sample limit of glossy pixels.
+    pub struct FilmSettings: Default {
+        /// Width and height of the picture; together at most 67108864 pixels.
+        size: [u32; 2] = [640, 480], in closed(1.0, 16384.0) "pixels";
+        /// Distribution of samples over a pixel.
+        filter: Filter = "box";
+        /// Largest number of samples per pixel spent on glossy pictures; 0 is no cap.
+        rays_per_pixel: u32 = 0, in closed(0.0, 1e9) "samples";
+    }
 }
 
-/// Pixel filter: distribution of samples over a pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Filter {
-    /// Uniform over the pixel's square.
-    Box,
-    /// All samples at the pixel's centre, without anti-aliasing.
-    Point,
+choices! {
+    /// Distribution of samples over a pixel.
+    pub enum Filter {
+        /// uniform over the pixel's square
+        Box = "box",
+        /// all at the pixel's centre: no anti-aliasing
+        Point = "point",
+    }
 }
 
-/// Integrator settings, the table `[trace]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct IntegratorSettings {
+description! {
+    /// Integrator settings, the table `[trace]`.
+    pub struct IntegratorSettings: Default {
+        /// Kinds of rays that are traced.
+        ray_types: RayTypes = "full";
+        /// Largest number of surfaces that a path hits after the first; 0: no reflection, no transmission.
+        max_depth: u32 = 16, in closed(0.0, 10000.0) "surfaces";
+        /// Paths whose throughput is smaller end.
+        min_throughput: f64 = 0.0, in SHARE;
+        /// Treatment of sampled reflections below the surface's horizon.
+        below_horizon: BelowHorizon = "fold";
+        /// Acceleration structure. Every choice renders the same image; only speed differs.
+        acceleration: Acceleration = "auto";
+    }
+}
+
+choices! {
     /// Kinds of rays that are traced.
-    pub ray_types: RayTypes,
-    /// Largest number of surfaces that a path hits after the first; 0 disables reflection and
-    /// transmission.
-    pub max_depth: u32,
-    /// Paths with a smaller throughput end.
-    pub min_throughput: f64,
+    #[derive(PartialOrd, Ord)]
+    pub enum RayTypes {
+        /// camera rays only: no shadows, no reflections
+        Primary = "primary",
+        /// camera rays and shadow rays
+        Shadows = "shadows",
+        /// camera, shadow, reflected and transmitted rays
+        Full = "full",
+    }
+}
+
+choices! {
     /// Treatment of sampled reflections below the surface's horizon.
-    pub below_horizon: BelowHorizon,
-    /// Acceleration structure. Every choice renders the same image; only speed differs.
-    pub acceleration: Acceleration,
-}
-
-/// Kinds of rays that are traced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum RayTypes {
-    /// Camera rays only, without shadows and reflections.
-    Primary,
-    /// Camera rays and shadow rays.
-    Shadows,
-    /// Camera, shadow, reflected and transmitted rays.
-    Full,
-}
-
-/// Treatment of sampled reflections below the surface's horizon.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum BelowHorizon {
-    /// Mirrored at the surface, which conserves energy.
-    Fold,
-    /// Dropped, which loses energy.
-    Absorb,
-}
-
-/// Radiance of rays that hit no surface.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Background {
-    /// Radiance.
-    pub color: Color,
-}
-
-/// Ambient light: uniform, without shadows.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Ambient {
-    /// Intensity i_a in k_a i_a.
-    pub color: Color,
-}
-
-impl Default for FilmSettings {
-    fn default() -> Self {
-        Self { size: [640, 480], filter: Filter::Box, rays_per_pixel: 0 }
+    pub enum BelowHorizon {
+        /// mirrored at the surface: no light is lost
+        Fold = "fold",
+        /// dropped: its light is lost
+        Absorb = "absorb",
     }
 }
 
-impl Default for IntegratorSettings {
-    fn default() -> Self {
-        Self {
-            ray_types: RayTypes::Full,
-            max_depth: 16,
-            min_throughput: 0.0,
-            below_horizon: BelowHorizon::Fold,
-            acceleration: Acceleration::Auto,
-        }
+description! {
+    /// Radiance of rays that hit no surface.
+    pub struct Background: Default {
+        /// Radiance of rays that hit no surface.
+        color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
     }
 }
 
-impl Default for Background {
-    fn default() -> Self {
-        Self { color: Color::BLACK }
+description! {
+    /// Ambient light: uniform, without shadows.
+    pub struct Ambient: Default {
+        /// Light from everywhere, without shadows: i_a of k_a i_a.
+        color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
     }
 }
 
-impl Default for Ambient {
-    fn default() -> Self {
-        Self { color: Color::BLACK }
+impl FieldValue for Acceleration {
+    type Written = &'static str;
+    const TYPE: ValueType = ValueType::Choice(Self::CHOICES);
+
+    fn from_written(written: &'static str) -> Self {
+        let named = |choice: &Self| choice.name() == written;
+        Self::ALL.into_iter().find(named).unwrap_or_default()
+    }
+
+    fn errors(&self, _: &Field) -> Vec<ValidationError> {
+        Vec::new()
     }
 }
 
 /// Largest number of pixels: 8192 x 8192.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// Keys of `[film]`.
-pub const FILM_FIELDS: &[Field] = &[
-    Field::preset(
-        "size",
-        ValueType::Wholes(2, NumberRange::closed(1.0, 16384.0)),
-        "pixels",
-        "[640, 480]",
-        "Width and height of the picture; together at most 67108864 pixels.",
-    ),
-    Field::preset(
-        "filter",
-        ValueType::Choice(&[
-            Choice { name: "box", doc: "uniform over the pixel's square" },
-            Choice { name: "point", doc: "all at the pixel's centre: no anti-aliasing" },
-        ]),
-        "",
-        "\"box\"",
-        "Distribution of samples over a pixel.",
-    ),
-    Field::preset(
-        "rays_per_pixel",
-        ValueType::Whole(NumberRange::closed(0.0, 1e9)),
-        "samples",
-        "0",
-        "Largest number of samples per pixel spent on glossy pictures; 0 is no cap.",
-    ),
-];
-
-/// Keys of `[trace]`.
-pub const TRACE_FIELDS: &[Field] = &[
-    Field::preset(
-        "ray_types",
-        ValueType::Choice(&[
-            Choice { name: "primary", doc: "camera rays only: no shadows, no reflections" },
-            Choice { name: "shadows", doc: "camera rays and shadow rays" },
-            Choice { name: "full", doc: "camera, shadow, reflected and transmitted rays" },
-        ]),
-        "",
-        "\"full\"",
-        "Kinds of rays that are traced.",
-    ),
-    Field::preset(
-        "max_depth",
-        ValueType::Whole(NumberRange::closed(0.0, 10000.0)),
-        "surfaces",
-        "16",
-        "Largest number of surfaces that a path hits after the first; 0: no reflection, no transmission.",
-    ),
-    Field::preset(
-        "min_throughput",
-        ValueType::Number(NumberRange::SHARE),
-        "",
-        "0.0",
-        "Paths whose throughput is smaller end.",
-    ),
-    Field::preset(
-        "below_horizon",
-        ValueType::Choice(&[
-            Choice { name: "fold", doc: "mirrored at the surface: no light is lost" },
-            Choice { name: "absorb", doc: "dropped: its light is lost" },
-        ]),
-        "",
-        "\"fold\"",
-        "Treatment of sampled reflections below the surface's horizon.",
-    ),
-    Field::preset(
-        "acceleration",
-        ValueType::Choice(Acceleration::CHOICES),
-        "",
-        "\"auto\"",
-        "Acceleration structure. Every choice renders the same image; only speed differs.",
-    ),
-];
-
-/// Keys of `[background]`.
-pub const BACKGROUND_FIELDS: &[Field] = &[Field::preset(
-    "color",
-    ValueType::Color(NumberRange::LIGHT),
-    "radiance",
-    "[0.0, 0.0, 0.0]",
-    "Radiance of rays that hit no surface.",
-)];
-
-/// Keys of `[ambient]`.
-pub const AMBIENT_FIELDS: &[Field] = &[Field::preset(
-    "color",
-    ValueType::Color(NumberRange::LIGHT),
-    "radiance",
-    "[0.0, 0.0, 0.0]",
-    "Light from everywhere, without shadows: i_a of k_a i_a.",
-)];
+/// The keys of `[film]`.
+pub const FILM_FIELDS: &[Field] = FilmSettings::FIELDS;
+/// The keys of `[trace]`.
+pub const TRACE_FIELDS: &[Field] = IntegratorSettings::FIELDS;
+/// The keys of `[background]`.
+pub const BACKGROUND_FIELDS: &[Field] = Background::FIELDS;
+/// The keys of `[ambient]`.
+pub const AMBIENT_FIELDS: &[Field] = Ambient::FIELDS;
 
 impl FilmSettings {
     /// Returns the errors in the film settings.
     pub fn faults(&self) -> Vec<ValidationError> {
         let [width, height] = self.size;
-        let checks =
-            Validator::new(FILM_FIELDS).numbers("size", &[f64::from(width), f64::from(height)]);
+        let errors = self.validator().errors();
         let pixels = u64::from(width) * u64::from(height);
-        let too_many = (checks.clean() && pixels > MAX_PIXELS).then(|| {
-            ValidationError::new(
-                "size",
-                format!("size is [{width}, {height}], {pixels} pixels"),
-                format!("at most {MAX_PIXELS} pixels, such as [8192, 8192]"),
-            )
-        });
-        checks.and(too_many).numbers("rays_per_pixel", &[f64::from(self.rays_per_pixel)]).validate()
+        let too_many = (errors.iter().all(|error| error.key != "size") && pixels > MAX_PIXELS)
+            .then(|| {
+                ValidationError::new(
+                    "size",
+                    format!("size is [{width}, {height}], {pixels} pixels"),
+                    format!("at most {MAX_PIXELS} pixels, such as [8192, 8192]"),
+                )
+            });
+        errors.into_iter().chain(too_many).collect()
     }
 }
 
 impl IntegratorSettings {
     /// Returns the errors in the integrator settings.
     pub fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(TRACE_FIELDS)
-            .numbers("max_depth", &[f64::from(self.max_depth)])
-            .numbers("min_throughput", &[self.min_throughput])
-            .validate()
+        self.validator().errors()
     }
 }
 
 impl Background {
     /// Returns the errors in the background.
     pub fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(BACKGROUND_FIELDS).numbers("color", &self.color.0).validate()
+        self.validator().errors()
     }
 }
 
 impl Ambient {
     /// Returns the errors in the ambient light.
     pub fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(AMBIENT_FIELDS).numbers("color", &self.color.0).validate()
+        self.validator().errors()
     }
 }

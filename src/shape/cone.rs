@@ -4,46 +4,24 @@ use crate::primitive::Form;
 use crate::shape::ShapeDesc;
 use crate::shape::axial::axes_between;
 use crate::shape::axial::{degenerate_axis, frustum_between, height, is_upright};
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
+use crate::value::{Description, ValidationError, description};
 use glam::{DMat3, DVec3};
-use serde::{Deserialize, Serialize};
 
-/// A right circular cone with its base closed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Cone {
-    /// Centre of the base.
-    pub base: [f64; 3],
-    /// The apex.
-    pub apex: [f64; 3],
-    /// Radius of the base.
-    pub radius: f64,
+description! {
+    /// A right circular cone with a flat base.
+    pub struct Cone {
+        /// Centre of the base.
+        base: [f64; 3], in COORDINATE "scene units";
+        /// The apex.
+        apex: [f64; 3], in COORDINATE "scene units";
+        /// Radius of the base.
+        radius: f64, in SIZE "scene units";
+    }
 }
 
 impl ShapeDesc for Cone {
-    const DOC: &'static str = "A right circular cone with a flat base.";
     const EXAMPLE: &'static str =
         "shape.cone = { base = [0.0, 0.0, 0.0], apex = [0.0, 1.0, 0.0], radius = 0.5 }";
-    const FIELDS: &'static [Field] = &[
-        Field::required(
-            "base",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "Centre of the base.",
-        ),
-        Field::required(
-            "apex",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "The apex.",
-        ),
-        Field::required(
-            "radius",
-            ValueType::Number(NumberRange::SIZE),
-            "scene units",
-            "Radius of the base.",
-        ),
-    ];
 
     fn form(&self) -> Form {
         frustum_between(self.base, self.apex, self.radius, 0.0)
@@ -51,13 +29,10 @@ impl ShapeDesc for Cone {
 
     fn faults(&self) -> Vec<ValidationError> {
         let sizes = [("radius", self.radius), ("apex", height(self.base, self.apex))];
-        Validator::new(Self::FIELDS)
-            .numbers("base", &self.base)
-            .numbers("apex", &self.apex)
-            .numbers("radius", &[self.radius])
+        self.validator()
             .and(degenerate_axis(self.base, self.apex, "apex"))
             .ratio(&sizes, &[self.base, self.apex].concat())
-            .validate()
+            .errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

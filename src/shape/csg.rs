@@ -8,7 +8,7 @@ use crate::primitive::csg_tree::{CsgSolid, CsgTree};
 use crate::shape::registry::KIND_TABLE;
 use crate::shape::transform::{TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
-use crate::value::{Field, ValidationError, Validator, ValueType};
+use crate::value::{Description, Field, ValidationError, Validator, ValueType};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +29,8 @@ pub struct CsgOperand {
     pub transform: Vec<TransformOp>,
 }
 
+// A `description!` would have constants, and a constant cannot be part of a table that refers to
+// itself: shapes have parts, parts have shapes.
 static PART_FIELDS: [Field; 3] = [
     Field::required(
         "shape",
@@ -70,17 +72,25 @@ macro_rules! compounds {
             pub of: Vec<CsgOperand>,
         }
 
-        impl ShapeDesc for $kind {
+        impl Description for $kind {
             const DOC: &'static str = $doc;
-            const EXAMPLE: &'static str = $example;
             const FIELDS: &'static [Field] = &OF_FIELDS;
+
+            fn validator(&self) -> Validator {
+                let errors = part_faults(&self.of, 1).into_iter().map(Some);
+                errors.fold(Validator::new(Self::FIELDS), Validator::and)
+            }
+        }
+
+        impl ShapeDesc for $kind {
+            const EXAMPLE: &'static str = $example;
 
             fn form(&self) -> Form {
                 Form::Csg(combined(&self.of, CsgTree::$kind))
             }
 
             fn faults(&self) -> Vec<ValidationError> {
-                let faults = part_faults(&self.of, 1);
+                let faults = self.validator().errors();
                 if !faults.is_empty() || self.form().bounds().is_some() {
                     return faults;
                 }
@@ -219,15 +229,14 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
             let found = format!("a {} {why}", part.shape.key());
             ValidationError::new("shape", found, "a solid")
         });
-        let mut checks = Validator::new(&PART_FIELDS).nested("shape", inner).and(open);
-        for (k, step) in part.transform.iter().enumerate() {
-            checks = checks.nested(&format!("transform.{k}"), step.faults());
-        }
+        let checks = Validator::new(&PART_FIELDS)
+            .nested("shape", inner)
+            .and(open)
+            .field("transform", &part.transform);
         let moved =
-            if checks.clean() { ill_conditioned(&part.shape, &part.transform) } else { None };
-        faults.extend(
-            checks.and(moved).validate().into_iter().map(|f| f.prefixed(&format!("of.{i}"))),
-        );
+            if checks.is_clean() { ill_conditioned(&part.shape, &part.transform) } else { None };
+        faults
+            .extend(checks.and(moved).errors().into_iter().map(|f| f.prefixed(&format!("of.{i}"))));
     }
     faults
 }

@@ -5,49 +5,24 @@ use crate::shape::ShapeDesc;
 use crate::shape::prismoid::{corner_of_centered, prismoid};
 use crate::shape::registry::turned_rotation;
 use crate::shape::texture_space::turned_axes;
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
+use crate::value::{Description, ValidationError, description};
 use glam::{DMat3, DVec2, DVec3};
-use serde::{Deserialize, Serialize};
 
-/// A cube. Unturned it spans x to x + edge, y to y + edge and z - edge to z from its corner
-/// (x, y, z).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Cube {
-    /// Lower left near corner before the rotation; near is +z.
-    pub corner: [f64; 3],
-    /// Length of an edge.
-    pub edge: f64,
-    /// Degrees about the vertical through the centre, counter-clockwise seen from above.
-    #[serde(default)]
-    pub rotation: f64,
+description! {
+    /// A cube that stands upright.
+    pub struct Cube {
+        /// Lower left near corner, before the rotation (near is +z).
+        corner: [f64; 3], in COORDINATE "scene units";
+        /// Length of an edge.
+        edge: f64, in SIZE "scene units";
+        /// Turn about the vertical through the centre, counter-clockwise seen from above.
+        rotation: f64 = 0.0, in FINITE "degrees";
+    }
 }
 
 impl ShapeDesc for Cube {
-    const DOC: &'static str = "A cube that stands upright.";
     const EXAMPLE: &'static str =
         "shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0, rotation = 30.0 }";
-    const FIELDS: &'static [Field] = &[
-        Field::required(
-            "corner",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "Lower left near corner, before the rotation (near is +z).",
-        ),
-        Field::required(
-            "edge",
-            ValueType::Number(NumberRange::SIZE),
-            "scene units",
-            "Length of an edge.",
-        ),
-        Field::preset(
-            "rotation",
-            ValueType::Number(NumberRange::FINITE),
-            "degrees",
-            "0.0",
-            "Turn about the vertical through the centre, counter-clockwise seen from above.",
-        ),
-    ];
 
     fn form(&self) -> Form {
         let e = self.edge;
@@ -55,12 +30,7 @@ impl ShapeDesc for Cube {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(Self::FIELDS)
-            .numbers("corner", &self.corner)
-            .numbers("edge", &[self.edge])
-            .numbers("rotation", &[self.rotation])
-            .ratio(&[("edge", self.edge)], &self.corner)
-            .validate()
+        self.validator().ratio(&[("edge", self.edge)], &self.corner).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -6,39 +6,22 @@
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
 use crate::shape::prismoid::prismoid;
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
+use crate::value::{Description, ValidationError, description};
 use glam::{DVec2, DVec3};
-use serde::{Deserialize, Serialize};
 
-/// A box with sides parallel to the axes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Cuboid {
-    /// Centre of the solid.
-    pub center: [f64; 3],
-    /// Lengths along x, y and z.
-    pub size: [f64; 3],
+description! {
+    /// A box with sides parallel to the axes; an object's `transform` can turn it.
+    pub struct Cuboid {
+        /// Centre of the solid.
+        center: [f64; 3], in COORDINATE "scene units";
+        /// Lengths along x, y and z.
+        size: [f64; 3], in SIZE "scene units";
+    }
 }
 
 impl ShapeDesc for Cuboid {
-    const DOC: &'static str =
-        "A box with sides parallel to the axes; an object's `transform` can turn it.";
     const EXAMPLE: &'static str =
         "shape.box = { center = [0.0, 0.5, 0.0], size = [2.0, 1.0, 0.5] }";
-    const FIELDS: &'static [Field] = &[
-        Field::required(
-            "center",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "Centre of the solid.",
-        ),
-        Field::required(
-            "size",
-            ValueType::Numbers(3, NumberRange::SIZE),
-            "scene units",
-            "Lengths along x, y and z.",
-        ),
-    ];
 
     fn form(&self) -> Form {
         let [x, y, z] = self.size;
@@ -48,11 +31,7 @@ impl ShapeDesc for Cuboid {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(Self::FIELDS)
-            .numbers("center", &self.center)
-            .numbers("size", &self.size)
-            .ratio(&self.size.map(|s| ("size", s)), &self.center)
-            .validate()
+        self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

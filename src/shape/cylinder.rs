@@ -4,41 +4,24 @@ use crate::primitive::Form;
 use crate::shape::ShapeDesc;
 use crate::shape::axial::axes_between;
 use crate::shape::axial::{degenerate_axis, frustum_between, height, is_upright};
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
+use crate::value::{Description, ValidationError, description};
 use glam::{DMat3, DVec3};
-use serde::{Deserialize, Serialize};
 
-/// A circular cylinder with its ends closed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Cylinder {
-    /// Centre of one end.
-    pub base: [f64; 3],
-    /// Centre of the other end.
-    pub top: [f64; 3],
-    /// Radius.
-    pub radius: f64,
+description! {
+    /// A circular cylinder with flat ends.
+    pub struct Cylinder {
+        /// Centre of one end.
+        base: [f64; 3], in COORDINATE "scene units";
+        /// Centre of the other end.
+        top: [f64; 3], in COORDINATE "scene units";
+        /// Radius.
+        radius: f64, in SIZE "scene units";
+    }
 }
 
 impl ShapeDesc for Cylinder {
-    const DOC: &'static str = "A circular cylinder with flat ends.";
     const EXAMPLE: &'static str =
         "shape.cylinder = { base = [0.0, 0.0, 0.0], top = [0.0, 1.0, 0.0], radius = 0.4 }";
-    const FIELDS: &'static [Field] = &[
-        Field::required(
-            "base",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "Centre of one end.",
-        ),
-        Field::required(
-            "top",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "Centre of the other end.",
-        ),
-        Field::required("radius", ValueType::Number(NumberRange::SIZE), "scene units", "Radius."),
-    ];
 
     fn form(&self) -> Form {
         frustum_between(self.base, self.top, self.radius, self.radius)
@@ -46,13 +29,10 @@ impl ShapeDesc for Cylinder {
 
     fn faults(&self) -> Vec<ValidationError> {
         let sizes = [("radius", self.radius), ("top", height(self.base, self.top))];
-        Validator::new(Self::FIELDS)
-            .numbers("base", &self.base)
-            .numbers("top", &self.top)
-            .numbers("radius", &[self.radius])
+        self.validator()
             .and(degenerate_axis(self.base, self.top, "top"))
             .ratio(&sizes, &[self.base, self.top].concat())
-            .validate()
+            .errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

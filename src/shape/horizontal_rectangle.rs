@@ -3,39 +3,22 @@
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::on_plane;
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
+use crate::value::{Description, ValidationError, description};
 use glam::{DMat3, DVec3};
-use serde::{Deserialize, Serialize};
 
-/// A horizontal rectangle that faces up.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct HorizontalRectangle {
-    /// Centre.
-    pub center: [f64; 3],
-    /// Lengths along x and z.
-    pub size: [f64; 2],
+description! {
+    /// A horizontal rectangle that faces up: the ground that things stand on.
+    pub struct HorizontalRectangle {
+        /// Centre.
+        center: [f64; 3], in COORDINATE "scene units";
+        /// Lengths along x and z.
+        size: [f64; 2], in SIZE "scene units";
+    }
 }
 
 impl ShapeDesc for HorizontalRectangle {
-    const DOC: &'static str =
-        "A horizontal rectangle that faces up: the ground that things stand on.";
     const EXAMPLE: &'static str =
         "shape.platform = { center = [0.0, 0.0, 0.0], size = [8.0, 8.0] }";
-    const FIELDS: &'static [Field] = &[
-        Field::required(
-            "center",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "Centre.",
-        ),
-        Field::required(
-            "size",
-            ValueType::Numbers(2, NumberRange::SIZE),
-            "scene units",
-            "Lengths along x and z.",
-        ),
-    ];
 
     fn form(&self) -> Form {
         let [x, z] = self.size;
@@ -47,11 +30,7 @@ impl ShapeDesc for HorizontalRectangle {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(Self::FIELDS)
-            .numbers("center", &self.center)
-            .numbers("size", &self.size)
-            .ratio(&self.size.map(|s| ("size", s)), &self.center)
-            .validate()
+        self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).errors()
     }
 
     /// A table top: at the height of the box's upper side.

@@ -3,44 +3,33 @@
 use crate::asset::{AssetError, Mesh, TriangleMesh};
 use crate::primitive::Form;
 use crate::shape::{Shape, ShapeDesc};
-use crate::value::{Choice, Field, ValidationError, ValueType};
+use crate::value::{ValidationError, choices, description};
 use glam::{DAffine3, DVec3};
-use serde::{Deserialize, Serialize};
 use std::sync::{Arc, LazyLock};
 
-/// A mesh of triangles from a file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MeshDesc {
-    /// Name of the file, as the scene's author wrote it; empty: the stand-in.
-    #[serde(default)]
-    pub file: String,
-    /// What light sees of the triangles.
-    #[serde(default)]
-    pub normals: Normals,
-    /// What is in the file, once it was looked for.
-    #[serde(skip)]
-    content: Option<Result<Arc<Mesh>, AssetError>>,
+description! {
+    /// Triangles from a file: OBJ (with the colours of its MTL), PLY, STL, glTF or GLB. Placed by
+    /// `transform`. Light falls on the side from which the corners of a triangle turn
+    /// counter-clockwise, and on the other if its material is two-sided.
+    pub struct MeshDesc: Default {
+        /// Name of the file, relative to the folder of the scene file. Empty: an icosahedron stands in.
+        file: String = "";
+        /// What light sees: curved triangles or flat ones.
+        normals: Normals = "smooth";
+        // The file's content, once it was looked for.
+        skip content: Option<Result<Arc<Mesh>, AssetError>>;
+    }
 }
 
-/// Normals that light is computed with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Normals {
-    /// Interpolated between those of the vertices.
-    #[default]
-    Smooth,
-    /// The triangles' own.
-    Flat,
+choices! {
+    /// Normals that light is computed with.
+    pub enum Normals {
+        /// interpolated between the vertices: the file's, else the mean of the triangles around
+        Smooth = "smooth",
+        /// each triangle's own
+        Flat = "flat",
+    }
 }
-
-const NORMALS: &[Choice] = &[
-    Choice {
-        name: "smooth",
-        doc: "interpolated between the vertices: the file's, else the mean of the triangles around",
-    },
-    Choice { name: "flat", doc: "each triangle's own" },
-];
 
 /// An icosahedron that stands on the origin and is 1 high.
 static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
@@ -99,28 +88,8 @@ impl MeshDesc {
 }
 
 impl ShapeDesc for MeshDesc {
-    const DOC: &'static str = "Triangles from a file: OBJ (with the colours of its MTL), PLY, STL, glTF or GLB. Placed by \
-         `transform`. Light falls on the side from which the corners of a triangle turn \
-         counter-clockwise, and on the other if its material is two-sided.";
     const EXAMPLE: &'static str =
         "shape.mesh = { file = \"scenes/meshes/knot.ply\", normals = \"smooth\" }";
-    const FIELDS: &'static [Field] = &[
-        Field::preset(
-            "file",
-            ValueType::Text,
-            "",
-            "\"\"",
-            "Name of the file, relative to the folder of the scene file. Empty: an icosahedron \
-             stands in.",
-        ),
-        Field::preset(
-            "normals",
-            ValueType::Choice(NORMALS),
-            "",
-            "\"smooth\"",
-            "What light sees: curved triangles or flat ones.",
-        ),
-    ];
 
     fn form(&self) -> Form {
         let mesh = self.mesh().clone();
@@ -142,7 +111,7 @@ impl ShapeDesc for MeshDesc {
 
     /// The stand-in at the origin: only a transform places it.
     fn fitted_to(_: DVec3, _: DVec3) -> Self {
-        Self { file: String::new(), normals: Normals::Smooth, content: None }
+        Self::default()
     }
 
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {

@@ -3,44 +3,26 @@
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::on_plane;
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType, turned, unit};
+use crate::value::{description, turned, unit};
 use glam::{DMat3, DVec3};
-use serde::{Deserialize, Serialize};
 
-/// A plane without end.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Plane {
-    /// Any point of it.
-    pub point: [f64; 3],
-    /// Direction in which the front faces; any length but 0.
-    pub normal: [f64; 3],
+description! {
+    /// A plane without end. Its front is the side that `normal` points to.
+    pub struct Plane {
+        /// Any point of the plane.
+        point: [f64; 3], in COORDINATE "scene units";
+        /// Direction in which the front faces.
+        normal: [f64; 3], as Direction;
+    }
 }
 
 impl ShapeDesc for Plane {
-    const DOC: &'static str = "A plane without end. Its front is the side that `normal` points to.";
     const EXAMPLE: &'static str =
         "shape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }";
-    const FIELDS: &'static [Field] = &[
-        Field::required(
-            "point",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "Any point of the plane.",
-        ),
-        Field::required("normal", ValueType::Direction, "", "Direction in which the front faces."),
-    ];
 
     fn form(&self) -> Form {
         let normal = unit(self.normal).unwrap_or(DVec3::Y);
         Form::Plane { normal, offset: normal.dot(DVec3::from_array(self.point)) }
-    }
-
-    fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(Self::FIELDS)
-            .numbers("point", &self.point)
-            .numbers("normal", &self.normal)
-            .validate()
     }
 
     /// The ground, through `base`.

@@ -5,53 +5,27 @@ use crate::shape::ShapeDesc;
 use crate::shape::prismoid::{corner_of_centered, prismoid};
 use crate::shape::registry::turned_rotation;
 use crate::shape::texture_space::turned_axes;
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
+use crate::value::{Description, ValidationError, description};
 use glam::{DMat3, DVec2, DVec3};
-use serde::{Deserialize, Serialize};
 
-/// A right prism. Unturned, an edge of its base runs from the corner along +x and the third vertex
-/// lies towards -z.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Prism {
-    /// Lower left near corner of the base before the rotation; near is +z.
-    pub corner: [f64; 3],
-    /// Side of the base.
-    pub side: f64,
-    /// Height.
-    pub height: f64,
-    /// Degrees about the vertical through the base's centroid, counter-clockwise seen from above.
-    #[serde(default)]
-    pub rotation: f64,
+description! {
+    /// A right prism on a base with three equal sides. Unturned, the base has an edge along +x from
+    /// `corner` and its third vertex towards -z.
+    pub struct Prism {
+        /// Lower left near corner of the base, before the rotation (near is +z).
+        corner: [f64; 3], in COORDINATE "scene units";
+        /// Side of the base.
+        side: f64, in SIZE "scene units";
+        /// Height.
+        height: f64, in SIZE "scene units";
+        /// Turn about the vertical through the base's centroid, counter-clockwise seen from above.
+        rotation: f64 = 0.0, in FINITE "degrees";
+    }
 }
 
 impl ShapeDesc for Prism {
-    const DOC: &'static str = "A right prism on a base with three equal sides. Unturned, the base has an \
-         edge along +x from `corner` and its third vertex towards -z.";
     const EXAMPLE: &'static str =
         "shape.prism = { corner = [-0.5, 0.0, 0.3], side = 1.0, height = 1.2 }";
-    const FIELDS: &'static [Field] = &[
-        Field::required(
-            "corner",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "Lower left near corner of the base, before the rotation (near is +z).",
-        ),
-        Field::required(
-            "side",
-            ValueType::Number(NumberRange::SIZE),
-            "scene units",
-            "Side of the base.",
-        ),
-        Field::required("height", ValueType::Number(NumberRange::SIZE), "scene units", "Height."),
-        Field::preset(
-            "rotation",
-            ValueType::Number(NumberRange::FINITE),
-            "degrees",
-            "0.0",
-            "Turn about the vertical through the base's centroid, counter-clockwise seen from above.",
-        ),
-    ];
 
     fn form(&self) -> Form {
         let s = self.side;
@@ -60,13 +34,9 @@ impl ShapeDesc for Prism {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(Self::FIELDS)
-            .numbers("corner", &self.corner)
-            .numbers("side", &[self.side])
-            .numbers("height", &[self.height])
-            .numbers("rotation", &[self.rotation])
+        self.validator()
             .ratio(&[("side", self.side), ("height", self.height)], &self.corner)
-            .validate()
+            .errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

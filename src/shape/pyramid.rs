@@ -6,66 +6,29 @@ use crate::shape::cube::square;
 use crate::shape::prismoid::{corner_of_centered, prismoid};
 use crate::shape::registry::turned_rotation;
 use crate::shape::texture_space::turned_axes;
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
+use crate::value::{Description, ValidationError, description};
 use glam::{DMat3, DVec3};
-use serde::{Deserialize, Serialize};
 
-/// A pyramid of height `apex_height`, cut off at `height`. If `apex_height` is not larger than
-/// `height` nothing is cut off: an ordinary pyramid whose height is the smaller of the two.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Pyramid {
-    /// Lower left near corner of the base before the rotation; near is +z.
-    pub corner: [f64; 3],
-    /// Side of the base.
-    pub side: f64,
-    /// Height of the untruncated pyramid.
-    pub apex_height: f64,
-    /// Height of the truncated one.
-    pub height: f64,
-    /// Degrees about the vertical through the base's centre, counter-clockwise seen from above.
-    #[serde(default)]
-    pub rotation: f64,
+description! {
+    /// A regular pyramid on a square base, truncated at `height`. If `apex_height` is not larger than
+    /// `height`, it is an ordinary pyramid whose height is the smaller of the two.
+    pub struct Pyramid {
+        /// Lower left near corner of the base, before the rotation (near is +z).
+        corner: [f64; 3], in COORDINATE "scene units";
+        /// Side of the base.
+        side: f64, in SIZE "scene units";
+        /// Height of the untruncated pyramid.
+        apex_height: f64, in SIZE "scene units";
+        /// Height of the truncated pyramid.
+        height: f64, in SIZE "scene units";
+        /// Turn about the vertical through the base's centre, counter-clockwise seen from above.
+        rotation: f64 = 0.0, in FINITE "degrees";
+    }
 }
 
 impl ShapeDesc for Pyramid {
-    const DOC: &'static str = "A regular pyramid on a square base, truncated at `height`. \
-         If `apex_height` is not larger than `height`, it is an ordinary pyramid whose height is the smaller of the two.";
     const EXAMPLE: &'static str = "shape.pyramid = { corner = [-0.5, 0.0, 0.5], side = 1.0, \
          apex_height = 1.5, height = 0.8 }";
-    const FIELDS: &'static [Field] = &[
-        Field::required(
-            "corner",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "Lower left near corner of the base, before the rotation (near is +z).",
-        ),
-        Field::required(
-            "side",
-            ValueType::Number(NumberRange::SIZE),
-            "scene units",
-            "Side of the base.",
-        ),
-        Field::required(
-            "apex_height",
-            ValueType::Number(NumberRange::SIZE),
-            "scene units",
-            "Height of the untruncated pyramid.",
-        ),
-        Field::required(
-            "height",
-            ValueType::Number(NumberRange::SIZE),
-            "scene units",
-            "Height of the truncated pyramid.",
-        ),
-        Field::preset(
-            "rotation",
-            ValueType::Number(NumberRange::FINITE),
-            "degrees",
-            "0.0",
-            "Turn about the vertical through the base's centre, counter-clockwise seen from above.",
-        ),
-    ];
 
     fn form(&self) -> Form {
         let height = self.height.min(self.apex_height);
@@ -77,14 +40,7 @@ impl ShapeDesc for Pyramid {
     fn faults(&self) -> Vec<ValidationError> {
         let sizes =
             [("side", self.side), ("apex_height", self.apex_height), ("height", self.height)];
-        Validator::new(Self::FIELDS)
-            .numbers("corner", &self.corner)
-            .numbers("side", &[self.side])
-            .numbers("apex_height", &[self.apex_height])
-            .numbers("height", &[self.height])
-            .numbers("rotation", &[self.rotation])
-            .ratio(&sizes, &self.corner)
-            .validate()
+        self.validator().ratio(&sizes, &self.corner).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -3,23 +3,21 @@
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
 
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType, turned, unit};
+use crate::value::{Description, ValidationError, description, turned, unit};
 use glam::{DMat3, DVec3};
-use serde::{Deserialize, Serialize};
 
-/// A flat rectangle. Its front is the side that `normal` points to.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Rectangle {
-    /// Centre.
-    pub center: [f64; 3],
-    /// Width (across) and height (along `up`).
-    pub size: [f64; 2],
-    /// Direction in which the front faces; any length but 0.
-    pub normal: [f64; 3],
-    /// Direction of the height, made perpendicular to the normal; any length but 0.
-    #[serde(default = "up")]
-    pub up: [f64; 3],
+description! {
+    /// A flat rectangle, such as a mirror. Its front is the side that `normal` points to.
+    pub struct Rectangle {
+        /// Centre.
+        center: [f64; 3], in COORDINATE "scene units";
+        /// Width (across) and height (along `up`).
+        size: [f64; 2], in SIZE "scene units";
+        /// Direction in which the front faces.
+        normal: [f64; 3], as Direction;
+        /// Direction of the height, made perpendicular to `normal`; not parallel to it.
+        up: [f64; 3] => "up" "[0.0, 1.0, 0.0]", as Direction;
+    }
 }
 
 fn up() -> [f64; 3] {
@@ -41,32 +39,8 @@ impl Rectangle {
 }
 
 impl ShapeDesc for Rectangle {
-    const DOC: &'static str =
-        "A flat rectangle, such as a mirror. Its front is the side that `normal` points to.";
     const EXAMPLE: &'static str = "shape.rectangle = { center = [0.0, 1.5, -2.0], size = [4.0, 3.0], \
          normal = [0.0, 0.0, 1.0] }";
-    const FIELDS: &'static [Field] = &[
-        Field::required(
-            "center",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "Centre.",
-        ),
-        Field::required(
-            "size",
-            ValueType::Numbers(2, NumberRange::SIZE),
-            "scene units",
-            "Width (across) and height (along `up`).",
-        ),
-        Field::required("normal", ValueType::Direction, "", "Direction in which the front faces."),
-        Field::preset(
-            "up",
-            ValueType::Direction,
-            "",
-            "[0.0, 1.0, 0.0]",
-            "Direction of the height, made perpendicular to `normal`; not parallel to it.",
-        ),
-    ];
 
     fn form(&self) -> Form {
         let [right, up, _] = self.frame().unwrap_or([DVec3::X, DVec3::Y, DVec3::Z]);
@@ -75,13 +49,8 @@ impl ShapeDesc for Rectangle {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        let checks = Validator::new(Self::FIELDS)
-            .numbers("center", &self.center)
-            .numbers("size", &self.size)
-            .numbers("normal", &self.normal)
-            .numbers("up", &self.up)
-            .ratio(&self.size.map(|s| ("size", s)), &self.center);
-        let parallel = checks.clean() && self.frame().is_none();
+        let checks = self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center);
+        let parallel = checks.is_clean() && self.frame().is_none();
         checks
             .and(parallel.then(|| {
                 ValidationError::new(
@@ -90,7 +59,7 @@ impl ShapeDesc for Rectangle {
                     "an `up` across the normal, such as [0.0, 0.0, -1.0] for one that lies flat",
                 )
             }))
-            .validate()
+            .errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

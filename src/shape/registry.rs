@@ -7,24 +7,22 @@ use crate::shape::{
     Prism, Pyramid,
 };
 use crate::shape::{Rectangle, Sphere, TaperedCylinder, Union, UnitFrustum};
-use crate::value::{Field, ValidationError, ValueType, rounded_to};
+use crate::value::{Description, Field, FieldValue, ValidationError, ValueType, rounded_to};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// What every kind's description says of itself.
-pub trait ShapeDesc {
-    /// What it is, in a sentence or two.
-    const DOC: &'static str;
+pub trait ShapeDesc: Description {
     /// A line for a scene file.
     const EXAMPLE: &'static str;
-    /// Its keys.
-    const FIELDS: &'static [Field];
 
     /// The geometry, in double precision. Of a description without faults.
     fn form(&self) -> Form;
 
     /// What is wrong with it.
-    fn faults(&self) -> Vec<ValidationError>;
+    fn faults(&self) -> Vec<ValidationError> {
+        self.validator().errors()
+    }
 
     /// One of this kind that stands upright on `base`, the middle of its lower side, and fills about
     /// a box with the lengths `size` along x, y and z, all greater than 0.
@@ -160,6 +158,19 @@ kinds! {
     "union" => Union with OF_FIELDS,
     "intersection" => Intersection with OF_FIELDS,
     "difference" => Difference with OF_FIELDS,
+}
+
+impl FieldValue for Shape {
+    type Written = Self;
+    const TYPE: ValueType = ValueType::OneOf(KINDS);
+
+    fn from_written(written: Self) -> Self {
+        written
+    }
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        self.faults().into_iter().map(|error| error.prefixed(field.name)).collect()
+    }
 }
 
 impl Shape {

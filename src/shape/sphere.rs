@@ -2,43 +2,28 @@
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType, round_nice};
+use crate::value::{Description, ValidationError, description, round_nice};
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
-/// A sphere.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Sphere {
-    /// Centre.
-    pub center: [f64; 3],
-    /// Radius.
-    pub radius: f64,
+description! {
+    /// A sphere.
+    pub struct Sphere {
+        /// Centre.
+        center: [f64; 3], in COORDINATE "scene units";
+        /// Radius.
+        radius: f64, in SIZE "scene units";
+    }
 }
 
 impl ShapeDesc for Sphere {
-    const DOC: &'static str = "A sphere.";
     const EXAMPLE: &'static str = "shape.sphere = { center = [0.0, 1.0, 0.0], radius = 1.0 }";
-    const FIELDS: &'static [Field] = &[
-        Field::required(
-            "center",
-            ValueType::Numbers(3, NumberRange::COORDINATE),
-            "scene units",
-            "Centre.",
-        ),
-        Field::required("radius", ValueType::Number(NumberRange::SIZE), "scene units", "Radius."),
-    ];
 
     fn form(&self) -> Form {
         Form::Sphere { center: DVec3::from_array(self.center), radius: self.radius }
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(Self::FIELDS)
-            .numbers("center", &self.center)
-            .numbers("radius", &[self.radius])
-            .ratio(&[("radius", self.radius)], &self.center)
-            .validate()
+        self.validator().ratio(&[("radius", self.radius)], &self.center).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

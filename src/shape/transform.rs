@@ -3,7 +3,8 @@
 use crate::primitive::Form;
 use crate::shape::Shape;
 use crate::value::{
-    Field, NumberRange, ValidationError, Validator, ValueType, sin_cos_degrees, unit,
+    Description, Field, FieldValue, NumberRange, ValidationError, Validator, ValueType,
+    description, sin_cos_degrees, unit,
 };
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -27,14 +28,14 @@ pub enum TransformOp {
     Scale(Scale),
 }
 
-/// A turn about an axis through the origin.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Rotate {
-    /// Direction of the axis; any length but 0.
-    pub axis: [f64; 3],
-    /// Angle in degrees.
-    pub degrees: f64,
+description! {
+    /// Turns about any axis through the origin.
+    pub struct Rotate: Copy {
+        /// Direction of the axis.
+        axis: [f64; 3], as Direction;
+        /// Angle, counter-clockwise against the axis.
+        degrees: f64, in FINITE "degrees";
+    }
 }
 
 /// Factors along x, y and z. In files one number stands for three that are equal.
@@ -92,12 +93,7 @@ pub const TRANSFORM_OP_FIELDS: &[Field] = &[
         "Turns about the y axis, the vertical: counter-clockwise seen from above.",
     ),
     Field::required("rotate_z", ANGLE, "degrees", "Turns about the z axis."),
-    Field::required(
-        "rotate",
-        ValueType::Table(ROTATE_FIELDS),
-        "",
-        "Turns about any axis through the origin.",
-    ),
+    Field::required("rotate", ValueType::Table(Rotate::FIELDS), "", Rotate::DOC),
     Field::required(
         "scale",
         ValueType::Factor,
@@ -107,10 +103,6 @@ pub const TRANSFORM_OP_FIELDS: &[Field] = &[
 ];
 
 const ANGLE: ValueType = ValueType::Number(NumberRange::FINITE);
-const ROTATE_FIELDS: &[Field] = &[
-    Field::required("axis", ValueType::Direction, "", "Direction of the axis."),
-    Field::required("degrees", ANGLE, "degrees", "Angle, counter-clockwise against the axis."),
-];
 
 impl TransformOp {
     /// The step as a map. Of a step without faults.
@@ -129,21 +121,36 @@ impl TransformOp {
     pub fn faults(&self) -> Vec<ValidationError> {
         let checks = Validator::new(TRANSFORM_OP_FIELDS);
         match self {
-            Self::Translate(by) => checks.numbers("translate", by),
-            Self::RotateX(degrees) => checks.numbers("rotate_x", &[*degrees]),
-            Self::RotateY(degrees) => checks.numbers("rotate_y", &[*degrees]),
-            Self::RotateZ(degrees) => checks.numbers("rotate_z", &[*degrees]),
-            Self::Rotate(Rotate { axis, degrees }) => checks.nested(
-                "rotate",
-                Validator::new(ROTATE_FIELDS)
-                    .numbers("axis", axis)
-                    .numbers("degrees", &[*degrees])
-                    .validate(),
-            ),
-            Self::Scale(Scale([x, y, z])) if x == y && y == z => checks.numbers("scale", &[*x]),
-            Self::Scale(Scale(by)) => checks.numbers("scale", by),
+            Self::Translate(by) => checks.field("translate", by),
+            Self::RotateX(degrees) => checks.field("rotate_x", degrees),
+            Self::RotateY(degrees) => checks.field("rotate_y", degrees),
+            Self::RotateZ(degrees) => checks.field("rotate_z", degrees),
+            Self::Rotate(rotate) => checks.field("rotate", rotate),
+            Self::Scale(Scale([x, y, z])) if x == y && y == z => checks.field("scale", x),
+            Self::Scale(Scale(by)) => checks.field("scale", by),
         }
-        .validate()
+        .errors()
+    }
+}
+
+impl FieldValue for Vec<TransformOp> {
+    type Written = Self;
+    const TYPE: ValueType = ValueType::ListOf(TRANSFORM_OP_FIELDS);
+
+    fn from_written(written: Self) -> Self {
+        written
+    }
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        let errors = |(i, step): (usize, &TransformOp)| {
+            let key = format!("{}.{i}", field.name);
+            step.faults().into_iter().map(move |error| error.prefixed(&key))
+        };
+        self.iter().enumerate().flat_map(errors).collect()
+    }
+
+    fn is_absent(&self) -> bool {
+        self.is_empty()
     }
 }
 

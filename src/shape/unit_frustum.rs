@@ -4,36 +4,23 @@
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::around_axis;
-use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType};
+use crate::value::description;
 use glam::{DAffine3, DMat3, DVec3};
-use serde::{Deserialize, Serialize};
 
-/// The canonical tapered cylinder, to be placed by a transform: its axis runs from the origin to
-/// z = 1, its radius is 1 there and s here.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct UnitFrustum {
-    /// Radius at z = 1: 0 a cone, 1 a cylinder, above 1 it widens.
-    pub s: f64,
+description! {
+    /// The canonical tapered cylinder, to be placed by `transform`: its axis runs from the origin to
+    /// z = 1; its radius is 1 at z = 0 and `s` at z = 1.
+    pub struct UnitFrustum {
+        /// Radius at z = 1: 0 makes a cone, 1 a cylinder, more than 1 widens.
+        s: f64, in closed(0.0, 1e6);
+    }
 }
 
 impl ShapeDesc for UnitFrustum {
-    const DOC: &'static str = "The canonical tapered cylinder, to be placed by `transform`: its axis runs from the \
-         origin to z = 1; its radius is 1 at z = 0 and `s` at z = 1.";
     const EXAMPLE: &'static str = "shape.unit_frustum = { s = 0.5 }";
-    const FIELDS: &'static [Field] = &[Field::required(
-        "s",
-        ValueType::Number(NumberRange::closed(0.0, 1e6)),
-        "",
-        "Radius at z = 1: 0 makes a cone, 1 a cylinder, more than 1 widens.",
-    )];
 
     fn form(&self) -> Form {
         Form::conical_frustum(DAffine3::IDENTITY, self.s)
-    }
-
-    fn faults(&self) -> Vec<ValidationError> {
-        Validator::new(Self::FIELDS).numbers("s", &[self.s]).validate()
     }
 
     /// A cylinder at the origin: only a transform places it.

@@ -1,7 +1,7 @@
 //! Angles as users write them: in degrees.
 
-/// Sine and cosine of an angle in degrees, exact at every multiple of 90, so that a quarter turn
-/// leaves no rounding behind.
+/// Sine and cosine of an angle in degrees, exact at every multiple of 90, so that a
+/// quarter turn has no rounding error.
 pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     let turn = degrees.rem_euclid(360.0);
     match turn {
@@ -18,7 +18,7 @@ mod tests {
     use super::sin_cos_degrees;
 
     #[test]
-    fn quarter_turns_are_exact_and_the_rest_agrees_with_radians() {
+    fn sin_cos_of_quarter_turns_is_exact() {
         for k in -9i32..9 {
             let (s, c) = sin_cos_degrees(90.0 * f64::from(k));
             assert_eq!((s.abs() + c.abs(), s * c), (1.0, 0.0), "{k} quarter turns");

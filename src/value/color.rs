@@ -8,41 +8,41 @@ use std::fmt;
 pub struct Color(pub [f64; 3]);
 
 impl Color {
-    /// No light.
+    /// Zero in every channel.
     pub const BLACK: Self = Self([0.0; 3]);
     /// One in every channel.
     pub const WHITE: Self = Self([1.0; 3]);
 
-    /// Each channel times `s`.
+    /// Returns the colour with each channel multiplied by `s`.
     pub fn scaled(self, s: f64) -> Self {
         Self(self.0.map(|c| c * s))
     }
 
-    /// The largest channel.
+    /// Returns the largest channel.
     pub fn largest(self) -> f64 {
         self.0.into_iter().fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// From an sRGB colour `#rrggbb`; `None` if `text` is not of that form.
+    /// Parses an sRGB colour `#rrggbb`; `None` if `text` has another form.
     pub fn from_hex(text: &str) -> Option<Self> {
         let digits = text.strip_prefix('#')?;
-        // from_str_radix would take a sign.
+        // `from_str_radix` accepts a sign.
         if digits.len() != 6 || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
             return None;
         }
-        let code = u32::from_str_radix(digits, 16).ok()?;
-        Some(Self([16, 8, 0].map(|shift| linear_from_srgb(f64::from(code >> shift & 255) / 255.0))))
+        let rgb = u32::from_str_radix(digits, 16).ok()?;
+        Some(Self([16, 8, 0].map(|shift| linear_from_srgb(f64::from(rgb >> shift & 255) / 255.0))))
     }
 
-    /// The `#rrggbb` that stands for exactly this colour, if there is one.
+    /// Returns the `#rrggbb` that decodes to exactly this colour, if one exists.
     pub fn to_hex(self) -> Option<String> {
         let mut text = "#".to_string();
         for channel in self.0 {
-            let code = (srgb_from_linear(channel) * 255.0).round();
-            if !(0.0..=255.0).contains(&code) {
+            let level = (srgb_from_linear(channel) * 255.0).round();
+            if !(0.0..=255.0).contains(&level) {
                 return None;
             }
-            text += &format!("{:02x}", code as u8);
+            text += &format!("{:02x}", level as u8);
         }
         (Self::from_hex(&text) == Some(self)).then_some(text)
     }
@@ -53,9 +53,9 @@ fn srgb_from_linear(linear: f64) -> f64 {
     if linear <= 0.0031308 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// sRGB (IEC 61966-2-1) code 0..1 to linear light 0..1.
-pub fn linear_from_srgb(code: f64) -> f64 {
-    if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
+/// Converts an sRGB level (IEC 61966-2-1) from 0..1 to linear light in 0..1.
+pub fn linear_from_srgb(level: f64) -> f64 {
+    if level <= 0.04045 { level / 12.92 } else { ((level + 0.055) / 1.055).powf(2.4) }
 }
 
 impl Serialize for Color {
@@ -101,7 +101,7 @@ mod tests {
     use super::Color;
 
     #[test]
-    fn hex_codes_go_there_and_back() {
+    fn hex_colors_round_trip() {
         for code in ["#000000", "#ffffff", "#0a80fe", "#010b0c"] {
             let color = Color::from_hex(code).unwrap();
             assert_eq!(color.to_hex().as_deref(), Some(code));
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn other_strings_are_no_colours() {
+    fn malformed_hex_colors_are_rejected() {
         for text in ["", "#", "ffffff", "#fff", "#+12345", "#gggggg", "#ffffff0", "#ééé"] {
             assert_eq!(Color::from_hex(text), None, "{text}");
         }

@@ -2,20 +2,21 @@
 
 use glam::DVec3;
 
-/// Vectors whose largest component lies between this and its inverse keep their digits when they are squared.
-const PLAIN: f64 = 1e-100;
+/// Smallest magnitude of a vector's largest component at which squaring it keeps full precision; the
+/// largest such magnitude is the inverse.
+const MIN_EXACT: f64 = 1e-100;
 
-/// Brings every other vector there: 2^600, so that no digit changes.
-const SHIFT: f64 = f64::from_bits((1023 + 600) << 52);
+/// Factor that brings any other vector into that range: 2^600, a power of two and therefore exact.
+const RESCALE: f64 = f64::from_bits((1023 + 600) << 52);
 
-/// `direction` with length 1, whatever finite length it has; `None` if that is 0.
+/// Returns `direction` scaled to length 1; `None` if its length is 0 or not finite.
 pub fn unit(direction: impl Into<DVec3>) -> Option<DVec3> {
     let v = direction.into();
     let largest = v.abs().max_element();
-    let near_one = if largest < PLAIN {
-        v * SHIFT
-    } else if largest > PLAIN.recip() {
-        v / SHIFT
+    let near_one = if largest < MIN_EXACT {
+        v * RESCALE
+    } else if largest > MIN_EXACT.recip() {
+        v / RESCALE
     } else {
         v
     };
@@ -28,7 +29,7 @@ mod tests {
     use glam::DVec3;
 
     #[test]
-    fn every_length_but_zero_gives_the_same_bits() {
+    fn unit_is_exact_for_every_power_of_two_length() {
         for v in [DVec3::new(0.3, -0.2, 0.9), DVec3::new(1.0, 1e-9, 0.0), DVec3::splat(-1.0)] {
             let expected = v.normalize();
             for exponent in [-980, -900, -664, -400, -333, -1, 0, 1, 332, 400, 664, 1022] {
@@ -36,7 +37,7 @@ mod tests {
                 assert_eq!(unit(scaled), Some(expected), "{v} x 2^{exponent}");
             }
         }
-        // Lengths that are no powers of two are rounded otherwise, by no more than that.
+        // Lengths other than powers of two are rounded within 1e-15.
         for length in [1e-320, 1e-200, 1e-101, 1e101, 1e200, 1.7e308] {
             let found = unit([0.0, -length, length]).unwrap();
             assert!((found - DVec3::new(0.0, -0.5f64.sqrt(), 0.5f64.sqrt())).length() < 1e-3);
@@ -48,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn what_points_nowhere_has_no_direction() {
+    fn unit_of_zero_or_non_finite_vector_is_none() {
         for v in [[0.0; 3], [f64::NAN, 1.0, 0.0], [f64::INFINITY, 0.0, 0.0]] {
             assert_eq!(unit(v), None, "{v:?}");
         }

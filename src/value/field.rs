@@ -1,7 +1,7 @@
-//! Tables of what may be written: one [`Field`] a key. Reading, messages, range checks, the
-//! generated reference and every form that edits a description use the same tables.
+//! Tables of keys: one [`Field`] per key of a description. Parser, messages, range checks, the
+//! generated reference and the editing forms all use these tables.
 
-use crate::value::NumberRange;
+use crate::value::{NumberRange, ValidationError, number};
 use std::fmt;
 
 /// One key of a description.
@@ -9,37 +9,37 @@ use std::fmt;
 pub struct Field {
     /// The key.
     pub name: &'static str,
-    /// What may stand behind it.
+    /// Type of its value.
     pub takes: ValueType,
-    /// Unit of its numbers; empty: none.
+    /// Unit of its numbers; empty if there is none.
     pub unit: &'static str,
-    /// What holds if it is left out.
+    /// Default if the key is left out.
     pub preset: DefaultValue,
-    /// What it is, in a sentence.
+    /// Help text, one sentence.
     pub doc: &'static str,
 }
 
-/// What holds if a key is left out.
+/// Default of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DefaultValue {
-    /// It must not be left out.
+    /// The key is required.
     Required,
-    /// This value, as TOML text.
+    /// A value, as TOML text.
     Is(&'static str),
-    /// No value; the phrase says what happens then.
+    /// No value; the phrase describes the result.
     Without(&'static str),
 }
 
-/// A word out of a fixed set.
+/// One word of a fixed set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Choice {
     /// The word.
     pub name: &'static str,
-    /// What it means.
+    /// Help text, a phrase.
     pub doc: &'static str,
 }
 
-/// What may stand behind a key.
+/// Type and range of a key's value.
 #[derive(Clone, Copy, Debug)]
 pub enum ValueType {
     /// A string.
@@ -50,15 +50,15 @@ pub enum ValueType {
     Choice(&'static [Choice]),
     /// A whole number.
     Whole(NumberRange),
-    /// That many whole numbers.
+    /// A list of this many whole numbers, each in the range.
     Wholes(usize, NumberRange),
     /// A number.
     Number(NumberRange),
-    /// That many numbers, each in the range.
+    /// A list of this many numbers, each in the range.
     Numbers(usize, NumberRange),
-    /// Three numbers that are not all zero; the length does not matter.
+    /// Three numbers that are not all zero; the vector may have any length.
     Direction,
-    /// A factor other than zero, or three.
+    /// One factor other than zero, or three.
     Factor,
     /// A linear colour or `"#rrggbb"`; each channel in the range.
     Color(NumberRange),
@@ -75,7 +75,7 @@ pub enum ValueType {
 }
 
 impl Field {
-    /// A key that must be given.
+    /// Creates a required key.
     pub const fn required(
         name: &'static str,
         takes: ValueType,
@@ -85,18 +85,7 @@ impl Field {
         Self { name, takes, unit, preset: DefaultValue::Required, doc }
     }
 
-    /// A key with a default, given as TOML text.
-    pub const fn preset(
-        name: &'static str,
-        takes: ValueType,
-        unit: &'static str,
-        value: &'static str,
-        doc: &'static str,
-    ) -> Self {
-        Self { name, takes, unit, preset: DefaultValue::Is(value), doc }
-    }
-
-    /// A key that may be left out and has no value then.
+    /// Creates a key without a default value; `instead` describes the result of leaving it out.
     pub const fn optional(
         name: &'static str,
         takes: ValueType,
@@ -106,11 +95,64 @@ impl Field {
     ) -> Self {
         Self { name, takes, unit, preset: DefaultValue::Without(instead), doc }
     }
+
+    /// Returns the key with the default `value`, given as TOML text.
+    pub const fn with_default(self, value: &'static str) -> Self {
+        Self { preset: DefaultValue::Is(value), ..self }
+    }
+
+    /// Returns the key without a default value; `instead` describes the result of leaving it out.
+    pub const fn or(self, instead: &'static str) -> Self {
+        Self { preset: DefaultValue::Without(instead), ..self }
+    }
+
+    /// Checks `values` against the value type; returns the error if one is out of range.
+    pub fn check(&self, values: &[f64]) -> Option<ValidationError> {
+        let each = |range: NumberRange| values.iter().all(|x| range.holds(*x));
+        let valid = match self.takes {
+            ValueType::Number(range)
+            | ValueType::Numbers(_, range)
+            | ValueType::Whole(range)
+            | ValueType::Wholes(_, range)
+            | ValueType::Color(range) => each(range),
+            ValueType::Direction => each(NumberRange::FINITE) && values.iter().any(|x| *x != 0.0),
+            ValueType::Factor => each(NumberRange::FINITE) && values.iter().all(|x| *x != 0.0),
+            _ => true,
+        };
+        let name = self.name;
+        let found = || match values {
+            [x] => format!("{name} is {}", number(*x)),
+            list => {
+                let list: Vec<_> = list.iter().map(|x| number(*x)).collect();
+                format!("{name} is [{}]", list.join(", "))
+            }
+        };
+        (!valid).then(|| ValidationError::new(name, found(), self.takes.to_string()))
+    }
+}
+
+impl ValueType {
+    /// Returns the value type with `range` in place of its own.
+    pub const fn within(self, range: NumberRange) -> Self {
+        match self {
+            Self::Whole(_) => Self::Whole(range),
+            Self::Wholes(n, _) => Self::Wholes(n, range),
+            Self::Number(_) => Self::Number(range),
+            Self::Numbers(n, _) => Self::Numbers(n, range),
+            Self::Color(_) => Self::Color(range),
+            other => other,
+        }
+    }
+
+    /// Returns `other`, the value type that a declaration gives explicitly.
+    pub(crate) const fn replaced(self, other: Self) -> Self {
+        other
+    }
 }
 
 const COUNTS: [&str; 5] = ["no", "one", "two", "three", "four"];
 
-/// As the object of "Expected": `a number from 0 to 1`.
+/// Object of the phrase "Expected ...": `a number from 0 to 1`.
 impl fmt::Display for ValueType {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {

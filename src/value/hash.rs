@@ -1,6 +1,6 @@
-//! A hash that is the same everywhere and always.
+//! A hash that is stable across platforms and versions.
 
-/// 64-bit FNV-1a. Fowler, Noll, Vo: offset basis and prime as in draft-eastlake-fnv.
+/// 64-bit FNV-1a (Fowler, Noll, Vo), with the offset basis and prime of draft-eastlake-fnv.
 pub fn fnv1a64(bytes: &[u8]) -> u64 {
     const OFFSET_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;
@@ -13,7 +13,7 @@ mod tests {
 
     /// Test vectors of the draft.
     #[test]
-    fn the_hash_is_fnv_1a() {
+    fn fnv1a64_matches_reference_values() {
         assert_eq!(fnv1a64(b""), 0xcbf2_9ce4_8422_2325);
         assert_eq!(fnv1a64(b"a"), 0xaf63_dc4c_8601_ec8c);
         assert_eq!(fnv1a64(b"foobar"), 0x8594_4171_f739_67e8);

@@ -1,9 +1,10 @@
-//! What users write, as values: colours, the faults that a value can have, and the tables that say
-//! what may be written. Known to every description (shape, material, light, camera, scene) and
-//! knowing none of them.
+//! Values of scene files: colours, number ranges, validation errors, and the tables of keys that
+//! describe them. Every description (shape, material, light, camera, scene) uses this module; it
+//! depends on none of them.
 
 mod angle;
 mod color;
+mod description;
 mod direction;
 mod field;
 mod hash;
@@ -14,6 +15,8 @@ mod validation;
 
 pub use angle::sin_cos_degrees;
 pub use color::{Color, linear_from_srgb};
+pub use description::{Description, FieldValue};
+pub(crate) use description::{choices, description, doc_text, is_absent};
 pub use direction::unit;
 pub use field::{Choice, DefaultValue, Field, ValueType};
 pub use hash::fnv1a64;

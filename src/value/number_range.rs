@@ -1,55 +1,55 @@
-//! Intervals that a number may lie in.
+//! Intervals of valid numbers.
 
 use std::fmt;
 
-/// An interval of finite numbers. Neither NaN nor an infinity lies in any.
+/// An interval of finite numbers; NaN and the infinities are outside of every interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NumberRange {
-    /// Lower end; negative infinity: none.
+    /// Lower bound; negative infinity if there is none.
     pub low: f64,
-    /// Whether `low` itself is in.
+    /// `true` if `low` belongs to the interval.
     pub low_in: bool,
-    /// Upper end; infinity: none.
+    /// Upper bound; infinity if there is none.
     pub high: f64,
-    /// Whether `high` itself is in.
+    /// `true` if `high` belongs to the interval.
     pub high_in: bool,
 }
 
-/// Largest coordinate and largest size that geometry is promised to be accurate for.
-const FARTHEST: f64 = 1e9;
+/// Largest coordinate and largest size for which geometry is guaranteed to be accurate.
+const MAX_COORDINATE: f64 = 1e9;
 
 impl NumberRange {
     /// Any finite number.
     pub const FINITE: Self =
         Self { low: f64::NEG_INFINITY, low_in: false, high: f64::INFINITY, high_in: false };
     /// A coordinate: from -1e9 to 1e9.
-    pub const COORDINATE: Self = Self::closed(-FARTHEST, FARTHEST);
+    pub const COORDINATE: Self = Self::closed(-MAX_COORDINATE, MAX_COORDINATE);
     /// A size: greater than 0, at most 1e9.
-    pub const SIZE: Self = Self::above(0.0, FARTHEST);
-    /// A share: from 0 to 1.
+    pub const SIZE: Self = Self::above(0.0, MAX_COORDINATE);
+    /// A fraction: from 0 to 1.
     pub const SHARE: Self = Self::closed(0.0, 1.0);
 
-    /// A coefficient or a body colour: sums above 1 are legal.
+    /// A coefficient or a body colour: sums above 1 are valid.
     pub const COEFFICIENT: Self = Self::closed(0.0, 1e6);
     /// An amount of light.
     pub const LIGHT: Self = Self::closed(0.0, 1e15);
 
-    /// From `low` to `high`, both in.
+    /// Interval from `low` to `high`, both included.
     pub const fn closed(low: f64, high: f64) -> Self {
         Self { low, low_in: true, high, high_in: true }
     }
 
-    /// Greater than `low`, at most `high`.
+    /// Interval of numbers greater than `low` and at most `high`.
     pub const fn above(low: f64, high: f64) -> Self {
         Self { low, low_in: false, high, high_in: true }
     }
 
-    /// Between `low` and `high`, neither in.
+    /// Interval between `low` and `high`, both excluded.
     pub const fn between(low: f64, high: f64) -> Self {
         Self { low, low_in: false, high, high_in: false }
     }
 
-    /// Whether `x` lies in it.
+    /// Returns `true` if `x` is in the interval.
     pub fn holds(&self, x: f64) -> bool {
         x.is_finite()
             && (x > self.low || self.low_in && x == self.low)
@@ -57,7 +57,7 @@ impl NumberRange {
     }
 }
 
-/// As the end of a phrase: `a number` ... `from 0 to 1`.
+/// End of the phrase `a number ...`: `from 0 to 1`.
 impl fmt::Display for NumberRange {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let (low, high) = (number(self.low), number(self.high));
@@ -79,7 +79,8 @@ impl fmt::Display for NumberRange {
     }
 }
 
-/// A number as people write it: `0.5`, `-3`, `1e9`, `NaN`, and never three hundred digits.
+/// Formats a number in short form: `0.5`, `-3`, `1e9`, `NaN`; numbers below 1e-4 and from 1e6 have an
+/// exponent.
 pub fn number(x: f64) -> String {
     let plain = x == 0.0 || !x.is_finite() || (1e-4..1e6).contains(&x.abs());
     if plain { format!("{x}") } else { format!("{x:e}") }
@@ -90,7 +91,7 @@ mod tests {
     use super::{NumberRange, number};
 
     #[test]
-    fn ends_count_as_told() {
+    fn bounds_are_included_as_declared() {
         for (range, inside, outside) in [
             (NumberRange::SHARE, vec![0.0, 0.5, 1.0], vec![-1e-300, 1.0 + 1e-15]),
             (NumberRange::SIZE, vec![5e-324, 1e9], vec![0.0, -1.0, 1.1e9]),
@@ -105,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_read_well() {
+    fn numbers_are_formatted_short() {
         let shown: Vec<_> = [0.5, -3.0, 1e9, f64::NAN, 1e-300, 0.0].map(number).into();
         assert_eq!(shown, ["0.5", "-3", "1e9", "NaN", "1e-300", "0"]);
     }

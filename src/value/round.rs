@@ -1,6 +1,6 @@
-//! Numbers that programs compute and people read: rounded to decimals that look chosen.
+//! Rounding of computed numbers to short decimals.
 
-/// `x` rounded to a multiple of 10^`exponent`: the number nearest to that decimal, never `-0`.
+/// Rounds `x` to a multiple of 10^`exponent`: the nearest number to that decimal, never `-0`.
 pub fn rounded_to(x: f64, exponent: i32) -> f64 {
     if !x.is_finite() {
         return x;
@@ -15,40 +15,40 @@ pub fn rounded_to(x: f64, exponent: i32) -> f64 {
     rounded + 0.0
 }
 
-/// `x` rounded to that many significant decimal digits (at least one).
+/// Rounds `x` to `digits` significant decimal digits, at least one.
 pub fn round_significant(x: f64, digits: usize) -> f64 {
     if x.is_finite() { format!("{x:.*e}", digits.max(1) - 1).parse().unwrap_or(x) } else { x }
 }
 
-/// The exponent of the largest power of ten that is not above |`x`|; 0 for 0 and for what is not
-/// finite.
+/// Returns the exponent of the largest power of ten not above |`x`|; 0 if `x` is 0 or not finite.
 pub fn floor_log10(x: f64) -> i32 {
     if x == 0.0 || !x.is_finite() {
         return 0;
     }
-    // The formatter knows powers of ten exactly; a logarithm would miss some by one.
+    // The formatter is exact at powers of ten; a logarithm is off by one at some of them.
     format!("{:e}", x.abs()).rsplit_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0)
 }
 
-/// `x` rounded to a ten-thousandth of the power of ten at or below `scale`: for a coordinate in a
-/// scene of that size.
+/// Rounds the coordinate `x` of a scene of size `scale` to a ten-thousandth of the power of ten at or
+/// below `scale`.
 pub fn round_nice(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 4)
 }
 
-/// The direction `v` turned by `degrees` about the vertical, counter-clockwise seen from above, its
-/// numbers rounded to about a millionth of its length. Turns add up: the heading is rounded to
-/// thousandths of a degree, so that the rounding of a direction does not reach the next turn.
+/// Rotates the direction `v` by `degrees` about the vertical, counter-clockwise seen from above.
+///
+/// Components are rounded to about a millionth of the length. The heading is rounded to thousandths of
+/// a degree, so that rounding errors do not add up over repeated rotations.
 pub fn turned(v: [f64; 3], degrees: f64) -> [f64; 3] {
     let [x, y, z] = v;
-    let flat = x.hypot(z);
-    if flat == 0.0 || !flat.is_finite() {
+    let horizontal = x.hypot(z);
+    if horizontal == 0.0 || !horizontal.is_finite() {
         return v;
     }
     let heading = rounded_to((x.atan2(z).to_degrees() + degrees).rem_euclid(360.0), -3);
     let (sin, cos) = crate::value::sin_cos_degrees(heading);
-    let digits = floor_log10(flat) - 6;
-    [rounded_to(flat * sin, digits), y, rounded_to(flat * cos, digits)]
+    let digits = floor_log10(horizontal) - 6;
+    [rounded_to(horizontal * sin, digits), y, rounded_to(horizontal * cos, digits)]
 }
 
 #[cfg(test)]
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn decimals_are_the_nearest_ones() {
+    fn rounding_gives_nearest_decimal() {
         for (x, exponent, expected) in [
             (0.1 + 0.2, -4, 0.3),
             (0.34999, -2, 0.35),
@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn decades_are_exact() {
+    fn floor_log10_is_exact_at_powers_of_ten() {
         for e in -300..300 {
             let x: f64 = format!("1e{e}").parse().unwrap();
             assert_eq!((floor_log10(x), floor_log10(x * 9.99)), (e, e));
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn turns_come_round() {
+    fn repeated_rotations_return_to_start() {
         let start = [0.3, -0.2, 0.7];
         let mut v = start;
         for _ in 0..7200 {

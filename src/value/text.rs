@@ -1,9 +1,9 @@
-//! Text from outside on its way to a terminal.
+//! Untrusted text for output on a terminal.
 
 use std::fmt::Write as _;
 
-/// `text` with every character replaced that could steer a terminal or hide: control characters,
-/// line ends, directional and invisible formatting characters become `\u{..}` escapes.
+/// Escapes the characters of `text` that could control a terminal or hide: control characters, line
+/// ends, directional and invisible formatting characters become `\u{..}`.
 pub fn sanitized(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -21,8 +21,8 @@ pub fn sanitized(text: &str) -> String {
     out
 }
 
-/// Format characters (Unicode category Cf, and the line and paragraph separators): they reorder or
-/// vanish, so that a name on screen is not the name in the file.
+/// Returns `true` for format characters (Unicode category Cf, and the line and paragraph separators).
+/// They reorder or hide text, so that a name on screen would differ from the name in the file.
 fn controls_terminal(c: char) -> bool {
     matches!(c,
         '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
@@ -30,10 +30,10 @@ fn controls_terminal(c: char) -> bool {
         | '\u{e0000}'..='\u{e007f}')
 }
 
-/// The first 40 characters of `text`, printable, with an ellipsis if there was more.
+/// Returns the first 40 characters of `text`, sanitised, with an ellipsis if there are more.
 pub fn truncated(text: &str) -> String {
-    let mut rest = text.char_indices().skip(40);
-    match rest.next() {
+    let mut remaining = text.char_indices().skip(40);
+    match remaining.next() {
         Some((end, _)) => sanitized(&text[..end]) + "…",
         None => sanitized(text),
     }
@@ -44,7 +44,7 @@ mod tests {
     use super::{sanitized, truncated};
 
     #[test]
-    fn nothing_that_steers_a_terminal_passes() {
+    fn sanitized_escapes_control_characters() {
         assert_eq!(
             sanitized("a\x1b[31mé\u{9b}\u{202e}\n\u{7f}"),
             "a\\u{1b}[31mé\\u{9b}\\u{202e}\\n\\u{7f}"
@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn excerpts_are_short() {
+    fn truncated_keeps_40_characters() {
         assert_eq!(truncated("short"), "short");
         assert_eq!(truncated(&"ä".repeat(100)).chars().count(), 41);
     }

@@ -1,25 +1,26 @@
-//! What is wrong with a value, before anybody knows where in the file it stands.
+//! Validation errors of a description, before they have a place in a file.
 
-use crate::value::{Field, NumberRange, ValueType, number};
+use crate::value::{Field, FieldValue, number};
 
-/// One thing wrong in a description. The scene room adds file, line, column and object.
+/// One error in a description. The module `scene` adds file, line, column and object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ValidationError {
-    /// The key inside the description, dotted (`center`, `shape.sphere.radius`); empty: the whole.
+    /// Dotted key inside the description (`center`, `shape.sphere.radius`); empty for the whole
+    /// description.
     pub key: String,
-    /// What was found, as a phrase: `radius is -1`.
+    /// Phrase that states the error: `radius is -1`.
     pub found: String,
-    /// What would be right, as a phrase: `a number greater than 0`.
+    /// Phrase that states the valid values: `a number greater than 0`.
     pub expected: String,
 }
 
 impl ValidationError {
-    /// From its three parts.
+    /// Creates an error from its three parts.
     pub fn new(key: &str, found: impl Into<String>, expected: impl Into<String>) -> Self {
         Self { key: key.to_string(), found: found.into(), expected: expected.into() }
     }
 
-    /// The same fault of a description that stands behind the key `outer` of another.
+    /// Returns the error with `outer` before its key: the description is the value of that key.
     pub fn prefixed(mut self, outer: &str) -> Self {
         self.key =
             if self.key.is_empty() { outer.to_string() } else { format!("{outer}.{}", self.key) };
@@ -27,54 +28,36 @@ impl ValidationError {
     }
 }
 
-/// Collects the faults of one description against its table of fields.
+/// Collects the errors of one description against its table of fields.
 #[derive(Debug)]
 pub struct Validator {
     fields: &'static [Field],
-    validate: Vec<ValidationError>,
+    errors: Vec<ValidationError>,
 }
 
 impl Validator {
-    /// None found yet.
+    /// Creates a validator without errors.
     pub fn new(fields: &'static [Field]) -> Self {
-        Self { fields, validate: Vec::new() }
+        Self { fields, errors: Vec::new() }
     }
 
-    /// Checks the numbers behind the key `name` against what the table says about it.
+    /// Checks the value of the key `name`.
     ///
     /// # Panics
-    /// If the table has no such key: an error of the program, found by the first test of the kind.
-    pub fn numbers(mut self, name: &str, values: &[f64]) -> Self {
-        let field = self.fields.iter().find(|f| f.name == name);
-        let takes = field.unwrap_or_else(|| panic!("no field `{name}` in its table")).takes;
-        let each = |range: NumberRange| values.iter().all(|x| range.holds(*x));
-        let right = match takes {
-            ValueType::Number(range)
-            | ValueType::Numbers(_, range)
-            | ValueType::Whole(range)
-            | ValueType::Wholes(_, range)
-            | ValueType::Color(range) => each(range),
-            ValueType::Direction => each(NumberRange::FINITE) && values.iter().any(|x| *x != 0.0),
-            ValueType::Factor => each(NumberRange::FINITE) && values.iter().all(|x| *x != 0.0),
-            _ => true,
-        };
-        if !right {
-            self.validate.push(ValidationError::new(name, is(name, values), takes.to_string()));
-        }
+    /// If the table has no such key.
+    pub fn field(mut self, name: &str, value: &impl FieldValue) -> Self {
+        let errors = value.errors(self.find(name));
+        self.errors.extend(errors);
         self
     }
 
-    /// As `numbers`, if there is a value.
-    pub fn optional(self, name: &str, values: Option<&[f64]>) -> Self {
-        match values {
-            Some(values) => self.numbers(name, values),
-            None => self,
-        }
+    fn find(&self, name: &str) -> &'static Field {
+        let field = self.fields.iter().find(|field| field.name == name);
+        field.unwrap_or_else(|| panic!("no field `{name}` in its table"))
     }
 
-    /// Checks that no number here is more than 1e12 times as large as the smallest of `sizes`:
-    /// beyond that a coordinate has no digits left for the size. Says nothing about values found
-    /// wrong above.
+    /// Checks that no number is more than 1e12 times as large as the smallest of `sizes`: beyond that
+    /// a coordinate has no digits left for the size. Skipped if there are errors already.
     pub fn ratio(mut self, sizes: &[(&str, f64)], coordinates: &[f64]) -> Self {
         let smallest = sizes.iter().copied().reduce(|a, b| if b.1 < a.1 { b } else { a });
         let largest = sizes
@@ -83,10 +66,10 @@ impl Validator {
             .chain(coordinates.iter().map(|c| c.abs()))
             .fold(0.0, f64::max);
         if let Some((name, smallest)) = smallest
-            && self.validate.is_empty()
+            && self.errors.is_empty()
             && largest > 1e12 * smallest
         {
-            self.validate.push(ValidationError::new(
+            self.errors.push(ValidationError::new(
                 name,
                 format!(
                     "{name} is {}, too small beside {} in the same shape",
@@ -99,36 +82,25 @@ impl Validator {
         self
     }
 
-    /// Adds `fault` if there is one.
-    pub fn and(mut self, fault: Option<ValidationError>) -> Self {
-        self.validate.extend(fault);
+    /// Adds `error` if there is one.
+    pub fn and(mut self, error: Option<ValidationError>) -> Self {
+        self.errors.extend(error);
         self
     }
 
-    /// Adds the faults of a description behind the key `outer`.
-    pub fn nested(mut self, outer: &str, validate: Vec<ValidationError>) -> Self {
-        self.validate.extend(validate.into_iter().map(|f| f.prefixed(outer)));
+    /// Adds the errors of the description that is the value of the key `outer`.
+    pub fn nested(mut self, outer: &str, errors: Vec<ValidationError>) -> Self {
+        self.errors.extend(errors.into_iter().map(|f| f.prefixed(outer)));
         self
     }
 
-    /// Whether none was found so far.
-    pub fn clean(&self) -> bool {
-        self.validate.is_empty()
+    /// Returns `true` if there are no errors so far.
+    pub fn is_clean(&self) -> bool {
+        self.errors.is_empty()
     }
 
-    /// What was found.
-    pub fn validate(self) -> Vec<ValidationError> {
-        self.validate
-    }
-}
-
-/// `radius is -1`, `center is [NaN, 0, 0]`.
-fn is(name: &str, values: &[f64]) -> String {
-    match values {
-        [x] => format!("{name} is {}", number(*x)),
-        many => {
-            let list: Vec<_> = many.iter().map(|x| number(*x)).collect();
-            format!("{name} is [{}]", list.join(", "))
-        }
+    /// Returns the errors.
+    pub fn errors(self) -> Vec<ValidationError> {
+        self.errors
     }
 }

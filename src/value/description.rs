@@ -1,0 +1,331 @@
+//! One declaration per table of a scene file.
+//!
+//! [`description!`] makes from it the struct, its serde implementation, its defaults, its table of
+//! fields and the checks of its ranges. [`choices!`] does the same for a fixed set of words.
+
+use crate::value::{Color, Field, NumberRange, ValidationError, Validator, ValueType};
+
+/// A table of a scene file: the keys that it has and the checks of their values.
+pub trait Description {
+    /// Help text of the table.
+    const DOC: &'static str;
+    /// Keys of the table, in the order of the declaration.
+    const FIELDS: &'static [Field];
+
+    /// Checks each value against its field. Checks across fields can be added.
+    fn validator(&self) -> Validator;
+}
+
+/// A Rust type that a key of a scene file can have.
+pub trait FieldValue {
+    /// A default as a scene file writes it.
+    type Written;
+
+    /// Type of the value in the table of fields; numbers have the range `FINITE`.
+    const TYPE: ValueType;
+
+    /// Converts a default.
+    ///
+    /// # Panics
+    /// If `written` is no value of the type, which is a mistake in a declaration.
+    fn from_written(written: Self::Written) -> Self;
+
+    /// Errors of the value, with keys that begin with the field's.
+    fn errors(&self, field: &Field) -> Vec<ValidationError>;
+
+    /// Returns `true` if the key is left out when the value is written.
+    fn is_absent(&self) -> bool {
+        false
+    }
+}
+
+/// [`FieldValue::is_absent`] as a function that serde can name.
+pub(crate) fn is_absent(value: &impl FieldValue) -> bool {
+    value.is_absent()
+}
+
+/// Doc comments, joined, without the space after `///`.
+pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
+    doc.split_at(1).1
+}
+
+/// Numbers, which a scene file writes like Rust does.
+macro_rules! numeric {
+    ($([$($n:ident)?] $type:ty => $value_type:expr, $numbers:expr;)+) => {$(
+        impl $(<const $n: usize>)? FieldValue for $type {
+            type Written = Self;
+            const TYPE: ValueType = $value_type;
+
+            fn from_written(written: Self) -> Self {
+                written
+            }
+
+            fn errors(&self, field: &Field) -> Vec<ValidationError> {
+                let numbers: fn(&Self) -> Vec<f64> = $numbers;
+                field.check(&numbers(self)).into_iter().collect()
+            }
+        }
+    )+};
+}
+
+numeric! {
+    [] f64 => ValueType::Number(NumberRange::FINITE), |x| vec![*x];
+    [N] [f64; N] => ValueType::Numbers(N, NumberRange::FINITE), |list| list.to_vec();
+    [] u32 => ValueType::Whole(NumberRange::FINITE), |x| vec![f64::from(*x)];
+    [N] [u32; N] => ValueType::Wholes(N, NumberRange::FINITE), |list| list.map(f64::from).to_vec();
+}
+
+impl FieldValue for Color {
+    type Written = [f64; 3];
+    const TYPE: ValueType = ValueType::Color(NumberRange::FINITE);
+
+    fn from_written(written: [f64; 3]) -> Self {
+        Self(written)
+    }
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        self.0.errors(field)
+    }
+}
+
+impl FieldValue for bool {
+    type Written = Self;
+    const TYPE: ValueType = ValueType::Switch;
+
+    fn from_written(written: Self) -> Self {
+        written
+    }
+
+    fn errors(&self, _: &Field) -> Vec<ValidationError> {
+        Vec::new()
+    }
+}
+
+impl FieldValue for String {
+    type Written = &'static str;
+    const TYPE: ValueType = ValueType::Text;
+
+    fn from_written(written: &'static str) -> Self {
+        written.to_string()
+    }
+
+    fn errors(&self, _: &Field) -> Vec<ValidationError> {
+        Vec::new()
+    }
+
+    fn is_absent(&self) -> bool {
+        self.is_empty()
+    }
+}
+
+impl<T: FieldValue> FieldValue for Option<T> {
+    type Written = T::Written;
+    const TYPE: ValueType = T::TYPE;
+
+    fn from_written(written: T::Written) -> Self {
+        Some(T::from_written(written))
+    }
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        self.as_ref().map(|value| value.errors(field)).unwrap_or_default()
+    }
+
+    fn is_absent(&self) -> bool {
+        self.is_none()
+    }
+}
+
+/// A table inside a table.
+impl<T: Description> FieldValue for T {
+    type Written = Self;
+    const TYPE: ValueType = ValueType::Table(T::FIELDS);
+
+    fn from_written(written: Self) -> Self {
+        written
+    }
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        self.validator().errors().into_iter().map(|error| error.prefixed(field.name)).collect()
+    }
+}
+
+/// Declares an enum whose variants are words in scene files. The doc comment of a variant is the
+/// help text of its word.
+///
+/// ```ignore
+/// choices! {
+///     /// Distribution of samples over a pixel.
+///     pub enum Filter {
+///         /// evenly over the pixel's square
+///         Box = "box",
+///         /// all in its centre: no anti-aliasing
+///         Center = "center",
+///     }
+/// }
+/// ```
+macro_rules! choices {
+    (
+        $(#[$attribute:meta])*
+        pub enum $name:ident {
+            $($(#[doc = $doc:literal])+ $variant:ident = $word:literal,)+
+        }
+    ) => {
+        $(#[$attribute])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, ::serde::Serialize, ::serde::Deserialize)]
+        pub enum $name {
+            $($(#[doc = $doc])+ #[serde(rename = $word)] $variant,)+
+        }
+
+        impl $name {
+            /// Words in scene files with their help texts, in the order of the variants.
+            pub const CHOICES: &'static [$crate::value::Choice] = &[$($crate::value::Choice {
+                name: $word,
+                doc: $crate::value::doc_text(concat!($($doc),+)),
+            },)+];
+
+            /// Every variant, in the order of [`Self::CHOICES`].
+            pub const ALL: [Self; Self::CHOICES.len()] = [$(Self::$variant),+];
+        }
+
+        impl $crate::value::FieldValue for $name {
+            type Written = &'static str;
+            const TYPE: $crate::value::ValueType =
+                $crate::value::ValueType::Choice(Self::CHOICES);
+
+            fn from_written(written: &'static str) -> Self {
+                match written {
+                    $($word => Self::$variant,)+
+                    _ => panic!("`{written}` is not a word of {}", stringify!($name)),
+                }
+            }
+
+            fn errors(&self, _: &$crate::value::Field) -> Vec<$crate::value::ValidationError> {
+                Vec::new()
+            }
+        }
+    };
+}
+
+pub(crate) use choices;
+
+/// Declares a table of a scene file: struct, serde, defaults, table of fields, range checks.
+///
+/// ```ignore
+/// description! {
+///     /// Help text of the table.
+///     pub struct Example {
+///         /// A key that must be given, with its range and unit.
+///         center: [f64; 3], in COORDINATE "scene units";
+///         /// A key with a default, written as in a scene file.
+///         rotation: f64 = 0.0, in closed(-180.0, 180.0) "degrees";
+///         /// A key that may be left out, and the phrase that says what holds then.
+///         alpha: Option<f64>, or "roughness / (2 √2)", in SHARE;
+///         /// A value type other than that of the Rust type.
+///         normal: [f64; 3], as Direction;
+///         // A private field that files do not have.
+///         skip content: Option<Content>;
+///     }
+/// }
+/// ```
+///
+/// Ranges are those of [`NumberRange`]. If every key may be left out, the struct is declared as
+/// `Example: Default` and gets the declared defaults. Otherwise a default has to be that of the Rust
+/// type, unless it is declared as `up: [f64; 3] => "up" "[0.0, 1.0, 0.0]"`: the function that serde
+/// calls, and its result as TOML.
+macro_rules! description {
+    ($(#[doc = $doc:literal])+ pub struct $name:ident: Default { $($fields:tt)+ }) => {
+        $crate::value::description!(@struct any all [$($doc)+] [] $name $($fields)+);
+        $crate::value::description!(@default $name $($fields)+);
+    };
+    ($(#[doc = $doc:literal])+ pub struct $name:ident $(: $derived:ident)? { $($fields:tt)+ }) => {
+        $crate::value::description!(@struct all any [$($doc)+] [$($derived)?] $name $($fields)+);
+    };
+
+    // `$per_field` and `$whole` are `all` and `any`, true and false as conditions: serde takes
+    // defaults from the Rust type of each field, or from the struct's `Default`.
+    (
+        @struct $per_field:ident $whole:ident [$($doc:literal)+] [$($derived:ident)?] $name:ident
+        $(
+            $(#[doc = $help:literal])+
+            $key:ident: $type:ty $(= $default:expr)? $(=> $function:literal $toml:literal)?
+            $(, or $absent:literal)?
+            $(, in $range:ident $(($($bound:expr),+))? $($unit:literal)?)?
+            $(, as $value_type:ident)?;
+        )+
+        $(skip $hidden:ident: $hidden_type:ty;)?
+    ) => {
+        $(#[doc = $doc])+
+        #[derive(Clone, Debug, PartialEq, ::serde::Serialize, ::serde::Deserialize)]
+        $(#[derive($derived)])?
+        #[serde(deny_unknown_fields)]
+        #[cfg_attr($whole(), serde(default))]
+        pub struct $name {
+            $(
+                $(#[doc = $help])+
+                $(
+                    #[doc = concat!("\n\nDefault: `", stringify!($default), "`.")]
+                    #[cfg_attr($per_field(), serde(default))]
+                )?
+                $(
+                    #[doc = concat!("\n\nDefault: `", $toml, "`.")]
+                    #[serde(default = $function)]
+                )?
+                $(
+                    #[doc = concat!("\n\nDefault: none (", $absent, ").")]
+                    #[serde(default, skip_serializing_if = "crate::value::is_absent")]
+                )?
+                pub $key: $type,
+            )+
+            $(#[serde(skip)] $hidden: $hidden_type,)?
+        }
+
+        impl $crate::value::Description for $name {
+            const DOC: &'static str = $crate::value::doc_text(concat!($($doc),+));
+            const FIELDS: &'static [$crate::value::Field] = &[$(
+                $crate::value::Field::required(
+                    stringify!($key),
+                    <$type as $crate::value::FieldValue>::TYPE
+                        $(.within($crate::value::NumberRange::$range $(($($bound),+))?))?
+                        $(.replaced($crate::value::ValueType::$value_type))?,
+                    concat!("" $($(, $unit)?)?),
+                    $crate::value::doc_text(concat!($($help),+)),
+                )
+                $(.with_default(stringify!($default)))?
+                $(.with_default($toml))?
+                $(.or($absent))?,
+            )+];
+
+            fn validator(&self) -> $crate::value::Validator {
+                $crate::value::Validator::new(Self::FIELDS)
+                    $(.field(stringify!($key), &self.$key))+
+            }
+        }
+    };
+
+    (
+        @default $name:ident
+        $(
+            $(#[doc = $help:literal])+
+            $key:ident: $type:ty $(= $default:expr)? $(, or $absent:literal)?
+            $(, in $range:ident $(($($bound:expr),+))? $($unit:literal)?)?
+            $(, as $value_type:ident)?;
+        )+
+        $(skip $hidden:ident: $hidden_type:ty;)?
+    ) => {
+        impl Default for $name {
+            fn default() -> Self {
+                Self {
+                    $($key: $crate::value::description!(@value $type $(= $default)?),)+
+                    $($hidden: Default::default(),)?
+                }
+            }
+        }
+    };
+    (@value $type:ty = $default:expr) => {
+        <$type as $crate::value::FieldValue>::from_written($default)
+    };
+    (@value $type:ty) => {
+        <$type as Default>::default()
+    };
+}
+pub(crate) use description;
