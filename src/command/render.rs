@@ -7,10 +7,10 @@ use crate::command::signals::Signals;
 use crate::command::stats::{Stats, peak_rss_bytes};
 use crate::command::{Failure, all_threads, print_line, warn};
 use crate::film::{Depth, Display, ImageOutput, WriteError};
+use crate::render::Options;
 use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use crate::render::session::{Report, Session, State};
-use crate::render::{Options, RenderState};
 use crate::sampling::SampleSettings;
 use crate::scene::{Document, Scene};
 use crate::world;
@@ -41,8 +41,8 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let signals = Signals::watch().map_err(|e| Failure::Failed(format!("no signals: {e}")))?;
 
     let threads = args.threads.map_or_else(all_threads, usize::from);
-    let mut session: Session<RenderState> =
-        Session::new(threads, options(args), schedule_settings(args)).map_err(|error| {
+    let mut session: Session = Session::new(threads, options(args), schedule_settings(args))
+        .map_err(|error| {
             Failure::Failed(format!(
                 "cannot start {threads} threads: {error}; try fewer by --threads"
             ))
@@ -113,7 +113,7 @@ enum End {
 }
 
 /// Shows progress until the work is done or a signal ends it.
-fn watch(session: &Session<RenderState>, signals: &Signals) -> Result<End, Failure> {
+fn watch(session: &Session, signals: &Signals) -> Result<End, Failure> {
     let mut progress = Progress::on_stderr();
     let end = loop {
         if let Some(status) = signals.caught() {
@@ -134,7 +134,7 @@ type Written = (Report, &'static str, Result<(), WriteError>);
 
 /// Writes the picture where the film lives.
 fn write(
-    session: &Session<RenderState>,
+    session: &Session,
     args: &RenderArgs,
     target: &ImageOutput,
     hash: String,
