@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
-use zerkalo::film::Display;
+use zerkalo::film::{Display, LinearImage, Thumbnail};
 use zerkalo::render::Options;
 use zerkalo::render::schedule::{Criterion, Settings, Stop};
 use zerkalo::render::session::{Session, Snapshot, View};
@@ -73,8 +73,8 @@ fn figures(size: [u32; 2]) {
             vec![start.elapsed()]
         };
         [
-            timed(&|| drop(black_box(film.thumbnail(RASTER[0], RASTER[1])))),
-            timed(&|| drop(black_box(film.linear(&rendering.mix)))),
+            timed(&|| drop(black_box(Thumbnail::of_film(film, RASTER[0], RASTER[1])))),
+            timed(&|| drop(black_box(LinearImage::of_film(film, &rendering.mix)))),
         ]
     });
     let [thumbnail, linear] = costs.unwrap();

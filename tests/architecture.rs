@@ -64,7 +64,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("light", &["value", "lanes"]),
     ("camera", &["value", "lanes"]),
     ("value", &[]),
-    ("film", &["lanes"]),
+    ("film", &["value", "lanes"]),
     ("sampling", &["lanes"]),
     ("lanes", &[]),
 ];

@@ -13,7 +13,7 @@ mod text;
 mod validation;
 
 pub use angle::sin_cos_degrees;
-pub use color::{Color, linear_from_srgb};
+pub use color::{Color, linear_from_srgb, srgb_from_linear};
 pub use direction::unit;
 pub use field::{Choice, DefaultValue, Field, ValueType};
 pub use hash::fnv1a64;

@@ -6,7 +6,7 @@ mod noise;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
-use zerkalo::film::{Display, Tone};
+use zerkalo::film::{Display, LinearImage, Tone};
 use zerkalo::lanes::{SimdFloat, Single};
 use zerkalo::render::Options;
 use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
@@ -282,8 +282,12 @@ fn tasks_do_not_wait_and_always_answer() {
     let end = resting(&session, generation);
     let (keep, kept) = channel();
     session.submit(move |film| {
-        keep.send(film.map(|(r, _)| (r.film.linear(&r.mix), r.film.pixel(50, 40, &r.mix))))
-            .unwrap();
+        keep.send(
+            film.map(|(r, _)| {
+                (LinearImage::of_film(&r.film, &r.mix), r.film.pixel(50, 40, &r.mix))
+            }),
+        )
+        .unwrap();
     });
     let (kept, pixel) = kept.recv_timeout(PATIENCE).unwrap().unwrap();
     for (a, b) in end.picture.unwrap().mixed(&end.mix).iter().zip(kept.resampled(20, 14)) {

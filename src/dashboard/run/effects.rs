@@ -3,6 +3,7 @@
 use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport, stem};
 use crate::dashboard::run::file_worker::Files;
+use crate::film::LinearImage;
 use crate::render::Options;
 use crate::render::schedule::Settings;
 use crate::render::session::{Session, View};
@@ -131,7 +132,7 @@ impl EffectRunner {
                 let results = self.results.clone();
                 self.session.submit(move |film| {
                     if let Some((rendering, report)) = film {
-                        let picture = rendering.film.linear(&rendering.mix);
+                        let picture = LinearImage::of_film(&rendering.film, &rendering.mix);
                         let _ = results.send(Message::Kept(Arc::new(picture), report.spp.mean));
                     }
                 });

@@ -120,7 +120,8 @@ impl Frame {
             Some(_) => Arc::new(TileMaps::of(film, noise_codes)),
             None => Arc::default(),
         };
-        let probe = self.view.probe.and_then(|pixel| film.probe(pixel, &self.mix, &self.display));
+        let probe =
+            self.view.probe.and_then(|pixel| Probe::of_film(film, pixel, &self.mix, &self.display));
         Snapshot {
             report,
             picture,
