@@ -63,8 +63,8 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("bvh", &["lanes"]),
     ("light", &["value", "lanes"]),
     ("camera", &["value", "lanes"]),
-    ("value", &[]),
     ("film", &["value", "lanes"]),
+    ("value", &[]),
     ("sampling", &["lanes"]),
     ("lanes", &[]),
 ];
