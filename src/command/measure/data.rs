@@ -99,7 +99,7 @@ fn points(measured: &Measured) -> impl Iterator<Item = Point> {
         spp: p.spp,
         seconds: median(&measured.seconds(p)),
         seconds_spread: spread(&measured.seconds(p)),
-        told_codes: p.told_codes,
+        told_codes: p.estimated_codes,
         rmse_codes: p.errors.rmse_codes,
         rmse_codes_spread: p.errors.spread,
         rmse_linear: p.errors.rmse_linear,
@@ -121,7 +121,7 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
         })
     };
     Variation {
-        setting: measured.topic.name(),
+        setting: measured.experiment.name(),
         name: &measured.name,
         threads: measured.threads,
         samples_per_second: speed.map(|s| s.0),
@@ -175,7 +175,7 @@ pub fn csv(measurement: &Measurement) -> Vec<u8> {
     for measured in &measurement.measured {
         for p in points(measured) {
             let line = Line {
-                setting: measured.topic.name(),
+                setting: measured.experiment.name(),
                 name: &measured.name,
                 threads: measured.threads,
                 samples: p.samples,

@@ -34,9 +34,9 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
         None => None,
     };
     let threads = args.compute.threads();
-    let topics = match (&args.only, args.full) {
-        (topics, _) if !topics.is_empty() => topics.clone(),
-        (_, true) => Experiment::ALL.iter().map(|(topic, ..)| *topic).collect(),
+    let experiments = match (&args.only, args.full) {
+        (experiments, _) if !experiments.is_empty() => experiments.clone(),
+        (_, true) => Experiment::ALL.iter().map(|(experiment, ..)| *experiment).collect(),
         _ => SHORT.to_vec(),
     };
     let seconds = args.seconds.unwrap_or(if args.full { 300.0 } else { 50.0 });
@@ -44,7 +44,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     targets.sort_by(|a, b| b.total_cmp(a));
     let plan = Plan {
         targets,
-        topics,
+        experiments,
         repetitions: usize::from(args.repetitions),
         seconds,
         threads,
@@ -57,9 +57,9 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let signals = Signals::watch().map_err(|e| failed(format!("no signals: {e}")))?;
     let bar = progress_bar();
     let measurement = measure::measure(&Arc::new(scene), &plan, reference, &mut |progress| {
-        bar.set_length(progress.of as u64);
+        bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
-        bar.set_message(progress.what.to_string());
+        bar.set_message(progress.step.to_string());
         signals.caught().is_none()
     })
     .map_err(|e| failed(format!("cannot start {threads} threads: {e}; try fewer by --threads")))?;

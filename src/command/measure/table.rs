@@ -168,15 +168,15 @@ impl fmt::Display for About<'_> {
         }
         let mut last = Experiment::Default;
         for measured in &m.measured[1..] {
-            if measured.topic != last {
-                last = measured.topic;
+            if measured.experiment != last {
+                last = measured.experiment;
                 self.heading(f, last)?;
-                self.row(f, &last.of_default(self.single, self.threads), default)?;
+                self.row(f, &last.default_name(self.single, self.threads), default)?;
             }
             self.row(f, &measured.name, measured)?;
         }
-        for topic in &m.idle {
-            writeln!(f, "\n{}: nothing to compare in this scene", topic.question())?;
+        for experiment in &m.idle {
+            writeln!(f, "\n{}: nothing to compare in this scene", experiment.title())?;
         }
         if m.measured.iter().any(|m| m.bias.is_some()) {
             writeln!(
@@ -190,14 +190,14 @@ impl fmt::Display for About<'_> {
 }
 
 impl About<'_> {
-    fn heading(&self, f: &mut fmt::Formatter, topic: Experiment) -> fmt::Result {
+    fn heading(&self, f: &mut fmt::Formatter, experiment: Experiment) -> fmt::Result {
         writeln!(
             f,
             "\n{} (to {:.2} 8-bit levels)",
-            topic.question(),
+            experiment.title(),
             self.measurement.compared_at
         )?;
-        let last = if topic.unbiased() { "" } else { "   bias" };
+        let last = if experiment.unbiased() { "" } else { "   bias" };
         writeln!(
             f,
             "  {:<18}  {:>14}  {:>9}  {:>9}  {:>9}{last}",
