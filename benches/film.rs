@@ -4,7 +4,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use zerkalo::film::{
     Depth, Display, Estimator, Film, Header, ImageData, ImageOutput, LightWeights, TILE_PIXELS,
-    Tone,
+    Thumbnail, Tone,
 };
 
 /// A noisy gradient of `groups` lights, 64 + 64 samples in every pixel.
@@ -60,7 +60,7 @@ fn pictures(c: &mut Criterion) {
     let one = film(1920, 1080, 1);
     let other = film(1920, 1080, 1);
     group.bench_function("resampled to 200x110", |b| {
-        b.iter(|| one.resampled(200, 110, &white(1)));
+        b.iter(|| Thumbnail::of_film(&one, 200, 110).mixed(&white(1)));
     });
     group.bench_function("add", |b| {
         let mut sum = film(1920, 1080, 1);

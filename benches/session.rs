@@ -7,10 +7,10 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
-use zerkalo::film::Display;
+use zerkalo::film::{Display, LinearImage, Thumbnail};
+use zerkalo::render::Options;
 use zerkalo::render::schedule::{Criterion, Settings, Stop};
 use zerkalo::render::session::{Session, Snapshot, View};
-use zerkalo::render::{Options, RenderState};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Scene, built_in};
 use zerkalo::world;
@@ -42,7 +42,7 @@ fn figures(size: [u32; 2]) {
         rays_per_pixel: 0,
         stop: Stop::default(),
     };
-    let mut session: Session<RenderState> = Session::new(threads, options, settings).unwrap();
+    let mut session = Session::new(threads, options, settings).unwrap();
     session.set_view(View { raster: Some(RASTER), probe: Some([9, 9]) });
     let mut scene = built_in();
     scene.film.size = size;
@@ -73,8 +73,8 @@ fn figures(size: [u32; 2]) {
             vec![start.elapsed()]
         };
         [
-            timed(&|| drop(black_box(film.thumbnail(RASTER[0], RASTER[1])))),
-            timed(&|| drop(black_box(film.linear(&rendering.mix)))),
+            timed(&|| drop(black_box(Thumbnail::of_film(film, RASTER[0], RASTER[1])))),
+            timed(&|| drop(black_box(LinearImage::of_film(film, &rendering.mix)))),
         ]
     });
     let [thumbnail, linear] = costs.unwrap();
@@ -91,7 +91,7 @@ fn tell(what: &str, times: &[Duration]) {
     println!("  {what:42} {:8.1} {:8.1} {:8.1}", at(0.5), at(0.99), at(1.0));
 }
 
-fn wait(session: &Session<RenderState>, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {
+fn wait(session: &Session, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {
     let end = Instant::now() + PATIENCE;
     while Instant::now() < end {
         if let Some(snapshot) = session.wait(Duration::from_millis(100)).filter(&wanted) {
@@ -101,7 +101,7 @@ fn wait(session: &Session<RenderState>, wanted: impl Fn(&Snapshot) -> bool) -> S
     panic!("no snapshot in time");
 }
 
-fn first_pictures(session: &mut Session<RenderState>, scene: &Scene, which: &str) {
+fn first_pictures(session: &mut Session, scene: &Scene, which: &str) {
     let start = Instant::now();
     let generation = session.set_scene(Arc::new(scene.clone()));
     wait(session, |s| s.report.generation == generation);
@@ -111,7 +111,7 @@ fn first_pictures(session: &mut Session<RenderState>, scene: &Scene, which: &str
     tell(&format!("{which}: every pixel"), &[start.elapsed()]);
 }
 
-fn snapshots(session: &Session<RenderState>, during: Duration) -> Vec<Duration> {
+fn snapshots(session: &Session, during: Duration) -> Vec<Duration> {
     let end = Instant::now() + during;
     let (mut last, mut apart) = (Instant::now(), Vec::new());
     while Instant::now() < end {
@@ -122,7 +122,7 @@ fn snapshots(session: &Session<RenderState>, during: Duration) -> Vec<Duration> 
     apart
 }
 
-fn tasks(session: &Session<RenderState>, count: usize) -> Vec<Duration> {
+fn tasks(session: &Session, count: usize) -> Vec<Duration> {
     let task = |i: usize| {
         std::thread::sleep(Duration::from_millis(i as u64 * 7 % 50));
         session.take();
@@ -137,7 +137,7 @@ fn tasks(session: &Session<RenderState>, count: usize) -> Vec<Duration> {
     (0..count).map(task).collect()
 }
 
-fn edits(session: &mut Session<RenderState>, scene: &mut Scene, count: usize) -> Vec<Duration> {
+fn edits(session: &mut Session, scene: &mut Scene, count: usize) -> Vec<Duration> {
     let mut edit = |i: usize| {
         std::thread::sleep(Duration::from_millis(i as u64 * 37 % 400));
         scene.camera.eye[0] += 0.01;
@@ -151,7 +151,7 @@ fn edits(session: &mut Session<RenderState>, scene: &mut Scene, count: usize) ->
 }
 
 fn relights(
-    session: &mut Session<RenderState>,
+    session: &mut Session,
     scene: &mut Scene,
     count: usize,
 ) -> (Vec<Duration>, Vec<Duration>) {

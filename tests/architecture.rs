@@ -63,8 +63,8 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("bvh", &["lanes"]),
     ("light", &["value", "lanes"]),
     ("camera", &["value", "lanes"]),
+    ("film", &["value", "lanes"]),
     ("value", &[]),
-    ("film", &["lanes"]),
     ("sampling", &["lanes"]),
     ("lanes", &[]),
 ];

@@ -13,7 +13,6 @@ use support::{Rng, all_shipped, begin, pool, shipped, sized, trace, uniform, wav
 use told::told;
 use zerkalo::film::Film;
 use zerkalo::render::RenderState;
-use zerkalo::render::session::RenderBackend;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
@@ -117,7 +116,7 @@ fn extreme_29_stopped_and_resumed() {
                             std::thread::sleep(Duration::from_micros(pause.unwrap_or(0)));
                             cancel.store(true, Ordering::Relaxed);
                         });
-                        begun.run(&all, &pool, &cancel)
+                        begun.trace_wave(&all, &pool, &cancel)
                     });
                     let mut rest = all.clone();
                     let mut done = report.reports.iter().map(Option::is_some);
@@ -191,10 +190,11 @@ fn the_interleaved_first_pass_is_a_plain_wave() {
             let mut rendering = begin(&scene, SEED, precision);
             let first = wave(&rendering.film, 0, 0, 1);
             let mut shown = 0;
-            let report = rendering.first(&first, &pool, &AtomicBool::new(false), &mut |film| {
-                assert!(film.samples() > 0);
-                shown += 1;
-            });
+            let report =
+                rendering.trace_first_pass(&first, &pool, &AtomicBool::new(false), &mut |film| {
+                    assert!(film.samples() > 0);
+                    shown += 1;
+                });
             assert!(report.is_some() && shown > 0);
             for (replicate, first, count) in [(1, 0, 1), (0, 1, 15), (1, 1, 15)] {
                 let wave = wave(&rendering.film, replicate, first, count);

@@ -16,7 +16,6 @@ use tables::{Key, at, keys, put, scene, table};
 use toml::{Table, Value};
 use zerkalo::film::Replicates;
 use zerkalo::render::RenderState;
-use zerkalo::render::session::RenderBackend;
 use zerkalo::scene::Scene;
 use zerkalo::shape::EXAMPLES;
 use zerkalo::value::ValueType;

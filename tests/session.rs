@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo::film::Display;
+use zerkalo::render::Options;
 use zerkalo::render::schedule::{Criterion, Settings, Stop};
 use zerkalo::render::session::{Report, Session, State};
-use zerkalo::render::{Options, RenderState};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::world;
@@ -32,7 +32,7 @@ material = "mirror"
 shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0, 0.0, 1.0] }
 "#;
 
-fn session(threads: usize, adaptive: bool) -> Session<RenderState> {
+fn session(threads: usize, adaptive: bool) -> Session {
     let options = Options {
         world: world::Options::default(),
         sampling: SampleSettings { seed: 3, kind: SamplerKind::Sobol },
@@ -48,7 +48,7 @@ fn scene() -> Arc<Scene> {
 }
 
 /// Waits for the end of scene `generation`.
-fn finished(session: &Session<RenderState>, generation: u64) -> Report {
+fn finished(session: &Session, generation: u64) -> Report {
     let end = Instant::now() + Duration::from_secs(60);
     while Instant::now() < end {
         let Some(snapshot) = session.wait(Duration::from_millis(100)) else { continue };
@@ -60,7 +60,7 @@ fn finished(session: &Session<RenderState>, generation: u64) -> Report {
     panic!("not finished in time")
 }
 
-fn bytes(session: &Session<RenderState>) -> Vec<u8> {
+fn bytes(session: &Session) -> Vec<u8> {
     session.with(|rendering, _| rendering.film.bytes()).expect("a film")
 }
 

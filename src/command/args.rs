@@ -1,9 +1,9 @@
-//! The command line.
+//! Command-line arguments.
 
-use crate::film::Tone;
+use crate::film::{Display, Tone};
 use crate::measure::Experiment;
 use crate::sampling::SamplerKind;
-use crate::scene::Acceleration;
+use crate::scene::{Acceleration, Scene};
 use crate::world::Precision;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -18,10 +18,10 @@ use std::path::PathBuf;
                         signal (`render` then writes the picture so far)."
 )]
 pub struct Cli {
-    /// What to do.
+    /// The subcommand.
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// What the dashboard is opened with.
+    /// Arguments of the dashboard.
     #[command(flatten)]
     pub edit: EditArgs,
 }
@@ -31,63 +31,90 @@ pub struct Cli {
 pub struct EditArgs {
     /// A scene file [default: the built-in mirror room]
     pub scene: Option<PathBuf>,
-    /// Threads that trace [default: one per processor]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
-    pub threads: Option<u16>,
-    /// Number that the random choices follow from; the same seed gives the same picture
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
-    pub seed: u64,
-    /// Precision of the geometry; auto: double where the scene's proportions need it
-    #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]
-    pub precision: PrecisionArg,
-    /// Colours of the terminal: 24-bit, 256, 16 or none; auto: as environment and terminal tell
+    #[command(flatten)]
+    pub compute: ComputeArgs,
+    #[command(flatten)]
+    pub precision: PrecisionArgs,
+    /// Colours of the terminal: 24-bit, 256, 16 or none; auto: from the environment and the
+    /// terminal's replies
     #[arg(long, value_enum, default_value_t = ColorArg::Auto)]
     pub color: ColorArg,
-    /// Send this many kilobytes a second to the terminal [default: over SSH what the line carries, as
-    /// measured; else everything]
+    /// Kilobytes per second sent to the terminal [default: over SSH the measured rate of the
+    /// connection; else unlimited]
     #[arg(long, value_name = "KB", value_parser = bandwidth, allow_negative_numbers = true)]
     pub bandwidth: Option<f64>,
-    /// Write how long the answers to keys and mouse took, as CSV, and print the distribution at the
-    /// end
+    /// Write the latencies of keys and mouse as CSV, and print their distribution at the end
     #[arg(long, value_name = "FILE.csv", hide = true)]
     pub trace: Option<PathBuf>,
 }
 
-/// What to do.
+/// Options of every command that traces.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct ComputeArgs {
+    /// Number of tracing threads [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
+    threads: Option<u16>,
+    /// Random seed; equal seeds give equal pictures
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    pub seed: u64,
+}
+
+/// The option `--precision`.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct PrecisionArgs {
+    /// Floating-point precision of the geometry; auto: double where the scene's proportions need it
+    #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]
+    precision: PrecisionArg,
+}
+
+/// Size and display of a picture.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct PictureArgs {
+    /// Width and height in pixels, instead of the scene's
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// Exposure of the displayed picture, in stops: radiance times 2 to the power of EV
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, allow_negative_numbers = true)]
+    exposure: f64,
+    /// Tone curve for light brighter than white: clip it, or compress it and keep the hue
+    #[arg(long, value_parser = tone(), default_value = "clip")]
+    tone: Tone,
+}
+
+/// Subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Render a scene to a picture file
     Render(Box<RenderArgs>),
-    /// Measure what accuracy costs on a scene: seconds to a given noise, what settings give and cost
+    /// Measure the cost of accuracy on a scene: seconds to a given noise, gain and cost of settings
     Measure(Box<MeasureArgs>),
-    /// Validate a scene and say what it contains
+    /// Validate a scene and print its contents
     Check(CheckArgs),
     /// Write a commented starter scene
     New(NewArgs),
-    /// Tell what the terminal and the line to it can do, and what would make them better
+    /// Report the abilities of the terminal and of the connection, and how to improve them
     Doctor(DoctorArgs),
 }
 
 /// Arguments of `zerkalo render`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "RenderState stops at whichever of --spp, --noise, --rmse and --time is reached \
+    after_help = "Rendering stops at whichever of --spp, --noise, --rmse and --time is reached \
                         first; with none of them, at --noise 0.5."
 )]
 pub struct RenderArgs {
     /// The scene file
     pub scene: PathBuf,
-    /// The picture; the extension chooses the format: .png or .exr
+    /// The picture file; its extension chooses the format: .png or .exr
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// Width and height in pixels, instead of the scene's
-    #[arg(long, value_name = "WxH", value_parser = size)]
-    pub size: Option<[u32; 2]>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
     /// Stop at this many samples per pixel (the mean, if adaptive; rounds up to even)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     pub spp: Option<u32>,
-    /// Stop at this noise: estimated RMSE of the picture as displayed, in 8-bit codes [default: 0.5]
-    #[arg(long, value_name = "CODES", value_parser = positive, allow_negative_numbers = true)]
+    /// Stop at this noise: estimated RMSE of the displayed picture, in 8-bit levels [default: 0.5]
+    #[arg(long, value_name = "LEVELS", value_parser = positive, allow_negative_numbers = true)]
     pub noise: Option<f64>,
     /// Stop at this estimated RMSE of the linear picture
     #[arg(long, value_name = "LINEAR", value_parser = positive, allow_negative_numbers = true)]
@@ -95,20 +122,14 @@ pub struct RenderArgs {
     /// Stop after this many seconds of rendering
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub time: Option<f64>,
-    /// Threads that trace [default: one per processor]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
-    pub threads: Option<u16>,
-    /// Number that the random choices follow from; the same seed gives the same picture
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
-    pub seed: u64,
-    /// Precision of the geometry; auto: double where the scene's proportions need it
-    #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]
-    pub precision: PrecisionArg,
-    /// How rays are kept from things that they cannot meet, instead of as the scene says; the picture
-    /// stays the same
+    #[command(flatten)]
+    pub compute: ComputeArgs,
+    #[command(flatten)]
+    pub precision: PrecisionArgs,
+    /// Acceleration structure, instead of the scene's; every choice renders the same picture
     #[arg(long, value_parser = acceleration())]
     pub acceleration: Option<Acceleration>,
-    /// Where samples lie: sobol spreads them evenly, random is for comparison
+    /// Sampler: sobol spreads samples evenly, random is for comparison
     #[arg(long, value_enum, default_value_t = SamplerArg::Sobol)]
     pub sampler: SamplerArg,
     /// Give every pixel the same number of samples
@@ -117,12 +138,6 @@ pub struct RenderArgs {
     /// Bits per channel of a PNG
     #[arg(long, value_name = "8|16", default_value = "8", value_parser = bits)]
     pub bits: u8,
-    /// Exposure, in stops: the picture times 2 to the power of EV
-    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, allow_negative_numbers = true)]
-    pub exposure: f64,
-    /// What becomes of light brighter than white: clip it, or compress it keeping the hue
-    #[arg(long, value_parser = tone(), default_value = "clip")]
-    pub tone: Tone,
     /// Write statistics of the run as JSON
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
@@ -133,8 +148,8 @@ pub struct RenderArgs {
 pub struct MeasureArgs {
     /// The scene file
     pub scene: PathBuf,
-    /// Noise levels to reach, in 8-bit codes
-    #[arg(long, value_name = "CODES,..", value_parser = positive, value_delimiter = ',', default_value = "2,1,0.5,0.25")]
+    /// Noise targets, in 8-bit levels
+    #[arg(long, value_name = "LEVELS,..", value_parser = positive, value_delimiter = ',', default_value = "2,1,0.5,0.25")]
     pub noise: Vec<f64>,
     /// Compare only these settings, such as: adaptivity,precision,threads,sampler,lobe,ray-types,max-depth,min-throughput,rays-per-pixel,acceleration
     #[arg(long, value_name = "SETTING,..", value_delimiter = ',', conflicts_with = "full")]
@@ -142,37 +157,26 @@ pub struct MeasureArgs {
     /// Compare all settings, which takes about five minutes
     #[arg(long)]
     pub full: bool,
-    /// About so many seconds in all [default: 50, with --full 300]
+    /// Approximate duration of all measurements [default: 50, with --full 300]
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub seconds: Option<f64>,
-    /// Time everything at least so many times
+    /// Least number of timed runs of each setting
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub repetitions: u16,
-    /// Compare with this picture instead of one made with another seed
+    /// Reference picture, instead of one rendered with another seed
     #[arg(long, value_name = "FILE.exr")]
     pub reference: Option<PathBuf>,
-    /// Width and height in pixels, instead of the scene's
-    #[arg(long, value_name = "WxH", value_parser = size)]
-    pub size: Option<[u32; 2]>,
-    /// Threads that trace [default: one per processor]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
-    pub threads: Option<u16>,
-    /// Number that the random choices follow from
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
-    pub seed: u64,
-    /// Exposure, in stops, at which codes are told
-    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, allow_negative_numbers = true)]
-    pub exposure: f64,
-    /// Tone curve with which codes are told
-    #[arg(long, value_parser = tone(), default_value = "clip")]
-    pub tone: Tone,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    #[command(flatten)]
+    pub compute: ComputeArgs,
     /// Write everything as JSON
     #[arg(long, value_name = "FILE.json")]
     pub json: Option<PathBuf>,
-    /// Write the errors against samples and seconds as CSV
+    /// Write errors against samples and seconds as CSV
     #[arg(long, value_name = "FILE.csv")]
     pub csv: Option<PathBuf>,
-    /// Draw error against time
+    /// Plot error against time
     #[arg(long, value_name = "FILE.svg|png")]
     pub plot: Option<PathBuf>,
 }
@@ -194,7 +198,7 @@ pub struct NewArgs {
 /// Arguments of `zerkalo doctor`.
 #[derive(Debug, Args)]
 pub struct DoctorArgs {
-    /// Measure how fast the line is, too, which takes a second or some
+    /// Measure the rate of the connection as well, which takes a few seconds
     #[arg(long)]
     pub rate: bool,
 }
@@ -206,14 +210,14 @@ pub enum PrecisionArg {
     Single,
     /// 64-bit
     Double,
-    /// As the scene's proportions need it
+    /// Chosen by the scene's proportions
     Auto,
 }
 
 /// Values of `--color`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ColorArg {
-    /// As environment and terminal tell
+    /// From the environment and the terminal's replies
     Auto,
     /// 24-bit
     True,
@@ -236,19 +240,47 @@ pub enum SamplerArg {
     Random,
 }
 
-impl PrecisionArg {
-    /// What the world calls it.
-    pub fn precision(self) -> Precision {
-        match self {
-            Self::Single => Precision::Single,
-            Self::Double => Precision::Double,
-            Self::Auto => Precision::Auto,
+impl ComputeArgs {
+    /// Number of tracing threads: one per processor unless given.
+    pub fn threads(&self) -> usize {
+        let all = || std::thread::available_parallelism().map_or(1, usize::from);
+        self.threads.map_or_else(all, usize::from)
+    }
+}
+
+impl PrecisionArgs {
+    /// Precision for the world's options.
+    pub fn get(&self) -> Precision {
+        match self.precision {
+            PrecisionArg::Single => Precision::Single,
+            PrecisionArg::Double => Precision::Double,
+            PrecisionArg::Auto => Precision::Auto,
+        }
+    }
+}
+
+impl PictureArgs {
+    /// Exposure and tone curve.
+    pub fn display(&self) -> Display {
+        Display { exposure_ev: self.exposure, tone: self.tone }
+    }
+
+    /// Replaces the size of `scene` by the given one, if there is one.
+    ///
+    /// # Errors
+    /// Returns the first fault of the scene of that size.
+    pub fn resize(&self, scene: &mut Scene) -> Result<(), String> {
+        let Some(size) = self.size else { return Ok(()) };
+        scene.film.size = size;
+        match scene.faults().first() {
+            Some(fault) => Err(format!("--size {}x{}: {fault}", size[0], size[1])),
+            None => Ok(()),
         }
     }
 }
 
 impl SamplerArg {
-    /// What the sampler calls it.
+    /// Kind for the sampler's settings.
     pub fn kind(self) -> SamplerKind {
         match self {
             Self::Sobol => SamplerKind::Sobol,
@@ -274,7 +306,7 @@ fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
         .map(|given| Acceleration::from_name(&given).unwrap_or_default())
 }
 
-/// `640x480`; what a size may be is the scene's to say.
+/// Parses `640x480`. The scene checks the range.
 fn size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_string())
@@ -309,7 +341,7 @@ mod tests {
     use clap::CommandFactory;
 
     #[test]
-    fn the_command_line_is_consistent() {
+    fn command_line_definition_is_consistent() {
         Cli::command().debug_assert();
     }
 
@@ -323,8 +355,8 @@ mod tests {
     }
 
     #[test]
-    fn sizes() {
-        assert_eq!(render(&["--size", "640x480"]).unwrap().size, Some([640, 480]));
+    fn sizes_have_two_sides() {
+        assert_eq!(render(&["--size", "640x480"]).unwrap().picture.size, Some([640, 480]));
         for wrong in ["640", "640x", "x480", "640x-1", "640X480", "1x1x1", "5000000000x1", ""] {
             assert!(render(&["--size", wrong]).is_err(), "{wrong}");
         }
@@ -332,7 +364,7 @@ mod tests {
 
     #[test]
     fn numbers_have_ranges() {
-        assert_eq!(render(&["--exposure", "-1.5"]).unwrap().exposure, -1.5);
+        assert_eq!(render(&["--exposure", "-1.5"]).unwrap().picture.exposure, -1.5);
         for wrong in [
             ["--noise", "0"],
             ["--noise", "nan"],
@@ -349,13 +381,13 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_alone_is_understood() {
+    fn scene_alone_opens_the_dashboard() {
         assert!(Cli::try_parse_from(["zerkalo"]).unwrap().command.is_none());
         let cli = Cli::try_parse_from(["zerkalo", "a.toml"]).unwrap();
         assert_eq!(cli.edit.scene, Some(PathBuf::from("a.toml")));
         let cli = Cli::try_parse_from(["zerkalo", "a.toml", "--color", "256", "--threads", "2"]);
         let edit = cli.unwrap().edit;
-        assert_eq!((edit.color, edit.threads), (ColorArg::Indexed, Some(2)));
+        assert_eq!((edit.color, edit.compute.threads()), (ColorArg::Indexed, 2));
         assert!(Cli::try_parse_from(["zerkalo", "--color", "17"]).is_err());
         let slow = Cli::try_parse_from(["zerkalo", "--bandwidth", "12.5"]).unwrap().edit;
         assert_eq!(slow.bandwidth, Some(12.5));

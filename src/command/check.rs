@@ -1,4 +1,4 @@
-//! `zerkalo check`: is a scene valid, and what is in it?
+//! `zerkalo check`: validates a scene and prints its contents.
 
 use crate::command::args::CheckArgs;
 use crate::command::load_progress::LoadReporter;
@@ -29,7 +29,7 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Memory of a whole film: a 64-bit sum for each replicate, pixel, group and channel.
+/// Memory of a whole film, in bytes: a 64-bit sum for each replicate, pixel, group and channel.
 fn film_bytes(size: [u32; 2], groups: usize) -> u64 {
     let [columns, rows] = size.map(|n| u64::from(n).div_ceil(TILE as u64));
     columns * rows * (2 * TILE_PIXELS * groups * 3 * size_of::<i64>()) as u64
@@ -40,7 +40,7 @@ mod tests {
     use super::film_bytes;
 
     #[test]
-    fn memory_of_films() {
+    fn film_memory_counts_whole_tiles() {
         // Whole tiles: 40 x 30 of them.
         assert_eq!(film_bytes([640, 480], 1), 640 * 480 * 48);
         assert_eq!(film_bytes([1, 1], 3), 256 * 48 * 3);

@@ -1,15 +1,15 @@
-//! Whether this processor has what the program was compiled for.
+//! Check of the processor for the features that the program was compiled for.
 //!
-//! The build names a processor (see `.cargo/config.toml`) and the compiler uses all that it has everywhere,
-//! so that a lesser one would stop with an illegal instruction in the middle of something.
-//! `is_x86_feature_detected!` does not help here: for a feature that the build assumes it answers
-//! true without looking. So the processor is asked directly, in plain code.
+//! The build names a processor (see `.cargo/config.toml`), and the compiler uses all of its features
+//! everywhere; an older processor would stop with an illegal instruction at any moment.
+//! `is_x86_feature_detected!` returns `true` without a test for features that the build assumes.
+//! Therefore plain code reads CPUID directly.
 //!
-//! This is promised for builds for a named processor, such as x86-64-v3, and was seen to work under an emulator of older
-//! ones. In an optimised build for `native` the standard library is compiled anew with what comes before `main`, and
-//! the illegal instruction may be there already.
+//! This holds for builds for a named processor, such as x86-64-v3, and was tested under an emulator of older
+//! ones. An optimised build for `native` compiles the standard library again, including the code before `main`, and
+//! that code may contain the illegal instruction.
 
-/// For each of these features that the build assumes: looks at the bit by which the processor says that it has it.
+/// Ends the program at the first listed feature that the build assumes and whose CPUID bit is 0.
 #[cfg(target_arch = "x86_64")]
 macro_rules! need {
     ($($name:literal $register:ident $bit:literal)*) => {
@@ -20,7 +20,7 @@ macro_rules! need {
 }
 
 /// Ends the program with exit status 1 and a line on stderr if this processor lacks a feature that the
-/// program was compiled for. To be called before anything else.
+/// program was compiled for. `main` calls it first.
 #[cfg(target_arch = "x86_64")]
 #[inline(never)]
 pub fn require() {
@@ -28,7 +28,7 @@ pub fn require() {
     // Bits: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 2A, CPUID; AMD64
     // Architecture Programmer's Manual, volume 3, appendix E (those of leaf 8000_0001).
     let none = CpuidResult { eax: 0, ebx: 0, ecx: 0, edx: 0 };
-    // Bit 27: the operating system lets programs ask which registers it keeps. Without, there is no AVX.
+    // Bit 27 (OSXSAVE): the operating system saves the extended registers. AVX needs it.
     let basic = __cpuid(1).ecx;
     let basic = if basic >> 27 & 1 == 1 { basic } else { basic & !(1 << 28) };
     let seven = if __cpuid(0).eax >= 7 { __cpuid_count(7, 0) } else { none };
@@ -59,7 +59,7 @@ pub fn require() {}
 fn refuse(lacking: &str) -> ! {
     use std::io::Write;
     let mut err = std::io::stderr();
-    // If nobody can read it, the exit status is all there is to say.
+    // With a closed stderr the exit status is the only message.
     let _ = err.write_all(b"zerkalo was built for a processor with ");
     let _ = err.write_all(lacking.as_bytes());
     let _ = err.write_all(

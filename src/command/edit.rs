@@ -3,7 +3,7 @@
 use crate::asset::Assets;
 use crate::command::args::{ColorArg, EditArgs};
 use crate::command::load_progress::LoadReporter;
-use crate::command::{Failure, all_threads, print_line, warn};
+use crate::command::{Failure, print_line, warn};
 use crate::dashboard::message::Exported;
 use crate::dashboard::run::{Colors, DEFAULT_STOP, Setup, run as run_dashboard};
 use crate::film::Display;
@@ -20,57 +20,56 @@ use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What the built-in scene is called.
+/// File name of the built-in scene.
 const BUILT_IN_NAME: &str = "mirror-room.toml";
 
 pub fn run(args: &EditArgs) -> Result<(), Failure> {
-    let surroundings = Environment::of(|name| env::var(name).ok());
+    let environment = Environment::of(|name| env::var(name).ok());
     let terminals = io::stdin().is_terminal() && io::stdout().is_terminal();
-    if !terminals || surroundings.term == "dumb" {
+    if !terminals || environment.term == "dumb" {
         let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
-        let why = match terminals {
+        let reason = match terminals {
             true => "TERM=dumb: a terminal that cannot place text shows no dashboard",
             false => "the dashboard needs a terminal",
         };
         return Err(Failure::Usage(format!(
-            "{why}; `zerkalo render {scene} -o PICTURE.png` renders without \
-             one"
+            "{reason}; `zerkalo render {scene} -o PICTURE.png` renders without one"
         )));
     }
-    let reading = LoadReporter::new();
+    let reporter = LoadReporter::new();
     let state = state_folder(|name| env::var_os(name));
     let file = match &args.scene {
-        Some(path) => opened(path, reading.assets.clone(), state.as_deref())?,
+        Some(path) => open(path, reporter.assets.clone(), state.as_deref())?,
         None => SceneFile::untitled(BUILT_IN.to_string(), BUILT_IN_NAME)
             .map_err(|errors| (PathBuf::new(), errors)),
     };
-    reading.mute();
+    reporter.mute();
     let setup = Setup {
         file,
         state,
-        threads: args.threads.map_or_else(all_threads, usize::from),
+        threads: args.compute.threads(),
         options: Options {
-            world: world::Options { precision: args.precision.precision() },
-            sampling: SampleSettings { seed: args.seed, kind: SamplerKind::Sobol },
+            world: world::Options { precision: args.precision.get() },
+            sampling: SampleSettings { seed: args.compute.seed, kind: SamplerKind::Sobol },
             display: Display::default(),
         },
         settings: Settings {
             adaptive: true,
             criterion: Criterion::Codes,
-            // The scene's; the session puts it in.
+            // Replaced by the scene's.
             rays_per_pixel: 0,
             stop: DEFAULT_STOP,
         },
         colors: colors(args.color),
-        surroundings,
+        surroundings: environment,
         bandwidth: args.bandwidth.map(|kilobytes| 1e3 * kilobytes),
         trace: args.trace.clone(),
     };
     let ended = run_dashboard(setup).map_err(|error| Failure::Failed(error.to_string()))?;
     for exported in &ended.exported {
         match exported {
-            Ok(exported) => print_line(&told(exported)),
-            Err(why) => warn(why),
+            Ok(exported) => print_line(&summary(exported)),
+            Err(reason) => warn(reason),
         }
     }
     if let Some(path) = &ended.kept {
@@ -81,9 +80,12 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     ended.signalled.map_or(Ok(()), |status| Err(Failure::Signalled(status)))
 }
 
-/// The scene's file. One that can be read but holds no scene is the dashboard's to show: its user may
-/// mend it meanwhile.
-fn opened(
+/// Opens the scene file. The dashboard shows the errors of a readable file without a valid scene, whose
+/// user may correct it meanwhile.
+///
+/// # Errors
+/// Fails if the file cannot be read.
+fn open(
     path: &Path,
     assets: Arc<Assets>,
     state: Option<&Path>,
@@ -94,14 +96,14 @@ fn opened(
             let readable = File::open(path).and_then(|file| file.metadata());
             match readable.is_ok_and(|metadata| metadata.is_file()) {
                 true => Ok(Err((path.to_path_buf(), errors))),
-                false => Err(Failure::Failed(errors.to_string() + &lost(path, state))),
+                false => Err(Failure::Failed(errors.to_string() + &orphaned_edits(path, state))),
             }
         }
     }
 }
 
-/// A hint at edits of a scene whose file is gone, if there are any.
-fn lost(path: &Path, state: Option<&Path>) -> String {
+/// Hint at unsaved edits of a scene whose file is gone; empty without any.
+fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     let found = Recovery::of(Some(path), "", state).find();
     let hint = |path: &Path| {
         let path = sanitized(&path.display().to_string());
@@ -110,20 +112,20 @@ fn lost(path: &Path, state: Option<&Path>) -> String {
     found.lost.first().map_or(String::new(), |lost| hint(lost.path()))
 }
 
-/// `mirror-room-1.png  640x480  212 spp  noise 0.50 codes`
-fn told(exported: &Exported) -> String {
+/// `mirror-room-1.png  640x480  212 spp  noise 0.50 8-bit levels`
+fn summary(exported: &Exported) -> String {
     let [width, height] = exported.size;
     let noise = match exported.noise_codes {
-        Some(codes) => format!("{codes:.2} codes"),
+        Some(levels) => format!("{levels:.2} 8-bit levels"),
         None => "unknown".to_string(),
     };
     let path = exported.path.display();
     format!("{path}  {width}x{height}  {:.0} spp  noise {noise}", exported.spp)
 }
 
-/// How many colours the user says that the terminal has, if so.
-fn colors(asked: ColorArg) -> Option<Colors> {
-    match asked {
+/// Colours of the terminal given by `--color`; `None` for `auto`.
+fn colors(requested: ColorArg) -> Option<Colors> {
+    match requested {
         ColorArg::True => Some(Colors::True),
         ColorArg::Indexed => Some(Colors::Indexed),
         ColorArg::Sixteen => Some(Colors::Sixteen),

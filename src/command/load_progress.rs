@@ -1,4 +1,4 @@
-//! What is told while files are read that a scene names.
+//! Progress messages while the files that a scene names are read.
 
 use crate::asset::{Assets, LoadProgress};
 use crate::command::warn;
@@ -6,34 +6,34 @@ use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Files and trees that take longer than a moment: so many bytes, so many triangles.
+/// Least size in bytes of a file, and number of triangles of a BVH, that is reported.
 const LARGE: (u64, usize) = (8 << 20, 200_000);
 
-/// Where files are remembered, and who tells of large ones on a terminal's stderr.
+/// Asset cache that reports large files on stderr if that is a terminal.
 pub struct LoadReporter {
-    /// To be shared by all that read scenes.
+    /// The cache, shared by all readers of scenes.
     pub assets: Arc<Assets>,
     enabled: Arc<AtomicBool>,
 }
 
 impl LoadReporter {
-    /// Aloud if somebody looks on.
+    /// Creates a reporter, enabled if stderr is a terminal.
     pub fn new() -> Self {
         let enabled = Arc::new(AtomicBool::new(std::io::stderr().is_terminal()));
-        let heard = enabled.clone();
-        let tell = move |stage: &LoadProgress| {
+        let is_enabled = enabled.clone();
+        let report = move |stage: &LoadProgress| {
             let large = match stage {
                 LoadProgress::Reading { bytes, .. } => *bytes >= LARGE.0,
                 LoadProgress::Building { triangles, .. } => *triangles >= LARGE.1,
             };
-            if large && heard.load(Ordering::Relaxed) {
+            if large && is_enabled.load(Ordering::Relaxed) {
                 warn(&stage.to_string());
             }
         };
-        Self { assets: Arc::new(Assets::new(tell)), enabled }
+        Self { assets: Arc::new(Assets::new(report)), enabled }
     }
 
-    /// Says no more: the terminal is somebody else's.
+    /// Disables the messages: the dashboard owns the terminal from now on.
     pub fn mute(&self) {
         self.enabled.store(false, Ordering::Relaxed);
     }

@@ -1,4 +1,4 @@
-//! The command line: what users ask for, done by the other rooms.
+//! The command line: parses arguments and runs subcommands.
 
 mod args;
 mod check;
@@ -27,21 +27,21 @@ use std::time::Instant;
 /// Exit status of a command line that cannot be understood; clap uses the same.
 const WRONG_USAGE: u8 = 2;
 
-/// How a command ends if not well.
+/// Unsuccessful end of a command.
 enum Failure {
-    /// Exit status 1, and why.
+    /// Exit status 1, with the message.
     Failed(String),
-    /// Exit status 2, and why.
+    /// Exit status 2, with the message.
     Usage(String),
-    /// Ended by a signal after saving what there is: the exit status, 129, 130 or 143.
+    /// Ended by a signal after saving the picture or edits so far: exit status 129, 130 or 143.
     Signalled(u8),
 }
 
-/// Runs the command line that the program was started with.
+/// Runs the command line of the process.
 #[inline(never)]
 pub fn main() -> ExitCode {
     let started = Instant::now();
-    let cli = understood();
+    let cli = parse_command_line();
     let result = match &cli.command {
         Some(Command::Render(args)) => render::run(args, started),
         Some(Command::Measure(args)) => measure::run(args),
@@ -52,16 +52,16 @@ pub fn main() -> ExitCode {
     };
     let (status, message) = match result {
         Ok(()) => return ExitCode::SUCCESS,
-        Err(Failure::Failed(why)) => (1, why),
-        Err(Failure::Usage(why)) => (WRONG_USAGE, why),
+        Err(Failure::Failed(message)) => (1, message),
+        Err(Failure::Usage(message)) => (WRONG_USAGE, message),
         Err(Failure::Signalled(status)) => return ExitCode::from(status),
     };
     warn(&message);
     ExitCode::from(status)
 }
 
-/// The command line, or its end with exit status 2.
-fn understood() -> Cli {
+/// Parses the command line; ends the program with exit status 2 if it is wrong.
+fn parse_command_line() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
         // Of `zerkalo rendr a.toml` clap takes the first word for a scene and refuses the second.
         let first = std::env::args_os().nth(1).unwrap_or_default();
@@ -70,43 +70,38 @@ fn understood() -> Cli {
         if error.kind() == ErrorKind::ArgumentConflict && unknown {
             let names: Vec<_> =
                 Cli::command().get_subcommands().map(|c| c.get_name().to_string()).collect();
-            let why = format!("`{first}` is no command; commands: {}", names.join(", "));
-            end(&Cli::command().error(ErrorKind::InvalidSubcommand, why))
+            let message = format!("`{first}` is no command; commands: {}", names.join(", "));
+            end(&Cli::command().error(ErrorKind::InvalidSubcommand, message))
         }
         end(&error)
     })
 }
 
-/// Tells what is wrong with the command line, or what was asked about it, and ends the program.
+/// Prints a usage error, help or the version, and ends the program.
 fn end(error: &clap::Error) -> ! {
-    // What was typed, or found by a shell's pattern, shall not steer the terminal.
-    let steers = |argument: OsString| {
+    // Arguments, which a shell's pattern may have found, must not control the terminal.
+    let has_control_characters = |argument: OsString| {
         let argument = argument.to_string_lossy();
         sanitized(&argument) != argument
     };
-    if std::env::args_os().any(steers) {
+    if std::env::args_os().any(has_control_characters) {
         warn(error.render().to_string().trim_end());
         std::process::exit(error.exit_code());
     }
     error.exit()
 }
 
-/// One thread per processor.
-fn all_threads() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
-}
-
-/// A line on stderr; if nobody can read it, that is no reason to fail.
+/// Prints a line on stderr. A closed stderr is no failure.
 fn warn(message: &str) {
-    let _ = writeln!(std::io::stderr(), "{}", shown(message));
+    let _ = writeln!(std::io::stderr(), "{}", sanitized_lines(message));
 }
 
-/// A line on stdout; as [`warn`].
+/// Prints a line on stdout. A closed stdout is no failure.
 fn print_line(message: &str) {
-    let _ = writeln!(std::io::stdout(), "{}", shown(message));
+    let _ = writeln!(std::io::stdout(), "{}", sanitized_lines(message));
 }
 
-/// Lines without anything in them that could steer a terminal: they may hold names of files.
-fn shown(message: &str) -> String {
+/// Removes control characters from the lines of `message`, which may hold file names.
+fn sanitized_lines(message: &str) -> String {
     message.split('\n').map(sanitized).collect::<Vec<_>>().join("\n")
 }

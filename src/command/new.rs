@@ -1,4 +1,4 @@
-//! `zerkalo new`: a scene to start from.
+//! `zerkalo new`: writes a starter scene.
 
 use crate::command::args::NewArgs;
 use crate::command::{Failure, print_line};
@@ -8,7 +8,7 @@ use std::io::{ErrorKind, Write};
 
 pub fn run(args: &NewArgs) -> Result<(), Failure> {
     let shown = args.file.display();
-    // Creating fails if the file exists, also if it came into being a moment ago.
+    // `create_new` fails atomically if the file exists.
     let created = OpenOptions::new().write(true).create_new(true).open(&args.file);
     created.and_then(|mut file| file.write_all(starter().as_bytes())).map_err(|error| {
         Failure::Failed(match error.kind() {

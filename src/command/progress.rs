@@ -1,29 +1,29 @@
-//! How a render is getting on, on stderr: a bar in a terminal, lines in a log.
+//! Progress of a render on stderr: a bar in a terminal, lines in a log.
 
 use crate::render::session::Report;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
 
-/// Nothing is shown before so many seconds: a render that is done by then needs no bar.
+/// Seconds before the first output: a shorter render needs no bar.
 const QUIET_SECONDS: f64 = 0.25;
-/// The first line in a log comes after so many seconds; each interval is twice the one before, up to the longest.
+/// Seconds before the first line in a log; each interval is twice the one before, up to the longest.
 const FIRST_LINE_SECONDS: f64 = 1.0;
 const LONGEST_INTERVAL_SECONDS: f64 = 60.0;
 
 /// The steps of the bar.
 const STEPS: u64 = 1000;
 
-/// Tells how far a render is.
+/// Progress display.
 pub enum Progress {
-    /// In a terminal; made when there is something to show.
+    /// A bar in a terminal, created at the first output.
     Bar(Option<ProgressBar>),
-    /// In a log: the seconds of rendering after which the next line is due.
+    /// Lines in a log, with the seconds of rendering after which the next one is due.
     Lines(f64),
 }
 
 impl Progress {
-    /// For the stderr that there is.
+    /// Creates the display that fits stderr.
     pub fn on_stderr() -> Self {
         if std::io::stderr().is_terminal() {
             Self::Bar(None)
@@ -32,7 +32,7 @@ impl Progress {
         }
     }
 
-    /// Shows `report`, if it is time to.
+    /// Shows `report` if output is due.
     pub fn show(&mut self, report: &Report) {
         if report.seconds < QUIET_SECONDS {
             return;
@@ -46,7 +46,7 @@ impl Progress {
             Self::Lines(due) if report.seconds >= *due => {
                 let percent =
                     report.progress.map_or(String::new(), |p| format!("{:.0} %  ", 100.0 * p));
-                // Progress that cannot be told (stderr is closed) is no reason to stop rendering.
+                // A closed stderr does not stop the render.
                 let _ = writeln!(std::io::stderr(), "{percent}{}", status(report));
                 *due = report.seconds
                     + report.seconds.clamp(FIRST_LINE_SECONDS, LONGEST_INTERVAL_SECONDS);
@@ -55,7 +55,7 @@ impl Progress {
         }
     }
 
-    /// Clears the bar away.
+    /// Clears the bar.
     pub fn finish(self) {
         if let Self::Bar(Some(bar)) = self {
             bar.finish_and_clear();
@@ -64,14 +64,15 @@ impl Progress {
 }
 
 fn new_bar() -> ProgressBar {
-    // Short, so that the time left has its place in 80 columns.
+    // Short enough for the time left to fit in 80 columns.
     let style = ProgressStyle::with_template("{bar:10} {percent:>3} %  {wide_msg}")
         .expect("the template is well-formed");
     let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
     bar.with_style(style)
 }
 
-/// `33 spp (32-210)  41.2 Msamples/s  noise 0.81  3-5 s left`
+/// Formats a report: `33 spp (32-210)  41.2 Msamples/s  noise 0.81  3-5 s left`. The noise is in 8-bit
+/// levels.
 fn status(report: &Report) -> String {
     let spp = &report.spp;
     let mut text = if spp.min == spp.max {
@@ -89,7 +90,7 @@ fn status(report: &Report) -> String {
     text
 }
 
-/// A range of times in words.
+/// Formats a range of times.
 fn span(low: f64, high: f64) -> String {
     let [low_text, high_text] = [low, high].map(duration);
     if low_text == high_text {
@@ -102,7 +103,7 @@ fn span(low: f64, high: f64) -> String {
     }
 }
 
-/// `0.4 s`, `12 s`, `5 min`, `3.4 h`, `2.1 d`
+/// Formats a time: `0.4 s`, `12 s`, `5 min`, `3.4 h`, `2.1 d`
 fn duration(seconds: f64) -> String {
     const MINUTE: f64 = 60.0;
     const HOUR: f64 = 60.0 * MINUTE;
@@ -121,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_in_words() {
+    fn time_ranges_share_their_unit() {
         for (low, high, text) in [
             (0.4, 0.4, "0.4 s"),
             (3.0, 5.0, "3.0-5.0 s"),

@@ -1,16 +1,16 @@
-//! `zerkalo render`: a scene file to a picture file.
+//! `zerkalo render`: renders a scene file to a picture file.
 
 use crate::command::args::RenderArgs;
 use crate::command::load_progress::LoadReporter;
 use crate::command::progress::Progress;
 use crate::command::signals::Signals;
 use crate::command::stats::{Stats, peak_rss_bytes};
-use crate::command::{Failure, all_threads, print_line, warn};
-use crate::film::{Depth, Display, ImageOutput, WriteError};
+use crate::command::{Failure, print_line, warn};
+use crate::film::{Depth, ImageOutput, WriteError};
+use crate::render::Options;
 use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use crate::render::session::{Report, Session, State};
-use crate::render::{Options, RenderState};
 use crate::sampling::SampleSettings;
 use crate::scene::{Document, Scene};
 use crate::world;
@@ -18,20 +18,20 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// The noise at which a render stops that is not told when to: half a step of an 8-bit file.
+/// Noise target of a render without stop options, in 8-bit levels: half a step of an 8-bit file.
 const DEFAULT_NOISE_CODES: f64 = 0.5;
 
-/// How often signals are looked for.
+/// Interval at which signals are polled.
 const POLL: Duration = Duration::from_millis(50);
 
 pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
-    let target =
+    let output =
         ImageOutput::from_path(&args.output).map_err(|error| Failure::Usage(error.to_string()))?;
     let document = Document::read_with(&args.scene, LoadReporter::new().assets)
         .map_err(|e| Failure::Failed(e.to_string()))?;
     let scene = sized(document.scene(), args)?;
-    // What cannot be written had better be known before the work than after it.
-    target.check_writable().map_err(failed_write)?;
+    // An output that cannot be written is reported before the work.
+    output.check_writable().map_err(failed_write)?;
     if let Some(path) = &args.stats {
         check_stats_path(path, &args.output)?;
     }
@@ -40,8 +40,8 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
     let signals = Signals::watch().map_err(|e| Failure::Failed(format!("no signals: {e}")))?;
 
-    let threads = args.threads.map_or_else(all_threads, usize::from);
-    let mut session: Session<RenderState> =
+    let threads = args.compute.threads();
+    let mut session =
         Session::new(threads, options(args), schedule_settings(args)).map_err(|error| {
             Failure::Failed(format!(
                 "cannot start {threads} threads: {error}; try fewer by --threads"
@@ -49,16 +49,16 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         })?;
     let size = scene.film.size;
     session.set_scene(Arc::new(scene));
-    let taken_up = started.elapsed();
+    let scene_set_after = started.elapsed();
     let end = watch(&session, &signals)?;
 
     let writing = Instant::now();
     let hash = scene_hash(document.text());
-    let (report, precision, written) = write(&session, args, &target, hash.clone())
+    let (report, precision, written) = write(&session, args, &output, hash.clone())
         .ok_or_else(|| Failure::Failed("the renderer has no picture".to_string()))?;
     written.map_err(failed_write)?;
     let write_seconds = writing.elapsed().as_secs_f64();
-    print_line(&summary(target.path(), size, &report, end));
+    print_line(&summary(output.path(), size, &report, end));
 
     if let Some(path) = &args.stats {
         let stats = Stats {
@@ -67,7 +67,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
             output: args.output.display().to_string(),
             version: env!("CARGO_PKG_VERSION"),
             size,
-            seed: args.seed,
+            seed: args.compute.seed,
             sampler: args.sampler.kind().name(),
             precision,
             lanes: report.lanes,
@@ -83,7 +83,9 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
             write_seconds,
             total_seconds: started.elapsed().as_secs_f64(),
             samples_per_second: report.samples_per_second(),
-            first_picture_seconds: report.first_picture_seconds.map(|s| s + taken_up.as_secs_f64()),
+            first_picture_seconds: report
+                .first_picture_seconds
+                .map(|s| s + scene_set_after.as_secs_f64()),
             noise_codes: report.noise.map(|n| n.rmse_codes),
             noise_codes_p95: report.noise.map(|n| n.p95_codes),
             rmse_linear: report.noise.map(|n| n.rmse_linear),
@@ -104,16 +106,17 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
 }
 
-/// How rendering ended.
+/// End of a render.
 #[derive(Clone, Copy)]
 enum End {
+    /// A stop criterion was reached.
     Done(StoppedBy),
-    /// With this exit status.
+    /// A signal ended it, with this exit status.
     Signal(u8),
 }
 
 /// Shows progress until the work is done or a signal ends it.
-fn watch(session: &Session<RenderState>, signals: &Signals) -> Result<End, Failure> {
+fn watch(session: &Session, signals: &Signals) -> Result<End, Failure> {
     let mut progress = Progress::on_stderr();
     let end = loop {
         if let Some(status) = signals.caught() {
@@ -122,7 +125,7 @@ fn watch(session: &Session<RenderState>, signals: &Signals) -> Result<End, Failu
         let Some(snapshot) = session.wait(POLL) else { continue };
         match &snapshot.report.state {
             State::Finished(reason) => break Ok(End::Done(*reason)),
-            State::Failed(why) => break Err(Failure::Failed(why.clone())),
+            State::Failed(reason) => break Err(Failure::Failed(reason.clone())),
             State::Idle | State::Tracing | State::Paused => progress.show(&snapshot.report),
         }
     };
@@ -132,24 +135,24 @@ fn watch(session: &Session<RenderState>, signals: &Signals) -> Result<End, Failu
 
 type Written = (Report, &'static str, Result<(), WriteError>);
 
-/// Writes the picture where the film lives.
+/// Writes the picture on the rendering thread; `None` without a film.
 fn write(
-    session: &Session<RenderState>,
+    session: &Session,
     args: &RenderArgs,
-    target: &ImageOutput,
+    output: &ImageOutput,
     hash: String,
 ) -> Option<Written> {
-    let origin = Provenance {
+    let provenance = Provenance {
         source: args.scene.display().to_string(),
         scene_hash: hash,
         sampler: args.sampler.kind(),
         adaptive: !args.uniform,
     };
     let depth = if args.bits == 16 { Depth::Sixteen } else { Depth::Eight };
-    let (display, target) = (display(args), target.clone());
-    session.with(move |rendering, report| {
-        let written = rendering.write(report, &origin, display, depth, &target);
-        (report.clone(), rendering.world.precision(), written)
+    let (display, output) = (args.picture.display(), output.clone());
+    session.with(move |state, report| {
+        let written = state.write(report, &provenance, display, depth, &output);
+        (report.clone(), state.world.precision(), written)
     })
 }
 
@@ -157,18 +160,13 @@ fn failed_write(error: WriteError) -> Failure {
     Failure::Failed(error.to_string())
 }
 
-/// The scene with the size that the command line asks for.
+/// Applies the acceleration structure and the size of the command line to `scene`.
 fn sized(scene: &Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     let mut scene = scene.clone();
     if let Some(acceleration) = args.acceleration {
         scene.trace.acceleration = acceleration;
     }
-    if let Some(size) = args.size {
-        scene.film.size = size;
-        if let Some(fault) = scene.faults().first() {
-            return Err(Failure::Usage(format!("--size {}x{}: {fault}", size[0], size[1])));
-        }
-    }
+    args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     Ok(scene)
 }
 
@@ -188,34 +186,30 @@ fn check_stats_path(path: &Path, output: &Path) -> Result<(), Failure> {
     Err(Failure::Failed(format!("cannot write {}: {what}", path.display())))
 }
 
-fn display(args: &RenderArgs) -> Display {
-    Display { exposure_ev: args.exposure, tone: args.tone }
-}
-
 fn options(args: &RenderArgs) -> Options {
     Options {
-        world: world::Options { precision: args.precision.precision() },
-        sampling: SampleSettings { seed: args.seed, kind: args.sampler.kind() },
-        display: display(args),
+        world: world::Options { precision: args.precision.get() },
+        sampling: SampleSettings { seed: args.compute.seed, kind: args.sampler.kind() },
+        display: args.picture.display(),
     }
 }
 
 fn schedule_settings(args: &RenderArgs) -> Settings {
-    let told =
+    let has_target =
         args.spp.is_some() || args.noise.is_some() || args.rmse.is_some() || args.time.is_some();
-    let noise_codes = if told { args.noise } else { Some(DEFAULT_NOISE_CODES) };
+    let noise_codes = if has_target { args.noise } else { Some(DEFAULT_NOISE_CODES) };
     let linear_file = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
     let linear = noise_codes.is_none() && (args.rmse.is_some() || linear_file);
     Settings {
         adaptive: !args.uniform,
         criterion: if linear { Criterion::Linear } else { Criterion::Codes },
-        // The scene's; the session puts it in.
+        // Replaced by the scene's.
         rays_per_pixel: 0,
         stop: Stop { spp: args.spp, noise_codes, rmse_linear: args.rmse, seconds: args.time },
     }
 }
 
-/// `room.png  640x480  212 spp (32-900)  noise 0.50 codes  1.31 s`
+/// `room.png  640x480  212 spp (32-900)  noise 0.500 8-bit levels  1.31 s`
 fn summary(path: &Path, size: [u32; 2], report: &Report, end: End) -> String {
     let spp = &report.spp;
     let counts = if spp.min == spp.max {
@@ -224,7 +218,7 @@ fn summary(path: &Path, size: [u32; 2], report: &Report, end: End) -> String {
         format!("{:.0} spp ({}-{})", spp.mean, spp.min, spp.max)
     };
     let noise = match report.noise {
-        Some(noise) => format!("noise {:.3} codes", noise.rmse_codes),
+        Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse_codes),
         None => "noise unknown".to_string(),
     };
     let mut text = format!(

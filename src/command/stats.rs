@@ -1,10 +1,10 @@
-//! `--stats`: a run in numbers.
+//! `--stats`: statistics of a run as JSON.
 
 use serde::Serialize;
 use std::fs;
 use std::path::Path;
 
-/// What `--stats` writes. Keys are for scripts: they stay.
+/// Contents of the file of `--stats`. Scripts rely on the keys: they stay.
 #[derive(Debug, Serialize)]
 pub struct Stats {
     /// The scene file as named on the command line.
@@ -19,7 +19,7 @@ pub struct Stats {
     pub size: [u32; 2],
     pub seed: u64,
     pub sampler: &'static str,
-    /// `single` or `double`: what was used, not what was asked for.
+    /// The precision used: `single` or `double`.
     pub precision: &'static str,
     /// Lane type, such as `f32x8`.
     pub lanes: &'static str,
@@ -42,18 +42,18 @@ pub struct Stats {
     pub samples_per_second: f64,
     /// From the start of the program to one sample in every pixel.
     pub first_picture_seconds: Option<f64>,
-    /// Estimated RMSE as displayed, in 8-bit codes; null if A and B never had equal counts.
+    /// Estimated RMSE as displayed, in 8-bit levels; null if A and B never had equal counts.
     pub noise_codes: Option<f64>,
-    /// 95th percentile of the tiles' RMSE in codes.
+    /// 95th percentile of the tiles' RMSE, in 8-bit levels.
     pub noise_codes_p95: Option<f64>,
     pub rmse_linear: Option<f64>,
-    /// NaN or negative; left out.
+    /// Samples left out because they were NaN, infinite or negative.
     pub bad_samples: u64,
-    /// Brighter than the film holds; made as bright as it does.
+    /// Samples brighter than the film can hold; stored with its largest value.
     pub saturated_samples: u64,
-    /// Pixels with a sum that is full.
+    /// Pixels with a sum that has reached its limit.
     pub saturated_pixels: u64,
-    /// Highest resident memory; null where the system does not tell.
+    /// Peak resident memory; null where the system does not report it.
     pub peak_rss_bytes: Option<u64>,
     /// `spp`, `noise`, `rmse`, `time`, `rays_per_pixel`, `full` or `signal`.
     pub stopped_by: &'static str,
@@ -68,7 +68,7 @@ impl Stats {
     }
 }
 
-/// The most memory that the process has had resident, in bytes, where Linux tells it.
+/// Peak resident memory of the process in bytes, from Linux's `/proc`.
 pub fn peak_rss_bytes() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
@@ -79,7 +79,7 @@ pub fn peak_rss_bytes() -> Option<u64> {
 #[cfg(all(test, target_os = "linux"))]
 mod tests {
     #[test]
-    fn linux_tells_the_peak_memory() {
+    fn peak_memory_includes_a_large_block() {
         let before = super::peak_rss_bytes().unwrap();
         let block = std::hint::black_box(vec![1u8; 64 << 20]);
         assert!(super::peak_rss_bytes().unwrap() >= before.max(block.len() as u64));

@@ -1,49 +1,6 @@
-//! The film at another resolution, for displays: box averages of whatever samples exist.
+//! Box filter: area-weighted means of pixels over larger or smaller cells, and hole filling.
 
-use crate::film::downsample::{DirtyTile, IncrementalDownsample};
-use crate::film::film::Film;
-use crate::film::light_weights::LightWeights;
-
-/// Means of the film over the cells of a raster, for each light group by itself, so that lights can
-/// be mixed anew without the film.
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct Thumbnail {
-    /// Cells in a row.
-    pub cols: usize,
-    /// Rows of cells.
-    pub rows: usize,
-    /// `[row][column][group][channel]`, radiance of unit light.
-    means: Vec<f32>,
-    groups: usize,
-}
-
-impl Thumbnail {
-    /// From means in `[row][column][group][channel]`.
-    pub(super) fn new([cols, rows]: [usize; 2], means: Vec<f32>, groups: usize) -> Self {
-        Self { cols, rows, means, groups }
-    }
-
-    /// Number of light groups: what a [`LightWeights`] for it needs weights for.
-    pub fn groups(&self) -> usize {
-        self.groups
-    }
-
-    /// Radiance, `[row][column]`.
-    pub fn mixed(&self, mix: &LightWeights) -> Vec<[f32; 3]> {
-        assert_eq!(mix.weights.len(), self.groups, "weights for the groups of the film");
-        let weights: Vec<_> = mix.weights.iter().map(|w| w.map(|w| w as f32)).collect();
-        let cell = |means: &[f32]| {
-            let mut sum = [0.0; 3];
-            for (mean, weight) in means.chunks_exact(3).zip(&weights) {
-                (0..3).for_each(|c| sum[c] += mean[c] * weight[c]);
-            }
-            sum
-        };
-        self.means.chunks_exact(3 * self.groups).map(cell).collect()
-    }
-}
-
-/// Which pixels a cell covers in one direction, and how much of each.
+/// Pixels that a cell covers in one direction.
 pub(super) struct Coverage {
     /// First pixel.
     pub first: usize,
@@ -64,26 +21,41 @@ pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     (0..cells).map(cover).collect()
 }
 
-impl Film {
-    /// The picture averaged over `cols` x `rows` cells, `[row][column]`, radiance; see
-    /// [`Film::thumbnail`].
-    pub fn resampled(&self, cols: usize, rows: usize, mix: &LightWeights) -> Vec<[f32; 3]> {
-        self.thumbnail(cols, rows).mixed(mix)
+/// Means over `cells` (columns, rows) that together cover an image of `size` (columns, rows) pixels,
+/// `[row][column]`, weighted by the covered area of each pixel. The argument of `pixel` counts
+/// `[row][column]`.
+pub fn box_means(
+    size: [usize; 2],
+    cells: [usize; 2],
+    pixel: impl Fn(usize) -> [f64; 3],
+) -> Vec<[f64; 3]> {
+    let (columns, rows) = (coverage(size[0], cells[0]), coverage(size[1], cells[1]));
+    let mut means = Vec::with_capacity(cells[0] * cells[1]);
+    let mut sums = vec![[0.0f64; 3]; cells[0]];
+    for row in &rows {
+        sums.fill([0.0; 3]);
+        for (y, height) in (row.first..).zip(&row.parts) {
+            for (sum, column) in sums.iter_mut().zip(&columns) {
+                let mut row_sum = [0.0; 3];
+                for (x, width) in (column.first..).zip(&column.parts) {
+                    let value = pixel(y * size[0] + x);
+                    (0..3).for_each(|c| row_sum[c] += width * value[c]);
+                }
+                (0..3).for_each(|c| sum[c] += height * row_sum[c]);
+            }
+        }
+        let length = |cover: &Coverage| cover.parts.iter().sum::<f64>();
+        let mean = |(sum, column): (&[f64; 3], &Coverage)| {
+            let area = length(column) * length(row);
+            sum.map(|s| s / area)
+        };
+        means.extend(sums.iter().zip(&columns).map(mean));
     }
-
-    /// The film averaged over `cols` x `rows` cells that together cover it: in each cell the mean of
-    /// its sampled pixels, weighted by the area that the cell covers of them. A cell without samples
-    /// looks like the nearest one of its row that has some, a row without samples like the nearest
-    /// row; a film without samples is black.
-    pub fn thumbnail(&self, cols: usize, rows: usize) -> Thumbnail {
-        let mut raster = IncrementalDownsample::new(self, cols, rows);
-        raster.stale(self).into_iter().for_each(DirtyTile::refresh);
-        raster.thumbnail()
-    }
+    means
 }
 
-/// Gives cells without samples the means of the nearest known cell of their row, then rows without
-/// any the means of the nearest row.
+/// Fills holes: a cell without samples gets the means of the nearest known cell of its row, a row
+/// without samples those of the nearest row. `stride` is the number of means of a cell.
 pub(super) fn fill_gaps(
     means: &mut [f32],
     known: &mut [bool],
@@ -106,144 +78,51 @@ pub(super) fn fill_gaps(
     }
 }
 
-/// For each place the nearest known one (the lower of two); itself if none is known.
-pub(super) fn nearest(known: &[bool]) -> Vec<usize> {
+/// Index of the nearest known element for each element: the lower of two, or itself if none is known.
+fn nearest(known: &[bool]) -> Vec<usize> {
     let mut below: Vec<Option<usize>> = Vec::with_capacity(known.len());
     for (i, k) in known.iter().enumerate() {
         below.push(if *k { Some(i) } else { below.last().copied().flatten() });
     }
     let mut above = None;
-    let mut out: Vec<usize> = (0..known.len()).collect();
+    let mut indices: Vec<usize> = (0..known.len()).collect();
     for i in (0..known.len()).rev() {
         if known[i] {
             above = Some(i);
         }
-        out[i] = match (below[i], above) {
-            (Some(b), Some(a)) => {
-                if i - b <= a - i {
-                    b
-                } else {
-                    a
-                }
-            }
-            (b, a) => b.or(a).unwrap_or(i),
+        indices[i] = match (below[i], above) {
+            (Some(below), Some(above)) if i - below > above - i => above,
+            (below, above) => below.or(above).unwrap_or(i),
         };
     }
-    out
+    indices
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::TILE;
-    use crate::film::testing::{each_tile, fill, film, white};
-    use crate::film::tile::lattice_pixels;
-    use proptest::prelude::*;
 
-    /// By its definition: every pixel against every cell.
-    fn by_definition(film: &Film, cols: usize, rows: usize, mix: &LightWeights) -> Vec<[f64; 3]> {
-        let overlap = |cell: usize, cells: usize, pixel: usize, pixels: usize| {
-            let edge = |c: usize| c as f64 * pixels as f64 / cells as f64;
-            (edge(cell + 1).min((pixel + 1) as f64) - edge(cell).max(pixel as f64)).max(0.0)
-        };
-        let cell = |col, row| {
-            let (mut sum, mut area) = ([0.0; 3], 0.0);
-            for (x, y) in (0..film.height()).flat_map(|y| (0..film.width()).map(move |x| (x, y))) {
-                let part =
-                    overlap(col, cols, x, film.width()) * overlap(row, rows, y, film.height());
-                let value = film.pixel(x, y, mix);
-                (0..3).for_each(|c| sum[c] += part * value[c]);
-                area += part;
+    #[test]
+    fn constant_images_stay_constant_and_parts_add_up() {
+        for (pixels, cells) in [(7, 3), (640, 417), (1000, 999), (5, 1), (9, 9), (3, 8)] {
+            let mut covered = vec![0.0; pixels];
+            for cover in coverage(pixels, cells) {
+                let length: f64 = cover.parts.iter().sum();
+                assert!((length - pixels as f64 / cells as f64).abs() < 1e-9);
+                (cover.first..).zip(cover.parts).for_each(|(pixel, part)| covered[pixel] += part);
             }
-            sum.map(|s| s / area)
-        };
-        (0..rows)
-            .flat_map(|row| (0..cols).map(move |col| (col, row)))
-            .map(|(c, r)| cell(c, r))
-            .collect()
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(64))]
-        #[test]
-        fn cells_hold_area_weighted_means(
-            width in 1usize..40, height in 1usize..40, cols in 1usize..50, rows in 1usize..50,
-        ) {
-            let mut film = film(width, height, &[1024.0, 1.0]);
-            fill(&mut film, 2, |x, y, r| {
-                let v = (x * 7 + y * 13 + r * 5) as f64;
-                vec![v, v % 11.0, 1.0, v % 3.0, 2.0, v % 17.0]
-            });
-            let mix = LightWeights { weights: vec![[1.0, 0.5, 2.0], [0.0, 1.0, 0.25]] };
-            let got = film.resampled(cols, rows, &mix);
-            let expected = by_definition(&film, cols, rows, &mix);
-            prop_assert_eq!(got.len(), expected.len());
-            for (got, expected) in got.iter().zip(&expected) {
-                for c in 0..3 {
-                    let (got, expected) = (f64::from(got[c]), expected[c]);
-                    prop_assert!((got - expected).abs() <= 1e-6 * expected.abs() + 1e-6);
-                }
-            }
+            assert!(covered.iter().all(|part| (part - 1.0).abs() < 1e-9), "{pixels} {cells}");
+            let means = box_means([pixels, 2], [cells, 1], |_| [0.1, 0.5, 7.0]);
+            assert_eq!(means.len(), cells);
+            let near =
+                |mean: &[f64; 3]| (mean[2] - 7.0).abs() < 1e-9 && (mean[0] - 0.1).abs() < 1e-9;
+            assert!(means.iter().all(near), "{pixels} {cells}");
         }
     }
 
-    /// One sample of value x + 100 y in every lattice pixel.
-    fn first_samples(film: &mut Film, before_px: usize, step_px: usize) {
-        each_tile(film, |tile, [x0, y0]| {
-            let [width, height] = tile.extent();
-            for pixel in lattice_pixels(before_px, step_px) {
-                let (x, y) = (pixel % TILE, pixel / TILE);
-                if x < width && y < height {
-                    tile.add(0, pixel, &[((x0 + x) + 100 * (y0 + y)) as i64; 3]);
-                }
-            }
-            tile.set_lattice(step_px);
-        });
-    }
-
     #[test]
-    fn a_first_lattice_is_a_whole_picture() {
-        let mut film = film(32, 24, &[1.0]);
-        let value = |film: &Film, cols: usize, rows: usize, col: usize, row: usize| {
-            film.resampled(cols, rows, &white(1))[row * cols + col][0]
-        };
-        assert_eq!(value(&film, 8, 6, 7, 5), 0.0);
-        first_samples(&mut film, 0, 8);
-        assert_eq!(film.samples(), 12);
-        // Cells of 4x4 pixels: every second one has a sample, the others look like a neighbour.
-        for (col, row) in (0..6).flat_map(|row| (0..8).map(move |col| (col, row))) {
-            let expected = (col / 2 * 8 + 100 * (row / 2 * 8)) as f32;
-            assert_eq!(value(&film, 8, 6, col, row), expected, "{col} {row}");
-        }
-        // One cell for all: the mean of the samples that there are.
-        assert_eq!(value(&film, 1, 1, 0, 0), 12.0 + 800.0);
-        first_samples(&mut film, 8, 2);
-        assert_eq!(value(&film, 8, 6, 1, 1), 5.0 + 500.0);
-        first_samples(&mut film, 2, 1);
-        assert_eq!(film.samples(), 32 * 24);
-        assert_eq!(value(&film, 32, 24, 31, 23), 31.0 + 2300.0);
-    }
-
-    #[test]
-    fn gaps_take_the_nearest() {
+    fn holes_take_the_nearest_known_element() {
         assert_eq!(nearest(&[false, true, false, false, false, true]), [1, 1, 1, 1, 5, 5]);
         assert_eq!(nearest(&[false, false]), [0, 1]);
-        // The upper half of the film has samples, the lower none: it looks like the last row.
-        let mut film = film(32, 32, &[1.0]);
-        for slot in film.slots(&[1, 0]) {
-            let value = slot.index as i64 + 3;
-            let tile = slot.prepare();
-            (0..256).for_each(|p| tile.add(0, p, &[value; 3]));
-            tile.advance(0, 1);
-        }
-        let picture = film.resampled(4, 4, &white(1));
-        for row in picture.chunks(4) {
-            assert_eq!(row, [[3.0; 3], [3.0; 3], [4.0; 3], [4.0; 3]]);
-        }
-    }
-
-    #[test]
-    fn no_cells_no_picture() {
-        assert!(film(4, 4, &[1.0]).resampled(0, 5, &white(1)).is_empty());
     }
 }

@@ -8,7 +8,7 @@
 //! samples, their count (u64).
 
 use crate::film::TILE;
-use crate::film::film::Film;
+use crate::film::store::Film;
 use crate::film::tile::Tile;
 use std::io::{self, Write};
 

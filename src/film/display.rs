@@ -1,6 +1,7 @@
 //! From radiance to the numbers of a picture file: exposure, tone curve, sRGB.
 
 use crate::film::srgb_table::SrgbTable;
+use crate::value::srgb_from_linear;
 use std::fmt;
 use std::str::FromStr;
 
@@ -105,16 +106,6 @@ fn neutral(color: [f64; 3]) -> [f64; 3] {
     color.map(|c| c * (new_peak / peak)).map(|c| c + (new_peak - c) * to_white)
 }
 
-/// Linear light 0..=1 to sRGB code 0..=1 (IEC 61966-2-1, piecewise).
-pub(super) fn srgb_from_linear(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
-}
-
-/// A code 0..=255 to the nearest of 8 bits.
-pub fn quantised_8(code: f64) -> u8 {
-    code.round() as u8
-}
-
 /// A code 0..=255 to the nearest of 16 bits, 65535 for 255.
 pub fn quantised_16(code: f64) -> u16 {
     (code * (65535.0 / 255.0)).round() as u16
@@ -123,6 +114,8 @@ pub fn quantised_16(code: f64) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::quantised_8;
+    use crate::value::linear_from_srgb;
 
     #[test]
     fn the_curve_is_that_of_the_standard() {
@@ -131,7 +124,7 @@ mod tests {
         assert!((above - below).abs() < 1e-6 && above > below);
         for code in 0..=255u8 {
             let v = f64::from(code) / 255.0;
-            let linear = if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+            let linear = linear_from_srgb(v);
             let codes = Display::default().codes([linear; 3]);
             assert!((codes[0] - f64::from(code)).abs() < 1e-5, "{code}: {codes:?}");
             assert_eq!(quantised_8(codes[1]), code);

@@ -1,52 +1,96 @@
-//! Means of the film over the cells of a display, kept up to date tile by tile: a picture costs what
-//! has changed since the last one, not what the film is large.
+//! Incremental downsampling of the film to the cells of a display: only tiles that have changed since
+//! the previous picture are read again.
 
 use crate::film::TILE;
-use crate::film::box_filter::{Coverage, Thumbnail, coverage, fill_gaps};
-use crate::film::film::Film;
-use crate::film::light_weights::Replicates;
+use crate::film::box_filter::{Coverage, coverage, fill_gaps};
+use crate::film::light_weights::{LightWeights, Replicates};
+use crate::film::store::Film;
 use crate::film::tile::Tile;
 
-/// A raster of `cols` x `rows` cells that together cover a film. In each cell the mean of its sampled
-/// pixels, weighted by the area that the cell covers of them.
+/// Means of the film over the cells of a raster, one per light group, so that light weights can
+/// change without the film.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Thumbnail {
+    /// Cells in a row.
+    pub cols: usize,
+    /// Rows of cells.
+    pub rows: usize,
+    /// `[row][column][group][channel]`, radiance of unit light.
+    means: Vec<f32>,
+    groups: usize,
+}
+
+impl Thumbnail {
+    /// Averages `film` over `cols` x `rows` cells that together cover it: each cell holds the mean of
+    /// its sampled pixels, weighted by the area that it covers of them. A cell without samples gets
+    /// the means of the nearest one of its row that has some, a row without samples those of the
+    /// nearest row; a film without samples is black.
+    pub fn of_film(film: &Film, cols: usize, rows: usize) -> Self {
+        let mut downsample = IncrementalDownsample::new(film, cols, rows);
+        downsample.stale(film).into_iter().for_each(DirtyTile::refresh);
+        downsample.thumbnail()
+    }
+
+    /// Number of light groups, which [`LightWeights`] for it must have.
+    pub fn groups(&self) -> usize {
+        self.groups
+    }
+
+    /// Radiance under `weights`, `[row][column]`.
+    pub fn mixed(&self, weights: &LightWeights) -> Vec<[f32; 3]> {
+        assert_eq!(weights.weights.len(), self.groups, "weights for the groups of the film");
+        let weights: Vec<_> = weights.weights.iter().map(|w| w.map(|w| w as f32)).collect();
+        let cell = |means: &[f32]| {
+            let mut sum = [0.0; 3];
+            for (mean, weight) in means.chunks_exact(3).zip(&weights) {
+                (0..3).for_each(|c| sum[c] += mean[c] * weight[c]);
+            }
+            sum
+        };
+        self.means.chunks_exact(3 * self.groups).map(cell).collect()
+    }
+}
+
+/// Cached contributions of a film's tiles to a raster of cells; see [`Thumbnail::of_film`].
 pub struct IncrementalDownsample {
     layout: Layout,
     /// In the order of the film's tiles.
     parts: Vec<TilePart>,
 }
 
-/// How the film's pixels and the cells lie on each other.
+/// Geometry of a raster of cells over the film's tiles.
 struct Layout {
     cols: usize,
     rows: usize,
     size: [usize; 2],
     groups: usize,
-    /// For each column of tiles and each row of tiles.
+    /// Cells under each column of tiles.
     across: Vec<Span>,
+    /// Cells under each row of tiles.
     down: Vec<Span>,
 }
 
-/// The cells that one column (row) of tiles lies on.
+/// Cells under one column (row) of tiles.
 struct Span {
     /// The first cell.
     first: usize,
     /// Number of cells.
     len: usize,
-    /// For each pixel, the cells that it lies on, counted from `first`, with the covered part of the
-    /// pixel, 0..=1.
+    /// The cells of each pixel, counted from `first`, and the part of the pixel that each covers,
+    /// 0..=1.
     pixels: Vec<Vec<(usize, f64)>>,
 }
 
-/// What a tile adds to the cells that it lies on.
+/// Contribution of a tile to the cells under it.
 #[derive(Default)]
 struct TilePart {
-    /// Epoch, counts and lattice of the tile when this was computed; equal ones mean equal contents.
-    of: Option<(u64, [u32; 2], usize)>,
-    /// `[row][column][area, group 0 red, ...]`: sums of area times mean; empty: nothing.
+    /// Epoch, counts and lattice of the tile at its latest refresh; equal ones mean equal contents.
+    version: Option<(u64, [u32; 2], usize)>,
+    /// `[row][column][area, group 0 red, ...]`: sums of area times mean; empty without samples.
     sums: Vec<f64>,
 }
 
-/// A tile that has changed, to be taken in by [`DirtyTile::refresh`], on any thread.
+/// A tile that has changed, to be read by [`DirtyTile::refresh`] on any thread.
 pub struct DirtyTile<'a> {
     layout: &'a Layout,
     part: &'a mut TilePart,
@@ -55,7 +99,7 @@ pub struct DirtyTile<'a> {
 }
 
 impl IncrementalDownsample {
-    /// A raster for films like `film` (by size and groups); it has not seen any samples yet.
+    /// Creates a raster for films of the size and groups of `film`, without any samples.
     pub fn new(film: &Film, cols: usize, rows: usize) -> Self {
         let size = [film.width(), film.height()];
         let spans = |pixels: usize, cells: usize| {
@@ -74,7 +118,7 @@ impl IncrementalDownsample {
         Self { layout, parts }
     }
 
-    /// Whether this is a raster of `cols` x `rows` cells for films like `film`.
+    /// Returns `true` for a raster of `cols` x `rows` cells for films of the size and groups of `film`.
     pub fn is_for(&self, film: &Film, cols: usize, rows: usize) -> bool {
         let Layout { size, groups, .. } = self.layout;
         [self.layout.cols, self.layout.rows] == [cols, rows]
@@ -82,21 +126,20 @@ impl IncrementalDownsample {
             && groups == film.groups()
     }
 
-    /// The tiles that have changed since they were last refreshed. Always call this with the same
-    /// film, which may have been restarted.
+    /// Returns the tiles that have changed since their latest refresh. `film` is always the same one,
+    /// which may have been restarted.
     pub fn stale<'a>(&'a mut self, film: &'a Film) -> Vec<DirtyTile<'a>> {
         let layout = &self.layout;
         let stale = |(index, part): (usize, &'a mut TilePart)| {
-            let of = film.tile(index).map(|t| (film.epoch(), t.counts(), t.lattice_px()));
-            let changed = of != part.of;
-            part.of = of;
+            let version = film.tile(index).map(|t| (film.epoch(), t.counts(), t.lattice_px()));
+            let changed = version != part.version;
+            part.version = version;
             changed.then_some(DirtyTile { layout, part, film, index })
         };
         self.parts.iter_mut().enumerate().filter_map(stale).collect()
     }
 
-    /// The means. A cell without samples looks like the nearest one of its row that has some, a row
-    /// without samples like the nearest row; without any samples all is black.
+    /// Means over the cells, with holes filled.
     pub fn thumbnail(&self) -> Thumbnail {
         let Layout { cols, rows, groups, .. } = self.layout;
         let stride = 3 * groups;
@@ -121,12 +164,12 @@ impl IncrementalDownsample {
             means.extend(cell[1..].iter().map(mean));
         }
         fill_gaps(&mut means, &mut known, cols, rows, stride);
-        Thumbnail::new([cols, rows], means, groups)
+        Thumbnail { cols, rows, means, groups }
     }
 }
 
 impl Span {
-    /// Of the tile that begins at pixel `start` of `pixels`.
+    /// Cells under the tile that starts at pixel `start` of `pixels`.
     fn new(start: usize, pixels: usize, coverage: &[Coverage]) -> Self {
         let end = (start + TILE).min(pixels);
         let touched =
@@ -146,7 +189,7 @@ impl Span {
 }
 
 impl DirtyTile<'_> {
-    /// Takes in the tile as it is now.
+    /// Reads the current samples of the tile.
     pub fn refresh(self) {
         let Self { layout, part, film, index } = self;
         let columns = film.tile_columns();
@@ -158,7 +201,7 @@ impl DirtyTile<'_> {
         part.sums.resize(down.len * width, 0.0);
         let per_unit: Vec<f64> = film.scales().iter().flat_map(|s| [1.0 / s; 3]).collect();
         let mut line = vec![0.0; width];
-        // Of a first sample on a lattice only the lattice has to be looked at.
+        // A tile in its first pass has samples on the lattice only.
         let step = if tile.counts() == [0; 2] { tile.lattice_px() } else { 1 };
         for (y, rows) in down.pixels.iter().enumerate().step_by(step) {
             line.fill(0.0);
@@ -171,7 +214,7 @@ impl DirtyTile<'_> {
     }
 }
 
-/// Adds every `step`-th pixel of row `y` of a tile to a row of cells, as if they were of height 1.
+/// Adds every `step`-th pixel of row `y` of a tile to a row of cells of height 1.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {
@@ -197,20 +240,21 @@ fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], 
 mod tests {
     use super::*;
     use crate::film::testing::{each_tile, fill, film, white};
+    use crate::film::tile::lattice_pixels;
+    use proptest::prelude::*;
 
-    /// Whatever was taken in when: the picture is that of a new raster.
     #[test]
-    fn only_what_has_changed_is_read_again() {
+    fn only_changed_tiles_are_refreshed_and_the_picture_is_that_of_a_new_raster() {
         let mut film = film(70, 40, &[1.0, 2.0]);
         let mut raster = IncrementalDownsample::new(&film, 9, 7);
         let refresh = |raster: &mut IncrementalDownsample, film: &Film| {
             let stale = raster.stale(film);
             let count = stale.len();
             stale.into_iter().for_each(DirtyTile::refresh);
-            assert_eq!(raster.thumbnail(), film.thumbnail(9, 7));
+            assert_eq!(raster.thumbnail(), Thumbnail::of_film(film, 9, 7));
             count
         };
-        assert_eq!(refresh(&mut raster, &film), 0, "nothing is there");
+        assert_eq!(refresh(&mut raster, &film), 0, "no samples yet");
         fill(&mut film, 2, |x, y, r| vec![(x * 3 + y + r) as f64; 6]);
         assert_eq!(refresh(&mut raster, &film), 15);
         assert_eq!(refresh(&mut raster, &film), 0);
@@ -229,5 +273,110 @@ mod tests {
         assert_eq!(refresh(&mut raster, &film), 15);
         assert!(raster.is_for(&film, 9, 7) && !raster.is_for(&film, 7, 9));
         assert_eq!(raster.thumbnail().mixed(&white(2)).len(), 63);
+    }
+
+    /// Brute-force reference: every pixel against every cell.
+    fn brute_force(film: &Film, cols: usize, rows: usize, mix: &LightWeights) -> Vec<[f64; 3]> {
+        let overlap = |cell: usize, cells: usize, pixel: usize, pixels: usize| {
+            let edge = |c: usize| c as f64 * pixels as f64 / cells as f64;
+            (edge(cell + 1).min((pixel + 1) as f64) - edge(cell).max(pixel as f64)).max(0.0)
+        };
+        let cell = |col, row| {
+            let (mut sum, mut area) = ([0.0; 3], 0.0);
+            for (x, y) in (0..film.height()).flat_map(|y| (0..film.width()).map(move |x| (x, y))) {
+                let part =
+                    overlap(col, cols, x, film.width()) * overlap(row, rows, y, film.height());
+                let value = film.pixel(x, y, mix);
+                (0..3).for_each(|c| sum[c] += part * value[c]);
+                area += part;
+            }
+            sum.map(|s| s / area)
+        };
+        (0..rows)
+            .flat_map(|row| (0..cols).map(move |col| (col, row)))
+            .map(|(c, r)| cell(c, r))
+            .collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn cells_hold_area_weighted_means(
+            width in 1usize..40, height in 1usize..40, cols in 1usize..50, rows in 1usize..50,
+        ) {
+            let mut film = film(width, height, &[1024.0, 1.0]);
+            fill(&mut film, 2, |x, y, r| {
+                let v = (x * 7 + y * 13 + r * 5) as f64;
+                vec![v, v % 11.0, 1.0, v % 3.0, 2.0, v % 17.0]
+            });
+            let mix = LightWeights { weights: vec![[1.0, 0.5, 2.0], [0.0, 1.0, 0.25]] };
+            let got = Thumbnail::of_film(&film, cols, rows).mixed(&mix);
+            let expected = brute_force(&film, cols, rows, &mix);
+            prop_assert_eq!(got.len(), expected.len());
+            for (got, expected) in got.iter().zip(&expected) {
+                for c in 0..3 {
+                    let (got, expected) = (f64::from(got[c]), expected[c]);
+                    prop_assert!((got - expected).abs() <= 1e-6 * expected.abs() + 1e-6);
+                }
+            }
+        }
+    }
+
+    /// Adds one sample of value x + 100 y in every lattice pixel.
+    fn first_samples(film: &mut Film, before_px: usize, step_px: usize) {
+        each_tile(film, |tile, [x0, y0]| {
+            let [width, height] = tile.extent();
+            for pixel in lattice_pixels(before_px, step_px) {
+                let (x, y) = (pixel % TILE, pixel / TILE);
+                if x < width && y < height {
+                    tile.add(0, pixel, &[((x0 + x) + 100 * (y0 + y)) as i64; 3]);
+                }
+            }
+            tile.set_lattice(step_px);
+        });
+    }
+
+    #[test]
+    fn first_lattice_fills_every_cell() {
+        let mut film = film(32, 24, &[1.0]);
+        let value = |film: &Film, cols: usize, rows: usize, col: usize, row: usize| {
+            Thumbnail::of_film(film, cols, rows).mixed(&white(1))[row * cols + col][0]
+        };
+        assert_eq!(value(&film, 8, 6, 7, 5), 0.0);
+        first_samples(&mut film, 0, 8);
+        assert_eq!(film.samples(), 12);
+        // Cells of 4x4 pixels: every second one has a sample, the others take that of a neighbour.
+        for (col, row) in (0..6).flat_map(|row| (0..8).map(move |col| (col, row))) {
+            let expected = (col / 2 * 8 + 100 * (row / 2 * 8)) as f32;
+            assert_eq!(value(&film, 8, 6, col, row), expected, "{col} {row}");
+        }
+        // One cell for all: the mean of the samples at hand.
+        assert_eq!(value(&film, 1, 1, 0, 0), 12.0 + 800.0);
+        first_samples(&mut film, 8, 2);
+        assert_eq!(value(&film, 8, 6, 1, 1), 5.0 + 500.0);
+        first_samples(&mut film, 2, 1);
+        assert_eq!(film.samples(), 32 * 24);
+        assert_eq!(value(&film, 32, 24, 31, 23), 31.0 + 2300.0);
+    }
+
+    #[test]
+    fn rows_without_samples_take_the_nearest_row() {
+        // The upper half of the film has samples, the lower none: they get the last row.
+        let mut film = film(32, 32, &[1.0]);
+        for slot in film.slots(&[1, 0]) {
+            let value = slot.index as i64 + 3;
+            let tile = slot.prepare();
+            (0..256).for_each(|p| tile.add(0, p, &[value; 3]));
+            tile.advance(0, 1);
+        }
+        let picture = Thumbnail::of_film(&film, 4, 4).mixed(&white(1));
+        for row in picture.chunks(4) {
+            assert_eq!(row, [[3.0; 3], [3.0; 3], [4.0; 3], [4.0; 3]]);
+        }
+    }
+
+    #[test]
+    fn raster_without_cells_is_empty() {
+        assert!(Thumbnail::of_film(&film(4, 4, &[1.0]), 0, 5).mixed(&white(1)).is_empty());
     }
 }

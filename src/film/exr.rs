@@ -6,8 +6,8 @@
 //! contributes, summing up to the picture; `count` the samples of a pixel.
 
 use crate::film::exr_header::Ordered;
+use crate::film::image_data::{ImageData, WriteSeek};
 use crate::film::light_weights::{Replicates, Sums};
-use crate::film::output::{ImageData, WriteSeek};
 use exr::block::UncompressedBlock;
 use exr::block::writer::ChunksWriter;
 use exr::compression::Compression;

@@ -1,7 +1,5 @@
 //! From sums to radiance: the colour and strength of each light are put in here.
 
-use crate::film::TILE;
-use crate::film::film::Film;
 use crate::film::tile::Tile;
 
 /// Colour times intensity of the lights whose unit-light sums the film holds.
@@ -86,37 +84,6 @@ impl Tile {
     pub(super) fn sums(&self, pixel: usize) -> Sums<'_> {
         let values = [self.pixel(0, pixel), self.pixel(1, pixel)];
         Sums { values, counts: self.counts_of(pixel) }
-    }
-}
-
-impl Film {
-    /// Radiance of the pixel in column `x`, row `y`: the mean over all its samples of both
-    /// replicates; black without samples.
-    pub fn pixel(&self, x: usize, y: usize, mix: &LightWeights) -> [f64; 3] {
-        assert!(x < self.width() && y < self.height(), "pixel ({x}, {y}) of the film");
-        let index = y / TILE * self.tile_columns() + x / TILE;
-        let pixel = y % TILE * TILE + x % TILE;
-        let per_unit = mix.radiance_per_step(self.scales());
-        self.tile(index).map_or([0.0; 3], |tile| tile.sums(pixel).mean(Replicates::Both, &per_unit))
-    }
-
-    /// Row `y` of the picture, radiance; `row` is resized to the film's width.
-    pub fn row(&self, y: usize, part: Replicates, mix: &LightWeights, row: &mut Vec<[f64; 3]>) {
-        row.clear();
-        row.resize(self.width(), [0.0; 3]);
-        let per_unit = mix.radiance_per_step(self.scales());
-        self.visit_row(y, |x, sums| row[x] = sums.mean(part, &per_unit));
-    }
-
-    /// Calls `f` with the column and the sums of each pixel of row `y` in touched tiles.
-    pub(super) fn visit_row(&self, y: usize, mut f: impl FnMut(usize, Sums)) {
-        let columns = self.tile_columns();
-        for column in 0..columns {
-            let Some(tile) = self.tile(y / TILE * columns + column) else { continue };
-            for x in 0..tile.extent()[0] {
-                f(column * TILE + x, tile.sums(y % TILE * TILE + x));
-            }
-        }
     }
 }
 

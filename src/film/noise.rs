@@ -25,7 +25,6 @@
 
 use crate::film::TILE;
 use crate::film::display::{Display, Tone, toned};
-use crate::film::film::Film;
 use crate::film::light_weights::LightWeights;
 use crate::film::srgb_table::SrgbTable;
 use crate::film::tile::Tile;
@@ -74,7 +73,7 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// For tiles of films with these `scales` (see [`Film::scales`]).
+    /// For tiles of films with these `scales` (see [`Film::scales`](crate::film::Film::scales)).
     pub fn new(scales: &[f64], mix: &LightWeights, display: &Display) -> Self {
         Self {
             per_unit: mix.radiance_per_step(scales),
@@ -231,16 +230,5 @@ impl Noise {
             worst_codes: worst.sqrt(),
             effective_pixels,
         })
-    }
-}
-
-impl Film {
-    /// Estimated error of the picture; `None` while a tile has unequal numbers of samples in A and B.
-    pub fn noise(&self, mix: &LightWeights, display: &Display) -> Option<Noise> {
-        let estimator = Estimator::new(self.scales(), mix, display);
-        Noise::of_tiles(
-            (0..self.tile_count())
-                .map(|index| self.tile(index).and_then(|tile| estimator.tile(tile))),
-        )
     }
 }

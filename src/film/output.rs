@@ -1,47 +1,13 @@
 //! Picture files: which format a path asks for, and writing so that a failure leaves the old file.
 
-use crate::film::display::Display;
-use crate::film::film::Film;
-use crate::film::light_weights::LightWeights;
+use crate::film::image_data::{ImageData, WriteSeek};
 use crate::film::{exr, png};
 use std::ffi::OsStr;
 use std::fmt;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, ErrorKind, Seek, Write};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
-
-/// Everything that goes into a picture file.
-#[derive(Clone, Copy, Debug)]
-pub struct ImageData<'a> {
-    /// The samples.
-    pub film: &'a Film,
-    /// Colour and strength of the light groups.
-    pub mix: &'a LightWeights,
-    /// Name of each light group, for the layers of formats that have layers.
-    pub group_names: &'a [String],
-    /// Exposure and tone curve, for formats that hold what a display shows.
-    pub display: Display,
-    /// Bits per channel, for formats that hold what a display shows.
-    pub depth: Depth,
-    /// Keys and values to be written into the file. Keys: 1 to 79 printable ASCII characters without
-    /// leading, trailing or double spaces, the first one a capital (OpenEXR's own begin small).
-    pub metadata: &'a [(String, String)],
-}
-
-/// Bits per channel of a picture file in display codes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Depth {
-    /// 8 bits: 256 codes.
-    #[default]
-    Eight,
-    /// 16 bits: 65 536 codes.
-    Sixteen,
-}
-
-/// Where encoders write to.
-pub(super) trait WriteSeek: Write + Seek {}
-impl<T: Write + Seek> WriteSeek for T {}
 
 /// A picture file format.
 struct Format {

@@ -1,8 +1,8 @@
 //! PNG: what the display shows, in 8 or 16 bits per channel, sRGB, with text metadata.
 
 use crate::film::display::quantised_16;
+use crate::film::image_data::{Depth, ImageData, WriteSeek};
 use crate::film::light_weights::Replicates;
-use crate::film::output::{Depth, ImageData, WriteSeek};
 use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SourceChromaticities,
     SrgbRenderingIntent,

@@ -2,9 +2,9 @@
 
 use crate::film::TILE;
 use crate::film::display::Display;
-use crate::film::film::Film;
 use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::noise::Estimator;
+use crate::film::store::Film;
 
 /// What the film knows about one pixel under one mix of lights and one display transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,18 +26,18 @@ pub struct Probe {
     pub tile_rmse_codes: Option<f64>,
 }
 
-impl Film {
-    /// The pixel in column `x`, row `y`; `None`: it lies outside.
-    pub fn probe(
-        &self,
+impl Probe {
+    /// Probes the pixel in column `x`, row `y` of `film`; `None` if it lies outside.
+    pub fn of_film(
+        film: &Film,
         [x, y]: [usize; 2],
-        mix: &LightWeights,
+        weights: &LightWeights,
         display: &Display,
-    ) -> Option<Probe> {
-        if x >= self.width() || y >= self.height() {
+    ) -> Option<Self> {
+        if x >= film.width() || y >= film.height() {
             return None;
         }
-        let mut probe = Probe {
+        let mut probe = Self {
             pixel: [x, y],
             samples: [0; 2],
             radiance: [0.0; 3],
@@ -46,19 +46,20 @@ impl Film {
             tile_rmse_linear: None,
             tile_rmse_codes: None,
         };
-        let Some(tile) = self.tile(y / TILE * self.tile_columns() + x / TILE) else {
+        let Some(tile) = film.tile(y / TILE * film.tile_columns() + x / TILE) else {
             return Some(probe);
         };
-        let per_unit = mix.radiance_per_step(self.scales());
+        let per_unit = weights.radiance_per_step(film.scales());
         let sums = tile.sums(y % TILE * TILE + x % TILE);
         probe.samples = sums.counts;
         probe.radiance = sums.mean(Replicates::Both, &per_unit);
         probe.codes = display.codes(probe.radiance);
         if !sums.counts.contains(&0) {
-            let [a, b] = [Replicates::A, Replicates::B].map(|part| sums.mean(part, &per_unit));
+            let [a, b] =
+                [Replicates::A, Replicates::B].map(|replicates| sums.mean(replicates, &per_unit));
             probe.difference = Some([0, 1, 2].map(|c| 0.5 * (a[c] - b[c]).abs()));
         }
-        if let Some(noise) = Estimator::new(self.scales(), mix, display).tile_so_far(tile) {
+        if let Some(noise) = Estimator::new(film.scales(), weights, display).tile_so_far(tile) {
             let noise = noise.of_all();
             probe.tile_rmse_linear = Some(noise.linear.sqrt());
             probe.tile_rmse_codes = Some(noise.codes.sqrt());
@@ -77,7 +78,7 @@ mod tests {
         let mut film = film(20, 18, &[8.0, 4.0]);
         let mix = LightWeights { weights: vec![[1.0, 2.0, 0.0], [0.0, 0.0, 3.0]] };
         let display = Display { exposure_ev: -3.0, ..Display::default() };
-        let probe = |film: &Film, at| film.probe(at, &mix, &display);
+        let probe = |film: &Film, pixel| Probe::of_film(film, pixel, &mix, &display);
         let empty = probe(&film, [19, 17]).unwrap();
         assert_eq!((empty.samples, empty.radiance, empty.difference), ([0; 2], [0.0; 3], None));
         assert_eq!(empty.tile_rmse_codes, None);

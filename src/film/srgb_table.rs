@@ -1,6 +1,6 @@
 //! The sRGB curve by table, many times cheaper than the power function.
 
-use crate::film::display::{quantised_8, srgb_from_linear};
+use crate::value::srgb_from_linear;
 use std::sync::LazyLock;
 
 /// Segments per octave (power of two).
@@ -61,9 +61,15 @@ impl SrgbTable {
     }
 }
 
+/// Rounds a code 0..=255 to 8 bits.
+pub fn quantised_8(code: f64) -> u8 {
+    code.round() as u8
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::value::linear_from_srgb;
 
     #[test]
     fn the_table_keeps_its_bound() {
@@ -88,11 +94,7 @@ mod tests {
         }
         // Around every border between two codes.
         for border in (0..255).map(|code| (f64::from(code) + 0.5) / 255.0) {
-            let linear = if border <= 0.04045 {
-                border / 12.92
-            } else {
-                ((border + 0.055) / 1.055).powf(2.4)
-            };
+            let linear = linear_from_srgb(border);
             for step in -2000..=2000 {
                 let linear = linear * (1.0 + f64::from(step) * 1e-8);
                 assert_eq!(SrgbTable::shared().code_8(linear), exact(linear), "{linear}");

@@ -1,6 +1,6 @@
 //! Films with known contents, for the tests of this room.
 
-use crate::film::film::{Film, Header};
+use crate::film::store::{Film, Header};
 use crate::film::tile::Tile;
 use crate::film::{LightWeights, TILE};
 

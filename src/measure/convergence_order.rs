@@ -1,16 +1,16 @@
-//! The order of convergence: the slope of log error against log samples.
+//! Order of convergence: the slope of log error against log samples.
 
-/// A straight line's slope by least squares, with its standard error.
+/// Slope of a least-squares line, with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
     /// d log(error) / d log(samples): -0.5 for independent random samples.
     pub value: f64,
-    /// Its standard error, from how far the points lie off the line.
+    /// Standard error of the slope, from the residuals.
     pub standard_error: f64,
 }
 
 impl Slope {
-    /// Through points of (samples, error), all positive. `None`: fewer than three points.
+    /// Fits points of (samples, error), both positive; `None` for fewer than three points.
     pub fn fit(points: &[(f64, f64)]) -> Option<Self> {
         let logs: Vec<(f64, f64)> = points
             .iter()
@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_power_law_is_found_exactly() {
+    fn slope_of_a_power_law_is_exact() {
         let points: Vec<_> =
             (0..6).map(|k| (2f64.powi(k), 3.0 * 2f64.powi(k).powf(-0.62))).collect();
         let slope = Slope::fit(&points).unwrap();
@@ -48,9 +48,9 @@ mod tests {
         assert_eq!(Slope::fit(&points[..2]), None);
     }
 
-    /// Residuals (1, -2, 1) / 10 about a horizontal line: the slope's error is sqrt(0.06 / 1 / 2).
+    /// Residuals are (1, -2, 1) / 10 about a horizontal line: the slope's error is sqrt(0.06 / 1 / 2).
     #[test]
-    fn scatter_gives_the_error() {
+    fn scatter_determines_the_standard_error() {
         let e = std::f64::consts::E;
         let points = [(1.0, 0.1f64.exp()), (e, (-0.2f64).exp()), (e * e, 0.1f64.exp())];
         let slope = Slope::fit(&points).unwrap();

@@ -1,4 +1,4 @@
-//! One setting's way from the first samples to a quiet picture.
+//! Error curve of one variant, from the first samples to the target noise.
 
 use crate::measure::contention::RunQueueDelay;
 use crate::measure::experiment::Variant;
@@ -6,10 +6,10 @@ use crate::measure::reference::{Errors, Reference};
 use crate::render::SyncRender;
 use std::io;
 
-/// A place on the way.
+/// Point of an error curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Decisions of the schedule before it.
+    /// Number of preceding decisions of the schedule.
     pub step: usize,
     /// Samples over all pixels.
     pub samples: u64,
@@ -17,29 +17,29 @@ pub struct Point {
     pub spp: f64,
     /// Seconds of tracing, one entry for each repetition.
     pub seconds: Vec<f64>,
-    /// The error that the program itself told, in codes.
-    pub told_codes: Option<f64>,
+    /// The program's own estimate of the error, in 8-bit levels.
+    pub estimated_codes: Option<f64>,
     /// The error against the reference.
     pub errors: Errors,
 }
 
-/// When to end a way.
+/// End of an error curve.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
-    /// The true error has come down to this, in codes.
+    /// Error at which the curve ends, in 8-bit levels.
     pub codes: f64,
-    /// Or so many seconds of tracing have passed.
+    /// Seconds of tracing after which it ends in any case.
     pub seconds: f64,
-    /// Not the true error counts but what the program tells: for what never becomes right.
-    pub told: bool,
+    /// Compares the estimated error instead of the true one, for biased variants.
+    pub use_estimate: bool,
 }
 
-/// The error is looked at each time it has, by the program's own estimate, come down by this factor.
-const EVERY: f64 = 0.84;
+/// Factor by which the estimated error falls between two points of the curve.
+const POINT_RATIO: f64 = 0.84;
 
-/// The share of the processors' time that others took while so many threads wanted them for so many
-/// seconds since `before`; `None`: nobody knows, or these threads wait for each other.
-fn taken(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) -> Option<f64> {
+/// Share of the processors' time that other programs used while `threads` threads ran for `seconds`
+/// since `before`; `None` if it is unknown, or if these threads wait for each other.
+fn stolen_share(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) -> Option<f64> {
     if seconds <= 0.0 || threads > std::thread::available_parallelism().map_or(1, usize::from) {
         return None;
     }
@@ -47,59 +47,66 @@ fn taken(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) -> Option
     Some((waited / (threads as f64 * seconds)).min(1.0))
 }
 
-/// The way of `variation`, with errors, the share of the processors that others took meanwhile, and the
-/// picture at its end.
+/// Renders `variant` until `end`. Returns the points, the share of the processors that other programs
+/// used meanwhile, and the render.
+///
+/// # Errors
+/// Returns the error of the system that refuses to start a thread.
 pub fn follow(
-    variation: &Variant,
+    variant: &Variant,
     reference: &Reference,
     end: End,
 ) -> io::Result<(Vec<Point>, Option<f64>, SyncRender)> {
-    let mut course = variation.course()?;
+    let mut render = variant.start()?;
     let before = RunQueueDelay::now();
     let mut points: Vec<Point> = Vec::new();
-    let mut looked_at = f64::INFINITY;
+    let mut last_estimate = f64::INFINITY;
     for step in 1.. {
-        let done = course.step().is_some();
-        let told = course.noise_codes();
-        let over = course.seconds() >= end.seconds;
-        let changed = told.is_some_and(|t| t <= EVERY * looked_at);
-        // A picture without noise is right at once, and stays as it is.
-        let quiet = told == Some(0.0);
-        if changed || done || over {
-            looked_at = told.unwrap_or(looked_at);
-            let rendering = course.rendering();
+        let done = render.step().is_some();
+        let estimate = render.noise_codes();
+        let timed_out = render.seconds() >= end.seconds;
+        let changed = estimate.is_some_and(|t| t <= POINT_RATIO * last_estimate);
+        // A picture without noise is final at once.
+        let noiseless = estimate == Some(0.0);
+        if changed || done || timed_out {
+            last_estimate = estimate.unwrap_or(last_estimate);
+            let rendering = render.rendering();
             let errors = reference.errors(&rendering.film, &rendering.mix);
-            if points.last().is_none_or(|last| last.samples < course.samples()) {
+            if points.last().is_none_or(|last| last.samples < render.samples()) {
                 points.push(Point {
                     step,
-                    samples: course.samples(),
-                    spp: course.spp().mean,
-                    seconds: vec![course.seconds()],
-                    told_codes: told,
+                    samples: render.samples(),
+                    spp: render.spp().mean,
+                    seconds: vec![render.seconds()],
+                    estimated_codes: estimate,
                     errors,
                 });
             }
-            let reached = if end.told { told } else { Some(errors.rmse_codes) };
-            if reached.is_some_and(|codes| codes <= end.codes) || done || over || quiet {
+            let reached = if end.use_estimate { estimate } else { Some(errors.rmse_codes) };
+            if reached.is_some_and(|codes| codes <= end.codes) || done || timed_out || noiseless {
                 break;
             }
         }
     }
-    let taken = taken(before.as_ref(), variation.threads, course.seconds());
-    Ok((points, taken, course))
+    let stolen = stolen_share(before.as_ref(), variant.threads, render.seconds());
+    Ok((points, stolen, render))
 }
 
-/// Goes the same way again and notes the seconds; the share of the processors that others took meanwhile.
-pub fn repeat(variation: &Variant, points: &mut [Point]) -> io::Result<Option<f64>> {
-    let mut course = variation.course()?;
+/// Renders `variant` again and adds the seconds to each point. Returns the share of the processors that
+/// other programs used meanwhile.
+///
+/// # Errors
+/// Returns the error of the system that refuses to start a thread.
+pub fn repeat(variant: &Variant, points: &mut [Point]) -> io::Result<Option<f64>> {
+    let mut render = variant.start()?;
     let before = RunQueueDelay::now();
     let mut step = 0;
     for point in points {
         while step < point.step {
-            course.step();
+            render.step();
             step += 1;
         }
-        point.seconds.push(course.seconds());
+        point.seconds.push(render.seconds());
     }
-    Ok(taken(before.as_ref(), variation.threads, course.seconds()))
+    Ok(stolen_share(before.as_ref(), variant.threads, render.seconds()))
 }

@@ -1,4 +1,4 @@
-//! What is measured: the settings that trade speed for accuracy, one at a time.
+//! Experiments: the settings that trade speed for accuracy, varied one at a time.
 
 use crate::film::Display;
 use crate::material::Lobe;
@@ -11,62 +11,68 @@ use std::io;
 use std::str::FromStr;
 use std::sync::Arc;
 
-/// A setting.
+/// A setting to vary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Experiment {
-    /// All settings as the program has them unless told otherwise.
+    /// Default settings.
     Default,
-    /// Samples where they help most, or the same number everywhere.
+    /// Adaptive or uniform sampling.
     Adaptivity,
     /// Single or double precision.
     Precision,
-    /// Threads that trace.
+    /// Number of tracing threads.
     Threads,
-    /// Sobol's points or independent random numbers.
+    /// Sobol points or independent random numbers.
     Sampler,
-    /// The cone or its cheap stand-in, the square.
+    /// Cone lobe or its cheap approximation, the square lobe.
     Lobe,
-    /// What is traced at all.
+    /// Ray types.
     Level,
-    /// The most reflections of a path.
+    /// Largest number of reflections of a path.
     Depth,
-    /// Paths end below a weight.
+    /// Least weight of a path.
     MinWeight,
-    /// The most samples of a glossy pixel.
+    /// Cap on the samples of a glossy pixel.
     RaysPerPixel,
-    /// How rays are kept from things that they cannot meet.
+    /// Acceleration structure.
     Acceleration,
 }
 
 impl Experiment {
-    /// Every setting, its name on the command line, and the question that it answers.
+    /// Every setting, its name on the command line, and its title.
     pub const ALL: &'static [(Self, &'static str, &'static str)] = &[
-        (Self::Default, "default", "As the program is set"),
-        (Self::Adaptivity, "adaptivity", "What adaptive sampling gives"),
-        (Self::Precision, "precision", "What double precision costs"),
-        (Self::Threads, "threads", "How many threads pay"),
-        (Self::Sampler, "sampler", "What Sobol's points give over independent random numbers"),
-        (Self::Lobe, "lobe", "What the square gives over the cone, and gets wrong"),
-        (Self::Level, "ray-types", "What less tracing gives, and gets wrong"),
-        (Self::Depth, "max-depth", "What fewer reflections give, and get wrong"),
-        (Self::MinWeight, "min-throughput", "What ending weak paths gives, and gets wrong"),
-        (Self::RaysPerPixel, "rays-per-pixel", "What a cap on glossy pixels gives, and leaves"),
-        (Self::Acceleration, "acceleration", "What boxes, rectangles and trees cost and save"),
+        (Self::Default, "default", "Default settings"),
+        (Self::Adaptivity, "adaptivity", "Adaptive against uniform sampling"),
+        (Self::Precision, "precision", "Single against double precision"),
+        (Self::Threads, "threads", "Scaling with threads"),
+        (Self::Sampler, "sampler", "Sobol points against independent random numbers"),
+        (Self::Lobe, "lobe", "Square lobe against cone lobe"),
+        (Self::Level, "ray-types", "Fewer ray types"),
+        (Self::Depth, "max-depth", "Fewer reflections"),
+        (Self::MinWeight, "min-throughput", "Termination of weak paths"),
+        (Self::RaysPerPixel, "rays-per-pixel", "Cap on samples of glossy pixels"),
+        (Self::Acceleration, "acceleration", "Acceleration structures"),
     ];
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(topic, ..)| *topic == self).map_or("", |(_, name, _)| name)
+        Self::ALL
+            .iter()
+            .find(|(experiment, ..)| *experiment == self)
+            .map_or("", |(_, name, _)| name)
     }
 
-    /// The question that it answers.
-    pub fn question(self) -> &'static str {
-        Self::ALL.iter().find(|(topic, ..)| *topic == self).map_or("", |(.., question)| question)
+    /// Title in tables and plots.
+    pub fn title(self) -> &'static str {
+        Self::ALL
+            .iter()
+            .find(|(experiment, ..)| *experiment == self)
+            .map_or("", |(.., title)| title)
     }
 
-    /// What the default is beside the variations: `adaptive, default`.
-    pub fn of_default(self, single: bool, threads: usize) -> String {
-        let own = match self {
+    /// Name of the default among the variants: `adaptive, default`.
+    pub fn default_name(self, single: bool, threads: usize) -> String {
+        let name = match self {
             Self::Adaptivity => "adaptive".to_string(),
             Self::Precision => if single { "single" } else { "double" }.to_string(),
             Self::Threads if threads == 1 => "1 thread".to_string(),
@@ -74,10 +80,10 @@ impl Experiment {
             Self::Sampler => "Sobol".to_string(),
             _ => return "default".to_string(),
         };
-        format!("{own}, default")
+        format!("{name}, default")
     }
 
-    /// Whether all its variations have the same expectation: only their noise differs.
+    /// Returns `true` if all variants have the same expectation and differ in noise only.
     pub fn unbiased(self) -> bool {
         matches!(
             self,
@@ -103,33 +109,36 @@ impl FromStr for Experiment {
             current => current,
         };
         let found = Self::ALL.iter().find(|(_, name, _)| *name == text);
-        found.map(|(topic, ..)| *topic).ok_or_else(|| {
+        found.map(|(experiment, ..)| *experiment).ok_or_else(|| {
             let names: Vec<_> = Self::ALL.iter().map(|(_, name, _)| *name).collect();
             format!("setting `{text}` is not known; known: {}", names.join(", "))
         })
     }
 }
 
-/// One way to render the scene.
+/// Settings of one render of the scene.
 #[derive(Clone)]
 pub struct Variant {
-    /// Which setting differs from the default.
-    pub topic: Experiment,
-    /// How: `uniform`, `depth 4`.
+    /// The setting that differs from the default.
+    pub experiment: Experiment,
+    /// Value of the setting: `uniform`, `depth 4`.
     pub name: String,
-    /// The scene, with the settings that it holds.
+    /// The scene, with the settings of its file.
     pub scene: Arc<Scene>,
-    /// How it is compiled and sampled.
+    /// Options of compilation and sampling.
     pub options: Options,
-    /// Whether samples go where they help most.
+    /// Adaptive sampling.
     pub adaptive: bool,
-    /// Threads that trace.
+    /// Number of tracing threads.
     pub threads: usize,
 }
 
 impl Variant {
-    /// A render of it, not begun, that ends by itself only when there is nothing left to do.
-    pub fn course(&self) -> io::Result<SyncRender> {
+    /// Creates its render, which ends by itself only when every tile is full.
+    ///
+    /// # Errors
+    /// Returns the error of the system that refuses to start a thread.
+    pub fn start(&self) -> io::Result<SyncRender> {
         let settings = Settings {
             adaptive: self.adaptive,
             criterion: Criterion::Codes,
@@ -140,39 +149,39 @@ impl Variant {
     }
 }
 
-/// What to measure.
+/// Plan of a measurement.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Noise to reach, in codes, falling.
+    /// Noise targets in 8-bit levels, descending.
     pub targets: Vec<f64>,
-    /// The settings to compare, beside the default.
-    pub topics: Vec<Experiment>,
-    /// How often each way is timed, at least.
+    /// The settings to vary.
+    pub experiments: Vec<Experiment>,
+    /// Least number of timed runs of each variant.
     pub repetitions: usize,
-    /// About so many seconds in all.
+    /// Approximate duration of all measurements, in seconds.
     pub seconds: f64,
-    /// Threads, unless they are what is compared.
+    /// Number of threads, except in [`Experiment::Threads`].
     pub threads: usize,
-    /// Number that the random choices follow from. The reference has another one.
+    /// Random seed. The reference has another one.
     pub seed: u64,
-    /// Exposure and tone curve that codes are told in.
+    /// Exposure and tone curve of the displayed error.
     pub display: Display,
 }
 
 impl Plan {
-    /// The default, then the variations of each topic that make a difference in this scene.
-    pub fn variations(&self, scene: &Arc<Scene>) -> Vec<Variant> {
+    /// The default, then the variants of each experiment that differ from it in this scene.
+    pub fn variants(&self, scene: &Arc<Scene>) -> Vec<Variant> {
         let mut all = vec![self.default_of(scene)];
-        for topic in &self.topics {
-            all.extend(self.of_topic(*topic, scene));
+        for experiment in &self.experiments {
+            all.extend(self.of_topic(*experiment, scene));
         }
         all
     }
 
-    /// All settings as the program has them.
+    /// The variant with default settings.
     pub fn default_of(&self, scene: &Arc<Scene>) -> Variant {
         Variant {
-            topic: Experiment::Default,
+            experiment: Experiment::Default,
             name: "default".to_string(),
             scene: Arc::clone(scene),
             options: Options {
@@ -185,13 +194,13 @@ impl Plan {
         }
     }
 
-    fn of_topic(&self, topic: Experiment, scene: &Arc<Scene>) -> Vec<Variant> {
+    fn of_topic(&self, experiment: Experiment, scene: &Arc<Scene>) -> Vec<Variant> {
         let base = self.default_of(scene);
-        let named = |name: &str| Variant { topic, name: name.to_string(), ..base.clone() };
+        let named = |name: &str| Variant { experiment, name: name.to_string(), ..base.clone() };
         let edited = |name: String, edit: &dyn Fn(&mut Scene)| {
             let mut scene = Scene::clone(scene);
             edit(&mut scene);
-            Variant { topic, name, scene: Arc::new(scene), ..base.clone() }
+            Variant { experiment, name, scene: Arc::new(scene), ..base.clone() }
         };
         let reflects = scene.trace.ray_types == RayTypes::Full
             && scene.trace.max_depth > 0
@@ -200,27 +209,27 @@ impl Plan {
                 .iter()
                 .flat_map(|object| object.materials())
                 .any(|name| scene.materials.get(name).is_some_and(|m| m.reflection > 0.0));
-        match topic {
+        match experiment {
             Experiment::Default => Vec::new(),
             Experiment::Adaptivity => vec![Variant { adaptive: false, ..named("uniform") }],
             Experiment::Precision => {
-                // The other one than the scene asks for.
+                // The precision that `auto` does not choose for this scene.
                 let (name, precision) = match AnyWorld::compile(scene, &base.options.world) {
                     AnyWorld::Single(_) => ("double", Precision::Double),
                     AnyWorld::Double(_) => ("single", Precision::Single),
                 };
-                let mut variation = named(name);
-                variation.options.world.precision = precision;
-                vec![variation]
+                let mut variant = named(name);
+                variant.options.world.precision = precision;
+                vec![variant]
             }
             Experiment::Threads => {
-                // As many as there are is the default.
+                // All threads are the default.
                 let counts = (0..).map(|k| 1 << k).take_while(|n| *n < self.threads);
-                let of = |n: usize| {
+                let variant = |n: usize| {
                     let name = if n == 1 { "1 thread".to_string() } else { format!("{n} threads") };
                     Variant { threads: n, ..named(&name) }
                 };
-                counts.map(of).collect()
+                counts.map(variant).collect()
             }
             Experiment::Sampler => {
                 let mut random = named("random");
@@ -233,8 +242,8 @@ impl Plan {
                 let swap = |from: Lobe, to: Lobe, name: &str| {
                     has(from).then(|| {
                         edited(name.to_string(), &|scene| {
-                            let of = scene.materials.values_mut().filter(|m| m.lobe == from);
-                            of.for_each(|m| m.lobe = to);
+                            let matching = scene.materials.values_mut().filter(|m| m.lobe == from);
+                            matching.for_each(|m| m.lobe = to);
                         })
                     })
                 };
@@ -266,8 +275,8 @@ impl Plan {
                 .collect(),
             Experiment::Acceleration => Acceleration::ALL
                 .into_iter()
-                .filter(|by| *by != scene.trace.acceleration)
-                .map(|by| edited(by.name().to_string(), &|s| s.trace.acceleration = by))
+                .filter(|kind| *kind != scene.trace.acceleration)
+                .map(|kind| edited(kind.name().to_string(), &|s| s.trace.acceleration = kind))
                 .collect(),
         }
     }
@@ -278,31 +287,30 @@ mod tests {
     use super::*;
     use crate::scene::built_in;
 
-    fn names(topic: Experiment, threads: usize) -> Vec<String> {
+    fn names(experiment: Experiment, threads: usize) -> Vec<String> {
         let plan = Plan {
             targets: vec![0.5],
-            topics: vec![topic],
+            experiments: vec![experiment],
             repetitions: 3,
             seconds: 1.0,
             threads,
             seed: 0,
             display: Display::default(),
         };
-        let all = plan.variations(&Arc::new(built_in()));
-        assert_eq!((all[0].topic, all[0].threads), (Experiment::Default, threads));
+        let all = plan.variants(&Arc::new(built_in()));
+        assert_eq!((all[0].experiment, all[0].threads), (Experiment::Default, threads));
         all[1..].iter().map(|v| v.name.clone()).collect()
     }
 
-    /// What would be the default again is left out.
     #[test]
-    fn variations_differ_from_the_default() {
+    fn variants_differ_from_the_default() {
         assert_eq!(names(Experiment::Precision, 2), ["double"]);
         assert_eq!(names(Experiment::Threads, 1), [""; 0]);
         assert_eq!(names(Experiment::Threads, 2), ["1 thread"]);
         assert_eq!(names(Experiment::Threads, 6), ["1 thread", "2 threads", "4 threads"]);
         assert_eq!(names(Experiment::Adaptivity, 2), ["uniform"]);
-        assert_eq!(Experiment::Threads.of_default(true, 6), "6 threads, default");
-        assert_eq!(Experiment::Precision.of_default(true, 6), "single, default");
-        assert_eq!(Experiment::Depth.of_default(true, 6), "default");
+        assert_eq!(Experiment::Threads.default_name(true, 6), "6 threads, default");
+        assert_eq!(Experiment::Precision.default_name(true, 6), "single, default");
+        assert_eq!(Experiment::Depth.default_name(true, 6), "default");
     }
 }

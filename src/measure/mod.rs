@@ -1,9 +1,9 @@
-//! The trade of speed for accuracy, measured on one scene: errors against a reference, seconds to a
-//! given noise, what each setting costs and what it gets wrong.
+//! Measurement of speed against accuracy on one scene: errors against a reference, seconds to a given
+//! noise, cost and bias of each setting.
 //!
-//! Errors are those of a seeded picture and come out the same each time; seconds are medians of
-//! repetitions, taken in turns so that a slow moment of the machine hits all settings alike, and those
-//! in which other programs took the processors are left out.
+//! Errors are those of a seeded picture and repeat exactly. Seconds are medians of repetitions. Settings
+//! take turns, so that a slow moment of the machine affects all of them alike; repetitions in which
+//! other programs used the processors are left out.
 
 mod contention;
 mod convergence_order;

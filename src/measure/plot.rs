@@ -1,4 +1,4 @@
-//! Error against time, drawn: a panel for each setting, log-log, the default beside its variations.
+//! Plot of error against time: a log-log panel for each experiment, with the default and its variants.
 
 use crate::measure::experiment::Experiment;
 use crate::measure::result::{Measured, Measurement, median};
@@ -14,13 +14,13 @@ use std::ops::Range;
 const PANEL: (i32, i32) = (440, 374);
 const HEAD: i32 = 64;
 
-/// From a panel's sides to its field: left, right, top, bottom.
+/// Margins between a panel and its field, in pixels: left, right, top, bottom.
 const FRAME: [i32; 4] = [58, 22, 96, 50];
 
-/// Axes' ends are this much beyond the data.
+/// Factor by which the axes extend beyond the data.
 const MARGIN: f64 = 1.15;
 
-/// Colours that can be told apart with any kind of sight (Okabe and Ito 2008).
+/// Colours that are distinguishable with any colour vision (Okabe and Ito 2008).
 const COLORS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -34,11 +34,11 @@ const INK: RGBColor = RGBColor(40, 40, 40);
 const GRID: RGBColor = RGBColor(226, 226, 226);
 const TARGET: RGBColor = RGBColor(150, 150, 150);
 
-/// One variation.
+/// Curve of one variant.
 struct Line<'a> {
     name: &'a str,
     color: RGBColor,
-    /// (seconds, codes)
+    /// (seconds, RMSE in 8-bit levels)
     points: Vec<(f64, f64)>,
 }
 
@@ -51,20 +51,20 @@ pub fn size(measurement: &Measurement) -> (u32, u32) {
     ((cols * PANEL.0) as u32, (HEAD + rows * PANEL.1) as u32)
 }
 
-/// The drawing as SVG.
+/// Draws the plot as SVG.
 ///
 /// # Errors
-/// What the drawing library says.
+/// Returns the error of the drawing library.
 pub fn svg(measurement: &Measurement, title: &str) -> Result<String, Box<dyn Error>> {
     let mut text = String::new();
     draw(SVGBackend::with_string(&mut text, size(measurement)), measurement, title)?;
     Ok(text)
 }
 
-/// The drawing as rows of red, green, blue, 8 bits each, [`size`] pixels.
+/// Draws the plot as rows of red, green, blue, 8 bits each, [`size`] pixels.
 ///
 /// # Errors
-/// What the drawing library says.
+/// Returns the error of the drawing library.
 pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn Error>> {
     let (width, height) = size(measurement);
     let mut bytes = vec![0; width as usize * height as usize * 3];
@@ -72,13 +72,15 @@ pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn
     Ok(bytes)
 }
 
-/// A setting's variations. The default has a panel only if there is nothing else.
+/// Experiments with their variants. The default has a panel only if there is no other.
 fn panels(measurement: &Measurement) -> Vec<(Experiment, Vec<&Measured>)> {
     let mut panels: Vec<(Experiment, Vec<&Measured>)> = Vec::new();
     for measured in measurement.measured.iter().skip(1) {
         match panels.last_mut() {
-            Some((topic, of)) if *topic == measured.topic => of.push(measured),
-            _ => panels.push((measured.topic, vec![measured])),
+            Some((experiment, variants)) if *experiment == measured.experiment => {
+                variants.push(measured)
+            }
+            _ => panels.push((measured.experiment, vec![measured])),
         }
     }
     if panels.is_empty() {
@@ -87,7 +89,7 @@ fn panels(measurement: &Measurement) -> Vec<(Experiment, Vec<&Measured>)> {
     panels
 }
 
-/// Columns and rows for so many panels.
+/// Columns and rows of a grid of `panels` panels.
 fn grid(panels: usize) -> (i32, i32) {
     let cols = match panels {
         1 => 1,
@@ -97,13 +99,14 @@ fn grid(panels: usize) -> (i32, i32) {
     (cols as i32, panels.div_ceil(cols) as i32)
 }
 
-/// (seconds, codes) of the points that have both.
+/// (seconds, RMSE in 8-bit levels) of the points where both are positive.
 fn points(measured: &Measured) -> Vec<(f64, f64)> {
-    let of = |p: &crate::measure::Point| (median(&measured.seconds(p)), p.errors.rmse_codes);
-    measured.points.iter().map(of).filter(|(s, e)| *s > 0.0 && *e > 0.0).collect()
+    let coordinates =
+        |p: &crate::measure::Point| (median(&measured.seconds(p)), p.errors.rmse_codes);
+    measured.points.iter().map(coordinates).filter(|(s, e)| *s > 0.0 && *e > 0.0).collect()
 }
 
-/// From numbers to pixels along one axis, by their logarithms.
+/// Logarithmic map from numbers to pixels along one axis.
 struct Axis {
     numbers: Range<f64>,
     pixels: (i32, i32),
@@ -122,11 +125,11 @@ impl Axis {
         self.pixels.0 + (share * f64::from(self.pixels.1 - self.pixels.0)).round() as i32
     }
 
-    /// Round numbers in its range: 1, 2 and 5 of each power of ten, or these powers alone.
+    /// Round numbers in the range: 1, 2 and 5 times each power of ten, or the powers alone.
     fn ticks(&self) -> Vec<(f64, String)> {
         let Range { start, end } = self.numbers;
         let powers = start.log10().floor() as i32..=end.log10().ceil() as i32;
-        let of = |steps: &'static [u32]| {
+        let multiples = |steps: &'static [u32]| {
             powers.clone().flat_map(move |k| steps.iter().map(move |m| (*m, k)))
         };
         let number = |(m, k): (u32, i32)| f64::from(m) * 10f64.powi(k);
@@ -134,9 +137,9 @@ impl Axis {
         let label = |tick: (u32, i32)| {
             (number(tick), format!("{:.*}", (-tick.1).max(0) as usize, number(tick)))
         };
-        let mut ticks: Vec<_> = of(&[1, 2, 5]).filter(inside).collect();
+        let mut ticks: Vec<_> = multiples(&[1, 2, 5]).filter(inside).collect();
         if ticks.len() > 9 {
-            ticks = of(&[1]).filter(inside).collect();
+            ticks = multiples(&[1]).filter(inside).collect();
         }
         ticks.into_iter().map(label).collect()
     }
@@ -150,30 +153,30 @@ fn draw<B: DrawingBackend>(backend: B, measurement: &Measurement, title: &str) -
 where
     B::ErrorType: 'static,
 {
-    // Drawings look alike on every machine; a font that is registered already stays.
+    // The same font on every machine; a font that is registered already stays.
     let _ = register_font("sans-serif", FontStyle::Normal, UBUNTU_LIGHT);
     let root = backend.into_drawing_area();
     root.fill(&WHITE)?;
     root.draw_text(title, &text(20, INK, HPos::Left, VPos::Top), (24, 14))?;
-    let words = "How the error falls with the time: the lower and the further left, the better";
+    let words = "Error against time: lower and further left is better";
     root.draw_text(words, &text(14, DEFAULT, HPos::Left, VPos::Top), (24, 40))?;
     let panels = panels(measurement);
     let (cols, _) = grid(panels.len());
-    for (i, (topic, variations)) in (0..).zip(&panels) {
+    for (i, (experiment, variants)) in (0..).zip(&panels) {
         let corner = (i % cols * PANEL.0, HEAD + i / cols * PANEL.1);
-        panel(&root, corner, measurement, *topic, variations)?;
+        panel(&root, corner, measurement, *experiment, variants)?;
     }
     root.present()?;
     Ok(())
 }
 
-/// One setting, in the panel that has its upper left corner at `corner`.
+/// Draws one experiment in the panel whose upper left corner is `corner`.
 fn panel<'a, B: DrawingBackend>(
     root: &Canvas<B>,
     corner: (i32, i32),
     measurement: &'a Measurement,
-    topic: Experiment,
-    variations: &[&'a Measured],
+    experiment: Experiment,
+    variants: &[&'a Measured],
 ) -> Drawn
 where
     B::ErrorType: 'static,
@@ -182,7 +185,7 @@ where
     let (x0, x1) = (corner.0 + left, corner.0 + PANEL.0 - right);
     let (y0, y1) = (corner.1 + PANEL.1 - bottom, corner.1 + top);
     let colors = std::iter::once(&DEFAULT).chain(COLORS.iter().cycle());
-    let all = measurement.measured.first().into_iter().chain(variations.iter().copied());
+    let all = measurement.measured.first().into_iter().chain(variants.iter().copied());
     let line = |(measured, color): (&'a Measured, &RGBColor)| Line {
         name: &measured.name,
         color: *color,
@@ -194,7 +197,7 @@ where
     let codes = Axis::new(numbers().map(|p| p.1), (y0, y1));
 
     let heading = text(15, INK, HPos::Left, VPos::Top);
-    root.draw_text(topic.question(), &heading, (x0 - 34, corner.1 + 8))?;
+    root.draw_text(experiment.title(), &heading, (x0 - 34, corner.1 + 8))?;
     legend(root, (x0 - 34, corner.1 + 38), x1, &lines)?;
     let path = |from, to, color: &RGBColor| PathElement::new([from, to], color.stroke_width(1));
     for (tick, label) in seconds.ticks() {
@@ -207,14 +210,14 @@ where
         root.draw(&path((x0, y), (x1, y), &GRID))?;
         root.draw_text(&label, &text(13, INK, HPos::Right, VPos::Center), (x0 - 8, y))?;
     }
-    // Lines come from the upper left: below them there is room.
+    // Curves fall from the upper left: labels fit below them.
     let small = text(12, TARGET, HPos::Left, VPos::Bottom);
     for target in measurement.targets.iter().filter(|t| codes.numbers.contains(t)) {
         let y = codes.at(*target);
         for x in (x0..x1).step_by(8) {
             root.draw(&path((x, y), ((x + 4).min(x1), y), &TARGET))?;
         }
-        let unit = if *target == 1.0 { "code" } else { "codes" };
+        let unit = if *target == 1.0 { "level" } else { "levels" };
         root.draw_text(&format!("{target} {unit}"), &small, (x0 + 4, y - 2))?;
     }
     root.draw(&path((x0, y0), (x1, y0), &INK))?;
@@ -222,21 +225,20 @@ where
     let axis = text(13, DEFAULT, HPos::Right, VPos::Top);
     root.draw_text("seconds of tracing", &axis, (x1, y0 + 26))?;
     let axis = text(13, DEFAULT, HPos::Left, VPos::Top);
-    root.draw_text("RMSE as displayed, 8-bit codes", &axis, (x0 - 34, y1 - 26))?;
+    root.draw_text("RMSE as displayed, 8-bit levels", &axis, (x0 - 34, y1 - 26))?;
     for Line { color, points, .. } in &lines {
-        let at: Vec<(i32, i32)> =
+        let vertices: Vec<(i32, i32)> =
             points.iter().map(|(s, e)| (seconds.at(*s), codes.at(*e))).collect();
         let width = if *color == DEFAULT { 4 } else { 2 };
-        root.draw(&PathElement::new(at.clone(), color.stroke_width(width)))?;
-        for point in at {
+        root.draw(&PathElement::new(vertices.clone(), color.stroke_width(width)))?;
+        for point in vertices {
             root.draw(&Circle::new(point, 3, color.filled()))?;
         }
     }
     Ok(())
 }
 
-/// The names of the lines in their colours, side by side from `corner` on, in a second row if the first
-/// is full at `end`.
+/// Draws the names of the curves in their colours, side by side from `corner`; rows end at `end`.
 fn legend<B: DrawingBackend>(
     root: &Canvas<B>,
     corner: (i32, i32),
@@ -267,7 +269,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_round_and_not_too_many() {
+    fn ticks_are_round_and_at_most_nine() {
         let labels = |numbers| {
             let axis = Axis { numbers, pixels: (0, 100) };
             axis.ticks().into_iter().map(|(_, label)| label).collect::<Vec<_>>()
@@ -279,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithms_are_spread_evenly() {
+    fn axis_maps_logarithms_evenly() {
         let axis = Axis { numbers: 0.01..100.0, pixels: (100, 500) };
         assert_eq!([0.01, 1.0, 10.0, 100.0].map(|v| axis.at(v)), [100, 300, 400, 500]);
     }

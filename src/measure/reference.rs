@@ -1,17 +1,17 @@
-//! Pictures beside a reference.
+//! Errors of pictures against a reference.
 
 use crate::film::{Display, Film, LightWeights, Replicates};
 
 /// Radiance below which relative errors do not count as larger: relMSE = mean((x - r)^2 / (r^2 + 0.01)).
 const RELATIVE_FLOOR: f64 = 0.01;
 
-/// A picture that others are compared with, and its own error.
+/// Reference picture and its own error.
 pub struct Reference {
     size: [usize; 2],
     pixels: Vec<[f64; 3]>,
     codes: Vec<[f64; 3]>,
-    /// Half the difference of the replicates in codes: as large as its error, and independent of it.
-    /// Empty: it is taken for the truth.
+    /// Half the difference of the replicates in 8-bit levels: as large as its error, and independent of
+    /// it. Empty if the picture counts as exact.
     halves: Vec<[f64; 3]>,
     own: Squares,
     /// Variance of the mean of all pixels and channels.
@@ -27,43 +27,43 @@ struct Squares {
     relative: f64,
 }
 
-/// How far a picture is from the truth.
+/// Errors of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
     /// Root mean square error in linear radiance.
     pub rmse_linear: f64,
-    /// Root mean square error as displayed, in unrounded 8-bit codes.
+    /// Root mean square error as displayed, in unrounded 8-bit levels.
     pub rmse_codes: f64,
     /// Mean of (x - r)^2 / (r^2 + 0.01).
     pub rel_mse: f64,
-    /// Relative standard error of `rmse_codes` beside another reference as noisy as this one, at most
-    /// 1: what the own error of the reference, once subtracted, leaves open.
+    /// Relative standard error of `rmse_codes` against another reference as noisy as this one, at most
+    /// 1: the uncertainty that remains after subtraction of the reference's own error.
     pub spread: f64,
 }
 
-/// How a picture's expectation differs from the truth.
+/// Difference of a picture's expectation from the reference's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bias {
     /// Difference of the pictures' means in standard errors.
     pub z: f64,
-    /// Root mean square of the pixels' differences that noise does not explain, in codes.
+    /// Root mean square of the pixels' differences that noise does not explain, in 8-bit levels.
     pub codes: f64,
-    /// The least of that which can be told from noise, at two standard errors.
+    /// The least `codes` that can be distinguished from noise, at two standard errors.
     pub least_codes: f64,
 }
 
 impl Bias {
-    /// Whether there is more than noise explains.
+    /// Returns `true` if there is more than noise explains.
     pub fn is_seen(&self) -> bool {
         self.codes > self.least_codes || self.z.abs() > 4.0
     }
 }
 
-/// Mean squares of half the difference of two replicates, and the variance of their mean's mean: what
-/// their mean is wrong by. As displayed, the distance of the mean's codes from those of the
-/// replicates.
+/// Mean squared error of the mean of two replicates, and the variance of its mean over the picture. Linear
+/// errors are half the difference of the replicates; displayed errors are the distance of the mean's
+/// 8-bit levels from those of the replicates.
 fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64) {
-    let mut own = Squares::default();
+    let mut squares = Squares::default();
     let mut mean_variance = 0.0;
     for (a, b) in a.iter().zip(b) {
         let mean = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
@@ -72,28 +72,28 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64
         for c in 0..3 {
             let half = 0.5 * (a[c] - b[c]);
             half_sum += half;
-            own.linear += half * half;
-            own.relative += half * half / (mean[c] * mean[c] + RELATIVE_FLOOR);
-            own.codes += 0.5 * ((code_a[c] - code[c]).powi(2) + (code_b[c] - code[c]).powi(2));
+            squares.linear += half * half;
+            squares.relative += half * half / (mean[c] * mean[c] + RELATIVE_FLOOR);
+            squares.codes += 0.5 * ((code_a[c] - code[c]).powi(2) + (code_b[c] - code[c]).powi(2));
         }
         mean_variance += half_sum * half_sum;
     }
     let values = (3 * a.len()) as f64;
     let own = Squares {
-        linear: own.linear / values,
-        codes: own.codes / values,
-        relative: own.relative / values,
+        linear: squares.linear / values,
+        codes: squares.codes / values,
+        relative: squares.relative / values,
     };
     (own, mean_variance / (values * values))
 }
 
 /// Both replicates, row by row.
 fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
-    [Replicates::A, Replicates::B].map(|part| {
+    [Replicates::A, Replicates::B].map(|replicates| {
         let mut all = Vec::with_capacity(film.width() * film.height());
         let mut row = Vec::new();
         for y in 0..film.height() {
-            film.row(y, part, mix, &mut row);
+            film.row(y, replicates, mix, &mut row);
             all.extend_from_slice(&row);
         }
         all
@@ -101,14 +101,14 @@ fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
 }
 
 impl Reference {
-    /// The film's picture, whose own error is known from its replicates, which hold equally many
-    /// samples.
+    /// Reference from the picture of `film`, whose replicates hold equally many samples and determine its
+    /// own error.
     pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
         let [a, b] = replicates(film, mix);
         Self::of_replicates([film.width(), film.height()], &a, &b, display)
     }
 
-    /// The mean of two independent pictures, row by row.
+    /// Reference from the mean of two independent pictures, `[row][column]`.
     pub fn of_replicates(
         size: [usize; 2],
         a: &[[f64; 3]],
@@ -122,7 +122,7 @@ impl Reference {
         Self { halves, ..Self::new(size, pixels, own, mean_variance, *display) }
     }
 
-    /// A picture from elsewhere, which is taken for the truth.
+    /// Reference from a picture that counts as exact.
     pub fn of_pixels(size: [usize; 2], pixels: Vec<[f64; 3]>, display: &Display) -> Self {
         Self::new(size, pixels, Squares::default(), 0.0, *display)
     }
@@ -143,22 +143,22 @@ impl Reference {
         self.size
     }
 
-    /// Its own root mean square error, in codes.
+    /// Root mean square error of the reference itself, in 8-bit levels.
     pub fn noise_codes(&self) -> f64 {
         self.own.codes.sqrt()
     }
 
-    /// Its own root mean square error, in linear radiance.
+    /// Root mean square error of the reference itself, in linear radiance.
     pub fn noise_linear(&self) -> f64 {
         self.own.linear.sqrt()
     }
 
-    /// The film's errors: its distance from the reference, less what the reference is wrong by itself.
+    /// Errors of `film`: its distance from the reference, less the reference's own error.
     pub fn errors(&self, film: &Film, mix: &LightWeights) -> Errors {
         self.errors_of(&mut |y, row| film.row(y, Replicates::Both, mix, row))
     }
 
-    /// The same of a picture that `fill` gives row by row.
+    /// Errors of the picture whose rows `fill` writes.
     fn errors_of(&self, fill: &mut dyn FnMut(usize, &mut Vec<[f64; 3]>)) -> Errors {
         let mut sum = Squares::default();
         let mut crossed = 0.0;
@@ -178,19 +178,19 @@ impl Reference {
             }
         }
         let values = (3 * self.pixels.len()) as f64;
-        let left = |sum: f64, own: f64| (sum / values - own).max(0.0);
-        let codes = left(sum.codes, self.own.codes);
-        // Of the sum of squares, whose error is twice this; of its root, which halves it.
+        let remaining = |sum: f64, own: f64| (sum / values - own).max(0.0);
+        let codes = remaining(sum.codes, self.own.codes);
+        // The error of the sum of squares is twice this; its root halves it.
         let spread = crossed.sqrt() / values;
         Errors {
-            rmse_linear: left(sum.linear, self.own.linear).sqrt(),
+            rmse_linear: remaining(sum.linear, self.own.linear).sqrt(),
             rmse_codes: codes.sqrt(),
-            rel_mse: left(sum.relative, self.own.relative),
+            rel_mse: remaining(sum.relative, self.own.relative),
             spread: if spread < codes { spread / codes } else { f64::from(spread > 0.0) },
         }
     }
 
-    /// How far the film's expectation is from the reference's.
+    /// Bias of the expectation of `film` against the reference's.
     pub fn bias(&self, film: &Film, mix: &LightWeights) -> Bias {
         let [a, b] = replicates(film, mix);
         let (own, mean_variance) = own_error(&a, &b, &self.display);
@@ -208,7 +208,7 @@ impl Reference {
         let mean = sum / values;
         let deviation = (mean_variance + self.mean_variance).sqrt();
         Bias {
-            // Two pictures without noise differ, or they do not.
+            // Without noise z is 0 or infinite.
             z: if mean == 0.0 { 0.0 } else { mean / deviation },
             codes: (squares / values - own.codes - self.own.codes).max(0.0).sqrt(),
             least_codes: (2.0 * 2.0 * crossed.sqrt() / values).sqrt(),
@@ -220,7 +220,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Half the difference of two replicates of a pixel as displayed, in codes.
+/// Half the difference of two replicates of a pixel as displayed, in 8-bit levels.
 fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
     let [a, b] = [*a, *b].map(|x| display.codes(x));
     std::array::from_fn(|c| 0.5 * (a[c] - b[c]))
@@ -230,7 +230,7 @@ fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    /// Normal numbers, nearly: twelve uniform ones.
+    /// Approximately normal numbers: sums of twelve uniform ones.
     struct Noise(u64);
 
     impl Noise {
@@ -241,7 +241,7 @@ mod tests {
             })
         }
 
-        /// Grey of standard deviation `s` about 0.5, in all channels alike, a third of it anew in each.
+        /// Grey pixels of standard deviation `s` about 0.5, plus a third of that in each channel.
         fn pixels(&mut self, count: usize, s: f64) -> Vec<[f64; 3]> {
             let pixel = |_| {
                 let common = self.next();
@@ -251,9 +251,9 @@ mod tests {
         }
     }
 
-    /// Noise of standard deviation s in both replicates: their mean is wrong by s / sqrt 2.
+    /// Replicates with noise of standard deviation s have a mean whose error is s / sqrt 2.
     #[test]
-    fn the_own_error_is_that_of_the_mean() {
+    fn own_error_is_that_of_the_mean() {
         let mut noise = Noise(1);
         let [a, b] = [0; 2].map(|_| noise.pixels(10_000, 0.01));
         let reference = Reference::of_replicates([100, 100], &a, &b, &Display::default());
@@ -264,10 +264,9 @@ mod tests {
         assert!((reference.noise_codes() / (slope * expected) - 1.0).abs() < 0.02);
     }
 
-    /// One picture beside many references of the same noise: its errors differ as much as each of them
-    /// says that they may.
+    /// Errors of one picture against many references of the same noise differ by the predicted spread.
     #[test]
-    fn the_spread_is_that_between_references() {
+    fn spread_is_that_between_references() {
         let mut noise = Noise(2);
         let size = [40, 30];
         for (own, theirs) in [(0.01, 0.003), (0.01, 0.01), (0.004, 0.01)] {
@@ -285,14 +284,17 @@ mod tests {
             let n = errors.len() as f64;
             let mean = errors.iter().map(|e| e.rmse_codes).sum::<f64>() / n;
             let variance = errors.iter().map(|e| (e.rmse_codes - mean).powi(2)).sum::<f64>() / n;
-            let (seen, told) =
+            let (observed, predicted) =
                 (variance.sqrt() / mean, errors.iter().map(|e| e.spread).sum::<f64>() / n);
-            assert!((told / seen - 1.0).abs() < 0.2, "{own} {theirs}: {told} told, {seen} seen");
+            assert!(
+                (predicted / observed - 1.0).abs() < 0.2,
+                "{own} {theirs}: {predicted} predicted, {observed} observed"
+            );
         }
     }
 
     #[test]
-    fn a_picture_beside_itself_has_no_error_and_beside_the_truth_no_doubt() {
+    fn exact_reference_has_no_spread_and_equal_pictures_no_error() {
         let mut noise = Noise(3);
         let pixels = noise.pixels(1200, 0.01);
         let same = |row: &mut Vec<[f64; 3]>, y: usize| {

@@ -1,110 +1,107 @@
-//! What came out.
+//! Results of a measurement.
 
 use crate::measure::convergence_order::Slope;
 use crate::measure::error_curve::Point;
 use crate::measure::experiment::{Experiment, Variant};
 use crate::measure::reference::Bias;
 
-/// When a way reached a given noise.
+/// Time at which a render reached a given noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeToTarget {
-    /// The true error, in codes.
+    /// The true error, in 8-bit levels.
     pub codes: f64,
     /// Seconds of tracing, median of the repetitions.
     pub seconds: f64,
-    /// How far the repetitions are apart, see [`spread`].
+    /// Relative spread of the repetitions, see [`spread`].
     pub spread: f64,
     /// Samples per pixel, mean.
     pub spp: f64,
-    /// The first picture was better already: it took at most this.
+    /// The first picture was better already; `seconds` is an upper bound.
     pub at_most: bool,
 }
 
-/// When the default would reach a noise that it was not followed to.
+/// Extrapolated time to a noise that the default did not reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
-    /// The noise, in codes.
+    /// The noise, in 8-bit levels.
     pub codes: f64,
-    /// A lower and an upper guess of the seconds, by how the noise fell last.
+    /// Lower and upper estimate of the seconds, extrapolated from the convergence so far.
     pub seconds: (f64, f64),
 }
 
-/// One variation, measured.
+/// Results of one variant.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// Which setting.
-    pub topic: Experiment,
-    /// How it differs.
+    /// The setting that differs from the default.
+    pub experiment: Experiment,
+    /// Value of the setting.
     pub name: String,
-    /// Threads that traced.
+    /// Number of tracing threads.
     pub threads: usize,
-    /// The way, first to last.
+    /// Error curve, first point to last.
     pub points: Vec<Point>,
-    /// Of each repetition, the share of the processors' time that other programs took meanwhile; `None`:
-    /// nobody knows.
+    /// Share of the processors' time that other programs used, for each repetition; `None` if unknown.
     pub stolen: Vec<Option<f64>>,
-    /// Compared with the reference at the end, if its expectation may be another one.
+    /// Bias against the reference at the end, for variants with another expectation.
     pub bias: Option<Bias>,
 }
 
-/// Everything about a scene.
+/// Results for a scene.
 pub struct Measurement {
     /// Film size in pixels.
     pub size: [u32; 2],
-    /// The reference's samples per pixel; 0: it came from a file.
+    /// Samples per pixel of the reference; 0 if it was read from a file.
     pub reference_spp: f64,
-    /// The reference's own error, in codes and in linear radiance.
+    /// Error of the reference itself, in 8-bit levels.
     pub reference_codes: f64,
-    /// The same in linear radiance.
+    /// Error of the reference itself, in linear radiance.
     pub reference_linear: f64,
-    /// Seconds that the reference took.
+    /// Seconds of tracing of the reference.
     pub reference_seconds: f64,
-    /// The noise, in codes, at which settings are compared: a target that the default reached.
+    /// Noise at which settings are compared, in 8-bit levels: a target that the default reached.
     pub compared_at: f64,
-    /// The noise levels asked for, falling.
+    /// Noise targets, descending.
     pub targets: Vec<f64>,
-    /// Those of them that the default did not reach in its time.
+    /// Targets that the default did not reach in its time.
     pub expected: Vec<Expected>,
-    /// Settings that were asked for and have nothing to compare in this scene.
+    /// Requested experiments without a variant in this scene.
     pub idle: Vec<Experiment>,
-    /// The default first.
+    /// Results of all variants, the default first.
     pub measured: Vec<Measured>,
 }
 
-/// How far a measurement's times are to be trusted.
+/// Reliability of a measurement's times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steadiness {
-    /// The fewest repetitions that any of them is the median of.
+    /// Least number of repetitions of which a time is the median.
     pub repetitions: usize,
-    /// The greatest spread of those that are told.
+    /// Largest relative spread of the reported times.
     pub spread: f64,
-    /// The greatest share of the processors that others took while those were taken; `None`: nobody
-    /// knows.
+    /// Largest share of the processors that other programs used meanwhile; `None` if unknown.
     pub stolen: Option<f64>,
 }
 
-/// A repetition counts as undisturbed if others took no more than this share of the processors.
-const CALM: f64 = 0.05;
-/// So many repetitions count in any case, the calmest ones.
-const LEAST: usize = 5;
-/// An error that another reference could change by more than this share is not told.
-const DOUBTFUL: f64 = 0.05;
+/// Largest share of the processors that other programs use in an undisturbed repetition.
+const MAX_STOLEN: f64 = 0.05;
+/// Least number of repetitions that count, the least disturbed ones first.
+const MIN_COUNTED: usize = 5;
+/// Largest share by which another reference could change a reported error.
+const MAX_SPREAD: f64 = 0.05;
 
-/// Standard deviations within which a number of signs lies in about four of five cases, times the root
-/// of two for the difference of two such numbers.
+/// Number of standard deviations that contains a count of signs in about four of five cases, times the
+/// square root of two for the difference of two such counts.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
-/// The middle one; the mean of the two in the middle.
+/// Median; of an even number of values the mean of the two in the middle.
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// How far the median of another measurement may be from this one's, as a share of it, on a machine that
-/// stays as it is: it is that near in about four of five cases. With fewer than five values the
-/// distance of the least and the greatest; else half the distance of the two values between which the
-/// median of all that could be measured lies, so certainly that two such medians agree (by the signs test:
-/// Conover, *Practical Nonparametric Statistics*, confidence interval for a quantile). 0 for fewer than
-/// two values.
+/// Relative spread of a median: in about four of five cases the median of another measurement on the same
+/// machine is within this share of it. For fewer than five values it is their range. Otherwise it is half
+/// the width of the confidence interval of the median by the signs test (Conover, *Practical Nonparametric
+/// Statistics*, confidence interval for a quantile), at a level at which two such medians agree. 0 for
+/// fewer than two values.
 pub fn spread(values: &[f64]) -> f64 {
     let middle = median(values);
     if values.len() < 2 || middle == 0.0 {
@@ -122,83 +119,82 @@ fn quantile(values: &[f64], q: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
-    let at = q * last as f64;
-    let (low, part) = (at as usize, at.fract());
+    let position = q * last as f64;
+    let (low, part) = (position as usize, position.fract());
     sorted[low] + part * (sorted[(low + 1).min(last)] - sorted[low])
 }
 
 impl Measured {
-    /// An empty record of a variation whose way is `points`.
+    /// Creates the results of the first repetition of `variant`.
     pub fn new(
-        variation: &Variant,
+        variant: &Variant,
         points: Vec<Point>,
         stolen: Option<f64>,
         bias: Option<Bias>,
     ) -> Self {
         Self {
-            topic: variation.topic,
-            name: variation.name.clone(),
-            threads: variation.threads,
+            experiment: variant.experiment,
+            name: variant.name.clone(),
+            threads: variant.threads,
             points,
             stolen: vec![stolen],
             bias,
         }
     }
 
-    /// The repetitions that count: those in which nobody else took the processors; if they are too few,
-    /// the calmest.
+    /// The repetitions that count: the undisturbed ones; if they are too few, the least disturbed.
     fn counted(&self) -> Vec<usize> {
-        let of = |i: &usize| self.stolen[*i].unwrap_or(0.0);
+        let stolen = |i: &usize| self.stolen[*i].unwrap_or(0.0);
         let mut all: Vec<usize> = (0..self.stolen.len()).collect();
-        all.sort_by(|a, b| of(a).total_cmp(&of(b)));
-        let calm = all.iter().filter(|i| of(i) <= CALM).count();
-        all.truncate(calm.max(LEAST));
+        all.sort_by(|a, b| stolen(a).total_cmp(&stolen(b)));
+        let undisturbed = all.iter().filter(|i| stolen(i) <= MAX_STOLEN).count();
+        all.truncate(undisturbed.max(MIN_COUNTED));
         all
     }
 
-    /// Seconds at a point of the way, of each repetition that counts.
+    /// Seconds at `point`, for each repetition that counts.
     pub fn seconds(&self, point: &Point) -> Vec<f64> {
         self.counted().into_iter().filter_map(|i| point.seconds.get(i).copied()).collect()
     }
 
-    /// The greatest share of the processors that others took in the repetitions that count.
-    fn most_taken(&self) -> Option<f64> {
+    /// Largest share of the processors that other programs used in the repetitions that count.
+    fn max_stolen(&self) -> Option<f64> {
         self.counted().into_iter().filter_map(|i| self.stolen[i]).reduce(f64::max)
     }
 
-    /// Where the true error came down to `codes`, between points on straight lines of the logarithms.
+    /// Time at which the true error fell to `codes`, interpolated log-log between points.
     pub fn time_to(&self, codes: f64) -> Option<TimeToTarget> {
-        self.crossing_of(codes, |p| {
-            let certain = p.errors.spread <= DOUBTFUL;
+        self.interpolated_time(codes, |p| {
+            let certain = p.errors.spread <= MAX_SPREAD;
             if certain { p.errors.rmse_codes } else { f64::INFINITY }
         })
     }
 
-    /// The same of the error that the program told, for what is never right.
+    /// Time at which the program's own estimate of the error fell to `codes`, for biased variants.
     pub fn estimated_time_to(&self, codes: f64) -> Option<TimeToTarget> {
-        self.crossing_of(codes, |p| p.told_codes.unwrap_or(f64::INFINITY))
+        self.interpolated_time(codes, |p| p.estimated_codes.unwrap_or(f64::INFINITY))
     }
 
-    /// The one of them that says when it is as quiet as it gets: of what is never right, what it told.
+    /// [`Measured::estimated_time_to`] for biased variants, [`Measured::time_to`] for the others.
     pub fn true_time_to(&self, codes: f64) -> Option<TimeToTarget> {
         if self.bias.is_some() { self.estimated_time_to(codes) } else { self.time_to(codes) }
     }
 
-    fn crossing_of(&self, codes: f64, of: impl Fn(&Point) -> f64) -> Option<TimeToTarget> {
-        let after = self.points.iter().position(|p| of(p) <= codes)?;
+    fn interpolated_time(&self, codes: f64, error: impl Fn(&Point) -> f64) -> Option<TimeToTarget> {
+        let after = self.points.iter().position(|p| error(p) <= codes)?;
         let to = &self.points[after];
         let from = after.checked_sub(1).map(|i| &self.points[i]);
         let (weight, from) = match from {
-            // A picture without any error left has no logarithm.
-            Some(from) if of(to) > 0.0 && of(from).is_finite() => {
-                ((of(from) / codes).ln() / (of(from) / of(to)).ln(), from)
+            // An error of 0 has no logarithm.
+            Some(from) if error(to) > 0.0 && error(from).is_finite() => {
+                ((error(from) / codes).ln() / (error(from) / error(to)).ln(), from)
             }
             _ => (1.0, to),
         };
         let between = |a: f64, b: f64| a * (b / a).powf(weight);
-        let (before, after_it) = (self.seconds(from), self.seconds(to));
+        let (seconds_from, seconds_to) = (self.seconds(from), self.seconds(to));
         let seconds: Vec<f64> =
-            before.iter().zip(&after_it).map(|(a, b)| between(*a, *b)).collect();
+            seconds_from.iter().zip(&seconds_to).map(|(a, b)| between(*a, *b)).collect();
         Some(TimeToTarget {
             codes,
             seconds: median(&seconds),
@@ -208,15 +204,15 @@ impl Measured {
         })
     }
 
-    /// Samples per second over the whole way: median and spread of the repetitions.
+    /// Samples per second over the whole render: median and spread of the repetitions.
     pub fn samples_per_second(&self) -> Option<(f64, f64)> {
         let last = self.points.last()?;
         let speeds: Vec<f64> = self.seconds(last).iter().map(|s| last.samples as f64 / s).collect();
         Some((median(&speeds), spread(&speeds)))
     }
 
-    /// The order of convergence in linear radiance, without the first quarter of the points, which
-    /// have too few samples for a law.
+    /// Order of convergence in linear radiance, without the first quarter of the points, which have too
+    /// few samples for a power law.
     pub fn slope(&self) -> Option<Slope> {
         let from = self.points.len() / 4;
         let points: Vec<_> =
@@ -224,7 +220,7 @@ impl Measured {
         Slope::fit(&points)
     }
 
-    /// 1 / (MSE x seconds) at the end, linear: what a second is worth.
+    /// Efficiency at the end: 1 / (linear MSE x seconds).
     pub fn efficiency(&self) -> Option<f64> {
         let last = self.points.last()?;
         let cost = last.errors.rmse_linear.powi(2) * median(&self.seconds(last));
@@ -233,7 +229,7 @@ impl Measured {
 }
 
 impl Measurement {
-    /// Of the times that are told: those to the targets, and those that settings are compared by.
+    /// Reliability of the reported times: those to the targets, and those that settings are compared by.
     pub fn steadiness(&self) -> Steadiness {
         let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0, stolen: None };
         for (i, measured) in self.measured.iter().enumerate() {
@@ -243,7 +239,7 @@ impl Measurement {
                 all.spread = all.spread.max(time_to.spread);
                 all.repetitions = all.repetitions.min(measured.counted().len());
             }
-            all.stolen = [all.stolen, measured.most_taken()].into_iter().flatten().reduce(f64::max);
+            all.stolen = [all.stolen, measured.max_stolen()].into_iter().flatten().reduce(f64::max);
         }
         if all.repetitions == usize::MAX {
             all.repetitions = 0;
@@ -251,11 +247,11 @@ impl Measurement {
         all
     }
 
-    /// The largest share by which another reference could change the errors that are told.
+    /// Largest share by which another reference could change the reported errors.
     pub fn reference_uncertainty(&self) -> f64 {
         let points = self.measured.iter().flat_map(|m| &m.points);
-        let told = points.map(|p| p.errors.spread).filter(|spread| *spread <= DOUBTFUL);
-        told.fold(0.0, f64::max)
+        let reported = points.map(|p| p.errors.spread).filter(|spread| *spread <= MAX_SPREAD);
+        reported.fold(0.0, f64::max)
     }
 }
 
@@ -270,7 +266,7 @@ mod tests {
             samples: *spp as u64,
             spp: *spp,
             seconds: vec![*spp * 1e-3, *spp * 3e-3, *spp * 2e-3],
-            told_codes: Some(2.0 * codes),
+            estimated_codes: Some(2.0 * codes),
             errors: Errors {
                 rmse_linear: codes / 255.0,
                 rmse_codes: *codes,
@@ -279,7 +275,7 @@ mod tests {
             },
         };
         Measured {
-            topic: Experiment::Default,
+            experiment: Experiment::Default,
             name: String::new(),
             threads: 1,
             points: points.iter().enumerate().map(point).collect(),
@@ -289,12 +285,15 @@ mod tests {
     }
 
     #[test]
-    fn crossings_lie_on_the_power_law() {
+    fn times_are_interpolated_on_the_power_law() {
         // error = 8 / sqrt(spp)
         let way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
-        let at = way.time_to(2f64.sqrt()).unwrap();
-        assert!((at.spp - 32.0).abs() < 1e-9 && (at.seconds - 0.064).abs() < 1e-12, "{at:?}");
-        assert!(!at.at_most && (at.spread - 1.0).abs() < 1e-12);
+        let target = way.time_to(2f64.sqrt()).unwrap();
+        assert!(
+            (target.spp - 32.0).abs() < 1e-9 && (target.seconds - 0.064).abs() < 1e-12,
+            "{target:?}"
+        );
+        assert!(!target.at_most && (target.spread - 1.0).abs() < 1e-12);
         assert!(way.time_to(3.0).unwrap().at_most);
         assert_eq!(way.time_to(0.4), None);
         assert!((way.estimated_time_to(2.0).unwrap().spp - 64.0).abs() < 1e-9);
@@ -303,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn medians_and_spreads() {
+    fn medians_and_spreads_of_known_values() {
         assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
         assert_eq!(median(&[1.0, 2.0]), 1.5);
         assert_eq!(spread(&[1.0, 2.0, 3.0]), 1.0);
@@ -313,10 +312,10 @@ mod tests {
         assert!(median(&[]).is_nan());
     }
 
-    /// Measurements of normally scattered times, again and again: how often the second is as near to the
-    /// first as the first says.
+    /// The median of a second measurement of normally distributed times is within the spread of the first
+    /// in about four of five cases.
     #[test]
-    fn a_spread_tells_where_another_measurement_will_be() {
+    fn spread_predicts_the_median_of_another_measurement() {
         let mut state = 5u64;
         let mut time = || {
             1.0 + 0.03
@@ -335,8 +334,8 @@ mod tests {
         }
     }
 
-    /// Two repetitions of nine were disturbed: they do not count. Of nine disturbed ones the five
-    /// calmest do, and it is said how disturbed they were.
+    /// Two disturbed repetitions of nine do not count. Of nine disturbed ones the five least disturbed do,
+    /// and their disturbance is reported.
     #[test]
     fn disturbed_repetitions_do_not_count() {
         let mut way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
@@ -345,8 +344,11 @@ mod tests {
             point.seconds = (0..9).map(|i| first * [1.0, 3.0, 1.0, 1.1][i % 4]).collect();
         }
         way.stolen = [0.0, 0.4, 0.01, 0.0].into_iter().cycle().take(9).map(Some).collect();
-        let at = way.time_to(1.0).unwrap();
-        assert!((at.seconds - 0.064).abs() < 1e-12 && (at.spread - 0.05).abs() < 1e-9, "{at:?}");
+        let target = way.time_to(1.0).unwrap();
+        assert!(
+            (target.seconds - 0.064).abs() < 1e-12 && (target.spread - 0.05).abs() < 1e-9,
+            "{target:?}"
+        );
         let mut measurement = Measurement {
             size: [1, 1],
             reference_spp: 0.0,
@@ -368,9 +370,9 @@ mod tests {
         assert!((steady.spread - 1.0).abs() < 1e-9, "1, 3, 1, 1.1, 1: {steady:?}");
     }
 
-    /// An error that the reference's own drowns is no answer.
+    /// An error that is uncertain because of the reference's own error does not count.
     #[test]
-    fn a_doubtful_error_reaches_no_target() {
+    fn uncertain_error_reaches_no_target() {
         let mut way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
         way.points[2].errors.spread = 0.3;
         assert!(way.time_to(1.0).is_some());

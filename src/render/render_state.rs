@@ -1,35 +1,34 @@
-//! A scene in work: the compiled world and the film that its samples go to.
+//! Compiled scene with its film: the state of one progressive render.
 
 use crate::film::{Display, Estimator, Film, Header, LightWeights, TILE};
 use crate::render::relighting::Relighting;
 use crate::render::schedule::{Schedule, Settings};
-use crate::render::session::RenderBackend;
 use crate::render::wave::{Wave, WaveReport};
 use crate::render::{first_pass, pass};
 use crate::sampling::SampleSettings;
 use crate::scene::Scene;
-use crate::world::{self, AnyWorld, FirstHit};
+use crate::world::{self, AnyWorld};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// How scenes are compiled, sampled and judged.
+/// Settings of compilation, sampling and noise estimation.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// How the scene becomes a world.
+    /// Compilation of the scene into a world.
     pub world: world::Options,
-    /// Where samples lie.
+    /// Seed and kind of the sampler.
     pub sampling: SampleSettings,
-    /// The display whose codes the noise is told in.
+    /// The display for which the noise is estimated, in 8-bit levels.
     pub display: Display,
 }
 
-/// A scene in work.
+/// Compiled scene, its film and the estimator of its noise.
 pub struct RenderState {
     /// The compiled scene.
     pub world: AnyWorld,
     /// The samples.
     pub film: Film,
-    /// Colour and strength of the light groups, as the scene has them.
+    /// Colour and strength of each light group in the scene.
     pub mix: LightWeights,
     scene: Arc<Scene>,
     lighting: Arc<Relighting>,
@@ -39,12 +38,28 @@ pub struct RenderState {
 }
 
 impl RenderState {
-    /// Compiles `scene` and gives it an empty film, in the memory of that of `before`.
-    pub fn new(scene: &Scene, options: &Options, before: Option<Self>) -> Self {
-        Self::compiled(Arc::new(scene.clone()), options, before)
+    /// Compiles `scene`, which has no faults, and gives it an empty film in the memory of the film
+    /// of `previous`.
+    pub fn new(scene: &Scene, options: &Options, previous: Option<Self>) -> Self {
+        Self::compile(Arc::new(scene.clone()), options, previous)
     }
 
-    fn compiled(scene: Arc<Scene>, options: &Options, before: Option<Self>) -> Self {
+    /// Compiles `scene` as [`RenderState::new`] does, if it is valid.
+    ///
+    /// # Errors
+    /// Returns the first fault of the scene.
+    pub fn checked(
+        scene: &Arc<Scene>,
+        options: &Options,
+        previous: Option<Self>,
+    ) -> Result<Self, String> {
+        match scene.faults().first() {
+            Some(fault) => Err(fault.to_string()),
+            None => Ok(Self::compile(Arc::clone(scene), options, previous)),
+        }
+    }
+
+    fn compile(scene: Arc<Scene>, options: &Options, previous: Option<Self>) -> Self {
         let world = AnyWorld::compile(&scene, &options.world);
         let [width, height] = scene.film.size.map(|n| n as usize);
         let header = Header {
@@ -56,8 +71,8 @@ impl RenderState {
         };
         let mix = LightWeights { weights: world.mix(&scene) };
         let estimator = Estimator::new(&header.scales, &mix, &options.display);
-        let film = match before {
-            Some(before) => before.film.reuse_for(header),
+        let film = match previous {
+            Some(previous) => previous.film.reuse_for(header),
             None => Film::new(header),
         };
         let lighting = Relighting::new(Arc::clone(&scene), world.light_groups().clone());
@@ -73,109 +88,88 @@ impl RenderState {
         }
     }
 
-    /// The scene that the picture shows, which may differ from the compiled one in its lights' colours
-    /// and strengths.
-    pub fn scene(&self) -> &Arc<Scene> {
-        &self.scene
-    }
-
-    /// A name for each light group.
-    pub fn group_names(&self) -> Vec<String> {
-        self.lighting.names(&self.scene)
-    }
-
-    fn new_estimator(&mut self) {
-        self.estimator = Estimator::new(self.film.scales(), &self.mix, &self.display);
-    }
-}
-
-impl RenderBackend for RenderState {
-    type Options = Options;
-
-    fn begin(scene: &Arc<Scene>, options: &Options, before: Option<Self>) -> Result<Self, String> {
-        match scene.faults().first() {
-            Some(fault) => Err(fault.to_string()),
-            None => Ok(Self::compiled(Arc::clone(scene), options, before)),
-        }
-    }
-
-    fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
+    /// Takes `scene` over and returns `true` if the samples at hand are samples of it as well.
+    /// Otherwise nothing changes.
+    pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let Some(mix) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
             return false;
         };
         self.mix = mix;
         self.scene = Arc::clone(scene);
-        self.new_estimator();
+        self.rebuild_estimator();
         true
     }
 
-    fn display_of(options: &mut Options) -> &mut Display {
-        &mut options.display
+    /// Scene that the picture shows. It may differ from the compiled scene in the colours and
+    /// strengths of its lights.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
     }
 
-    fn set_display(&mut self, display: Display) {
-        self.display = display;
-        self.new_estimator();
+    /// Name of each light group.
+    pub fn group_names(&self) -> Vec<String> {
+        self.lighting.names(&self.scene)
     }
 
-    fn restart(&mut self) {
-        self.film.restart();
-    }
-
-    fn first(
-        &mut self,
-        wave: &Wave,
-        pool: &rayon::ThreadPool,
-        abandon: &AtomicBool,
-        shown: &mut dyn FnMut(&Film),
-    ) -> Option<WaveReport> {
-        first_pass::run(&self.world, &mut self.film, wave, &self.sampling, pool, abandon, shown)
-    }
-
-    fn run(&mut self, wave: &Wave, pool: &rayon::ThreadPool, interrupt: &AtomicBool) -> WaveReport {
-        let Self { world, film, sampling, estimator, .. } = self;
-        pass::run(world, film, wave, sampling, estimator, pool, interrupt)
-    }
-
-    fn film(&self) -> &Film {
-        &self.film
-    }
-
-    fn mix(&self) -> &LightWeights {
-        &self.mix
-    }
-
-    fn display(&self) -> Display {
-        self.display
-    }
-
-    fn estimator(&self) -> &Estimator {
-        &self.estimator
-    }
-
-    fn lighting(&self) -> &Arc<Relighting> {
+    /// The set of scenes that the samples serve.
+    pub fn lighting(&self) -> &Arc<Relighting> {
         &self.lighting
     }
 
-    fn look(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
-        self.world.first_hit(points, seen);
+    /// Display for which the noise is estimated.
+    pub fn display(&self) -> Display {
+        self.display
     }
 
-    fn lanes(&self) -> &'static str {
-        self.world.lanes()
+    /// Estimates the noise for `display` from now on.
+    pub fn set_display(&mut self, display: Display) {
+        self.display = display;
+        self.rebuild_estimator();
     }
 
-    fn inventory(&self) -> String {
-        self.world.inventory().to_string()
+    /// Estimator of the noise under the current light weights and display.
+    pub fn estimator(&self) -> &Estimator {
+        &self.estimator
     }
 
-    fn schedule(&self, settings: Settings) -> Schedule {
+    fn rebuild_estimator(&mut self) {
+        self.estimator = Estimator::new(self.film.scales(), &self.mix, &self.display);
+    }
+
+    /// Schedule for this film.
+    pub fn schedule(&self, settings: Settings) -> Schedule {
         let film = &self.film;
-        let pixels_of = |tile: usize| {
+        let pixels_of_tile = |tile: usize| {
             let [x, y] = film.tile_origin(tile);
             ((film.width() - x).min(TILE) * (film.height() - y).min(TILE)) as u32
         };
-        let pixels: Vec<u32> = (0..film.tile_count()).map(pixels_of).collect();
+        let pixels: Vec<u32> = (0..film.tile_count()).map(pixels_of_tile).collect();
         Schedule::new(&pixels, settings)
+    }
+
+    /// Traces the wave that holds the first sample of every pixel, coarse to fine, and calls
+    /// `on_refined` whenever the picture has become finer. A raised `cancel_first_pass` ends the
+    /// pass after the first call of `on_refined`; the result is then `None`, and the film is fit for
+    /// display only.
+    pub fn trace_first_pass(
+        &mut self,
+        wave: &Wave,
+        pool: &rayon::ThreadPool,
+        cancel_first_pass: &AtomicBool,
+        on_refined: &mut dyn FnMut(&Film),
+    ) -> Option<WaveReport> {
+        let Self { world, film, sampling, .. } = self;
+        first_pass::run(world, film, wave, sampling, pool, cancel_first_pass, on_refined)
+    }
+
+    /// Traces a wave. A raised `cancel_wave` keeps further jobs from starting.
+    pub fn trace_wave(
+        &mut self,
+        wave: &Wave,
+        pool: &rayon::ThreadPool,
+        cancel_wave: &AtomicBool,
+    ) -> WaveReport {
+        let Self { world, film, sampling, estimator, .. } = self;
+        pass::run(world, film, wave, sampling, estimator, pool, cancel_wave)
     }
 }

@@ -2,7 +2,7 @@
 //! where nothing may depend on when somebody looks.
 
 use crate::render::schedule::{Schedule, Settings, Spp, Step, StoppedBy};
-use crate::render::session::RenderBackend;
+
 use crate::render::{Options, RenderState};
 use crate::scene::Scene;
 use std::io;
@@ -45,7 +45,7 @@ impl SyncRender {
                 Step::Trace(wave) => wave,
             };
             let start = Instant::now();
-            let report = self.rendering.run(&wave, &self.pool, &AtomicBool::new(false));
+            let report = self.rendering.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
             self.seconds += start.elapsed().as_secs_f64();
             self.schedule.complete(&wave, &report);
             if wave.replicate == 1 {

@@ -14,7 +14,7 @@ mod text;
 mod validation;
 
 pub use angle::sin_cos_degrees;
-pub use color::{Color, linear_from_srgb};
+pub use color::{Color, linear_from_srgb, srgb_from_linear};
 pub use description::{Description, FieldValue};
 pub(crate) use description::{choices, description, doc_text, is_absent};
 pub use direction::unit;

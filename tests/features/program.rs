@@ -10,7 +10,7 @@ use zerkalo::film::{Display, Film, Replicates, TILE};
 use zerkalo::material::Material;
 use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo::render::session::{Session, State};
-use zerkalo::render::{Options, RenderState, SyncRender};
+use zerkalo::render::{Options, SyncRender};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::edit::{self, Edit, EditError, Target};
 use zerkalo::scene::{Document, History, Scene};
@@ -140,7 +140,7 @@ const SPP: Stop = Stop { spp: Some(8), noise_codes: None, rmse_linear: None, sec
 
 /// A session that shows scenes while they are edited.
 struct Desk {
-    session: Session<RenderState>,
+    session: Session,
 }
 
 impl Desk {

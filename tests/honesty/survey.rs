@@ -9,7 +9,6 @@ use crate::support::{begin, picture, pool, rendered, settings, trace};
 use zerkalo::film::{Display, Replicates};
 use zerkalo::render::RenderState;
 use zerkalo::render::schedule::{Schedule, Step, Stop, StoppedBy};
-use zerkalo::render::session::RenderBackend;
 use zerkalo::world::Precision;
 
 /// Samples per pixel at which the survey ends a picture that has not reached its target.

@@ -7,7 +7,6 @@ use ratatui::style::{Color, Style};
 use zerkalo::film::{Display, Replicates};
 use zerkalo::render::RenderState;
 use zerkalo::render::schedule::{Schedule, Step, Stop};
-use zerkalo::render::session::RenderBackend;
 use zerkalo::scene::Scene;
 use zerkalo::terminal::cells::{CellColor, Colors, Oklab, PictureCells, Raster};
 use zerkalo::terminal::diff::TargetFrame;

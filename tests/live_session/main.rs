@@ -6,11 +6,11 @@ mod noise;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
-use zerkalo::film::{Display, Tone};
+use zerkalo::film::{Display, LinearImage, Tone};
 use zerkalo::lanes::{SimdFloat, Single};
+use zerkalo::render::Options;
 use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo::render::session::{Session, Snapshot, State, View};
-use zerkalo::render::{Options, RenderState};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::value::Color;
@@ -60,11 +60,11 @@ fn noise(codes: f64) -> Stop {
     Stop { noise_codes: Some(codes), ..Stop::default() }
 }
 
-fn session(stop: Stop, adaptive: bool) -> Session<RenderState> {
+fn session(stop: Stop, adaptive: bool) -> Session {
     session_of(3, stop, adaptive)
 }
 
-fn session_of(seed: u64, stop: Stop, adaptive: bool) -> Session<RenderState> {
+fn session_of(seed: u64, stop: Stop, adaptive: bool) -> Session {
     let options = Options {
         world: world::Options::default(),
         sampling: SampleSettings { seed, kind: SamplerKind::Sobol },
@@ -74,7 +74,7 @@ fn session_of(seed: u64, stop: Stop, adaptive: bool) -> Session<RenderState> {
     Session::new(2, options, settings).unwrap()
 }
 
-fn wait(session: &Session<RenderState>, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {
+fn wait(session: &Session, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {
     let end = Instant::now() + PATIENCE;
     while Instant::now() < end {
         if let Some(snapshot) = session.wait(Duration::from_millis(100)).filter(&wanted) {
@@ -85,19 +85,19 @@ fn wait(session: &Session<RenderState>, wanted: impl Fn(&Snapshot) -> bool) -> S
 }
 
 /// Sets `scene` and waits until it is finished.
-fn finish(session: &mut Session<RenderState>, scene: &Scene) -> Snapshot {
+fn finish(session: &mut Session, scene: &Scene) -> Snapshot {
     let generation = session.set_scene(Arc::new(scene.clone()));
     resting(session, generation)
 }
 
-fn resting(session: &Session<RenderState>, generation: u64) -> Snapshot {
+fn resting(session: &Session, generation: u64) -> Snapshot {
     let done = |s: &Snapshot| {
         s.report.generation == generation && matches!(s.report.state, State::Finished(_))
     };
     wait(session, done)
 }
 
-fn bytes(session: &Session<RenderState>) -> Vec<u8> {
+fn bytes(session: &Session) -> Vec<u8> {
     session.with(|rendering, _| rendering.film.bytes()).unwrap()
 }
 
@@ -205,7 +205,7 @@ fn a_mix_that_is_too_noisy_wakes_a_session_at_rest() {
 #[test]
 fn a_light_that_goes_out_keeps_its_group_until_a_restart() {
     let mut session = session(spp(32), true);
-    let groups = |session: &Session<RenderState>| session.with(|r, _| r.film.groups());
+    let groups = |session: &Session| session.with(|r, _| r.film.groups());
     let before = finish(&mut session, &scene()).report;
     let mut dark = scene();
     dark.lights[0].on = false;
@@ -265,7 +265,7 @@ fn aims_display_and_threads_change_without_losing_samples() {
 fn tasks_do_not_wait_and_always_answer() {
     let mut session = session(Stop::default(), true);
     let (answer, answers) = channel();
-    let samples = |session: &Session<RenderState>| {
+    let samples = |session: &Session| {
         let answer = answer.clone();
         session.submit(move |film| answer.send(film.map(|(_, r)| r.generation)).unwrap());
     };
@@ -282,8 +282,12 @@ fn tasks_do_not_wait_and_always_answer() {
     let end = resting(&session, generation);
     let (keep, kept) = channel();
     session.submit(move |film| {
-        keep.send(film.map(|(r, _)| (r.film.linear(&r.mix), r.film.pixel(50, 40, &r.mix))))
-            .unwrap();
+        keep.send(
+            film.map(|(r, _)| {
+                (LinearImage::of_film(&r.film, &r.mix), r.film.pixel(50, 40, &r.mix))
+            }),
+        )
+        .unwrap();
     });
     let (kept, pixel) = kept.recv_timeout(PATIENCE).unwrap().unwrap();
     for (a, b) in end.picture.unwrap().mixed(&end.mix).iter().zip(kept.resampled(20, 14)) {
@@ -359,7 +363,7 @@ fn nothing_wakes_a_session_at_rest_or_in_a_pause() {
 /// How often the session's threads wake in a while; the least of a few tries, as they need a moment to
 /// fall asleep.
 #[cfg(target_os = "linux")]
-fn switches_in(session: &Session<RenderState>) -> u64 {
+fn switches_in(session: &Session) -> u64 {
     let ids = session
         .with(|_, _| {
             let of_pool = std::fs::read_dir("/proc/self/task").unwrap();

@@ -7,7 +7,7 @@ use zerkalo::render::session::Session;
 use zerkalo::value::Color;
 
 /// The codes of a session's picture, not rounded, and the noise that it tells.
-fn codes(session: &Session<RenderState>) -> (Vec<[f64; 3]>, f64) {
+fn codes(session: &Session) -> (Vec<[f64; 3]>, f64) {
     let read = |r: &RenderState| {
         let mut all = Vec::new();
         let mut row = Vec::new();

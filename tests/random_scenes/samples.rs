@@ -9,7 +9,6 @@ use crate::support::{begin, picture, pool, rendered, settings, trace};
 use zerkalo::film::{Display, Replicates, TILE};
 use zerkalo::render::RenderState;
 use zerkalo::render::schedule::{Step, Stop};
-use zerkalo::render::session::RenderBackend;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 

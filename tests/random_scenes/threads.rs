@@ -4,7 +4,6 @@ use crate::driver::{Verdict, compare, compare_many};
 use crate::support::{begin, pool, settings, trace};
 use zerkalo::film::Noise;
 use zerkalo::render::schedule::{Step, Stop, StoppedBy};
-use zerkalo::render::session::RenderBackend;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 

@@ -11,7 +11,7 @@ use zerkalo::dashboard::message::{Effect, Exported, Message};
 use zerkalo::dashboard::model::{Colors, Model, Start};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::{begin, update};
-use zerkalo::film::{Film, Header, LightWeights};
+use zerkalo::film::{Film, Header, LightWeights, LinearImage};
 use zerkalo::render::schedule::Stop;
 use zerkalo::scene::edit::Target;
 use zerkalo::scene::{Document, SaveError, Scene};
@@ -183,7 +183,7 @@ impl Desk {
                     precision: "f32".into(),
                 };
                 let mix = LightWeights { weights: vec![[1.0; 3]] };
-                Message::Kept(Arc::new(Film::new(header).linear(&mix)), 16.0)
+                Message::Kept(Arc::new(LinearImage::of_film(&Film::new(header), &mix)), 16.0)
             }
             _ => return None,
         })

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use zerkalo::film::{Display, Film, Replicates};
 use zerkalo::render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
-use zerkalo::render::session::RenderBackend;
 use zerkalo::render::wave::{Job, Wave, WaveReport};
 use zerkalo::render::{Options, RenderState};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
@@ -66,7 +65,7 @@ pub fn wave(film: &Film, replicate: usize, first: u32, count: u32) -> Wave {
 
 /// Traces a wave to its end.
 pub fn trace(rendering: &mut RenderState, wave: &Wave, pool: &rayon::ThreadPool) -> WaveReport {
-    rendering.run(wave, pool, &AtomicBool::new(false))
+    rendering.trace_wave(wave, pool, &AtomicBool::new(false))
 }
 
 /// Samples `first .. first + count` of both replicates in every pixel.

@@ -1,4 +1,4 @@
-//! A measurement for programs. Keys are for scripts: they stay.
+//! A measurement as JSON and CSV. Scripts rely on the keys: they stay.
 
 use crate::command::measure::table::About;
 use crate::measure::{Measured, Measurement, median, spread};
@@ -19,11 +19,11 @@ struct Document<'a> {
     compared_at_codes: f64,
     /// The largest share by which another reference could change the errors.
     errors_spread: f64,
-    /// The greatest spread of the times that the table tells.
+    /// The largest spread of the times in the table.
     times_spread: f64,
-    /// The greatest share of the processors that other programs took.
+    /// The largest share of the processors that other programs used.
     taken_by_others: Option<f64>,
-    /// Noise levels that were not waited for.
+    /// Noise targets whose times are extrapolated.
     expected: Vec<Expected>,
     variations: Vec<Variation<'a>>,
 }
@@ -41,7 +41,7 @@ struct Variation<'a> {
     efficiency: Option<f64>,
     bias_z: Option<f64>,
     bias_codes: Option<f64>,
-    /// The least that could be told from noise.
+    /// The least bias that can be distinguished from noise.
     bias_least_codes: Option<f64>,
     crossings: Vec<TimeToTarget>,
     points: Vec<Point>,
@@ -63,7 +63,7 @@ struct Expected {
     seconds_high: f64,
 }
 
-/// One place on the way; a line of the CSV.
+/// One point of an error curve; a line of the CSV.
 #[derive(Serialize)]
 struct Point {
     samples: u64,
@@ -99,7 +99,7 @@ fn points(measured: &Measured) -> impl Iterator<Item = Point> {
         spp: p.spp,
         seconds: median(&measured.seconds(p)),
         seconds_spread: spread(&measured.seconds(p)),
-        told_codes: p.told_codes,
+        told_codes: p.estimated_codes,
         rmse_codes: p.errors.rmse_codes,
         rmse_codes_spread: p.errors.spread,
         rmse_linear: p.errors.rmse_linear,
@@ -110,18 +110,18 @@ fn points(measured: &Measured) -> impl Iterator<Item = Point> {
 fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
     let speed = measured.samples_per_second();
     let slope = measured.slope();
-    let crossing = |codes: &f64| {
-        let c = measured.time_to(*codes)?;
+    let time_to_target = |codes: &f64| {
+        let time = measured.time_to(*codes)?;
         Some(TimeToTarget {
             codes: *codes,
-            seconds: c.seconds,
-            spread: c.spread,
-            spp: c.spp,
-            at_most: c.at_most,
+            seconds: time.seconds,
+            spread: time.spread,
+            spp: time.spp,
+            at_most: time.at_most,
         })
     };
     Variation {
-        setting: measured.topic.name(),
+        setting: measured.experiment.name(),
         name: &measured.name,
         threads: measured.threads,
         samples_per_second: speed.map(|s| s.0),
@@ -133,12 +133,12 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
         bias_z: measured.bias.map(|b| b.z).filter(|z| z.is_finite()),
         bias_codes: measured.bias.map(|b| b.codes),
         bias_least_codes: measured.bias.map(|b| b.least_codes),
-        crossings: targets.iter().filter_map(crossing).collect(),
+        crossings: targets.iter().filter_map(time_to_target).collect(),
         points: points(measured).collect(),
     }
 }
 
-/// Everything.
+/// Serialises the measurement as JSON.
 pub fn json(about: &About) -> Vec<u8> {
     let m = about.measurement;
     let steadiness = m.steadiness();
@@ -169,13 +169,13 @@ pub fn json(about: &About) -> Vec<u8> {
     bytes
 }
 
-/// The points of all ways, a line each.
+/// Serialises the points of all error curves as CSV, a line each.
 pub fn csv(measurement: &Measurement) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for measured in &measurement.measured {
         for p in points(measured) {
             let line = Line {
-                setting: measured.topic.name(),
+                setting: measured.experiment.name(),
                 name: &measured.name,
                 threads: measured.threads,
                 samples: p.samples,

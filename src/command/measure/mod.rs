@@ -1,4 +1,4 @@
-//! `zerkalo measure`: what accuracy costs on a scene, as a table, as data, as a drawing.
+//! `zerkalo measure`: the cost of accuracy on a scene, as a table, as data, as a plot.
 
 mod data;
 mod table;
@@ -14,11 +14,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
 use std::sync::Arc;
 
-/// What most people ask.
+/// Experiments without `--only` and `--full`.
 const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];
 
 pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
-    let failed = |why: String| Failure::Failed(why);
+    let failed = |reason: String| Failure::Failed(reason);
     if let Some(path) = &args.plot {
         drawing(path).map_err(Failure::Usage)?;
     }
@@ -27,25 +27,16 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
         warn(&format!("warning: {warning}"));
     }
     let mut scene = document.scene().clone();
-    if let Some(size) = args.size {
-        scene.film.size = size;
-        if let Some(fault) = scene.faults().first() {
-            let [width, height] = size;
-            return Err(Failure::Usage(format!("--size {width}x{height}: {fault}")));
-        }
-    }
-    let display = Display { exposure_ev: args.exposure, tone: args.tone };
+    args.picture.resize(&mut scene).map_err(Failure::Usage)?;
+    let display = args.picture.display();
     let reference = match &args.reference {
         Some(path) => Some(given_reference(path, scene.film.size, &display)?),
         None => None,
     };
-    let threads = match args.threads {
-        Some(n) => usize::from(n),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
-    let topics = match (&args.only, args.full) {
-        (topics, _) if !topics.is_empty() => topics.clone(),
-        (_, true) => Experiment::ALL.iter().map(|(topic, ..)| *topic).collect(),
+    let threads = args.compute.threads();
+    let experiments = match (&args.only, args.full) {
+        (experiments, _) if !experiments.is_empty() => experiments.clone(),
+        (_, true) => Experiment::ALL.iter().map(|(experiment, ..)| *experiment).collect(),
         _ => SHORT.to_vec(),
     };
     let seconds = args.seconds.unwrap_or(if args.full { 300.0 } else { 50.0 });
@@ -53,11 +44,11 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     targets.sort_by(|a, b| b.total_cmp(a));
     let plan = Plan {
         targets,
-        topics,
+        experiments,
         repetitions: usize::from(args.repetitions),
         seconds,
         threads,
-        seed: args.seed,
+        seed: args.compute.seed,
         display,
     };
     let world = AnyWorld::compile(&scene, &world::Options::default());
@@ -66,9 +57,9 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let signals = Signals::watch().map_err(|e| failed(format!("no signals: {e}")))?;
     let bar = progress_bar();
     let measurement = measure::measure(&Arc::new(scene), &plan, reference, &mut |progress| {
-        bar.set_length(progress.of as u64);
+        bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
-        bar.set_message(progress.what.to_string());
+        bar.set_message(progress.step.to_string());
         signals.caught().is_none()
     })
     .map_err(|e| failed(format!("cannot start {threads} threads: {e}; try fewer by --threads")))?;
@@ -92,7 +83,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     }
 }
 
-/// Kinds of drawings.
+/// File formats of plots.
 enum Drawing {
     Svg,
     Png,
@@ -124,9 +115,9 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         .map_err(|e| Failure::Failed(format!("cannot write {}: {e}", path.display())))
 }
 
-/// The reference out of an EXR file.
+/// Reads the reference from an EXR file.
 fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Reference, Failure> {
-    let failed = |why: String| Failure::Failed(format!("{}: {why}", path.display()));
+    let failed = |reason: String| Failure::Failed(format!("{}: {reason}", path.display()));
     let read = film::read_exr(path).map_err(failed)?;
     let [width, height] = read.size;
     if read.size != size.map(|n| n as usize) {

@@ -1,27 +1,27 @@
-//! A measurement for people.
+//! A measurement as a table of text.
 
 use crate::measure::{Experiment, Measured, Measurement, Steadiness, TimeToTarget, median};
 use std::fmt;
 use std::path::Path;
 
-/// A measurement with what it was made on.
+/// A measurement with its scene and machine.
 pub struct About<'a> {
     pub scene: &'a Path,
     pub threads: usize,
     pub lanes: &'static str,
-    /// Whether the scene is traced in single precision.
+    /// The scene is traced in single precision.
     pub single: bool,
     pub measurement: &'a Measurement,
 }
 
 impl About<'_> {
-    /// One line for a drawing.
+    /// Title of a plot.
     pub fn title(&self) -> String {
         let [width, height] = self.measurement.size;
         format!("{}, {width} x {height}, {} threads", self.scene.display(), self.threads)
     }
 
-    /// What it ran on.
+    /// Model of the processor and number of cores.
     pub fn machine(&self) -> String {
         let model = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
             let line = text.lines().find(|line| line.starts_with("model name"))?;
@@ -32,7 +32,7 @@ impl About<'_> {
     }
 }
 
-/// `1.2 s`, `35 ms`: three digits.
+/// Formats a time with three digits: `1.23 s`, `35.1 ms`.
 fn time(seconds: f64) -> String {
     match seconds {
         s if s < 0.9995 => format!("{:.*} ms", digits(1e3 * s), 1e3 * s),
@@ -41,7 +41,7 @@ fn time(seconds: f64) -> String {
     }
 }
 
-/// Digits after the point that make three in all.
+/// Number of decimals that makes three digits in all.
 fn digits(value: f64) -> usize {
     if value >= 99.95 {
         0
@@ -56,12 +56,12 @@ fn percent(share: f64) -> String {
     format!("±{:.0} %", 100.0 * share)
 }
 
-fn reached(crossing: &TimeToTarget) -> String {
-    let least = if crossing.at_most { "< " } else { "" };
-    format!("{least}{} {}", time(crossing.seconds), percent(crossing.spread))
+fn reached(target: &TimeToTarget) -> String {
+    let bound = if target.at_most { "< " } else { "" };
+    format!("{bound}{} {}", time(target.seconds), percent(target.spread))
 }
 
-/// Two times in the unit of the second: `12 to 30 s`.
+/// Formats two times, with one unit if they share it: `12 to 30 s`.
 fn between((low, high): (f64, f64)) -> String {
     let (low, high) = (time(low), time(high));
     match (low.split_once(' '), high.split_once(' ')) {
@@ -70,15 +70,15 @@ fn between((low, high): (f64, f64)) -> String {
     }
 }
 
-/// Times that are apart by more than this are not steady.
+/// Relative spread beyond which times count as unsteady.
 const UNSTEADY: f64 = 0.1;
-/// Others that took less than this share of the processors are not worth a word.
-const TAKEN: f64 = 0.03;
+/// Share of the processors beyond which the use by other programs is reported.
+const STOLEN: f64 = 0.03;
 
-/// What is to be said about times that are apart so far; `None`: nothing.
+/// Warning about unsteady times; `None` without a reason for one.
 fn caution(steadiness: &Steadiness) -> Option<String> {
-    let Steadiness { spread, stolen: taken, .. } = steadiness;
-    let others = taken.filter(|share| *share > TAKEN).map(|share| {
+    let Steadiness { spread, stolen, .. } = steadiness;
+    let others = stolen.filter(|share| *share > STOLEN).map(|share| {
         format!("other programs used up to {:.0} % of the processors meanwhile", 100.0 * share)
     });
     match (*spread > UNSTEADY, others) {
@@ -87,13 +87,13 @@ fn caution(steadiness: &Steadiness) -> Option<String> {
             Some(format!("These times are steady, but {others}: without them it is faster."))
         }
         (true, others) => {
-            let why = others.unwrap_or_else(|| {
+            let reason = others.unwrap_or_else(|| {
                 "too few runs fitted in, or the machine itself is now faster, now slower \
                  (a virtual machine, heat, a battery)"
                     .to_string()
             });
             Some(format!(
-                "Do not trust these times beyond their spread, up to {}: {why}.\n\
+                "Do not trust these times beyond their spread, up to {}: {reason}.\n\
                  Measure again when the machine has nothing else to do, or longer (--seconds). Errors and\n\
                  samples per pixel do not depend on that.",
                 percent(*spread)
@@ -118,7 +118,7 @@ impl fmt::Display for About<'_> {
         if m.reference_spp > 0.0 {
             writeln!(
                 f,
-                "Errors are against a reference of {:.0} samples per pixel, itself {:.3} codes off ({}); \
+                "Errors are against a reference of {:.0} samples per pixel, whose own error is {:.3} 8-bit levels ({}); \
                  against another\none they would be the same within {:.1} %.",
                 m.reference_spp,
                 m.reference_codes,
@@ -129,15 +129,15 @@ impl fmt::Display for About<'_> {
         let steadiness = m.steadiness();
         writeln!(
             f,
-            "Times are medians of {} runs or more, ± how far these are apart.",
+            "Times are medians of {} runs or more, ± their spread.",
             steadiness.repetitions
         )?;
         if let Some(words) = caution(&steadiness) {
             writeln!(f, "{words}")?;
         }
         let Some(default) = m.measured.first() else { return Ok(()) };
-        writeln!(f, "\nHow long to a given noise (RMSE as displayed, 8-bit codes)")?;
-        writeln!(f, "  {:>7}  {:>18}  {:>18}", "codes", "time", "samples per pixel")?;
+        writeln!(f, "\nTime to a given noise (RMSE as displayed, 8-bit levels)")?;
+        writeln!(f, "  {:>7}  {:>18}  {:>18}", "levels", "time", "samples per pixel")?;
         for target in &m.targets {
             let expected = m.expected.iter().find(|e| e.codes == *target);
             match (default.time_to(*target), expected) {
@@ -164,25 +164,25 @@ impl fmt::Display for About<'_> {
             )?;
         }
         if !m.expected.is_empty() {
-            writeln!(f, "  ~ was not waited for: expected from how the noise fell last")?;
+            writeln!(f, "  ~ extrapolated from the convergence so far")?;
         }
         let mut last = Experiment::Default;
         for measured in &m.measured[1..] {
-            if measured.topic != last {
-                last = measured.topic;
+            if measured.experiment != last {
+                last = measured.experiment;
                 self.heading(f, last)?;
-                self.row(f, &last.of_default(self.single, self.threads), default)?;
+                self.row(f, &last.default_name(self.single, self.threads), default)?;
             }
             self.row(f, &measured.name, measured)?;
         }
-        for topic in &m.idle {
-            writeln!(f, "\n{}: there is nothing to compare here", topic.question())?;
+        for experiment in &m.idle {
+            writeln!(f, "\n{}: nothing to compare in this scene", experiment.title())?;
         }
         if m.measured.iter().any(|m| m.bias.is_some()) {
             writeln!(
                 f,
-                "\noff by: what stays wrong however long it runs, as RMSE; z: by how many standard errors the \
-                 picture's\nmean brightness differs from the reference's (beyond 4 it is no chance)"
+                "\nbias: RMSE that remains at any number of samples, in 8-bit levels; z: difference of the mean \
+                 brightness\nfrom the reference's, in standard errors (significant beyond 4)"
             )?;
         }
         Ok(())
@@ -190,9 +190,14 @@ impl fmt::Display for About<'_> {
 }
 
 impl About<'_> {
-    fn heading(&self, f: &mut fmt::Formatter, topic: Experiment) -> fmt::Result {
-        writeln!(f, "\n{} (to {:.2} codes)", topic.question(), self.measurement.compared_at)?;
-        let last = if topic.unbiased() { "" } else { "   off by" };
+    fn heading(&self, f: &mut fmt::Formatter, experiment: Experiment) -> fmt::Result {
+        writeln!(
+            f,
+            "\n{} (to {:.2} 8-bit levels)",
+            experiment.title(),
+            self.measurement.compared_at
+        )?;
+        let last = if experiment.unbiased() { "" } else { "   bias" };
         writeln!(
             f,
             "  {:<18}  {:>14}  {:>9}  {:>9}  {:>9}{last}",
@@ -203,25 +208,25 @@ impl About<'_> {
     fn row(&self, f: &mut fmt::Formatter, name: &str, measured: &Measured) -> fmt::Result {
         let codes = self.measurement.compared_at;
         let default = self.measurement.measured[0].time_to(codes);
-        let own = measured.true_time_to(codes);
+        let reached_at = measured.true_time_to(codes);
         let followed = || measured.points.last().map_or(0.0, |p| median(&measured.seconds(p)));
-        let (time, speed) = match (&own, &default) {
-            (Some(own), Some(default)) => {
-                (reached(own), format!("{:.2}x", default.seconds / own.seconds))
+        let (time, speed) = match (&reached_at, &default) {
+            (Some(target), Some(default)) => {
+                (reached(target), format!("{:.2}x", default.seconds / target.seconds))
             }
-            (Some(own), None) => (reached(own), String::new()),
+            (Some(target), None) => (reached(target), String::new()),
             (None, Some(default)) => (
                 format!("> {}", time(followed())),
                 format!("< {:.2}x", default.seconds / followed()),
             ),
             (None, None) => (format!("> {}", time(followed())), String::new()),
         };
-        let spp = own.as_ref().map_or(String::new(), |c| format!("{:.0}", c.spp));
+        let spp = reached_at.as_ref().map_or(String::new(), |c| format!("{:.0}", c.spp));
         let rate = measured.samples_per_second().map_or(0.0, |(speed, _)| speed * 1e-6);
         write!(f, "  {name:<18}  {time:>14}  {speed:>9}  {spp:>9}  {rate:>9.1}")?;
         match measured.bias {
-            Some(b) if b.is_seen() => writeln!(f, "   {:.2} codes (z = {:.0})", b.codes, b.z),
-            Some(b) => writeln!(f, "   nothing to be seen (less than {:.2} codes)", b.least_codes),
+            Some(b) if b.is_seen() => writeln!(f, "   {:.2} levels (z = {:.0})", b.codes, b.z),
+            Some(b) => writeln!(f, "   not detectable (below {:.2} levels)", b.least_codes),
             None => writeln!(f),
         }
     }
@@ -241,21 +246,21 @@ mod tests {
     }
 
     #[test]
-    fn expected_times_have_one_unit_if_they_can() {
+    fn extrapolated_times_share_their_unit() {
         assert_eq!(between((12.0, 30.0)), "12.0 to 30.0 s");
         assert_eq!(between((40.0, 300.0)), "40.0 s to 5.0 min");
     }
 
     #[test]
-    fn unsteady_times_are_told_with_the_reason() {
-        let told = |spread, taken| caution(&Steadiness { repetitions: 3, spread, stolen: taken });
-        assert_eq!(told(0.04, Some(0.01)), None);
-        assert_eq!(told(0.1, None), None);
-        let words = told(0.04, Some(0.5)).unwrap();
+    fn unsteady_times_are_reported_with_the_reason() {
+        let warning = |spread, stolen| caution(&Steadiness { repetitions: 3, spread, stolen });
+        assert_eq!(warning(0.04, Some(0.01)), None);
+        assert_eq!(warning(0.1, None), None);
+        let words = warning(0.04, Some(0.5)).unwrap();
         assert!(words.contains("50 %") && words.contains("steady"), "{words}");
-        let words = told(0.18, Some(0.23)).unwrap();
+        let words = warning(0.18, Some(0.23)).unwrap();
         assert!(words.contains("±18 %") && words.contains("other programs used up to 23 %"));
-        let words = told(0.18, Some(0.0)).unwrap();
+        let words = warning(0.18, Some(0.0)).unwrap();
         assert!(words.contains("±18 %") && !words.contains("other programs"), "{words}");
     }
 }

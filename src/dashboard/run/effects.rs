@@ -3,9 +3,10 @@
 use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport, stem};
 use crate::dashboard::run::file_worker::Files;
+use crate::film::LinearImage;
+use crate::render::Options;
 use crate::render::schedule::Settings;
 use crate::render::session::{Session, View};
-use crate::render::{Options, RenderState};
 use crate::scene::{Scene, SceneFile};
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::io;
@@ -32,7 +33,7 @@ pub struct EffectSetup {
 
 /// The renderer, the files, and what is being written.
 pub struct EffectRunner {
-    session: Session<RenderState>,
+    session: Session,
     files: Files,
     studio: Exporter,
     sized: Option<ResizedExport>,
@@ -79,7 +80,7 @@ impl EffectRunner {
     }
 
     /// The renderer.
-    pub fn session(&self) -> &Session<RenderState> {
+    pub fn session(&self) -> &Session {
         &self.session
     }
 
@@ -131,7 +132,7 @@ impl EffectRunner {
                 let results = self.results.clone();
                 self.session.submit(move |film| {
                     if let Some((rendering, report)) = film {
-                        let picture = rendering.film.linear(&rendering.mix);
+                        let picture = LinearImage::of_film(&rendering.film, &rendering.mix);
                         let _ = results.send(Message::Kept(Arc::new(picture), report.spp.mean));
                     }
                 });

@@ -6,7 +6,7 @@ use crate::dashboard::run::paths;
 use crate::film::{Depth, Display, ImageOutput};
 use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Settings, Stop};
-use crate::render::session::{RenderBackend, Report, Session, State};
+use crate::render::session::{Report, Session, State};
 use crate::render::{Options, RenderState};
 use crate::sampling::SamplerKind;
 use crate::scene::{Document, Scene};
@@ -149,7 +149,7 @@ fn render(
 ) -> Option<Result<Exported, String>> {
     let options = Options { display: order.display, ..order.options };
     let settings = Settings { stop: order.stop, ..order.settings };
-    let mut session: Session<RenderState> = match Session::new(order.threads, options, settings) {
+    let mut session: Session = match Session::new(order.threads, options, settings) {
         Ok(session) => session,
         Err(error) => return Some(Err(format!("no threads to render with: {error}"))),
     };

@@ -1,33 +1,35 @@
-//! What a session tells its guests.
+//! Progress report of a session.
 
 use crate::film::Noise;
 use crate::render::schedule::{Spp, StoppedBy};
 use std::sync::Arc;
 
-/// The noise, in codes, of the qualities that a user chooses from: halves of one another.
+/// Noise targets that a user chooses from, in 8-bit levels; each is half of the one before.
 pub const QUALITIES: [f64; 6] = [4.0, 2.0, 1.0, 0.5, 0.25, 0.125];
 
-/// What the session is doing.
+/// State of a session.
 #[derive(Clone, Debug, PartialEq)]
 pub enum State {
-    /// It has no scene yet.
+    /// No scene yet.
     Idle,
     /// Samples are being added.
     Tracing,
-    /// The work is done.
+    /// A stop criterion is reached.
     Finished(StoppedBy),
-    /// A guest asked for a pause.
+    /// Paused by the client.
     Paused,
-    /// The newest scene cannot be rendered, and why.
+    /// The newest scene cannot be rendered, for this reason.
     Failed(String),
 }
 
-/// Where the work stands.
+/// Progress of the render of one scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// Which scene this is about: what [`Session::set_scene`](crate::render::session::Session::set_scene) returned.
+    /// Generation of the scene, as returned by [`Session::set_scene`].
+    ///
+    /// [`Session::set_scene`]: crate::render::session::Session::set_scene
     pub generation: u64,
-    /// What the session is doing.
+    /// State of the session.
     pub state: State,
     /// Samples per pixel that both replicates have.
     pub spp: Spp,
@@ -37,23 +39,24 @@ pub struct Report {
     pub rays: u64,
     /// Seconds spent on tracing this scene, without compilation and pauses.
     pub seconds: f64,
-    /// Seconds that the compilation of the scene took.
+    /// Duration of the scene's compilation.
     pub compile_seconds: f64,
-    /// Seconds from taking up the scene to its first complete picture.
+    /// Seconds from the start of the compilation to the first complete picture.
     pub first_picture_seconds: Option<f64>,
     /// Estimated error.
     pub noise: Option<Noise>,
-    /// A lower and an upper guess of the seconds left.
+    /// Lower and upper estimate of the seconds left.
     pub eta_seconds: Option<(f64, f64)>,
-    /// The same for each of the [`QUALITIES`], whatever the targets are.
+    /// Lower and upper estimate of the seconds left until each of the [`QUALITIES`] is reached,
+    /// whatever the stop criteria are.
     pub quality_seconds: [Option<(f64, f64)>; QUALITIES.len()],
     /// Share of the work that is done, 0..=1.
     pub progress: Option<f64>,
-    /// Samples that were lost because they were no numbers or negative.
+    /// Samples left out because they were NaN, infinite or negative.
     pub bad_samples: u64,
-    /// Samples that were brighter than the film holds, and so have the largest value that it does.
+    /// Samples brighter than the film can hold; they are stored with its largest value.
     pub saturated_samples: u64,
-    /// Pixels whose sum of samples is full, and so lower than it should be.
+    /// Pixels whose sum of samples has reached its limit and is too low.
     pub saturated_pixels: u64,
     /// Speed of the last second of tracing, samples per second; 0 before it is known.
     pub recent_samples_per_second: f64,
@@ -61,12 +64,12 @@ pub struct Report {
     pub threads: usize,
     /// Name of the lane type, such as `f32x8`; empty without a scene.
     pub lanes: &'static str,
-    /// What the compiled scene contains, in one line; empty without a scene.
+    /// Contents of the compiled scene, in one line; empty without a scene.
     pub inventory: Arc<str>,
 }
 
 impl Report {
-    /// About no scene.
+    /// Report without a scene.
     pub(super) fn idle(threads: usize) -> Self {
         Self {
             generation: 0,
@@ -91,7 +94,7 @@ impl Report {
         }
     }
 
-    /// What was changed of the samples, in words; nothing, if nothing was.
+    /// One phrase for each kind of sample that was left out or clamped.
     pub fn warnings(&self) -> Vec<String> {
         let plural = |n: u64, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
         let mut out = Vec::new();

@@ -1,4 +1,4 @@
-//! What a session shows its guests.
+//! Snapshots: the picture and progress that a session publishes.
 
 use crate::film::{
     DirtyTile, Display, Film, IncrementalDownsample, LightWeights, Probe, Thumbnail,
@@ -10,39 +10,39 @@ use crate::scene::Scene;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What snapshots are to contain.
+/// Requested contents of snapshots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct View {
-    /// Columns and rows of the raster for [`Snapshot::picture`] and [`Snapshot::guide`]; `None`: no
-    /// picture, no guide, no tile maps.
+    /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::guide`]; `None`: no picture, no
+    /// feature buffer, no tile maps.
     pub raster: Option<[usize; 2]>,
-    /// Column and row of the film's pixel to look at closely.
+    /// Column and row of the film's pixel to probe.
     pub probe: Option<[usize; 2]>,
 }
 
-/// The state of the work at one moment. All of it is about the scene of `report.generation`.
+/// The state of a render at one moment. All fields describe the scene of `report.generation`.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// Where the work stands.
+    /// Progress of the render.
     pub report: Report,
-    /// Means per light group over the cells of the guest's raster, to be mixed by the guest; `None`:
-    /// not asked for, or there is no film.
+    /// Means per light group over the cells of [`View::raster`], to be weighted by the client; `None`
+    /// if not requested, or without a film.
     pub picture: Option<Thumbnail>,
-    /// The mix of the scene; empty without a film.
+    /// Light weights of the scene; empty without a film.
     pub mix: LightWeights,
-    /// How the picture is mixed for other scenes; `None`: there is no film.
+    /// Light weights for other scenes; `None` without a film.
     pub lighting: Option<Arc<Relighting>>,
-    /// What is seen in each cell of the guest's raster. May come a snapshot later than the first
-    /// picture, if it takes long.
+    /// First hit in each cell of [`View::raster`]. A slow one comes a snapshot later than the first
+    /// picture.
     pub guide: Option<Arc<FeatureBuffer>>,
     /// Error and samples of each tile.
     pub tiles: Arc<TileMaps>,
-    /// The pixel that the guest asked for; `None` also if it lies outside of the film.
+    /// The requested pixel; `None` if it lies outside of the film.
     pub probe: Option<Probe>,
 }
 
 impl Snapshot {
-    /// A report without a film.
+    /// Snapshot of a report without a film.
     pub(super) fn without_film(report: Report) -> Self {
         Self {
             report,
@@ -55,8 +55,8 @@ impl Snapshot {
         }
     }
 
-    /// The mix in which this picture shows `scene`, which may be newer than the snapshot; `None`: it
-    /// needs samples of its own, and this picture can only be shown in its own [`Snapshot::mix`].
+    /// Light weights with which this picture shows `scene`, which may be newer than the snapshot.
+    /// `None` if the scene needs samples of its own; the picture then fits only [`Snapshot::mix`].
     pub fn mix_for(&self, scene: &Scene) -> Option<LightWeights> {
         self.lighting.as_ref()?.mix(scene)
     }
@@ -70,7 +70,7 @@ pub struct TileMaps {
     pub columns: usize,
     /// Rows of tiles.
     pub rows: usize,
-    /// Estimated RMSE in codes; empty before the first estimate.
+    /// Estimated RMSE in 8-bit levels; empty before the first estimate.
     pub noise_codes: Vec<f32>,
     /// Samples per pixel, A and B together.
     pub spp: Vec<u32>,
@@ -87,7 +87,7 @@ impl TileMaps {
     }
 }
 
-/// What snapshots of one film share.
+/// Fields that all snapshots of one film share.
 pub(super) struct Frame {
     pub view: View,
     pub mix: LightWeights,
@@ -97,30 +97,31 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The film as it is now. `raster` remembers what it has seen of the film.
+    /// Snapshot of the current film. `downsample` caches the tiles that it has read.
     pub fn snapshot(
         &self,
         film: &Film,
         noise_codes: Vec<f32>,
         report: Report,
-        raster: &mut Option<IncrementalDownsample>,
+        downsample: &mut Option<IncrementalDownsample>,
         pool: &rayon::ThreadPool,
     ) -> Snapshot {
         let picture = self.view.raster.map(|[columns, rows]| {
-            let known = raster.take().filter(|raster| raster.is_for(film, columns, rows));
-            let raster = raster
-                .insert(known.unwrap_or_else(|| IncrementalDownsample::new(film, columns, rows)));
-            let stale = raster.stale(film);
+            let cached = downsample.take().filter(|cached| cached.is_for(film, columns, rows));
+            let downsample = downsample
+                .insert(cached.unwrap_or_else(|| IncrementalDownsample::new(film, columns, rows)));
+            let stale = downsample.stale(film);
             if !stale.is_empty() {
                 pool.install(|| stale.into_par_iter().for_each(DirtyTile::refresh));
             }
-            raster.thumbnail()
+            downsample.thumbnail()
         });
         let tiles = match self.view.raster {
             Some(_) => Arc::new(TileMaps::of(film, noise_codes)),
             None => Arc::default(),
         };
-        let probe = self.view.probe.and_then(|at| film.probe(at, &self.mix, &self.display));
+        let probe =
+            self.view.probe.and_then(|pixel| Probe::of_film(film, pixel, &self.mix, &self.display));
         Snapshot {
             report,
             picture,
@@ -133,7 +134,7 @@ impl Frame {
     }
 }
 
-/// A place for one snapshot: a newer one replaces what has not been taken.
+/// Slot for one snapshot; a newer one replaces an untaken one.
 #[derive(Debug, Default)]
 pub(super) struct Slot(Mutex<Option<Snapshot>>);
 
@@ -150,7 +151,7 @@ impl Slot {
         self.lock().is_none()
     }
 
-    /// A guest that panicked while it held the lock leaves a whole snapshot behind.
+    /// Ignores poisoning: a client that panicked while it held the lock leaves a whole snapshot.
     fn lock(&self) -> std::sync::MutexGuard<'_, Option<Snapshot>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -1,10 +1,13 @@
-//! The pool of threads that trace.
+//! Pool of the tracing threads.
 
 use std::io;
 
-/// A pool of `threads` threads. With a `niceness` above 0 they leave the processor to others: 19 only
-/// takes what nobody else wants. On Linux, where threads have priorities of their own; elsewhere, and
-/// if it is refused (it cannot rise above that of the process), it has no effect.
+/// Creates a pool of `threads` threads. A `niceness` above 0 lowers their priority; 19 leaves them
+/// the idle time of the processor. It takes effect on Linux, where threads have priorities of their
+/// own, unless the system refuses it (a priority cannot rise above that of the process).
+///
+/// # Errors
+/// Returns the error of the system that refuses to start a thread.
 pub(super) fn pool(threads: usize, niceness: i32) -> io::Result<rayon::ThreadPool> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -28,12 +31,12 @@ fn lower_priority(_: i32) {}
 #[cfg(all(test, target_os = "linux"))]
 mod tests {
     #[test]
-    fn threads_are_as_nice_as_asked_for_and_others_stay() {
-        let own = rustix::process::getpriority_process(None).unwrap();
-        let wanted = (own + 3).min(19);
-        let pool = super::pool(2, wanted).unwrap();
+    fn niceness_applies_to_the_threads_of_the_pool_only() {
+        let inherited = rustix::process::getpriority_process(None).unwrap();
+        let requested = (inherited + 3).min(19);
+        let pool = super::pool(2, requested).unwrap();
         let nice = pool.broadcast(|_| rustix::process::getpriority_process(None).unwrap());
-        assert_eq!(nice, [wanted; 2]);
-        assert_eq!(rustix::process::getpriority_process(None).unwrap(), own);
+        assert_eq!(nice, [requested; 2]);
+        assert_eq!(rustix::process::getpriority_process(None).unwrap(), inherited);
     }
 }

@@ -1,22 +1,22 @@
-//! How fast the work has gone of late.
+//! Throughput meter: samples per second over the latest second of tracing.
 
 use std::collections::VecDeque;
 
-/// The speed is that of the last so many seconds of tracing.
+/// Length of the measured window, in seconds of tracing.
 const WINDOW_SECONDS: f64 = 1.0;
 
-/// Samples against seconds of tracing, over the last second.
+/// Sample counts at the moments of the latest [`WINDOW_SECONDS`].
 #[derive(Debug, Default)]
 pub(super) struct Throughput {
-    /// Seconds and samples since the beginning, oldest first.
+    /// Seconds and samples since the start, oldest first.
     marks: VecDeque<(f64, u64)>,
 }
 
 impl Throughput {
-    /// Notes that `samples` samples have been traced in the first `seconds` seconds.
-    pub fn note(&mut self, seconds: f64, samples: u64) {
+    /// Records that `samples` samples have been traced in the first `seconds` seconds.
+    pub fn record(&mut self, seconds: f64, samples: u64) {
         self.marks.push_back((seconds, samples));
-        while self.marks.get(1).is_some_and(|(at, _)| *at <= seconds - WINDOW_SECONDS) {
+        while self.marks.get(1).is_some_and(|(time, _)| *time <= seconds - WINDOW_SECONDS) {
             self.marks.pop_front();
         }
     }
@@ -33,16 +33,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_second_counts() {
-        let mut pace = Throughput::default();
-        assert_eq!(pace.samples_per_second(), None);
-        pace.note(0.0, 0);
-        assert_eq!(pace.samples_per_second(), None);
-        pace.note(0.25, 100);
-        assert_eq!(pace.samples_per_second(), Some(400.0));
+    fn throughput_is_that_of_the_last_second() {
+        let mut throughput = Throughput::default();
+        assert_eq!(throughput.samples_per_second(), None);
+        throughput.record(0.0, 0);
+        assert_eq!(throughput.samples_per_second(), None);
+        throughput.record(0.25, 100);
+        assert_eq!(throughput.samples_per_second(), Some(400.0));
         // Ten times as fast from here on.
-        (1..=20).for_each(|i| pace.note(0.25 + 0.25 * f64::from(i), 100 + 1000 * i as u64));
-        assert_eq!(pace.samples_per_second(), Some(4000.0));
-        assert!(pace.marks.len() < 10);
+        (1..=20).for_each(|i| throughput.record(0.25 + 0.25 * f64::from(i), 100 + 1000 * i as u64));
+        assert_eq!(throughput.samples_per_second(), Some(4000.0));
+        assert!(throughput.marks.len() < 10);
     }
 }

@@ -1,47 +1,49 @@
-//! The session's thread: takes in commands, decides what is done next.
+//! The session's thread: takes in commands and chooses the next piece of work.
 
 use crate::film::Display;
+use crate::render::Options;
 use crate::render::schedule::{Settings, Step, Stop};
 use crate::render::session::active_render::{ActiveRender, WorkContext};
 use crate::render::session::report::{Report, State};
 use crate::render::session::snapshot::{Snapshot, View};
-use crate::render::session::{Command, RenderBackend, Shared, Task};
+use crate::render::session::{Command, Shared, Task};
 use crate::scene::Scene;
 use crossbeam_channel::{Receiver, Sender};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-pub(super) struct Worker<T: RenderBackend> {
-    inbox: Receiver<Command<T>>,
+pub(super) struct Worker {
+    inbox: Receiver<Command>,
     notify: Sender<()>,
     shared: Arc<Shared>,
     pool: rayon::ThreadPool,
-    options: T::Options,
+    options: Options,
     settings: Settings,
-    /// The newest scene and its number.
+    /// The newest scene and its generation.
     newest: Option<(u64, Arc<Scene>)>,
-    /// The newest scene has not been taken up yet.
+    /// The newest scene has not been started yet.
     pending: bool,
-    /// It is to begin with an empty film.
-    afresh: bool,
-    tasks: Vec<Task<T>>,
+    /// The newest scene starts with an empty film.
+    restart: bool,
+    tasks: Vec<Task>,
     paused: bool,
     view: View,
-    work: Result<Option<ActiveRender<T>>, String>,
-    /// What is going on, as far as the last step told.
+    /// The active render; `Err` holds the reason why the newest scene cannot be rendered.
+    work: Result<Option<ActiveRender>, String>,
+    /// State after the latest step.
     state: State,
-    /// There is nothing to do before the next command.
+    /// Nothing is left to do before the next command.
     idle: bool,
 }
 
-impl<T: RenderBackend> Worker<T> {
+impl Worker {
     pub fn new(
-        inbox: Receiver<Command<T>>,
+        inbox: Receiver<Command>,
         notify: Sender<()>,
         shared: Arc<Shared>,
         pool: rayon::ThreadPool,
-        options: T::Options,
+        options: Options,
         settings: Settings,
     ) -> Self {
         Self {
@@ -53,7 +55,7 @@ impl<T: RenderBackend> Worker<T> {
             settings,
             newest: None,
             pending: false,
-            afresh: false,
+            restart: false,
             tasks: Vec::new(),
             paused: false,
             view: View::default(),
@@ -73,9 +75,9 @@ impl<T: RenderBackend> Worker<T> {
         }
     }
 
-    /// Takes in all commands; waits for one if there is nothing to do.
+    /// Takes in all commands; waits for one if there is nothing left to do.
     fn listen(&mut self) -> ControlFlow<()> {
-        // The marks first, then the inbox: see the module's description.
+        // The flags first, then the inbox: see the module's description.
         self.shared.cancel_wave.swap(false, Ordering::AcqRel);
         self.shared.cancel_first_pass.swap(false, Ordering::AcqRel);
         if self.idle {
@@ -90,16 +92,16 @@ impl<T: RenderBackend> Worker<T> {
         ControlFlow::Continue(())
     }
 
-    fn apply(&mut self, command: Command<T>) -> ControlFlow<()> {
+    fn apply(&mut self, command: Command) -> ControlFlow<()> {
         match command {
             Command::Scene(generation, scene) => {
                 self.newest = Some((generation, scene));
                 self.pending = true;
             }
-            Command::Restart(number) => {
-                if let Some((generation, _)) = &mut self.newest {
-                    *generation = number;
-                    (self.pending, self.afresh) = (true, true);
+            Command::Restart(generation) => {
+                if let Some((newest, _)) = &mut self.newest {
+                    *newest = generation;
+                    (self.pending, self.restart) = (true, true);
                 }
             }
             Command::Pause(paused) => self.paused = paused,
@@ -109,7 +111,7 @@ impl<T: RenderBackend> Worker<T> {
             Command::Pool(pool) => {
                 self.pool = pool;
                 if let Ok(Some(work)) = &mut self.work {
-                    work.forget_pace();
+                    work.reset_throughput();
                 }
             }
             Command::Task(task) => self.tasks.push(task),
@@ -126,26 +128,28 @@ impl<T: RenderBackend> Worker<T> {
     }
 
     fn set_display(&mut self, display: Display) {
-        *T::display_of(&mut self.options) = display;
+        self.options.display = display;
         if let Ok(Some(work)) = &mut self.work
-            && work.traced.display() != display
+            && work.state.display() != display
         {
-            work.traced.set_display(display);
+            work.state.set_display(display);
             work.invalidate_estimates();
         }
     }
 
     fn start_newest(&mut self) {
         let Some((_, scene)) = &self.newest else { return };
-        let afresh = std::mem::take(&mut self.afresh);
+        let restart = std::mem::take(&mut self.restart);
         if let Ok(Some(work)) = &mut self.work
-            && !afresh
+            && !restart
             && work.try_reuse(scene)
         {
             return;
         }
-        let before = std::mem::replace(&mut self.work, Ok(None)).ok().flatten();
-        self.work = ActiveRender::begin(scene, &self.options, self.settings, before).map(Some);
+        #[cfg(test)]
+        self.shared.compilations.fetch_add(1, Ordering::SeqCst);
+        let previous = std::mem::replace(&mut self.work, Ok(None)).ok().flatten();
+        self.work = ActiveRender::start(scene, &self.options, self.settings, previous).map(Some);
     }
 
     fn run_tasks(&mut self) {
@@ -154,11 +158,11 @@ impl<T: RenderBackend> Worker<T> {
         }
         let tasks = std::mem::take(&mut self.tasks);
         let film = match &self.work {
-            Ok(Some(work)) => Some((&work.traced, work.report(&self.site(), self.state.clone()))),
+            Ok(Some(work)) => Some((&work.state, work.report(&self.context(), self.state.clone()))),
             _ => None,
         };
         for task in tasks {
-            task(film.as_ref().map(|(traced, report)| (*traced, report)));
+            task(film.as_ref().map(|(state, report)| (*state, report)));
         }
     }
 
@@ -166,7 +170,7 @@ impl<T: RenderBackend> Worker<T> {
         self.newest.as_ref().map_or(0, |(generation, _)| *generation)
     }
 
-    fn site(&self) -> WorkContext<'_> {
+    fn context(&self) -> WorkContext<'_> {
         WorkContext {
             pool: &self.pool,
             shared: &self.shared,
@@ -176,10 +180,10 @@ impl<T: RenderBackend> Worker<T> {
         }
     }
 
-    /// One piece of work, or none if there is nothing to do.
+    /// Does one piece of work, or none if nothing is left to do.
     fn advance(&mut self) {
         let generation = self.generation();
-        let site = WorkContext {
+        let context = WorkContext {
             pool: &self.pool,
             shared: &self.shared,
             notify: &self.notify,
@@ -190,20 +194,20 @@ impl<T: RenderBackend> Worker<T> {
         let work = match &mut self.work {
             Ok(Some(work)) => work,
             Ok(None) => return,
-            Err(why) => {
-                self.state = State::Failed(why.clone());
+            Err(reason) => {
+                self.state = State::Failed(reason.clone());
                 let idle = Report::idle(self.pool.current_num_threads());
                 let report = Report { generation, state: self.state.clone(), ..idle };
-                site.put(Snapshot::without_film(report));
+                context.put(Snapshot::without_film(report));
                 return;
             }
         };
         // The first picture of a scene is shown even in a pause.
-        let paused = self.paused && work.first_picture.is_some();
-        if work.misjudged {
-            // The new look is shown at once, its noise as soon as it is known.
+        let paused = self.paused && work.first_picture_after.is_some();
+        if work.estimates_stale {
+            // The picture is published at once, its noise as soon as it is estimated.
             self.state = if paused { State::Paused } else { State::Tracing };
-            work.publish(&site, self.state.clone(), true);
+            work.publish(&context, self.state.clone(), true);
             if !work.reestimate(&self.pool, &self.shared.cancel_wave) {
                 self.idle = false;
                 return;
@@ -215,12 +219,12 @@ impl<T: RenderBackend> Worker<T> {
             match work.schedule.next(work.seconds()) {
                 Step::Finished(reason) => State::Finished(reason),
                 Step::Trace(wave) => {
-                    work.trace(wave, &site);
+                    work.trace(wave, &context);
                     self.idle = false;
                     State::Tracing
                 }
             }
         };
-        work.publish(&site, self.state.clone(), self.idle);
+        work.publish(&context, self.state.clone(), self.idle);
     }
 }

@@ -3,6 +3,7 @@
 //! Björn Ottosson, "A perceptual color space for image processing" (2020), with the matrices for
 //! linear sRGB as he published them in 2021.
 
+use crate::value::linear_from_srgb;
 use std::sync::LazyLock;
 
 /// A colour.
@@ -17,12 +18,8 @@ pub struct Oklab {
 }
 
 /// Linear light, 0..=1, of 8-bit sRGB codes (IEC 61966-2-1).
-static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|code| {
-        let v = code as f64 / 255.0;
-        (if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }) as f32
-    })
-});
+static LINEAR: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f64 / 255.0) as f32));
 
 /// Linear light, 0..=1, of 8-bit sRGB.
 pub(crate) fn linear(rgb: [u8; 3]) -> [f32; 3] {

@@ -6,9 +6,9 @@ use crate::dashboard::model::{Colors, Model};
 use crate::dashboard::view::tests::drawn;
 use crate::dashboard::view::tests::states::{STATES, tracing};
 use crate::film::Display;
+use crate::render::Options;
 use crate::render::schedule::{Criterion, Settings, Stop};
 use crate::render::session::{Session, Snapshot, State, View};
-use crate::render::{Options, RenderState};
 use crate::sampling::{SampleSettings, SamplerKind};
 use crate::terminal::diff::Encoder;
 use crate::world;
@@ -25,7 +25,7 @@ fn rendered(model: &Model, spp: u32) -> Snapshot {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let settings =
         Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
-    let mut session: Session<RenderState> = Session::new(2, options, settings).unwrap();
+    let mut session = Session::new(2, options, settings).unwrap();
     session.set_view(View { raster: Some(model.layout().unwrap().raster), probe: model.probe });
     session.set_scene(Arc::clone(model.scene()));
     loop {

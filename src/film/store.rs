@@ -1,7 +1,10 @@
 //! The film: tiles of integer sums, restarted lazily, added exactly.
 
 use crate::film::TILE;
+use crate::film::display::Display;
 use crate::film::invalid::InvalidSamples;
+use crate::film::light_weights::{LightWeights, Replicates, Sums};
+use crate::film::noise::{Estimator, Noise};
 use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::fmt;
 
@@ -220,6 +223,51 @@ impl Film {
             (counts[0] + counts[1]) * (width * height) as u64 + lattice as u64
         };
         self.touched().map(|(_, tile)| of_tile(tile)).sum()
+    }
+
+    /// Radiance of the pixel in column `x`, row `y`: the mean over all its samples of both
+    /// replicates; black without samples.
+    ///
+    /// # Panics
+    /// If there is no such pixel.
+    pub fn pixel(&self, x: usize, y: usize, weights: &LightWeights) -> [f64; 3] {
+        assert!(x < self.width() && y < self.height(), "pixel ({x}, {y}) of the film");
+        let index = y / TILE * self.tile_columns() + x / TILE;
+        let pixel = y % TILE * TILE + x % TILE;
+        let per_unit = weights.radiance_per_step(self.scales());
+        self.tile(index).map_or([0.0; 3], |tile| tile.sums(pixel).mean(Replicates::Both, &per_unit))
+    }
+
+    /// Writes the radiance of row `y` to `row`, which is resized to the film's width.
+    pub fn row(
+        &self,
+        y: usize,
+        replicates: Replicates,
+        weights: &LightWeights,
+        row: &mut Vec<[f64; 3]>,
+    ) {
+        row.clear();
+        row.resize(self.width(), [0.0; 3]);
+        let per_unit = weights.radiance_per_step(self.scales());
+        self.visit_row(y, |x, sums| row[x] = sums.mean(replicates, &per_unit));
+    }
+
+    /// Calls `f` with the column and the sums of each pixel of row `y` in touched tiles.
+    pub(super) fn visit_row(&self, y: usize, mut f: impl FnMut(usize, Sums)) {
+        let columns = self.tile_columns();
+        for column in 0..columns {
+            let Some(tile) = self.tile(y / TILE * columns + column) else { continue };
+            for x in 0..tile.extent()[0] {
+                f(column * TILE + x, tile.sums(y % TILE * TILE + x));
+            }
+        }
+    }
+
+    /// Estimated error of the picture; `None` while a tile has unequal numbers of samples in A and B.
+    pub fn noise(&self, weights: &LightWeights, display: &Display) -> Option<Noise> {
+        let estimator = Estimator::new(self.scales(), weights, display);
+        let noise_of_tile = |index| self.tile(index).and_then(|tile| estimator.tile(tile));
+        Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }
 
     /// Bad samples since the last restart.
