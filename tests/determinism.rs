@@ -1,16 +1,16 @@
 //! A sample is a pure function of seed, pixel, replicate and index: the film is the same bytes
 //! whichever thread traced it, in whatever order, in packets of whatever form, in whatever parts.
 
+#[path = "common/report.rs"]
+mod report;
 mod support;
-#[path = "common/told.rs"]
-mod told;
 
+use report::report;
 use std::fs;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use support::{Rng, all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
-use told::told;
 use zerkalo::film::Film;
 use zerkalo::render::RenderState;
 use zerkalo::render::session::RenderBackend;
@@ -73,7 +73,7 @@ fn extreme_29_determinism() {
             }
         }
     }
-    told(29, "both", "threads 1, 2, 7: the same bytes");
+    report(29, "both", "threads 1, 2, 7: the same bytes");
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn extreme_29_parts_added_in_any_order_are_the_whole() {
             }
         }
     }
-    told(29, "both", "parts in 6 orders: the same bytes");
+    report(29, "both", "parts in 6 orders: the same bytes");
 }
 
 /// A render that is stopped somewhere in a wave, and another one, begun anew, that traces what is left:
@@ -131,7 +131,7 @@ fn extreme_29_stopped_and_resumed() {
             }
         }
     }
-    told(29, "both", "stopped and resumed: the same bytes");
+    report(29, "both", "stopped and resumed: the same bytes");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::common::Numbers;
 use crate::rays::{Line, Met, blocked, closest};
-use crate::told::told;
+use crate::report::report;
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::primitive::{Aggregate, CsgSolid, CsgTree as Tree, Form};
@@ -199,8 +199,8 @@ fn extreme_08_parity() {
     assert!(seen > 150_000, "{seen} surfaces");
     // Single precision loses what is thinner than 2e-5 across, which a line here meets as seldom.
     assert!(odd * 10_000 <= asked, "single precision: {odd} of {asked} lines out of turn");
-    told(8, "double", &format!("0 of {asked} lines out of turn"));
-    told(8, "single", &format!("{odd} of {asked} lines out of turn"));
+    report(8, "double", &format!("0 of {asked} lines out of turn"));
+    report(8, "single", &format!("{odd} of {asked} lines out of turn"));
 }
 
 /// Whether surfaces are entered and left in turn.
@@ -277,6 +277,6 @@ fn extreme_09_csg_algebra() {
         let at_once = difference(vec![a(), b(), c]);
         same_surfaces(&named("(A - B) - C"), &steps, &at_once, &lines);
     }
-    told(9, "double", "surfaces the same");
-    told(9, "single", &format!("at most {most} of {} lines meet other surfaces", lines.len()));
+    report(9, "double", "surfaces the same");
+    report(9, "single", &format!("at most {most} of {} lines meet other surfaces", lines.len()));
 }

@@ -2,7 +2,7 @@
 
 use crate::common::Numbers;
 use crate::rays::{Line, any_line, ball, blocked, closest, every_kind, forms};
-use crate::told::{precision, told};
+use crate::report::{precision, report};
 use glam::DVec3;
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::primitive::{Aggregate, Form};
@@ -83,7 +83,7 @@ fn extreme_04_camera_inside() {
         }
     }
     assert!(every_kind().iter().any(|k| is_solid(&k.1)));
-    told(4, "both", &format!("0 wrong of 100,000 rays in each of {solids} solids"));
+    report(4, "both", &format!("0 wrong of 100,000 rays in each of {solids} solids"));
 }
 
 /// Where a line meets the closed box from -1 to 1, in exact integers scaled by `UNIT`: `None` if it
@@ -177,7 +177,7 @@ fn check_lattice<L: SimdFloat>() -> [usize; 3] {
         }
     }
     let asked = counts.iter().sum::<usize>();
-    told(6, precision::<L>(), &format!("0 wrong of {asked} rays"));
+    report(6, precision::<L>(), &format!("0 wrong of {asked} rays"));
     counts
 }
 
