@@ -3,7 +3,7 @@
 //! is 4 V / S (Cauchy, Crofton). Every registered kind is tested.
 
 use crate::common::Numbers;
-use crate::rays::{Line, ball, closest, every_kind};
+use crate::rays::{Line, bounding_sphere, closest, every_kind};
 use crate::report::{LEFT_TO_DOUBLE, report};
 use glam::{DMat3, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -204,7 +204,7 @@ fn extreme_07_cauchy() {
     let mut odd = 0;
     for (i, (name, form)) in every_kind().into_iter().enumerate() {
         let (Some((center, radius)), Some((surface, volume))) =
-            (ball(&form), surface_and_volume(&form))
+            (bounding_sphere(&form), surface_and_volume(&form))
         else {
             continue;
         };

@@ -1,7 +1,7 @@
 //! Cylinders, cones and what lies between, at their extremes.
 
 use crate::common::Numbers;
-use crate::rays::{Line, Met, closest};
+use crate::rays::{Line, LineHit, closest};
 use crate::report::{LEFT_TO_DOUBLE, precision, report};
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, SimdFloat, Single};
@@ -12,7 +12,7 @@ fn canonical(s: f64) -> Form {
     Form::conical_frustum(DAffine3::IDENTITY, s)
 }
 
-fn meet<L: SimdFloat>(form: &Form, lines: &[Line]) -> Vec<Option<Met>> {
+fn meet<L: SimdFloat>(form: &Form, lines: &[Line]) -> Vec<Option<LineHit>> {
     closest(&Aggregate::<L>::new(std::slice::from_ref(form)), lines)
 }
 
@@ -126,7 +126,7 @@ fn extreme_11_without_taper_it_is_the_cylinder() {
         let (a, b) = (meet::<Double>(&a, &lines), meet::<Double>(&b, &lines));
         assert!(a.iter().flatten().count() > 5_000, "{name}");
         for ((line, a), b) in lines.iter().zip(a).zip(b) {
-            let bits = |m: Met| (m.t.to_bits(), m.normal.to_array().map(f64::to_bits));
+            let bits = |m: LineHit| (m.t.to_bits(), m.normal.to_array().map(f64::to_bits));
             assert_eq!(a.map(bits), b.map(bits), "{name}: {line:?}");
         }
     }
