@@ -1,6 +1,7 @@
-//! Meshes: time to build the tree, memory, and closest hits per second of processor time on one core:
-//! camera rays (blocks of neighbouring pixels of a picture of 1024 x 1024) and rays between random
-//! points; then, for rays whose directions differ more and more, together and apart.
+//! Triangle meshes of three sizes: BVH build time, memory, and closest hits per second of processor time on
+//! one core. Camera rays are blocks of neighbouring pixels of a picture of 1024 x 1024; random rays join
+//! random points. The last part compares packet traversal with single-ray traversal for packets whose
+//! directions differ more and more.
 //!
 //! `cargo bench --bench mesh`; `-- --short` leaves out the last part.
 
@@ -15,13 +16,13 @@ use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
 use zerkalo::primitive::triangle_mesh;
 
-/// Random rays of each measurement.
+/// Number of random rays in each measurement.
 const RAYS: usize = 1 << 19;
 
-/// Width and height of the picture whose camera rays are traced.
+/// Width and height in pixels of the picture whose camera rays are traced.
 const SIDE: usize = 1024;
 
-/// A packet from one ray per lane: origin and direction.
+/// A packet whose lanes are calls of `ray`, which returns origin and direction.
 fn packet<L: SimdFloat>(mut ray: impl FnMut(usize) -> ([f64; 3], [f64; 3])) -> Ray<L> {
     let rays: Vec<_> = (0..L::WIDTH).map(&mut ray).collect();
     let vector = |v: [f64; 3]| v.map(L::Scalar::from_f64);
@@ -31,7 +32,7 @@ fn packet<L: SimdFloat>(mut ray: impl FnMut(usize) -> ([f64; 3], [f64; 3])) -> R
     }
 }
 
-/// Camera rays, a block of pixels two rows high in each packet.
+/// Camera rays; each packet is a block of pixels two rows high.
 fn camera<L: SimdFloat>() -> Vec<Ray<L>> {
     let (eye, across) = ([0.0, 0.0, 3.5], L::WIDTH / 2);
     let pixel = |i: usize| 2.2 * (i as f64 / SIDE as f64) - 1.1;
@@ -45,7 +46,8 @@ fn camera<L: SimdFloat>() -> Vec<Ray<L>> {
     corners.map(block).collect()
 }
 
-/// Rays whose directions differ by at most `spread` in a packet; above 1: by anything.
+/// Random rays. `spread` is the largest difference of directions within a packet; above 1 the rays of a
+/// packet are independent.
 fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
     let mut random = Random(7);
     (0..rays / L::WIDTH)
@@ -56,26 +58,27 @@ fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
                     ends = (random.point(1.6), random.point(0.9));
                     return (ends.0, towards(ends.0, ends.1));
                 }
-                let (d, turn) = (towards(ends.0, ends.1), random.point(0.5 * spread));
-                (ends.0, towards([0.0; 3], std::array::from_fn(|i| d[i] + turn[i])))
+                let (d, offset) = (towards(ends.0, ends.1), random.point(0.5 * spread));
+                (ends.0, towards([0.0; 3], std::array::from_fn(|i| d[i] + offset[i])))
             })
         })
         .collect()
 }
 
-/// Millions of rays per second; `how`: together, apart, or as the packet itself suggests.
-fn speed<L: SimdFloat>(mesh: &Mesh, rays: &[Ray<L>], how: Option<bool>) -> f64 {
+/// Millions of rays per second. `as_packet` selects packet traversal (`true`) or single-ray traversal
+/// (`false`); with `None` the traversal chooses by the packet's coherence.
+fn speed<L: SimdFloat>(mesh: &Mesh, rays: &[Ray<L>], as_packet: Option<bool>) -> f64 {
     let limit = L::from_f64(L::MAX);
     let seconds = in_turns(
         3,
         &mut [&mut || {
             let hits: u32 = rays
                 .iter()
-                .map(|ray| match how {
+                .map(|ray| match as_packet {
                     None => triangle_mesh::closest(mesh, ray, limit),
-                    Some(together) => triangle_mesh::closest_with(mesh, ray, limit, together),
+                    Some(as_packet) => triangle_mesh::closest_with(mesh, ray, limit, as_packet),
                 })
-                .map(|found| found.t.lt(limit).bits().count_ones())
+                .map(|hit| hit.t.lt(limit).bits().count_ones())
                 .sum();
             black_box(hits);
         }],
@@ -90,12 +93,12 @@ fn rays<L: SimdFloat>(mesh: &Mesh) -> [f64; 2] {
     [camera, random]
 }
 
-fn together_or_apart<L: SimdFloat>(mesh: &Mesh) {
-    print!("  {}, together or apart:", L::NAME);
+fn packet_or_single<L: SimdFloat>(mesh: &Mesh) {
+    print!("  {}, packet or single-ray traversal, by spread:", L::NAME);
     for spread in [0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 9.0] {
         let rays = scattered::<L>(spread, RAYS / 4);
-        let [together, apart] = [true, false].map(|how| speed(mesh, &rays, Some(how)));
-        print!("  {spread}: {together:.2} {apart:.2}");
+        let [packet, single] = [true, false].map(|as_packet| speed(mesh, &rays, Some(as_packet)));
+        print!("  {spread}: {packet:.2} {single:.2}");
     }
     println!();
 }
@@ -110,7 +113,7 @@ fn main() {
         let mesh = Mesh::new(triangles);
         let count = mesh.mesh().triangles.len();
         println!(
-            "{count} triangles: tree in {:.3} s, {:.1} bytes a triangle, depth {}",
+            "{count} triangles: BVH in {:.3} s, {:.1} bytes a triangle, depth {}",
             common::seconds(clock) - begin,
             mesh.bytes() as f64 / count as f64,
             mesh.boxes().depth()
@@ -118,8 +121,8 @@ fn main() {
         single.push(rays::<Single>(&mesh));
         rays::<Double>(&mesh);
         if !short {
-            together_or_apart::<Single>(&mesh);
-            together_or_apart::<Double>(&mesh);
+            packet_or_single::<Single>(&mesh);
+            packet_or_single::<Double>(&mesh);
         }
     }
     let ratio = |k: usize| single[0][k] / single[2][k];

@@ -1,12 +1,13 @@
-//! The map of the rooms in ARCHITECTURE.md, held: who may import whom, which room knows which crate,
-//! and how long a file may be.
+//! Guards of the map in ARCHITECTURE.md: the imports allowed between folders of `src`, and the folders in
+//! which each external crate may be used.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Every room and what it may import, from left to right: nothing looks left.
-const ROOMS: &[(&str, &[&str])] = &[
+/// Every folder of `src` and the folders that it may import. A folder imports only folders below it in this
+/// list.
+const FOLDERS: &[(&str, &[&str])] = &[
     ("main", &["command"]),
     (
         "command",
@@ -69,7 +70,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("lanes", &[]),
 ];
 
-/// Crates that only some rooms know.
+/// External crates and the folders that may use them.
 const CRATES: &[(&str, &[&str])] = &[
     ("base64", &["asset", "terminal"]),
     ("clap", &["command"]),
@@ -95,9 +96,9 @@ const CRATES: &[(&str, &[&str])] = &[
     ("serde_json", &["command"]),
     ("signal_hook", &["command", "dashboard"]),
     ("stl_io", &["asset"]),
-    // In `asset` only tests do.
+    // In `asset` only in tests.
     ("tempfile", &["film", "command", "scene", "dashboard", "asset"]),
-    // Descriptions read their own examples in tests.
+    // In descriptions only in tests, which parse their examples.
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),
     ("tobj", &["asset"]),
     ("toml_edit", &["scene"]),
@@ -106,7 +107,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("wide", &["lanes"]),
 ];
 
-/// Every Rust file under `folder`, with its text.
+/// Path and text of every Rust file under `folder`.
 fn files(folder: &str) -> Vec<(PathBuf, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut folders = vec![root.join(folder)];
@@ -126,15 +127,15 @@ fn files(folder: &str) -> Vec<(PathBuf, String)> {
     files
 }
 
-/// The room that a file under `src` belongs to; `lib.rs` belongs to none.
-fn room(path: &Path) -> Option<String> {
+/// The folder of a file under `src`. `main.rs` is a folder of its own; `lib.rs` belongs to none.
+fn folder_of(path: &Path) -> Option<String> {
     let inside = path.strip_prefix("src").ok()?;
     let first = inside.iter().next()?.to_str()?;
-    let room = first.strip_suffix(".rs").unwrap_or(first);
-    (room != "lib").then(|| room.to_string())
+    let folder = first.strip_suffix(".rs").unwrap_or(first);
+    (folder != "lib").then(|| folder.to_string())
 }
 
-/// The text without comments and strings, in which names would be no imports.
+/// `text` without comments and string literals, whose contents are no imports.
 fn code(text: &str) -> String {
     let mut code = String::new();
     let mut chars = text.chars().peekable();
@@ -154,7 +155,7 @@ fn code(text: &str) -> String {
                 }
                 code.push_str("\"\"");
             }
-            // Characters that would look like the beginning of a string or of an escape in one.
+            // Character literals that contain a quotation mark or an escape.
             '\'' if chars.peek() == Some(&'"') => drop(chars.next()),
             '\'' if chars.peek() == Some(&'\\') => drop(chars.nth(1)),
             _ => code.push(c),
@@ -163,20 +164,21 @@ fn code(text: &str) -> String {
     code
 }
 
-/// The first names after each `prefix` (`crate::`): one, or those of a group in braces.
+/// The first path segment after each `prefix` (such as `crate::`); for a group in braces, those of all its
+/// members.
 fn first_names(code: &str, prefix: &str) -> BTreeSet<String> {
     let name = |text: &str| {
         text.trim_start().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
     };
     let mut names = BTreeSet::new();
-    for (at, _) in code.match_indices(prefix) {
-        let before = code[..at].chars().next_back();
+    for (position, _) in code.match_indices(prefix) {
+        let before = code[..position].chars().next_back();
         if before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':' || c == '$') {
             continue;
         }
-        let rest = &code[at + prefix.len()..];
-        let Some(group) = rest.strip_prefix('{') else {
-            names.insert(name(rest));
+        let after = &code[position + prefix.len()..];
+        let Some(group) = after.strip_prefix('{') else {
+            names.insert(name(after));
             continue;
         };
         let mut depth = 0;
@@ -201,7 +203,7 @@ fn first_names(code: &str, prefix: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn names_are_found_where_they_import() {
+fn imported_names_are_found() {
     let source = r#"
         use crate::film::{Film, Mix};  // crate::comment
         use crate::{lanes, scene::{Scene, light}, value::Color};
@@ -213,29 +215,32 @@ fn names_are_found_where_they_import() {
 }
 
 #[test]
-fn the_map_has_no_way_back() {
-    for (i, (room, may)) in ROOMS.iter().enumerate() {
-        for other in *may {
-            let j = ROOMS.iter().position(|(r, _)| r == other);
-            assert!(j.is_some_and(|j| j > i), "`{room}` -> `{other}` looks left or nowhere");
+fn allowed_imports_run_one_way() {
+    for (i, (folder, allowed)) in FOLDERS.iter().enumerate() {
+        for imported in *allowed {
+            let j = FOLDERS.iter().position(|(f, _)| f == imported);
+            assert!(
+                j.is_some_and(|j| j > i),
+                "`{folder}` -> `{imported}` is unknown or runs upwards"
+            );
         }
     }
 }
 
 #[test]
-fn rooms_import_only_what_the_map_allows() {
+fn folders_import_only_what_the_map_allows() {
     let mut wrong = Vec::new();
     for (path, text) in files("src") {
-        let Some(room) = room(&path) else { continue };
-        let Some((_, may)) = ROOMS.iter().find(|(r, _)| *r == room) else {
-            wrong.push(format!("{}: the room `{room}` is not on the map", path.display()));
+        let Some(folder) = folder_of(&path) else { continue };
+        let Some((_, allowed)) = FOLDERS.iter().find(|(f, _)| *f == folder) else {
+            wrong.push(format!("{}: the folder `{folder}` is not on the map", path.display()));
             continue;
         };
         let code = code(&text);
-        let prefix = if room == "main" { "zerkalo::" } else { "crate::" };
-        for other in first_names(&code, prefix) {
-            if other != room && !may.contains(&other.as_str()) {
-                wrong.push(format!("{}: `{room}` may not import `{other}`", path.display()));
+        let prefix = if folder == "main" { "zerkalo::" } else { "crate::" };
+        for imported in first_names(&code, prefix) {
+            if imported != folder && !allowed.contains(&imported.as_str()) {
+                wrong.push(format!("{}: `{folder}` may not import `{imported}`", path.display()));
             }
         }
     }
@@ -243,19 +248,19 @@ fn rooms_import_only_what_the_map_allows() {
 }
 
 #[test]
-fn crates_are_known_only_where_the_map_says() {
+fn crates_are_used_only_where_the_map_allows() {
     let mut wrong = Vec::new();
     for (path, text) in files("src") {
-        let Some(room) = room(&path) else { continue };
+        let Some(folder) = folder_of(&path) else { continue };
         let code = code(&text);
-        for (name, rooms) in CRATES {
-            // A module of the same name inside the room (`film::png`) is not the crate.
-            let own = path.parent().unwrap().join(format!("{name}.rs"));
-            let is_module = Path::new(env!("CARGO_MANIFEST_DIR")).join(own).exists();
+        for (name, allowed) in CRATES {
+            // A sibling module of the same name (`film::png`) shadows the crate.
+            let module = path.parent().unwrap().join(format!("{name}.rs"));
+            let is_module = Path::new(env!("CARGO_MANIFEST_DIR")).join(module).exists();
             let used = !first_names(&code, &format!("{name}::")).is_empty()
                 || code.contains(&format!("use {name};"));
-            if used && !is_module && !rooms.contains(&room.as_str()) {
-                wrong.push(format!("{}: `{room}` may not know `{name}`", path.display()));
+            if used && !is_module && !allowed.contains(&folder.as_str()) {
+                wrong.push(format!("{}: `{folder}` may not use `{name}`", path.display()));
             }
         }
     }
@@ -266,10 +271,10 @@ fn crates_are_known_only_where_the_map_says() {
 fn every_guarded_crate_is_a_dependency() {
     let manifest = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")).unwrap();
     for (name, _) in CRATES {
-        let known = manifest.lines().any(|line| {
+        let is_dependency = manifest.lines().any(|line| {
             let key = line.split([' ', '=']).next().unwrap_or_default();
             key.replace('-', "_") == *name
         });
-        assert!(known, "`{name}` is guarded here but not in Cargo.toml");
+        assert!(is_dependency, "`{name}` is guarded here but not in Cargo.toml");
     }
 }

@@ -1,16 +1,16 @@
-//! A sample is a pure function of seed, pixel, replicate and index: the film is the same bytes
-//! whichever thread traced it, in whatever order, in packets of whatever form, in whatever parts.
+//! A sample is a pure function of seed, pixel, replicate and index. The bytes of the film do not depend on
+//! thread, order, packet layout or division into parts.
 
+#[path = "common/report.rs"]
+mod report;
 mod support;
-#[path = "common/told.rs"]
-mod told;
 
+use report::report;
 use std::fs;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use support::{Rng, all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
-use told::told;
 use zerkalo::film::Film;
 use zerkalo::render::RenderState;
 use zerkalo::scene::Scene;
@@ -18,10 +18,10 @@ use zerkalo::world::Precision;
 
 const PRECISIONS: [Precision; 2] = [Precision::Single, Precision::Double];
 const SEED: u64 = 29;
-/// Not a multiple of a tile: tiles at the edges are narrower than a packet.
+/// Film size that is not a multiple of the tile size; tiles at the edges are narrower than a packet.
 const SIZE: [u32; 2] = [37, 35];
 
-/// Scenes that between them have every lobe, highlight, kind of light, several light groups, and paths
+/// Scenes that together contain every lobe, highlight and kind of light, several light groups, and paths
 /// that branch.
 fn scenes() -> Vec<(String, Scene)> {
     [
@@ -36,12 +36,12 @@ fn scenes() -> Vec<(String, Scene)> {
 }
 
 /// The film of samples `0..count` of both replicates.
-fn whole(scene: &Scene, precision: Precision, count: u32) -> Film {
-    of_ranges(scene, precision, &[(0, count), (0, count)])
+fn film_of_samples(scene: &Scene, precision: Precision, count: u32) -> Film {
+    film_of_ranges(scene, precision, &[(0, count), (0, count)])
 }
 
 /// The film of one range (first, count) of each replicate.
-fn of_ranges(scene: &Scene, precision: Precision, ranges: &[(u32, u32)]) -> Film {
+fn film_of_ranges(scene: &Scene, precision: Precision, ranges: &[(u32, u32)]) -> Film {
     let mut rendering = begin(scene, SEED, precision);
     let pool = pool(2);
     for (replicate, (first, count)) in ranges.iter().enumerate() {
@@ -57,7 +57,7 @@ fn of_ranges(scene: &Scene, precision: Precision, ranges: &[(u32, u32)]) -> Film
 fn extreme_29_determinism() {
     for (name, scene) in scenes() {
         for precision in PRECISIONS {
-            let expected = whole(&scene, precision, 19).bytes();
+            let expected = film_of_samples(&scene, precision, 19).bytes();
             for threads in [1, 2, 7] {
                 let pool = pool(threads);
                 let mut rng = Rng(threads as u64);
@@ -72,18 +72,18 @@ fn extreme_29_determinism() {
             }
         }
     }
-    told(29, "both", "threads 1, 2, 7: the same bytes");
+    report(29, "both", "threads 1, 2, 7: the same bytes");
 }
 
 #[test]
-fn extreme_29_parts_added_in_any_order_are_the_whole() {
-    // Both replicates of each part; aligned to no packet, one empty in A, one empty in B.
+fn extreme_29_sum_of_parts_does_not_depend_on_order() {
+    // Ranges of both replicates in each part. None is aligned to a packet, one is empty in A, one in B.
     let parts: [[(u32, u32); 2]; 4] =
         [[(0, 3), (0, 13)], [(3, 18), (13, 1)], [(21, 0), (14, 16)], [(21, 9), (30, 0)]];
     for (name, scene) in scenes() {
         for precision in PRECISIONS {
-            let expected = whole(&scene, precision, 30).bytes();
-            let films = parts.map(|ranges| of_ranges(&scene, precision, &ranges));
+            let expected = film_of_samples(&scene, precision, 30).bytes();
+            let films = parts.map(|ranges| film_of_ranges(&scene, precision, &ranges));
             let mut order = [0, 1, 2, 3];
             for seed in 0..6 {
                 Rng(seed).shuffle(&mut order);
@@ -93,50 +93,49 @@ fn extreme_29_parts_added_in_any_order_are_the_whole() {
             }
         }
     }
-    told(29, "both", "parts in 6 orders: the same bytes");
+    report(29, "both", "parts in 6 orders: the same bytes");
 }
 
-/// A render that is stopped somewhere in a wave, and another one, begun anew, that traces what is left:
-/// what a process that is killed leaves behind, and what the next one adds. A film has no file yet that
-/// the two could be apart by, so both live here; its bytes are those that such a file would hold.
+/// A render is stopped within a wave, and a second, restarted one traces the remaining jobs. This stands
+/// for a killed process and its successor; both films live in this process, and their bytes are compared.
 #[test]
 fn extreme_29_stopped_and_resumed() {
     let pool = pool(2);
     for (name, scene) in scenes() {
         for precision in PRECISIONS {
-            let expected = whole(&scene, precision, 19).bytes();
+            let expected = film_of_samples(&scene, precision, 19).bytes();
             for pause in [None, Some(0), Some(300), Some(2000)] {
-                let (mut begun, mut resumed) =
+                let (mut stopped, mut resumed) =
                     (begin(&scene, SEED, precision), begin(&scene, SEED, precision));
                 for replicate in [0, 1] {
-                    let all = wave(&begun.film, replicate, 0, 19);
+                    let all = wave(&stopped.film, replicate, 0, 19);
                     let cancel = AtomicBool::new(pause.is_none());
                     let report = std::thread::scope(|scope| {
                         scope.spawn(|| {
                             std::thread::sleep(Duration::from_micros(pause.unwrap_or(0)));
                             cancel.store(true, Ordering::Relaxed);
                         });
-                        begun.trace_wave(&all, &pool, &cancel)
+                        stopped.trace_wave(&all, &pool, &cancel)
                     });
-                    let mut rest = all.clone();
+                    let mut remaining = all.clone();
                     let mut done = report.reports.iter().map(Option::is_some);
-                    rest.jobs.retain(|_| !done.next().unwrap());
-                    assert!(pause.is_some() || rest.jobs.len() == all.jobs.len());
-                    trace(&mut resumed, &rest, &pool);
+                    remaining.jobs.retain(|_| !done.next().unwrap());
+                    assert!(pause.is_some() || remaining.jobs.len() == all.jobs.len());
+                    trace(&mut resumed, &remaining, &pool);
                 }
-                resumed.film.add(&begun.film).unwrap();
+                resumed.film.add(&stopped.film).unwrap();
                 let same = resumed.film.bytes() == expected;
                 assert!(same, "{name} in {precision:?}, stopped after {pause:?} us");
             }
         }
     }
-    told(29, "both", "stopped and resumed: the same bytes");
+    report(29, "both", "stopped and resumed: the same bytes");
 }
 
 #[test]
-fn tiles_may_be_shared_out_among_films() {
+fn sum_of_films_with_disjoint_tiles_is_the_whole_film() {
     let scene = &scenes()[2].1;
-    let expected = whole(scene, Precision::Single, 16).bytes();
+    let expected = film_of_samples(scene, Precision::Single, 16).bytes();
     let pool = pool(2);
     let films: Vec<Film> = (0..3)
         .map(|share| {
@@ -154,16 +153,16 @@ fn tiles_may_be_shared_out_among_films() {
     assert!(sum.bytes() == expected);
 }
 
-/// Packets of one pixel and of several hold the same samples: eight waves of one sample, which are
-/// always packets of several pixels, equal one wave of sixteen, which is packets of one pixel.
+/// Packets of one pixel and of several pixels trace the same samples. Waves of one sample make packets
+/// of several pixels, a wave of sixteen samples makes packets of one pixel.
 #[test]
-fn packets_of_one_pixel_and_of_many_agree_in_every_scene() {
+fn film_does_not_depend_on_pixels_per_packet_in_any_scene() {
     let pool = pool(2);
     let mut differing = Vec::new();
     for (name, scene) in all_shipped() {
         let scene = sized(scene, SIZE);
         for precision in PRECISIONS {
-            let expected = whole(&scene, precision, 16).bytes();
+            let expected = film_of_samples(&scene, precision, 16).bytes();
             for counts in [&[1u32; 16] as &[u32], &[1, 1, 2, 4, 8], &[8, 8], &[5, 11]] {
                 let mut rendering = begin(&scene, SEED, precision);
                 let mut first = 0;
@@ -181,33 +180,33 @@ fn packets_of_one_pixel_and_of_many_agree_in_every_scene() {
 }
 
 #[test]
-fn the_interleaved_first_pass_is_a_plain_wave() {
+fn interleaved_first_pass_equals_a_plain_wave() {
     let pool = pool(2);
-    // So wide that not all tiles of a row share packets; black in parts, and with a tree.
+    // Wide enough that not all tiles of a row share packets; black in parts, and with a BVH.
     let wide = ("wide".to_string(), sized(shipped("reflecting-tracks.toml"), [300, 40]));
     for (name, scene) in scenes().into_iter().chain([wide]) {
         for precision in PRECISIONS {
             let mut rendering = begin(&scene, SEED, precision);
             let first = wave(&rendering.film, 0, 0, 1);
-            let mut shown = 0;
+            let mut updates = 0;
             let report =
                 rendering.trace_first_pass(&first, &pool, &AtomicBool::new(false), &mut |film| {
                     assert!(film.samples() > 0);
-                    shown += 1;
+                    updates += 1;
                 });
-            assert!(report.is_some() && shown > 0);
+            assert!(report.is_some() && updates > 0);
             for (replicate, first, count) in [(1, 0, 1), (0, 1, 15), (1, 1, 15)] {
                 let wave = wave(&rendering.film, replicate, first, count);
                 trace(&mut rendering, &wave, &pool);
             }
-            let expected = whole(&scene, precision, 16).bytes();
+            let expected = film_of_samples(&scene, precision, 16).bytes();
             assert!(rendering.film.bytes() == expected, "{name} in {precision:?}");
         }
     }
 }
 
 #[test]
-fn a_film_used_before_is_as_good_as_new() {
+fn reused_film_equals_a_new_film() {
     let (_, scene) = &scenes()[0];
     let mut other = scene.clone();
     other.camera.eye[0] += 0.5;
@@ -223,15 +222,15 @@ fn a_film_used_before_is_as_good_as_new() {
     uniform(&mut rendering, 0, 8, &pool(2));
     let mut rendering = RenderState::new(scene, &options, Some(rendering));
     uniform(&mut rendering, 0, 8, &pool(2));
-    assert!(rendering.film.bytes() == whole(scene, Precision::Auto, 8).bytes());
+    assert!(rendering.film.bytes() == film_of_samples(scene, Precision::Auto, 8).bytes());
 }
 
-/// The program itself.
+/// Picture files written by `zerkalo render`.
 #[test]
 fn extreme_29_picture_files_are_the_same_for_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/mirror-room.toml");
-    for (name, more) in [
+    for (name, options) in [
         ("adaptive.png", &["--noise", "1.5"] as &[&str]),
         ("uniform.png", &["--spp", "30", "--uniform", "--bits", "16"]),
         ("double.png", &["--spp", "40", "--precision", "double"]),
@@ -241,7 +240,7 @@ fn extreme_29_picture_files_are_the_same_for_any_number_of_threads() {
             let path = folder.path().join(format!("{threads}-{name}"));
             let mut command = Command::new(env!("CARGO_BIN_EXE_zerkalo"));
             command.args(["render", scene, "--size", "100x70", "--threads", threads]);
-            let run = command.args(more).arg("-o").arg(&path).output().unwrap();
+            let run = command.args(options).arg("-o").arg(&path).output().unwrap();
             assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
             fs::read(path).unwrap()
         };
@@ -251,15 +250,15 @@ fn extreme_29_picture_files_are_the_same_for_any_number_of_threads() {
     }
 }
 
-/// The program itself, where the noise decides who gets samples: the pictures that are written down here, with eight
-/// lanes and with sixteen. (Without fused multiply-add the last bits are others.)
+/// Golden hashes of pictures written by `zerkalo render`, mostly with adaptive sampling. They hold for 8 and for 16
+/// lanes. Without fused multiply-add the last bits differ.
 #[cfg(all(target_arch = "x86_64", target_feature = "fma"))]
 #[test]
-fn pictures_do_not_depend_on_the_width_of_the_lanes() {
+fn golden_pictures_do_not_depend_on_lane_count() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("picture.png");
     let mut hashes = String::new();
-    for (name, more) in [
+    for (name, options) in [
         ("mirror-room", "--noise 0.7"),
         ("mirror-room-physical", "--rmse 0.002"),
         ("mirror-room-physical", "--rmse 0.002 --precision double"),
@@ -270,14 +269,14 @@ fn pictures_do_not_depend_on_the_width_of_the_lanes() {
         let scene = format!("{}/scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
         let mut command = Command::new(env!("CARGO_BIN_EXE_zerkalo"));
         command.args(["render", &scene, "--size", "100x70", "--bits", "16"]);
-        let run = command.args(more.split(' ')).arg("-o").arg(&path).output().unwrap();
+        let run = command.args(options.split(' ')).arg("-o").arg(&path).output().unwrap();
         assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
         let pixels = image::open(&path).unwrap().into_rgb16().into_raw();
         // FNV-1a.
         let hash = pixels.iter().fold(0xcbf2_9ce4_8422_2325u64, |hash, value| {
             (hash ^ u64::from(*value)).wrapping_mul(0x100_0000_01b3)
         });
-        hashes += &format!("{hash:016x} {name} {more}\n");
+        hashes += &format!("{hash:016x} {name} {options}\n");
     }
     assert_eq!(hashes, include_str!("golden/pictures.txt"), "{hashes}");
 }

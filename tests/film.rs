@@ -1,8 +1,8 @@
 //! The film from outside: the same bits in any order, sums that do not stall, files that hold what
 //! they should.
 
-#[path = "common/told.rs"]
-mod told;
+#[path = "common/report.rs"]
+mod report;
 
 use proptest::prelude::*;
 use std::fs::{self, File};
@@ -208,7 +208,7 @@ fn extreme_28_milliard_samples() {
     assert!((green / 0.6993 - 1.0).abs() < 1e-8, "{green}");
     assert!((blue - 1e-8).abs() <= 0.5 / scale, "{blue}");
     let off = (red / 0.7 - 1.0).abs().max((green / 0.6993 - 1.0).abs());
-    told::told(28, "both", &format!("{off:.0e} off (relative)"));
+    report::report(28, "both", &format!("{off:.0e} off (relative)"));
 }
 
 #[test]
@@ -237,7 +237,7 @@ fn extreme_28_saturation_is_flagged() {
     sums[1].add(&film).unwrap();
     assert_eq!(sums.each_ref().map(Film::saturated), [1, 1]);
     assert!(sums[0].bytes() == sums[1].bytes());
-    told::told(28, "both", "saturation flagged");
+    report::report(28, "both", "saturation flagged");
 }
 
 #[test]

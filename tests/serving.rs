@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::sync::Arc;
 use support::{begin, picture, pool, uniform};
-use tables::{Key, at, keys, put, scene, table};
+use tables::{Key, keys, put, scene, table, value_at};
 use toml::{Table, Value};
 use zerkalo::film::Replicates;
 use zerkalo::render::RenderState;
@@ -119,7 +119,7 @@ fn rendered(scene: &Scene, pool: &rayon::ThreadPool) -> RenderState {
 fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value> {
     let names: Vec<String> =
         scene["materials"].as_table().unwrap().keys().cloned().chain([String::new()]).collect();
-    let old = at(scene, &key.path).cloned();
+    let old = value_at(scene, &key.path).cloned();
     let other = |x: f64, numbers: &mut Numbers| match numbers.below(5) {
         0 => 0.0,
         1 => x + 0.25,
@@ -277,7 +277,7 @@ fn what_is_served_is_the_picture_of_the_edited_scene() {
         for _ in 0..3 {
             let mut changed = plain.clone();
             edit(&mut changed, key, &mut numbers);
-            let what = format!("{:?} = {:?}", key.path, at(&mut changed, &key.path));
+            let what = format!("{:?} = {:?}", key.path, value_at(&mut changed, &key.path));
             if let Some(served) = bench.holds(&changed, &what).filter(|_| changed != plain) {
                 bench.by_key[usize::from(served)].insert(key.path.last().unwrap().clone());
             }
@@ -299,7 +299,7 @@ fn what_is_served_is_the_picture_of_the_edited_scene() {
                 &all[numbers.below(all.len())]
             };
             edit(&mut changed, key, &mut numbers);
-            write!(what, "{:?} = {:?}; ", key.path, at(&mut changed, &key.path)).unwrap();
+            write!(what, "{:?} = {:?}; ", key.path, value_at(&mut changed, &key.path)).unwrap();
         }
         bench.holds(&changed, &what);
     }

@@ -1,37 +1,38 @@
-//! What several benches need: time, random numbers, a bumpy ball of triangles.
-#![allow(dead_code, reason = "no bench needs all of it")]
+//! Helpers shared by benches: timing, random numbers, a bumpy ball of triangles.
+#![allow(dead_code, reason = "each bench uses its part")]
 
 use std::time::Instant;
 use zerkalo::asset::TriangleMesh;
 
-/// Seconds of processor time of this thread where the system tells them, so that a busy machine
-/// disturbs little; else of the clock.
+/// Processor time of this thread in seconds, which other load disturbs little. On systems without
+/// `/proc/thread-self/schedstat`: wall-clock time since `start`.
 pub fn seconds(start: Instant) -> f64 {
-    // Giving way brings the account up to date.
+    // Yielding makes the kernel update the counter.
     std::thread::yield_now();
     let times = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = times.and_then(|t| t.split(' ').next()?.parse::<f64>().ok());
     nanoseconds.map_or_else(|| start.elapsed().as_secs_f64(), |n| n * 1e-9)
 }
 
-/// The least seconds that each of `ways` takes, of `rounds` in turns.
-pub fn in_turns(rounds: usize, ways: &mut [&mut dyn FnMut()]) -> Vec<f64> {
+/// Shortest time in seconds of each of `candidates` over `rounds` interleaved rounds.
+pub fn in_turns(rounds: usize, candidates: &mut [&mut dyn FnMut()]) -> Vec<f64> {
     let clock = Instant::now();
-    let mut best = vec![f64::INFINITY; ways.len()];
+    let mut best = vec![f64::INFINITY; candidates.len()];
     for _ in 0..rounds {
-        for (best, way) in best.iter_mut().zip(ways.iter_mut()) {
+        for (best, candidate) in best.iter_mut().zip(candidates.iter_mut()) {
             let begin = seconds(clock);
-            way();
+            candidate();
             *best = best.min(seconds(clock) - begin);
         }
     }
     best
 }
 
-/// Random numbers from 0 to 1 (splitmix64).
+/// Random number generator (SplitMix64).
 pub struct Random(pub u64);
 
 impl Random {
+    /// Uniform number in [0, 1).
     pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -40,7 +41,7 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// A point on the sphere of radius `r`.
+    /// Point, uniform on the sphere of radius `r`.
     pub fn point(&mut self, r: f64) -> [f64; 3] {
         let (z, around) = (2.0 * self.next() - 1.0, std::f64::consts::TAU * self.next());
         let across = (1.0 - z * z).sqrt();
@@ -48,7 +49,7 @@ impl Random {
     }
 }
 
-/// The unit vector from `a` to `b`.
+/// Unit vector from `a` to `b`.
 pub fn towards(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     let d: [f64; 3] = std::array::from_fn(|i| b[i] - a[i]);
     let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();

@@ -7,7 +7,7 @@ use glam::DVec3;
 pub struct Numbers(u64);
 
 impl Numbers {
-    /// The sequence of `seed`.
+    /// Creates the sequence of `seed`.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -21,22 +21,22 @@ impl Numbers {
         z ^ (z >> 31)
     }
 
-    /// Uniform in [0, 1).
+    /// Uniform number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Uniform between `low` and `high`.
+    /// Uniform number between `low` and `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform among 0 .. n.
+    /// Uniform integer in 0..n.
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }
 
-    /// Uniform over the unit sphere.
+    /// Unit vector, uniform over the sphere.
     pub fn direction(&mut self) -> DVec3 {
         let z = self.between(-1.0, 1.0);
         let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
@@ -44,7 +44,7 @@ impl Numbers {
         DVec3::new(r * cos, r * sin, z).normalize()
     }
 
-    /// Uniform in the cube from -half to half.
+    /// Point, uniform in the cube from -`half` to `half`.
     pub fn in_cube(&mut self, half: f64) -> DVec3 {
         DVec3::new(self.between(-half, half), self.between(-half, half), self.between(-half, half))
     }

@@ -1,13 +1,14 @@
-//! Tails of the normal distribution and of Student's.
+//! Tails of the normal distribution and of Student's t-distribution.
 #![allow(dead_code, reason = "each test file uses its part")]
 
-/// The two-sided probability that a standard normal number exceeds `z`, by its continued fraction.
+/// Two-sided probability that the magnitude of a standard normal number exceeds `z`, by its continued
+/// fraction.
 pub fn tail(z: f64) -> f64 {
     let fraction = (1..200).rev().fold(z, |f, k| z + f64::from(k) / f);
     2.0 * (-0.5 * z * z).exp() / (std::f64::consts::TAU.sqrt() * fraction)
 }
 
-/// The z that a standard normal number exceeds with probability `p`, on both sides together; above 1.5.
+/// Inverse of [`tail`] by bisection: the `z` above 1.5 whose two-sided probability is `p`.
 pub fn two_sided_z(p: f64) -> f64 {
     let (mut low, mut high) = (1.5, 20.0);
     for _ in 0..100 {
@@ -17,7 +18,8 @@ pub fn two_sided_z(p: f64) -> f64 {
     high
 }
 
-/// The normal number that is as rare as `t` of Student's distribution with `freedom` degrees (Wallace 1959).
+/// Standard normal number with the same tail probability as `t` in Student's t-distribution.
+/// `freedom` is the number of degrees of freedom (Wallace 1959).
 pub fn z_of_t(t: f64, freedom: f64) -> f64 {
     (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) * (freedom * (t * t / freedom).ln_1p()).sqrt()
 }

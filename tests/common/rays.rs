@@ -12,26 +12,27 @@ use zerkalo::scene::Scene;
 use zerkalo::shape::EXAMPLES;
 use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Precision, Radiance, World};
 
-/// Origin and unit direction.
+/// A single ray in double precision: origin and unit direction.
 pub type Line = (DVec3, DVec3);
 
-/// Where a ray met something.
+/// The nearest surface that a ray hits.
 #[derive(Clone, Copy, Debug)]
-pub struct Met {
+pub struct LineHit {
     pub t: f64,
-    /// Position of the form in the list that the geometry was made of.
+    /// Index of the form in the list from which the aggregate was built.
     pub form: usize,
     pub point: DVec3,
     pub normal: DVec3,
 }
 
-/// Packets of `lines`, the last one filled up with its last ray, and the range each is for.
+/// Packets of `lines` with the number of rays in each. The last packet repeats its last ray to fill all
+/// lanes.
 pub fn packets<L: SimdFloat>(lines: &[Line]) -> impl Iterator<Item = (Ray<L>, usize)> + '_ {
     lines.chunks(L::WIDTH).map(|lines| {
-        let at = |i: usize| lines[i.min(lines.len() - 1)];
-        let real = |v: DVec3| v.to_array().map(L::Scalar::from_f64);
-        let origin = Vec3::from_fn(|i| real(at(i).0));
-        let direction = Vec3::from_fn(|i| real(at(i).1));
+        let line_of_lane = |i: usize| lines[i.min(lines.len() - 1)];
+        let to_scalars = |v: DVec3| v.to_array().map(L::Scalar::from_f64);
+        let origin = Vec3::from_fn(|i| to_scalars(line_of_lane(i).0));
+        let direction = Vec3::from_fn(|i| to_scalars(line_of_lane(i).1));
         (Ray { origin, direction }, lines.len())
     })
 }
@@ -40,7 +41,7 @@ pub fn to_dvec3<L: SimdFloat>(v: Vec3<L>, lane: usize) -> DVec3 {
     DVec3::from(v.lane(lane).map(Float::to_f64))
 }
 
-/// The surfaces of all lanes, item by item.
+/// Surface points of all lanes, gathered item by item.
 pub fn surface<L: SimdFloat>(
     geometry: &Aggregate<L>,
     ray: &Ray<L>,
@@ -48,28 +49,28 @@ pub fn surface<L: SimdFloat>(
 ) -> SurfacePoint<L> {
     let mut all =
         SurfacePoint { point: ray.at(hit.t), normal: Vec3::zero(), max_coordinate: L::zero() };
-    let mut left = hit.t.lt(L::from_f64(L::MAX));
-    while left.any() {
-        let item = hit.item.id_lane(left.bits().trailing_zeros() as usize);
-        let here = left & hit.item.id_eq(item);
+    let mut pending = hit.t.lt(L::from_f64(L::MAX));
+    while pending.any() {
+        let item = hit.item.id_lane(pending.bits().trailing_zeros() as usize);
+        let item_mask = pending & hit.item.id_eq(item);
         let one = geometry.surface(item, hit.triangle, ray.at(hit.t));
-        all.point = Vec3::select(here, one.point, all.point);
-        all.normal = Vec3::select(here, one.normal, all.normal);
-        all.max_coordinate = L::select(here, one.max_coordinate, all.max_coordinate);
-        left = left.and_not(here);
+        all.point = Vec3::select(item_mask, one.point, all.point);
+        all.normal = Vec3::select(item_mask, one.normal, all.normal);
+        all.max_coordinate = L::select(item_mask, one.max_coordinate, all.max_coordinate);
+        pending = pending.and_not(item_mask);
     }
     all
 }
 
-/// The nearest things, ray by ray.
-pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Option<Met>> {
+/// The nearest hit of each ray; `None` for a miss.
+pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Option<LineHit>> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
         let hit = geometry.closest(&ray, geometry.all());
-        let met = hit.t.lt(L::from_f64(L::MAX));
+        let hit_mask = hit.t.lt(L::from_f64(L::MAX));
         let surface = surface(geometry, &ray, &hit);
         out.extend((0..count).map(|i| {
-            met.lane(i).then(|| Met {
+            hit_mask.lane(i).then(|| LineHit {
                 t: hit.t.lane(i).to_f64(),
                 form: geometry.sources()[hit.item.id_lane(i) as usize].form,
                 point: to_dvec3(surface.point, i),
@@ -80,7 +81,7 @@ pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Opt
     out
 }
 
-/// Whether anything lies nearer than `limit`, ray by ray.
+/// Occlusion of each ray: `true` if an occluder lies nearer than `limit`.
 pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64) -> Vec<bool> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
@@ -90,27 +91,28 @@ pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64
     out
 }
 
-/// One form of every registered kind, by its example.
+/// One form of every registered kind, taken from its example.
 pub fn every_kind() -> Vec<(&'static str, Form)> {
     let form = |text: &str| scene(&format!("[[object]]\n{text}")).objects[0].shape.form();
     EXAMPLES.iter().map(|(key, example)| (*key, form(example))).collect()
 }
 
-/// A scene without faults.
+/// The scene in `text`; panics if it has faults.
 pub fn scene(text: &str) -> Scene {
     Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Centre and radius of a sphere around a bounded form's box.
-pub fn ball(form: &Form) -> Option<(DVec3, f64)> {
+/// Centre and radius of the sphere around the bounding box of `form`; `None` for an unbounded form.
+pub fn bounding_sphere(form: &Form) -> Option<(DVec3, f64)> {
     form.bounds().map(|(low, high)| (0.5 * (low + high), 0.5 * (high - low).length()))
 }
 
-/// A compiled scene that answers with radiance.
+/// A compiled scene whose radiance can be evaluated along single rays.
 pub struct Traced {
     world: AnyWorld,
-    mix: Vec<[f64; 3]>,
-    /// What the compilation subtracted from every coordinate.
+    /// Weight of each light group.
+    weights: Vec<[f64; 3]>,
+    /// Centre of the scene, which compilation subtracts from every coordinate.
     origin: DVec3,
 }
 
@@ -121,30 +123,30 @@ impl Traced {
             AnyWorld::Single(w) => w.view().eye(),
             AnyWorld::Double(w) => w.view().eye(),
         };
-        let mix = world.mix(scene);
-        Self { world, mix, origin: DVec3::from(scene.camera.eye) - eye }
+        let weights = world.mix(scene);
+        Self { world, weights, origin: DVec3::from(scene.camera.eye) - eye }
     }
 
-    /// Radiance along the lines, which are given in the scene's coordinates.
+    /// Radiance along `lines`, given in scene coordinates.
     pub fn radiance(&self, lines: &[Line]) -> Vec<[f64; 3]> {
         let lines: Vec<Line> = lines.iter().map(|(o, d)| (*o - self.origin, *d)).collect();
         self.centered(&lines)
     }
 
-    /// The same for lines around the scene's centre.
+    /// Radiance along `lines`, given relative to the scene's centre.
     pub fn centered(&self, lines: &[Line]) -> Vec<[f64; 3]> {
         match &self.world {
-            AnyWorld::Single(w) => self.of(w, lines),
-            AnyWorld::Double(w) => self.of(w, lines),
+            AnyWorld::Single(w) => self.radiance_in(w, lines),
+            AnyWorld::Double(w) => self.radiance_in(w, lines),
         }
     }
 
-    /// Where the scene's centre lies.
+    /// Centre of the scene in scene coordinates.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
 
-    fn of<L: SimdFloat>(&self, world: &World<L>, lines: &[Line]) -> Vec<[f64; 3]> {
+    fn radiance_in<L: SimdFloat>(&self, world: &World<L>, lines: &[Line]) -> Vec<[f64; 3]> {
         let settings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
         let sampler = Sampler::new(settings, world.jitter());
         let mut out = Vec::with_capacity(lines.len());
@@ -155,7 +157,7 @@ impl Traced {
             world.trace((ray.origin, ray.direction), None, &draws, L::mask(true), &mut radiance);
             for i in 0..count {
                 let mut sum = DVec3::ZERO;
-                for (group, weight) in radiance.groups.iter().zip(&self.mix) {
+                for (group, weight) in radiance.groups.iter().zip(&self.weights) {
                     sum += to_dvec3(*group, i) * DVec3::from(*weight);
                 }
                 out.push(sum.to_array());
@@ -165,17 +167,17 @@ impl Traced {
     }
 }
 
-/// A ray of one kind or another around a form: through it, beside it, from inside, along the axes,
-/// from points of its surface, with zeros of both signs.
+/// A random ray around `form`, of one of six kinds: through it, beside it, from inside, along an axis,
+/// from a corner, face or edge centre of its box, with zeros of both signs.
 pub fn any_line(numbers: &mut Numbers, form: &Form) -> Line {
-    let (center, radius) = ball(form).unwrap_or((DVec3::ZERO, 2.0));
+    let (center, radius) = bounding_sphere(form).unwrap_or((DVec3::ZERO, 2.0));
     let axis = |numbers: &mut Numbers| {
         let zero = if numbers.bits() & 1 == 0 { 0.0 } else { -0.0 };
         let mut d = DVec3::splat(zero);
-        let at = numbers.below(3);
-        d[at] = if numbers.bits() & 1 == 0 { 1.0 } else { -1.0 };
+        let main_axis = numbers.below(3);
+        d[main_axis] = if numbers.bits() & 1 == 0 { 1.0 } else { -1.0 };
         if numbers.below(2) == 0 {
-            d[(at + 1) % 3] = numbers.between(-1.0, 1.0);
+            d[(main_axis + 1) % 3] = numbers.between(-1.0, 1.0);
         }
         d.normalize()
     };
@@ -191,8 +193,8 @@ pub fn any_line(numbers: &mut Numbers, form: &Form) -> Line {
     };
     match numbers.below(6) {
         0 => {
-            let from = center + numbers.direction() * (3.0 * radius);
-            (from, (target - from).normalize())
+            let origin = center + numbers.direction() * (3.0 * radius);
+            (origin, (target - origin).normalize())
         }
         1 => (target, numbers.direction()),
         2 => {
@@ -205,14 +207,15 @@ pub fn any_line(numbers: &mut Numbers, form: &Form) -> Line {
             (corner(numbers) - d * (2.0 * radius), d)
         }
         _ => {
-            let (from, to) = (corner(numbers), corner(numbers));
-            let d = (to - from).try_normalize().unwrap_or(DVec3::Y);
-            (from - d * if numbers.bits() & 1 == 0 { 0.0 } else { radius }, d)
+            let (start, end) = (corner(numbers), corner(numbers));
+            let d = (end - start).try_normalize().unwrap_or(DVec3::Y);
+            (start - d * if numbers.bits() & 1 == 0 { 0.0 } else { radius }, d)
         }
     }
 }
 
-/// Every kind as it is, turned, and scaled unevenly (spheres become ellipsoids).
+/// One form of every kind in three versions: unchanged, rotated, and scaled non-uniformly (spheres become
+/// ellipsoids).
 pub fn forms() -> Vec<(String, Form)> {
     let mut out = Vec::new();
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);
@@ -226,8 +229,8 @@ pub fn forms() -> Vec<(String, Form)> {
                 DAffine3::from_scale_rotation_translation(DVec3::new(1.0, -0.2, 3.0), turn, place),
             ),
         ];
-        for (how, map) in maps {
-            out.push((format!("{name}{how}"), form.clone().transformed(&map)));
+        for (suffix, map) in maps {
+            out.push((format!("{name}{suffix}"), form.clone().transformed(&map)));
         }
     }
     out

@@ -1,23 +1,26 @@
-//! The values of a scene, found by the tables of fields: what a test changes without a list of its own.
+//! The keys and values of a scene, enumerated from the field tables, so that tests need no lists of
+//! their own.
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use toml::{Table, Value};
 use zerkalo::scene::{AssetResolver, FIELDS, Scene};
 use zerkalo::value::{Field, ValueType};
 
-/// A key of a scene: the keys that lead to it, positions in lists as numbers, and what it takes.
+/// A key of a scene file.
 #[derive(Clone, Debug)]
 pub struct Key {
+    /// Keys from the root; an index in a list is written as a number.
     pub path: Vec<String>,
+    /// Type of its value.
     pub takes: ValueType,
 }
 
-/// The scene as a table.
+/// `scene` as a TOML table.
 pub fn table(scene: &Scene) -> Table {
     Table::try_from(scene).expect("scenes are tables")
 }
 
-/// The scene in `table`, with the files of `library`; `None`: it has faults.
+/// The scene in `table` with the files of `library`; `None` if it has faults.
 pub fn scene(table: &Table, library: &AssetResolver) -> Option<Scene> {
     let mut scene: Scene = table.clone().try_into().ok()?;
     scene.library = library.clone();
@@ -25,21 +28,22 @@ pub fn scene(table: &Table, library: &AssetResolver) -> Option<Scene> {
     scene.faults().is_empty().then_some(scene)
 }
 
-/// Every key that the tables name in what `scene` holds, given or left out; a table in a list or under a name once
-/// for each that there is. Of what holds others, it as a whole as well.
+/// Every key that the field tables define for the tables that `scene` contains, whether given or left
+/// out. Keys of a table in a list or under a name appear once for each such table. Tables and lists are
+/// included as well as their members.
 pub fn keys(scene: &Table) -> Vec<Key> {
     let mut out = Vec::new();
     walk(FIELDS, scene, &[], &mut out);
     out
 }
 
-fn joined(path: &[String], key: &str) -> Vec<String> {
+fn child_path(path: &[String], key: &str) -> Vec<String> {
     path.iter().cloned().chain([key.to_string()]).collect()
 }
 
 fn walk(fields: &[Field], table: &Table, path: &[String], out: &mut Vec<Key>) {
     for field in fields {
-        let path = joined(path, field.name);
+        let path = child_path(path, field.name);
         out.push(Key { path: path.clone(), takes: field.takes });
         let Some(value) = table.get(field.name) else { continue };
         let mut inner = |fields: &[Field], value: &Value, path: &[String]| {
@@ -58,17 +62,17 @@ fn walk(fields: &[Field], table: &Table, path: &[String], out: &mut Vec<Key>) {
                     let given = step.as_table().into_iter().flat_map(|step| {
                         kinds.iter().filter(|kind| step.contains_key(kind.name)).copied()
                     });
-                    inner(&given.collect::<Vec<_>>(), step, &joined(&path, &i.to_string()));
+                    inner(&given.collect::<Vec<_>>(), step, &child_path(&path, &i.to_string()));
                 }
             }
             (ValueType::Tables(fields), Value::Array(list)) => {
                 for (i, value) in list.iter().enumerate() {
-                    inner(fields, value, &joined(&path, &i.to_string()));
+                    inner(fields, value, &child_path(&path, &i.to_string()));
                 }
             }
             (ValueType::Named(fields), Value::Table(named)) => {
                 for (name, value) in named {
-                    inner(fields, value, &joined(&path, name));
+                    inner(fields, value, &child_path(&path, name));
                 }
             }
             _ => {}
@@ -76,11 +80,11 @@ fn walk(fields: &[Field], table: &Table, path: &[String], out: &mut Vec<Key>) {
     }
 }
 
-/// What stands at `path`.
-pub fn at<'a>(table: &'a mut Table, path: &[String]) -> Option<&'a mut Value> {
-    let (first, rest) = path.split_first()?;
+/// The value at `path`.
+pub fn value_at<'a>(table: &'a mut Table, path: &[String]) -> Option<&'a mut Value> {
+    let (first, deeper_keys) = path.split_first()?;
     let mut value = table.get_mut(first)?;
-    for key in rest {
+    for key in deeper_keys {
         value = match value {
             Value::Table(table) => table.get_mut(key)?,
             Value::Array(list) => list.get_mut(key.parse::<usize>().ok()?)?,
@@ -90,14 +94,17 @@ pub fn at<'a>(table: &'a mut Table, path: &[String]) -> Option<&'a mut Value> {
     Some(value)
 }
 
-/// Puts `value` at `path`, or takes what is there away. The table around it is there.
+/// Sets the value at `path`; `None` removes it. Does nothing if the parent table is missing.
 pub fn put(table: &mut Table, path: &[String], value: Option<Value>) {
-    let (last, above) = path.split_last().expect("a key");
-    let around =
-        if above.is_empty() { Some(table) } else { at(table, above).and_then(Value::as_table_mut) };
-    let Some(around) = around else { return };
+    let (last, parent_path) = path.split_last().expect("a key");
+    let parent = if parent_path.is_empty() {
+        Some(table)
+    } else {
+        value_at(table, parent_path).and_then(Value::as_table_mut)
+    };
+    let Some(parent) = parent else { return };
     match value {
-        Some(value) => around.insert(last.clone(), value),
-        None => around.remove(last),
+        Some(value) => parent.insert(last.clone(), value),
+        None => parent.remove(last),
     };
 }

@@ -1,6 +1,6 @@
 //! The thirty numbered tests are all there: each stands where its tools are.
 
-use crate::told::told;
+use crate::report::report;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -229,8 +229,8 @@ fn all_thirty_are_there() {
         let name = format!("extreme_{:02}_{name}", i + 1);
         let places = found.iter().filter(|(n, f)| *n == name && f == file).count();
         assert_eq!(places, 1, "{name} ({about}) in {file}");
-        told(i + 1, "about", about);
-        told(i + 1, "criterion", criterion);
+        report(i + 1, "about", about);
+        report(i + 1, "criterion", criterion);
     }
     for (name, file) in &found {
         let number: usize = name[8..10].parse().unwrap();

@@ -1,7 +1,7 @@
 //! Brightness at its extremes: samples that the film can hold, and those that it cannot.
 
+use crate::report::report;
 use crate::support::{begin, parsed, picture, pool, rendered, uniform};
-use crate::told::told;
 use std::fs;
 use zerkalo::film::{Display, Replicates};
 use zerkalo::render::RenderState;
@@ -98,7 +98,7 @@ fn what_a_close_lamp_lights_is_bright_however_large_the_scene() {
             worst = worst.max((found - 1.0).abs());
         }
     }
-    told(30, "both", &format!("close lamps in large scenes: {worst:.0e} off"));
+    report(30, "both", &format!("close lamps in large scenes: {worst:.0e} off"));
 }
 
 /// A room whose walls are triangles.

@@ -2,7 +2,7 @@
 
 use crate::common::Numbers;
 use crate::rays::to_dvec3;
-use crate::told::{precision, told};
+use crate::report::{precision, report};
 use glam::DVec3;
 use zerkalo::camera::{Camera, PinholeCamera, ViewAngle};
 use zerkalo::lanes::{Double, Frame, SimdFloat, Single, Vec3};
@@ -55,7 +55,7 @@ fn extreme_17_odd_cameras() {
             }
         }
     }
-    told(17, "both", "rays finite");
+    report(17, "both", "rays finite");
 }
 
 /// The angle between the outermost rays is the view angle.
@@ -80,7 +80,7 @@ fn extreme_17_narrow_and_wide_angles_are_right() {
         assert!((found - degrees).abs() < tolerance, "{degrees}: {found}");
         worst = worst.max((found - degrees).abs());
     }
-    told(17, "double", &format!("angles {worst:.0e} degrees off at most"));
+    report(17, "double", &format!("angles {worst:.0e} degrees off at most"));
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn extreme_17_impossible_views_are_located_errors() {
         };
         assert!(words.starts_with(place), "expected at {place}: {words}");
     }
-    told(17, "both", "errors located");
+    report(17, "both", "errors located");
 }
 
 fn check_frames<L: SimdFloat>(bound: f64) {
@@ -152,7 +152,7 @@ fn check_frames<L: SimdFloat>(bound: f64) {
     }
     assert!(worst > 0.0);
     if L::WIDTH > 1 {
-        told(18, precision::<L>(), &format!("{worst:.0e}"));
+        report(18, precision::<L>(), &format!("{worst:.0e}"));
     }
 }
 

@@ -3,8 +3,8 @@
 //! is 4 V / S (Cauchy, Crofton). Every registered kind is tested.
 
 use crate::common::Numbers;
-use crate::rays::{Line, ball, closest, every_kind};
-use crate::told::{LEFT, told};
+use crate::rays::{Line, bounding_sphere, closest, every_kind};
+use crate::report::{LEFT_TO_DOUBLE, report};
 use glam::{DMat3, DVec3};
 use std::f64::consts::{PI, TAU};
 use zerkalo::lanes::{Double, SimdFloat, Single};
@@ -204,7 +204,7 @@ fn extreme_07_cauchy() {
     let mut odd = 0;
     for (i, (name, form)) in every_kind().into_iter().enumerate() {
         let (Some((center, radius)), Some((surface, volume))) =
-            (ball(&form), surface_and_volume(&form))
+            (bounding_sphere(&form), surface_and_volume(&form))
         else {
             continue;
         };
@@ -225,8 +225,8 @@ fn extreme_07_cauchy() {
         let limit = 100.0 * f64::from(f32::EPSILON) * single.lines;
         assert!(single.odd as f64 <= limit, "{name}: {} lines of {LINES}", single.odd);
     }
-    told(7, "double", &format!("{:.1} sigma at most, 0 lines out of order", worst[0]));
-    told(7, "single", &format!("{:.1} sigma at most, {odd} lines out of order", worst[1]));
+    report(7, "double", &format!("{:.1} sigma at most, 0 lines out of order", worst[0]));
+    report(7, "single", &format!("{:.1} sigma at most, {odd} lines out of order", worst[1]));
 }
 
 #[test]
@@ -313,6 +313,6 @@ fn extreme_13_slivers() {
         // Parity. Coordinates about 1 are known to 1e-16 x the distance of 4: 1e-9 of the thin side.
         assert_eq!(found.odd, 0, "{name}: {} of {} lines", found.odd, found.lines);
     }
-    told(13, "double", &format!("{worst:.1} sigma at most, 0 lines out of order"));
-    told(13, "single", LEFT);
+    report(13, "double", &format!("{worst:.1} sigma at most, 0 lines out of order"));
+    report(13, "single", LEFT_TO_DOUBLE);
 }

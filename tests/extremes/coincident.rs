@@ -3,7 +3,7 @@
 use crate::common::Numbers;
 use crate::compound::{block, difference, geometry, union};
 use crate::rays::{Line, Traced, blocked, closest, scene};
-use crate::told::told;
+use crate::report::report;
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::lanes::{Double, SimdFloat, Single};
@@ -63,8 +63,8 @@ fn extreme_10_coincident_faces() {
         check_flush::<Double>(units, 112_000);
         check_flush::<Single>(units, 60_000);
     }
-    told(10, "double", "0 skins, 0 lids for 9 x 112,000 rays");
-    told(10, "single", "0 skins, 0 lids for 9 x 60,000 rays");
+    report(10, "double", "0 skins, 0 lids for 9 x 112,000 rays");
+    report(10, "single", "0 skins, 0 lids for 9 x 60,000 rays");
 }
 
 /// Two boxes side by side are one: no crack lets a ray in between, and no wall stands inside.
@@ -114,7 +114,7 @@ fn extreme_10_no_crack_where_parts_touch() {
         check_fused::<Double>(units);
         check_fused::<Single>(units);
     }
-    told(10, "both", "0 cracks");
+    report(10, "both", "0 cracks");
 }
 
 /// Where faces of two materials lie on each other, the part that is listed first is seen, not a

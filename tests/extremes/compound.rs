@@ -1,8 +1,8 @@
 //! Compound solids: volumes, parity, algebra.
 
 use crate::common::Numbers;
-use crate::rays::{Line, Met, blocked, closest};
-use crate::told::told;
+use crate::rays::{Line, LineHit, blocked, closest};
+use crate::report::report;
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::primitive::{Aggregate, CsgSolid, CsgTree as Tree, Form};
@@ -50,7 +50,7 @@ pub fn lines(seed: u64, count: usize) -> Vec<Line> {
 }
 
 /// Every surface along each line, by going on from one to the next.
-fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<Met>> {
+fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<LineHit>> {
     let mut out = vec![Vec::new(); lines.len()];
     let mut open: Vec<(usize, f64)> = (0..lines.len()).map(|i| (i, 0.0)).collect();
     while !open.is_empty() {
@@ -60,7 +60,7 @@ fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<Me
         for ((i, t), met) in open.iter().zip(closest(geometry, &starts)) {
             let Some(met) = met else { continue };
             let t = t + met.t;
-            out[*i].push(Met { t, ..met });
+            out[*i].push(LineHit { t, ..met });
             // Past the surface by more than what it may be off, flat or not.
             let cosine = met.normal.dot(lines[*i].1).abs().max(1e-7);
             next.push((*i, t + 64.0 * L::EPSILON * 8.0 / cosine));
@@ -72,7 +72,7 @@ fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<Me
 }
 
 /// The length of a line inside; every surface must be the right way round, in turn.
-fn chord(name: &str, line: &Line, met: &[Met]) -> f64 {
+fn chord(name: &str, line: &Line, met: &[LineHit]) -> f64 {
     let told = || format!("{name}: {line:?} {met:?}");
     assert!(met.len().is_multiple_of(2), "odd: {}", told());
     for (i, met) in met.iter().enumerate() {
@@ -199,13 +199,13 @@ fn extreme_08_parity() {
     assert!(seen > 150_000, "{seen} surfaces");
     // Single precision loses what is thinner than 2e-5 across, which a line here meets as seldom.
     assert!(odd * 10_000 <= asked, "single precision: {odd} of {asked} lines out of turn");
-    told(8, "double", &format!("0 of {asked} lines out of turn"));
-    told(8, "single", &format!("{odd} of {asked} lines out of turn"));
+    report(8, "double", &format!("0 of {asked} lines out of turn"));
+    report(8, "single", &format!("{odd} of {asked} lines out of turn"));
 }
 
 /// Whether surfaces are entered and left in turn.
-fn in_turn(line: &Line, met: &[Met]) -> bool {
-    let turned = |(i, m): (usize, &Met)| (m.normal.dot(line.1) < 0.0) == (i % 2 == 0);
+fn in_turn(line: &Line, met: &[LineHit]) -> bool {
+    let turned = |(i, m): (usize, &LineHit)| (m.normal.dot(line.1) < 0.0) == (i % 2 == 0);
     met.len().is_multiple_of(2) && met.iter().enumerate().all(turned)
 }
 
@@ -213,10 +213,11 @@ fn in_turn(line: &Line, met: &[Met]) -> bool {
 /// distance apart over the cosine.
 fn differing(a: &Form, b: &Form, lines: &[Line]) -> usize {
     let (a, b) = (geometry::<Single>(a), geometry::<Single>(b));
-    let apart =
-        |line: &Line, a: &Met, b: &Met| (a.t - b.t).abs() > 1e-5 * a.t / a.normal.dot(line.1).abs();
+    let apart = |line: &Line, a: &LineHit, b: &LineHit| {
+        (a.t - b.t).abs() > 1e-5 * a.t / a.normal.dot(line.1).abs()
+    };
     let both = surfaces(&a, lines).into_iter().zip(surfaces(&b, lines));
-    let differs = |(line, (a, b)): &(&Line, (Vec<Met>, Vec<Met>))| {
+    let differs = |(line, (a, b)): &(&Line, (Vec<LineHit>, Vec<LineHit>))| {
         a.len() != b.len() || a.iter().zip(b).any(|(a, b)| apart(line, a, b))
     };
     lines.iter().zip(both).filter(differs).count()
@@ -226,7 +227,7 @@ fn differing(a: &Form, b: &Form, lines: &[Line]) -> usize {
 fn same_surfaces(name: &str, a: &Form, b: &Form, lines: &[Line]) {
     let (a, b) = (geometry::<Double>(a), geometry::<Double>(b));
     for ((line, a), b) in lines.iter().zip(surfaces(&a, lines)).zip(surfaces(&b, lines)) {
-        let flat = |m: &Met| m.normal.dot(line.1).abs() < 1e-5;
+        let flat = |m: &LineHit| m.normal.dot(line.1).abs() < 1e-5;
         if a.iter().chain(&b).any(flat) {
             continue;
         }
@@ -277,6 +278,6 @@ fn extreme_09_csg_algebra() {
         let at_once = difference(vec![a(), b(), c]);
         same_surfaces(&named("(A - B) - C"), &steps, &at_once, &lines);
     }
-    told(9, "double", "surfaces the same");
-    told(9, "single", &format!("at most {most} of {} lines meet other surfaces", lines.len()));
+    report(9, "double", "surfaces the same");
+    report(9, "single", &format!("at most {most} of {} lines meet other surfaces", lines.len()));
 }

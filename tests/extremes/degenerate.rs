@@ -1,8 +1,8 @@
 //! Rays that start inside, on faces, in the planes of faces, along the axes.
 
 use crate::common::Numbers;
-use crate::rays::{Line, any_line, ball, blocked, closest, every_kind, forms};
-use crate::told::{precision, told};
+use crate::rays::{Line, any_line, blocked, bounding_sphere, closest, every_kind, forms};
+use crate::report::{precision, report};
 use glam::DVec3;
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::primitive::{Aggregate, Form};
@@ -44,7 +44,7 @@ fn inside(numbers: &mut Numbers, form: &Form) -> DVec3 {
 fn check_inside<L: SimdFloat>(name: &str, form: &Form, seed: u64, rays: usize) {
     let geometry = Aggregate::<L>::new(std::slice::from_ref(form));
     let mut numbers = Numbers::new(seed);
-    let (_, radius) = ball(form).unwrap();
+    let (_, radius) = bounding_sphere(form).unwrap();
     let lines: Vec<Line> =
         (0..rays).map(|_| (inside(&mut numbers, form), numbers.direction())).collect();
     let met = closest(&geometry, &lines);
@@ -83,7 +83,7 @@ fn extreme_04_camera_inside() {
         }
     }
     assert!(every_kind().iter().any(|k| is_solid(&k.1)));
-    told(4, "both", &format!("0 wrong of 100,000 rays in each of {solids} solids"));
+    report(4, "both", &format!("0 wrong of 100,000 rays in each of {solids} solids"));
 }
 
 /// Where a line meets the closed box from -1 to 1, in exact integers scaled by `UNIT`: `None` if it
@@ -177,7 +177,7 @@ fn check_lattice<L: SimdFloat>() -> [usize; 3] {
         }
     }
     let asked = counts.iter().sum::<usize>();
-    told(6, precision::<L>(), &format!("0 wrong of {asked} rays"));
+    report(6, precision::<L>(), &format!("0 wrong of {asked} rays"));
     counts
 }
 
@@ -191,7 +191,7 @@ fn extreme_06_ray_in_a_face() {
 fn check_finite<L: SimdFloat>(name: &str, form: &Form, seed: u64) {
     let geometry = Aggregate::<L>::new(std::slice::from_ref(form));
     let mut numbers = Numbers::new(seed);
-    let (center, radius) = ball(form).unwrap_or((DVec3::ZERO, f64::INFINITY));
+    let (center, radius) = bounding_sphere(form).unwrap_or((DVec3::ZERO, f64::INFINITY));
     let lines: Vec<Line> = (0..40_000).map(|_| any_line(&mut numbers, form)).collect();
     for (n, (line, met)) in lines.iter().zip(closest(&geometry, &lines)).enumerate() {
         let Some(met) = met else { continue };

@@ -1,7 +1,7 @@
 //! Directions of every length that a file can hold: only where they point matters.
 
 use crate::support::{parsed, rendered};
-use crate::tables::{at, keys, scene, table};
+use crate::tables::{keys, scene, table, value_at};
 use std::collections::BTreeSet;
 use toml::Value;
 use zerkalo::scene::{FIELDS, Scene};
@@ -57,7 +57,7 @@ fn stretched(base: &Scene, factor: f64) -> Scene {
     let mut changed = table(base);
     let mut met = BTreeSet::new();
     for key in keys(&changed).iter().filter(|key| matches!(key.takes, ValueType::Direction)) {
-        let Some(Value::Array(numbers)) = at(&mut changed, &key.path) else { continue };
+        let Some(Value::Array(numbers)) = value_at(&mut changed, &key.path) else { continue };
         for number in numbers {
             *number = Value::Float(number.as_float().unwrap() * factor);
         }

@@ -6,12 +6,12 @@
 mod common;
 #[path = "../common/rays.rs"]
 mod rays;
+#[path = "../common/report.rs"]
+mod report;
 #[path = "../support/mod.rs"]
 mod support;
 #[path = "../common/tables.rs"]
 mod tables;
-#[path = "../common/told.rs"]
-mod told;
 
 mod audit;
 mod brightness;

@@ -3,7 +3,7 @@
 
 use crate::common::Numbers;
 use crate::rays::{Line, closest, packets};
-use crate::told::{LEFT, told};
+use crate::report::{LEFT_TO_DOUBLE, report};
 use glam::{DAffine3, DQuat, DVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -142,8 +142,12 @@ fn check(rays: usize) {
         assert!(single <= allowed, "{name}: {single} of {rays} rays in single precision");
         lost += if left_to_double { single } else { 0 };
     }
-    told(14, "double", &format!("0 missed of 5 x {rays} rays"));
-    told(14, "single", &format!("0 missed of 3 x {rays} rays; slivers ({lost} missed) {LEFT}"));
+    report(14, "double", &format!("0 missed of 5 x {rays} rays"));
+    report(
+        14,
+        "single",
+        &format!("0 missed of 3 x {rays} rays; slivers ({lost} missed) {LEFT_TO_DOUBLE}"),
+    );
 }
 
 /// Two million rays, each asked twice; ten times as many below.

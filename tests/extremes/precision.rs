@@ -2,8 +2,8 @@
 //! proportion shrinks; what single precision gets wrong is measured as the RMSE beside double precision
 //! with the same samples, in codes.
 
+use crate::report::report;
 use crate::support::{all_shipped, parsed, picture, rendered, shipped, sized};
-use crate::told::told;
 use std::collections::BTreeMap;
 use zerkalo::film::{Display, Replicates};
 use zerkalo::scene::Scene;
@@ -332,7 +332,7 @@ fn auto_takes_double_for_the_extremes_beyond_single() {
     assert!(chosen.keys().copied().eq(1..=30), "{chosen:?}");
     for (number, mut words) in chosen {
         words.dedup();
-        told(number, "auto", &words.join(", "));
+        report(number, "auto", &words.join(", "));
     }
 }
 

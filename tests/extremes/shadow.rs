@@ -2,7 +2,7 @@
 
 use crate::common::Numbers;
 use crate::rays::{Line, Traced, scene};
-use crate::told::told;
+use crate::report::report;
 use glam::{DMat3, DVec3};
 use zerkalo::world::Precision;
 
@@ -198,7 +198,7 @@ fn extreme_15_self_shadow() {
     check_self_shadow(Precision::Double, DVec3::ZERO, &SCALES, 8000);
     check_self_shadow(Precision::Single, DVec3::ZERO, &SCALES, 8000);
     let asked = THINGS.len() * SCALES.len() * 4 * 8000;
-    told(15, "both", &format!("0 falsely dark of {asked} points"));
+    report(15, "both", &format!("0 falsely dark of {asked} points"));
 }
 
 /// A million units from the origin the file's own numbers end at 1e-10: things are as small as 1e-4.
@@ -209,7 +209,7 @@ fn extreme_15_self_shadow_far_from_the_origin() {
     check_self_shadow(Precision::Double, place, &SCALES[1..], 4000);
     check_self_shadow(Precision::Single, place, &SCALES[1..], 4000);
     let asked = THINGS.len() * (SCALES.len() - 1) * 4 * 4000;
-    told(15, "both", &format!("a million units off 0 of {asked}"));
+    report(15, "both", &format!("a million units off 0 of {asked}"));
 }
 
 /// A box that hovers a millionth of its size above the ground: under it the ground is dark but for
@@ -266,6 +266,6 @@ fn extreme_16_thin_gap() {
         check_gap(scale, Precision::Double);
         check_gap(scale, Precision::Single);
     }
-    told(16, "double", "no leak, the strip under the edge is lit");
-    told(16, "single", "no leak, the strip is not to be seen");
+    report(16, "double", "no leak, the strip under the edge is lit");
+    report(16, "single", "no leak, the strip is not to be seen");
 }

@@ -2,7 +2,7 @@
 
 use crate::common::Numbers;
 use crate::rays::{Line, Traced, closest, scene};
-use crate::told::{LEFT, precision, told};
+use crate::report::{LEFT_TO_DOUBLE, precision, report};
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::camera::{Camera, PinholeCamera, ViewAngle};
@@ -114,14 +114,18 @@ fn extreme_01_sphere_far_away() {
     for (i, far) in [1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9].into_iter().enumerate() {
         worst = worst.max(check_far::<Double>(far, 10 + i as u64));
     }
-    told(1, "double", &format!("hits right, {worst:.0e} r off at most"));
+    report(1, "double", &format!("hits right, {worst:.0e} r off at most"));
     // Single precision ends where a rounding of the distance is a thousandth of the radius; the
     // choice of precision leaves it before.
     let mut worst = 0f64;
     for (i, far) in [1e2, 1e3, 8192.0].into_iter().enumerate() {
         worst = worst.max(check_far::<Single>(far, 30 + i as u64));
     }
-    told(1, "single", &format!("up to 8192: hits right, {worst:.0e} r off at most; beyond {LEFT}"));
+    report(
+        1,
+        "single",
+        &format!("up to 8192: hits right, {worst:.0e} r off at most; beyond {LEFT_TO_DOUBLE}"),
+    );
 }
 
 #[test]
@@ -176,8 +180,8 @@ fn extreme_02_sphere_as_ground() {
         let dark = traced.radiance(&lines).iter().filter(|l| l[0] <= 0.0).count();
         assert_eq!(dark, 0, "light {light}: dark points on bare ground");
     }
-    told(2, "double", &format!("horizon {:.0e} px off, no dark point", (below - row).abs()));
-    told(2, "single", LEFT);
+    report(2, "double", &format!("horizon {:.0e} px off, no dark point", (below - row).abs()));
+    report(2, "single", LEFT_TO_DOUBLE);
 }
 
 /// Share of the rays through points of the square around the image of `center` on z = -1 that meet
@@ -221,8 +225,8 @@ fn extreme_03_tiny_sphere() {
     let center = DVec3::new(0.3, -0.2, -1.0).normalize();
     let ratio = check_silhouette(center, 1e-6, 1_000_000, 3);
     assert!((ratio - 1.0).abs() < 0.01, "silhouette {ratio} of the true one");
-    told(3, "double", &format!("{:+.2} %", 100.0 * (ratio - 1.0)));
-    told(3, "single", LEFT);
+    report(3, "double", &format!("{:+.2} %", 100.0 * (ratio - 1.0)));
+    report(3, "single", LEFT_TO_DOUBLE);
 }
 
 #[test]
@@ -321,7 +325,7 @@ fn check_tangents<L: SimdFloat>() {
             longest = longest.max(chord);
         }
     }
-    told(5, precision::<L>(), &format!("sphere: chords up to {longest:.0e}"));
+    report(5, precision::<L>(), &format!("sphere: chords up to {longest:.0e}"));
 }
 
 #[test]

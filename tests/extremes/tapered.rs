@@ -1,8 +1,8 @@
 //! Cylinders, cones and what lies between, at their extremes.
 
 use crate::common::Numbers;
-use crate::rays::{Line, Met, closest};
-use crate::told::{LEFT, precision, told};
+use crate::rays::{Line, LineHit, closest};
+use crate::report::{LEFT_TO_DOUBLE, precision, report};
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::primitive::{Aggregate, Form};
@@ -12,7 +12,7 @@ fn canonical(s: f64) -> Form {
     Form::conical_frustum(DAffine3::IDENTITY, s)
 }
 
-fn meet<L: SimdFloat>(form: &Form, lines: &[Line]) -> Vec<Option<Met>> {
+fn meet<L: SimdFloat>(form: &Form, lines: &[Line]) -> Vec<Option<LineHit>> {
     closest(&Aggregate::<L>::new(std::slice::from_ref(form)), lines)
 }
 
@@ -103,8 +103,8 @@ fn extreme_11_tapered_cylinders() {
             }
         }
     }
-    told(11, "double", &format!("a step of {worst:.0e} at most"));
-    told(11, "single", LEFT);
+    report(11, "double", &format!("a step of {worst:.0e} at most"));
+    report(11, "single", LEFT_TO_DOUBLE);
 }
 
 /// A tapered cylinder of equal radii is the cylinder, bit for bit, and one of radius 0 the cone.
@@ -126,11 +126,11 @@ fn extreme_11_without_taper_it_is_the_cylinder() {
         let (a, b) = (meet::<Double>(&a, &lines), meet::<Double>(&b, &lines));
         assert!(a.iter().flatten().count() > 5_000, "{name}");
         for ((line, a), b) in lines.iter().zip(a).zip(b) {
-            let bits = |m: Met| (m.t.to_bits(), m.normal.to_array().map(f64::to_bits));
+            let bits = |m: LineHit| (m.t.to_bits(), m.normal.to_array().map(f64::to_bits));
             assert_eq!(a.map(bits), b.map(bits), "{name}: {line:?}");
         }
     }
-    told(11, "double", "without taper bit-equal");
+    report(11, "double", "without taper bit-equal");
 }
 
 #[test]
@@ -203,8 +203,8 @@ fn extreme_12_along_a_generator() {
             }
         }
     }
-    told(12, "double", &format!("finite, lengths {worst:.0e} off at most"));
-    told(12, "single", "finite");
+    report(12, "double", &format!("finite, lengths {worst:.0e} off at most"));
+    report(12, "single", "finite");
 }
 
 /// Lines that touch: no NaN, and no more than `limit` of their length inside.
@@ -242,7 +242,7 @@ fn check_tangents<L: SimdFloat>(limit: f64) {
             }
         }
     }
-    told(5, precision::<L>(), &format!("others: chords up to {longest:.0e}"));
+    report(5, precision::<L>(), &format!("others: chords up to {longest:.0e}"));
 }
 
 #[test]

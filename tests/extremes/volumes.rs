@@ -3,7 +3,7 @@
 use crate::common::Numbers;
 use crate::compound::{ball, block, chords, difference, intersection, lines, union};
 use crate::rays::Line;
-use crate::told::told;
+use crate::report::report;
 use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::PI;
 use zerkalo::lanes::Double;
@@ -121,7 +121,7 @@ fn extreme_09_volumes() {
         assert!(z.abs() < 4.0, "{name}: {found} +- {error}, not {expected}: {z} sigma");
         worst = worst.max(z.abs());
     }
-    told(9, "double", &format!("volumes {worst:.1} sigma off at most"));
+    report(9, "double", &format!("volumes {worst:.1} sigma off at most"));
 }
 
 /// V(A or B) + V(A and B) = V(A) + V(B), on every line.

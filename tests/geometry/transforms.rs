@@ -2,7 +2,7 @@
 //! object.
 
 use crate::common::Numbers;
-use crate::rays::{Line, ball, closest, every_kind, scene};
+use crate::rays::{Line, bounding_sphere, closest, every_kind, scene};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use zerkalo::lanes::Double;
 use zerkalo::primitive::{Aggregate, Form};
@@ -32,7 +32,7 @@ fn objects_under_affine_maps_are_met_where_their_originals_are() {
             let back = map.inverse();
             let image = form.clone().transformed(&map);
             let geometry = Aggregate::<Double>::new(std::slice::from_ref(&image));
-            let (center, radius) = ball(&image).unwrap_or((map.translation, 3.0));
+            let (center, radius) = bounding_sphere(&image).unwrap_or((map.translation, 3.0));
             let lines: Vec<Line> = (0..2000)
                 .map(|_| {
                     let from = center + numbers.direction() * (3.0 * radius);

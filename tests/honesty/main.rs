@@ -1,12 +1,12 @@
 //! The error that the program tells is the error that is left, and the picture is not biased: shown
 //! on a scene whose every pixel is known in closed form, and on the mirror room.
 
+#[path = "../common/report.rs"]
+mod report;
 mod scenes;
 #[path = "../support/mod.rs"]
 mod support;
 mod survey;
-#[path = "../common/told.rs"]
-mod told;
 
 use std::f64::consts::PI;
 use support::{begin, follow, parsed, picture, pool, rendered, settings, shipped, sized};
@@ -302,7 +302,7 @@ fn assert_always_honest(adaptive: bool) {
     let ratios: Vec<f64> = ways.map(|(f, spp)| assert_honest(f, adaptive, spp)).collect();
     let (low, high) = ratios.iter().fold((f64::INFINITY, 0f64), |(l, h), r| (l.min(*r), h.max(*r)));
     let way = if adaptive { "adaptive" } else { "uniform" };
-    told::told(30, "both", &format!("{way}: true / told {low:.3} to {high:.3}"));
+    report::report(30, "both", &format!("{way}: true / told {low:.3} to {high:.3}"));
 }
 
 #[test]
@@ -322,7 +322,7 @@ fn extreme_30_a_noise_target_is_reached() {
         let outcomes = outcomes(filter, true, stop, StoppedBy::Noise);
         let achieved = mean(outcomes.iter().map(|o| o.codes * o.codes)).sqrt();
         assert!(achieved <= 1.1 * target, "{filter:?}: asked for {target}, achieved {achieved}");
-        told::told(30, "both", &format!("asked for {target} codes: {achieved:.2}"));
+        report::report(30, "both", &format!("asked for {target} codes: {achieved:.2}"));
     }
 }
 

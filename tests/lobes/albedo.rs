@@ -1,7 +1,7 @@
 //! Extreme test 23: Cook-Torrance in a white furnace.
 
+use crate::report::{precision, report};
 use crate::setup::*;
-use crate::told::{precision, told};
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::material::{Lobe, Masking};
 
@@ -42,7 +42,7 @@ fn compare<L: SimdFloat>() {
             worst = worst.max((found - known).abs());
         }
     }
-    told(23, precision::<L>(), &format!("table {worst:.4} off at most"));
+    report(23, precision::<L>(), &format!("table {worst:.4} off at most"));
 }
 
 #[test]
@@ -69,6 +69,6 @@ fn extreme_23_microfacets_never_return_more_than_they_get() {
             }
         }
     }
-    told(23, "double", &format!("at most {:.5} comes back", most[0]));
-    told(23, "single", &format!("at most {:.5} comes back", most[1]));
+    report(23, "double", &format!("at most {:.5} comes back", most[0]));
+    report(23, "single", &format!("at most {:.5} comes back", most[1]));
 }

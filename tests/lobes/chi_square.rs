@@ -1,8 +1,8 @@
 //! Drawn directions against the integrated density that their lobe states (extreme test 22).
 
+use crate::report::{precision, report};
 use crate::setup::*;
 use crate::stats::chi_square_p;
-use crate::told::{precision, told};
 use std::f64::consts::{PI, TAU};
 use zerkalo::lanes::{Double, Frame, SimdFloat, Single, Vec3};
 use zerkalo::material::{Bsdf, Lobe, Masking, Material, ReflectionLobe};
@@ -199,7 +199,7 @@ fn walk<A: SimdFloat, B: SimdFloat>(cases: &[(Material, f64)]) {
     }
     assert!(wrong.is_empty(), "{}, {}:\n{}", A::NAME, B::NAME, wrong.join("\n"));
     let words = format!("{} tests, least p = {least:.0e}", 2 * cases.len());
-    told(22, precision::<A>(), &words);
+    report(22, precision::<A>(), &words);
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! What a lobe sees of a half-space, in closed form, against the lobes themselves.
 
+use crate::report::{precision, report};
 use crate::setup::*;
 use crate::stats::slope;
-use crate::told::{precision, told};
 use std::f64::consts::{FRAC_PI_2, PI};
 use zerkalo::lanes::{Double, Float, Frame, SimdFloat, Single, Vec3};
 use zerkalo::material::{Bsdf, Lobe, Masking, ReflectionLobe};
@@ -156,8 +156,8 @@ fn extreme_19_cone_in_a_half_space() {
         assert!(z < 4.0, "single lanes, {theta}: {z} sigma");
         worst[1] = worst[1].max(z);
     }
-    told(19, "double", &format!("{:.1} sigma at most", worst[0]));
-    told(19, "single", &format!("{:.1} sigma at most", worst[1]));
+    report(19, "double", &format!("{:.1} sigma at most", worst[0]));
+    report(19, "single", &format!("{:.1} sigma at most", worst[1]));
 }
 
 #[test]
@@ -171,7 +171,7 @@ fn extreme_19_the_error_falls_faster_than_that_of_random_numbers() {
         assert!(slope <= -0.7, "{theta}: {slope}");
         flattest = flattest.max(slope);
     }
-    told(19, "double", &format!("slope {flattest:.2} or steeper"));
+    report(19, "double", &format!("slope {flattest:.2} or steeper"));
 }
 
 /// Closed form 4: the share of the flat disc is the limit of the cone's, nearer than theta^2 / 18.
@@ -211,8 +211,8 @@ fn extreme_20_square_in_a_half_space() {
         let slope = rmse_slope(Lobe::Square, roughness, &all);
         assert!(slope <= -0.7, "{roughness}: {slope}");
     }
-    told(20, "double", &format!("{:.1} sigma at most", worst[0]));
-    told(20, "single", &format!("{:.1} sigma at most", worst[1]));
+    report(20, "double", &format!("{:.1} sigma at most", worst[0]));
+    report(20, "single", &format!("{:.1} sigma at most", worst[1]));
 }
 
 /// Closed form 5: the direction density 1 / (side^2 cos^3) belongs to a uniform point of the square:
@@ -367,6 +367,6 @@ fn horizon<L: SimdFloat>(tolerance: f64) {
     }
     if L::WIDTH > 1 {
         let words = format!("folded {worst:.0e} off, absorbed {worst_z:.1} sigma at most");
-        told(21, precision::<L>(), &words);
+        report(21, precision::<L>(), &words);
     }
 }

@@ -7,10 +7,10 @@ mod claims;
 mod closed_forms;
 mod highlights;
 mod lanes;
+#[path = "../common/report.rs"]
+mod report;
 mod sampler;
 mod setup;
 mod stats;
 mod through;
-#[path = "../common/told.rs"]
-mod told;
 mod worlds;

@@ -1,7 +1,7 @@
 //! Light through transparent things: slabs, furnaces, cameras inside, against closed forms.
 
+use crate::report::report;
 use crate::setup::*;
-use crate::told::told;
 use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
 use zerkalo::material::Interface;
@@ -74,10 +74,10 @@ fn check_slab<L: SimdFloat>() -> f64 {
 fn extreme_27_slab_displacement() {
     let double = check_slab::<f64>();
     assert!(double <= 1e-10, "{double}");
-    told(27, "double", &format!("{double:.0e} t off at most"));
+    report(27, "double", &format!("{double:.0e} t off at most"));
     let single = check_slab::<f32>();
     assert!(single <= 1.5e-3, "{single}");
-    told(27, "single", &format!("{single:.0e} t off at most"));
+    report(27, "single", &format!("{single:.0e} t off at most"));
 }
 
 /// A red wall behind a slab, a green one behind the camera.

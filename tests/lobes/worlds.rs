@@ -1,7 +1,7 @@
 //! Whole paths: furnaces, endless mirrors, the width-1 instances against the packets.
 
+use crate::report::report;
 use crate::setup::*;
-use crate::told::told;
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::material::{Lobe, Masking};
 use zerkalo::scene::Scene;
@@ -63,7 +63,7 @@ fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
         near.iter().zip(&mirror).filter(far).count()
     };
     assert_eq!(differing(1e-9, &mut scene), 0);
-    told(20, "double", "bit-equal to the mirror at 0");
+    report(20, "double", "bit-equal to the mirror at 0");
     assert!(differing(0.3, &mut scene) > 100);
 }
 
@@ -119,8 +119,8 @@ fn extreme_26_parallel_mirrors() {
             worst[1] = worst[1].max((r / truncated - 1.0).abs());
         }
     }
-    told(26, "double", &format!("{:.0e} off (relative)", worst[0]));
-    told(26, "single", &format!("{:.0e} off (relative)", worst[1]));
+    report(26, "double", &format!("{:.0e} off (relative)", worst[0]));
+    report(26, "single", &format!("{:.0e} off (relative)", worst[1]));
 }
 
 /// One hundredth of what a lit wall of the physical room returns of its unit light. Differences are

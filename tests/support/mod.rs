@@ -1,4 +1,4 @@
-//! Renderings that tests drive wave by wave, without clock or channels.
+//! Renderings that tests drive wave by wave, without a clock or channels.
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use std::fs;
@@ -12,13 +12,13 @@ use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Acceleration, Filter, Scene};
 use zerkalo::world::{self, Precision};
 
-/// A scene of the folder `scenes`.
+/// The shipped scene `name` of the folder `scenes`.
 pub fn shipped(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
     Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Every scene of the folder `scenes`, by name.
+/// Every shipped scene of the folder `scenes`, sorted by file name.
 pub fn all_shipped() -> Vec<(String, Scene)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
@@ -30,13 +30,13 @@ pub fn all_shipped() -> Vec<(String, Scene)> {
     paths.iter().map(|path| (name(path), shipped(&name(path)))).collect()
 }
 
-/// Smaller, in another raster; the field of view stays as the scene has it.
+/// `scene` with a film of `size` pixels. The view angle stays.
 pub fn sized(mut scene: Scene, size: [u32; 2]) -> Scene {
     scene.film.size = size;
     scene
 }
 
-/// A scene in a text.
+/// The scene in `text`; panics if it has faults.
 pub fn parsed(text: &str) -> Scene {
     Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
 }
@@ -46,7 +46,7 @@ pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> RenderState {
     begin_with(scene, SampleSettings { seed, kind: SamplerKind::Sobol }, precision)
 }
 
-/// A rendering without samples, with a sampler of its own.
+/// A rendering without samples, with the given sampler settings.
 pub fn begin_with(scene: &Scene, sampling: SampleSettings, precision: Precision) -> RenderState {
     let world = world::Options { precision };
     RenderState::new(scene, &Options { world, sampling, display: Display::default() }, None)
@@ -57,18 +57,18 @@ pub fn pool(threads: usize) -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
 }
 
-/// The same samples in every tile, in the film's order.
+/// A wave of samples `first .. first + count` in every tile, in film order.
 pub fn wave(film: &Film, replicate: usize, first: u32, count: u32) -> Wave {
     let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first, count }).collect();
     Wave { replicate, jobs, estimate: false }
 }
 
-/// Traces a wave to its end.
+/// Traces a whole wave.
 pub fn trace(rendering: &mut RenderState, wave: &Wave, pool: &rayon::ThreadPool) -> WaveReport {
     rendering.trace_wave(wave, pool, &AtomicBool::new(false))
 }
 
-/// Samples `first .. first + count` of both replicates in every pixel.
+/// Traces samples `first .. first + count` of both replicates in every pixel.
 pub fn uniform(rendering: &mut RenderState, first: u32, count: u32, pool: &rayon::ThreadPool) {
     for replicate in [0, 1] {
         let wave = wave(&rendering.film, replicate, first, count);
@@ -76,29 +76,30 @@ pub fn uniform(rendering: &mut RenderState, first: u32, count: u32, pool: &rayon
     }
 }
 
-/// Both replicates of `scene`, `count` samples each.
+/// A rendering of `scene` with `count` samples in each of both replicates, traced by two threads.
 pub fn rendered(scene: &Scene, seed: u64, precision: Precision, count: u32) -> RenderState {
     let mut rendering = begin(scene, seed, precision);
     uniform(&mut rendering, 0, count, &pool(2));
     rendering
 }
 
-/// Both replicates of `scene` by one thread, accelerated in one of the ways.
+/// A rendering of `scene` with the given acceleration structure, `count` samples in each of both replicates,
+/// traced by one thread.
 pub fn accelerated(
     scene: &Scene,
-    by: Acceleration,
+    acceleration: Acceleration,
     precision: Precision,
     count: u32,
 ) -> RenderState {
     let mut scene = scene.clone();
-    scene.trace.acceleration = by;
+    scene.trace.acceleration = acceleration;
     let mut rendering = begin(&scene, 5, precision);
     uniform(&mut rendering, 0, count, &pool(1));
     rendering
 }
 
-/// Takes from a scene all that is left to chance: anti-aliasing, lobes, and beyond two surfaces that let
-/// light through the choice of one of two rays.
+/// Removes all random choices from a scene: anti-aliasing, blurred lobes, and the choice between
+/// reflection and refraction, which begins behind the second transmitting surface.
 pub fn without_chance(scene: &mut Scene) {
     scene.film.filter = Filter::Point;
     for material in scene.materials.values_mut() {
@@ -109,7 +110,7 @@ pub fn without_chance(scene: &mut Scene) {
     }
 }
 
-/// Follows a schedule that stops for anything but time.
+/// Runs a schedule until it stops, with a clock that stands at 0.
 pub fn follow(
     rendering: &mut RenderState,
     settings: Settings,
@@ -127,12 +128,12 @@ pub fn follow(
     }
 }
 
-/// Settings that minimise the error in codes.
+/// Settings that minimise the error in 8-bit levels.
 pub fn settings(adaptive: bool, rays_per_pixel: u32, stop: Stop) -> Settings {
     Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel, stop }
 }
 
-/// The radiance of every pixel, row by row.
+/// Radiance of every pixel, row by row.
 pub fn picture(rendering: &RenderState, part: Replicates) -> Vec<[f64; 3]> {
     let mut row = Vec::new();
     let mut all = Vec::new();
@@ -143,7 +144,7 @@ pub fn picture(rendering: &RenderState, part: Replicates) -> Vec<[f64; 3]> {
     all
 }
 
-/// Numbers for tests (SplitMix64).
+/// Random number generator of tests (SplitMix64).
 pub struct Rng(pub u64);
 
 impl Rng {
@@ -154,7 +155,7 @@ impl Rng {
         z ^ (z >> 31)
     }
 
-    /// `items` in a random order (Fisher-Yates).
+    /// Shuffles `items` (Fisher-Yates).
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for i in (1..items.len()).rev() {
             items.swap(i, (self.bits() % (i as u64 + 1)) as usize);
