@@ -7,11 +7,10 @@
 //! be looked at. `run` acts: renderer, files, time; and
 //! `terminal` is what lies at the other end of the line.
 
-pub mod action;
 pub mod convergence;
 pub mod editor;
 pub mod hints;
-pub mod keymap;
+pub mod key_context;
 pub mod layout;
 pub mod message;
 pub mod model;

@@ -2,7 +2,7 @@
 
 use crate::dashboard::convergence::Convergence;
 use crate::dashboard::editor::Editor;
-use crate::dashboard::keymap::Context;
+use crate::dashboard::key_context::KeyContext;
 use crate::dashboard::layout::{Focus, Layout, Request, layout};
 use crate::dashboard::message::{DisplayChannel, Format, OrphanedEdits};
 use crate::dashboard::overlay::Overlay;
@@ -303,17 +303,17 @@ impl Model {
     }
 
     /// Where keys are looked up now.
-    pub fn context(&self) -> Context {
+    pub fn context(&self) -> KeyContext {
         match (&self.overlay, self.focus, self.mode) {
-            (Some(_), ..) => Context::Overlay,
-            (None, Focus::Outline, _) => Context::Outline,
-            (None, Focus::Inspector, _) => Context::Inspector,
+            (Some(_), ..) => KeyContext::Overlay,
+            (None, Focus::Outline, _) => KeyContext::Outline,
+            (None, Focus::Inspector, _) => KeyContext::Inspector,
             (None, Focus::Picture, mode) => match mode {
-                Mode::Orbit => Context::Picture,
-                Mode::Move => Context::Moving,
-                Mode::Rotate => Context::Turning,
-                Mode::Fly => Context::Flying,
-                Mode::Probe => Context::Probing,
+                Mode::Orbit => KeyContext::Picture,
+                Mode::Move => KeyContext::Moving,
+                Mode::Rotate => KeyContext::Turning,
+                Mode::Fly => KeyContext::Flying,
+                Mode::Probe => KeyContext::Probing,
             },
         }
     }

@@ -55,7 +55,7 @@ pub struct ViewedImage {
 pub struct Palette {
     /// What is typed.
     pub editor: Editor,
-    /// Rows of the key table that fit, the best first: positions in `KEYMAP`.
+    /// Matching commands, best first: positions in the command table.
     pub found: Vec<usize>,
     /// Position in `found`.
     pub cursor: usize,

@@ -5,11 +5,10 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo::dashboard::action::Action;
-use zerkalo::dashboard::keymap::{KEYMAP, lookup};
 use zerkalo::dashboard::message::{Effect, Exported, Message};
 use zerkalo::dashboard::model::{Colors, Model, Start};
 use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
 use zerkalo::dashboard::update::{begin, update};
 use zerkalo::film::{Film, Header, LightWeights};
 use zerkalo::render::schedule::Stop;
@@ -69,8 +68,8 @@ pub struct Desk {
     pub effects: Vec<Effect>,
     /// Files and their texts.
     pub disk: BTreeMap<PathBuf, String>,
-    /// Every action that a key or the palette has fired.
-    pub fired: HashSet<Action>,
+    /// Labels of the commands that keys or the palette have run.
+    pub fired: HashSet<&'static str>,
     pub document: Document,
     begun_with: Document,
     /// Whether reading the file is answered: it begins another history of edits.
@@ -196,8 +195,8 @@ impl Desk {
         self.send(Message::Key(key));
     }
 
-    /// What a key fires as things stand.
-    fn would_fire(&self, key: Key) -> Vec<Action> {
+    /// Labels of the commands that a key would run in the current state.
+    fn would_fire(&self, key: Key) -> Vec<&'static str> {
         if self.model.editor().is_some_and(|editor| editor.clone().key(key)) {
             return Vec::new();
         }
@@ -205,11 +204,10 @@ impl Desk {
         if types && self.model.overlay.is_some() {
             return Vec::new();
         }
-        let mut fired: Vec<_> = lookup(self.model.context(), key).into_iter().collect();
-        if let (Some(Overlay::Palette(palette)), Some(Action::Open)) =
-            (&self.model.overlay, fired.first())
-        {
-            fired.extend(palette.found.get(palette.cursor).map(|at| KEYMAP[*at].action));
+        let command = lookup(self.model.context(), key);
+        let mut fired: Vec<_> = command.map(|command| command.label).into_iter().collect();
+        if let (Some(Overlay::Palette(palette)), Code::Enter) = (&self.model.overlay, key.code) {
+            fired.extend(palette.found.get(palette.cursor).map(|i| COMMANDS[*i].label));
         }
         fired
     }
@@ -232,7 +230,7 @@ impl Desk {
     /// Finds a row of the table in the palette by its label and fires it.
     pub fn palette(&mut self, label: &str) -> &mut Self {
         self.keys(": ").keys(&format!("`{label}`"));
-        let at = KEYMAP.iter().position(|row| row.label == label);
+        let at = COMMANDS.iter().position(|row| row.label == label);
         let Some(Overlay::Palette(palette)) = &self.model.overlay else { panic!("no palette") };
         let downs = palette.found.iter().position(|found| Some(*found) == at);
         let downs = downs.unwrap_or_else(|| panic!("{label} is not found by its own name"));

@@ -4,14 +4,15 @@
 use crate::desk::{Desk, ROOM};
 use std::collections::HashSet;
 use std::time::Duration;
-use zerkalo::dashboard::action::Action;
-use zerkalo::dashboard::keymap::{KEYMAP, lookup};
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
 use zerkalo::scene::BUILT_IN;
 use zerkalo::terminal::event::{Button, Code, Key, MouseKind};
 
 const EVENTS: usize = 10_000;
+/// Label of the command that ends the program.
+const QUIT: &str = "quit";
 
 /// xorshift64*.
 struct Rng(u64);
@@ -27,7 +28,8 @@ impl Rng {
 
 /// Every key of the table, and those that type.
 fn keys() -> Vec<Key> {
-    let names = KEYMAP.iter().flat_map(|row| row.keys).flat_map(|(_, names)| names.iter());
+    let bindings = COMMANDS.iter().flat_map(|command| command.keys);
+    let names = bindings.flat_map(|(_, names)| names.split(' '));
     let mut keys: Vec<Key> = names.map(|name| name.parse().unwrap()).collect();
     for c in "0123456789.-#eyxñ鏡 ".chars() {
         keys.push(Key { code: Code::Char(c), ctrl: false, alt: false, shift: false });
@@ -38,11 +40,12 @@ fn keys() -> Vec<Key> {
 fn quits(desk: &Desk, key: Key) -> bool {
     let palette = match &desk.model.overlay {
         Some(Overlay::Palette(palette)) => {
-            palette.found.get(palette.cursor).is_some_and(|at| KEYMAP[*at].action == Action::Quit)
+            palette.found.get(palette.cursor).is_some_and(|i| COMMANDS[*i].label == QUIT)
         }
         _ => false,
     };
-    lookup(desk.model.context(), key) == Some(Action::Quit) || palette && key.code == Code::Enter
+    lookup(desk.model.context(), key).is_some_and(|c| c.label == QUIT)
+        || palette && key.code == Code::Enter
 }
 
 fn event(desk: &mut Desk, rng: &mut Rng, keys: &[Key]) {
@@ -56,9 +59,9 @@ fn event(desk: &mut Desk, rng: &mut Rng, keys: &[Key]) {
         }
         // By name, as one does who does not know the keys; what has no key, too.
         14 if desk.model.overlay.is_none() && desk.model.editor().is_none() => {
-            let row = KEYMAP[rng.below(KEYMAP.len())];
-            if row.action != Action::Quit {
-                desk.palette(row.label);
+            let label = COMMANDS[rng.below(COMMANDS.len())].label;
+            if label != QUIT {
+                desk.palette(label);
             }
         }
         14..16 => {
@@ -86,7 +89,7 @@ fn event(desk: &mut Desk, rng: &mut Rng, keys: &[Key]) {
     }
 }
 
-fn play(name: &str, text: &str, seed: u64, fired: &mut HashSet<Action>) {
+fn play(name: &str, text: &str, seed: u64, fired: &mut HashSet<&'static str>) {
     let (keys, mut rng) = (keys(), Rng(seed));
     let mut desk = Desk::new(text);
     desk.reads = false;
@@ -124,10 +127,9 @@ fn random_events_break_nothing() {
     play("room", ROOM, 1, &mut fired);
     play("built in", BUILT_IN, 2, &mut fired);
     play("physical", physical, 3, &mut fired);
-    let table: Vec<_> = KEYMAP.iter().filter(|row| row.action != Action::Quit).collect();
-    let missed: Vec<_> =
-        table.iter().filter(|row| !fired.contains(&row.action)).map(|row| row.label).collect();
-    let share = 1.0 - missed.len() as f64 / table.len() as f64;
-    println!("{:.1} % of {} rows fired; not: {missed:?}", 100.0 * share, table.len());
+    let labels: Vec<_> = COMMANDS.iter().map(|c| c.label).filter(|label| *label != QUIT).collect();
+    let missed: Vec<_> = labels.iter().filter(|label| !fired.contains(*label)).collect();
+    let share = 1.0 - missed.len() as f64 / labels.len() as f64;
+    println!("{:.1} % of {} commands run; not: {missed:?}", 100.0 * share, labels.len());
     assert!(share >= 0.95, "{share}: {missed:?}");
 }

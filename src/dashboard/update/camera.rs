@@ -1,8 +1,7 @@
 //! Moving the camera by keys and by hand.
 
 use crate::camera::Camera;
-use crate::dashboard::action::{Delta, Direction, StepSize};
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
 use crate::scene::Scene;
 use crate::scene::edit::{
     Edit, EditError, Target, bounds, focus_distance, recall_view, scene_bounds, step_length,
@@ -93,9 +92,9 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Repeat, |camera, _| camera.roll(degrees));
     }
 
-    pub(super) fn view_angle(&mut self, change: Delta) {
-        let factor = if change == Delta::Up { 1.0 / ZOOM } else { ZOOM };
-        self.set_camera(Coalesce::Repeat, |camera, _| camera.zoom(factor));
+    /// Widens the view angle by `steps`; negative steps narrow it.
+    pub(super) fn view_angle(&mut self, steps: i32) {
+        self.set_camera(Coalesce::Repeat, |camera, _| camera.zoom(ZOOM.powi(-steps)));
         let (key, degrees) = self.scene().camera.view_angle.key_degrees();
         self.say(format!("{key} view angle {degrees}°"));
     }

@@ -1,9 +1,8 @@
 //! What the picture shows: exposure, tone curve, channel, probe, kept against live.
 
-use crate::dashboard::action::{Direction, StepSize};
 use crate::dashboard::message::{DisplayChannel, Effect};
 use crate::dashboard::model::{CompareView, Mode};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::update::{Direction, StepSize, UpdateContext};
 use crate::film::{LinearImage, Tone};
 use std::sync::Arc;
 

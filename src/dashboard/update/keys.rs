@@ -1,11 +1,11 @@
 //! Keys: first to a line of text that is open, then through the key table.
 
-use crate::dashboard::action::Action;
 use crate::dashboard::editor::Editor;
-use crate::dashboard::keymap::{Context, lookup};
+use crate::dashboard::key_context::KeyContext;
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::UpdateContext;
+use crate::dashboard::update::commands::{Command, lookup};
 use crate::terminal::event::{Code, Key};
 
 /// The character that a key types, if it is one that types.
@@ -36,9 +36,9 @@ impl UpdateContext<'_> {
             self.model.notice = None;
         }
         if let Some(Overlay::ViewerImage(_)) = self.model.overlay {
-            match lookup(Context::Overlay, key) {
-                Some(action @ (Action::Suspend | Action::Quit)) => self.act(action, None),
-                _ => self.close_viewer(),
+            match lookup(KeyContext::Overlay, key).filter(|command| command.over_image) {
+                Some(command) => self.run(command),
+                None => self.close_viewer(),
             }
             return;
         }
@@ -53,7 +53,7 @@ impl UpdateContext<'_> {
         {
             return;
         }
-        let Some(action) = lookup(self.model.context(), key) else {
+        let Some(command) = lookup(self.model.context(), key) else {
             if self.model.overlay.is_none() && self.model.inspector.editor.is_none() {
                 self.say(format!("{key} does nothing here · ? all keys"));
             }
@@ -62,12 +62,22 @@ impl UpdateContext<'_> {
         // A value being typed is applied before anything else is done, or holds it back.
         if self.model.overlay.is_none()
             && self.model.inspector.editor.is_some()
-            && !self.ends_typing(action)
+            && !command.while_typing
             && !self.apply_field()
         {
             return;
         }
-        self.act(action, typed(key));
+        self.typed = typed(key);
+        self.run(command);
+    }
+
+    /// Carries out a command, or refuses it if the model does not have what it needs.
+    pub(super) fn run(&mut self, command: &Command) {
+        if (command.available)(self.model) {
+            (command.run)(self);
+        } else {
+            self.refuse("There is no scene to work on until its file can be read: mend it");
+        }
     }
 
     /// Pasted text goes to a line of text; anywhere else it would be forty shortcuts.

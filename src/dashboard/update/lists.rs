@@ -1,13 +1,11 @@
 //! Moving over lines and choosing: outline, inspector, palette, lists, help, questions.
 
-use crate::dashboard::action::Direction;
 use crate::dashboard::editor::Editor;
-use crate::dashboard::hints::help;
-use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::overlay::{Answer, Overlay, Palette, PickFor, Question};
 use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
 use crate::dashboard::update::UpdateContext;
+use crate::dashboard::update::commands::{COMMANDS, Chapter};
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
@@ -26,7 +24,11 @@ impl UpdateContext<'_> {
         let inventory = self.model.inventory(width).len();
         match &mut self.model.overlay {
             Some(Overlay::Help { scroll }) => {
-                *scroll = moved(*scroll, steps, help().len().saturating_sub(rows) + 1);
+                *scroll = moved(
+                    *scroll,
+                    steps,
+                    (COMMANDS.len() + Chapter::ALL.len()).saturating_sub(rows) + 1,
+                );
             }
             Some(Overlay::Inventory { scroll }) => {
                 *scroll = moved(*scroll, steps, inventory.saturating_sub(rows) + 1);
@@ -55,14 +57,15 @@ impl UpdateContext<'_> {
         }
     }
 
-    pub(super) fn page(&mut self, way: Direction) {
+    /// Moves the cursor by `pages`, each a line less than the rows that are visible.
+    pub(super) fn page(&mut self, pages: isize) {
         let rows = match (self.model.place(), self.model.focus) {
             (Some(place), _) => place.list.height,
             (None, Focus::Outline) => self.model.outline_rows().map_or(1, |rows| rows.height),
             (None, _) => self.model.inspector_rows().map_or(1, |(rows, _)| rows.height),
         };
         let page = isize::from(i16::try_from(rows).unwrap_or(1)).max(2) - 1;
-        self.walk(if way == Direction::Up { -page } else { page });
+        self.walk(pages * page);
     }
 
     fn walk_outline(&mut self, steps: isize) {
@@ -80,7 +83,7 @@ impl UpdateContext<'_> {
     }
 
     /// Opens what is under the cursor.
-    pub(super) fn open(&mut self, typed: Option<char>) {
+    pub(super) fn open(&mut self) {
         match &self.model.overlay {
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
             Some(Overlay::Quality { cursor }) => {
@@ -89,10 +92,10 @@ impl UpdateContext<'_> {
                 self.set_stop(Stop { noise_codes, rmse_linear: None, ..self.model.stop });
             }
             Some(Overlay::Palette(palette)) => {
-                let row = palette.found.get(palette.cursor).map(|at| KEYMAP[*at]);
-                if let Some(row) = row {
+                if let Some(found) = palette.found.get(palette.cursor) {
+                    let command = &COMMANDS[*found];
                     self.model.overlay = None;
-                    self.act(row.action, None);
+                    self.run(command);
                 }
             }
             Some(Overlay::Pick(pick)) => {
@@ -119,7 +122,7 @@ impl UpdateContext<'_> {
                 if self.model.inspector.editor.is_some() {
                     self.apply_field();
                 } else {
-                    self.open_field(typed);
+                    self.open_field(self.typed);
                 }
             }
             None => self.inspect(),
@@ -138,10 +141,14 @@ impl UpdateContext<'_> {
         }
     }
 
+    pub(super) fn open_overlay(&mut self, overlay: Overlay) {
+        self.model.overlay = Some(overlay);
+    }
+
     pub(super) fn open_palette(&mut self) {
         self.model.overlay = Some(Overlay::Palette(Palette {
             editor: Editor::default(),
-            found: (0..KEYMAP.len()).collect(),
+            found: (0..COMMANDS.len()).collect(),
             cursor: 0,
             scroll: 0,
         }));
@@ -154,7 +161,7 @@ impl UpdateContext<'_> {
         let pattern = Pattern::parse(text, CaseMatching::Ignore, Normalization::Smart);
         let mut matcher = Matcher::new(Config::DEFAULT);
         let mut buffer = Vec::new();
-        let mut found: Vec<(u32, usize)> = KEYMAP
+        let mut found: Vec<(u32, usize)> = COMMANDS
             .iter()
             .enumerate()
             .filter_map(|(i, row)| {

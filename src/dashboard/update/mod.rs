@@ -1,10 +1,11 @@
 //! What every message does: a changed model and what is asked for. No clock, no file, no terminal.
 
-mod actions;
 mod camera;
+pub mod commands;
 mod compare;
 mod fields;
 mod files;
+mod focus;
 mod form;
 mod image_viewer;
 mod keys;
@@ -63,6 +64,28 @@ struct UpdateContext<'a> {
     effects: Vec<Effect>,
     /// Whether lists are to be scrolled to their cursors.
     follow: bool,
+    /// The character that ran the current command, if one did.
+    typed: Option<char>,
+}
+
+/// A direction on the screen or along the view.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Direction {
+    Left,
+    Right,
+    Up,
+    Down,
+    /// Away from the eye.
+    In,
+    /// Towards the eye.
+    Out,
+}
+
+/// Size of a step.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum StepSize {
+    Coarse,
+    Fine,
 }
 
 /// How an edit joins the one before.
@@ -78,7 +101,7 @@ enum Coalesce {
 
 impl<'a> UpdateContext<'a> {
     fn new(model: &'a mut Model, now: Duration) -> Self {
-        Self { model, now, effects: Vec::new(), follow: true }
+        Self { model, now, effects: Vec::new(), follow: true, typed: None }
     }
 
     fn take(&mut self, message: Message) {

@@ -125,7 +125,7 @@ impl UpdateContext<'_> {
         };
         if let Some(at) = line_at(place.list, scroll, mouse).filter(|at| *at < len) {
             match at == cursor {
-                true => self.open(None),
+                true => self.open(),
                 false => self.walk(at as isize - cursor as isize),
             }
         }

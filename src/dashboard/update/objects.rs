@@ -1,8 +1,7 @@
 //! Moving, turning, copying, removing what is selected.
 
-use crate::dashboard::action::{Direction, StepSize};
 use crate::dashboard::model::Mode;
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
 use crate::scene::edit::{self, bounds, step_length};
 use glam::{DVec2, DVec3};
 
@@ -101,7 +100,7 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    pub(super) fn drop_down(&mut self) {
+    pub(super) fn snap_to_ground(&mut self) {
         let edit = edit::snap_to_ground(self.scene(), &self.model.selection);
         self.commit(edit, Coalesce::Single);
     }

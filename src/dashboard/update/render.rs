@@ -1,6 +1,5 @@
 //! The work: pause, restart, targets, threads; exports; the terminal's colours.
 
-use crate::dashboard::action::Delta;
 use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::Colors;
 use crate::dashboard::overlay::Overlay;
@@ -36,8 +35,7 @@ impl UpdateContext<'_> {
             Some(Overlay::Quality { cursor: cursor.unwrap_or(QUALITIES.len() - 1) });
     }
 
-    pub(super) fn threads(&mut self, change: Delta) {
-        let more = if change == Delta::Up { 1 } else { -1 };
+    pub(super) fn threads(&mut self, more: isize) {
         let threads = self.model.threads.saturating_add_signed(more);
         self.model.threads = threads.clamp(1, self.model.most_threads);
         self.emit(Effect::Threads(self.model.threads));

@@ -1,11 +1,11 @@
 //! What lies over the panels: help, lists, forms, prompts, questions.
 
 use crate::dashboard::hints::{HelpLine, help};
-use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::{ABOUT, Cost};
 use crate::dashboard::overlay::{Form, Overlay, Palette, Pick, Prompt, Question};
 use crate::dashboard::overlay_layout::{OverlayLayout, wrapped};
+use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::view::fields::{Fields, typed};
 use crate::dashboard::view::frame::{overlay, scroll_mark};
 use crate::dashboard::view::text::{Row, columns, cut, duration, durations};
@@ -147,13 +147,13 @@ fn palette(
     let (first, rows) = window(place, open.scroll, open.found.len(), theme, buffer);
     let shown = open.found.iter().enumerate().skip(first).take(rows);
     for (row, (i, found)) in (0..).zip(shown) {
-        let Some(action) = KEYMAP.get(*found) else { continue };
+        let Some(command) = COMMANDS.get(*found) else { continue };
         let (mut to, name, rest) = chosen(place.list, row, i == open.cursor, theme, buffer);
-        let keys = action.all_keys();
+        let keys = command.all_keys(str::to_string);
         let key = if i == open.cursor { name } else { theme.accent() };
-        to.put_right(" ", 0, key).put_right(&keys, columns(action.label) + 2, key);
-        to.put(action.label, name);
-        to.put_right("  ", 1, rest).put_right(action.chapter.title(), 1, rest);
+        to.put_right(" ", 0, key).put_right(&keys, columns(command.label) + 2, key);
+        to.put(command.label, name);
+        to.put_right("  ", 1, rest).put_right(command.chapter.title(), 1, rest);
     }
     cursor
 }

@@ -1,7 +1,8 @@
 //! The two lowest lines: where the work stands, and what the keys do or what has just happened.
 
-use crate::dashboard::hints::{Hint, hints};
+use crate::dashboard::hints::hints;
 use crate::dashboard::model::{Model, Tone};
+use crate::dashboard::update::commands::Hint;
 use crate::dashboard::view::text::{Row, columns, duration, durations, number};
 use crate::dashboard::view::theme::Theme;
 use crate::render::schedule::StoppedBy;
@@ -176,26 +177,23 @@ pub fn hints_line(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer)
         row.put(mark, style).put(&notice.text, theme.text());
         return;
     }
-    let all = hints(model);
-    for (keys, _, does) in fitting(all, row.left()) {
-        row.put(keys, theme.accent().add_modifier(Modifier::BOLD)).put(" ", theme.dim());
-        row.put(does, theme.dim()).skip(3);
+    for hint in fitting(hints(model), row.left()) {
+        row.put(hint.keys, theme.accent().add_modifier(Modifier::BOLD)).put(" ", theme.dim());
+        row.put(hint.text, theme.dim()).skip(3);
     }
 }
 
-/// The hints that fit whole in `width` columns. The last ones, which lead to all others, stay.
-fn fitting(all: &[Hint], width: usize) -> Vec<Hint> {
-    let mut some = all.to_vec();
-    let taken = |hints: &[Hint]| -> usize {
-        let one = |(keys, _, does): &Hint| columns(keys) + 1 + columns(does) + 3;
-        hints.iter().map(one).sum::<usize>().saturating_sub(3)
+/// Removes hints until the others fit whole in `width` columns. The first one and the last two, which
+/// lead to all commands, are removed last.
+fn fitting(mut hints: Vec<&Hint>, width: usize) -> Vec<&Hint> {
+    let width_of = |hints: &[&Hint]| -> usize {
+        let columns_of = |hint: &&Hint| columns(hint.keys) + 1 + columns(hint.text) + 3;
+        hints.iter().map(columns_of).sum::<usize>().saturating_sub(3)
     };
-    while taken(&some) > width && !some.is_empty() {
-        // The first and the last two are the last to go.
-        let at = if some.len() > 3 { some.len() - 3 } else { some.len() - 1 };
-        some.remove(at);
+    while width_of(&hints) > width && !hints.is_empty() {
+        hints.remove(if hints.len() > 3 { hints.len() - 3 } else { hints.len() - 1 });
     }
-    some
+    hints
 }
 
 #[cfg(test)]
@@ -209,12 +207,14 @@ mod tests {
     }
 
     #[test]
-    fn hints_are_dropped_whole_and_the_way_to_help_stays() {
-        let all: &[Hint] =
-            &[("a", "a", "first"), ("b", "b", "second"), (":", ":", "all"), ("?", "?", "keys")];
-        assert_eq!(fitting(all, 80).len(), 4);
-        let some = fitting(all, 25);
-        assert_eq!(some.iter().map(|h| h.0).collect::<Vec<_>>(), ["a", ":", "?"]);
-        assert!(fitting(all, 3).is_empty());
+    fn hints_to_all_commands_are_dropped_last() {
+        let all = [("a", "first"), ("b", "second"), (":", "all"), ("?", "keys")]
+            .map(|(keys, text)| Hint { lines: &[], position: 0, keys, text });
+        let keys_fitting = |width| -> Vec<_> {
+            fitting(all.iter().collect(), width).iter().map(|hint| hint.keys).collect()
+        };
+        assert_eq!(keys_fitting(80).len(), 4);
+        assert_eq!(keys_fitting(25), ["a", ":", "?"]);
+        assert!(keys_fitting(3).is_empty());
     }
 }

@@ -1,7 +1,6 @@
 //! Models in every state that has a look of its own.
 
 use crate::dashboard::editor::Editor;
-use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::message::{DisplayChannel, Format, Message, OrphanedEdits};
 use crate::dashboard::model::{
@@ -12,6 +11,7 @@ use crate::dashboard::overlay::{
 };
 use crate::dashboard::panel_lines::{PanelLine, scrolled};
 use crate::dashboard::testing::report;
+use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::update::update;
 use crate::film::{LightWeights, Probe};
 use crate::render::schedule::{Spp, Stop, StoppedBy};
@@ -240,7 +240,7 @@ pub const STATES: &[Named] = &[
     ("inventory", |m| m.overlay = Some(Overlay::Inventory { scroll: 0 })),
     ("quality", |m| m.overlay = Some(Overlay::Quality { cursor: 3 })),
     ("palette", |m| {
-        let found = (0..KEYMAP.len()).filter(|i| KEYMAP[*i].label.contains("light")).collect();
+        let found = (0..COMMANDS.len()).filter(|i| COMMANDS[*i].label.contains("light")).collect();
         let editor = Editor::new("light");
         m.overlay = Some(Overlay::Palette(Palette { editor, found, cursor: 1, scroll: 0 }));
     }),
