@@ -25,7 +25,7 @@ const LOOK: Duration = Duration::from_millis(200);
 #[derive(Clone)]
 pub struct Exporter {
     /// The scene's file.
-    pub paper: SharedDocument,
+    pub document: SharedDocument,
     /// Where pictures are put.
     pub folder: PathBuf,
     /// What pictures are called, before the counter.
@@ -70,7 +70,7 @@ impl Exporter {
 
     /// What the scene's file is called, and its text with `scene` in it.
     fn source(&self, scene: &Scene) -> (String, String) {
-        match self.paper.document() {
+        match self.document.get() {
             Some(document) => {
                 let mut document = (*document).clone();
                 document.apply(scene);
@@ -108,15 +108,15 @@ pub struct ExportRequest {
 impl ResizedExport {
     /// Starts the thread. It tells of its progress, and at last of the picture, unless cancelled.
     pub fn start(
-        order: ExportRequest,
-        studio: Exporter,
+        request: ExportRequest,
+        exporter: Exporter,
         results: Sender<Message>,
     ) -> io::Result<Self> {
         let cancelled = Arc::new(AtomicBool::new(false));
         let mark = Arc::clone(&cancelled);
         let thread = thread::Builder::new().name("export".into()).spawn(move || {
             // Nobody listens any more when the program ends.
-            let told = render(order, &studio, &mark, &|progress| {
+            let told = render(request, &exporter, &mark, &|progress| {
                 let _ = results.send(Message::ExportProgress(progress));
             });
             if let Some(result) = told {
@@ -142,18 +142,18 @@ impl ResizedExport {
 
 /// Renders and writes; `None`: cancelled.
 fn render(
-    order: ExportRequest,
-    studio: &Exporter,
+    request: ExportRequest,
+    exporter: &Exporter,
     cancelled: &AtomicBool,
     tell: &dyn Fn(f64),
 ) -> Option<Result<Exported, String>> {
-    let options = Options { display: order.display, ..order.options };
-    let settings = Settings { stop: order.stop, ..order.settings };
-    let mut session: Session<RenderState> = match Session::new(order.threads, options, settings) {
+    let options = Options { display: request.display, ..request.options };
+    let settings = Settings { stop: request.stop, ..request.settings };
+    let mut session: Session<RenderState> = match Session::new(request.threads, options, settings) {
         Ok(session) => session,
         Err(error) => return Some(Err(format!("no threads to render with: {error}"))),
     };
-    session.set_scene(order.scene);
+    session.set_scene(request.scene);
     loop {
         if cancelled.load(Ordering::Relaxed) {
             return None;
@@ -167,8 +167,8 @@ fn render(
             }
         }
     }
-    let (studio, format) = (studio.clone(), order.format);
-    let written = session.with(move |rendering, report| studio.write(rendering, report, format));
+    let (exporter, format) = (exporter.clone(), request.format);
+    let written = session.with(move |rendering, report| exporter.write(rendering, report, format));
     Some(written.unwrap_or_else(|| Err("the renderer has no picture".to_string())))
 }
 

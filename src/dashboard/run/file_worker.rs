@@ -30,7 +30,7 @@ pub struct SharedDocument(Arc<Mutex<Option<Arc<Document>>>>);
 
 impl SharedDocument {
     /// The document.
-    pub fn document(&self) -> Option<Arc<Document>> {
+    pub fn get(&self) -> Option<Arc<Document>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
@@ -43,7 +43,7 @@ impl SharedDocument {
 /// The thread that reads and writes the scene's file.
 pub struct Files {
     jobs: Option<Sender<Job>>,
-    paper: SharedDocument,
+    document: SharedDocument,
     thread: Option<JoinHandle<Option<PathBuf>>>,
 }
 
@@ -57,7 +57,7 @@ impl Files {
         results: Sender<Message>,
     ) -> io::Result<Self> {
         let (jobs, inbox) = unbounded();
-        let paper = SharedDocument::default();
+        let document = SharedDocument::default();
         let (path, file) = match file {
             Ok(file) => (file.path().map(Path::to_path_buf), Some(file)),
             Err(path) => (Some(path), None),
@@ -67,9 +67,9 @@ impl Files {
         let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
         let name = file.as_ref().map_or("", |file| file.document().name());
         let journal = Autosave::new(path.as_deref(), name, state);
-        let clerk = FileWorker { path, file, seen, journal, paper: paper.clone(), results };
+        let clerk = FileWorker { path, file, seen, journal, document: document.clone(), results };
         let thread = thread::Builder::new().name("files".into()).spawn(|| clerk.run(inbox))?;
-        Ok(Self { jobs: Some(jobs), paper, thread: Some(thread) })
+        Ok(Self { jobs: Some(jobs), document, thread: Some(thread) })
     }
 
     /// Writes the scene: a [`Message::Saved`] follows.
@@ -120,8 +120,8 @@ impl Files {
     }
 
     /// What the file holds.
-    pub fn paper(&self) -> SharedDocument {
-        self.paper.clone()
+    pub fn document(&self) -> SharedDocument {
+        self.document.clone()
     }
 
     fn give(&self, job: Job) {
@@ -153,7 +153,7 @@ struct FileWorker {
     /// The state of the file when it was last read, written or looked at.
     seen: FileStamp,
     journal: Autosave,
-    paper: SharedDocument,
+    document: SharedDocument,
     results: Sender<Message>,
 }
 
@@ -285,7 +285,7 @@ impl FileWorker {
 
     fn publish(&self) {
         if let Some(file) = &self.file {
-            self.paper.put(file.document());
+            self.document.put(file.document());
         }
     }
 }
@@ -330,7 +330,7 @@ mod tests {
         files.save(Arc::new(scene.clone()), None, false);
         let saved = inbox.recv_timeout(PATIENCE).unwrap();
         assert!(matches!(saved, Message::Saved(_, Ok(at)) if at == path));
-        assert_eq!(files.paper().document().unwrap().scene(), &scene);
+        assert_eq!(files.document().get().unwrap().scene(), &scene);
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL + CHECK_INTERVAL / 2);
         assert!(quiet.is_err(), "{quiet:?}");
         fs::write(&path, format!("{}\n# more\n", starter())).unwrap();
@@ -359,7 +359,7 @@ mod tests {
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
         files.load();
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_ok());
-        assert!(files.paper().document().is_some());
+        assert!(files.document().get().is_some());
     }
 
     #[test]

@@ -60,7 +60,7 @@ pub enum DrawOutcome {
     /// Nothing may be sent now; nothing was drawn.
     Nothing,
     /// Only the picture differs, and has to wait.
-    BranchStack,
+    Deferred,
     /// The screen is as it ought to be, in what matters.
     Same,
     /// A slice of a still was sent; nothing was drawn.
@@ -106,7 +106,7 @@ impl FramePipeline {
     }
 
     /// How much of the still that is shown has been sent, 0..=1.
-    pub fn still_sent(&self) -> Option<f64> {
+    pub fn uploaded(&self) -> Option<f64> {
         self.sending.as_ref().map(ImageUpload::share)
     }
 
@@ -286,7 +286,7 @@ impl FramePipeline {
                 return self.slice(now, whole);
             }
             return if self.pacing.rest().visible {
-                DrawOutcome::BranchStack
+                DrawOutcome::Deferred
             } else {
                 DrawOutcome::Same
             };

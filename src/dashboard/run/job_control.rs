@@ -67,7 +67,7 @@ impl Dashboard {
     /// program is to end instead.
     pub(super) fn suspend(&mut self, whom: StopTarget, line: &TerminalIo) -> Option<u8> {
         // It may never go on.
-        self.hands.flush(SECURED_WITHIN);
+        self.effects.flush(SECURED_WITHIN);
         self.await_answers(&line.input);
         line.tty.suspend();
         let mut stopped = stop(whom).is_ok();

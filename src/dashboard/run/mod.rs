@@ -28,7 +28,7 @@ use crate::terminal::{
     Capabilities, Environment, Event, Keyboard, Reply, Screen, Timed, probe, size,
 };
 use crossbeam_channel::{Receiver, after, never, select};
-use effects::{EffectRunner, EffectSetup};
+use effects::{EffectRunner, EffectSetup, Outcome};
 use frames::{DrawOutcome, FramePipeline};
 use input::Input;
 use job_control::{ResizeDebounce, TerminalIo};
@@ -92,10 +92,10 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         Ok(file) => (file.path().map(PathBuf::from), file.document().name().to_string()),
         Err(path) => (Some(path.clone()), String::new()),
     };
-    let mut hands = EffectRunner::new(EffectSetup { file, state, threads, options, settings })?;
+    let mut effects = EffectRunner::new(EffectSetup { file, state, threads, options, settings })?;
     if let Ok(scene) = &start {
         // While the terminal is asked what it can do.
-        hands.show(Arc::clone(scene));
+        effects.show(Arc::clone(scene));
     }
     let signals = signals::block()?;
     let screen = Screen::enter()?;
@@ -117,7 +117,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     });
     let mut dashboard = Dashboard {
         model,
-        hands,
+        effects,
         frames: FramePipeline::new(screen.tty(), &terminal, bandwidth)?,
         terminal,
         trace: LatencyRecorder::new(trace.is_some()),
@@ -137,13 +137,13 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         TerminalIo { tty: screen.tty(), input, signals: signals.told, left: screen.left().clone() };
     let result = dashboard.watch(&line);
     // First of all, and whatever else there is to write.
-    dashboard.hands.flush(Duration::ZERO);
+    dashboard.effects.flush(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
         dashboard.await_answers(&line.input);
     }
     // What is still to be written may take a while: it need not be waited for on an empty screen.
     drop(screen);
-    let (finished, kept) = dashboard.hands.finish();
+    let (finished, kept) = dashboard.effects.finish();
     let exported = finished.into_iter().filter_map(|message| match message {
         Message::Exported(result) => Some(result),
         _ => None,
@@ -159,7 +159,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
 
 struct Dashboard {
     model: Model,
-    hands: EffectRunner,
+    effects: EffectRunner,
     frames: FramePipeline,
     /// What the terminal can do, as far as it has said.
     terminal: Capabilities,
@@ -182,8 +182,8 @@ struct Dashboard {
 impl Dashboard {
     /// Lets things happen until the end; the exit status of a signal.
     fn watch(&mut self, line: &TerminalIo) -> io::Result<Option<u8>> {
-        let bell = self.hands.session().wakeup().clone();
-        let done = self.hands.done().clone();
+        let bell = self.effects.session().wakeup().clone();
+        let done = self.effects.done().clone();
         let written = self.frames.written().clone();
         let silence = never();
         let mut waiting = Vec::new();
@@ -287,31 +287,30 @@ impl Dashboard {
         }
     }
 
-    /// Takes what happened into the model and does what that asks for; the number of the scene if the
-    /// answer needs a new picture.
+    /// Updates the model with a message and runs the effects. Returns the generation of the scene if
+    /// the response needs a new picture.
     fn dispatch(&mut self, message: Message) -> Option<u64> {
         let mut awaited = None;
         let is_snapshot = matches!(message, Message::Snapshot(_));
         let version = self.model.picture_version;
         for effect in update(&mut self.model, message, self.began.elapsed()) {
-            self.quit |= effect == Effect::Quit;
-            self.suspend |= effect == Effect::Suspend;
-            if let Effect::Copy(path) = &effect {
-                self.frames.copy(&paths::full(path));
-            }
             let scene = match &effect {
                 Effect::Show(scene) => Some(Arc::clone(scene)),
                 _ => None,
             };
-            if let Effect::Look { path, display, screen } = &effect {
-                self.prepare_still(path, *display, *screen);
-            }
-            let number = self.hands.run_effect(effect);
-            // A change of light is seen at once in the picture that is there.
-            let snapshot = self.model.snapshot.as_deref();
-            let mixed = scene.is_some_and(|s| snapshot.is_some_and(|n| n.mix_for(&s).is_some()));
-            if number.is_some() && !mixed {
-                awaited = number;
+            match self.effects.run(effect, &mut self.frames, &self.terminal) {
+                Outcome::Done => {}
+                Outcome::Rendering(generation) => {
+                    // A change of lights is visible at once: the current picture is relit.
+                    let snapshot = self.model.snapshot.as_deref();
+                    let relit =
+                        scene.is_some_and(|s| snapshot.is_some_and(|n| n.mix_for(&s).is_some()));
+                    if !relit {
+                        awaited = Some(generation);
+                    }
+                }
+                Outcome::Suspend => self.suspend = true,
+                Outcome::Quit => self.quit = true,
             }
         }
         if version != self.model.picture_version && awaited.is_none() && !is_snapshot {
@@ -322,12 +321,12 @@ impl Dashboard {
     }
 
     fn take_done(&mut self, message: Message) {
-        self.hands.observe(&message);
+        self.effects.observe(&message);
         self.dispatch(message);
     }
 
     fn take_snapshot(&mut self) {
-        if let Some(snapshot) = self.hands.session().take() {
+        if let Some(snapshot) = self.effects.session().take() {
             let failed = matches!(snapshot.report.state, State::Failed(_));
             let raster = |s: &Snapshot| s.picture.as_ref().map(|p| [p.cols, p.rows]);
             if snapshot.picture.is_some() || failed {
@@ -369,11 +368,11 @@ impl Dashboard {
         let reading = self.frames.reading();
         let mode = |line: &Option<LinkStatus>| line.as_ref().map(|line| line.mode);
         let other = mode(&reading) != mode(&self.model.line);
-        if other || self.changed && self.status_sent_at + TELL_INTERVAL <= now {
+        if other || self.changed && self.status_sent_at + STATUS_INTERVAL <= now {
             self.status_sent_at = now;
             self.dispatch(Message::LinkStatus(reading));
         }
-        self.tell_of_still(now);
+        self.report_upload(now);
         self.frames.follow(&self.model);
         let mut due = None;
         if self.frames.ready() && !self.quit {
@@ -386,7 +385,7 @@ impl Dashboard {
                 self.trace.line(now, waits, sent);
                 self.changed &= matches!(drawn, DrawOutcome::Nothing | DrawOutcome::Slice);
                 match drawn {
-                    DrawOutcome::Nothing | DrawOutcome::BranchStack | DrawOutcome::Slice => {}
+                    DrawOutcome::Nothing | DrawOutcome::Deferred | DrawOutcome::Slice => {}
                     DrawOutcome::Same => {
                         // The screen was the answer already.
                         self.trace.sent(self.shown);
@@ -410,7 +409,7 @@ impl Dashboard {
 }
 
 /// What the status line tells about the line to the terminal is not older than this.
-const TELL_INTERVAL: Duration = Duration::from_millis(500);
+const STATUS_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Without a better idea the work is done at half a step of an 8-bit file.
 pub const DEFAULT_STOP: Stop =
