@@ -19,7 +19,10 @@ fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
         Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => HintLine::Reading,
         Some(
-            Overlay::Palette(_) | Overlay::Pick(_) | Overlay::Quality { .. } | Overlay::Question(_),
+            Overlay::Palette(_)
+            | Overlay::Pick(_)
+            | Overlay::NoiseTargets { .. }
+            | Overlay::Question(_),
         ) => HintLine::List,
         Some(Overlay::ViewerImage(_)) => return None,
         Some(Overlay::Form(form)) if form.editor.is_none() => HintLine::Form,

@@ -223,7 +223,7 @@ fn object_stories() -> Vec<Story> {
         story("turn right, fine", GLASS, "r Shift-Right", |_, d| {
             (0.01..0.02).contains(&normal(d.scene())[0])
         }),
-        story("put the selection down", BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),
+        story("snap the selection to ground", BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),
         story("give it a material of its own", BALL, "M", |a, d| {
             let own = &d.scene().objects[1].material;
             own != "red" && d.scene().materials[own] == a.materials["red"]
@@ -266,7 +266,7 @@ fn panel_stories() -> Vec<Story> {
             eye(d.scene()) == [0.0, 1.0, 5.0]
         }),
         story("only the picture", c(), "z", |_, d| {
-            d.model.only_picture && d.model.layout().unwrap().outline.is_none()
+            d.model.fullscreen && d.model.layout().unwrap().outline.is_none()
         }),
     ]
 }
@@ -329,30 +329,30 @@ fn picture_stories() -> Vec<Story> {
             d.asked(|e| matches!(e, Effect::Copy(_)))
         }),
         story("look at the last picture", c(), "p o", |_, d| {
-            d.asked(|e| matches!(e, Effect::Look { .. }))
+            d.asked(|e| matches!(e, Effect::ViewImage { .. }))
         }),
         story("probe down", c(), "i Down", move |_, d| probe(d)[1] > 24),
         fine("probe left by one pixel", "i Shift-Left", [31, 24]),
         fine("probe right by one pixel", "i Shift-Right", [33, 24]),
         fine("probe up by one pixel", "i Shift-Up", [32, 23]),
         fine("probe down by one pixel", "i Shift-Down", [32, 25]),
-        story("keep this picture", c(), "k", |_, d| d.model.comparison.pinned.is_some()),
-        story("flip between kept and live", c(), "k c", |_, d| {
+        story("pin this picture", c(), "k", |_, d| d.model.comparison.pinned.is_some()),
+        story("flip between pinned and live", c(), "k c", |_, d| {
             d.model.comparison.shown == CompareView::Pinned
         }),
-        story("difference of kept and live", c(), "k C", |_, d| {
+        story("difference of pinned and live", c(), "k C", |_, d| {
             d.model.comparison.shown == CompareView::Difference
         }),
-        story("pause or go on", c(), "Space", |_, d| {
+        story("pause or resume", c(), "Space", |_, d| {
             d.model.paused && d.asked(|e| *e == Effect::Pause(true))
         }),
-        story("begin the picture anew", c(), "R", |_, d| d.asked(|e| *e == Effect::Restart)),
+        story("restart the picture", c(), "R", |_, d| d.asked(|e| *e == Effect::Restart)),
         story("stop at …", c(), "T Ctrl-u `spp 100, time 5` Enter", |_, d| {
             d.model.stop.spp == Some(100)
                 && d.model.stop.seconds == Some(5.0)
                 && d.model.stop.noise_codes.is_none()
         }),
-        story("quality: what each costs", c(), "N Down Enter", |_, d| {
+        story("noise targets and their times", c(), "N Down Enter", |_, d| {
             // From the target, half a code, to the next finer one.
             d.model.stop.noise_codes == Some(0.25) && d.model.overlay.is_none()
         }),

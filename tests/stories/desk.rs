@@ -93,7 +93,7 @@ impl Desk {
             colors: Colors::True,
             stop: Stop { noise_codes: Some(0.5), ..Stop::default() },
             threads: 2,
-            most_threads: 4,
+            max_threads: 4,
         });
         let disk = [(PathBuf::from(FILE), text.to_string())].into();
         let (effects, fired) = (Vec::new(), HashSet::new());
@@ -173,7 +173,7 @@ impl Desk {
                 noise_codes: Some(2.5),
                 scp: "me@here:room-1.png".into(),
             })),
-            Effect::Keep => {
+            Effect::Pin => {
                 let header = Header {
                     width: 64,
                     height: 48,
@@ -182,7 +182,7 @@ impl Desk {
                     precision: "f32".into(),
                 };
                 let mix = LightWeights { weights: vec![[1.0; 3]] };
-                Message::Kept(Arc::new(Film::new(header).linear(&mix)), 16.0)
+                Message::Pinned(Arc::new(Film::new(header).linear(&mix)), 16.0)
             }
             _ => return None,
         })

@@ -137,7 +137,7 @@ fn a_form_is_cancelled_as_a_whole() {
             assert!(matches!(desk.effects.last(), Some(Effect::Show(s)) if s.objects.len() == 3));
             assert_eq!(desk.model.selection, BALL);
             desk.keys("u");
-            assert!(desk.notice().contains("nothing to undo"));
+            assert!(desk.notice().contains("Nothing to undo"));
         }
     }
 }

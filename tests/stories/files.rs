@@ -21,7 +21,7 @@ fn start(path: Option<&str>, text: &str) -> Model {
         colors: Colors::True,
         stop: Stop::default(),
         threads: 1,
-        most_threads: 1,
+        max_threads: 1,
     })
 }
 
@@ -208,7 +208,7 @@ fn edits_bring_back_a_scene_whose_file_is_spoilt() {
     update(&mut model, Message::OrphanedEdits(left), Duration::ZERO);
     let effects = press(&mut model, "r");
     assert!(effects.contains(&Effect::Show(Arc::clone(&scene))), "{effects:?}");
-    assert!(effects.contains(&Effect::TakeUp) && effects.contains(&Effect::KeepEdits(Some(scene))));
+    assert!(effects.contains(&Effect::Recover) && effects.contains(&Effect::Autosave(Some(scene))));
     assert!(model.is_unsaved() && !model.file.unreadable);
     // What stands in the file is not overwritten unasked.
     let effects = press(&mut model, "Ctrl-s");
@@ -243,7 +243,9 @@ fn the_last_picture_is_looked_at_until_a_key_comes() {
     desk.effects.clear();
     let screen = [100, 30];
     desk.effects.extend(update(&mut desk.model, Message::Resize(screen), Duration::ZERO));
-    assert!(looked(&desk) && desk.asked(|e| matches!(e, Effect::Look { screen: [100, 30], .. })));
+    assert!(
+        looked(&desk) && desk.asked(|e| matches!(e, Effect::ViewImage { screen: [100, 30], .. }))
+    );
     let before = desk.text();
     desk.keys("x");
     assert!(desk.model.overlay.is_none() && desk.text() == before);

@@ -125,11 +125,11 @@ fn outline_and_inspector_are_clicked_line_by_line() {
 fn lists_and_questions_are_clicked() {
     let mut desk = Desk::new(ROOM);
     desk.keys("a");
-    let place = desk.model.place().unwrap();
+    let place = desk.model.overlay_layout().unwrap();
     desk.click(place.list.x + 1, place.list.y + 1).click(place.list.x + 1, place.list.y + 1);
     assert!(matches!(&desk.model.overlay, Some(Overlay::Form(form)) if form.title == "new cube"));
     desk.keys("Esc Left q");
-    let place = desk.model.place().unwrap();
+    let place = desk.model.overlay_layout().unwrap();
     desk.click(place.list.x + 1, place.list.y + 1).click(place.list.x + 1, place.list.y + 1);
     assert!(desk.asked(|e| *e == Effect::Quit), "discard and quit");
 }

@@ -91,7 +91,7 @@ impl Autosave {
                 None
             }
             Err(_) if std::mem::replace(&mut self.complained, true) => None,
-            Err(error) => Some(Message::Trouble(format!(
+            Err(error) => Some(Message::Warning(format!(
                 "unsaved edits would be lost if the program were killed: they cannot be kept ({error})"
             ))),
         }
@@ -116,12 +116,12 @@ impl Autosave {
             .iter()
             .map(|(path, why)| {
                 let path = sanitized(&path.display().to_string());
-                Message::Trouble(format!("unsaved edits in {path} cannot be read: {why}"))
+                Message::Warning(format!("unsaved edits in {path} cannot be read: {why}"))
             })
             .collect();
         if elsewhere {
             let told = "this scene is open elsewhere, with unsaved edits";
-            messages.push(Message::Trouble(told.to_string()));
+            messages.push(Message::Warning(told.to_string()));
         }
         lost.reverse();
         self.found = lost;
@@ -149,14 +149,14 @@ impl Autosave {
                     let first = errors.messages().first().map(ToString::to_string);
                     let first = first.unwrap_or_default();
                     let first: Vec<_> = first.lines().map(str::trim).collect();
-                    Message::Trouble(format!("unsaved edits cannot be read: {}", first.join(" ")))
+                    Message::Warning(format!("unsaved edits cannot be read: {}", first.join(" ")))
                 }
             });
         }
     }
 
     /// What was offered is what is unsaved now. Its file, if the scene's could not be read.
-    pub fn take_up(&mut self, path: Option<&Path>) -> Option<SceneFile> {
+    pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let lost = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, lost.text.clone()).ok());
         self.recovery.take_up(lost);
@@ -222,7 +222,7 @@ mod tests {
         // Whoever is alive is not offered to others, but told of.
         let mut second = Autosave::new(Some(&path), "", None);
         let told = second.search(Ok(&file));
-        assert!(matches!(&told[..], [Message::Trouble(t)] if t.contains("elsewhere")), "{told:?}");
+        assert!(matches!(&told[..], [Message::Warning(t)] if t.contains("elsewhere")), "{told:?}");
         drop(first);
         let told = second.search(Ok(&file));
         let [Message::OrphanedEdits(left)] = &told[..] else { panic!("{told:?}") };
@@ -232,7 +232,7 @@ mod tests {
         let file = SceneFile::open(&path).unwrap();
         let Some(Message::OrphanedEdits(left)) = second.offer(Ok(&file)) else { panic!() };
         assert!(left.changed);
-        assert!(second.take_up(None).is_none());
+        assert!(second.recover(None).is_none());
         assert!(second.offer(Ok(&file)).is_none());
         // Saved, it is gone.
         second.note(Some(scene(3)), Instant::now());
@@ -254,7 +254,7 @@ mod tests {
         assert!(journal.search(Ok(&file)).is_empty() && !hidden.exists());
         std::fs::write(&hidden, "[camera\n").unwrap();
         let told = journal.search(Ok(&file));
-        assert!(matches!(&told[..], [Message::Trouble(t)] if t.contains(".a.toml.unsaved:1:")));
+        assert!(matches!(&told[..], [Message::Warning(t)] if t.contains(".a.toml.unsaved:1:")));
         assert!(hidden.exists());
         journal.note(Some(scene(3)), Instant::now());
         assert!(journal.write(&file).is_none());
@@ -270,7 +270,7 @@ mod tests {
         let mut journal = Autosave::new(Some(&path), "", None);
         let told = journal.search(Err(&path));
         assert!(matches!(&told[..], [Message::OrphanedEdits(left)] if left.changed), "{told:?}");
-        let mut file = journal.take_up(Some(&path)).unwrap();
+        let mut file = journal.recover(Some(&path)).unwrap();
         let scene = file.document().scene().clone();
         file.save(&scene, false).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), starter());
@@ -284,7 +284,7 @@ mod tests {
             journal.note(Some(scene(3)), Instant::now());
             journal.write(&file)
         };
-        assert!(matches!(write(), Some(Message::Trouble(_))));
+        assert!(matches!(write(), Some(Message::Warning(_))));
         assert!(write().is_none());
     }
 }

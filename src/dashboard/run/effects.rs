@@ -142,12 +142,12 @@ impl EffectRunner {
                 self.niceness = if low { LOW_PRIORITY } else { 0 };
                 self.set_threads();
             }
-            Effect::Keep => {
+            Effect::Pin => {
                 let results = self.results.clone();
                 self.session.submit(move |film| {
                     if let Some((rendering, report)) = film {
                         let picture = rendering.film.linear(&rendering.mix);
-                        let _ = results.send(Message::Kept(Arc::new(picture), report.spp.mean));
+                        let _ = results.send(Message::Pinned(Arc::new(picture), report.spp.mean));
                     }
                 });
             }
@@ -176,10 +176,10 @@ impl EffectRunner {
                     resized.cancel();
                 }
             }
-            Effect::KeepEdits(scene) => self.files.journal(scene),
-            Effect::TakeUp => self.files.take_up(),
+            Effect::Autosave(scene) => self.files.autosave(scene),
+            Effect::Recover => self.files.recover(),
             Effect::Discard => self.files.discard(),
-            Effect::Look { path, display, screen } => {
+            Effect::ViewImage { path, display, screen } => {
                 let line_rate = frames.reading().map(|link| link.rate);
                 let viewport = image_viewer::viewport(terminal, screen, line_rate);
                 image_viewer::prepare(path, display, viewport, self.results.clone());

@@ -20,7 +20,7 @@ enum Job {
     Load,
     Autosave(Option<Arc<Scene>>),
     Secure(Sender<()>),
-    TakeUp,
+    Recover,
     Discard,
 }
 
@@ -84,7 +84,7 @@ impl Files {
 
     /// The scene has unsaved edits, and is this now; `None`: it has none any more. They are written
     /// where the next start finds them: soon, or at the end.
-    pub fn journal(&self, scene: Option<Arc<Scene>>) {
+    pub fn autosave(&self, scene: Option<Arc<Scene>>) {
         self.give(Job::Autosave(scene));
     }
 
@@ -96,8 +96,8 @@ impl Files {
     }
 
     /// The edits of the last [`Message::OrphanedEdits`] are what is unsaved now.
-    pub fn take_up(&self) {
-        self.give(Job::TakeUp);
+    pub fn recover(&self) {
+        self.give(Job::Recover);
     }
 
     /// The edits of the last [`Message::OrphanedEdits`] are not wanted.
@@ -204,9 +204,9 @@ impl FileWorker {
                 // Nobody waits any more if it has taken long.
                 let _ = done.try_send(());
             }
-            Job::TakeUp => {
+            Job::Recover => {
                 let spoilt = self.path.as_deref().filter(|_| self.file.is_none());
-                if let Some(file) = self.journal.take_up(spoilt) {
+                if let Some(file) = self.journal.recover(spoilt) {
                     self.file = Some(file);
                     self.publish();
                 }
@@ -372,7 +372,7 @@ mod tests {
         let scene = Arc::new(scene);
         let hidden = folder.path().join(".a.toml.unsaved");
         let (files, _inbox) = opened(&path);
-        files.journal(Some(Arc::clone(&scene)));
+        files.autosave(Some(Arc::clone(&scene)));
         assert_eq!(files.finish(), Some(hidden.clone()));
         assert!(fs::read_to_string(&hidden).unwrap().contains("64"));
         let (files, inbox) = opened(&path);
@@ -381,17 +381,17 @@ mod tests {
             matches!(&offered, Message::OrphanedEdits(left) if left.scene == scene),
             "{offered:?}"
         );
-        files.take_up();
-        files.journal(Some(Arc::clone(&scene)));
+        files.recover();
+        files.autosave(Some(Arc::clone(&scene)));
         files.save(Arc::clone(&scene), None, false);
         assert_eq!(files.finish(), None);
         assert!(!hidden.exists());
         assert!(fs::read_to_string(&path).unwrap().contains("64"));
         let (files, _inbox) = opened(&path);
-        files.journal(Some(Arc::new(Scene::parse(starter(), "a").unwrap())));
+        files.autosave(Some(Arc::new(Scene::parse(starter(), "a").unwrap())));
         files.flush(PATIENCE);
         assert!(hidden.exists());
-        files.journal(None);
+        files.autosave(None);
         assert_eq!(files.finish(), None);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }

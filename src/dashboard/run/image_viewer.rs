@@ -53,7 +53,7 @@ impl Dashboard {
         };
         if sent != known && (sent == 1.0 || self.status_sent_at + STATUS_INTERVAL <= now) {
             self.status_sent_at = now;
-            self.dispatch(Message::StillSent(sent));
+            self.dispatch(Message::ImageSent(sent));
         }
     }
 }

@@ -81,7 +81,7 @@ impl Dashboard {
         }
         let end = self.resume(line);
         if !stopped {
-            self.dispatch(Message::Trouble("there is no shell to go back to".to_string()));
+            self.dispatch(Message::Warning("there is no shell to go back to".to_string()));
         }
         end
     }

@@ -113,7 +113,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         colors: colors.unwrap_or(terminal.colors),
         stop: settings.stop,
         threads,
-        most_threads: std::thread::available_parallelism().map_or(threads, usize::from),
+        max_threads: std::thread::available_parallelism().map_or(threads, usize::from),
     });
     let mut dashboard = Dashboard {
         model,
@@ -367,7 +367,7 @@ impl Dashboard {
         self.frames.look(now);
         let reading = self.frames.reading();
         let mode = |line: &Option<LinkStatus>| line.as_ref().map(|line| line.mode);
-        let other = mode(&reading) != mode(&self.model.line);
+        let other = mode(&reading) != mode(&self.model.link);
         if other || self.changed && self.status_sent_at + STATUS_INTERVAL <= now {
             self.status_sent_at = now;
             self.dispatch(Message::LinkStatus(reading));

@@ -33,7 +33,7 @@ fn right_up(way: Direction) -> [f64; 2] {
 impl UpdateContext<'_> {
     /// Puts another camera in place of the scene's. Moves that follow each other are one step of undo,
     /// whatever they are.
-    pub(super) fn set_camera(&mut self, hold: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
+    pub(super) fn set_camera(&mut self, coalesce: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
         let scene = self.scene();
         let camera = f(&scene.camera, focus_distance(scene));
         if camera == scene.camera {
@@ -43,7 +43,7 @@ impl UpdateContext<'_> {
         // Of a camera without faults comes one without faults.
         let edit =
             Edit { scene: next, subject: Target::Camera, label: "camera".to_string(), note: None };
-        self.commit(Ok::<_, EditError>(edit), hold);
+        self.commit(Ok::<_, EditError>(edit), coalesce);
     }
 
     pub(super) fn orbit(&mut self, way: Direction) {

@@ -89,20 +89,20 @@ impl UpdateContext<'_> {
         self.set_probe(Some(to));
     }
 
-    pub(super) fn keep(&mut self) {
-        self.emit(Effect::Keep);
+    pub(super) fn pin(&mut self) {
+        self.emit(Effect::Pin);
     }
 
-    pub(super) fn kept(&mut self, picture: Arc<LinearImage>, spp: f64) {
+    pub(super) fn pinned(&mut self, picture: Arc<LinearImage>, spp: f64) {
         self.model.comparison.pinned = Some((picture, spp));
         self.repaint();
-        self.say(format!("kept at {spp:.0} spp · c flips · C shows the difference"));
+        self.say(format!("pinned at {spp:.0} spp · c flips · C shows the difference"));
     }
 
     /// Shows the kept picture or the difference; the live one if it is that already.
     pub(super) fn compare(&mut self, what: CompareView) {
         if self.model.comparison.pinned.is_none() {
-            self.say("No picture is kept yet · k keeps one");
+            self.say("No picture is pinned yet · k pins one");
             return;
         }
         let shown = &mut self.model.comparison.shown;

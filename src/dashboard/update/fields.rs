@@ -32,7 +32,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    pub(super) fn walk_field(&mut self, steps: isize) {
+    pub(super) fn move_field_cursor(&mut self, steps: isize) {
         let lines = self.model.field_lines();
         self.set_cursor(walk_fields(&lines, self.cursor(), steps));
     }
@@ -100,9 +100,9 @@ impl UpdateContext<'_> {
                 self.record(edit, Coalesce::Single);
                 true
             }
-            Err(refusal) => {
+            Err(error) => {
                 if let Some(editor) = self.model.editor_mut() {
-                    editor.problem = Some(refusal.to_string());
+                    editor.problem = Some(error.to_string());
                 }
                 false
             }
@@ -123,7 +123,7 @@ impl UpdateContext<'_> {
 
     pub(super) fn step_field(&mut self, steps: f64) {
         if matches!(self.model.overlay, Some(Overlay::Pick(_) | Overlay::Question(_))) {
-            self.walk(if steps > 0.0 { 1 } else { -1 });
+            self.move_cursor(if steps > 0.0 { 1 } else { -1 });
             return;
         }
         if self.model.overlay.is_some() && !self.in_form() {

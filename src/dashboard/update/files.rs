@@ -13,15 +13,15 @@ use std::sync::Arc;
 impl UpdateContext<'_> {
     pub(super) fn undo(&mut self) {
         let undone = self.model.history.undo();
-        self.went_back(undone, "undone", "There is nothing to undo");
+        self.report_history_step(undone, "undone", "Nothing to undo");
     }
 
     pub(super) fn redo(&mut self) {
         let redone = self.model.history.redo();
-        self.went_back(redone, "done again", "There is nothing to do again");
+        self.report_history_step(redone, "redone", "Nothing to redo");
     }
 
-    fn went_back(&mut self, label: Option<String>, what: &str, nothing: &str) {
+    fn report_history_step(&mut self, label: Option<String>, what: &str, nothing: &str) {
         self.model.last_edit = None;
         match label {
             Some(label) => {
@@ -108,8 +108,7 @@ impl UpdateContext<'_> {
         if self.model.file.path.is_none() {
             self.say("This scene has no file to read yet");
         } else if self.model.is_unsaved() {
-            let text =
-                format!("LinkStatus {} again loses the unsaved edits.", self.model.file.name);
+            let text = format!("Reading {} again loses the unsaved edits.", self.model.file.name);
             self.ask(
                 text,
                 &[('k', "keep my edits", Answer::Nothing), ('r', "read the file", Answer::Load)],
@@ -225,7 +224,7 @@ impl UpdateContext<'_> {
         let shown = path.display().to_string();
         if sanitized(&shown) != shown {
             // Pasted into a shell it could do what nobody wants.
-            self.refuse("The path has characters in it that steer terminals: it is not copied");
+            self.refuse("Path contains control characters; not copied");
             return;
         }
         self.emit(Effect::Copy(path));

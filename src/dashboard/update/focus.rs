@@ -29,8 +29,8 @@ impl UpdateContext<'_> {
             self.end_mode();
         } else if self.model.focus != Focus::Picture {
             self.model.focus = Focus::Picture;
-        } else if self.model.only_picture {
-            self.only_picture();
+        } else if self.model.fullscreen {
+            self.toggle_fullscreen();
         } else if self.model.comparison.shown != CompareView::Live {
             self.model.comparison.shown = CompareView::Live;
             self.repaint();
@@ -48,7 +48,7 @@ impl UpdateContext<'_> {
 
     pub(super) fn next_panel(&mut self, by: isize) {
         if self.model.overlay.is_some() {
-            self.walk(by);
+            self.move_cursor(by);
             return;
         }
         let panels = [Focus::Picture, Focus::Outline, Focus::Inspector];
@@ -60,7 +60,7 @@ impl UpdateContext<'_> {
     pub(super) fn set_focus(&mut self, focus: Focus) {
         if focus != Focus::Picture {
             self.end_mode();
-            self.model.only_picture = false;
+            self.model.fullscreen = false;
         }
         if focus != Focus::Inspector {
             self.model.inspector.editor = None;
@@ -68,8 +68,8 @@ impl UpdateContext<'_> {
         self.model.focus = focus;
     }
 
-    pub(super) fn only_picture(&mut self) {
-        self.model.only_picture = !self.model.only_picture;
+    pub(super) fn toggle_fullscreen(&mut self) {
+        self.model.fullscreen = !self.model.fullscreen;
         self.model.focus = Focus::Picture;
         self.model.inspector =
             Inspector { editor: None, ..std::mem::take(&mut self.model.inspector) };

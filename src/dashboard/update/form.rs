@@ -46,7 +46,7 @@ impl UpdateContext<'_> {
                 }));
                 self.show();
             }
-            Err(refusal) => self.refuse(&refusal.to_string()),
+            Err(error) => self.refuse(&error.to_string()),
         }
     }
 

@@ -10,16 +10,16 @@ use std::sync::Arc;
 
 impl UpdateContext<'_> {
     /// Shows the last picture that was written.
-    pub(super) fn look_at_export(&mut self) {
+    pub(super) fn view_last_export(&mut self) {
         match self.model.last_export.clone() {
-            Some(path) => self.look_at(path),
+            Some(path) => self.view_image(path),
             None => self.say("No picture was written yet · p writes one"),
         }
     }
 
-    fn look_at(&mut self, path: PathBuf) {
+    fn view_image(&mut self, path: PathBuf) {
         let (display, screen) = (self.model.display, self.model.screen);
-        self.emit(Effect::Look { path: path.clone(), display, screen });
+        self.emit(Effect::ViewImage { path: path.clone(), display, screen });
         self.model.drag = None;
         self.model.overlay =
             Some(Overlay::ViewerImage(ViewedImage { path, still: None, sent: 0.0 }));
@@ -27,9 +27,9 @@ impl UpdateContext<'_> {
     }
 
     /// On a screen of another size.
-    pub(super) fn look_again(&mut self) {
+    pub(super) fn refit_image(&mut self) {
         if let Some(Overlay::ViewerImage(looked)) = &self.model.overlay {
-            self.look_at(looked.path.clone());
+            self.view_image(looked.path.clone());
         }
     }
 

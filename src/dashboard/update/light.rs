@@ -51,9 +51,9 @@ impl UpdateContext<'_> {
         self.commit_light(edit, Coalesce::Single);
     }
 
-    fn commit_light(&mut self, edit: Result<Edit, EditError>, hold: Coalesce) {
+    fn commit_light(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
-        self.commit(edit, hold);
+        self.commit(edit, coalesce);
         let scene = self.scene();
         let told = match subject {
             Some(Target::Light(i)) => scene.lights.get(i).map(|light| {

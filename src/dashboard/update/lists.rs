@@ -18,9 +18,9 @@ fn moved(cursor: usize, steps: isize, len: usize) -> usize {
 
 impl UpdateContext<'_> {
     /// Moves the cursor of whatever has it by `steps` lines.
-    pub(super) fn walk(&mut self, steps: isize) {
-        let rows = self.model.place().map_or(1, |place| usize::from(place.list.height));
-        let width = self.model.place().map_or(1, |place| place.list.width);
+    pub(super) fn move_cursor(&mut self, steps: isize) {
+        let rows = self.model.overlay_layout().map_or(1, |place| usize::from(place.list.height));
+        let width = self.model.overlay_layout().map_or(1, |place| place.list.width);
         let inventory = self.model.inventory(width).len();
         match &mut self.model.overlay {
             Some(Overlay::Help { scroll }) => {
@@ -33,7 +33,9 @@ impl UpdateContext<'_> {
             Some(Overlay::Inventory { scroll }) => {
                 *scroll = moved(*scroll, steps, inventory.saturating_sub(rows) + 1);
             }
-            Some(Overlay::Quality { cursor }) => *cursor = moved(*cursor, steps, QUALITIES.len()),
+            Some(Overlay::NoiseTargets { cursor }) => {
+                *cursor = moved(*cursor, steps, QUALITIES.len())
+            }
             Some(Overlay::Palette(palette)) => {
                 palette.cursor = moved(palette.cursor, steps, palette.found.len());
                 palette.scroll =
@@ -49,26 +51,26 @@ impl UpdateContext<'_> {
             Some(Overlay::Prompt(_) | Overlay::ViewerImage(_)) => {}
             Some(Overlay::Form(_)) => {
                 if self.apply_field() {
-                    self.walk_field(steps);
+                    self.move_field_cursor(steps);
                 }
             }
-            None if self.model.focus == Focus::Outline => self.walk_outline(steps),
-            None => self.walk_field(steps),
+            None if self.model.focus == Focus::Outline => self.move_outline_cursor(steps),
+            None => self.move_field_cursor(steps),
         }
     }
 
     /// Moves the cursor by `pages`, each a line less than the rows that are visible.
     pub(super) fn page(&mut self, pages: isize) {
-        let rows = match (self.model.place(), self.model.focus) {
+        let rows = match (self.model.overlay_layout(), self.model.focus) {
             (Some(place), _) => place.list.height,
             (None, Focus::Outline) => self.model.outline_rows().map_or(1, |rows| rows.height),
             (None, _) => self.model.inspector_rows().map_or(1, |(rows, _)| rows.height),
         };
         let page = isize::from(i16::try_from(rows).unwrap_or(1)).max(2) - 1;
-        self.walk(pages * page);
+        self.move_cursor(pages * page);
     }
 
-    fn walk_outline(&mut self, steps: isize) {
+    fn move_outline_cursor(&mut self, steps: isize) {
         let lines = outline(self.scene());
         let entry = |line: &OutlineLine| match line {
             OutlineLine::Entry { subject, .. } => Some(subject.clone()),
@@ -86,7 +88,7 @@ impl UpdateContext<'_> {
     pub(super) fn open(&mut self) {
         match &self.model.overlay {
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
-            Some(Overlay::Quality { cursor }) => {
+            Some(Overlay::NoiseTargets { cursor }) => {
                 let noise_codes = Some(QUALITIES[*cursor]);
                 self.model.overlay = None;
                 self.set_stop(Stop { noise_codes, rmse_linear: None, ..self.model.stop });
@@ -112,7 +114,7 @@ impl UpdateContext<'_> {
                 if form.editor.is_none() {
                     self.confirm_form();
                 } else if self.apply_field() {
-                    self.walk_field(1);
+                    self.move_field_cursor(1);
                 }
             }
             Some(Overlay::Prompt(_)) => self.answer_prompt(),
@@ -186,7 +188,7 @@ impl UpdateContext<'_> {
         };
         let after = (pick.cursor + 1..pick.entries.len()).find(begins);
         if let Some(to) = after.or_else(|| (0..pick.entries.len()).find(begins)) {
-            self.walk(to as isize - pick.cursor as isize);
+            self.move_cursor(to as isize - pick.cursor as isize);
         }
     }
 
@@ -212,8 +214,8 @@ impl UpdateContext<'_> {
             Answer::Load => self.emit(crate::dashboard::update::Effect::Load),
             Answer::Overwrite(path) => self.write(path, true),
             Answer::SaveAs => self.ask_path(),
-            Answer::TakeUp => self.take_up(),
-            Answer::Discard => self.discard_left_behind(),
+            Answer::Recover => self.recover(),
+            Answer::Discard => self.discard_orphaned_edits(),
         }
     }
 }

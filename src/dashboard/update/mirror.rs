@@ -21,9 +21,9 @@ impl UpdateContext<'_> {
     }
 
     /// Carries the edit out and tells what the mirror is like now.
-    fn commit_mirror(&mut self, edit: Result<Edit, EditError>, hold: Coalesce) {
+    fn commit_mirror(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
-        self.commit(edit, hold);
+        self.commit(edit, coalesce);
         let Some(Target::Material(name)) = subject else { return };
         let Some(material) = self.scene().materials.get(&name) else { return };
         let lobe = edit::rows(self.scene(), &Target::Material(name.clone()))

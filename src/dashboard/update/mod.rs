@@ -111,7 +111,7 @@ impl<'a> UpdateContext<'a> {
             Message::Paste(text) => self.paste(&text),
             Message::Resize(screen) => {
                 self.model.screen = screen;
-                self.look_again();
+                self.refit_image();
                 self.repaint();
             }
             Message::Snapshot(snapshot) => {
@@ -124,12 +124,12 @@ impl<'a> UpdateContext<'a> {
                 self.model.snapshot = Some(snapshot);
                 self.repaint();
             }
-            Message::Kept(picture, spp) => self.kept(picture, spp),
+            Message::Pinned(picture, spp) => self.pinned(picture, spp),
             Message::Saved(scene, result) => self.saved(scene, result),
             Message::Loaded(result) => self.loaded(*result),
             Message::ChangedOnDisk => self.changed_on_disk(),
-            Message::OrphanedEdits(left) => self.left_behind(left),
-            Message::Trouble(text) => {
+            Message::OrphanedEdits(left) => self.orphaned_edits(left),
+            Message::Warning(text) => {
                 self.follow = false;
                 self.notify(Tone::Bad, capital(&text), None);
             }
@@ -141,7 +141,7 @@ impl<'a> UpdateContext<'a> {
                 }
             }
             Message::ViewerImage(path, result) => self.still(&path, result),
-            Message::StillSent(sent) => {
+            Message::ImageSent(sent) => {
                 self.follow = false;
                 if let Some(Overlay::ViewerImage(looked)) = &mut self.model.overlay {
                     looked.sent = sent;
@@ -149,7 +149,7 @@ impl<'a> UpdateContext<'a> {
             }
             Message::LinkStatus(line) => {
                 self.follow = false;
-                self.model.line = line;
+                self.model.link = line;
             }
             Message::Tick => self.follow = false,
         }
@@ -180,17 +180,17 @@ impl<'a> UpdateContext<'a> {
     }
 
     /// Carries an edit out or says why it is refused. Whether the scene is another now.
-    fn commit(&mut self, edit: Result<Edit, EditError>, hold: Coalesce) -> bool {
+    fn commit(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) -> bool {
         match edit {
-            Ok(edit) => self.record(edit, hold),
-            Err(refusal) => {
-                self.refuse(&refusal.to_string());
+            Ok(edit) => self.record(edit, coalesce),
+            Err(error) => {
+                self.refuse(&error.to_string());
                 false
             }
         }
     }
 
-    fn record(&mut self, edit: Edit, hold: Coalesce) -> bool {
+    fn record(&mut self, edit: Edit, coalesce: Coalesce) -> bool {
         if let Some(note) = &edit.note {
             self.say(note.clone());
         }
@@ -206,7 +206,7 @@ impl<'a> UpdateContext<'a> {
         }
         let model = &mut *self.model;
         let soon = |last: Duration| self.now.saturating_sub(last) <= REPEAT_WINDOW;
-        let joins = match hold {
+        let joins = match coalesce {
             Coalesce::Single => false,
             Coalesce::Repeat => model.last_edit.is_some_and(soon),
             Coalesce::Gesture => true,
@@ -214,8 +214,8 @@ impl<'a> UpdateContext<'a> {
         if !joins {
             model.history.end_gesture();
         }
-        let changed = model.history.record(scene, &edit.label, hold != Coalesce::Single);
-        model.last_edit = (hold == Coalesce::Repeat).then_some(self.now);
+        let changed = model.history.record(scene, &edit.label, coalesce != Coalesce::Single);
+        model.last_edit = (coalesce == Coalesce::Repeat).then_some(self.now);
         if changed {
             self.show();
         }
@@ -294,23 +294,23 @@ impl<'a> UpdateContext<'a> {
             self.emit(Effect::Raster(raster));
             self.repaint();
         }
-        self.settle_panels();
-        self.journal();
+        self.normalize_panels();
+        self.autosave();
     }
 
-    fn settle_panels(&mut self) {
+    fn normalize_panels(&mut self) {
         let lines = self.model.field_lines();
         let follow = self.follow;
-        let place = self.model.place();
+        let place = self.model.overlay_layout();
         let inspector_rows = self.model.inspector_rows();
         if let Some(Overlay::Form(form)) = &mut self.model.overlay {
             let rows = place.map_or(0, |place| place.list.height);
-            settle_cursor(&mut form.cursor, &mut form.scroll, &lines, rows, follow);
+            normalize_cursor(&mut form.cursor, &mut form.scroll, &lines, rows, follow);
             return;
         }
         let rows = inspector_rows.map_or(0, |(rows, _)| rows.height);
         let Inspector { cursor, scroll, .. } = &mut self.model.inspector;
-        settle_cursor(cursor, scroll, &lines, rows, follow);
+        normalize_cursor(cursor, scroll, &lines, rows, follow);
         if let Some(rows) = self.model.outline_rows() {
             let lines = outline(self.model.scene());
             let rows = usize::from(rows.height);
@@ -322,7 +322,7 @@ impl<'a> UpdateContext<'a> {
     }
 }
 
-fn settle_cursor(
+fn normalize_cursor(
     cursor: &mut usize,
     scroll: &mut usize,
     lines: &[PanelLine],

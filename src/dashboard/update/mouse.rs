@@ -100,13 +100,13 @@ impl UpdateContext<'_> {
 
     /// A click on the line under the cursor takes it, another one moves the cursor there.
     fn press_in_overlay(&mut self, mouse: Mouse) {
-        let Some(place) = self.model.place() else { return };
+        let Some(place) = self.model.overlay_layout() else { return };
         let (scroll, cursor, len) = match &self.model.overlay {
             Some(Overlay::Palette(palette)) => {
                 (palette.scroll, palette.cursor, palette.found.len())
             }
             Some(Overlay::Pick(pick)) => (pick.scroll, pick.cursor, pick.entries.len()),
-            Some(Overlay::Quality { cursor }) => (0, *cursor, QUALITIES.len()),
+            Some(Overlay::NoiseTargets { cursor }) => (0, *cursor, QUALITIES.len()),
             Some(Overlay::Question(question)) => (0, question.cursor, question.answers.len()),
             Some(Overlay::Form(form)) => {
                 let at = line_at(place.list, form.scroll, mouse);
@@ -126,7 +126,7 @@ impl UpdateContext<'_> {
         if let Some(at) = line_at(place.list, scroll, mouse).filter(|at| *at < len) {
             match at == cursor {
                 true => self.open(),
-                false => self.walk(at as isize - cursor as isize),
+                false => self.move_cursor(at as isize - cursor as isize),
             }
         }
     }
@@ -208,7 +208,7 @@ impl UpdateContext<'_> {
                 self.model.overlay,
                 Some(Overlay::Help { .. } | Overlay::Inventory { .. })
             );
-            self.walk(if over_list { lines } else { -(ticks.clamp(-100, 100) as isize) });
+            self.move_cursor(if over_list { lines } else { -(ticks.clamp(-100, 100) as isize) });
             return;
         }
         let Some(layout) = self.model.layout().filter(|_| !self.model.file.unreadable) else {

@@ -29,12 +29,12 @@ impl UpdateContext<'_> {
 
     pub(super) fn check_movable(&mut self) -> bool {
         let tried = edit::move_by(self.scene(), &self.model.selection, [0.0; 3]);
-        tried.map_err(|refusal| self.refuse(&refusal.to_string())).is_ok()
+        tried.map_err(|error| self.refuse(&error.to_string())).is_ok()
     }
 
     pub(super) fn check_turnable(&mut self) -> bool {
         let tried = edit::turn(self.scene(), &self.model.selection, 0.0);
-        tried.map_err(|refusal| self.refuse(&refusal.to_string())).is_ok()
+        tried.map_err(|error| self.refuse(&error.to_string())).is_ok()
     }
 
     pub(super) fn move_selection(&mut self, way: Direction, pace: StepSize) {

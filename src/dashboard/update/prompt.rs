@@ -62,7 +62,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn ask_stop(&mut self) {
-        let help = "noise 0.5 (codes), rmse 0.001 (linear), spp 1000, time 60 (seconds): one or \
+        let help = "noise 0.5 (8-bit levels), rmse 0.001 (linear), spp 1000, time 60 (seconds): one or \
                     more, whichever comes first; or none";
         let now = stop_text(&self.model.stop);
         self.prompt(PromptFor::StopAt, "stop at", help, now);
@@ -140,7 +140,7 @@ impl UpdateContext<'_> {
             return Err(format!("\"{}\" is too much.", truncated(more)));
         }
         let film = edit::set(self.scene(), &Target::Film, "size", size);
-        let scene = film.map_err(|refusal| refusal.to_string())?.scene;
+        let scene = film.map_err(|error| error.to_string())?.scene;
         let size = scene.film.size;
         self.model.export = Some(RunningExport { size, format, progress: 0.0 });
         let (display, stop) = (self.model.display, self.model.stop);

@@ -16,7 +16,7 @@ impl UpdateContext<'_> {
 
     pub(super) fn restart(&mut self) {
         self.emit(Effect::Restart);
-        self.say("begun anew");
+        self.say("restarted");
     }
 
     pub(super) fn set_stop(&mut self, stop: Stop) {
@@ -28,18 +28,18 @@ impl UpdateContext<'_> {
     }
 
     /// Shows what each quality costs, with the cursor on the one the work stops at.
-    pub(super) fn open_qualities(&mut self) {
+    pub(super) fn open_noise_targets(&mut self) {
         let wanted = self.model.stop.noise_codes.unwrap_or(0.5);
         let cursor = QUALITIES.iter().position(|codes| *codes <= wanted);
         self.model.overlay =
-            Some(Overlay::Quality { cursor: cursor.unwrap_or(QUALITIES.len() - 1) });
+            Some(Overlay::NoiseTargets { cursor: cursor.unwrap_or(QUALITIES.len() - 1) });
     }
 
     pub(super) fn threads(&mut self, more: isize) {
         let threads = self.model.threads.saturating_add_signed(more);
-        self.model.threads = threads.clamp(1, self.model.most_threads);
+        self.model.threads = threads.clamp(1, self.model.max_threads);
         self.emit(Effect::Threads(self.model.threads));
-        let of = self.model.most_threads;
+        let of = self.model.max_threads;
         self.say(format!("{} of {of} threads", self.model.threads));
     }
 

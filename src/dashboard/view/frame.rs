@@ -65,7 +65,7 @@ pub fn draw(
     let area = layout.picture;
     let bottom = area.height.saturating_sub(1);
     let inside = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
-    if model.only_picture {
+    if model.fullscreen {
         return;
     }
     let focused = crate::dashboard::view::is_active(model, Focus::Picture);
@@ -108,9 +108,9 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
     match (model.comparison.shown, model.channel) {
         (CompareView::Pinned, _) => {
             let spp = model.comparison.pinned.as_ref().map_or(0.0, |(_, spp)| *spp);
-            chips.push((format!("kept picture, {spp:.0} spp"), true));
+            chips.push((format!("pinned picture, {spp:.0} spp"), true));
         }
-        (CompareView::Difference, _) => chips.push(("live − kept".to_string(), true)),
+        (CompareView::Difference, _) => chips.push(("live − pinned".to_string(), true)),
         (CompareView::Live, DisplayChannel::Beauty) => {}
         (CompareView::Live, channel) => chips.push((channel.name().to_string(), true)),
     }

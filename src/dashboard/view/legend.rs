@@ -33,7 +33,7 @@ impl Legend {
         Self {
             low: format!("-{end}"),
             high: format!("+{end}"),
-            unit: format!("codes · RMS {}", number(rms)),
+            unit: format!("8-bit levels · RMS {}", number(rms)),
             bar: bar(|part| difference(2.0 * part - 1.0)),
         }
     }

@@ -83,7 +83,7 @@ pub fn failure(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffe
         write(&lines, layout, buffer);
     }
     if let Some(first) = model.file.broken.as_ref().and_then(|b| b.messages().first())
-        && !model.only_picture
+        && !model.fullscreen
     {
         let area = layout.picture;
         let edge = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };

@@ -17,11 +17,11 @@ use ratatui::style::Style;
 
 /// Draws it. Where text is being typed, if it is.
 pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
-    let place = model.place()?;
+    let place = model.overlay_layout()?;
     match model.overlay.as_ref()? {
         Overlay::Help { scroll } => keys(*scroll, &place, theme, buffer),
         Overlay::Inventory { scroll } => inventory(model, *scroll, &place, theme, buffer),
-        Overlay::Quality { cursor } => qualities(model, *cursor, &place, theme, buffer),
+        Overlay::NoiseTargets { cursor } => qualities(model, *cursor, &place, theme, buffer),
         Overlay::Palette(open) => return palette(open, &place, theme, buffer),
         Overlay::Pick(open) => pick(open, &place, theme, buffer),
         Overlay::Form(open) => return form(model, open, &place, theme, buffer),
@@ -91,8 +91,8 @@ fn qualities(
     theme: &Theme,
     buffer: &mut Buffer,
 ) {
-    overlay(place.frame, "quality", theme, buffer);
-    for (row, quality) in (0..place.list.height).zip(model.qualities()) {
+    overlay(place.frame, "noise targets", theme, buffer);
+    for (row, quality) in (0..place.list.height).zip(model.noise_targets()) {
         let (mut to, name, rest) =
             chosen(place.list, row, usize::from(row) == cursor, theme, buffer);
         let cost = match quality.cost {
@@ -101,11 +101,11 @@ fn qualities(
             Cost::Left(from, to) => format!("{} more", durations(from, to)),
             Cost::Unknown => "not known yet".to_string(),
         };
-        let unit = if quality.noise_codes == 1.0 { "code" } else { "codes" };
+        let unit = if quality.noise_codes == 1.0 { "level" } else { "levels" };
         let target = if quality.is_target { "→ " } else { "  " };
         to.put_right("  ", 0, rest).put_right(&cost, 8, name).put_right("  ", 0, rest);
         to.put(target, theme.good()).put_wide(&quality.noise_codes.to_string(), 5, name).skip(1);
-        to.put_wide(unit, 5, name).skip(2).put(quality.looks, rest);
+        to.put_wide(unit, 6, name).skip(2).put(quality.looks, rest);
     }
     say(ABOUT, theme.dim(), place.help, buffer);
 }

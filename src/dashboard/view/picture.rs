@@ -51,7 +51,7 @@ impl PictureView {
         self.legend = None;
         let made = match (model.comparison.shown, model.channel) {
             (CompareView::Pinned, _) => {
-                self.kept(model, size).map(|kept| shown(kept, &model.display, size))
+                self.pinned(model, size).map(|kept| shown(kept, &model.display, size))
             }
             (CompareView::Difference, _) => self.difference(model, size),
             (CompareView::Live, channel) => self.live(model, channel, size),
@@ -68,7 +68,7 @@ impl PictureView {
             }
             DisplayChannel::Noise => {
                 let noise = &snapshot.tiles.noise_codes;
-                self.tiles(model, snapshot, "codes of noise", size, |i| {
+                self.tiles(model, snapshot, "8-bit levels of noise", size, |i| {
                     noise.get(i).map(|n| f64::from(*n))
                 })
             }
@@ -133,7 +133,7 @@ impl PictureView {
         })
     }
 
-    fn kept(&mut self, model: &Model, size: [usize; 2]) -> Option<&[[f32; 3]]> {
+    fn pinned(&mut self, model: &Model, size: [usize; 2]) -> Option<&[[f32; 3]]> {
         let (picture, _) = model.comparison.pinned.as_ref()?;
         let same = |kept: &PinnedCache| Arc::ptr_eq(&kept.of, picture) && kept.size == size;
         if !self.kept.as_ref().is_some_and(same) {
@@ -148,7 +148,7 @@ impl PictureView {
         let snapshot = model.snapshot.as_deref()?;
         let (live, from) = live_radiance(model, snapshot)?;
         let live = resized(shown(&live, &model.display, from), size);
-        let kept = shown(self.kept(model, size)?, &model.display, size);
+        let kept = shown(self.pinned(model, size)?, &model.display, size);
         let (mut squares, mut largest) = (0.0, 0.0f64);
         let mut lumas = Vec::with_capacity(live.pixels.len());
         for (live, kept) in live.pixels.iter().zip(&kept.pixels) {

@@ -74,7 +74,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     };
     let corner = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
     let mut title = Row::new(buffer, corner, 0);
-    title.skip(14).put_right(&format!(" {} codes ", number(last.noise_codes)), 0, theme.text());
+    title.skip(14).put_right(&format!(" {} levels ", number(last.noise_codes)), 0, theme.text());
     let target = model.stop.noise_codes.filter(|t| *t > 0.0);
     let eta = model.snapshot.as_ref().and_then(|s| s.report.eta_seconds);
     // Where the target is reached if the middle guess holds.

@@ -68,14 +68,14 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
     let [a, b] = probe.samples;
     let mut lines = vec![
         ("radiance", three(probe.radiance)),
-        ("codes", probe.codes.map(|c| format!("{c:.1}")).join("  ")),
+        ("levels", probe.codes.map(|c| format!("{c:.1}")).join("  ")),
         ("samples", format!("{}", u64::from(a) + u64::from(b))),
     ];
     if let Some(difference) = probe.difference {
         lines.push(("error", format!("± {}", three(difference))));
     }
     if let Some(codes) = probe.tile_rmse_codes {
-        lines.push(("tile", format!("± {} codes", number(codes))));
+        lines.push(("tile", format!("± {} levels", number(codes))));
     }
     if let Some(name) = seen(model, probe.pixel) {
         lines.push(("object", name));

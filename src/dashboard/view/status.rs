@@ -79,7 +79,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     for warning in report.warnings() {
         parts.push(part(3, vec![(warning, theme.warn())]));
     }
-    if let Some(line) = &model.line {
+    if let Some(line) = &model.link {
         parts.push(part(6, vec![plain(rate(line.rate)), dim(" "), dim(mode(line.mode))]));
     }
     let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
@@ -146,16 +146,16 @@ fn spp(model: &Model, report: &Report, theme: &Theme) -> Vec<(String, Style)> {
     text
 }
 
-/// `noise 0.84 → 0.5 codes in 3–5 s`.
+/// `noise 0.84 → 0.5 levels in 3–5 s`.
 fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<(String, Style)> {
     let dim = |text: &str| (text.to_string(), theme.dim());
     let mut text = vec![dim("noise "), (number(codes), theme.text())];
     match model.stop.noise_codes.filter(|target| *target < codes) {
         Some(target) => {
             text.push((format!(" → {target}"), theme.good()));
-            text.push(dim(" codes"));
+            text.push(dim(" levels"));
         }
-        None => text.push(dim(" codes")),
+        None => text.push(dim(" levels")),
     }
     if let (Some((from, to)), State::Tracing) = (report.eta_seconds, &report.state) {
         let left = if to < 1.0 { "under 1 s".to_string() } else { durations(from, to) };

@@ -34,7 +34,7 @@ pub fn tracing(screen: [u16; 2]) -> Model {
         colors: Colors::True,
         stop: Stop { noise_codes: Some(0.5), ..Stop::default() },
         threads: 2,
-        most_threads: 2,
+        max_threads: 2,
     });
     model.first_time = false;
     for spp in [2, 4, 8, 16, 32, 64, 96, 128, 160, 212] {
@@ -225,20 +225,20 @@ pub const STATES: &[Named] = &[
     ("noise", |m| m.channel = DisplayChannel::Noise),
     ("samples", |m| m.channel = DisplayChannel::Samples),
     ("objects", |m| m.channel = DisplayChannel::Objects),
-    ("kept", |m| m.comparison.shown = CompareView::Pinned),
-    ("only-picture", |m| m.only_picture = true),
+    ("pinned", |m| m.comparison.shown = CompareView::Pinned),
+    ("fullscreen", |m| m.fullscreen = true),
     ("notice", |m| {
         notice(
             m,
             Tone::Good,
-            "wrote mirror-room-1.png, 640×480, 212 spp, noise 0.9 codes — scp ada@sun:/home/ada/mirror-room-1.png .",
+            "wrote mirror-room-1.png, 640×480, 212 spp, noise 0.9 levels — scp ada@sun:/home/ada/mirror-room-1.png .",
         );
     }),
     ("notice-of-a-refusal", |m| notice(m, Tone::Bad, "nothing is selected that can be deleted")),
     ("help", |m| m.overlay = Some(Overlay::Help { scroll: 0 })),
     ("help-scrolled", |m| m.overlay = Some(Overlay::Help { scroll: 60 })),
     ("inventory", |m| m.overlay = Some(Overlay::Inventory { scroll: 0 })),
-    ("quality", |m| m.overlay = Some(Overlay::Quality { cursor: 3 })),
+    ("noise-targets", |m| m.overlay = Some(Overlay::NoiseTargets { cursor: 3 })),
     ("palette", |m| {
         let found = (0..COMMANDS.len()).filter(|i| COMMANDS[*i].label.contains("light")).collect();
         let editor = Editor::new("light");
@@ -266,7 +266,7 @@ pub const STATES: &[Named] = &[
     ("stop-at-refused", |m| {
         let help = "noise 0.5, spp 1000, time 60, or none.";
         let problem =
-            "`noise low` is no number of codes. Type noise 0.5, spp 1000, time 60, or none.";
+            "`noise low` is no number of levels. Type noise 0.5, spp 1000, time 60, or none.";
         prompt(m, PromptFor::StopAt, ["stop at", help, "noise low"], Some(problem));
     }),
     ("quit", |m| {
@@ -278,7 +278,7 @@ pub const STATES: &[Named] = &[
         ];
         m.overlay = Some(Overlay::Question(Question { text, answers, cursor: 0 }));
     }),
-    ("left-behind", |m| {
+    ("orphaned-edits", |m| {
         let age = Duration::from_secs(720);
         let left = OrphanedEdits { scene: Arc::new(built_in()), age, changed: true };
         update(m, Message::OrphanedEdits(left), Duration::ZERO);
