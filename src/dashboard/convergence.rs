@@ -83,7 +83,7 @@ mod tests {
     use crate::dashboard::testing::report;
 
     #[test]
-    fn history_stays_short_in_order_and_keeps_both_ends() {
+    fn history_is_thinned_in_order_with_both_ends() {
         let mut convergence = Convergence::default();
         for i in 1..100_000u64 {
             convergence.add(&report(1, i, Some(100.0 / (i as f64).sqrt())));
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_picture_and_a_restart_begin_anew() {
+    fn new_scene_and_restart_clear_history() {
         let mut convergence = Convergence::default();
         convergence.add(&report(1, 10, Some(3.0)));
         convergence.add(&report(1, 20, Some(2.0)));

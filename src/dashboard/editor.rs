@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_edited_as_lines_are() {
+    fn editor_applies_editing_keys() {
         let mut editor = Editor::new("0.5 red");
         press(&mut editor, "Backspace Left x Home 1 Delete End Ctrl-w");
         assert_eq!(editor.text(), "1.5 ");
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn pasted_text_is_one_line_of_what_could_be_typed() {
+    fn pasted_text_is_first_line_without_control_characters() {
         let mut editor = Editor { problem: Some("empty".into()), ..Editor::default() };
         editor.paste("\n1\t2\u{1b}[31m 3\nq\n");
         assert_eq!(editor.text(), "1 2[31m 3");

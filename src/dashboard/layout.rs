@@ -185,7 +185,7 @@ mod tests {
     /// The picture has the film's aspect ratio to within half a half cell, is as large as fits, and
     /// each of its cells shows a film pixel.
     #[test]
-    fn the_picture_keeps_the_shape_of_the_film() {
+    fn picture_keeps_aspect_ratio_of_film() {
         for film in [[640, 480], [480, 640], [1920, 800], [1, 1], [8192, 1], [1, 8192]] {
             for screen in [[80, 24], [120, 36], [200, 60], [40, 12]] {
                 for fullscreen in [false, true] {

@@ -15,8 +15,7 @@ const LOOKS: [&str; QUALITIES.len()] = [
 ];
 
 /// Note below the list of targets.
-pub const ABOUT: &str =
-    "Noise in 8-bit levels. Halving it takes two to four times as long. Enter: stop there.";
+pub const ABOUT: &str = "Halving the noise takes two to four times as long. Enter: stop there.";
 
 /// Time to a noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,7 +69,7 @@ mod tests {
     use crate::dashboard::testing::report;
 
     #[test]
-    fn what_is_reached_is_told_with_its_time_and_the_rest_with_what_is_left() {
+    fn reached_targets_show_time_and_others_the_rest() {
         let mut convergence = Convergence::default();
         for spp in [10, 20, 40] {
             convergence.add(&report(1, spp, Some(20.0 / spp as f64)));

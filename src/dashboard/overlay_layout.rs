@@ -175,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_are_kept_whole_where_they_fit() {
+    fn wrapping_keeps_words_whole() {
         assert_eq!(wrapped("one two three", 7), ["one two", "three"]);
         assert_eq!(wrapped("abcdefgh ij", 3), ["abc", "def", "gh", "ij"]);
         assert_eq!(wrapped("abcdef", 3), ["abc", "def", ""].map(String::from)[..2]);
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_and_help_share_a_panel() {
+    fn panel_splits_into_lines_and_help() {
         for height in 0..40 {
             for problem in [false, true] {
                 let inner = Area { x: 3, y: 2, width: 20, height };

@@ -119,11 +119,11 @@ pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
 /// Returns the fields of a form: those of the new object or light, and of its material if that is
 /// new as well. `base` is the scene without both.
 pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
-    let own = match form.subject.material(&form.scene) {
+    let has_new_material = match form.subject.material(&form.scene) {
         Some(Target::Material(name)) => !base.materials.contains_key(&name),
         _ => false,
     };
-    match own {
+    match has_new_material {
         true => inspector(&form.scene, &form.subject),
         false => fields(&form.scene, &form.subject),
     }
@@ -163,11 +163,11 @@ fn lines_of(subject: &Target, row: &Property) -> Vec<FieldLine> {
         (_, 2) => &["width", "height"],
         _ => &["x", "y", "z"],
     };
-    let of = |(i, value): (usize, &String)| {
+    let component_line = |(i, value): (usize, &String)| {
         let name = names.get(i).copied().unwrap_or_default();
         line(Some(i), format!("{} {name}", row.label), value.clone())
     };
-    row.components.iter().enumerate().map(of).collect()
+    row.components.iter().enumerate().map(component_line).collect()
 }
 
 impl Model {
@@ -212,7 +212,7 @@ mod tests {
     use crate::scene::built_in;
 
     #[test]
-    fn every_subject_has_its_line_and_every_field_its_place() {
+    fn every_target_has_outline_line_and_fields() {
         let mut scene = built_in();
         scene.views.insert("left".into(), scene.camera.clone());
         scene.lights[0].on = false;
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn the_cursor_walks_over_headings() {
+    fn cursor_skips_headings() {
         let scene = built_in();
         let lines = inspector(&scene, &Target::Object(2));
         let heading = lines.iter().position(|l| l.field().is_none()).unwrap();
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn scrolling_keeps_the_cursor_in_view() {
+    fn scrolling_keeps_cursor_visible() {
         for rows in 0..12 {
             for len in 1..30 {
                 let mut scroll = 0;

@@ -41,7 +41,7 @@ fn story(
     Story { label: label.to_string(), select, keys: keys.to_string(), expect: Box::new(expect) }
 }
 
-/// Nine viewpoints, each a unit farther to the right.
+/// The room with nine viewpoints, each a unit further to the right.
 fn room_with_views() -> String {
     let view =
         |n: i32| format!("\n[views.v{n}]\neye = [{n}.0, 1.0, 5.0]\ntarget = [0.0, 1.0, 0.0]\n");
@@ -353,7 +353,7 @@ fn picture_stories() -> Vec<Story> {
                 && d.model.stop.noise_codes.is_none()
         }),
         story("noise targets and their times", c(), "N Down Enter", |_, d| {
-            // From the target, half a code, to the next finer one.
+            // From the current target of 0.5 to the next finer one.
             d.model.stop.noise_codes == Some(0.25) && d.model.overlay.is_none()
         }),
         story("more threads", c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(3))),
@@ -416,7 +416,7 @@ fn every_command_does_what_its_story_expects() {
     }
 }
 
-/// A command found by its label in the palette runs like one that is run by its key.
+/// A command run from the palette does the same as by its key.
 #[test]
 fn palette_finds_every_command_by_its_label() {
     for command in COMMANDS {

@@ -1,5 +1,5 @@
-//! A dashboard without a terminal, a renderer or a disk: keys go in by name, what would be asked of
-//! the outside is answered at once by a make-believe one.
+//! A dashboard without terminal, renderer or disk: keys are given by name, and effects are answered
+//! at once by a simulated environment.
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -16,10 +16,10 @@ use zerkalo::scene::edit::Target;
 use zerkalo::scene::{Document, SaveError, Scene};
 use zerkalo::terminal::event::{Button, Code, Key, Mouse, MouseKind};
 
-/// The file of the scene.
+/// Path of the scene file.
 pub const FILE: &str = "room.toml";
 
-/// A room with one of each.
+/// A room with a light, a mirror and three objects.
 pub const ROOM: &str = r#"# A room.
 [film]
 size = [64, 48]
@@ -60,11 +60,11 @@ material = "mirror"
 shape.rectangle = { center = [0.0, 1.0, -2.0], size = [3.0, 2.0], normal = [0.0, 0.0, 1.0] }
 "#;
 
-/// The dashboard and its make-believe outside.
+/// The dashboard and its simulated environment.
 pub struct Desk {
     pub model: Model,
     pub now: Duration,
-    /// What was asked for since the last look.
+    /// Effects since the last clearing.
     pub effects: Vec<Effect>,
     /// Files and their texts.
     pub disk: BTreeMap<PathBuf, String>,
@@ -72,7 +72,7 @@ pub struct Desk {
     pub fired: HashSet<&'static str>,
     pub document: Document,
     begun_with: Document,
-    /// Whether reading the file is answered: it begins another history of edits.
+    /// Loads are answered; a load restarts the undo history.
     pub reads: bool,
 }
 
@@ -81,7 +81,7 @@ fn parse(text: &str) -> Document {
 }
 
 impl Desk {
-    /// Opened on a file with this text.
+    /// Opens a file with this text.
     pub fn new(text: &str) -> Self {
         let document = parse(text);
         let scene = Arc::new(document.scene().clone());
@@ -112,14 +112,14 @@ impl Desk {
         desk
     }
 
-    /// What the file would be if it were saved now.
+    /// Returns the text that a save would write.
     pub fn text(&self) -> String {
         let mut document = self.document.clone();
         document.apply(self.model.history.scene());
         document.text().to_string()
     }
 
-    /// The file as it was when the desk was opened.
+    /// Returns the document as opened.
     pub fn original(&self) -> Document {
         self.begun_with.clone()
     }
@@ -133,7 +133,7 @@ impl Desk {
         self.model.selection = subject;
     }
 
-    /// Takes in a message and lets the outside answer.
+    /// Sends a message and answers its effects.
     pub fn send(&mut self, message: Message) {
         let effects = update(&mut self.model, message, self.now);
         for effect in effects {
@@ -188,7 +188,7 @@ impl Desk {
         })
     }
 
-    /// A key by its event. A tenth of a second passes before it.
+    /// Presses a key, a tenth of a second after the last event.
     pub fn key(&mut self, key: Key) {
         self.now += Duration::from_millis(100);
         self.fired.extend(self.would_fire(key));
@@ -212,7 +212,7 @@ impl Desk {
         fired
     }
 
-    /// Keys by their names; what stands between backquotes is typed letter by letter.
+    /// Presses keys by name; text between backquotes is typed.
     pub fn keys(&mut self, keys: &str) -> &mut Self {
         for (i, part) in keys.split('`').enumerate() {
             if i % 2 == 1 {
@@ -227,7 +227,7 @@ impl Desk {
         self
     }
 
-    /// Finds a row of the table in the palette by its label and fires it.
+    /// Finds a command by its label in the palette and runs it.
     pub fn palette(&mut self, label: &str) -> &mut Self {
         self.keys(": ").keys(&format!("`{label}`"));
         let at = COMMANDS.iter().position(|row| row.label == label);
@@ -268,7 +268,7 @@ impl Desk {
         self.mouse(MouseKind::Release(button), column, row)
     }
 
-    /// Undoes everything.
+    /// Undoes every edit.
     pub fn undo_all(&mut self) {
         while self.model.history.undo_label().is_some() {
             assert!(self.model.history.undo().is_some());
@@ -279,7 +279,7 @@ impl Desk {
         self.effects.iter().any(what)
     }
 
-    /// The notice, or nothing.
+    /// Text of the notice, or an empty string.
     pub fn notice(&self) -> &str {
         self.model.notice.as_ref().map_or("", |notice| &notice.text)
     }

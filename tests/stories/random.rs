@@ -1,5 +1,5 @@
-//! Ten thousand random keys and mouse events on three scenes: nothing breaks, and everything can be
-//! taken back.
+//! Ten thousand random key and mouse events on three scenes: the model stays valid and every edit
+//! can be undone.
 
 use crate::desk::{Desk, ROOM};
 use std::collections::HashSet;
@@ -26,7 +26,7 @@ impl Rng {
     }
 }
 
-/// Every key of the table, and those that type.
+/// Every key of the table, and keys that type characters.
 fn keys() -> Vec<Key> {
     let bindings = COMMANDS.iter().flat_map(|command| command.keys);
     let names = bindings.flat_map(|(_, names)| names.split(' '));
@@ -57,7 +57,7 @@ fn event(desk: &mut Desk, rng: &mut Rng, keys: &[Key]) {
                 desk.key(key);
             }
         }
-        // By name, as one does who does not know the keys; what has no key, too.
+        // From the palette, which also covers commands without a key.
         14 if desk.model.overlay.is_none() && desk.model.editor().is_none() => {
             let label = COMMANDS[rng.below(COMMANDS.len())].label;
             if label != QUIT {
@@ -95,7 +95,7 @@ fn play(name: &str, text: &str, seed: u64, fired: &mut HashSet<&'static str>) {
     desk.reads = false;
     for i in 0..EVENTS {
         event(&mut desk, &mut rng, &keys);
-        // A question may lead to the end or to another file: that is told elsewhere.
+        // Questions may quit or load another file: other tests cover them.
         if let Some(Overlay::Question(_)) = desk.model.overlay {
             desk.keys("Esc");
         }
@@ -115,13 +115,13 @@ fn play(name: &str, text: &str, seed: u64, fired: &mut HashSet<&'static str>) {
     assert_eq!(desk.text(), text, "{name}: everything undone");
 }
 
-/// Copies of copies: more of them find nothing new.
+/// Returns `true` if duplicates have made the scene large; more of them find nothing new.
 fn scene_is_large(desk: &Desk) -> bool {
     desk.scene().objects.len() > 60
 }
 
 #[test]
-fn random_events_break_nothing() {
+fn random_events_keep_model_valid() {
     let physical = include_str!("../../scenes/mirror-room-physical.toml");
     let mut fired = HashSet::new();
     play("room", ROOM, 1, &mut fired);

@@ -1,4 +1,4 @@
-//! Stories of unsaved edits: what is kept while one edits, and what the next start makes of it.
+//! Stories of unsaved edits: autosave, and recovery at the next start.
 
 use crate::desk::{Desk, ROOM};
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::scene::Scene;
 
-/// What was asked to be kept since the last look: the scenes, `None` for nothing.
+/// Autosave requests since the last clearing: the scenes, `None` for a removal.
 fn kept(desk: &mut Desk) -> Vec<Option<Arc<Scene>>> {
     let effects = std::mem::take(&mut desk.effects);
     let kept = effects.into_iter().filter_map(|effect| match effect {
@@ -24,7 +24,7 @@ fn orphaned_edits(desk: &Desk, changed: bool) -> OrphanedEdits {
 }
 
 #[test]
-fn every_edit_is_kept_until_it_is_saved_undone_or_left() {
+fn edits_are_autosaved_until_saved_or_undone() {
     let mut desk = Desk::new(ROOM);
     desk.keys("Tab Down p v Esc");
     assert!(kept(&mut desk).is_empty(), "nothing was edited");
@@ -44,7 +44,7 @@ fn every_edit_is_kept_until_it_is_saved_undone_or_left() {
 }
 
 #[test]
-fn what_is_being_filled_in_is_kept_when_it_is_confirmed() {
+fn form_is_autosaved_when_confirmed() {
     let mut desk = Desk::new(ROOM);
     desk.keys("a Enter");
     assert!(matches!(desk.model.overlay, Some(Overlay::Form(_))) && kept(&mut desk).is_empty());
@@ -53,7 +53,7 @@ fn what_is_being_filled_in_is_kept_when_it_is_confirmed() {
 }
 
 #[test]
-fn edits_that_were_left_behind_are_offered_and_taken_up() {
+fn orphaned_edits_are_offered_and_recovered() {
     let mut desk = Desk::new(ROOM);
     let left = orphaned_edits(&desk, false);
     desk.send(Message::OrphanedEdits(left.clone()));
@@ -72,7 +72,7 @@ fn edits_that_were_left_behind_are_offered_and_taken_up() {
 }
 
 #[test]
-fn whoever_looks_at_the_file_first_finds_them_again() {
+fn orphaned_edits_can_be_recovered_later() {
     let mut desk = Desk::new(ROOM);
     desk.send(Message::OrphanedEdits(orphaned_edits(&desk, true)));
     let Some(Overlay::Question(question)) = &desk.model.overlay else { panic!() };
@@ -86,7 +86,7 @@ fn whoever_looks_at_the_file_first_finds_them_again() {
 }
 
 #[test]
-fn whoever_is_busy_is_not_interrupted() {
+fn orphaned_edits_do_not_interrupt_typing() {
     let mut desk = Desk::new(ROOM);
     desk.keys("a");
     desk.send(Message::OrphanedEdits(orphaned_edits(&desk, false)));
@@ -98,7 +98,7 @@ fn whoever_is_busy_is_not_interrupted() {
 }
 
 #[test]
-fn edits_that_change_nothing_are_done_with() {
+fn orphaned_edits_equal_to_file_are_discarded() {
     let mut desk = Desk::new(ROOM);
     let same =
         OrphanedEdits { scene: Arc::clone(desk.model.scene()), ..orphaned_edits(&desk, true) };
@@ -109,7 +109,7 @@ fn edits_that_change_nothing_are_done_with() {
 }
 
 #[test]
-fn suspending_asks_for_nothing_else() {
+fn suspend_emits_no_other_effect() {
     let mut desk = Desk::new(ROOM);
     desk.keys("Left");
     desk.effects.clear();

@@ -1,4 +1,4 @@
-//! The command table itself.
+//! Consistency of the command table.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! What the picture shows: exposure, tone curve, channel, probe, kept against live.
+//! Display of the picture: exposure, tone curve, channel, probe, A/B comparison.
 
 use crate::dashboard::message::{DisplayChannel, Effect};
 use crate::dashboard::model::{CompareView, Mode};
@@ -6,9 +6,9 @@ use crate::dashboard::update::{Direction, StepSize, UpdateContext};
 use crate::film::{LinearImage, Tone};
 use std::sync::Arc;
 
-/// Stops of a step.
+/// Stops per step.
 const EXPOSURE_STEP: f64 = 0.25;
-/// The most stops up or down: beyond it everything is white or black.
+/// Limit of the exposure in stops; beyond it the picture is white or black.
 const MOST_EXPOSURE: f64 = 20.0;
 
 impl UpdateContext<'_> {
@@ -67,7 +67,7 @@ impl UpdateContext<'_> {
         self.emit(Effect::Probe(pixel));
     }
 
-    /// By a cell of the picture, or by one pixel of the film.
+    /// Moves the probe by a cell of the picture (coarse) or a pixel of the film (fine).
     pub(super) fn move_probe(&mut self, way: Direction, pace: StepSize) {
         let Some([x, y]) = self.model.probe else {
             self.toggle_probe();
@@ -99,7 +99,7 @@ impl UpdateContext<'_> {
         self.say(format!("pinned at {spp:.0} spp · c flips · C shows the difference"));
     }
 
-    /// Shows the kept picture or the difference; the live one if it is that already.
+    /// Toggles between the live picture and `what`.
     pub(super) fn compare(&mut self, what: CompareView) {
         if self.model.comparison.pinned.is_none() {
             self.say("No picture is pinned yet · k pins one");

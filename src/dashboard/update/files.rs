@@ -1,4 +1,4 @@
-//! Undo, saving, reloading, quitting, and what became of the pictures that were written.
+//! Undo, saving, reloading, quitting, and results of exports.
 
 use crate::dashboard::message::{Effect, Exported};
 use crate::dashboard::model::{Tone, short_name};
@@ -53,7 +53,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Has the scene written.
+    /// Requests that the scene is written.
     pub(super) fn write(&mut self, path: Option<PathBuf>, overwrite: bool) {
         let scene = Arc::clone(self.model.history.scene());
         self.emit(Effect::Save { scene, path, overwrite });
@@ -69,7 +69,7 @@ impl UpdateContext<'_> {
                 self.model.history.mark_saved(scene);
                 self.model.last_edit = None;
                 self.notify(Tone::Good, format!("saved {}", self.model.file.name), Some(3.0));
-                // What was edited while the file was written is not left behind.
+                // Edits made during the write keep the program running.
                 if std::mem::take(&mut self.model.quit_when_saved) && !self.model.is_unsaved() {
                     self.emit(Effect::Quit);
                 }
@@ -142,7 +142,7 @@ impl UpdateContext<'_> {
     pub(super) fn loaded(&mut self, result: Result<Arc<Scene>, SceneErrors>) {
         match result {
             Ok(scene) => {
-                // Positions may be those of other things now: what is selected is found by name.
+                // Indices may have changed: the selection is found by name.
                 let title = self.model.selection.title(self.model.history.scene());
                 self.model.overlay = None;
                 self.end_mode();
@@ -194,7 +194,7 @@ impl UpdateContext<'_> {
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
             Ok(Exported { path, size: [width, height], spp, noise_codes, scp }) => {
-                // The render beside this one has ended if it was of this size.
+                // The export render of this size has finished.
                 if self.model.export.is_some_and(|e| e.size.map(|n| n as usize) == [width, height])
                 {
                     self.model.export = None;
@@ -223,7 +223,7 @@ impl UpdateContext<'_> {
         };
         let shown = path.display().to_string();
         if sanitized(&shown) != shown {
-            // Pasted into a shell it could do what nobody wants.
+            // Control characters could run commands when pasted into a shell.
             self.refuse("Path contains control characters; not copied");
             return;
         }
@@ -232,7 +232,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// With a capital at the beginning.
+/// Returns `text` with its first letter in upper case.
 pub(super) fn capital(text: &str) -> String {
     let mut chars = text.chars();
     chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())

@@ -5,7 +5,7 @@ use crate::dashboard::model::{CompareView, Inspector, Mode};
 use crate::dashboard::update::UpdateContext;
 
 impl UpdateContext<'_> {
-    /// Gives the focus to the picture and lets its keys act on something else.
+    /// Enters a mode and gives the focus to the picture.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
         let movable = match mode {
             Mode::Move => self.check_movable(),
@@ -19,7 +19,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Leads back: out of typing, an overlay, a mode, a panel.
+    /// Leaves the innermost of: editor, overlay, mode, panel, full screen, comparison.
     pub(super) fn leave(&mut self) {
         if self.model.overlay.is_some() {
             self.close_overlay();
@@ -37,7 +37,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// The picture's keys act on the camera again.
+    /// Ends the mode: the picture's keys control the camera again.
     pub(super) fn end_mode(&mut self) {
         self.end_gesture();
         if self.model.mode == Mode::Probe {

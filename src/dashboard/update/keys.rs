@@ -1,4 +1,4 @@
-//! Keys: first to a line of text that is open, then through the key table.
+//! Key dispatch: first to an open text editor, then through the command table.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::key_context::KeyContext;
@@ -8,7 +8,7 @@ use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{Command, lookup};
 use crate::terminal::event::{Code, Key};
 
-/// The character that a key types, if it is one that types.
+/// Returns the character that a key types, if any.
 fn typed(key: Key) -> Option<char> {
     match key {
         Key { code: Code::Char(c), ctrl: false, alt: false, .. } => Some(c),
@@ -17,7 +17,7 @@ fn typed(key: Key) -> Option<char> {
 }
 
 impl Model {
-    /// The line of text that keys go to.
+    /// Text editor that takes the keys, if one is open.
     pub(super) fn editor_mut(&mut self) -> Option<&mut Editor> {
         match &mut self.overlay {
             Some(Overlay::Palette(palette)) => Some(&mut palette.editor),
@@ -59,7 +59,7 @@ impl UpdateContext<'_> {
             }
             return;
         };
-        // A value being typed is applied before anything else is done, or holds it back.
+        // A value being typed is applied before another command runs; an invalid one blocks it.
         if self.model.overlay.is_none()
             && self.model.inspector.editor.is_some()
             && !command.while_typing
@@ -80,7 +80,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Pasted text goes to a line of text; anywhere else it would be forty shortcuts.
+    /// Inserts pasted text into the open text editor; elsewhere it would run commands.
     pub(super) fn paste(&mut self, text: &str) {
         self.model.first_time = false;
         match self.model.editor_mut() {
@@ -92,19 +92,19 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Something was typed or pasted.
+    /// Updates what depends on the text being typed.
     fn text_changed(&mut self) {
         if let Some(Overlay::Palette(_)) = self.model.overlay {
             self.search();
         }
     }
 
-    /// A character where a list, a form or a question has the keys. Whether it meant something.
+    /// Applies a character to a list, form or question. Returns `true` if an overlay has taken it.
     fn typed_in_overlay(&mut self, c: char) -> bool {
         match &self.model.overlay {
             Some(Overlay::Question(question)) => {
-                let of = |(letter, ..): &(char, _, _)| letter.eq_ignore_ascii_case(&c);
-                if let Some(at) = question.answers.iter().position(of) {
+                let has_letter = |(letter, ..): &(char, _, _)| letter.eq_ignore_ascii_case(&c);
+                if let Some(at) = question.answers.iter().position(has_letter) {
                     self.answer(at);
                 }
             }

@@ -1,4 +1,4 @@
-//! Moving over lines and choosing: outline, inspector, palette, lists, help, questions.
+//! Cursor movement and choice in outline, inspector, palette, lists, help and questions.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::Focus;
@@ -11,13 +11,13 @@ use crate::render::session::QUALITIES;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
 
-/// A position moved by `steps`, kept below `len`.
+/// Returns `cursor` moved by `steps`, clamped to a list of `len` entries.
 fn moved(cursor: usize, steps: isize, len: usize) -> usize {
     cursor.saturating_add_signed(steps).min(len.saturating_sub(1))
 }
 
 impl UpdateContext<'_> {
-    /// Moves the cursor of whatever has it by `steps` lines.
+    /// Moves the active cursor by `steps` lines.
     pub(super) fn move_cursor(&mut self, steps: isize) {
         let rows = self.model.overlay_layout().map_or(1, |place| usize::from(place.list.height));
         let width = self.model.overlay_layout().map_or(1, |place| place.list.width);
@@ -59,7 +59,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Moves the cursor by `pages`, each a line less than the rows that are visible.
+    /// Moves the cursor by `pages`; a page is one line less than the visible rows.
     pub(super) fn page(&mut self, pages: isize) {
         let rows = match (self.model.overlay_layout(), self.model.focus) {
             (Some(place), _) => place.list.height,
@@ -84,7 +84,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens what is under the cursor.
+    /// Opens or confirms the item under the cursor.
     pub(super) fn open(&mut self) {
         match &self.model.overlay {
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
@@ -131,7 +131,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Esc where an overlay lies.
+    /// Cancels the editor of a form, or else the overlay.
     pub(super) fn close_overlay(&mut self) {
         match &mut self.model.overlay {
             Some(Overlay::Form(form)) if form.editor.is_some() => form.editor = None,
@@ -156,7 +156,7 @@ impl UpdateContext<'_> {
         }));
     }
 
-    /// Finds the actions that fit what is typed in the palette, the best first.
+    /// Finds the commands that match the palette's text, best first.
     pub(super) fn search(&mut self) {
         let Some(Overlay::Palette(palette)) = &mut self.model.overlay else { return };
         let text = palette.editor.text();
@@ -172,14 +172,14 @@ impl UpdateContext<'_> {
                 Some((score, i))
             })
             .collect();
-        // Of equally good ones the first of the table comes first.
+        // Ties are in the order of the table.
         found.sort_by_key(|(score, i)| (std::cmp::Reverse(*score), *i));
         palette.found = found.into_iter().map(|(_, i)| i).collect();
         palette.cursor = 0;
         palette.scroll = 0;
     }
 
-    /// Goes to the next entry of a list that begins with this letter.
+    /// Moves to the next entry of a list that begins with this letter.
     pub(super) fn jump_to(&mut self, c: char) {
         let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
         let begins = |i: &usize| {
@@ -192,7 +192,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Asks something. `Esc` leaves all as it is.
+    /// Asks a question. `Esc` changes nothing.
     pub(super) fn ask(&mut self, text: String, answers: &[(char, &str, Answer)]) {
         let answers =
             answers.iter().map(|(c, words, answer)| (*c, words.to_string(), answer.clone()));

@@ -1,4 +1,5 @@
-//! What every message does: a changed model and what is asked for. No clock, no file, no terminal.
+//! State transitions: a message changes the model and returns effects. No access to clock, files or
+//! terminal.
 
 mod camera;
 pub mod commands;
@@ -33,36 +34,37 @@ use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Repeats of a key that come within this time are one step of undo: longer than the pause before
-/// a held key begins to repeat.
+/// Repeated keys within this time are one undo step. Longer than the delay before a held key
+/// repeats.
 const REPEAT_WINDOW: Duration = Duration::from_millis(700);
 
-/// What a model that has just been made asks for.
+/// Returns the initial effects of a new model.
 pub fn begin(model: &mut Model) -> Vec<Effect> {
-    let mut turn = UpdateContext::new(model, Duration::ZERO);
-    turn.emit(Effect::Stop(turn.model.stop));
-    if !turn.model.file.unreadable {
-        turn.show();
+    let mut context = UpdateContext::new(model, Duration::ZERO);
+    context.emit(Effect::Stop(context.model.stop));
+    if !context.model.file.unreadable {
+        context.show();
     }
-    turn.normalize();
-    turn.effects
+    context.normalize();
+    context.effects
 }
 
-/// Takes in a message at the time `now` (since any fixed moment) and says what is to be done.
+/// Updates the model with a message at time `now`, measured from any fixed origin, and returns the
+/// effects.
 pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
-    let mut turn = UpdateContext::new(model, now);
-    turn.forget_notice();
-    turn.take(message);
-    turn.normalize();
-    turn.effects
+    let mut context = UpdateContext::new(model, now);
+    context.expire_notice();
+    context.handle(message);
+    context.normalize();
+    context.effects
 }
 
-/// One message being taken in.
+/// Context of one update.
 struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
-    /// Whether lists are to be scrolled to their cursors.
+    /// Lists scroll to keep their cursor visible.
     follow: bool,
     /// The character that ran the current command, if one did.
     typed: Option<char>,
@@ -88,14 +90,14 @@ enum StepSize {
     Fine,
 }
 
-/// How an edit joins the one before.
+/// Coalescing of an edit with the previous undo step.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Coalesce {
-    /// It stands alone.
+    /// None.
     Single,
-    /// It joins edits of the same label a moment ago.
+    /// With recent edits of the same label.
     Repeat,
-    /// It joins edits of the same label until the gesture (a drag, a mode) ends.
+    /// With edits of the same label until the gesture (a drag or mode) ends.
     Gesture,
 }
 
@@ -104,7 +106,7 @@ impl<'a> UpdateContext<'a> {
         Self { model, now, effects: Vec::new(), follow: true, typed: None }
     }
 
-    fn take(&mut self, message: Message) {
+    fn handle(&mut self, message: Message) {
         match message {
             Message::Key(key) => self.key(key),
             Message::Mouse(mouse) => self.mouse(mouse),
@@ -143,8 +145,8 @@ impl<'a> UpdateContext<'a> {
             Message::ViewerImage(path, result) => self.still(&path, result),
             Message::ImageSent(sent) => {
                 self.follow = false;
-                if let Some(Overlay::ViewerImage(looked)) = &mut self.model.overlay {
-                    looked.sent = sent;
+                if let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay {
+                    viewed.sent = sent;
                 }
             }
             Message::LinkStatus(line) => {
@@ -155,7 +157,7 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Asks for something. A newer wish of the same kind replaces an older one, except for files.
+    /// Adds an effect. It replaces an earlier one of its kind, except for writes to files.
     fn emit(&mut self, effect: Effect) {
         if !matches!(effect, Effect::Save { .. } | Effect::Export(_) | Effect::ExportSized { .. }) {
             self.effects.retain(|e| discriminant(e) != discriminant(&effect));
@@ -163,12 +165,12 @@ impl<'a> UpdateContext<'a> {
         self.effects.push(effect);
     }
 
-    /// The cells of the picture may have to be others.
+    /// Marks the cells of the picture as outdated.
     fn repaint(&mut self) {
         self.model.picture_version += 1;
     }
 
-    /// Has the scene rendered that is to be seen.
+    /// Requests that the current scene is rendered.
     fn show(&mut self) {
         let scene = Arc::clone(self.model.scene());
         self.emit(Effect::Show(scene));
@@ -179,7 +181,7 @@ impl<'a> UpdateContext<'a> {
         self.model.scene()
     }
 
-    /// Carries an edit out or says why it is refused. Whether the scene is another now.
+    /// Commits an edit or reports its error. Returns `true` if the scene has changed.
     fn commit(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) -> bool {
         match edit {
             Ok(edit) => self.record(edit, coalesce),
@@ -222,13 +224,13 @@ impl<'a> UpdateContext<'a> {
         changed
     }
 
-    /// The next edit is a step of its own.
+    /// Ends coalescing: the next edit is an undo step of its own.
     fn end_gesture(&mut self) {
         self.model.history.end_gesture();
         self.model.last_edit = None;
     }
 
-    /// As `commit`; afterwards what was edited is selected.
+    /// Commits an edit and selects its target.
     fn commit_and_select(&mut self, edit: Result<Edit, EditError>) -> bool {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         let changed = self.commit(edit, Coalesce::Single);
@@ -245,7 +247,7 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Tells something for some seconds, the longer the more there is to read.
+    /// Shows a notice for at least `seconds`, longer for long texts; `None` until the next key.
     fn notify(&mut self, tone: Tone, text: impl Into<String>, seconds: Option<f64>) {
         let text = sanitized(&text.into());
         let until = seconds.map(|seconds| {
@@ -267,16 +269,16 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Takes away a notice whose time is over.
-    fn forget_notice(&mut self) {
+    /// Removes an expired notice.
+    fn expire_notice(&mut self) {
         let over = |notice: &Notice| notice.until.is_some_and(|until| until <= self.now);
         if self.model.notice.as_ref().is_some_and(over) {
             self.model.notice = None;
         }
     }
 
-    /// Leaves the model sound: the selection exists, cursors are in their lists and in view, and the
-    /// renderer knows the raster.
+    /// Restores the model's invariants: the selection exists, cursors are in range and visible, and
+    /// the renderer knows the raster.
     fn normalize(&mut self) {
         if !self.model.selection.exists(self.model.scene()) {
             let last = |len: usize, of: fn(usize) -> Target| len.checked_sub(1).map(of);

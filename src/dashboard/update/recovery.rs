@@ -1,4 +1,4 @@
-//! Unsaved edits: those of a program that was killed, and those of this one, which may be.
+//! Recovery of unsaved edits after a crash, and autosave.
 
 use crate::dashboard::message::{Effect, OrphanedEdits};
 use crate::dashboard::model::Tone;
@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 impl UpdateContext<'_> {
-    /// Edits were found that nobody saved.
+    /// Offers the orphaned edits of a crashed session.
     pub(super) fn orphaned_edits(&mut self, left: OrphanedEdits) {
         self.follow = false;
         self.model.orphaned_edits = Some(left);
@@ -51,7 +51,7 @@ impl UpdateContext<'_> {
         self.end_gesture();
         if std::mem::take(&mut self.model.file.unreadable) {
             self.model.history.restart(Arc::clone(&scene));
-            // What the file holds is no scene, so not this one.
+            // The contents of the file are not a scene, so the recovered scene is unsaved.
             self.model.history.mark_saved(Arc::default());
             self.model.file.saved = scene;
         } else if !self.model.history.record(scene, "recovered edits", false) {
@@ -71,8 +71,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Has what is unsaved kept where the next start finds it, or forgotten: what is left on purpose
-    /// is not kept.
+    /// Requests an autosave of unsaved edits, or the removal of the recovery file. Edits discarded
+    /// on quitting are removed.
     pub(super) fn autosave(&mut self) {
         let quit = self.effects.iter().position(|effect| *effect == Effect::Quit);
         let unsaved = quit.is_none() && !self.model.file.unreadable && self.model.is_unsaved();
@@ -89,7 +89,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// `12 minutes ago`.
+/// Formats an age: `12 minutes ago`.
 fn ago(age: Duration) -> String {
     let minutes = age.as_secs() / 60;
     let (count, unit) = match minutes {
@@ -107,7 +107,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn ages_in_words() {
+    fn ages_are_formatted_in_words() {
         for (seconds, words) in [
             (59, "a moment ago"),
             (60, "1 minute ago"),

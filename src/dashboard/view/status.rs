@@ -1,4 +1,4 @@
-//! The two lowest lines: where the work stands, and what the keys do or what has just happened.
+//! Status line and hint line.
 
 use crate::dashboard::hints::hints;
 use crate::dashboard::model::{Model, Tone};
@@ -15,12 +15,12 @@ use ratatui::style::{Modifier, Style};
 
 /// A part of the status line.
 struct Part {
-    /// The larger, the earlier it gives way.
+    /// Parts with larger values are dropped first.
     expendable: u8,
     text: Vec<(String, Style)>,
 }
 
-/// Draws where the work stands: as many parts as fit, whole ones only.
+/// Draws the status line with as many whole parts as fit.
 pub fn draw(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
     let mut parts = parts(model, theme);
     let width = |parts: &[Part]| -> usize {
@@ -93,7 +93,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     parts
 }
 
-/// `118 KB/s`, to two or three digits, so that it does not flicker.
+/// Formats a rate to two or three digits, which do not flicker: `118 KB/s`.
 fn rate(bytes_per_second: f64) -> String {
     let kilobytes = bytes_per_second / 1e3;
     match kilobytes {
@@ -103,7 +103,7 @@ fn rate(bytes_per_second: f64) -> String {
     }
 }
 
-/// How it is known what has arrived.
+/// Name of a pacing mode.
 fn mode(mode: PacingMode) -> &'static str {
     match mode {
         PacingMode::Unlimited => "here",
@@ -146,7 +146,7 @@ fn spp(model: &Model, report: &Report, theme: &Theme) -> Vec<(String, Style)> {
     text
 }
 
-/// `noise 0.84 → 0.5 levels in 3–5 s`.
+/// Formats the noise: `noise 0.84 → 0.5 levels in 3–5 s`.
 fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<(String, Style)> {
     let dim = |text: &str| (text.to_string(), theme.dim());
     let mut text = vec![dim("noise "), (number(codes), theme.text())];
@@ -164,7 +164,7 @@ fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<
     text
 }
 
-/// Draws the notice, or else the hints for what the keys do now.
+/// Draws the notice, or else the hints.
 pub fn hints_line(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
     let mut row = Row::new(buffer, area, 0);
     row.skip(1);

@@ -1,4 +1,4 @@
-//! Models in every state that has a look of its own.
+//! Models in every visually distinct state.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::Focus;
@@ -21,10 +21,10 @@ use crate::scene::{Scene, built_in};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A name, and what makes the state of a model that has been tracing for a while.
+/// A name, and the changes to a model that has been tracing for a while.
 pub type Named = (&'static str, fn(&mut Model));
 
-/// The built-in scene after 212 samples, nothing pressed since long.
+/// Creates a model of the built-in scene after 212 samples.
 pub fn tracing(screen: [u16; 2]) -> Model {
     let mut model = Model::new(Start {
         path: Some("scenes/mirror-room.toml".into()),
@@ -89,7 +89,7 @@ fn select(model: &mut Model, object: &str) {
     model.selection = found.unwrap_or_else(|| panic!("{object} in the built-in scene"));
 }
 
-/// The first object that is no mirror.
+/// Selects the first object that is not a mirror.
 fn select_first(model: &mut Model) {
     let name = Target::Object(0).label(model.scene());
     select(model, &name);
