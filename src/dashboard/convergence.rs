@@ -1,19 +1,19 @@
-//! How the error has fallen: what the plot shows.
+//! History of the estimated error, for the convergence plot.
 
 use crate::render::session::Report;
 
-/// One look at the work.
+/// One report about the render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// Seconds of tracing.
     pub seconds: f64,
     /// Mean samples per pixel.
     pub spp: f64,
-    /// Estimated RMSE as displayed, in codes; greater than 0.
+    /// Estimated RMSE as displayed, in 8-bit levels; greater than 0.
     pub noise_codes: f64,
 }
 
-/// The looks at one picture, in order, thinned so that there are never many.
+/// Reports about one picture in order, thinned to a bounded number.
 #[derive(Clone, Debug, Default)]
 pub struct Convergence {
     points: Vec<Point>,
@@ -21,19 +21,19 @@ pub struct Convergence {
     samples: u64,
 }
 
-/// Points kept at most: more than a plot has columns.
+/// Maximum number of points, more than a plot has columns.
 const MOST: usize = 400;
 
 impl Convergence {
-    /// The points, by rising seconds.
+    /// Points by increasing time.
     pub fn points(&self) -> &[Point] {
         &self.points
     }
 
-    /// After how many seconds of tracing the noise had fallen to `codes`, between two looks by a power
-    /// law. `None`: it has not, or had by the first look.
+    /// Returns the seconds of tracing at which the noise fell to `codes` 8-bit levels, interpolated
+    /// by a power law. `None` if it has not, or if the first report was below.
     pub fn seconds_at(&self, codes: f64) -> Option<f64> {
-        // The last time that it fell through: lights may have been lit since.
+        // The last crossing counts: lights may have been switched on since an earlier one.
         let after = self.points.iter().rposition(|p| p.noise_codes > codes)? + 1;
         let (before, after) = (self.points[after - 1], self.points.get(after)?);
         let part =
@@ -41,7 +41,7 @@ impl Convergence {
         Some(before.seconds * (after.seconds / before.seconds).powf(part))
     }
 
-    /// Takes in a report. A picture begun anew begins the history anew.
+    /// Adds a report. A restarted picture clears the history.
     pub fn add(&mut self, report: &Report) {
         if report.generation != self.generation || report.samples < self.samples {
             self.points.clear();
@@ -53,9 +53,10 @@ impl Convergence {
         };
         let point = Point { seconds: report.seconds, spp: report.spp.mean, noise_codes };
         match self.points.last_mut() {
-            // The estimate is still the one that was made then.
+            // The estimate has not been updated.
             Some(last) if last.noise_codes == point.noise_codes => {}
-            // Without new samples (a light was dimmed, the work rests) only the error is another.
+            // Without new samples (a light was dimmed, or the render has finished) only the error
+            // changes.
             Some(last) if last.seconds >= point.seconds => *last = point,
             _ => self.points.push(point),
         }
@@ -64,8 +65,8 @@ impl Convergence {
         }
     }
 
-    /// Leaves out every second of the later three quarters: on a logarithmic axis they stand
-    /// densest. The newest stays.
+    /// Removes every second point of the later three quarters, which are densest on a logarithmic
+    /// axis. The newest point stays.
     fn thin(&mut self) {
         let (early, newest) = (MOST / 4, self.points.len() - 1);
         let mut index = 0;
@@ -82,7 +83,7 @@ mod tests {
     use crate::dashboard::testing::report;
 
     #[test]
-    fn history_stays_short_in_order_and_keeps_both_ends() {
+    fn history_is_thinned_in_order_with_both_ends() {
         let mut convergence = Convergence::default();
         for i in 1..100_000u64 {
             convergence.add(&report(1, i, Some(100.0 / (i as f64).sqrt())));
@@ -95,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_picture_and_a_restart_begin_anew() {
+    fn new_scene_and_restart_clear_history() {
         let mut convergence = Convergence::default();
         convergence.add(&report(1, 10, Some(3.0)));
         convergence.add(&report(1, 20, Some(2.0)));

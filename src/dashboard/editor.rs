@@ -1,21 +1,21 @@
-//! One line of text being typed.
+//! A line of text being typed.
 
 use crate::terminal::event::{Code, Key};
 use tui_input::{Input, InputRequest};
 
-/// The most characters that are taken: enough for a path, too few to slow anything down.
+/// Maximum length in characters: enough for a path, few enough to stay fast.
 const MOST: usize = 400;
 
-/// A line of text with a cursor, and what was wrong with it when it was last tried.
+/// A line of text with a cursor and the problem of its last validation.
 #[derive(Clone, Debug, Default)]
 pub struct Editor {
     input: Input,
-    /// Why it was refused, in a sentence or two; shown below it until something is typed.
+    /// Reason for refusal, in a sentence or two; shown until the text changes.
     pub problem: Option<String>,
 }
 
 impl Editor {
-    /// With `text` in it, the cursor behind it.
+    /// Creates an editor with `text` and the cursor at its end.
     pub fn new(text: impl Into<String>) -> Self {
         Self { input: Input::new(text.into()), problem: None }
     }
@@ -25,18 +25,18 @@ impl Editor {
         self.input.value()
     }
 
-    /// Columns of the terminal from the beginning of the text to the cursor.
+    /// Column of the cursor from the beginning of the text.
     pub fn cursor_columns(&self) -> usize {
         self.input.visual_cursor()
     }
 
-    /// Columns of the text to leave out on the left so that the cursor shows in `width` columns.
+    /// Columns to skip on the left so that the cursor is visible in `width` columns.
     pub fn scroll_columns(&self, width: usize) -> usize {
         self.input.visual_scroll(width)
     }
 
-    /// Lets a key act on the text. Whether it was one for a line of text; the keys that end it (Enter,
-    /// Esc, Tab, Up, Down) are not.
+    /// Applies a key to the text. Returns `true` if it is an editing key; keys that end editing
+    /// (Enter, Esc, Tab, Up, Down) are not.
     pub fn key(&mut self, key: Key) -> bool {
         let request = match (key.code, key.ctrl, key.alt) {
             (Code::Char(c), false, false) => return self.insert(c),
@@ -65,7 +65,7 @@ impl Editor {
         true
     }
 
-    /// Inserts pasted text: its first line, without what could not be typed.
+    /// Inserts the first line of pasted text without control characters.
     pub fn paste(&mut self, text: &str) {
         let line = text.trim_start_matches(['\n', '\r']).lines().next().unwrap_or_default();
         for c in line.chars() {
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_edited_as_lines_are() {
+    fn editor_applies_editing_keys() {
         let mut editor = Editor::new("0.5 red");
         press(&mut editor, "Backspace Left x Home 1 Delete End Ctrl-w");
         assert_eq!(editor.text(), "1.5 ");
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn pasted_text_is_one_line_of_what_could_be_typed() {
+    fn pasted_text_is_first_line_without_control_characters() {
         let mut editor = Editor { problem: Some("empty".into()), ..Editor::default() };
         editor.paste("\n1\t2\u{1b}[31m 3\nq\n");
         assert_eq!(editor.text(), "1 2[31m 3");

@@ -1,62 +1,62 @@
-//! Where everything is on the screen: a pure function, used to draw and to know what a click means.
+//! Layout of the screen: a pure function, shared by drawing and mouse handling.
 
 use crate::terminal::Area;
 
-/// Who gets the keys that mean something else in every panel.
+/// Panel with the focus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Focus {
     /// The picture.
     Picture,
-    /// The list of everything in the scene.
+    /// List of everything in the scene.
     Outline,
-    /// The fields of the selection.
+    /// Fields of the selection.
     Inspector,
 }
 
-/// What the layout depends on.
+/// Input of the layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request {
     /// Columns and rows of the terminal.
     pub screen: [u16; 2],
     /// Width and height of the film in pixels.
     pub film: [u32; 2],
-    /// Which panel has the focus.
+    /// Panel with the focus.
     pub focus: Focus,
-    /// Everything but the picture is hidden.
-    pub only_picture: bool,
+    /// Only the picture is visible.
+    pub fullscreen: bool,
 }
 
-/// Where everything is. Panels are given with their borders; `None`: folded away.
+/// Areas of the screen. Panels include their borders; folded panels are `None`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layout {
-    /// The picture's panel.
+    /// Panel of the picture.
     pub picture: Area,
-    /// The cells inside it that the picture is painted on, centred.
+    /// Cells inside the panel that show the picture, centred.
     pub image: Area,
-    /// Columns and rows of half cells of the picture (its last row may be the upper half of a row of
-    /// cells). Half cells count as square.
+    /// Columns and rows of half cells of the picture. Half cells count as square. An odd last row
+    /// is the upper half of a row of cells.
     pub raster: [usize; 2],
-    /// The outline.
+    /// Outline.
     pub outline: Option<Area>,
-    /// The inspector.
+    /// Inspector.
     pub inspector: Option<Area>,
-    /// The convergence plot.
+    /// Convergence plot.
     pub plot: Option<Area>,
-    /// The status line.
+    /// Status line.
     pub status: Area,
-    /// The line of hints, notices and questions.
+    /// Line of hints and notices.
     pub hints: Area,
 }
 
-/// The smallest terminal that is drawn to: columns and rows.
+/// Smallest supported terminal: columns and rows.
 pub const SMALLEST: [u16; 2] = [40, 12];
 
-/// Rows of a plot that is worth looking at.
+/// Minimum height of the plot in rows.
 const PLOT_ROWS: u16 = 8;
-/// From this many columns on the side column is there whoever has the focus.
+/// Terminal width in columns from which the side column is visible with any focus.
 const SIDE_FROM: u16 = 72;
 
-/// The layout; `None`: the terminal is smaller than [`SMALLEST`].
+/// Returns the layout; `None` if the terminal is smaller than [`SMALLEST`].
 pub fn layout(request: &Request) -> Option<Layout> {
     let [width, height] = request.screen;
     if width < SMALLEST[0] || height < SMALLEST[1] {
@@ -70,11 +70,11 @@ pub fn layout(request: &Request) -> Option<Layout> {
         100..160 => 38,
         _ => 52,
     };
-    if request.only_picture || width < SIDE_FROM && request.focus == Focus::Picture {
+    if request.fullscreen || width < SIDE_FROM && request.focus == Focus::Picture {
         side = 0;
     }
     let picture = Area { x: 0, y: 0, width: width - side, height: rows };
-    let inside = if request.only_picture { picture } else { picture.inner() };
+    let inside = if request.fullscreen { picture } else { picture.inner() };
     let (image, raster) = fitted(inside, request.film);
     let [outline, inspector, plot] = match side {
         0 => [None; 3],
@@ -83,12 +83,12 @@ pub fn layout(request: &Request) -> Option<Layout> {
     Some(Layout { picture, image, raster, outline, inspector, plot, status, hints })
 }
 
-/// Outline, inspector and plot, one below the other.
+/// Stacks outline, inspector and plot in the side column.
 fn column(side: Area, focus: Focus) -> [Option<Area>; 3] {
     let rows = side.height;
     let part = |y: u16, height: u16| Some(Area { y: side.y + y, height, ..side });
     if rows < 16 {
-        // One at a time.
+        // Room for one panel only.
         return match focus {
             Focus::Outline => [part(0, rows), None, None],
             _ => [None, part(0, rows), None],
@@ -96,7 +96,7 @@ fn column(side: Area, focus: Focus) -> [Option<Area>; 3] {
     }
     let plot = if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 };
     let left = rows - plot;
-    // Where there is little room the panel in use gets the larger part.
+    // With little room the panel in use gets the larger part.
     let outline = match focus {
         _ if rows >= 40 => left * 2 / 5,
         Focus::Outline => left * 3 / 5,
@@ -106,7 +106,7 @@ fn column(side: Area, focus: Focus) -> [Option<Area>; 3] {
     [part(0, outline), part(outline, left - outline), plot]
 }
 
-/// The largest centred picture of the film's shape, and its raster of half cells.
+/// Returns the largest centred area of the film's aspect ratio, and its raster of half cells.
 fn fitted(inside: Area, [film_width, film_height]: [u32; 2]) -> (Area, [usize; 2]) {
     let (columns, halves) = (f64::from(inside.width), 2.0 * f64::from(inside.height));
     let (film_width, film_height) = (f64::from(film_width.max(1)), f64::from(film_height.max(1)));
@@ -124,8 +124,7 @@ fn fitted(inside: Area, [film_width, film_height]: [u32; 2]) -> (Area, [usize; 2
 }
 
 impl Layout {
-    /// The film's pixel (column, row) in the middle of what a cell shows; `None`: the cell is not in
-    /// the picture.
+    /// Returns the film pixel (column, row) at the centre of a cell; `None` outside the picture.
     pub fn film_pixel(&self, film: [u32; 2], column: u16, row: u16) -> Option<[usize; 2]> {
         if !self.image.contains(column, row) {
             return None;
@@ -146,13 +145,13 @@ mod tests {
 
     fn at(width: u16, height: u16, focus: Focus) -> Option<Layout> {
         let film = [640, 480];
-        layout(&Request { screen: [width, height], film, focus, only_picture: false })
+        layout(&Request { screen: [width, height], film, focus, fullscreen: false })
     }
 
     const FOCI: [Focus; 3] = [Focus::Picture, Focus::Outline, Focus::Inspector];
 
-    /// At every size: nothing overlaps, nothing leaves the screen, all cells but those of a folded
-    /// side are used, and the panel with the focus is there.
+    /// At every size panels do not overlap, stay on the screen, use all cells of unfolded columns,
+    /// and include the one with the focus.
     #[test]
     fn panels_tile_the_screen() {
         for width in 40..220 {
@@ -183,16 +182,16 @@ mod tests {
         assert!(at(80, 24, Focus::Picture).unwrap().inspector.is_some());
     }
 
-    /// The picture has the film's shape to within half a half cell, is as large as fits, and every
-    /// one of its cells shows a pixel of the film.
+    /// The picture has the film's aspect ratio to within half a half cell, is as large as fits, and
+    /// each of its cells shows a film pixel.
     #[test]
-    fn the_picture_keeps_the_shape_of_the_film() {
+    fn picture_keeps_aspect_ratio_of_film() {
         for film in [[640, 480], [480, 640], [1920, 800], [1, 1], [8192, 1], [1, 8192]] {
             for screen in [[80, 24], [120, 36], [200, 60], [40, 12]] {
-                for only_picture in [false, true] {
-                    let request = Request { screen, film, focus: Focus::Picture, only_picture };
+                for fullscreen in [false, true] {
+                    let request = Request { screen, film, focus: Focus::Picture, fullscreen };
                     let l = layout(&request).unwrap();
-                    let inside = if only_picture { l.picture } else { l.picture.inner() };
+                    let inside = if fullscreen { l.picture } else { l.picture.inner() };
                     let [columns, halves] = l.raster;
                     let room = [usize::from(inside.width), 2 * usize::from(inside.height)];
                     assert!(columns == room[0] || halves == room[1], "{request:?} {l:?}");

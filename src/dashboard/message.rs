@@ -1,4 +1,4 @@
-//! What comes in and what goes out: everything that `update` learns, and everything that it asks for.
+//! Messages that `update` takes and effects that it returns.
 
 use crate::film::{Display, LinearImage};
 use crate::render::schedule::Stop;
@@ -11,83 +11,83 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What happened.
+/// An event that `update` takes.
 #[derive(Debug)]
 pub enum Message {
     /// A key was pressed.
     Key(Key),
-    /// The mouse did something. Of several drags that wait, only the newest need come.
+    /// Mouse event. Of several pending drags only the newest is required.
     Mouse(Mouse),
-    /// Text was pasted; it never fires shortcuts.
+    /// Pasted text; never interpreted as keys.
     Paste(String),
-    /// The terminal has this many columns and rows now.
+    /// New size of the terminal in columns and rows.
     Resize([u16; 2]),
-    /// The renderer has news.
+    /// Latest snapshot of the renderer.
     Snapshot(Box<Snapshot>),
-    /// The picture that was asked for with [`Effect::Keep`], and its samples per pixel.
-    Kept(Arc<LinearImage>, f64),
-    /// This scene was written to this path, or not, and why. After [`Effect::Save`].
+    /// Picture requested by [`Effect::Pin`], and its mean samples per pixel.
+    Pinned(Arc<LinearImage>, f64),
+    /// Result of [`Effect::Save`] for this scene.
     Saved(Arc<Scene>, Result<PathBuf, SaveError>),
-    /// The file was read. After [`Effect::Load`].
+    /// Result of [`Effect::Load`].
     Loaded(Box<Result<Arc<Scene>, SceneErrors>>),
-    /// Somebody else has written the file since it was last read or written.
+    /// Another program has written the file since it was last read or written.
     ChangedOnDisk,
-    /// A program that did not end by itself has left unsaved edits of this scene.
+    /// Unsaved edits of this scene, left by a crashed session.
     OrphanedEdits(OrphanedEdits),
-    /// Something about unsaved edits that the user ought to know.
-    Trouble(String),
-    /// A picture was written, or not, and why.
+    /// Warning about unsaved edits.
+    Warning(String),
+    /// Result of an export.
     Exported(Result<Exported, String>),
-    /// How far the render of [`Effect::ExportSized`] is, 0..=1.
+    /// Progress of [`Effect::ExportSized`], 0..=1.
     ExportProgress(f64),
-    /// The picture at this path was made ready to be looked at, or not, and why. After [`Effect::Look`].
+    /// Result of [`Effect::ViewImage`] for this path.
     ViewerImage(PathBuf, Result<Arc<ViewerImage>, String>),
-    /// How much of a picture that is looked at has been sent, 0..=1.
-    StillSent(f64),
-    /// What is known of the line to the terminal.
+    /// Transferred share of the image in the viewer, 0..=1.
+    ImageSent(f64),
+    /// Status of the connection to a remote terminal.
     LinkStatus(Option<LinkStatus>),
-    /// Time has passed. At least once a second while something on the screen depends on it
-    /// ([`Model::wakes_at`](crate::dashboard::model::Model::wakes_at)).
+    /// A moment that the model waits for has come
+    /// ([`Model::next_timeout`](crate::dashboard::model::Model::next_timeout)).
     Tick,
 }
 
-/// Unsaved edits of a program that did not end by itself.
+/// Unsaved edits of a crashed session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrphanedEdits {
-    /// The scene with the edits.
+    /// Scene with the edits.
     pub scene: Arc<Scene>,
-    /// How long ago they were kept.
+    /// Time since the last autosave.
     pub age: Duration,
-    /// The scene's file is not what it was then.
+    /// The scene file has changed since then.
     pub changed: bool,
 }
 
-/// A picture that was written.
+/// An exported image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exported {
-    /// Where.
+    /// Path of the file.
     pub path: PathBuf,
     /// Width and height in pixels.
     pub size: [usize; 2],
     /// Mean samples per pixel.
     pub spp: f64,
-    /// Estimated RMSE as displayed, in codes, if there is an estimate.
+    /// Estimated RMSE as displayed, in 8-bit levels, if there is an estimate.
     pub noise_codes: Option<f64>,
-    /// `user@host:path` as scp takes it.
+    /// `user@host:path` for scp.
     pub scp: String,
 }
 
-/// A format of pictures.
+/// File format of an export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// As displayed, 8 bits a channel.
+    /// PNG: as displayed, 8 bits per channel.
     Png,
-    /// Linear light.
+    /// OpenEXR: linear radiance.
     Exr,
 }
 
 impl Format {
-    /// The file name's extension.
+    /// File name extension.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",
@@ -96,29 +96,29 @@ impl Format {
     }
 }
 
-/// What the picture shows.
+/// Channel that the picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DisplayChannel {
-    /// The picture.
+    /// Rendered picture.
     Beauty,
-    /// Estimated error of the tiles, false colour.
+    /// Estimated error of tiles, false colour.
     Noise,
-    /// Samples per pixel of the tiles, false colour.
+    /// Samples per pixel of tiles, false colour.
     Samples,
-    /// Which object is seen.
+    /// Object ids of the first hits.
     Objects,
-    /// Normals of the surfaces seen.
+    /// Surface normals of the first hits.
     Normals,
-    /// Distance from the eye, false colour.
+    /// Distance of the first hits from the eye, false colour.
     Depth,
 }
 
 impl DisplayChannel {
-    /// Every channel, in the order of the key that walks them.
+    /// Every channel, in the order in which the key cycles through them.
     pub const ALL: [Self; 6] =
         [Self::Beauty, Self::Noise, Self::Samples, Self::Objects, Self::Normals, Self::Depth];
 
-    /// Its name.
+    /// Name of the channel.
     pub fn name(self) -> &'static str {
         match self {
             Self::Beauty => "beauty",
@@ -131,77 +131,78 @@ impl DisplayChannel {
     }
 }
 
-/// What `update` asks for. Of several of one kind in a row only the last matters, except for saving
-/// and exporting.
+/// A request of `update` to the event loop. Of several requests of one kind in a row only the last
+/// matters, except for saving and exporting.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
-    /// Render this scene. Where only light has changed (intensity, colour, on and off, ambient,
-    /// background) the samples are kept.
+    /// Render this scene. Samples are kept where only light has changed (intensity, colour, on and
+    /// off, ambient, background).
     Show(Arc<Scene>),
-    /// The display whose codes the noise is told in.
+    /// Display transform that noise is measured through.
     Display(Display),
-    /// When to stop.
+    /// Stop criteria.
     Stop(Stop),
-    /// The picture is painted on this many columns and rows of half cells.
+    /// Columns and rows of half cells that snapshots are resampled to.
     Raster([usize; 2]),
-    /// Stop tracing, or go on.
+    /// Pause (`true`) or resume (`false`) tracing.
     Pause(bool),
-    /// Begin the picture anew.
+    /// Restart the picture.
     Restart,
-    /// Trace with that many threads, at least 1.
+    /// Number of tracing threads, at least 1.
     Threads(usize),
-    /// Low priority of the tracing threads, or normal.
+    /// Low (`true`) or normal priority of the tracing threads.
     LowPriority(bool),
-    /// Snapshots tell about this pixel of the film (column, row); `None`: about none.
+    /// Pixel of the film (column, row) whose values snapshots report.
     Probe(Option<[usize; 2]>),
-    /// Tell the picture as it is, for comparison.
-    Keep,
+    /// Return the current picture, for comparison.
+    Pin,
     /// Write the scene to its file, or to `path`, which becomes its file.
     Save {
-        /// What to write.
+        /// Scene to write.
         scene: Arc<Scene>,
-        /// Where, if not to its own file. Relative to the working directory.
+        /// Path other than the scene's own, relative to the working directory.
         path: Option<PathBuf>,
-        /// Although somebody else has written the file, or there is one at `path` already.
+        /// Overwrite changes by other programs, or an existing file at `path`.
         overwrite: bool,
     },
-    /// Read the file.
+    /// Read the scene file.
     Load,
-    /// Write the picture as it stands, under the next free name made of the scene's.
+    /// Write the current picture under the next free name derived from the scene's.
     Export(Format),
-    /// Render the scene at another size until `stop`, beside the running work, and write it under
+    /// Render the scene at another size until `stop`, beside the main render, and write it under
     /// the next free name.
     ExportSized {
-        /// What to render; its film has the size asked for.
+        /// Scene whose film has the requested size.
         scene: Arc<Scene>,
-        /// The format.
+        /// File format.
         format: Format,
         /// Exposure and tone curve.
         display: Display,
-        /// When it is done.
+        /// Stop criteria.
         stop: Stop,
     },
-    /// End the render of `ExportSized`; nothing is written.
+    /// Cancel the render of `ExportSized`; nothing is written.
     CancelExport,
-    /// Keep these unsaved edits where the next start finds them; `None`: there are none any more.
-    KeepEdits(Option<Arc<Scene>>),
-    /// The edits that were left behind are the unsaved ones of this program now.
-    TakeUp,
-    /// The edits that were left behind are not wanted.
+    /// Write these unsaved edits to the recovery file, which the next start offers; `None` removes
+    /// it.
+    Autosave(Option<Arc<Scene>>),
+    /// The orphaned edits become the unsaved edits of this session.
+    Recover,
+    /// Discard the orphaned edits.
     Discard,
-    /// Make this picture ready to be looked at, on a screen of so many columns and rows.
-    Look {
-        /// A PNG or an EXR.
+    /// Prepare an exported image for the viewer.
+    ViewImage {
+        /// Path of a PNG or EXR.
         path: PathBuf,
-        /// How linear light is shown.
+        /// Display transform for linear images.
         display: Display,
-        /// Columns and rows.
+        /// Columns and rows of the terminal.
         screen: [u16; 2],
     },
-    /// Put the path of this file into the clipboard of the terminal.
+    /// Copy the path of this file to the terminal's clipboard.
     Copy(PathBuf),
-    /// Give the terminal to the shell until it calls back.
+    /// Suspend the program and give the terminal to the shell.
     Suspend,
-    /// End the program.
+    /// Quit.
     Quit,
 }

@@ -1,17 +1,14 @@
-//! The dashboard: edit the scene, watch it converge.
+//! The dashboard: editing a scene and watching it converge.
 //!
-//! Parts that only meet in data. `update` decides: it turns a [`Message`](message::Message) into a
-//! changed [`Model`](model::Model) and a list of [`Effect`](message::Effect)s, without clock, file or
-//! terminal. `view` shows: it draws a model into a buffer of cells. `pacing` chooses which of them go
-//! out now, within what `link` says that the line carries; `still` makes written pictures ready to
-//! be looked at. `run` acts: renderer, files, time; and
-//! `terminal` is what lies at the other end of the line.
+//! `update` is a pure function: it turns a [`Message`](message::Message) into a changed
+//! [`Model`](model::Model) and a list of [`Effect`](message::Effect)s, without access to clock,
+//! files or terminal. `view` draws a model into a buffer of cells. `run` is the event loop: it
+//! executes effects with the renderer, the files and the terminal.
 
-pub mod action;
 pub mod convergence;
 pub mod editor;
 pub mod hints;
-pub mod keymap;
+pub mod key_context;
 pub mod layout;
 pub mod message;
 pub mod model;

@@ -2,7 +2,7 @@
 
 use crate::dashboard::convergence::Convergence;
 use crate::dashboard::editor::Editor;
-use crate::dashboard::keymap::Context;
+use crate::dashboard::key_context::KeyContext;
 use crate::dashboard::layout::{Focus, Layout, Request, layout};
 use crate::dashboard::message::{DisplayChannel, Format, OrphanedEdits};
 use crate::dashboard::overlay::Overlay;
@@ -20,87 +20,87 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What the keys act on while the picture has the focus.
+/// Object of the keys while the picture has the focus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mode {
     /// The camera.
     Orbit,
-    /// The selection moves.
+    /// The selection, moved.
     Move,
-    /// The selection turns.
+    /// The selection, rotated about the vertical.
     Rotate,
-    /// The camera flies.
+    /// The camera, flown by letters.
     Fly,
-    /// The probe moves.
+    /// The probe.
     Probe,
 }
 
-/// The file of the scene.
+/// The scene file.
 #[derive(Clone, Debug)]
 pub struct File {
-    /// Where it is; `None`: the scene has none yet.
+    /// Path; `None` for a scene that has no file yet.
     pub path: Option<PathBuf>,
-    /// What the title calls it, printable: the last part of the path.
+    /// Last component of the path, printable, for titles.
     pub name: String,
-    /// The scene as the file has it; that as begun with if there is no file.
+    /// Scene as last read or written; without a file, the scene at the start.
     pub saved: Arc<Scene>,
-    /// Why the file as it is now cannot be read.
+    /// Errors of the current file contents.
     pub broken: Option<SceneErrors>,
-    /// Nothing could be read yet: there is nothing to show but `broken`.
+    /// The file has never been readable: only `broken` can be shown.
     pub unreadable: bool,
 }
 
-/// The inspector's state. Its lines come from `panels::inspector`.
+/// State of the inspector. `panel_lines::inspector` makes its lines.
 #[derive(Clone, Debug, Default)]
 pub struct Inspector {
-    /// Position in the lines; always that of a field.
+    /// Line of the cursor, always a field.
     pub cursor: usize,
-    /// First line shown.
+    /// First visible line.
     pub scroll: usize,
-    /// The value being typed for the field under the cursor.
+    /// Editor of the field under the cursor, while a value is typed.
     pub editor: Option<Editor>,
 }
 
-/// What the picture is compared with.
+/// Comparison of the live picture with a pinned one (A/B).
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
-    /// The kept picture and its mean samples per pixel.
+    /// The pinned picture and its mean samples per pixel.
     pub pinned: Option<(Arc<LinearImage>, f64)>,
-    /// What is shown.
+    /// Visible side.
     pub shown: CompareView,
 }
 
-/// What is shown of two pictures.
+/// Visible side of a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CompareView {
-    /// The live one.
+    /// The live picture.
     #[default]
     Live,
-    /// The kept one.
+    /// The pinned picture.
     Pinned,
-    /// Their difference.
+    /// Live minus pinned.
     Difference,
 }
 
-/// The tone of a notice.
+/// Tone of a notice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
-    /// Something was done.
+    /// Success.
     Good,
-    /// Something to know.
+    /// Information.
     Plain,
-    /// Something was refused or went wrong.
+    /// Refusal or failure.
     Bad,
 }
 
-/// A line that stands in the place of the hints for a while.
+/// A message that replaces the hint line for a while.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Notice {
-    /// What it says; printable.
+    /// Text, printable.
     pub text: String,
-    /// How it is meant.
+    /// Tone.
     pub tone: Tone,
-    /// When it goes; `None`: with the next key.
+    /// Time at which it disappears; `None` until the next key.
     pub until: Option<Duration>,
 }
 
@@ -109,130 +109,131 @@ pub struct Notice {
 pub struct RunningExport {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// The format.
+    /// File format.
     pub format: Format,
-    /// How far it is, 0..=1.
+    /// Progress, 0..=1.
     pub progress: f64,
 }
 
 /// A mouse button that is held down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drag {
-    /// Which.
+    /// Button.
     pub button: Button,
-    /// With Control or Alt when it went down.
+    /// Control or Alt was down at the press.
     pub modified: bool,
-    /// Column and row where it was last.
+    /// Last known column and row.
     pub last: [u16; 2],
-    /// Whether it has moved since it went down: else it is a click.
+    /// The mouse has moved since the press; otherwise the release is a click.
     pub moved: bool,
-    /// Whether it went down in the picture.
+    /// The press was inside the picture.
     pub in_picture: bool,
 }
 
-/// Everything that the screen depends on.
+/// State that the screen is drawn from.
 #[derive(Debug)]
 pub struct Model {
     /// Columns and rows of the terminal.
     pub screen: [u16; 2],
-    /// How many colours it has.
+    /// Colour depth of the terminal.
     pub colors: Colors,
-    /// The scene's file.
+    /// Scene file.
     pub file: File,
-    /// The scene and its edits.
+    /// Scene with its undo history.
     pub history: History,
-    /// What is selected; always something that the scene has.
+    /// Selection; always exists in the scene.
     pub selection: Target,
-    /// Which panel has the focus.
+    /// Panel with the focus.
     pub focus: Focus,
-    /// What the keys do in the picture.
+    /// Object of the keys in the picture.
     pub mode: Mode,
-    /// Everything but the picture is hidden.
-    pub only_picture: bool,
-    /// First line of the outline that is shown.
+    /// Only the picture is visible.
+    pub fullscreen: bool,
+    /// First visible line of the outline.
     pub outline_scroll: usize,
-    /// The inspector.
+    /// Inspector.
     pub inspector: Inspector,
-    /// What lies over the panels.
+    /// Overlay over the panels, which takes the keys.
     pub overlay: Option<Overlay>,
     /// Exposure and tone curve.
     pub display: Display,
-    /// What the picture shows.
+    /// Channel that the picture shows.
     pub channel: DisplayChannel,
-    /// Kept and live.
+    /// Comparison with a pinned picture.
     pub comparison: Comparison,
     /// The probed pixel of the film (column, row).
     pub probe: Option<[usize; 2]>,
-    /// The newest news of the renderer.
+    /// Latest snapshot of the renderer.
     pub snapshot: Option<Box<Snapshot>>,
-    /// How the error has fallen.
+    /// History of the error.
     pub convergence: Convergence,
-    /// When the work is done.
+    /// Stop criteria of the render.
     pub stop: Stop,
-    /// Tracing is stopped by the user.
+    /// The user has paused the render.
     pub paused: bool,
     /// Tracing threads.
     pub threads: usize,
-    /// The most tracing threads that make sense here.
-    pub most_threads: usize,
+    /// Upper limit of tracing threads.
+    pub max_threads: usize,
     /// The tracing threads have low priority.
     pub low_priority: bool,
-    /// What is known of the line to the terminal, if that is not here.
-    pub line: Option<LinkStatus>,
-    /// A notice instead of the hints.
+    /// Status of the connection to a remote terminal.
+    pub link: Option<LinkStatus>,
+    /// Notice that replaces the hints.
     pub notice: Option<Notice>,
     /// A render at another size.
     pub export: Option<RunningExport>,
-    /// The last picture that was written.
+    /// Path of the last exported image.
     pub last_export: Option<PathBuf>,
-    /// Nothing has been pressed yet: the hints are those for a first time.
+    /// No key has been pressed yet: the hints are those for beginners.
     pub first_time: bool,
     /// A mouse button that is held down.
     pub drag: Option<Drag>,
-    /// When the last edit was that may be one gesture with the next.
+    /// Time of the last edit that the next one may be coalesced with.
     pub last_edit: Option<Duration>,
-    /// A save that was asked for so as to quit afterwards.
+    /// The program quits after the pending save.
     pub quit_when_saved: bool,
-    /// Unsaved edits of a session that broke off, about which is not decided.
-    pub left_behind: Option<OrphanedEdits>,
-    /// The unsaved edits that were last asked to be kept.
-    pub journaled: Option<Arc<Scene>>,
-    /// The raster that snapshots were last asked for.
+    /// Edits of a crashed session that wait for the user's decision.
+    pub orphaned_edits: Option<OrphanedEdits>,
+    /// Unsaved edits that were last passed to
+    /// [`Effect::Autosave`](crate::dashboard::message::Effect::Autosave).
+    pub autosaved: Option<Arc<Scene>>,
+    /// Raster that was last requested for snapshots.
     pub raster: Option<[usize; 2]>,
-    /// Counts up whenever the cells of the picture may have to be others.
+    /// Version of the picture's cells; increases when they may have changed.
     pub picture_version: u64,
 }
 
-/// What a model is begun with.
+/// Parameters of a new model.
 #[derive(Debug)]
 pub struct Start {
-    /// The file's path; `None`: no file yet.
+    /// Path of the scene file; `None` without a file.
     pub path: Option<PathBuf>,
-    /// What to call the scene if it has no file.
+    /// Name of a scene without a file.
     pub name: String,
-    /// The scene, or why it cannot be read.
+    /// The scene, or the errors in its file.
     pub scene: Result<Arc<Scene>, SceneErrors>,
     /// Columns and rows of the terminal.
     pub screen: [u16; 2],
-    /// How many colours it has.
+    /// Colour depth of the terminal.
     pub colors: Colors,
-    /// When the work is done.
+    /// Stop criteria of the render.
     pub stop: Stop,
     /// Tracing threads.
     pub threads: usize,
-    /// The most tracing threads that make sense here.
-    pub most_threads: usize,
+    /// Upper limit of tracing threads.
+    pub max_threads: usize,
 }
 
-/// The last part of a path, printable.
+/// Returns the last component of a path, printable.
 pub fn short_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     sanitized(&name.to_string_lossy())
 }
 
 impl Model {
-    /// The model of a program that has just been started. The run shows its scene
-    /// ([`Model::scene`]) unless [`File::unreadable`].
+    /// Creates the model of a program that starts. The event loop renders [`Model::scene`] unless
+    /// [`File::unreadable`].
     pub fn new(start: Start) -> Self {
         let (scene, broken) = match start.scene {
             Ok(scene) => (scene, None),
@@ -249,7 +250,7 @@ impl Model {
             selection,
             focus: Focus::Picture,
             mode: Mode::Orbit,
-            only_picture: false,
+            fullscreen: false,
             outline_scroll: 0,
             inspector: Inspector::default(),
             overlay: None,
@@ -262,9 +263,9 @@ impl Model {
             stop: start.stop,
             paused: false,
             threads: start.threads.max(1),
-            most_threads: start.most_threads.max(1),
+            max_threads: start.max_threads.max(1),
             low_priority: false,
-            line: None,
+            link: None,
             notice: None,
             export: None,
             last_export: None,
@@ -272,14 +273,14 @@ impl Model {
             drag: None,
             last_edit: None,
             quit_when_saved: false,
-            left_behind: None,
-            journaled: None,
+            orphaned_edits: None,
+            autosaved: None,
             raster: None,
             picture_version: 0,
         }
     }
 
-    /// The scene that is shown: with the new thing of an open form.
+    /// Scene to render: the preview of an open form, otherwise the edited scene.
     pub fn scene(&self) -> &Arc<Scene> {
         match &self.overlay {
             Some(Overlay::Form(form)) => &form.scene,
@@ -287,38 +288,38 @@ impl Model {
         }
     }
 
-    /// Whether there are edits that no file has.
+    /// Returns `true` if the scene has edits that its file lacks.
     pub fn is_unsaved(&self) -> bool {
         !self.history.is_saved()
     }
 
-    /// Where everything is; `None`: the terminal is too small.
+    /// Layout of the screen; `None` if the terminal is too small.
     pub fn layout(&self) -> Option<Layout> {
         layout(&Request {
             screen: self.screen,
             film: self.scene().film.size,
             focus: self.focus,
-            only_picture: self.only_picture,
+            fullscreen: self.fullscreen,
         })
     }
 
-    /// Where keys are looked up now.
-    pub fn context(&self) -> Context {
+    /// Context in which keys are looked up.
+    pub fn context(&self) -> KeyContext {
         match (&self.overlay, self.focus, self.mode) {
-            (Some(_), ..) => Context::Overlay,
-            (None, Focus::Outline, _) => Context::Outline,
-            (None, Focus::Inspector, _) => Context::Inspector,
+            (Some(_), ..) => KeyContext::Overlay,
+            (None, Focus::Outline, _) => KeyContext::Outline,
+            (None, Focus::Inspector, _) => KeyContext::Inspector,
             (None, Focus::Picture, mode) => match mode {
-                Mode::Orbit => Context::Picture,
-                Mode::Move => Context::Moving,
-                Mode::Rotate => Context::Turning,
-                Mode::Fly => Context::Flying,
-                Mode::Probe => Context::Probing,
+                Mode::Orbit => KeyContext::Picture,
+                Mode::Move => KeyContext::Moving,
+                Mode::Rotate => KeyContext::Turning,
+                Mode::Fly => KeyContext::Flying,
+                Mode::Probe => KeyContext::Probing,
             },
         }
     }
 
-    /// The line of text that keys go to, if one is open.
+    /// Text editor that takes the keys, if one is open.
     pub fn editor(&self) -> Option<&Editor> {
         match &self.overlay {
             Some(Overlay::Palette(palette)) => Some(&palette.editor),
@@ -329,13 +330,13 @@ impl Model {
         }
     }
 
-    /// What is known about the probed pixel.
+    /// Values of the probed pixel, if the snapshot has them.
     pub fn probed(&self) -> Option<&Probe> {
         let probe = self.snapshot.as_ref()?.probe.as_ref()?;
         (Some(probe.pixel) == self.probe).then_some(probe)
     }
 
-    /// What the compiled scene contains, in lines of at most `width` columns.
+    /// Inventory of the compiled scene, wrapped to `width` columns.
     pub fn inventory(&self, width: u16) -> Vec<String> {
         match &self.snapshot {
             Some(snapshot) if !snapshot.report.inventory.is_empty() => {
@@ -345,7 +346,7 @@ impl Model {
         }
     }
 
-    /// When the screen changes by itself: send a [`Tick`](crate::dashboard::message::Message::Tick) then.
+    /// Time of the next [`Tick`](crate::dashboard::message::Message::Tick) that the model needs.
     pub fn next_timeout(&self) -> Option<Duration> {
         self.notice.as_ref().and_then(|notice| notice.until)
     }

@@ -1,10 +1,10 @@
-//! What each quality costs on the scene at hand: how long it takes to a given noise.
+//! Noise targets for the current scene and the time to reach each.
 
 use crate::dashboard::convergence::Convergence;
 use crate::dashboard::model::Model;
 use crate::render::session::{QUALITIES, Report};
 
-/// What a noise, in codes, looks like.
+/// Visual effect of each noise target.
 const LOOKS: [&str; QUALITIES.len()] = [
     "a draft: grain is plain to see",
     "grain in dark and even parts",
@@ -14,38 +14,38 @@ const LOOKS: [&str; QUALITIES.len()] = [
     "for 16-bit files and measurements",
 ];
 
-/// What to know about all of them.
+/// Note below the list of targets.
 pub const ABOUT: &str = "Halving the noise takes two to four times as long. Enter: stop there.";
 
-/// What a quality costs.
+/// Time to a noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cost {
-    /// It is reached; after so many seconds of tracing, if that was seen.
+    /// Reached, after this many seconds of tracing if that was observed.
     Reached(Option<f64>),
-    /// So many seconds of tracing more, a lower and an upper guess.
+    /// Lower and upper estimate of the remaining seconds of tracing.
     Left(f64, f64),
-    /// No error is known yet.
+    /// No error estimate yet.
     Unknown,
 }
 
-/// A quality to choose.
+/// A selectable noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Quality {
-    /// Its noise, in codes.
+pub struct NoiseTarget {
+    /// Noise in 8-bit levels.
     pub noise_codes: f64,
-    /// What it looks like, in a few words.
+    /// Visual effect, in a few words.
     pub looks: &'static str,
-    /// What it costs.
+    /// Time to reach it.
     pub cost: Cost,
-    /// Whether the work stops there.
+    /// The render stops at this target.
     pub is_target: bool,
 }
 
 impl Model {
-    /// The qualities, the cheapest first.
-    pub fn qualities(&self) -> [Quality; QUALITIES.len()] {
+    /// Noise targets, the fastest first.
+    pub fn noise_targets(&self) -> [NoiseTarget; QUALITIES.len()] {
         let report = self.snapshot.as_ref().map(|snapshot| &snapshot.report);
-        std::array::from_fn(|i| Quality {
+        std::array::from_fn(|i| NoiseTarget {
             noise_codes: QUALITIES[i],
             looks: LOOKS[i],
             cost: report.map_or(Cost::Unknown, |report| cost(report, &self.convergence, i)),
@@ -69,7 +69,7 @@ mod tests {
     use crate::dashboard::testing::report;
 
     #[test]
-    fn what_is_reached_is_told_with_its_time_and_the_rest_with_what_is_left() {
+    fn reached_targets_show_time_and_others_the_rest() {
         let mut convergence = Convergence::default();
         for spp in [10, 20, 40] {
             convergence.add(&report(1, spp, Some(20.0 / spp as f64)));
@@ -77,7 +77,7 @@ mod tests {
         let mut now = report(1, 80, Some(0.4));
         convergence.add(&now);
         now.quality_seconds[4] = Some((0.2, 0.3));
-        // The reports are 10, 20, 40 and 80 ms into the work; 2, 1, 0.5 and 0.4 codes.
+        // The reports are at 10, 20, 40 and 80 ms, with 2, 1, 0.5 and 0.4 levels.
         for at in [0, 1] {
             assert_eq!(cost(&now, &convergence, at), Cost::Reached(None), "by the first look");
         }
@@ -87,7 +87,7 @@ mod tests {
         }
         assert_eq!(cost(&now, &convergence, 4), Cost::Left(0.2, 0.3));
         assert_eq!(cost(&now, &convergence, 5), Cost::Unknown);
-        // Half way between 1 and 2 codes, on logarithmic scales.
+        // Midway between 1 and 2 levels on logarithmic scales.
         let between = convergence.seconds_at(2f64.sqrt()).unwrap();
         assert!((between - 0.01 * 2f64.sqrt()).abs() < 1e-9, "{between}");
     }

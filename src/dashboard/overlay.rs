@@ -1,4 +1,4 @@
-//! What can lie over the panels and take the keys: help, lists, forms, prompts, questions.
+//! Overlays over the panels, which take the keys: help, lists, forms, prompts, questions.
 
 use crate::dashboard::editor::Editor;
 use crate::scene::Scene;
@@ -7,134 +7,136 @@ use crate::terminal::image::ViewerImage;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What lies over the panels.
+/// An overlay.
 #[derive(Clone, Debug)]
 pub enum Overlay {
     /// All keys: [`help`](crate::dashboard::hints::help).
     Help {
-        /// First line shown.
+        /// First visible line.
         scroll: usize,
     },
-    /// What the compiled scene contains: [`Model::inventory`](crate::dashboard::model::Model::inventory).
+    /// Inventory of the compiled scene:
+    /// [`Model::inventory`](crate::dashboard::model::Model::inventory).
     Inventory {
-        /// First line shown.
+        /// First visible line.
         scroll: usize,
     },
-    /// What each quality costs: [`Model::qualities`](crate::dashboard::model::Model::qualities).
-    Quality {
-        /// Position of the chosen one.
+    /// Noise targets and the time to each:
+    /// [`Model::noise_targets`](crate::dashboard::model::Model::noise_targets).
+    NoiseTargets {
+        /// Index of the target under the cursor.
         cursor: usize,
     },
-    /// Finds an action by typing.
+    /// Command palette: finds commands by fuzzy search.
     Palette(Palette),
-    /// One of a list.
+    /// A choice from a list.
     Pick(Pick),
     /// A new object or light, confirmed or cancelled as a whole.
     Form(Form),
-    /// A line of text that is asked for.
+    /// A prompt for a line of text.
     Prompt(Prompt),
     /// A question with a few answers.
     Question(Question),
-    /// A picture that was written, on the whole screen.
+    /// Viewer of an exported image, on the whole screen.
     ViewerImage(ViewedImage),
 }
 
-/// A picture that was written, being looked at.
+/// An exported image in the viewer.
 #[derive(Clone, Debug)]
 pub struct ViewedImage {
-    /// Its file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// The picture; `None`: it is being read.
+    /// The image; `None` while it is read.
     pub still: Option<Arc<ViewerImage>>,
-    /// How much of its transfer the terminal has been sent, 0..=1.
+    /// Transferred share, 0..=1.
     pub sent: f64,
 }
 
-/// Finds an action by typing.
+/// Command palette: finds commands by fuzzy search.
 #[derive(Clone, Debug)]
 pub struct Palette {
-    /// What is typed.
+    /// Text being typed.
     pub editor: Editor,
-    /// Rows of the key table that fit, the best first: positions in `KEYMAP`.
+    /// Matching commands, best first: positions in the command table.
     pub found: Vec<usize>,
-    /// Position in `found`.
+    /// Index in `found`.
     pub cursor: usize,
-    /// First line shown.
+    /// First visible line.
     pub scroll: usize,
 }
 
-/// One of a list.
+/// A choice from a list.
 #[derive(Clone, Debug)]
 pub struct Pick {
-    /// What for.
+    /// Purpose.
     pub purpose: PickFor,
-    /// Heading.
+    /// Title.
     pub title: String,
-    /// Names, and what they mean (may be empty).
+    /// Names and descriptions (may be empty).
     pub entries: Vec<(String, String)>,
-    /// Position of the chosen entry.
+    /// Index of the entry under the cursor.
     pub cursor: usize,
-    /// First line shown.
+    /// First visible line.
     pub scroll: usize,
 }
 
-/// What a choice from a list is for.
+/// Purpose of a choice from a list.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PickFor {
-    /// The kind of a new object.
+    /// Kind of a new object.
     Object,
-    /// The kind of a new light.
+    /// Kind of a new light.
     Light,
-    /// The word behind a key of a subject.
+    /// Value of a key of a target.
     Word(Target, String),
 }
 
-/// A new object or light. The picture shows the scene with it while the form is open.
+/// A new object or light. The picture previews it while the form is open.
 #[derive(Clone, Debug)]
 pub struct Form {
-    /// `new sphere`.
+    /// Title: `new sphere`.
     pub title: String,
-    /// The scene with the new thing as filled in so far; without faults.
+    /// Valid scene that includes the new object or light.
     pub scene: Arc<Scene>,
-    /// The new thing, in `scene`.
+    /// The new object or light in `scene`.
     pub subject: Target,
-    /// What undoing it will be called.
+    /// Label of its undo step.
     pub label: String,
-    /// What was selected before.
+    /// Previous selection.
     pub before: Target,
-    /// Position in the lines of the form (`panels::form`).
+    /// Line of the cursor (`panel_lines::form`).
     pub cursor: usize,
-    /// First line shown.
+    /// First visible line.
     pub scroll: usize,
-    /// The value being typed.
+    /// Editor of the field under the cursor.
     pub editor: Option<Editor>,
-    /// Why the last step was refused.
+    /// Reason why the last step was refused.
     pub problem: Option<String>,
 }
 
-/// A line of text that is asked for.
+/// A prompt for a line of text.
 #[derive(Clone, Debug)]
 pub struct Prompt {
-    /// What for.
+    /// Purpose.
     pub purpose: PromptFor,
-    /// `save as`.
+    /// Title: `save as`.
     pub title: String,
-    /// What may be typed, in a line.
+    /// One-line description of valid input.
     pub help: String,
-    /// What is typed.
+    /// Text being typed.
     pub editor: Editor,
 }
 
-/// What a typed line is for.
+/// Purpose of a prompt.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PromptFor {
-    /// A path to save to.
+    /// Path to save to.
     SaveAs,
-    /// A new name.
+    /// New name.
     Rename(Target),
-    /// A name for the viewpoint.
+    /// Name of a viewpoint.
     StoreView,
-    /// When to stop.
+    /// Stop criteria.
     StopAt,
     /// Size and format of an export.
     ExportSized,
@@ -143,31 +145,31 @@ pub enum PromptFor {
 /// A question with a few answers, each with a letter.
 #[derive(Clone, Debug)]
 pub struct Question {
-    /// What is asked, in a sentence or two.
+    /// Question, in a sentence or two.
     pub text: String,
-    /// Letter, words, what happens. The first is chosen at first.
+    /// Letter, text and effect of each answer. The cursor starts on the first.
     pub answers: Vec<(char, String, Answer)>,
-    /// Position of the chosen answer.
+    /// Index of the answer under the cursor.
     pub cursor: usize,
 }
 
-/// What an answer does.
+/// Effect of an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// Nothing.
+    /// None.
     Nothing,
-    /// Saves, then quits.
+    /// Save, then quit.
     SaveAndQuit,
-    /// Quits.
+    /// Quit.
     Quit,
-    /// Reads the file; unsaved edits are lost.
+    /// Read the file; unsaved edits are lost.
     Load,
-    /// Writes the file whatever stands there: the scene's own (`None`) or another.
+    /// Overwrite the scene file (`None`) or another one.
     Overwrite(Option<PathBuf>),
-    /// Asks for another name.
+    /// Prompt for another path.
     SaveAs,
-    /// Takes up the edits that were left behind.
-    TakeUp,
-    /// Throws them away.
+    /// Recover the orphaned edits.
+    Recover,
+    /// Discard the orphaned edits.
     Discard,
 }

@@ -1,5 +1,4 @@
-//! Where overlays lie and where the rows of panels are: pure, used to draw and to know what a click
-//! means.
+//! Layout of overlays and panel rows: pure, shared by drawing and mouse handling.
 
 use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::ABOUT;
@@ -7,26 +6,26 @@ use crate::dashboard::overlay::Overlay;
 use crate::render::session::QUALITIES;
 use crate::terminal::Area;
 
-/// Where an overlay lies. Parts without rows are not there.
+/// Areas of an overlay. Unused parts are empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OverlayLayout {
-    /// The box with its border.
+    /// Box with its border.
     pub frame: Area,
-    /// Where text is typed: one row.
+    /// Text input: one row.
     pub input: Area,
-    /// Rows of a list, of a form, of text.
+    /// Rows of a list, form or text.
     pub list: Area,
-    /// Rows for what is to be said: a help line, a problem, a question.
+    /// Rows for help, a problem or a question.
     pub help: Area,
 }
 
 impl Model {
-    /// Where the overlay lies; `None`: there is none, or the terminal is too small.
-    pub fn place(&self) -> Option<OverlayLayout> {
+    /// Layout of the overlay; `None` without an overlay or if the terminal is too small.
+    pub fn overlay_layout(&self) -> Option<OverlayLayout> {
         let layout = self.layout()?;
         let [width, height] = self.screen;
         let centred = |columns: u16, rows: u16| {
-            // The two lowest lines tell where the work stands and what the keys do.
+            // Status line and hint line stay visible.
             let (columns, rows) = (columns.min(width - 2), rows.min(height - 2));
             let [x, y] = [(width - columns) / 2, (height - 2 - rows) / 2];
             Area { x, y, width: columns, height: rows }
@@ -46,7 +45,7 @@ impl Model {
                 let rows = self.inventory(columns - 2).len() as u16;
                 whole(centred(columns, rows.saturating_add(2)))
             }
-            Overlay::Quality { .. } => {
+            Overlay::NoiseTargets { .. } => {
                 let about = wrapped_rows(ABOUT, 76.min(width - 2) - 5);
                 let frame = low(76, QUALITIES.len() as u16 + 2 + about);
                 let inner = frame.inner();
@@ -70,7 +69,7 @@ impl Model {
                 whole(centred(76, (pick.entries.len() as u16).saturating_add(2)))
             }
             Overlay::Form(form) => {
-                // Beside the picture, which shows what is being filled in.
+                // Beside the picture, which previews the form.
                 let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
                 let columns = side.min(width);
                 let x = width - columns;
@@ -93,7 +92,7 @@ impl Model {
             Overlay::Question(question) => {
                 let columns = 64.min(width - 2);
                 let answers = question.answers.len() as u16;
-                // A column free on both sides.
+                // One free column on both sides.
                 let rows = wrapped_rows(&question.text, columns - 4);
                 let frame = low(columns, rows + answers + 2);
                 let inner = frame.inner();
@@ -106,25 +105,25 @@ impl Model {
         })
     }
 
-    /// The rows of the outline's lines; `None`: folded away.
+    /// Rows of the outline's lines; `None` if it is folded.
     pub fn outline_rows(&self) -> Option<Area> {
         self.layout()?.outline.map(|area| area.inner())
     }
 
-    /// The rows of the inspector's lines, and those for what is to be said about the field under the
-    /// cursor; `None`: folded away.
+    /// Rows of the inspector's lines, and rows for help on the field under the cursor; `None` if it
+    /// is folded.
     pub fn inspector_rows(&self) -> Option<(Area, Area)> {
         let problem = self.inspector.editor.as_ref().is_some_and(|e| e.problem.is_some());
         self.layout()?.inspector.map(|area| split(area.inner(), problem))
     }
 }
 
-/// A box full of rows.
+/// A box that consists of list rows.
 fn whole(frame: Area) -> OverlayLayout {
     OverlayLayout { frame, list: frame.inner(), ..OverlayLayout::default() }
 }
 
-/// Rows for lines, and below them rows for what is to be said: more of them if there is a problem.
+/// Splits a panel into rows for lines and rows for help below; a problem gets more of them.
 fn split(inner: Area, problem: bool) -> (Area, Area) {
     let rows = match (inner.height, problem) {
         (0..4, _) => 0,
@@ -137,13 +136,13 @@ fn split(inner: Area, problem: bool) -> (Area, Area) {
     (lines, Area { y: inner.y + lines.height, height: rows, ..inner })
 }
 
-/// Rows that `text` takes when it is broken between words to `width` columns.
+/// Returns the number of lines that `text` wraps to in `width` columns.
 pub fn wrapped_rows(text: &str, width: u16) -> u16 {
     wrapped(text, width).len() as u16
 }
 
-/// `text` broken between words to `width` columns; a longer word is broken where it must be. Columns
-/// are counted as characters.
+/// Wraps `text` between words to `width` columns; longer words are broken. Columns are counted as
+/// characters.
 pub fn wrapped(text: &str, width: u16) -> Vec<String> {
     let width = usize::from(width.max(1));
     let mut lines = Vec::new();
@@ -176,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_are_kept_whole_where_they_fit() {
+    fn wrapping_keeps_words_whole() {
         assert_eq!(wrapped("one two three", 7), ["one two", "three"]);
         assert_eq!(wrapped("abcdefgh ij", 3), ["abc", "def", "gh", "ij"]);
         assert_eq!(wrapped("abcdef", 3), ["abc", "def", ""].map(String::from)[..2]);
@@ -185,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_and_help_share_a_panel() {
+    fn panel_splits_into_lines_and_help() {
         for height in 0..40 {
             for problem in [false, true] {
                 let inner = Area { x: 3, y: 2, width: 20, height };

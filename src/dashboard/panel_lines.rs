@@ -1,4 +1,4 @@
-//! The lines of outline, inspector and form as data: view paints them, update moves over them.
+//! Lines of outline, inspector and form as data: `view` draws them, `update` moves over them.
 
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::{Form, Overlay};
@@ -9,15 +9,15 @@ use crate::value::truncated;
 /// A line of the outline.
 #[derive(Clone, Debug, PartialEq)]
 pub enum OutlineLine {
-    /// The heading of a section.
+    /// Heading of a section.
     Heading(&'static str),
-    /// Something that can be selected.
+    /// A selectable entry.
     Entry {
-        /// What it is.
+        /// Target of the entry.
         subject: Target,
-        /// Its name, printable.
+        /// Name, printable.
         label: String,
-        /// What else there is to say: an object's material, `off`, a view's key; may be empty.
+        /// Material of an object, `off` for a light, key of a view; may be empty.
         note: String,
     },
 }
@@ -25,45 +25,45 @@ pub enum OutlineLine {
 /// A line of the inspector or of a form.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PanelLine {
-    /// A heading: what the fields below belong to.
+    /// Heading of the fields below.
     Heading(String),
-    /// A value.
+    /// A field with its value.
     Field(Box<FieldLine>),
 }
 
-/// A value with all that is to be known about it.
+/// A field with its value and description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldLine {
-    /// Whose value.
+    /// Target that the field belongs to.
     pub subject: Target,
-    /// Its key, dotted.
+    /// Dotted key.
     pub key: String,
-    /// Which of the numbers behind the key, if it has several.
+    /// Index of the number, if the key has several.
     pub component: Option<usize>,
-    /// What stands before the value.
+    /// Label before the value.
     pub label: String,
-    /// How deep it stands below others: 0, 1, 2.
+    /// Nesting depth: 0, 1, 2.
     pub depth: usize,
-    /// What kind of value.
+    /// Kind of input widget.
     pub entry: Widget,
-    /// The value as it can be typed, printable; empty: none is given.
+    /// Value in the syntax of the editor, printable; empty if the key is absent.
     pub value: String,
-    /// The colour that the value belongs to, linear, on the first line of a colour.
+    /// Linear colour of which this is the first line.
     pub swatch: Option<[f64; 3]>,
     /// Unit; may be empty.
     pub unit: &'static str,
-    /// Whether it is the value that holds when nothing is said.
+    /// The value is the default.
     pub is_default: bool,
-    /// What holds when nothing is said; `None`: something must be said.
+    /// Default value; `None` for a required key.
     pub default: Option<String>,
-    /// What may be typed, as a phrase.
+    /// Valid input, as a phrase.
     pub expected: String,
-    /// What it is, in a sentence.
+    /// Description, in a sentence.
     pub doc: &'static str,
 }
 
 impl PanelLine {
-    /// The field, if it is one.
+    /// Returns the field, if the line is one.
     pub fn field(&self) -> Option<&FieldLine> {
         match self {
             Self::Field(field) => Some(field),
@@ -72,7 +72,7 @@ impl PanelLine {
     }
 }
 
-/// The outline of a scene.
+/// Returns the outline of a scene.
 pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
     let mut lines = Vec::new();
     let mut last = None;
@@ -96,14 +96,14 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
     lines
 }
 
-/// Where `subject` stands in the outline.
+/// Returns the line of `subject` in the outline.
 pub fn outline_position(lines: &[OutlineLine], subject: &Target) -> Option<usize> {
     lines
         .iter()
         .position(|line| matches!(line, OutlineLine::Entry { subject: s, .. } if s == subject))
 }
 
-/// The fields of `subject`; below those of an object the ones of its material.
+/// Returns the fields of `subject`, and of its material if it is an object.
 pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     let mut lines = fields(scene, subject);
     let material = subject.material(scene).filter(|material| material != subject);
@@ -116,21 +116,21 @@ pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     lines
 }
 
-/// The fields of a form: those of the new thing and of a material that is new with it. `base` is the
-/// scene without both.
+/// Returns the fields of a form: those of the new object or light, and of its material if that is
+/// new as well. `base` is the scene without both.
 pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
-    let own = match form.subject.material(&form.scene) {
+    let has_new_material = match form.subject.material(&form.scene) {
         Some(Target::Material(name)) => !base.materials.contains_key(&name),
         _ => false,
     };
-    match own {
+    match has_new_material {
         true => inspector(&form.scene, &form.subject),
         false => fields(&form.scene, &form.subject),
     }
 }
 
 fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
-    // Something that is not there has no fields.
+    // A missing target has no fields.
     let rows = rows(scene, subject).unwrap_or_default();
     rows.iter()
         .flat_map(|row| lines_of(subject, row))
@@ -138,7 +138,7 @@ fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
         .collect()
 }
 
-/// One line for each number of a list, otherwise one line.
+/// Returns one line for each number of a list, otherwise one line.
 fn lines_of(subject: &Target, row: &Property) -> Vec<FieldLine> {
     let line = |component: Option<usize>, label: String, value: String| FieldLine {
         subject: subject.clone(),
@@ -163,15 +163,15 @@ fn lines_of(subject: &Target, row: &Property) -> Vec<FieldLine> {
         (_, 2) => &["width", "height"],
         _ => &["x", "y", "z"],
     };
-    let of = |(i, value): (usize, &String)| {
+    let component_line = |(i, value): (usize, &String)| {
         let name = names.get(i).copied().unwrap_or_default();
         line(Some(i), format!("{} {name}", row.label), value.clone())
     };
-    row.components.iter().enumerate().map(of).collect()
+    row.components.iter().enumerate().map(component_line).collect()
 }
 
 impl Model {
-    /// The lines of the inspector, or of the form that is open.
+    /// Lines of the open form, or else of the inspector.
     pub fn field_lines(&self) -> Vec<PanelLine> {
         match &self.overlay {
             Some(Overlay::Form(open)) => form(open, self.history.scene()),
@@ -180,7 +180,7 @@ impl Model {
     }
 }
 
-/// The position of the field nearest to `wanted`: it, or the next one below, or the last.
+/// Returns the index of the first field at or below `wanted`, or else of the last field.
 pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
     let field = |i: &usize| lines[*i].field().is_some();
     (wanted..lines.len())
@@ -189,7 +189,8 @@ pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
         .unwrap_or(0)
 }
 
-/// The position `steps` fields below (negative: above) the one at `cursor`; stops at the ends.
+/// Returns the index of the field `steps` below (negative: above) the one at `cursor`, clamped to
+/// the ends.
 pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].field().is_some()).collect();
     let at = fields.iter().position(|i| *i >= cursor).unwrap_or(fields.len().saturating_sub(1));
@@ -197,8 +198,8 @@ pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     fields.get(to).copied().unwrap_or(0)
 }
 
-/// The first line to show so that line `cursor` of `len` is in view in `rows` rows, with a line
-/// above it (a heading, perhaps), moving as little as possible from `scroll`.
+/// Returns the first visible line such that line `cursor` of `len` is visible in `rows` rows with
+/// the line above it, as close to `scroll` as possible.
 pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize {
     let lowest = (cursor + 1).saturating_sub(rows);
     let highest = if rows > 2 { cursor.saturating_sub(1) } else { cursor };
@@ -211,7 +212,7 @@ mod tests {
     use crate::scene::built_in;
 
     #[test]
-    fn every_subject_has_its_line_and_every_field_its_place() {
+    fn every_target_has_outline_line_and_fields() {
         let mut scene = built_in();
         scene.cameras.insert("left".into(), scene.camera.clone());
         scene.lights[0].on = false;
@@ -238,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn the_cursor_walks_over_headings() {
+    fn cursor_skips_headings() {
         let scene = built_in();
         let lines = inspector(&scene, &Target::Object(2));
         let heading = lines.iter().position(|l| l.field().is_none()).unwrap();
@@ -252,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn scrolling_keeps_the_cursor_in_view() {
+    fn scrolling_keeps_cursor_visible() {
         for rows in 0..12 {
             for len in 1..30 {
                 let mut scroll = 0;

@@ -1,10 +1,10 @@
-//! What tests of the dashboard share.
+//! Helpers shared by tests of the dashboard.
 
 use crate::film::{Mse, Noise};
 use crate::render::schedule::Spp;
 use crate::render::session::{QUALITIES, Report, State};
 
-/// A report about scene `generation` after `spp` samples in each pixel, ten thousand pixels.
+/// Creates a report about scene `generation` after `spp` samples in each of ten thousand pixels.
 pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
     Report {
         generation,

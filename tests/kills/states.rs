@@ -70,7 +70,7 @@ pub fn states(keys: &[usize]) -> Vec<String> {
         colors: Colors::Indexed,
         stop: Stop::default(),
         threads: 1,
-        most_threads: 1,
+        max_threads: 1,
     });
     begin(&mut model);
     let mut texts = vec![SCENE.to_string()];

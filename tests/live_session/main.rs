@@ -1,5 +1,5 @@
-//! What a guest changes while a session works: lights, aims, display, threads. Samples are kept
-//! wherever they serve, and figures are those of a fresh render.
+//! Changes by a client during a session: lights, stop criteria, display, threads. Samples are kept
+//! where possible, and estimates equal those of a fresh render.
 
 mod noise;
 
@@ -101,7 +101,7 @@ fn bytes(session: &Session) -> Vec<u8> {
     session.with(|rendering, _| rendering.film.bytes()).unwrap()
 }
 
-/// Other colours and strengths; every group is still there.
+/// Changes colours and strengths of lights; every light group remains.
 fn relit() -> Scene {
     let mut scene = scene();
     scene.ambient.color = Color([0.3, 0.1, 0.0]);
@@ -113,12 +113,12 @@ fn relit() -> Scene {
 }
 
 #[test]
-fn another_light_is_what_a_fresh_render_gives() {
+fn relit_picture_equals_fresh_render() {
     let mut fresh = session(spp(64), false);
     let expected = finish(&mut fresh, &relit());
     let film = bytes(&fresh);
 
-    // At rest, and at any moment before.
+    // After finishing, and at any moment before.
     for wait_us in [None, Some(0), Some(300), Some(3000), Some(9000)] {
         let mut session = session(spp(64), false);
         let first = match wait_us {
@@ -143,23 +143,23 @@ fn another_light_is_what_a_fresh_render_gives() {
 }
 
 #[test]
-fn no_sample_is_lost_to_another_light() {
+fn light_changes_keep_samples() {
     let mut session = session(spp(64), true);
     session.set_view(View { raster: Some([10, 7]), probe: None });
     let before = finish(&mut session, &scene());
     let newer = relit();
     let mix = before.mix_for(&newer).expect("the film serves the scene");
     let generation = session.set_scene(Arc::new(newer.clone()));
-    // All snapshots from here on have all the samples.
+    // All later snapshots have all the samples.
     let after = wait(&session, |s| {
         assert_eq!(s.report.samples, before.report.samples);
         s.report.generation == generation && s.report.noise.is_some()
     });
-    // What the guest has mixed from the old snapshot is what the new one shows.
+    // The client's relit old snapshot equals the new snapshot.
     assert_eq!(after.mix, mix);
     assert_eq!(before.picture.unwrap().mixed(&mix), after.picture.unwrap().mixed(&after.mix));
     assert_eq!(after.guide, before.guide);
-    // A name, a spare material, a cap that nothing reaches.
+    // A name, an unused material, a depth limit that no path reaches.
     let mut renamed = newer.clone();
     renamed.lights[0].name = "sun".to_string();
     renamed.materials.insert("spare".to_string(), renamed.materials["red"].clone());
@@ -169,7 +169,7 @@ fn no_sample_is_lost_to_another_light() {
     assert_eq!(renamed.report.noise, after.report.noise);
     let names = session.with(|rendering, _| rendering.group_names()).unwrap();
     assert_eq!(names, ["ambient", "background", "sun", "light 2"]);
-    // A moved light is another scene.
+    // A moved light needs new samples.
     let mut moved = newer;
     moved.lights[0].point.as_mut().unwrap().position[0] = 1.0;
     assert_eq!(after.lighting.unwrap().mix(&moved), None);
@@ -179,7 +179,7 @@ fn no_sample_is_lost_to_another_light() {
 }
 
 #[test]
-fn a_mix_that_is_too_noisy_wakes_a_session_at_rest() {
+fn noisy_light_change_resumes_finished_session() {
     let mut session = session(noise(0.15), true);
     let dim = finish(&mut session, &scene()).report;
     assert_eq!(dim.state, State::Finished(StoppedBy::Noise));
@@ -193,17 +193,17 @@ fn a_mix_that_is_too_noisy_wakes_a_session_at_rest() {
     .report;
     assert!(report.samples > dim.samples, "the target was not met: {:?}", dim.noise);
     assert!(report.noise.unwrap().rmse_codes <= 0.15);
-    // The figure is that of the film as it is, estimated from nothing.
+    // The estimate is that of the current film, computed from scratch.
     let film = session.with(|r, _| r.film.noise(&r.mix, &Display::default())).unwrap().unwrap();
     assert_eq!(report.noise.unwrap(), film);
-    // Back to less noise: it stays at rest.
+    // Less noise again: the session stays finished.
     let back = finish(&mut session, &scene()).report;
     assert_eq!(back.samples, report.samples);
     assert!(back.noise.unwrap().rmse_codes < 0.15);
 }
 
 #[test]
-fn a_light_that_goes_out_keeps_its_group_until_a_restart() {
+fn switched_off_light_keeps_group_until_restart() {
     let mut session = session(spp(32), true);
     let groups = |session: &Session| session.with(|r, _| r.film.groups());
     let before = finish(&mut session, &scene()).report;
@@ -217,7 +217,7 @@ fn a_light_that_goes_out_keeps_its_group_until_a_restart() {
     assert!(again.report.samples < before.samples, "it begins afresh");
     resting(&session, generation);
     assert_eq!(groups(&session), Some(3));
-    // Without a group it cannot be switched on without new samples.
+    // A light without a group needs new samples to be switched on.
     let on = session.set_scene(Arc::new(scene()));
     let first = wait(&session, |s| s.report.generation == on);
     assert!(first.report.samples < before.samples);
@@ -226,7 +226,7 @@ fn a_light_that_goes_out_keeps_its_group_until_a_restart() {
 }
 
 #[test]
-fn aims_display_and_threads_change_without_losing_samples() {
+fn stop_display_and_threads_change_keeps_samples() {
     let mut plain = session(spp(96), false);
     finish(&mut plain, &scene());
 
@@ -243,7 +243,7 @@ fn aims_display_and_threads_change_without_losing_samples() {
     assert_eq!(more.state, State::Finished(StoppedBy::Spp));
     assert!(bytes(&session) == bytes(&plain));
 
-    // An aim that is met already changes nothing.
+    // A stop criterion that is already met changes nothing.
     session.set_stop(noise(1000.0));
     let met = |s: &Snapshot| s.report.state == State::Finished(StoppedBy::Noise);
     assert_eq!(wait(&session, met).report.samples, more.samples);
@@ -253,7 +253,7 @@ fn aims_display_and_threads_change_without_losing_samples() {
     let expected = session.with(move |r, _| r.film.noise(&r.mix, &display)).unwrap();
     let judged = wait(&session, |s| s.report.noise == expected);
     assert_eq!(judged.report.samples, more.samples);
-    // It also holds for the scenes to come.
+    // It also applies to later scenes.
     let mut moved = scene();
     moved.camera.eye[0] = 0.1;
     let moved = finish(&mut session, &moved).report;
@@ -262,7 +262,7 @@ fn aims_display_and_threads_change_without_losing_samples() {
 }
 
 #[test]
-fn tasks_do_not_wait_and_always_answer() {
+fn submitted_tasks_always_run_without_waiting() {
     let mut session = session(Stop::default(), true);
     let (answer, answers) = channel();
     let samples = |session: &Session| {
@@ -276,7 +276,7 @@ fn tasks_do_not_wait_and_always_answer() {
     for _ in 0..50 {
         assert_eq!(answers.recv_timeout(PATIENCE).unwrap(), Some(generation));
     }
-    // A kept picture, and the probe at the same moment.
+    // The pinned picture and the probe, at the same moment.
     session.set_view(View { raster: Some([20, 14]), probe: Some([50, 40]) });
     session.set_stop(spp(16));
     let end = resting(&session, generation);
@@ -301,7 +301,7 @@ fn tasks_do_not_wait_and_always_answer() {
     assert_eq!((end.tiles.noise_codes.len(), end.tiles.spp.len()), (35, 35));
 }
 
-/// A wall whose colour and distance tell which scene it belongs to.
+/// A wall whose colour and distance identify the scene.
 fn wall(number: u64) -> Scene {
     let mut scene = scene();
     scene.lights.clear();
@@ -316,7 +316,7 @@ fn wall(number: u64) -> Scene {
 }
 
 #[test]
-fn picture_guide_and_generation_belong_together() {
+fn snapshot_picture_features_and_generation_match() {
     let (mut a, mut b) = (session(Stop::default(), true), session(spp(8), true));
     let mut seen = 0;
     for number in 1..=200u64 {
@@ -332,7 +332,7 @@ fn picture_guide_and_generation_belong_together() {
             };
             let red = picture.mixed(&snapshot.mix)[0][0];
             assert!((red - 0.01 * (number % 50 + 1) as f32).abs() < 1e-5, "{number}: {red}");
-            // On a busy machine it may seem too slow to come with the first picture.
+            // On a busy machine the first picture may lack them.
             let Some(guide) = snapshot.guide else { continue };
             assert_eq!((guide.columns, guide.rows), (picture.cols, picture.rows));
             let sight = guide.at(guide.columns / 2, 2).unwrap();
@@ -345,10 +345,10 @@ fn picture_guide_and_generation_belong_together() {
     assert!(seen > 20, "{seen} snapshots");
 }
 
-/// Threads that wait for a command are not woken by anything else.
+/// Threads that wait for a command wake only for it.
 #[cfg(target_os = "linux")]
 #[test]
-fn nothing_wakes_a_session_at_rest_or_in_a_pause() {
+fn finished_or_paused_session_stays_asleep() {
     let mut session = session(spp(8), true);
     let generation = session.set_scene(Arc::new(scene()));
     session.set_view(View { raster: Some([8, 8]), probe: None });
@@ -360,8 +360,8 @@ fn nothing_wakes_a_session_at_rest_or_in_a_pause() {
     assert_eq!((rest, switches_in(&session)), (0, 0));
 }
 
-/// How often the session's threads wake in a while; the least of a few tries, as they need a moment to
-/// fall asleep.
+/// Returns the number of wake-ups of the session's threads during an interval. It is the minimum of
+/// several tries, because the threads need a moment to fall asleep.
 #[cfg(target_os = "linux")]
 fn switches_in(session: &Session) -> u64 {
     let ids = session

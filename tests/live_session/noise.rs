@@ -1,4 +1,4 @@
-//! Whether the error that is told for a new mix of lights is the true one.
+//! Accuracy of the noise estimate for changed light weights.
 
 use super::{finish, scene, session_of, spp};
 use zerkalo::film::{Display, Replicates};
@@ -6,7 +6,7 @@ use zerkalo::render::RenderState;
 use zerkalo::render::session::Session;
 use zerkalo::value::Color;
 
-/// The codes of a session's picture, not rounded, and the noise that it tells.
+/// Returns the picture of a session in 8-bit levels, not rounded, and its estimated noise.
 fn codes(session: &Session) -> (Vec<[f64; 3]>, f64) {
     let read = |r: &RenderState| {
         let mut all = Vec::new();
@@ -21,11 +21,11 @@ fn codes(session: &Session) -> (Vec<[f64; 3]>, f64) {
     session.with(move |r, _| (read(r), noise(r))).unwrap()
 }
 
-/// Lights dimmed and lit in the middle of the work, adaptive: over several seeds the error that is
-/// told for the new mix is the true one, as it is for a fresh render. The reference is a fresh render
-/// of the new mix with another seed.
+/// Lights are dimmed and lit during an adaptive render. Over several seeds the estimated error for
+/// the new light weights equals the true one, as it does for a fresh render. The reference is a
+/// fresh render of the new weights with another seed.
 #[test]
-fn the_noise_of_a_new_mix_is_as_honest_as_that_of_a_fresh_render() {
+fn noise_estimate_after_light_change_is_accurate() {
     let mut bright = scene();
     bright.lights[0].intensity = 2.5;
     bright.lights[1].intensity = 0.05;

@@ -87,7 +87,7 @@ fn distance(screen: &vt100::Screen, layout: &Layout, picture: &Picture) -> Optio
 }
 
 fn room_layout() -> Layout {
-    let request = Request { screen: SIZE, film: FILM, focus: Focus::Picture, only_picture: false };
+    let request = Request { screen: SIZE, film: FILM, focus: Focus::Picture, fullscreen: false };
     layout(&request).unwrap()
 }
 

@@ -1,15 +1,14 @@
-//! One story at least for every action of the key table.
+//! At least one story for every command of the command table.
 
 use crate::desk::{Desk, FILE, ROOM};
 use std::collections::HashSet;
 use std::path::Path;
 use zerkalo::camera::Camera;
-use zerkalo::dashboard::action::{Action, Action::*, Delta, Direction, StepSize};
-use zerkalo::dashboard::keymap::{KEYMAP, Row};
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{DisplayChannel, Effect, Format};
 use zerkalo::dashboard::model::{Colors, CompareView, Mode};
 use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::dashboard::update::commands::COMMANDS;
 use zerkalo::film::Tone;
 use zerkalo::light::Light;
 use zerkalo::material::{Lobe, Material};
@@ -20,28 +19,29 @@ use zerkalo::shape::Shape;
 const BALL: Target = Target::Object(1);
 const GLASS: Target = Target::Object(2);
 
-/// The scene before, the desk afterwards.
+/// Condition on the scene before and the desk afterwards.
 type Expect = dyn Fn(&Scene, &Desk) -> bool;
 
-/// What was pressed with what selected, and what must be so afterwards.
+/// A selection, the keys that are pressed, and the expected result.
 struct Story {
-    action: Action,
+    /// The command under test.
+    label: String,
     select: Target,
-    /// Keys; `:` alone: the action is found in the palette.
+    /// Keys; `:` alone runs the command from the palette.
     keys: String,
     expect: Box<Expect>,
 }
 
 fn story(
-    action: Action,
+    label: &str,
     select: Target,
     keys: &str,
     expect: impl Fn(&Scene, &Desk) -> bool + 'static,
 ) -> Story {
-    Story { action, select, keys: keys.to_string(), expect: Box::new(expect) }
+    Story { label: label.to_string(), select, keys: keys.to_string(), expect: Box::new(expect) }
 }
 
-/// Nine viewpoints, each a unit farther to the right.
+/// The room with nine viewpoints, each a unit further to the right.
 fn room_with_views() -> String {
     let view =
         |n: i32| format!("\n[cameras.v{n}]\neye = [{n}.0, 1.0, 5.0]\ntarget = [0.0, 1.0, 0.0]\n");
@@ -85,77 +85,71 @@ fn normal(scene: &Scene) -> [f64; 3] {
 fn camera_stories() -> Vec<Story> {
     let c = || Target::Camera;
     let mut stories = vec![
-        story(Orbit(Direction::Left), c(), "Left", |a, d| {
+        story("orbit left", c(), "Left", |a, d| {
             eye(d.scene())[0] < 0.0 && target(a) == target(d.scene())
         }),
-        story(Orbit(Direction::Right), c(), "Right", |_, d| eye(d.scene())[0] > 0.0),
-        story(Orbit(Direction::Up), c(), "Up", |_, d| eye(d.scene())[1] > 1.0),
-        story(Orbit(Direction::Down), c(), "Down", |_, d| eye(d.scene())[1] < 1.0),
-        story(Pan(Direction::Left), c(), "Shift-Left", |_, d| {
+        story("orbit right", c(), "Right", |_, d| eye(d.scene())[0] > 0.0),
+        story("orbit up", c(), "Up", |_, d| eye(d.scene())[1] > 1.0),
+        story("orbit down", c(), "Down", |_, d| eye(d.scene())[1] < 1.0),
+        story("pan left", c(), "Shift-Left", |_, d| {
             eye(d.scene())[0] < 0.0 && target(d.scene())[0] < 0.0
         }),
-        story(Pan(Direction::Right), c(), "Shift-Right", |_, d| {
+        story("pan right", c(), "Shift-Right", |_, d| {
             eye(d.scene())[0] > 0.0 && target(d.scene())[0] > 0.0
         }),
-        story(Pan(Direction::Up), c(), "Shift-Up", |_, d| {
+        story("pan up", c(), "Shift-Up", |_, d| {
             eye(d.scene())[1] > 1.0 && target(d.scene())[1] > 1.0
         }),
-        story(Pan(Direction::Down), c(), "Shift-Down", |_, d| {
+        story("pan down", c(), "Shift-Down", |_, d| {
             eye(d.scene())[1] < 1.0 && target(d.scene())[1] < 1.0
         }),
-        story(Dolly(Direction::In, StepSize::Coarse), c(), "PageUp", |_, d| {
-            eye(d.scene())[2] < 4.9
-        }),
-        story(Dolly(Direction::Out, StepSize::Coarse), c(), "PageDown", |_, d| {
-            eye(d.scene())[2] > 5.1
-        }),
-        story(Dolly(Direction::In, StepSize::Fine), c(), "Shift-PageUp", |_, d| {
+        story("dolly in", c(), "PageUp", |_, d| eye(d.scene())[2] < 4.9),
+        story("dolly out", c(), "PageDown", |_, d| eye(d.scene())[2] > 5.1),
+        story("dolly in, fine", c(), "Shift-PageUp", |_, d| {
             (4.9..5.0).contains(&eye(d.scene())[2])
         }),
-        story(Dolly(Direction::Out, StepSize::Fine), c(), "Shift-PageDown", |_, d| {
+        story("dolly out, fine", c(), "Shift-PageDown", |_, d| {
             eye(d.scene())[2] > 5.0 && eye(d.scene())[2] < 5.1
         }),
-        story(ViewImage(Direction::Left), c(), "Ctrl-Left", |a, d| {
+        story("look left", c(), "Ctrl-Left", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[0] < 0.0
         }),
-        story(ViewImage(Direction::Right), c(), "w Right", |a, d| {
+        story("look right", c(), "w Right", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[0] > 0.0
         }),
-        story(ViewImage(Direction::Up), c(), "Ctrl-Up", |a, d| {
+        story("look up", c(), "Ctrl-Up", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[1] > 1.0
         }),
-        story(ViewImage(Direction::Down), c(), "w Down", |a, d| {
+        story("look down", c(), "w Down", |a, d| {
             eye(a) == eye(d.scene()) && target(d.scene())[1] < 1.0
         }),
-        story(Roll(Direction::Left), c(), "Alt-Left", |_, d| camera(d.scene()).up[0] != 0.0),
-        story(Roll(Direction::Right), c(), "Alt-Right Alt-Left", |a, d| {
-            camera(a) == camera(d.scene())
-        }),
-        story(ViewAngle(Delta::Down), c(), "Alt-Up", |_, d| {
+        story("roll left", c(), "Alt-Left", |_, d| camera(d.scene()).up[0] != 0.0),
+        story("roll right", c(), "Alt-Right Alt-Left", |a, d| camera(a) == camera(d.scene())),
+        story("narrower view angle", c(), "Alt-Up", |_, d| {
             camera(d.scene()).view_angle.key_degrees().1 < 40.0
         }),
-        story(ViewAngle(Delta::Up), c(), "Alt-Down", |_, d| {
+        story("wider view angle", c(), "Alt-Down", |_, d| {
             camera(d.scene()).view_angle.key_degrees().1 > 40.0
         }),
-        story(FlyMode, c(), "w", |_, d| d.model.mode == Mode::Fly),
-        story(Fly(Direction::In), c(), "w w", |_, d| {
+        story("fly the camera", c(), "w", |_, d| d.model.mode == Mode::Fly),
+        story("fly forward", c(), "w w", |_, d| {
             eye(d.scene())[2] < 5.0 && target(d.scene())[2] < 0.0
         }),
-        story(Fly(Direction::Out), c(), "w s", |_, d| eye(d.scene())[2] > 5.0),
-        story(Fly(Direction::Left), c(), "w a", |_, d| eye(d.scene())[0] < 0.0),
-        story(Fly(Direction::Right), c(), "w d", |_, d| eye(d.scene())[0] > 0.0),
-        story(Fly(Direction::Up), c(), "w r", |_, d| eye(d.scene())[1] > 1.0),
-        story(Fly(Direction::Down), c(), "w f", |_, d| eye(d.scene())[1] < 1.0),
-        story(Frame, BALL, "f", |_, d| {
+        story("fly back", c(), "w s", |_, d| eye(d.scene())[2] > 5.0),
+        story("fly left", c(), "w a", |_, d| eye(d.scene())[0] < 0.0),
+        story("fly right", c(), "w d", |_, d| eye(d.scene())[0] > 0.0),
+        story("fly up", c(), "w r", |_, d| eye(d.scene())[1] > 1.0),
+        story("fly down", c(), "w f", |_, d| eye(d.scene())[1] < 1.0),
+        story("frame the selection", BALL, "f", |_, d| {
             target(d.scene()) == [0.0, 1.0, 0.0] && eye(d.scene())[2] < 3.0
         }),
-        story(ResetCamera, c(), "Left Up Home", |a, d| camera(a) == camera(d.scene())),
-        story(StoreView, c(), "n Ctrl-u `door` Enter", |a, d| {
+        story("camera as in the file", c(), "Left Up Home", |a, d| camera(a) == camera(d.scene())),
+        story("store this viewpoint", c(), "n Ctrl-u `door` Enter", |a, d| {
             d.scene().cameras["door"] == a.camera
         }),
     ];
     for n in 1..=9 {
-        stories.push(story(RecallView(n), c(), &n.to_string(), move |_, d| {
+        stories.push(story(&format!("go to viewpoint {n}"), c(), &n.to_string(), move |_, d| {
             eye(d.scene())[0] == f64::from(n)
         }));
     }
@@ -165,102 +159,72 @@ fn camera_stories() -> Vec<Story> {
 fn light_and_mirror_stories() -> Vec<Story> {
     let c = || Target::Camera;
     vec![
-        story(NextLight, c(), "l", |_, d| d.model.selection == Target::Light(0)),
-        story(Intensity(Delta::Up, StepSize::Coarse), c(), "'", |_, d| {
-            lamp(d.scene()).intensity > 1.05
-        }),
-        story(Intensity(Delta::Down, StepSize::Coarse), c(), ";", |_, d| {
-            lamp(d.scene()).intensity < 0.95
-        }),
-        story(Intensity(Delta::Up, StepSize::Fine), c(), "Alt-'", |_, d| {
+        story("select the next light", c(), "l", |_, d| d.model.selection == Target::Light(0)),
+        story("light brighter", c(), "'", |_, d| lamp(d.scene()).intensity > 1.05),
+        story("light darker", c(), ";", |_, d| lamp(d.scene()).intensity < 0.95),
+        story("light brighter, fine", c(), "Alt-'", |_, d| {
             (1.001..1.05).contains(&lamp(d.scene()).intensity)
         }),
-        story(Intensity(Delta::Down, StepSize::Fine), c(), "Alt-;", |_, d| {
+        story("light darker, fine", c(), "Alt-;", |_, d| {
             (0.95..0.999).contains(&lamp(d.scene()).intensity)
         }),
-        story(SwitchLight, c(), "L", |_, d| !lamp(d.scene()).on),
-        story(AddLight, c(), "A Enter Enter", |_, d| {
+        story("light on or off", c(), "L", |_, d| !lamp(d.scene()).on),
+        story("add a light", c(), "A Enter Enter", |_, d| {
             d.scene().lights.len() == 2 && d.model.selection == Target::Light(1)
         }),
-        story(Roughness(Delta::Up, StepSize::Coarse), c(), "]", |_, d| {
-            mirror(d.scene()).roughness > 0.0525
-        }),
-        story(Roughness(Delta::Down, StepSize::Coarse), c(), ",", |_, d| {
-            mirror(d.scene()).roughness < 0.0475
-        }),
-        story(Roughness(Delta::Up, StepSize::Fine), c(), "}", |_, d| {
+        story("mirror rougher", c(), "]", |_, d| mirror(d.scene()).roughness > 0.0525),
+        story("mirror smoother", c(), ",", |_, d| mirror(d.scene()).roughness < 0.0475),
+        story("mirror rougher, fine", c(), "}", |_, d| {
             (0.0501..0.0525).contains(&mirror(d.scene()).roughness)
         }),
-        story(Roughness(Delta::Down, StepSize::Fine), c(), "<", |_, d| {
+        story("mirror smoother, fine", c(), "<", |_, d| {
             (0.0475..0.0499).contains(&mirror(d.scene()).roughness)
         }),
-        story(Reflection(Delta::Up), c(), ")", |_, d| mirror(d.scene()).reflection > 0.5),
-        story(Reflection(Delta::Down), c(), "(", |_, d| mirror(d.scene()).reflection < 0.5),
-        story(NextLobe, c(), "b", |_, d| mirror(d.scene()).lobe == Lobe::Square),
+        story("mirror reflects more", c(), ")", |_, d| mirror(d.scene()).reflection > 0.5),
+        story("mirror reflects less", c(), "(", |_, d| mirror(d.scene()).reflection < 0.5),
+        story("next lobe of the mirror", c(), "b", |_, d| mirror(d.scene()).lobe == Lobe::Square),
     ]
 }
 
 fn object_stories() -> Vec<Story> {
     let c = || Target::Camera;
     vec![
-        story(AddObject, c(), "a Enter Enter", |_, d| {
+        story("add an object", c(), "a Enter Enter", |_, d| {
             d.scene().objects.len() == 4 && d.model.selection == Target::Object(3)
         }),
-        story(Duplicate, BALL, "D", |_, d| {
+        story("duplicate the selection", BALL, "D", |_, d| {
             d.scene().objects.len() == 4 && d.model.selection != BALL
         }),
-        story(Delete, BALL, "x", |_, d| d.scene().objects.iter().all(|o| o.name != "ball")),
-        story(Rename, BALL, "e Ctrl-u `pearl` Enter", |_, d| d.scene().objects[1].name == "pearl"),
-        story(MoveMode, BALL, "m", |_, d| d.model.mode == Mode::Move),
-        story(Move(Direction::Left, StepSize::Coarse), BALL, "m Left", |_, d| {
-            ball(d.scene())[0] < 0.0
+        story("delete the selection", BALL, "x", |_, d| {
+            d.scene().objects.iter().all(|o| o.name != "ball")
         }),
-        story(Move(Direction::Right, StepSize::Coarse), BALL, "m Right", |_, d| {
-            ball(d.scene())[0] > 0.0
+        story("rename the selection", BALL, "e Ctrl-u `pearl` Enter", |_, d| {
+            d.scene().objects[1].name == "pearl"
         }),
-        story(Move(Direction::In, StepSize::Coarse), BALL, "m Up", |_, d| ball(d.scene())[2] < 0.0),
-        story(Move(Direction::Out, StepSize::Coarse), BALL, "m Down", |_, d| {
-            ball(d.scene())[2] > 0.0
-        }),
-        story(Move(Direction::Up, StepSize::Coarse), BALL, "m PageUp", |_, d| {
-            ball(d.scene())[1] > 1.0
-        }),
-        story(Move(Direction::Down, StepSize::Coarse), BALL, "m PageDown", |_, d| {
-            ball(d.scene())[1] < 1.0
-        }),
-        story(Move(Direction::Left, StepSize::Fine), BALL, "m Right Shift-Left", |_, d| {
-            ball(d.scene())[0] > 0.0
-        }),
-        story(Move(Direction::Right, StepSize::Fine), BALL, "m Left Shift-Right", |_, d| {
-            ball(d.scene())[0] < 0.0
-        }),
-        story(Move(Direction::In, StepSize::Fine), BALL, "m Down Shift-Up", |_, d| {
-            ball(d.scene())[2] > 0.0
-        }),
-        story(Move(Direction::Out, StepSize::Fine), BALL, "m Up Shift-Down", |_, d| {
-            ball(d.scene())[2] < 0.0
-        }),
-        story(Move(Direction::Up, StepSize::Fine), BALL, "m PageDown Shift-PageUp", |_, d| {
-            ball(d.scene())[1] < 1.0
-        }),
-        story(Move(Direction::Down, StepSize::Fine), BALL, "m PageUp Shift-PageDown", |_, d| {
-            ball(d.scene())[1] > 1.0
-        }),
-        story(TurnMode, GLASS, "r", |_, d| d.model.mode == Mode::Rotate),
-        story(Rotate(Direction::Left, StepSize::Coarse), GLASS, "r Left", |_, d| {
-            normal(d.scene())[0] < -0.2
-        }),
-        story(Rotate(Direction::Right, StepSize::Coarse), GLASS, "r Right", |_, d| {
-            normal(d.scene())[0] > 0.2
-        }),
-        story(Rotate(Direction::Left, StepSize::Fine), GLASS, "r Shift-Left", |_, d| {
+        story("move the selection", BALL, "m", |_, d| d.model.mode == Mode::Move),
+        story("move left", BALL, "m Left", |_, d| ball(d.scene())[0] < 0.0),
+        story("move right", BALL, "m Right", |_, d| ball(d.scene())[0] > 0.0),
+        story("move away", BALL, "m Up", |_, d| ball(d.scene())[2] < 0.0),
+        story("move nearer", BALL, "m Down", |_, d| ball(d.scene())[2] > 0.0),
+        story("raise", BALL, "m PageUp", |_, d| ball(d.scene())[1] > 1.0),
+        story("lower", BALL, "m PageDown", |_, d| ball(d.scene())[1] < 1.0),
+        story("move left, fine", BALL, "m Right Shift-Left", |_, d| ball(d.scene())[0] > 0.0),
+        story("move right, fine", BALL, "m Left Shift-Right", |_, d| ball(d.scene())[0] < 0.0),
+        story("move away, fine", BALL, "m Down Shift-Up", |_, d| ball(d.scene())[2] > 0.0),
+        story("move nearer, fine", BALL, "m Up Shift-Down", |_, d| ball(d.scene())[2] < 0.0),
+        story("raise, fine", BALL, "m PageDown Shift-PageUp", |_, d| ball(d.scene())[1] < 1.0),
+        story("lower, fine", BALL, "m PageUp Shift-PageDown", |_, d| ball(d.scene())[1] > 1.0),
+        story("turn the selection", GLASS, "r", |_, d| d.model.mode == Mode::Rotate),
+        story("turn left", GLASS, "r Left", |_, d| normal(d.scene())[0] < -0.2),
+        story("turn right", GLASS, "r Right", |_, d| normal(d.scene())[0] > 0.2),
+        story("turn left, fine", GLASS, "r Shift-Left", |_, d| {
             (-0.02..-0.01).contains(&normal(d.scene())[0])
         }),
-        story(Rotate(Direction::Right, StepSize::Fine), GLASS, "r Shift-Right", |_, d| {
+        story("turn right, fine", GLASS, "r Shift-Right", |_, d| {
             (0.01..0.02).contains(&normal(d.scene())[0])
         }),
-        story(SnapToGround, BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),
-        story(OwnMaterial, BALL, "M", |a, d| {
+        story("snap the selection to ground", BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),
+        story("give it a material of its own", BALL, "M", |a, d| {
             let own = &d.scene().objects[1].material;
             own != "red" && d.scene().materials[own] == a.materials["red"]
         }),
@@ -270,43 +234,39 @@ fn object_stories() -> Vec<Story> {
 fn panel_stories() -> Vec<Story> {
     let c = || Target::Camera;
     vec![
-        story(NextPanel, c(), "Tab", |_, d| d.model.focus == Focus::Outline),
-        story(PreviousPanel, c(), "Shift-Tab", |_, d| d.model.focus == Focus::Inspector),
-        story(Cancel, BALL, "m Esc", |_, d| d.model.mode == Mode::Orbit),
-        story(Open, BALL, "Enter", |_, d| d.model.focus == Focus::Inspector),
-        story(Cursor(Direction::Down), c(), "Tab Down", |_, d| {
+        story("next panel or field", c(), "Tab", |_, d| d.model.focus == Focus::Outline),
+        story("panel or field before", c(), "Shift-Tab", |_, d| d.model.focus == Focus::Inspector),
+        story("leave, back to the picture", BALL, "m Esc", |_, d| d.model.mode == Mode::Orbit),
+        story("inspect, type a value, choose", BALL, "Enter", |_, d| {
+            d.model.focus == Focus::Inspector
+        }),
+        story("line below", c(), "Tab Down", |_, d| d.model.selection == Target::View("v1".into())),
+        story("line above", c(), "Tab Down Down Up", |_, d| {
             d.model.selection == Target::View("v1".into())
         }),
-        story(Cursor(Direction::Up), c(), "Tab Down Down Up", |_, d| {
-            d.model.selection == Target::View("v1".into())
-        }),
-        story(Page(Direction::Down), c(), "Tab PageDown", |_, d| {
+        story("page down", c(), "Tab PageDown", |_, d| {
             !matches!(d.model.selection, Target::Camera | Target::View(_))
         }),
-        story(Page(Direction::Up), Target::IntegratorSettings, "Tab PageUp", |_, d| {
+        story("page up", Target::IntegratorSettings, "Tab PageUp", |_, d| {
             !matches!(d.model.selection, Target::IntegratorSettings | Target::Film)
         }),
-        story(First, Target::IntegratorSettings, "Tab Home", |_, d| {
+        story("first line", Target::IntegratorSettings, "Tab Home", |_, d| {
             d.model.selection == Target::Camera
         }),
-        story(Last, c(), "Tab End", |_, d| d.model.selection == Target::IntegratorSettings),
-        story(Step(Delta::Up, StepSize::Coarse), c(), "Enter Right", |_, d| {
-            eye(d.scene())[0] > 0.05
-        }),
-        story(Step(Delta::Down, StepSize::Coarse), c(), "Enter Left", |_, d| {
-            eye(d.scene())[0] < -0.05
-        }),
-        story(Step(Delta::Up, StepSize::Fine), c(), "Enter Shift-Right", |_, d| {
+        story("last line", c(), "Tab End", |_, d| d.model.selection == Target::IntegratorSettings),
+        story("field up", c(), "Enter Right", |_, d| eye(d.scene())[0] > 0.05),
+        story("field down", c(), "Enter Left", |_, d| eye(d.scene())[0] < -0.05),
+        story("field up, fine", c(), "Enter Shift-Right", |_, d| {
             (0.001..0.05).contains(&eye(d.scene())[0])
         }),
-        story(Step(Delta::Down, StepSize::Fine), c(), "Enter Shift-Left", |_, d| {
+        story("field down, fine", c(), "Enter Shift-Left", |_, d| {
             (-0.05..-0.001).contains(&eye(d.scene())[0])
         }),
-        story(ClearField, c(), "Enter `7` Enter Down Backspace", |_, d| {
+        story("field back to its default", c(), "Enter `7` Enter Down Backspace", |_, d| {
             eye(d.scene()) == [0.0, 1.0, 5.0]
         }),
-        story(ToggleFullscreen, c(), "z", |_, d| {
-            d.model.only_picture && d.model.layout().unwrap().outline.is_none()
+        story("only the picture", c(), "z", |_, d| {
+            d.model.fullscreen && d.model.layout().unwrap().outline.is_none()
         }),
     ]
 }
@@ -314,90 +274,101 @@ fn panel_stories() -> Vec<Story> {
 fn file_stories() -> Vec<Story> {
     let c = || Target::Camera;
     vec![
-        story(Undo, c(), "Left u", |a, d| d.scene() == a && !d.model.is_unsaved()),
-        story(Redo, c(), "Left u U", |_, d| eye(d.scene())[0] < 0.0),
-        story(Save, c(), "Enter `7` Enter Ctrl-s", |_, d| {
+        story("undo", c(), "Left u", |a, d| d.scene() == a && !d.model.is_unsaved()),
+        story("redo", c(), "Left u U", |_, d| eye(d.scene())[0] < 0.0),
+        story("save", c(), "Enter `7` Enter Ctrl-s", |_, d| {
             d.disk[Path::new(FILE)] == room_with_views().replacen("eye = [0.0", "eye = [7.0", 1)
                 && !d.model.is_unsaved()
         }),
-        story(SaveAs, c(), "W Ctrl-u `copy` Enter", |_, d| {
+        story("save as", c(), "W Ctrl-u `copy` Enter", |_, d| {
             d.disk.contains_key(Path::new("copy.toml")) && d.model.file.name == "copy.toml"
         }),
-        story(Reload, c(), "Ctrl-o", |_, d| d.asked(|e| *e == Effect::Load)),
-        story(Recover, c(), ":", |_, d| d.notice().contains("No session")),
-        story(Suspend, c(), "Ctrl-z", |_, d| d.asked(|e| *e == Effect::Suspend)),
-        story(Quit, c(), "q", |_, d| d.asked(|e| *e == Effect::Quit)),
+        story("read the file again", c(), "Ctrl-o", |_, d| d.asked(|e| *e == Effect::Load)),
+        story("recover edits of a broken session", c(), ":", |_, d| {
+            d.notice().contains("No session")
+        }),
+        story("suspend to the shell", c(), "Ctrl-z", |_, d| d.asked(|e| *e == Effect::Suspend)),
+        story("quit", c(), "q", |_, d| d.asked(|e| *e == Effect::Quit)),
     ]
 }
 
 fn picture_stories() -> Vec<Story> {
     let c = || Target::Camera;
     let probe = |d: &Desk| d.model.probe.unwrap();
-    let fine = |way, keys, at: [usize; 2]| {
-        story(MoveProbe(way, StepSize::Fine), c(), keys, move |_, d| probe(d) == at)
-    };
+    let fine =
+        |label, keys, pixel: [usize; 2]| story(label, c(), keys, move |_, d| probe(d) == pixel);
     vec![
-        story(ExportPng, c(), "p", |_, d| {
+        story("write a PNG", c(), "p", |_, d| {
             d.asked(|e| *e == Effect::Export(Format::Png))
                 && d.notice().contains("room-1.png  64x48  16 spp  noise 2.50")
         }),
-        story(ExportExr, c(), "P", |_, d| d.asked(|e| *e == Effect::Export(Format::Exr))),
-        story(ExportSized, c(), "Ctrl-e Ctrl-u `320x240 exr` Enter", |_, d| {
+        story("write an EXR", c(), "P", |_, d| d.asked(|e| *e == Effect::Export(Format::Exr))),
+        story("render at another size", c(), "Ctrl-e Ctrl-u `320x240 exr` Enter", |_, d| {
             d.asked(|e| matches!(e, Effect::ExportSized { scene, format: Format::Exr, .. } if scene.film.size == [320, 240])) && d.scene().film.size == [64, 48]
         }),
-        story(CancelExport, c(), "Ctrl-e Enter Ctrl-x", |_, d| {
+        story("cancel the running export", c(), "Ctrl-e Enter Ctrl-x", |_, d| {
             d.asked(|e| *e == Effect::CancelExport) && d.model.export.is_none()
         }),
-        story(Exposure(Delta::Up), c(), "=", |_, d| d.model.display.exposure_ev == 0.25),
-        story(Exposure(Delta::Down), c(), "-", |_, d| d.model.display.exposure_ev == -0.25),
-        story(ResetExposure, c(), "= = 0", |_, d| d.model.display.exposure_ev == 0.0),
-        story(NextTone, c(), "t", |_, d| {
+        story("exposure up", c(), "=", |_, d| d.model.display.exposure_ev == 0.25),
+        story("exposure down", c(), "-", |_, d| d.model.display.exposure_ev == -0.25),
+        story("exposure 0", c(), "= = 0", |_, d| d.model.display.exposure_ev == 0.0),
+        story("next tone curve", c(), "t", |_, d| {
             d.model.display.tone == Tone::Neutral && d.asked(|e| matches!(e, Effect::Display(_)))
         }),
-        story(NextChannel, c(), "v", |_, d| d.model.channel == DisplayChannel::Noise),
-        story(PreviousChannel, c(), "V", |_, d| d.model.channel == DisplayChannel::Depth),
-        story(Probe, c(), "i", |_, d| {
+        story("next view: noise, samples, objects, …", c(), "v", |_, d| {
+            d.model.channel == DisplayChannel::Noise
+        }),
+        story("view before", c(), "V", |_, d| d.model.channel == DisplayChannel::Depth),
+        story("probe a pixel", c(), "i", |_, d| {
             d.asked(|e| *e == Effect::Probe(Some([32, 24]))) && d.model.mode == Mode::Probe
         }),
-        story(MoveProbe(Direction::Left, StepSize::Coarse), c(), "i Left", move |_, d| {
-            probe(d)[0] < 32
+        story("probe left", c(), "i Left", move |_, d| probe(d)[0] < 32),
+        story("probe right", c(), "i Right", move |_, d| probe(d)[0] > 32),
+        story("probe up", c(), "i Up", move |_, d| probe(d)[1] < 24),
+        story("copy the path of the last picture", c(), "p y", |_, d| {
+            d.asked(|e| matches!(e, Effect::Copy(_)))
         }),
-        story(MoveProbe(Direction::Right, StepSize::Coarse), c(), "i Right", move |_, d| {
-            probe(d)[0] > 32
+        story("look at the last picture", c(), "p o", |_, d| {
+            d.asked(|e| matches!(e, Effect::ViewImage { .. }))
         }),
-        story(MoveProbe(Direction::Up, StepSize::Coarse), c(), "i Up", move |_, d| {
-            probe(d)[1] < 24
+        story("probe down", c(), "i Down", move |_, d| probe(d)[1] > 24),
+        fine("probe left by one pixel", "i Shift-Left", [31, 24]),
+        fine("probe right by one pixel", "i Shift-Right", [33, 24]),
+        fine("probe up by one pixel", "i Shift-Up", [32, 23]),
+        fine("probe down by one pixel", "i Shift-Down", [32, 25]),
+        story("pin this picture", c(), "k", |_, d| d.model.comparison.pinned.is_some()),
+        story("flip between pinned and live", c(), "k c", |_, d| {
+            d.model.comparison.shown == CompareView::Pinned
         }),
-        story(CopyPath, c(), "p y", |_, d| d.asked(|e| matches!(e, Effect::Copy(_)))),
-        story(ShowExport, c(), "p o", |_, d| d.asked(|e| matches!(e, Effect::Look { .. }))),
-        story(MoveProbe(Direction::Down, StepSize::Coarse), c(), "i Down", move |_, d| {
-            probe(d)[1] > 24
+        story("difference of pinned and live", c(), "k C", |_, d| {
+            d.model.comparison.shown == CompareView::Difference
         }),
-        fine(Direction::Left, "i Shift-Left", [31, 24]),
-        fine(Direction::Right, "i Shift-Right", [33, 24]),
-        fine(Direction::Up, "i Shift-Up", [32, 23]),
-        fine(Direction::Down, "i Shift-Down", [32, 25]),
-        story(Keep, c(), "k", |_, d| d.model.comparison.pinned.is_some()),
-        story(Flip, c(), "k c", |_, d| d.model.comparison.shown == CompareView::Pinned),
-        story(Difference, c(), "k C", |_, d| d.model.comparison.shown == CompareView::Difference),
-        story(Pause, c(), "Space", |_, d| d.model.paused && d.asked(|e| *e == Effect::Pause(true))),
-        story(Restart, c(), "R", |_, d| d.asked(|e| *e == Effect::Restart)),
-        story(StopAt, c(), "T Ctrl-u `spp 100, time 5` Enter", |_, d| {
+        story("pause or resume", c(), "Space", |_, d| {
+            d.model.paused && d.asked(|e| *e == Effect::Pause(true))
+        }),
+        story("restart the picture", c(), "R", |_, d| d.asked(|e| *e == Effect::Restart)),
+        story("stop at …", c(), "T Ctrl-u `spp 100, time 5` Enter", |_, d| {
             d.model.stop.spp == Some(100)
                 && d.model.stop.seconds == Some(5.0)
                 && d.model.stop.noise_codes.is_none()
         }),
-        story(Quality, c(), "N Down Enter", |_, d| {
-            // From the target, half a code, to the next finer one.
+        story("noise targets and their times", c(), "N Down Enter", |_, d| {
+            // From the current target of 0.5 to the next finer one.
             d.model.stop.noise_codes == Some(0.25) && d.model.overlay.is_none()
         }),
-        story(Threads(Delta::Up), c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(3))),
-        story(Threads(Delta::Down), c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(1))),
-        story(Priority, c(), ":", |_, d| d.asked(|e| *e == Effect::LowPriority(true))),
-        story(NextColors, c(), "#", |_, d| d.model.colors == Colors::Indexed),
-        story(Help, c(), "?", |_, d| matches!(d.model.overlay, Some(Overlay::Help { .. }))),
-        story(Palette, c(), ":", |_, d| matches!(d.model.overlay, Some(Overlay::Palette(_)))),
-        story(Inventory, c(), ":", |_, d| {
+        story("more threads", c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(3))),
+        story("fewer threads", c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(1))),
+        story("low or normal priority", c(), ":", |_, d| {
+            d.asked(|e| *e == Effect::LowPriority(true))
+        }),
+        story("next colour mode of the terminal", c(), "#", |_, d| {
+            d.model.colors == Colors::Indexed
+        }),
+        story("all keys", c(), "?", |_, d| matches!(d.model.overlay, Some(Overlay::Help { .. }))),
+        story("find an action", c(), ":", |_, d| {
+            matches!(d.model.overlay, Some(Overlay::Palette(_)))
+        }),
+        story("what the scene contains", c(), ":", |_, d| {
             matches!(d.model.overlay, Some(Overlay::Inventory { .. }))
         }),
     ]
@@ -416,42 +387,43 @@ fn stories() -> Vec<Story> {
 }
 
 #[test]
-fn every_action_does_what_its_story_says() {
-    let mut told = HashSet::new();
+fn every_command_does_what_its_story_expects() {
+    let mut with_story = HashSet::new();
     let mut wrong = Vec::new();
-    for Story { action, select, keys, expect } in stories() {
-        let row = Row::of(action).unwrap();
+    for Story { label, select, keys, expect } in stories() {
         let mut desk = Desk::new(&room_with_views());
         desk.select(select);
         let before = desk.scene().clone();
         match keys.as_str() {
-            ":" if action != Palette => drop(desk.palette(row.label)),
+            ":" if label != "find an action" => drop(desk.palette(&label)),
             keys => drop(desk.keys(keys)),
         }
-        if !desk.fired.contains(&action) {
-            wrong.push(format!("{}: {keys} does not fire it", row.label));
+        if !desk.fired.contains(label.as_str()) {
+            wrong.push(format!("{label}: {keys} does not run it"));
         }
         if !expect(&before, &desk) {
             let notice = desk.notice();
-            wrong.push(format!("{}: after {keys}: {notice:?}", row.label));
+            wrong.push(format!("{label}: after {keys}: {notice:?}"));
         }
-        assert!(desk.scene().faults().is_empty(), "{}", row.label);
+        assert!(desk.scene().faults().is_empty(), "{label}");
         desk.undo_all();
-        assert_eq!(desk.text(), room_with_views(), "{}: undone", row.label);
-        told.insert(action);
+        assert_eq!(desk.text(), room_with_views(), "{label}: undone");
+        with_story.insert(label);
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    KEYMAP.iter().for_each(|row| assert!(told.contains(&row.action), "no story: {}", row.label));
+    for command in COMMANDS {
+        assert!(with_story.contains(command.label), "no story: {}", command.label);
+    }
 }
 
-/// Whatever has a key can be found by its name too, and then does the same.
+/// A command run from the palette does the same as by its key.
 #[test]
-fn the_palette_finds_every_action_by_its_label() {
-    for row in KEYMAP {
+fn palette_finds_every_command_by_its_label() {
+    for command in COMMANDS {
         let mut desk = Desk::new(&room_with_views());
         desk.select(BALL);
-        desk.palette(row.label);
-        assert!(desk.fired.contains(&row.action), "{}", row.label);
-        assert!(desk.scene().faults().is_empty(), "{}", row.label);
+        desk.palette(command.label);
+        assert!(desk.fired.contains(command.label), "{}", command.label);
+        assert!(desk.scene().faults().is_empty(), "{}", command.label);
     }
 }

@@ -1,15 +1,14 @@
-//! A dashboard without a terminal, a renderer or a disk: keys go in by name, what would be asked of
-//! the outside is answered at once by a make-believe one.
+//! A dashboard without terminal, renderer or disk: keys are given by name, and effects are answered
+//! at once by a simulated environment.
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo::dashboard::action::Action;
-use zerkalo::dashboard::keymap::{KEYMAP, lookup};
 use zerkalo::dashboard::message::{Effect, Exported, Message};
 use zerkalo::dashboard::model::{Colors, Model, Start};
 use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
 use zerkalo::dashboard::update::{begin, update};
 use zerkalo::film::{Film, Header, LightWeights, LinearImage};
 use zerkalo::render::schedule::Stop;
@@ -17,10 +16,10 @@ use zerkalo::scene::edit::Target;
 use zerkalo::scene::{Document, SaveError, Scene};
 use zerkalo::terminal::event::{Button, Code, Key, Mouse, MouseKind};
 
-/// The file of the scene.
+/// Path of the scene file.
 pub const FILE: &str = "room.toml";
 
-/// A room with one of each.
+/// A room with a light, a mirror and three objects.
 pub const ROOM: &str = r#"# A room.
 [film]
 size = [64, 48]
@@ -61,19 +60,19 @@ material = "mirror"
 shape.rectangle = { center = [0.0, 1.0, -2.0], size = [3.0, 2.0], normal = [0.0, 0.0, 1.0] }
 "#;
 
-/// The dashboard and its make-believe outside.
+/// The dashboard and its simulated environment.
 pub struct Desk {
     pub model: Model,
     pub now: Duration,
-    /// What was asked for since the last look.
+    /// Effects since the last clearing.
     pub effects: Vec<Effect>,
     /// Files and their texts.
     pub disk: BTreeMap<PathBuf, String>,
-    /// Every action that a key or the palette has fired.
-    pub fired: HashSet<Action>,
+    /// Labels of the commands that keys or the palette have run.
+    pub fired: HashSet<&'static str>,
     pub document: Document,
     begun_with: Document,
-    /// Whether reading the file is answered: it begins another history of edits.
+    /// Loads are answered; a load restarts the undo history.
     pub reads: bool,
 }
 
@@ -82,7 +81,7 @@ fn parse(text: &str) -> Document {
 }
 
 impl Desk {
-    /// Opened on a file with this text.
+    /// Opens a file with this text.
     pub fn new(text: &str) -> Self {
         let document = parse(text);
         let scene = Arc::new(document.scene().clone());
@@ -94,7 +93,7 @@ impl Desk {
             colors: Colors::True,
             stop: Stop { noise_codes: Some(0.5), ..Stop::default() },
             threads: 2,
-            most_threads: 4,
+            max_threads: 4,
         });
         let disk = [(PathBuf::from(FILE), text.to_string())].into();
         let (effects, fired) = (Vec::new(), HashSet::new());
@@ -113,14 +112,14 @@ impl Desk {
         desk
     }
 
-    /// What the file would be if it were saved now.
+    /// Returns the text that a save would write.
     pub fn text(&self) -> String {
         let mut document = self.document.clone();
         document.apply(self.model.history.scene());
         document.text().to_string()
     }
 
-    /// The file as it was when the desk was opened.
+    /// Returns the document as opened.
     pub fn original(&self) -> Document {
         self.begun_with.clone()
     }
@@ -134,7 +133,7 @@ impl Desk {
         self.model.selection = subject;
     }
 
-    /// Takes in a message and lets the outside answer.
+    /// Sends a message and answers its effects.
     pub fn send(&mut self, message: Message) {
         let effects = update(&mut self.model, message, self.now);
         for effect in effects {
@@ -174,7 +173,7 @@ impl Desk {
                 noise_codes: Some(2.5),
                 scp: "me@here:room-1.png".into(),
             })),
-            Effect::Keep => {
+            Effect::Pin => {
                 let header = Header {
                     width: 64,
                     height: 48,
@@ -183,21 +182,21 @@ impl Desk {
                     precision: "f32".into(),
                 };
                 let mix = LightWeights { weights: vec![[1.0; 3]] };
-                Message::Kept(Arc::new(LinearImage::of_film(&Film::new(header), &mix)), 16.0)
+                Message::Pinned(Arc::new(LinearImage::of_film(&Film::new(header), &mix)), 16.0)
             }
             _ => return None,
         })
     }
 
-    /// A key by its event. A tenth of a second passes before it.
+    /// Presses a key, a tenth of a second after the last event.
     pub fn key(&mut self, key: Key) {
         self.now += Duration::from_millis(100);
         self.fired.extend(self.would_fire(key));
         self.send(Message::Key(key));
     }
 
-    /// What a key fires as things stand.
-    fn would_fire(&self, key: Key) -> Vec<Action> {
+    /// Labels of the commands that a key would run in the current state.
+    fn would_fire(&self, key: Key) -> Vec<&'static str> {
         if self.model.editor().is_some_and(|editor| editor.clone().key(key)) {
             return Vec::new();
         }
@@ -205,16 +204,15 @@ impl Desk {
         if types && self.model.overlay.is_some() {
             return Vec::new();
         }
-        let mut fired: Vec<_> = lookup(self.model.context(), key).into_iter().collect();
-        if let (Some(Overlay::Palette(palette)), Some(Action::Open)) =
-            (&self.model.overlay, fired.first())
-        {
-            fired.extend(palette.found.get(palette.cursor).map(|at| KEYMAP[*at].action));
+        let command = lookup(self.model.context(), key);
+        let mut fired: Vec<_> = command.map(|command| command.label).into_iter().collect();
+        if let (Some(Overlay::Palette(palette)), Code::Enter) = (&self.model.overlay, key.code) {
+            fired.extend(palette.found.get(palette.cursor).map(|i| COMMANDS[*i].label));
         }
         fired
     }
 
-    /// Keys by their names; what stands between backquotes is typed letter by letter.
+    /// Presses keys by name; text between backquotes is typed.
     pub fn keys(&mut self, keys: &str) -> &mut Self {
         for (i, part) in keys.split('`').enumerate() {
             if i % 2 == 1 {
@@ -229,10 +227,10 @@ impl Desk {
         self
     }
 
-    /// Finds a row of the table in the palette by its label and fires it.
+    /// Finds a command by its label in the palette and runs it.
     pub fn palette(&mut self, label: &str) -> &mut Self {
         self.keys(": ").keys(&format!("`{label}`"));
-        let at = KEYMAP.iter().position(|row| row.label == label);
+        let at = COMMANDS.iter().position(|row| row.label == label);
         let Some(Overlay::Palette(palette)) = &self.model.overlay else { panic!("no palette") };
         let downs = palette.found.iter().position(|found| Some(*found) == at);
         let downs = downs.unwrap_or_else(|| panic!("{label} is not found by its own name"));
@@ -270,7 +268,7 @@ impl Desk {
         self.mouse(MouseKind::Release(button), column, row)
     }
 
-    /// Undoes everything.
+    /// Undoes every edit.
     pub fn undo_all(&mut self) {
         while self.model.history.undo_label().is_some() {
             assert!(self.model.history.undo().is_some());
@@ -281,7 +279,7 @@ impl Desk {
         self.effects.iter().any(what)
     }
 
-    /// The notice, or nothing.
+    /// Text of the notice, or an empty string.
     pub fn notice(&self) -> &str {
         self.model.notice.as_ref().map_or("", |notice| &notice.text)
     }

@@ -24,7 +24,7 @@ fn radius(desk: &Desk) -> f64 {
     }
 }
 
-/// The inspector of the ball with the cursor on the radius.
+/// Opens the inspector of the ball with the cursor on the radius.
 fn at_radius() -> Desk {
     let desk = desk(BALL, "Enter Down Down Down Down Down Down");
     let lines = desk.model.field_lines();
@@ -33,7 +33,7 @@ fn at_radius() -> Desk {
 }
 
 #[test]
-fn typed_numbers_arrive_in_the_file() {
+fn typed_numbers_are_saved() {
     let mut desk = at_radius();
     desk.keys("`0.75` Enter");
     assert_eq!(radius(&desk), 0.75);
@@ -43,7 +43,7 @@ fn typed_numbers_arrive_in_the_file() {
 }
 
 #[test]
-fn what_is_wrong_is_refused_where_it_is_typed() {
+fn invalid_value_is_refused_in_its_field() {
     for (typed, words) in [
         ("-1", "radius is -1"),
         ("1e12", "radius is 1e12"),
@@ -57,7 +57,7 @@ fn what_is_wrong_is_refused_where_it_is_typed() {
         let problem = desk.problem().unwrap_or_default().to_string();
         assert!(problem.contains(words), "{typed}: {problem}");
         assert_eq!(desk.text(), ROOM, "{typed}: the scene stays");
-        // The reason goes with the next letter, the old value comes back with Esc.
+        // Typing clears the reason; Esc restores the old value.
         desk.keys("Backspace");
         assert_eq!(desk.problem(), None);
         desk.keys("Esc");
@@ -70,7 +70,7 @@ fn what_is_wrong_is_refused_where_it_is_typed() {
 }
 
 #[test]
-fn a_value_being_typed_is_applied_before_anything_else_is_done() {
+fn typed_value_is_applied_before_another_command() {
     let mut desk = at_radius();
     desk.keys("`0.25` Up");
     assert_eq!(radius(&desk), 0.25);
@@ -83,7 +83,7 @@ fn a_value_being_typed_is_applied_before_anything_else_is_done() {
 }
 
 #[test]
-fn a_whole_vector_or_colour_can_be_typed_into_any_of_its_lines() {
+fn vector_or_colour_can_be_typed_into_any_component() {
     let mut desk = desk(BALL, "Enter Down Down Down `1, 2 -3` Enter");
     let Shape::Sphere(sphere) = &desk.scene().objects[1].shape else { panic!() };
     assert_eq!(sphere.center, [1.0, 2.0, -3.0]);
@@ -93,7 +93,7 @@ fn a_whole_vector_or_colour_can_be_typed_into_any_of_its_lines() {
 }
 
 #[test]
-fn words_are_chosen_from_a_list_or_stepped() {
+fn choices_are_selected_from_list_or_stepped() {
     let mut desk = desk(BALL, "Enter Down Enter");
     assert!(
         matches!(&desk.model.overlay, Some(Overlay::Pick(pick)) if pick.entries[0].0 == "mirror")
@@ -108,7 +108,7 @@ fn words_are_chosen_from_a_list_or_stepped() {
 }
 
 #[test]
-fn a_form_shows_what_it_makes_and_is_taken_as_a_whole() {
+fn form_previews_and_confirms_as_one_step() {
     let mut desk = desk(Target::Camera, "a Enter");
     assert_eq!(desk.scene().objects.len(), 4, "it is seen while the form is open");
     assert!(matches!(desk.effects.last(), Some(Effect::Show(s)) if s.objects.len() == 4));
@@ -127,7 +127,7 @@ fn a_form_shows_what_it_makes_and_is_taken_as_a_whole() {
 }
 
 #[test]
-fn a_form_is_cancelled_as_a_whole() {
+fn form_cancels_as_a_whole() {
     for kind in 0..8 {
         for keys in ["Esc", "Down Right Right Esc", "`x` Esc Esc", "`-1` Enter Esc Esc"] {
             let downs = "Down ".repeat(kind);
@@ -137,13 +137,13 @@ fn a_form_is_cancelled_as_a_whole() {
             assert!(matches!(desk.effects.last(), Some(Effect::Show(s)) if s.objects.len() == 3));
             assert_eq!(desk.model.selection, BALL);
             desk.keys("u");
-            assert!(desk.notice().contains("nothing to undo"));
+            assert!(desk.notice().contains("Nothing to undo"));
         }
     }
 }
 
 #[test]
-fn a_form_shares_a_material_and_leaves_no_other_behind() {
+fn form_removes_unused_materials() {
     let mut desk = desk(Target::Camera, "a Enter Down");
     for _ in 0..3 {
         desk.keys("Right");
@@ -157,7 +157,7 @@ fn a_form_shares_a_material_and_leaves_no_other_behind() {
 }
 
 #[test]
-fn a_wrong_value_in_a_form_stays_in_the_form() {
+fn invalid_value_stays_in_form() {
     let mut desk = desk(Target::Camera, "a Enter End Home `ball` Enter");
     assert!(desk.problem().is_some_and(|p| p.contains("same name")), "{:?}", desk.problem());
     desk.keys("Backspace `2` Enter Enter");
@@ -165,7 +165,7 @@ fn a_wrong_value_in_a_form_stays_in_the_form() {
 }
 
 #[test]
-fn a_held_key_is_one_step_and_a_pause_ends_it() {
+fn held_key_is_one_undo_step_until_a_pause() {
     let mut desk = desk(Target::Camera, "] ] ] ] ]");
     desk.keys("u");
     assert_eq!(desk.text(), ROOM);
@@ -180,7 +180,7 @@ fn a_held_key_is_one_step_and_a_pause_ends_it() {
 }
 
 #[test]
-fn a_mode_is_one_step_however_long_it_takes() {
+fn mode_is_one_undo_step() {
     let mut desk = desk(BALL, "m Right");
     desk.now += Duration::from_secs(100);
     desk.keys("Up PageUp Esc");
@@ -194,7 +194,7 @@ fn a_mode_is_one_step_however_long_it_takes() {
 }
 
 #[test]
-fn pasted_text_never_fires_shortcuts() {
+fn pasted_text_runs_no_commands() {
     let mut desk = desk(BALL, "");
     desk.send(Message::Paste("xxq\nDDD".into()));
     assert_eq!(desk.text(), ROOM);
@@ -207,7 +207,7 @@ fn pasted_text_never_fires_shortcuts() {
 }
 
 #[test]
-fn prompts_say_what_is_wrong_and_stay_open() {
+fn invalid_prompt_answer_keeps_prompt_open() {
     for (keys, words) in [
         ("e Ctrl-u `floor` Enter", "same name"),
         ("T Ctrl-u `spp 0` Enter", "at least 1"),
@@ -227,7 +227,7 @@ fn prompts_say_what_is_wrong_and_stay_open() {
 }
 
 #[test]
-fn strength_of_light_is_told_and_keeps_its_subject() {
+fn light_intensity_is_reported_and_selection_stays() {
     let mut desk = desk(Target::Ambient, "' '");
     assert!(desk.scene().ambient.color.0[0] > 0.1 && desk.scene().lights[0].intensity == 1.0);
     assert!(desk.notice().starts_with("ambient: "), "{}", desk.notice());
@@ -237,7 +237,7 @@ fn strength_of_light_is_told_and_keeps_its_subject() {
 }
 
 #[test]
-fn every_size_of_terminal_can_be_worked_in() {
+fn editing_works_at_every_terminal_size() {
     for screen in [[200, 60], [120, 36], [80, 24], [40, 12], [39, 11], [1, 1], [0, 0]] {
         let mut desk = desk(BALL, "");
         desk.send(Message::Resize(screen));

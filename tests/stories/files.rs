@@ -1,4 +1,4 @@
-//! Stories of files: saving, other writers, errors in the file, leaving.
+//! Stories of files: saving, changes by other programs, errors in the file, quitting.
 
 use crate::desk::{Desk, FILE, ROOM};
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ fn start(path: Option<&str>, text: &str) -> Model {
         colors: Colors::True,
         stop: Stop::default(),
         threads: 1,
-        most_threads: 1,
+        max_threads: 1,
     })
 }
 
@@ -31,7 +31,7 @@ fn press(model: &mut Model, keys: &str) -> Vec<Effect> {
 }
 
 #[test]
-fn quitting_with_unsaved_edits_asks() {
+fn quit_with_unsaved_edits_asks() {
     let mut desk = Desk::new(ROOM);
     desk.keys("Left q");
     assert!(matches!(desk.model.overlay, Some(Overlay::Question(_))));
@@ -52,7 +52,7 @@ fn quitting_with_unsaved_edits_asks() {
 }
 
 #[test]
-fn save_as_never_overwrites_unasked() {
+fn save_as_asks_before_overwriting() {
     let mut desk = Desk::new(ROOM);
     desk.disk.insert("other.toml".into(), "precious".into());
     desk.keys("Left W Ctrl-u `other.toml` Enter");
@@ -68,7 +68,7 @@ fn save_as_never_overwrites_unasked() {
 }
 
 #[test]
-fn a_scene_without_a_file_is_asked_for_one_and_then_left() {
+fn untitled_scene_asks_for_path_before_quitting() {
     let mut model = start(None, ROOM);
     begin(&mut model);
     press(&mut model, "Left q s");
@@ -83,7 +83,7 @@ fn a_scene_without_a_file_is_asked_for_one_and_then_left() {
 }
 
 #[test]
-fn an_edit_made_while_the_file_was_written_stays_unsaved() {
+fn edit_during_save_stays_unsaved() {
     let mut model = start(Some(FILE), ROOM);
     let effects = press(&mut model, "Left Ctrl-s Left");
     let save = effects.into_iter().find_map(|e| match e {
@@ -95,7 +95,7 @@ fn an_edit_made_while_the_file_was_written_stays_unsaved() {
 }
 
 #[test]
-fn somebody_elses_version_is_asked_about() {
+fn save_over_external_change_asks() {
     let mut model = start(Some(FILE), ROOM);
     press(&mut model, "Left Ctrl-s");
     let scene = Arc::clone(model.history.scene());
@@ -112,7 +112,7 @@ fn somebody_elses_version_is_asked_about() {
 }
 
 #[test]
-fn a_changed_file_is_read_at_once_unless_edits_would_be_lost() {
+fn external_change_reloads_unless_edits_would_be_lost() {
     let mut desk = Desk::new(ROOM);
     desk.select(Target::Object(1));
     let other = ROOM.replace("radius = 0.5", "radius = 0.25");
@@ -128,7 +128,7 @@ fn a_changed_file_is_read_at_once_unless_edits_would_be_lost() {
     desk.send(Message::ChangedOnDisk);
     desk.keys("`r`");
     assert_eq!((desk.text().as_str(), desk.model.is_unsaved()), (ROOM, false));
-    // Who is filling in a form is not interrupted.
+    // An open form is not interrupted.
     desk.keys("a Enter");
     desk.send(Message::ChangedOnDisk);
     assert!(matches!(desk.model.overlay, Some(Overlay::Form(_))));
@@ -136,14 +136,14 @@ fn a_changed_file_is_read_at_once_unless_edits_would_be_lost() {
 }
 
 #[test]
-fn a_broken_file_is_told_and_work_begins_when_it_is_mended() {
+fn unreadable_file_loads_after_it_is_fixed() {
     let broken = ROOM.replace("radius = 0.5", "radius = -1");
     let mut model = start(Some(FILE), &broken);
     let begun = begin(&mut model);
     assert!(begun.iter().all(|e| !matches!(e, Effect::Show(_))), "{begun:?}");
     assert!(model.file.unreadable);
-    let told = model.file.broken.as_ref().unwrap().to_string();
-    assert!(told.contains("room.toml:33") && told.contains("radius is -1"), "{told}");
+    let errors = model.file.broken.as_ref().unwrap().to_string();
+    assert!(errors.contains("room.toml:33") && errors.contains("radius is -1"), "{errors}");
     let effects = press(&mut model, "Left a ] x m Ctrl-s Enter Tab Down Right p");
     assert!(effects.is_empty(), "{effects:?}");
     assert!(model.notice.as_ref().unwrap().text.contains("mend"));
@@ -160,7 +160,7 @@ fn a_broken_file_is_told_and_work_begins_when_it_is_mended() {
 }
 
 #[test]
-fn an_error_in_a_changed_file_leaves_the_scene() {
+fn error_in_changed_file_keeps_scene() {
     let mut desk = Desk::new(ROOM);
     desk.disk.insert(FILE.into(), ROOM.replace("[film]", "[flim]"));
     desk.send(Message::ChangedOnDisk);
@@ -175,7 +175,7 @@ fn an_error_in_a_changed_file_leaves_the_scene() {
 }
 
 #[test]
-fn the_built_in_scene_is_ready_at_once() {
+fn built_in_scene_opens_without_file() {
     let text = zerkalo::scene::BUILT_IN;
     let mut model = start(None, text);
     let effects = begin(&mut model);
@@ -187,7 +187,7 @@ fn the_built_in_scene_is_ready_at_once() {
 }
 
 #[test]
-fn an_edit_made_while_the_file_was_written_holds_back_the_end() {
+fn edit_during_save_prevents_quit() {
     let mut model = start(Some(FILE), ROOM);
     let effects = press(&mut model, "Left q s Left");
     let save = effects.into_iter().find_map(|e| match e {
@@ -200,7 +200,7 @@ fn an_edit_made_while_the_file_was_written_holds_back_the_end() {
 }
 
 #[test]
-fn edits_bring_back_a_scene_whose_file_is_spoilt() {
+fn recovered_edits_replace_unreadable_file() {
     let mut model = start(Some(FILE), "[camera");
     begin(&mut model);
     let scene = Arc::new(Scene::parse(ROOM, FILE).unwrap());
@@ -208,9 +208,9 @@ fn edits_bring_back_a_scene_whose_file_is_spoilt() {
     update(&mut model, Message::OrphanedEdits(left), Duration::ZERO);
     let effects = press(&mut model, "r");
     assert!(effects.contains(&Effect::Show(Arc::clone(&scene))), "{effects:?}");
-    assert!(effects.contains(&Effect::TakeUp) && effects.contains(&Effect::KeepEdits(Some(scene))));
+    assert!(effects.contains(&Effect::Recover) && effects.contains(&Effect::Autosave(Some(scene))));
     assert!(model.is_unsaved() && !model.file.unreadable);
-    // What stands in the file is not overwritten unasked.
+    // The contents of the file are not overwritten without confirmation.
     let effects = press(&mut model, "Ctrl-s");
     assert!(effects.is_empty() && matches!(model.overlay, Some(Overlay::Question(_))));
     let effects = press(&mut model, "o");
@@ -218,7 +218,7 @@ fn edits_bring_back_a_scene_whose_file_is_spoilt() {
 }
 
 #[test]
-fn the_path_of_the_last_picture_is_copied_unless_it_steers() {
+fn export_path_with_control_characters_is_not_copied() {
     let mut desk = Desk::new(ROOM);
     desk.keys("y");
     assert!(desk.notice().contains("No picture"));
@@ -230,24 +230,26 @@ fn the_path_of_the_last_picture_is_copied_unless_it_steers() {
     assert!(desk.effects.is_empty() && desk.notice().contains("not copied"));
 }
 
-/// A picture takes the whole screen, and the next key does nothing but take it away.
+/// An image covers the whole screen; the next key only closes it.
 #[test]
-fn the_last_picture_is_looked_at_until_a_key_comes() {
+fn image_viewer_closes_on_any_key() {
     let mut desk = Desk::new(ROOM);
     desk.keys("o");
     assert!(desk.model.overlay.is_none() && desk.notice().contains("No picture"));
     desk.keys("p o");
     let looked = |desk: &Desk| matches!(&desk.model.overlay, Some(Overlay::ViewerImage(looked)) if looked.path.ends_with("room-1.png"));
     assert!(looked(&desk));
-    // Made anew for a screen of another size; what was made for the old one is not shown.
+    // A resize prepares the image again; the result for the old size is ignored.
     desk.effects.clear();
     let screen = [100, 30];
     desk.effects.extend(update(&mut desk.model, Message::Resize(screen), Duration::ZERO));
-    assert!(looked(&desk) && desk.asked(|e| matches!(e, Effect::Look { screen: [100, 30], .. })));
+    assert!(
+        looked(&desk) && desk.asked(|e| matches!(e, Effect::ViewImage { screen: [100, 30], .. }))
+    );
     let before = desk.text();
     desk.keys("x");
     assert!(desk.model.overlay.is_none() && desk.text() == before);
-    // One that cannot be read is told and leads back.
+    // An unreadable image is reported and the viewer closes.
     desk.keys("o");
     let message = Message::ViewerImage("room-1.png".into(), Err("it is gone".to_string()));
     update(&mut desk.model, message, Duration::ZERO);

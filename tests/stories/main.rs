@@ -1,5 +1,5 @@
-//! Stories of the dashboard: a scene, what somebody presses, and what became of the scene. No
-//! terminal, no renderer, no disk.
+//! Stories of the dashboard: a scene, user input, and the expected state, without terminal,
+//! renderer or disk.
 
 mod actions;
 mod desk;

@@ -9,7 +9,7 @@ use zerkalo::scene::edit::Target;
 use zerkalo::shape::Shape;
 use zerkalo::terminal::event::{Button, MouseKind};
 
-/// The cell in the middle of the picture: the ball is seen there.
+/// The cell at the centre of the picture, which shows the ball.
 fn middle(desk: &Desk) -> [u16; 2] {
     let image = desk.model.layout().unwrap().image;
     [image.x + image.width / 2, image.y + image.height / 2]
@@ -23,7 +23,7 @@ fn center(desk: &Desk) -> [f64; 3] {
 }
 
 #[test]
-fn a_click_selects_what_is_seen() {
+fn click_selects_visible_object() {
     let mut desk = Desk::new(ROOM);
     let [x, y] = middle(&desk);
     desk.click(x, y);
@@ -37,7 +37,7 @@ fn a_click_selects_what_is_seen() {
 }
 
 #[test]
-fn a_drag_is_one_step_of_undo() {
+fn drag_is_one_undo_step() {
     let mut desk = Desk::new(ROOM);
     let at = middle(&desk);
     desk.drag(Button::Left, at, [12, -4]);
@@ -53,7 +53,7 @@ fn a_drag_is_one_step_of_undo() {
 }
 
 #[test]
-fn a_drag_moves_what_is_being_moved_and_stays_under_the_hand() {
+fn drag_moves_selection_under_mouse() {
     let mut desk = Desk::new(ROOM);
     desk.select(Target::Object(1));
     desk.keys("m");
@@ -73,7 +73,7 @@ fn a_drag_moves_what_is_being_moved_and_stays_under_the_hand() {
 }
 
 #[test]
-fn the_wheel_dollies_and_scrolls_and_steps() {
+fn wheel_dollies_scrolls_and_steps() {
     let mut desk = Desk::new(ROOM);
     let [x, y] = middle(&desk);
     desk.mouse(MouseKind::Scroll(2), x, y);
@@ -93,7 +93,7 @@ fn the_wheel_dollies_and_scrolls_and_steps() {
 }
 
 #[test]
-fn outline_and_inspector_are_clicked_line_by_line() {
+fn click_selects_lines_of_outline_and_inspector() {
     let mut desk = Desk::new(ROOM);
     desk.keys("Tab");
     let rows = desk.model.outline_rows().unwrap();
@@ -112,30 +112,30 @@ fn outline_and_inspector_are_clicked_line_by_line() {
     // Name, material, shape, center x.
     desk.click(rows.x + 3, rows.y + 3).click(rows.x + 3, rows.y + 3);
     desk.keys("Ctrl-u `0.25`");
-    // A click elsewhere applies what was typed.
+    // A click elsewhere applies the typed value.
     desk.click(rows.x + 3, rows.y + 5);
     assert_eq!(center(&desk)[0], 0.25);
-    // What is wrong holds the click back.
+    // An invalid value blocks the click.
     desk.keys("Enter Ctrl-u `far`").click(rows.x + 3, rows.y + 3);
     assert!(desk.problem().is_some_and(|p| p.contains("far")), "{:?}", desk.problem());
     assert_eq!(desk.model.inspector.cursor, 5);
 }
 
 #[test]
-fn lists_and_questions_are_clicked() {
+fn click_chooses_in_lists_and_questions() {
     let mut desk = Desk::new(ROOM);
     desk.keys("a");
-    let place = desk.model.place().unwrap();
+    let place = desk.model.overlay_layout().unwrap();
     desk.click(place.list.x + 1, place.list.y + 1).click(place.list.x + 1, place.list.y + 1);
     assert!(matches!(&desk.model.overlay, Some(Overlay::Form(form)) if form.title == "new cube"));
     desk.keys("Esc Left q");
-    let place = desk.model.place().unwrap();
+    let place = desk.model.overlay_layout().unwrap();
     desk.click(place.list.x + 1, place.list.y + 1).click(place.list.x + 1, place.list.y + 1);
     assert!(desk.asked(|e| *e == Effect::Quit), "discard and quit");
 }
 
 #[test]
-fn a_click_while_probing_places_the_probe() {
+fn click_places_probe() {
     let mut desk = Desk::new(ROOM);
     desk.keys("i");
     let image = desk.model.layout().unwrap().image;

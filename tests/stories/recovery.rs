@@ -1,4 +1,4 @@
-//! Stories of unsaved edits: what is kept while one edits, and what the next start makes of it.
+//! Stories of unsaved edits: autosave, and recovery at the next start.
 
 use crate::desk::{Desk, ROOM};
 use std::sync::Arc;
@@ -7,24 +7,24 @@ use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::scene::Scene;
 
-/// What was asked to be kept since the last look: the scenes, `None` for nothing.
+/// Autosave requests since the last clearing: the scenes, `None` for a removal.
 fn kept(desk: &mut Desk) -> Vec<Option<Arc<Scene>>> {
     let effects = std::mem::take(&mut desk.effects);
     let kept = effects.into_iter().filter_map(|effect| match effect {
-        Effect::KeepEdits(scene) => Some(scene),
+        Effect::Autosave(scene) => Some(scene),
         _ => None,
     });
     kept.collect()
 }
 
-fn left_behind(desk: &Desk, changed: bool) -> OrphanedEdits {
+fn orphaned_edits(desk: &Desk, changed: bool) -> OrphanedEdits {
     let mut scene = desk.scene().clone();
     scene.trace.max_depth = 7;
     OrphanedEdits { scene: Arc::new(scene), age: Duration::from_secs(720), changed }
 }
 
 #[test]
-fn every_edit_is_kept_until_it_is_saved_undone_or_left() {
+fn edits_are_autosaved_until_saved_or_undone() {
     let mut desk = Desk::new(ROOM);
     desk.keys("Tab Down p v Esc");
     assert!(kept(&mut desk).is_empty(), "nothing was edited");
@@ -40,11 +40,11 @@ fn every_edit_is_kept_until_it_is_saved_undone_or_left() {
     assert!(matches!(&kept(&mut desk)[..], [Some(_)]), "the file has what was undone");
     desk.keys("q `d`");
     let end: Vec<_> = desk.effects.iter().rev().take(2).collect();
-    assert_eq!(end, [&Effect::Quit, &Effect::KeepEdits(None)]);
+    assert_eq!(end, [&Effect::Quit, &Effect::Autosave(None)]);
 }
 
 #[test]
-fn what_is_being_filled_in_is_kept_when_it_is_confirmed() {
+fn form_is_autosaved_when_confirmed() {
     let mut desk = Desk::new(ROOM);
     desk.keys("a Enter");
     assert!(matches!(desk.model.overlay, Some(Overlay::Form(_))) && kept(&mut desk).is_empty());
@@ -53,16 +53,16 @@ fn what_is_being_filled_in_is_kept_when_it_is_confirmed() {
 }
 
 #[test]
-fn edits_that_were_left_behind_are_offered_and_taken_up() {
+fn orphaned_edits_are_offered_and_recovered() {
     let mut desk = Desk::new(ROOM);
-    let left = left_behind(&desk, false);
+    let left = orphaned_edits(&desk, false);
     desk.send(Message::OrphanedEdits(left.clone()));
     let Some(Overlay::Question(question)) = &desk.model.overlay else { panic!() };
     assert!(question.text.contains("12 minutes ago") && !question.text.contains("changed"));
     desk.effects.clear();
     desk.keys("Enter");
     assert_eq!(**desk.model.history.scene(), *left.scene);
-    assert!(desk.model.is_unsaved() && desk.asked(|e| *e == Effect::TakeUp));
+    assert!(desk.model.is_unsaved() && desk.asked(|e| *e == Effect::Recover));
     assert!(desk.asked(|e| matches!(e, Effect::Show(_))));
     assert!(matches!(&kept(&mut desk)[..], [Some(_)]));
     desk.keys("u");
@@ -72,13 +72,13 @@ fn edits_that_were_left_behind_are_offered_and_taken_up() {
 }
 
 #[test]
-fn whoever_looks_at_the_file_first_finds_them_again() {
+fn orphaned_edits_can_be_recovered_later() {
     let mut desk = Desk::new(ROOM);
-    desk.send(Message::OrphanedEdits(left_behind(&desk, true)));
+    desk.send(Message::OrphanedEdits(orphaned_edits(&desk, true)));
     let Some(Overlay::Question(question)) = &desk.model.overlay else { panic!() };
     assert!(question.text.contains("changed since"), "{}", question.text);
     desk.keys("`f` Left");
-    assert!(!desk.asked(|e| matches!(e, Effect::TakeUp | Effect::Discard)));
+    assert!(!desk.asked(|e| matches!(e, Effect::Recover | Effect::Discard)));
     desk.palette("recover edits of a broken session").keys("`d`");
     assert!(desk.asked(|e| *e == Effect::Discard) && desk.model.is_unsaved());
     desk.palette("recover edits of a broken session");
@@ -86,10 +86,10 @@ fn whoever_looks_at_the_file_first_finds_them_again() {
 }
 
 #[test]
-fn whoever_is_busy_is_not_interrupted() {
+fn orphaned_edits_do_not_interrupt_typing() {
     let mut desk = Desk::new(ROOM);
     desk.keys("a");
-    desk.send(Message::OrphanedEdits(left_behind(&desk, false)));
+    desk.send(Message::OrphanedEdits(orphaned_edits(&desk, false)));
     assert!(matches!(desk.model.overlay, Some(Overlay::Pick(_))));
     assert!(desk.notice().contains("recover"));
     desk.keys("Esc");
@@ -98,17 +98,18 @@ fn whoever_is_busy_is_not_interrupted() {
 }
 
 #[test]
-fn edits_that_change_nothing_are_done_with() {
+fn orphaned_edits_equal_to_file_are_discarded() {
     let mut desk = Desk::new(ROOM);
-    let same = OrphanedEdits { scene: Arc::clone(desk.model.scene()), ..left_behind(&desk, true) };
+    let same =
+        OrphanedEdits { scene: Arc::clone(desk.model.scene()), ..orphaned_edits(&desk, true) };
     desk.send(Message::OrphanedEdits(same));
     desk.keys("Enter");
-    assert!(desk.asked(|e| *e == Effect::Discard) && !desk.asked(|e| *e == Effect::TakeUp));
+    assert!(desk.asked(|e| *e == Effect::Discard) && !desk.asked(|e| *e == Effect::Recover));
     assert!(!desk.model.is_unsaved());
 }
 
 #[test]
-fn suspending_asks_for_nothing_else() {
+fn suspend_emits_no_other_effect() {
     let mut desk = Desk::new(ROOM);
     desk.keys("Left");
     desk.effects.clear();

@@ -1,4 +1,4 @@
-//! The roughness keys change what the mirror shows, and nothing else: not one bit.
+//! The roughness keys change the mirror's pixels and leave all others equal to the bit.
 
 use crate::desk::Desk;
 use crate::support::{pool, rendered, sized};
@@ -10,19 +10,20 @@ use zerkalo::world::{FirstHit, Precision};
 const SIZE: [u32; 2] = [96, 72];
 const SAMPLES: u32 = 16;
 
-/// The picture of a scene, uniform, always the same samples.
+/// Renders a scene with uniform sampling and a fixed seed.
 fn picture(scene: &Scene) -> RenderState {
     rendered(&sized(scene.clone(), SIZE), 0, Precision::Auto, SAMPLES)
 }
 
-/// Which pixels of two pictures differ in any bit.
+/// Returns the pixels that differ in any bit.
 fn changed(a: &RenderState, b: &RenderState) -> Vec<bool> {
     let [width, height] = SIZE.map(|n| n as usize);
     let pixel = |r: &RenderState, i: usize| r.film.pixel(i % width, i / width, &r.mix);
     (0..width * height).map(|i| pixel(a, i) != pixel(b, i)).collect()
 }
 
-/// With the ambient part of the materials that `of` names another: the paths that meet them see it.
+/// Returns the scene with changed ambient colour of the materials that `of` names, which marks the
+/// paths that hit them.
 fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> RenderState {
     let mut scene = scene.clone();
     for (_, material) in scene.materials.iter_mut().filter(|(name, _)| of(name)) {
@@ -33,10 +34,11 @@ fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> RenderState {
 }
 
 #[test]
-fn roughness_changes_what_the_mirror_shows_and_not_a_bit_elsewhere() {
+fn roughness_changes_only_pixels_of_the_mirror() {
     let mut desk = Desk::new(BUILT_IN);
     let smooth = desk.scene().clone();
-    // From 0.04 to about 0.1: what is in shadow is lit evenly, and a little blur leaves its middle as it was.
+    // From 0.04 to about 0.1. Shadowed areas are lit evenly, so a small blur leaves their centre
+    // unchanged.
     desk.keys("] ] ] ] ] ] ] ] ] ]");
     let rough = desk.scene().clone();
     let roughness = |scene: &Scene| scene.materials["mirror"].roughness;
@@ -53,7 +55,7 @@ fn roughness_changes_what_the_mirror_shows_and_not_a_bit_elsewhere() {
     assert!(wrong.is_empty(), "pixels whose paths never met the mirror changed: {wrong:?}");
     assert!(same > 1000, "only {same} pixels have nothing to do with the mirror");
 
-    // Pixels that show the mirror, and in it an object rather than the background.
+    // Pixels in which the mirror reflects an object rather than the background.
     let [width, height] = SIZE.map(|n| n as usize);
     let size = [width, height];
     let look = |points: &[[f64; 2]], seen: &mut [FirstHit]| before.world.first_hit(points, seen);

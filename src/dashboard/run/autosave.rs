@@ -1,4 +1,4 @@
-//! Unsaved edits on their way to where the next start finds them: soon after the last, not after each.
+//! Autosave of unsaved edits to a recovery file, debounced.
 
 use crate::dashboard::message::{Message, OrphanedEdits};
 use crate::scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, remove_stale};
@@ -7,19 +7,19 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Edits are written when none has come for so long,
+/// Edits are written after this time without another one,
 const DEBOUNCE: Duration = Duration::from_millis(400);
-/// and while they go on coming, when the oldest has waited for so long.
+/// or at the latest this time after the oldest unwritten one.
 const MAX_DELAY: Duration = Duration::from_secs(1);
 
-/// Unsaved edits of one scene after another, and those that were found at the start.
+/// Autosave of a scene, and the orphaned edits that were found at the start.
 pub struct Autosave {
     recovery: Recovery,
     state: Option<PathBuf>,
     pending: Option<Pending>,
-    /// What was found and has not been decided about; the last is the next to be offered.
+    /// Orphaned edits without a decision; the last is offered next.
     found: Vec<Orphan>,
-    /// It was told already that edits cannot be kept.
+    /// A failure to write has already been reported.
     complained: bool,
 }
 
@@ -30,8 +30,8 @@ struct Pending {
 }
 
 impl Autosave {
-    /// For the scene at `path`, or without one for that called `name`. `state`: the user's folder for
-    /// what programs remember.
+    /// Creates the autosave of the scene at `path`, or of an untitled scene called `name`. `state`
+    /// is the user's state folder.
     pub fn new(path: Option<&Path>, name: &str, state: Option<PathBuf>) -> Self {
         Self {
             recovery: Recovery::of(path, name, state.as_deref()),
@@ -42,23 +42,23 @@ impl Autosave {
         }
     }
 
-    /// `scene` is about to be written. What is kept is never older than what the file holds: else the
-    /// next start would offer what nobody wants any more.
+    /// Prepares a save of `scene`: a recovery file must not be older than the scene file, or the
+    /// next start would offer outdated edits.
     pub fn saving(&mut self, file: &SceneFile, scene: &Scene) {
         if self.recovery.path().is_some() {
-            // If it cannot be kept, saving will tell.
+            // An error shows when the scene is saved.
             let _ = self.recovery.keep(&file.text_of(scene), file.fingerprint());
         }
     }
 
-    /// `scene` was written to the file at `path`.
+    /// Records that `scene` was written to the file at `path`.
     pub fn saved(&mut self, scene: &Arc<Scene>, path: &Path) {
         self.recovery.forget();
         self.recovery = Recovery::of(Some(path), "", self.state.as_deref());
         self.pending.take_if(|pending| *pending.scene == **scene);
     }
 
-    /// The scene has unsaved edits, and is this now; `None`: it has none.
+    /// Schedules an autosave of `scene`; `None` removes the recovery file.
     pub fn note(&mut self, scene: Option<Arc<Scene>>, now: Instant) {
         match scene {
             Some(scene) => {
@@ -72,12 +72,12 @@ impl Autosave {
         }
     }
 
-    /// When to write; `None`: there is nothing to.
+    /// Time of the next write, if one is pending.
     pub fn due(&self) -> Option<Instant> {
         self.pending.as_ref().map(|p| (p.last + DEBOUNCE).min(p.first + MAX_DELAY))
     }
 
-    /// Writes what `file` would be with the edits; what there is to tell about that.
+    /// Writes the text of `file` with the edits. Returns a warning on the first failure.
     pub fn write(&mut self, file: &SceneFile) -> Option<Message> {
         let scene = self.pending.take()?.scene;
         let text = file.text_of(&scene);
@@ -91,20 +91,20 @@ impl Autosave {
                 None
             }
             Err(_) if std::mem::replace(&mut self.complained, true) => None,
-            Err(error) => Some(Message::Trouble(format!(
+            Err(error) => Some(Message::Warning(format!(
                 "unsaved edits would be lost if the program were killed: they cannot be kept ({error})"
             ))),
         }
     }
 
-    /// The file that holds what is unsaved.
+    /// Path of the recovery file.
     pub fn path(&self) -> Option<&Path> {
         self.recovery.path()
     }
 
-    /// Looks for what was left behind. `file`: the scene's, if it can be read.
+    /// Searches for orphaned edits. `file` is the scene file, if it is readable.
     pub fn search(&mut self, file: Result<&SceneFile, &Path>) -> Vec<Message> {
-        // Half-written scenes lie beside them, half-written pictures in the working directory.
+        // Incomplete scene files are beside the scene, incomplete exports in the working directory.
         let beside = file.map_or_else(Some, SceneFile::path).and_then(Path::parent);
         let beside = beside.filter(|folder| !folder.as_os_str().is_empty());
         [Some(Path::new(".")), beside, self.state.as_deref()]
@@ -116,12 +116,12 @@ impl Autosave {
             .iter()
             .map(|(path, why)| {
                 let path = sanitized(&path.display().to_string());
-                Message::Trouble(format!("unsaved edits in {path} cannot be read: {why}"))
+                Message::Warning(format!("unsaved edits in {path} cannot be read: {why}"))
             })
             .collect();
         if elsewhere {
-            let told = "this scene is open elsewhere, with unsaved edits";
-            messages.push(Message::Trouble(told.to_string()));
+            let text = "this scene is open elsewhere, with unsaved edits";
+            messages.push(Message::Warning(text.to_string()));
         }
         lost.reverse();
         self.found = lost;
@@ -129,7 +129,8 @@ impl Autosave {
         messages
     }
 
-    /// What was found next, or why it is of no use. Edits that the file has already are done with.
+    /// Returns the next orphaned edits, or the reason why they are unusable. Edits that the file
+    /// contains already are discarded.
     pub fn offer(&mut self, file: Result<&SceneFile, &Path>) -> Option<Message> {
         loop {
             let lost = self.found.last()?;
@@ -144,26 +145,27 @@ impl Autosave {
                     changed: file.map_or(true, |file| lost.base != file.fingerprint()),
                 }),
                 Err(errors) => {
-                    // It stays where it is, for its user to look at.
+                    // The file stays for its user.
                     self.found.pop();
                     let first = errors.messages().first().map(ToString::to_string);
                     let first = first.unwrap_or_default();
                     let first: Vec<_> = first.lines().map(str::trim).collect();
-                    Message::Trouble(format!("unsaved edits cannot be read: {}", first.join(" ")))
+                    Message::Warning(format!("unsaved edits cannot be read: {}", first.join(" ")))
                 }
             });
         }
     }
 
-    /// What was offered is what is unsaved now. Its file, if the scene's could not be read.
-    pub fn take_up(&mut self, path: Option<&Path>) -> Option<SceneFile> {
+    /// Adopts the offered edits as unsaved edits. Returns their file, if that of the scene is
+    /// unreadable.
+    pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let lost = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, lost.text.clone()).ok());
         self.recovery.take_up(lost);
         file
     }
 
-    /// What was offered is not wanted.
+    /// Discards the offered edits.
     pub fn discard(&mut self) {
         if let Some(lost) = self.found.pop() {
             lost.discard();
@@ -193,23 +195,23 @@ mod tests {
     }
 
     #[test]
-    fn edits_are_written_when_they_pause_and_at_the_latest_after_a_second() {
-        let mut journal = Autosave::new(None, "a", None);
+    fn autosave_waits_for_pause_up_to_one_second() {
+        let mut autosave = Autosave::new(None, "a", None);
         let start = Instant::now();
         let at = |ms| start + Duration::from_millis(ms);
-        assert_eq!(journal.due(), None);
-        journal.note(Some(scene(1)), at(0));
-        assert_eq!(journal.due(), Some(at(400)));
-        journal.note(Some(scene(2)), at(300));
-        assert_eq!(journal.due(), Some(at(700)));
-        journal.note(Some(scene(3)), at(650));
-        assert_eq!(journal.due(), Some(at(1000)));
-        journal.note(None, at(660));
-        assert_eq!(journal.due(), None);
+        assert_eq!(autosave.due(), None);
+        autosave.note(Some(scene(1)), at(0));
+        assert_eq!(autosave.due(), Some(at(400)));
+        autosave.note(Some(scene(2)), at(300));
+        assert_eq!(autosave.due(), Some(at(700)));
+        autosave.note(Some(scene(3)), at(650));
+        assert_eq!(autosave.due(), Some(at(1000)));
+        autosave.note(None, at(660));
+        assert_eq!(autosave.due(), None);
     }
 
     #[test]
-    fn a_life_with_a_crash_in_it() {
+    fn orphaned_edits_are_offered_after_crash() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
         std::fs::write(&path, starter()).unwrap();
@@ -219,22 +221,25 @@ mod tests {
         first.note(Some(scene(3)), Instant::now());
         assert!(first.write(&file).is_none());
         assert_eq!(first.path(), Some(&*folder.path().join(".a.toml.unsaved")));
-        // Whoever is alive is not offered to others, but told of.
+        // Edits of a running session are reported but not offered.
         let mut second = Autosave::new(Some(&path), "", None);
-        let told = second.search(Ok(&file));
-        assert!(matches!(&told[..], [Message::Trouble(t)] if t.contains("elsewhere")), "{told:?}");
+        let messages = second.search(Ok(&file));
+        assert!(
+            matches!(&messages[..], [Message::Warning(t)] if t.contains("elsewhere")),
+            "{messages:?}"
+        );
         drop(first);
-        let told = second.search(Ok(&file));
-        let [Message::OrphanedEdits(left)] = &told[..] else { panic!("{told:?}") };
+        let messages = second.search(Ok(&file));
+        let [Message::OrphanedEdits(left)] = &messages[..] else { panic!("{messages:?}") };
         assert_eq!((&left.scene, left.changed), (&scene(3), false));
-        // What another program wrote meanwhile is told of.
+        // A change by another program is reported.
         std::fs::write(&path, format!("# new\n{}", starter())).unwrap();
         let file = SceneFile::open(&path).unwrap();
         let Some(Message::OrphanedEdits(left)) = second.offer(Ok(&file)) else { panic!() };
         assert!(left.changed);
-        assert!(second.take_up(None).is_none());
+        assert!(second.recover(None).is_none());
         assert!(second.offer(Ok(&file)).is_none());
-        // Saved, it is gone.
+        // Saving removes the recovery file.
         second.note(Some(scene(3)), Instant::now());
         second.write(&file);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
@@ -243,48 +248,51 @@ mod tests {
     }
 
     #[test]
-    fn what_the_file_has_already_is_not_offered_and_what_is_no_scene_is_told_and_stays() {
+    fn equal_edits_are_discarded_and_unreadable_ones_reported() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
         std::fs::write(&path, starter()).unwrap();
         let file = SceneFile::open(&path).unwrap();
         let hidden = folder.path().join(".a.toml.unsaved");
-        let mut journal = Autosave::new(Some(&path), "", None);
+        let mut autosave = Autosave::new(Some(&path), "", None);
         std::fs::write(&hidden, starter()).unwrap();
-        assert!(journal.search(Ok(&file)).is_empty() && !hidden.exists());
+        assert!(autosave.search(Ok(&file)).is_empty() && !hidden.exists());
         std::fs::write(&hidden, "[camera\n").unwrap();
-        let told = journal.search(Ok(&file));
-        assert!(matches!(&told[..], [Message::Trouble(t)] if t.contains(".a.toml.unsaved:1:")));
+        let messages = autosave.search(Ok(&file));
+        assert!(matches!(&messages[..], [Message::Warning(t)] if t.contains(".a.toml.unsaved:1:")));
         assert!(hidden.exists());
-        journal.note(Some(scene(3)), Instant::now());
-        assert!(journal.write(&file).is_none());
-        assert_eq!(journal.path(), Some(&*folder.path().join(".a.toml.unsaved-2")));
+        autosave.note(Some(scene(3)), Instant::now());
+        assert!(autosave.write(&file).is_none());
+        assert_eq!(autosave.path(), Some(&*folder.path().join(".a.toml.unsaved-2")));
     }
 
     #[test]
-    fn a_scene_whose_file_is_spoilt_comes_back() {
+    fn scene_of_unreadable_file_is_recovered() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
         std::fs::write(&path, "[camera\n").unwrap();
         std::fs::write(folder.path().join(".a.toml.unsaved"), starter()).unwrap();
-        let mut journal = Autosave::new(Some(&path), "", None);
-        let told = journal.search(Err(&path));
-        assert!(matches!(&told[..], [Message::OrphanedEdits(left)] if left.changed), "{told:?}");
-        let mut file = journal.take_up(Some(&path)).unwrap();
+        let mut autosave = Autosave::new(Some(&path), "", None);
+        let messages = autosave.search(Err(&path));
+        assert!(
+            matches!(&messages[..], [Message::OrphanedEdits(left)] if left.changed),
+            "{messages:?}"
+        );
+        let mut file = autosave.recover(Some(&path)).unwrap();
         let scene = file.document().scene().clone();
         file.save(&scene, false).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), starter());
     }
 
     #[test]
-    fn complaints_come_once() {
-        let mut journal = Autosave::new(None, "a", None);
+    fn autosave_failure_is_reported_once() {
+        let mut autosave = Autosave::new(None, "a", None);
         let file = SceneFile::untitled(starter().to_string(), "a").unwrap();
         let mut write = || {
-            journal.note(Some(scene(3)), Instant::now());
-            journal.write(&file)
+            autosave.note(Some(scene(3)), Instant::now());
+            autosave.write(&file)
         };
-        assert!(matches!(write(), Some(Message::Trouble(_))));
+        assert!(matches!(write(), Some(Message::Warning(_))));
         assert!(write().is_none());
     }
 }

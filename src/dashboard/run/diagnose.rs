@@ -1,4 +1,4 @@
-//! The terminal and the line to it, looked at without showing anything.
+//! Diagnostics of the terminal and its connection, without visible output.
 
 use crate::dashboard::run::signals::{block, watch};
 use crate::terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
@@ -10,38 +10,37 @@ use rustix::termios::tcgetwinsize;
 use std::io;
 use std::time::{Duration, Instant};
 
-/// How long to wait for whoever may not answer at all.
+/// Timeout for replies of unknown support.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// How long to wait for a terminal that has answered before.
+/// Timeout for a terminal that has replied before.
 const LONG_PATIENCE: Duration = Duration::from_secs(10);
-/// A line is measured when something took so much longer than nothing,
+/// The rate is measured when a transfer exceeds the round trip by this time,
 const MEASURED: Duration = Duration::from_millis(300);
-/// or with so many bytes.
+/// or with this many bytes.
 const MOST_BYTES: usize = 1 << 20;
 
-/// What was found.
+/// Capabilities of the terminal and its connection.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TerminalReport {
-    /// What the terminal can do.
+    /// Capabilities of the terminal.
     pub terminal: Capabilities,
-    /// How the dashboard knows what has arrived.
+    /// Pacing mode of the dashboard.
     pub mode: PacingMode,
     /// Columns and rows.
     pub cells: [u16; 2],
     /// Width and height in pixels.
     pub pixels: Option<[u16; 2]>,
-    /// What the line carries, bytes a second, if that was to be measured and somebody answered.
+    /// Measured rate in bytes per second, if requested and possible.
     pub rate: Option<f64>,
 }
 
-/// Looks at the terminal that stdin comes from and stdout leads to; it is restored. `measure`: how
-/// fast it is, too, which takes a second or some.
+/// Probes the terminal of stdin and stdout, and restores it. `measure` is whether to measure the
+/// transfer rate, which takes a second or more.
 ///
 /// # Errors
-/// If there is no terminal, or it is gone.
+/// If there is no terminal, or it is lost.
 pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<TerminalReport> {
-    // On a screen of its own, which goes with whatever a terminal shows of questions that it does not
-    // understand.
+    // The alternate screen hides output of requests that a terminal does not support.
     let signals = block()?;
     let screen = Screen::enter()?;
     let tty = screen.tty();
@@ -54,7 +53,7 @@ pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<Terminal
     }
     let queue = terminal.surroundings.ssh.as_deref().and_then(TcpSendQueue::find);
     let mode = InitialLink::of(&terminal, queue.is_some(), None).mode;
-    // Answers of somebody in between say nothing about the line.
+    // Replies of a multiplexer do not measure the connection.
     let through = match mode {
         PacingMode::Unlimited => Some(None),
         PacingMode::AckClocked(through) => Some(through),
@@ -79,7 +78,8 @@ pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<Terminal
     Ok(TerminalReport { terminal, mode, cells, pixels, rate })
 }
 
-/// Writes `before` and asks where the cursor is: how long the answer took; `None`: there was none.
+/// Writes `before` and requests the cursor position. Returns the time until the reply, or `None`
+/// without one.
 fn answer(
     tty: &Tty,
     keyboard: &mut Keyboard,
@@ -101,7 +101,7 @@ fn answer(
     }
 }
 
-/// Bytes a second, by more and more bytes until they take long enough.
+/// Measures bytes per second with growing transfers.
 fn rate(
     tty: &Tty,
     keyboard: &mut Keyboard,
@@ -123,7 +123,7 @@ fn rate(
     }
 }
 
-/// So many letters that nobody sees and that compress badly, over and over on the same screen.
+/// Returns `bytes` invisible letters that compress badly, all written to the same screen.
 fn hidden_text(bytes: usize) -> Vec<u8> {
     let mut text = b"\x1b[8m\x1b[H".to_vec();
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
@@ -143,7 +143,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_sent_to_measure_steers_nothing() {
+    fn measurement_text_has_no_control_characters() {
         let text = hidden_text(4096);
         let inner = text.strip_prefix(b"\x1b[8m\x1b[H").unwrap().strip_suffix(b"\x1b[0m").unwrap();
         assert_eq!(inner.len(), 4096);

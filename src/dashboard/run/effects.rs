@@ -1,42 +1,58 @@
-//! Does what `update` asks for.
+//! Executor of the effects that `update` returns.
 
 use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport, stem};
 use crate::dashboard::run::file_worker::Files;
+use crate::dashboard::run::frames::FramePipeline;
+use crate::dashboard::run::{image_viewer, paths};
 use crate::film::LinearImage;
 use crate::render::Options;
 use crate::render::schedule::Settings;
 use crate::render::session::{Session, View};
 use crate::scene::{Scene, SceneFile};
+use crate::terminal::Capabilities;
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What low priority means: the tracing threads only take what nobody else wants.
+/// Niceness of tracing threads with low priority: they take only processor time that is idle.
 const LOW_PRIORITY: i32 = 19;
 
-/// What the hands work with.
+/// Parameters of an [`EffectRunner`].
 pub struct EffectSetup {
-    /// The scene's file; or where it is, as long as it cannot be read.
+    /// The scene file, or its path while it cannot be read.
     pub file: Result<SceneFile, PathBuf>,
-    /// The folder for unsaved edits that cannot be kept beside their scene.
+    /// Folder for recovery files that cannot be written beside their scene.
     pub state: Option<PathBuf>,
     /// Tracing threads.
     pub threads: usize,
-    /// How scenes are compiled and sampled.
+    /// Options of scene compilation and sampling.
     pub options: Options,
-    /// How samples are allotted, and when the work is done.
+    /// Sample allocation and stop criteria.
     pub settings: Settings,
 }
 
-/// The renderer, the files, and what is being written.
+/// Consequence of an effect for the event loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// None; results come as messages.
+    Done,
+    /// The renderer starts on the scene of this generation.
+    Rendering(u64),
+    /// The terminal goes to the shell.
+    Suspend,
+    /// The program ends.
+    Quit,
+}
+
+/// Renderer, scene file and exports: executes every effect.
 pub struct EffectRunner {
     session: Session,
     files: Files,
-    studio: Exporter,
-    sized: Option<ResizedExport>,
+    exporter: Exporter,
+    resized: Option<ResizedExport>,
     view: View,
     threads: usize,
     niceness: i32,
@@ -48,8 +64,8 @@ pub struct EffectRunner {
 
 impl EffectRunner {
     /// Starts the threads.
-    pub fn new(tools: EffectSetup) -> io::Result<Self> {
-        let EffectSetup { file, state, threads, options, settings } = tools;
+    pub fn new(setup: EffectSetup) -> io::Result<Self> {
+        let EffectSetup { file, state, threads, options, settings } = setup;
         let (results, done) = unbounded();
         let stem = match &file {
             Ok(file) => stem(file.path(), file.document().name()),
@@ -57,8 +73,8 @@ impl EffectRunner {
         };
         let session = Session::new(threads, options.clone(), settings)?;
         let files = Files::new(file, state, results.clone())?;
-        let studio = Exporter {
-            paper: files.paper(),
+        let exporter = Exporter {
+            document: files.document(),
             folder: PathBuf::new(),
             stem,
             sampler: options.sampling.kind,
@@ -67,8 +83,8 @@ impl EffectRunner {
         Ok(Self {
             session,
             files,
-            studio,
-            sized: None,
+            exporter,
+            resized: None,
             view: View::default(),
             threads,
             niceness: 0,
@@ -84,27 +100,26 @@ impl EffectRunner {
         &self.session
     }
 
-    /// Where what was done is told.
-    pub fn results(&self) -> Sender<Message> {
-        self.results.clone()
-    }
-
-    /// What was done, as messages; pass them through [`EffectRunner::observe`].
+    /// Results of effects, as messages; pass each to [`EffectRunner::observe`] before the model.
     pub fn done(&self) -> &Receiver<Message> {
         &self.done
     }
 
-    /// Shows a scene; the number returned comes back in reports about it.
+    /// Starts rendering a scene. Returns its generation, which reports about it carry.
     pub fn show(&mut self, scene: Arc<Scene>) -> u64 {
         self.session.set_scene(scene)
     }
 
-    /// Does what is asked for. What it leads to comes as messages. The number of the scene if the
-    /// renderer has a new one to show.
-    pub fn run_effect(&mut self, effect: Effect) -> Option<u64> {
+    /// Executes an effect; results come as messages. `frames` and `terminal` are the output.
+    pub fn run(
+        &mut self,
+        effect: Effect,
+        frames: &mut FramePipeline,
+        terminal: &Capabilities,
+    ) -> Outcome {
         match effect {
-            Effect::Show(scene) => return Some(self.show(scene)),
-            Effect::Restart => return Some(self.session.restart()),
+            Effect::Show(scene) => return Outcome::Rendering(self.show(scene)),
+            Effect::Restart => return Outcome::Rendering(self.session.restart()),
             Effect::Display(display) => {
                 self.options.display = display;
                 self.session.set_display(display);
@@ -128,12 +143,12 @@ impl EffectRunner {
                 self.niceness = if low { LOW_PRIORITY } else { 0 };
                 self.set_threads();
             }
-            Effect::Keep => {
+            Effect::Pin => {
                 let results = self.results.clone();
                 self.session.submit(move |film| {
                     if let Some((rendering, report)) = film {
                         let picture = LinearImage::of_film(&rendering.film, &rendering.mix);
-                        let _ = results.send(Message::Kept(Arc::new(picture), report.spp.mean));
+                        let _ = results.send(Message::Pinned(Arc::new(picture), report.spp.mean));
                     }
                 });
             }
@@ -141,7 +156,7 @@ impl EffectRunner {
             Effect::Load => self.files.load(),
             Effect::Export(format) => self.export(format),
             Effect::ExportSized { scene, format, display, stop } => {
-                let order = ExportRequest {
+                let request = ExportRequest {
                     scene,
                     format,
                     display,
@@ -151,57 +166,63 @@ impl EffectRunner {
                     threads: self.threads,
                 };
                 let started =
-                    ResizedExport::start(order, self.studio.clone(), self.results.clone());
+                    ResizedExport::start(request, self.exporter.clone(), self.results.clone());
                 match started {
-                    Ok(sized) => self.sized = Some(sized),
+                    Ok(resized) => self.resized = Some(resized),
                     Err(error) => self.refuse(&error),
                 }
             }
             Effect::CancelExport => {
-                if let Some(sized) = &self.sized {
-                    sized.cancel();
+                if let Some(resized) = &self.resized {
+                    resized.cancel();
                 }
             }
-            Effect::KeepEdits(scene) => self.files.journal(scene),
-            Effect::TakeUp => self.files.take_up(),
+            Effect::Autosave(scene) => self.files.autosave(scene),
+            Effect::Recover => self.files.recover(),
             Effect::Discard => self.files.discard(),
-            // The loop's own.
-            Effect::Quit | Effect::Suspend | Effect::Copy(_) | Effect::Look { .. } => {}
+            Effect::ViewImage { path, display, screen } => {
+                let line_rate = frames.reading().map(|link| link.rate);
+                let viewport = image_viewer::viewport(terminal, screen, line_rate);
+                image_viewer::prepare(path, display, viewport, self.results.clone());
+            }
+            Effect::Copy(path) => frames.copy(&paths::full(&path)),
+            Effect::Suspend => return Outcome::Suspend,
+            Effect::Quit => return Outcome::Quit,
         }
-        None
+        Outcome::Done
     }
 
-    /// Takes note of what was done, before the model does.
+    /// Follows the name of the scene file, after which exports are named.
     pub fn observe(&mut self, message: &Message) {
         if let Message::Saved(_, Ok(path)) = message {
-            self.studio.stem = stem(Some(path), "");
+            self.exporter.stem = stem(Some(path), "");
         }
     }
 
-    /// Unsaved edits are written now, whatever comes. Waits for that at most as long as `patience`.
+    /// Writes unsaved edits to the recovery file now. Waits for that at most `patience`.
     pub fn flush(&self, patience: Duration) {
         self.files.flush(patience);
     }
 
-    /// Ends the work, but waits for what is being written: returns what was done meanwhile, and where
-    /// unsaved edits are kept, if there are any.
+    /// Ends the threads after pending writes. Returns the remaining results, and the path of the
+    /// recovery file if there are unsaved edits.
     pub fn finish(mut self) -> (Vec<Message>, Option<PathBuf>) {
-        if let Some(sized) = self.sized.take() {
-            sized.end();
+        if let Some(resized) = self.resized.take() {
+            resized.end();
         }
         let Self { session, files, results, done, .. } = self;
         let kept = files.finish();
-        // Tasks are done in order: when this one is done, so are the pictures asked for before.
+        // Tasks run in order: after this one, all requested exports are written.
         session.with(|_, _| ());
         drop((session, results));
         (done.into_iter().collect(), kept)
     }
 
     fn export(&mut self, format: Format) {
-        let (studio, results) = (self.studio.clone(), self.results.clone());
+        let (exporter, results) = (self.exporter.clone(), self.results.clone());
         self.session.submit(move |film| {
             let written = match film {
-                Some((rendering, report)) => studio.write(rendering, report, format),
+                Some((rendering, report)) => exporter.write(rendering, report, format),
                 None => Err("there is no picture to write".to_string()),
             };
             let _ = results.send(Message::Exported(written));
@@ -209,7 +230,7 @@ impl EffectRunner {
     }
 
     fn set_threads(&self) {
-        // If no threads are to be had the old ones stay, and the renderer's reports say how many.
+        // On failure the old threads stay; the renderer's reports carry their number.
         let _ = self.session.set_threads(self.threads, self.niceness);
     }
 

@@ -1,4 +1,4 @@
-//! Pictures written while the work goes on: the film as it stands, or a render at another size.
+//! Exports: the current picture, or a render at another size.
 
 use crate::dashboard::message::{Exported, Format, Message};
 use crate::dashboard::run::file_worker::SharedDocument;
@@ -18,21 +18,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// How often a render at another size is looked at.
+/// Polling interval of a render at another size.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// What every picture of this scene has in common.
+/// Common properties of the exports of a scene.
 #[derive(Clone)]
 pub struct Exporter {
-    /// The scene's file.
-    pub paper: SharedDocument,
-    /// Where pictures are put.
+    /// Document of the scene.
+    pub document: SharedDocument,
+    /// Folder of the exports.
     pub folder: PathBuf,
-    /// What pictures are called, before the counter.
+    /// File name of the exports before the counter.
     pub stem: String,
-    /// Where samples lie.
+    /// Sampler, for the metadata.
     pub sampler: SamplerKind,
-    /// Whether noisy tiles get more samples than others.
+    /// Sample allocation is adaptive, for the metadata.
     pub adaptive: bool,
 }
 
@@ -45,7 +45,7 @@ impl Exporter {
         format: Format,
     ) -> Result<Exported, String> {
         let (source, text) = self.source(rendering.scene());
-        let origin = Provenance {
+        let provenance = Provenance {
             source,
             scene_hash: scene_hash(&text),
             sampler: self.sampler,
@@ -54,7 +54,7 @@ impl Exporter {
         let display = rendering.display();
         let write = |path: &Path| {
             let target = ImageOutput::from_path(path)?.create_new();
-            rendering.write(report, &origin, display, Depth::Eight, &target)
+            rendering.write(report, &provenance, display, Depth::Eight, &target)
         };
         let path = paths::numbered(&self.folder, &self.stem, format.extension(), write)
             .ok_or_else(|| format!("all names for pictures of {} are in use", self.stem))?
@@ -68,9 +68,9 @@ impl Exporter {
         })
     }
 
-    /// What the scene's file is called, and its text with `scene` in it.
+    /// Returns the name of the scene file, and its text updated to `scene`.
     fn source(&self, scene: &Scene) -> (String, String) {
-        match self.paper.document() {
+        match self.document.get() {
             Some(document) => {
                 let mut document = (*document).clone();
                 document.apply(scene);
@@ -87,51 +87,51 @@ pub struct ResizedExport {
     thread: JoinHandle<()>,
 }
 
-/// What is to be rendered.
+/// Request for a render at another size.
 pub struct ExportRequest {
-    /// The scene, with the size that is wanted.
+    /// Scene with the requested film size.
     pub scene: Arc<Scene>,
-    /// The format.
+    /// File format.
     pub format: Format,
     /// Exposure and tone curve.
     pub display: Display,
-    /// When it is done.
+    /// Stop criteria.
     pub stop: Stop,
-    /// How the scene is compiled and sampled.
+    /// Options of scene compilation and sampling.
     pub options: Options,
-    /// How samples are allotted.
+    /// Sample allocation.
     pub settings: Settings,
-    /// Threads that trace.
+    /// Tracing threads.
     pub threads: usize,
 }
 
 impl ResizedExport {
-    /// Starts the thread. It tells of its progress, and at last of the picture, unless cancelled.
+    /// Starts the thread. It reports progress, and the result unless cancelled.
     pub fn start(
-        order: ExportRequest,
-        studio: Exporter,
+        request: ExportRequest,
+        exporter: Exporter,
         results: Sender<Message>,
     ) -> io::Result<Self> {
         let cancelled = Arc::new(AtomicBool::new(false));
-        let mark = Arc::clone(&cancelled);
+        let cancel_flag = Arc::clone(&cancelled);
         let thread = thread::Builder::new().name("export".into()).spawn(move || {
-            // Nobody listens any more when the program ends.
-            let told = render(order, &studio, &mark, &|progress| {
+            // At the end of the program the receiver is gone.
+            let result = render(request, &exporter, &cancel_flag, &|progress| {
                 let _ = results.send(Message::ExportProgress(progress));
             });
-            if let Some(result) = told {
+            if let Some(result) = result {
                 let _ = results.send(Message::Exported(result));
             }
         })?;
         Ok(Self { cancelled, thread })
     }
 
-    /// Ends the render soon, without a picture if it is not being written already.
+    /// Cancels the render; a picture that is already being written is completed.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Cancels, and waits until the thread has ended.
+    /// Cancels, and waits for the thread.
     pub fn end(self) {
         self.cancel();
         if let Err(panic) = self.thread.join() {
@@ -140,20 +140,20 @@ impl ResizedExport {
     }
 }
 
-/// Renders and writes; `None`: cancelled.
+/// Renders and writes the picture; `None` if cancelled.
 fn render(
-    order: ExportRequest,
-    studio: &Exporter,
+    request: ExportRequest,
+    exporter: &Exporter,
     cancelled: &AtomicBool,
-    tell: &dyn Fn(f64),
+    report_progress: &dyn Fn(f64),
 ) -> Option<Result<Exported, String>> {
-    let options = Options { display: order.display, ..order.options };
-    let settings = Settings { stop: order.stop, ..order.settings };
-    let mut session: Session = match Session::new(order.threads, options, settings) {
+    let options = Options { display: request.display, ..request.options };
+    let settings = Settings { stop: request.stop, ..request.settings };
+    let mut session: Session = match Session::new(request.threads, options, settings) {
         Ok(session) => session,
         Err(error) => return Some(Err(format!("no threads to render with: {error}"))),
     };
-    session.set_scene(order.scene);
+    session.set_scene(request.scene);
     loop {
         if cancelled.load(Ordering::Relaxed) {
             return None;
@@ -163,16 +163,16 @@ fn render(
             State::Finished(_) => break,
             State::Failed(why) => return Some(Err(why)),
             State::Idle | State::Tracing | State::Paused => {
-                tell(snapshot.report.progress.unwrap_or(0.0));
+                report_progress(snapshot.report.progress.unwrap_or(0.0));
             }
         }
     }
-    let (studio, format) = (studio.clone(), order.format);
-    let written = session.with(move |rendering, report| studio.write(rendering, report, format));
+    let (exporter, format) = (exporter.clone(), request.format);
+    let written = session.with(move |rendering, report| exporter.write(rendering, report, format));
     Some(written.unwrap_or_else(|| Err("the renderer has no picture".to_string())))
 }
 
-/// What pictures of the scene at `path`, or called `name`, are called.
+/// Returns the file name of exports of the scene at `path`, or called `name`.
 pub fn stem(path: Option<&Path>, name: &str) -> String {
     let path = path.unwrap_or(Path::new(name));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());

@@ -1,5 +1,5 @@
-//! The scene's file, in a thread of its own: a slow disk holds up nobody, and somebody else's writing
-//! is noticed.
+//! Thread that reads and writes the scene file, so that a slow disk does not block the dashboard,
+//! and watches for changes by other programs.
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::autosave::Autosave;
@@ -12,25 +12,25 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime};
 
-/// How often the file is looked at.
+/// Interval between checks of the file.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 
 enum Job {
     Save { scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool },
     Load,
     Autosave(Option<Arc<Scene>>),
-    Secure(Sender<()>),
-    TakeUp,
+    Flush(Sender<()>),
+    Recover,
     Discard,
 }
 
-/// The scene file as it was last read or written; nothing if it never could be read.
+/// The scene document as last read or written; `None` if it has never been readable.
 #[derive(Clone, Default)]
 pub struct SharedDocument(Arc<Mutex<Option<Arc<Document>>>>);
 
 impl SharedDocument {
-    /// The document.
-    pub fn document(&self) -> Option<Arc<Document>> {
+    /// Returns the document.
+    pub fn get(&self) -> Option<Arc<Document>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
@@ -40,72 +40,72 @@ impl SharedDocument {
     }
 }
 
-/// The thread that reads and writes the scene's file.
+/// Handle of the thread that reads and writes the scene file.
 pub struct Files {
     jobs: Option<Sender<Job>>,
-    paper: SharedDocument,
+    document: SharedDocument,
     thread: Option<JoinHandle<Option<PathBuf>>>,
 }
 
 impl Files {
-    /// Starts the thread for a file that has been opened, or for one at a path that cannot be read
-    /// yet. Results go to `results`. `state`: the folder for unsaved edits that cannot be kept beside
-    /// their scene.
+    /// Starts the thread for an open file, or for the path of an unreadable one. Results go to
+    /// `results`. `state` is the folder for recovery files that cannot be written beside their
+    /// scene.
     pub fn new(
         file: Result<SceneFile, PathBuf>,
         state: Option<PathBuf>,
         results: Sender<Message>,
     ) -> io::Result<Self> {
         let (jobs, inbox) = unbounded();
-        let paper = SharedDocument::default();
+        let document = SharedDocument::default();
         let (path, file) = match file {
             Ok(file) => (file.path().map(Path::to_path_buf), Some(file)),
             Err(path) => (Some(path), None),
         };
-        // A file that could be read is compared at the first look; what is wrong with another one is
-        // known already.
+        // A readable file is compared at the first check; the errors of an unreadable one are
+        // known.
         let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
         let name = file.as_ref().map_or("", |file| file.document().name());
-        let journal = Autosave::new(path.as_deref(), name, state);
-        let clerk = FileWorker { path, file, seen, journal, paper: paper.clone(), results };
-        let thread = thread::Builder::new().name("files".into()).spawn(|| clerk.run(inbox))?;
-        Ok(Self { jobs: Some(jobs), paper, thread: Some(thread) })
+        let autosave = Autosave::new(path.as_deref(), name, state);
+        let worker = FileWorker { path, file, seen, autosave, document: document.clone(), results };
+        let thread = thread::Builder::new().name("files".into()).spawn(|| worker.run(inbox))?;
+        Ok(Self { jobs: Some(jobs), document, thread: Some(thread) })
     }
 
-    /// Writes the scene: a [`Message::Saved`] follows.
+    /// Writes the scene; the result is a [`Message::Saved`].
     pub fn save(&self, scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool) {
         self.give(Job::Save { scene, path, overwrite });
     }
 
-    /// Reads the file: a [`Message::Loaded`] follows.
+    /// Reads the file; the result is a [`Message::Loaded`].
     pub fn load(&self) {
         self.give(Job::Load);
     }
 
-    /// The scene has unsaved edits, and is this now; `None`: it has none any more. They are written
-    /// where the next start finds them: soon, or at the end.
-    pub fn journal(&self, scene: Option<Arc<Scene>>) {
+    /// Schedules an autosave of a scene with unsaved edits, written after a pause or at the end;
+    /// `None` removes the recovery file.
+    pub fn autosave(&self, scene: Option<Arc<Scene>>) {
         self.give(Job::Autosave(scene));
     }
 
-    /// Unsaved edits are written now. Waits for that at most as long as `patience`.
+    /// Writes unsaved edits now. Waits for that at most `patience`.
     pub fn flush(&self, patience: Duration) {
-        let (done, told) = bounded(1);
-        self.give(Job::Secure(done));
-        let _ = told.recv_timeout(patience);
+        let (done, completion) = bounded(1);
+        self.give(Job::Flush(done));
+        let _ = completion.recv_timeout(patience);
     }
 
-    /// The edits of the last [`Message::OrphanedEdits`] are what is unsaved now.
-    pub fn take_up(&self) {
-        self.give(Job::TakeUp);
+    /// The edits of the last [`Message::OrphanedEdits`] become the unsaved edits.
+    pub fn recover(&self) {
+        self.give(Job::Recover);
     }
 
-    /// The edits of the last [`Message::OrphanedEdits`] are not wanted.
+    /// Discards the edits of the last [`Message::OrphanedEdits`].
     pub fn discard(&self) {
         self.give(Job::Discard);
     }
 
-    /// Waits for what is being written; where unsaved edits are kept, if there are any.
+    /// Waits for pending writes. Returns the recovery file, if there are unsaved edits.
     pub fn finish(mut self) -> Option<PathBuf> {
         self.join()
     }
@@ -119,25 +119,25 @@ impl Files {
         }
     }
 
-    /// What the file holds.
-    pub fn paper(&self) -> SharedDocument {
-        self.paper.clone()
+    /// Returns a handle of the scene document.
+    pub fn document(&self) -> SharedDocument {
+        self.document.clone()
     }
 
     fn give(&self, job: Job) {
-        // The thread ends only with this sender, or by a panic, which `drop` passes on.
+        // The thread ends only with this sender, or by a panic, which `drop` propagates.
         let _ = self.jobs.as_ref().map(|jobs| jobs.send(job));
     }
 }
 
-/// Waits for what is being written.
+/// Waits for pending writes.
 impl Drop for Files {
     fn drop(&mut self) {
         self.join();
     }
 }
 
-/// What tells one state of a file from another.
+/// Modification time and length, to detect changes.
 type FileStamp = Option<(SystemTime, u64)>;
 
 fn stamp(path: &Path) -> FileStamp {
@@ -146,90 +146,90 @@ fn stamp(path: &Path) -> FileStamp {
 }
 
 struct FileWorker {
-    /// Where it is, if it is anywhere yet.
+    /// Path of the file, if it has one.
     path: Option<PathBuf>,
-    /// The file, once it could be read.
+    /// The file, once it has been readable.
     file: Option<SceneFile>,
-    /// The state of the file when it was last read, written or looked at.
+    /// Stamp of the file when last read, written or checked.
     seen: FileStamp,
-    journal: Autosave,
-    paper: SharedDocument,
+    autosave: Autosave,
+    document: SharedDocument,
     results: Sender<Message>,
 }
 
 impl FileWorker {
-    /// Works until there is nobody to work for. Where unsaved edits are kept, if there are any.
+    /// Runs until the senders are gone. Returns the recovery file, if there are unsaved edits.
     fn run(mut self, inbox: Receiver<Job>) -> Option<PathBuf> {
         self.publish();
-        for message in self.journal.search(whole(&self.file, &self.path)) {
-            self.tell(message);
+        for message in self.autosave.search(file_or_path(&self.file, &self.path)) {
+            self.send(message);
         }
-        let mut looked = Instant::now();
+        let mut checked = Instant::now();
         loop {
-            let next_look = looked + CHECK_INTERVAL;
-            let due = self.journal.due().map_or(next_look, |due| due.min(next_look));
+            let next_check = checked + CHECK_INTERVAL;
+            let due = self.autosave.due().map_or(next_check, |due| due.min(next_check));
             match inbox.recv_deadline(due) {
                 Ok(job) => self.work(job),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }
             let now = Instant::now();
-            if self.journal.due().is_some_and(|due| due <= now) {
-                self.write_journal();
+            if self.autosave.due().is_some_and(|due| due <= now) {
+                self.write_autosave();
             }
-            if next_look <= now {
-                looked = now;
+            if next_check <= now {
+                checked = now;
                 if self.changed() {
-                    self.tell(Message::ChangedOnDisk);
+                    self.send(Message::ChangedOnDisk);
                 }
             }
         }
-        self.write_journal();
-        self.journal.path().map(Path::to_path_buf)
+        self.write_autosave();
+        self.autosave.path().map(Path::to_path_buf)
     }
 
     fn work(&mut self, job: Job) {
         match job {
             Job::Save { scene, path, overwrite } => {
                 let saved = self.save(&scene, path, overwrite);
-                self.tell(Message::Saved(scene, saved));
+                self.send(Message::Saved(scene, saved));
             }
             Job::Load => {
                 let loaded = self.load();
-                self.tell(Message::Loaded(Box::new(loaded)));
+                self.send(Message::Loaded(Box::new(loaded)));
             }
-            Job::Autosave(scene) => self.journal.note(scene, Instant::now()),
-            Job::Secure(done) => {
-                self.write_journal();
-                // Nobody waits any more if it has taken long.
+            Job::Autosave(scene) => self.autosave.note(scene, Instant::now()),
+            Job::Flush(done) => {
+                self.write_autosave();
+                // The receiver has given up after its timeout.
                 let _ = done.try_send(());
             }
-            Job::TakeUp => {
+            Job::Recover => {
                 let spoilt = self.path.as_deref().filter(|_| self.file.is_none());
-                if let Some(file) = self.journal.take_up(spoilt) {
+                if let Some(file) = self.autosave.recover(spoilt) {
                     self.file = Some(file);
                     self.publish();
                 }
             }
             Job::Discard => {
-                self.journal.discard();
-                let next = self.journal.offer(whole(&self.file, &self.path));
-                next.into_iter().for_each(|message| self.tell(message));
+                self.autosave.discard();
+                let next = self.autosave.offer(file_or_path(&self.file, &self.path));
+                next.into_iter().for_each(|message| self.send(message));
             }
         }
     }
 
-    fn write_journal(&mut self) {
-        let told = self.file.as_ref().and_then(|file| self.journal.write(file));
-        told.into_iter().for_each(|message| self.tell(message));
+    fn write_autosave(&mut self) {
+        let warning = self.file.as_ref().and_then(|file| self.autosave.write(file));
+        warning.into_iter().for_each(|message| self.send(message));
     }
 
-    fn tell(&self, message: Message) {
-        // Nobody listens any more when the program ends.
+    fn send(&self, message: Message) {
+        // At the end of the program the receiver is gone.
         let _ = self.results.send(message);
     }
 
-    /// Whether somebody has written the file since it was read, written or told about.
+    /// Returns `true` if another program has changed the file since the last read, write or report.
     fn changed(&mut self) -> bool {
         let Some(path) = &self.path else { return false };
         let now = stamp(path);
@@ -250,24 +250,24 @@ impl FileWorker {
         overwrite: bool,
     ) -> Result<PathBuf, SaveError> {
         let Some(file) = &mut self.file else {
-            let what = "it holds something that is no scene".to_string();
+            let what = "its contents are not a scene".to_string();
             return Err(SaveError::Failed { path: self.path.clone().unwrap_or_default(), what });
         };
-        self.journal.saving(file, scene);
+        self.autosave.saving(file, scene);
         match path {
             Some(path) => file.save_as(&path, scene, overwrite)?,
             None => file.save(scene, overwrite)?,
         }
         let path = file.path().ok_or(SaveError::Untitled)?.to_path_buf();
         self.seen = stamp(&path);
-        self.journal.saved(scene, &path);
+        self.autosave.saved(scene, &path);
         self.path = Some(path.clone());
         self.publish();
         Ok(path)
     }
 
     fn load(&mut self) -> Result<Arc<Scene>, SceneErrors> {
-        // Before reading: what is written meanwhile is news.
+        // Before reading, so that a write during the read counts as a change.
         self.seen = self.path.as_deref().and_then(stamp);
         let file = match (self.file.take(), &self.path) {
             (Some(file), _) => {
@@ -285,13 +285,13 @@ impl FileWorker {
 
     fn publish(&self) {
         if let Some(file) = &self.file {
-            self.paper.put(file.document());
+            self.document.put(file.document());
         }
     }
 }
 
-/// The file, or where it is.
-fn whole<'a>(
+/// Returns the file, or its path.
+fn file_or_path<'a>(
     file: &'a Option<SceneFile>,
     path: &'a Option<PathBuf>,
 ) -> Result<&'a SceneFile, &'a Path> {
@@ -303,7 +303,7 @@ mod tests {
     use super::*;
     use crate::scene::starter;
 
-    /// Long enough for any machine; reached only on failure.
+    /// Generous timeout; reached only on failure.
     const PATIENCE: Duration = Duration::from_secs(60);
 
     fn opened(path: &Path) -> (Files, Receiver<Message>) {
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn what_others_write_is_told_once_and_what_is_saved_is_not() {
+    fn external_change_is_reported_once() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
         fs::write(&path, starter()).unwrap();
@@ -330,7 +330,7 @@ mod tests {
         files.save(Arc::new(scene.clone()), None, false);
         let saved = inbox.recv_timeout(PATIENCE).unwrap();
         assert!(matches!(saved, Message::Saved(_, Ok(at)) if at == path));
-        assert_eq!(files.paper().document().unwrap().scene(), &scene);
+        assert_eq!(files.document().get().unwrap().scene(), &scene);
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL + CHECK_INTERVAL / 2);
         assert!(quiet.is_err(), "{quiet:?}");
         fs::write(&path, format!("{}\n# more\n", starter())).unwrap();
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_file_is_read_once_it_is_mended() {
+    fn fixed_file_can_be_loaded() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
         fs::write(&path, "[camera").unwrap();
@@ -359,11 +359,11 @@ mod tests {
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
         files.load();
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_ok());
-        assert!(files.paper().document().is_some());
+        assert!(files.document().get().is_some());
     }
 
     #[test]
-    fn edits_are_kept_at_the_end_unless_they_were_saved_or_left() {
+    fn edits_are_autosaved_at_end_unless_saved() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
         fs::write(&path, starter()).unwrap();
@@ -372,7 +372,7 @@ mod tests {
         let scene = Arc::new(scene);
         let hidden = folder.path().join(".a.toml.unsaved");
         let (files, _inbox) = opened(&path);
-        files.journal(Some(Arc::clone(&scene)));
+        files.autosave(Some(Arc::clone(&scene)));
         assert_eq!(files.finish(), Some(hidden.clone()));
         assert!(fs::read_to_string(&hidden).unwrap().contains("64"));
         let (files, inbox) = opened(&path);
@@ -381,23 +381,23 @@ mod tests {
             matches!(&offered, Message::OrphanedEdits(left) if left.scene == scene),
             "{offered:?}"
         );
-        files.take_up();
-        files.journal(Some(Arc::clone(&scene)));
+        files.recover();
+        files.autosave(Some(Arc::clone(&scene)));
         files.save(Arc::clone(&scene), None, false);
         assert_eq!(files.finish(), None);
         assert!(!hidden.exists());
         assert!(fs::read_to_string(&path).unwrap().contains("64"));
         let (files, _inbox) = opened(&path);
-        files.journal(Some(Arc::new(Scene::parse(starter(), "a").unwrap())));
+        files.autosave(Some(Arc::new(Scene::parse(starter(), "a").unwrap())));
         files.flush(PATIENCE);
         assert!(hidden.exists());
-        files.journal(None);
+        files.autosave(None);
         assert_eq!(files.finish(), None);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
     #[test]
-    fn what_was_given_is_done_before_the_end() {
+    fn pending_jobs_finish_before_end() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new.toml");
         let (results, _inbox) = unbounded();

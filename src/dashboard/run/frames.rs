@@ -1,4 +1,4 @@
-//! From the model to the terminal's bytes: a frame is drawn, thinned out, encoded, sent.
+//! Frame pipeline: the model is drawn, diffed, encoded and sent.
 
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
@@ -15,13 +15,13 @@ use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// What is shown at once by terminals that know this mode, and then.
+/// Begin and end of a synchronised update.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
 
-/// What a question takes.
+/// Bytes of an acknowledgement request.
 const QUESTION_BYTES: usize = 16;
 
-/// Frames on their way to the terminal.
+/// Pipeline of frames to the terminal.
 pub struct FramePipeline {
     view: View,
     pacing: FrameDiff,
@@ -29,24 +29,24 @@ pub struct FramePipeline {
     queue: Option<TcpSendQueue>,
     synchronised: bool,
     writer: Writer,
-    /// Bytes so far.
+    /// Bytes sent so far.
     sent: u64,
     wanted: Buffer,
-    /// Where the cursor ought to be shown, if it ought to.
+    /// Position of the text cursor, if visible.
     cursor: Option<Position>,
     facts: FrameMeta,
-    /// For the clipboard: goes out with the next frame.
+    /// Clipboard sequence to send with the next frame.
     copied: String,
     tty: Arc<Tty>,
-    /// The still that the model shows.
+    /// Upload of the image in the viewer.
     sending: Option<ImageUpload>,
-    /// What takes away one that it shows no more: goes out before the next frame.
+    /// Sequence that removes the previous image; sent before the next frame.
     removal: Vec<u8>,
-    /// It has gone out.
+    /// The removal has been sent.
     removing: bool,
 }
 
-/// What a frame has to know of the model, as it was when it was drawn.
+/// Values of the model when the frame was drawn.
 #[derive(Clone, Copy, Debug, Default)]
 struct FrameMeta {
     version: u64,
@@ -54,25 +54,25 @@ struct FrameMeta {
     settled: bool,
 }
 
-/// What became of an attempt to draw.
+/// Outcome of an attempt to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DrawOutcome {
-    /// Nothing may be sent now; nothing was drawn.
+    /// The frame budget is empty; nothing was drawn.
     Nothing,
-    /// Only the picture differs, and has to wait.
-    BranchStack,
-    /// The screen is as it ought to be, in what matters.
+    /// Only the picture differs, and its transfer is deferred.
+    Deferred,
+    /// The screen is up to date in all visible differences.
     Same,
-    /// A slice of a still was sent; nothing was drawn.
+    /// A slice of an image was sent; nothing was drawn.
     Slice,
-    /// A frame was sent without the picture.
+    /// A frame without picture cells was sent.
     Text,
-    /// A frame was sent.
+    /// A frame with picture cells was sent.
     Picture,
 }
 
 impl FramePipeline {
-    /// For a terminal that shows nothing. `bandwidth`: bytes a second that the user wants to be sent.
+    /// Creates a pipeline for an empty screen. `bandwidth` is a fixed rate in bytes per second.
     pub fn new(tty: Arc<Tty>, terminal: &Capabilities, bandwidth: Option<f64>) -> io::Result<Self> {
         let queue = terminal.surroundings.ssh.as_deref().and_then(TcpSendQueue::find);
         Ok(Self {
@@ -94,26 +94,26 @@ impl FramePipeline {
         })
     }
 
-    /// Puts `text` into the clipboard of the terminal, with the next frame.
+    /// Copies `text` to the clipboard of the terminal, with the next frame.
     pub fn copy(&mut self, text: &str) {
         self.copied = copied(text);
     }
 
-    /// Nothing is known any more of what the terminal shows.
+    /// Forgets the contents of the screen, so that the next frame redraws all of it.
     pub fn forget(&mut self) {
         self.pacing = FrameDiff::new();
         self.give_up();
     }
 
-    /// How much of the still that is shown has been sent, 0..=1.
-    pub fn still_sent(&self) -> Option<f64> {
+    /// Transferred share of the viewed image, 0..=1.
+    pub fn uploaded(&self) -> Option<f64> {
         self.sending.as_ref().map(ImageUpload::share)
     }
 
-    /// The model's still is the one that is sent.
+    /// Follows the image in the model's viewer.
     pub fn follow(&mut self, model: &Model) {
         let still = match &model.overlay {
-            Some(Overlay::ViewerImage(looked)) => looked.still.as_ref(),
+            Some(Overlay::ViewerImage(viewed)) => viewed.still.as_ref(),
             _ => None,
         };
         let same = |sending: &ImageUpload| still.is_some_and(|still| sending.is_of(still));
@@ -123,7 +123,7 @@ impl FramePipeline {
         }
     }
 
-    /// Takes away what was sent of a still.
+    /// Stops an upload and removes what was sent of it.
     fn give_up(&mut self) {
         if let Some(sending) = self.sending.take() {
             let (removal, destroys) = sending.removal();
@@ -134,13 +134,13 @@ impl FramePipeline {
         }
     }
 
-    /// Sends the next slice of a still.
+    /// Sends the next slice of an image.
     fn slice(&mut self, now: Duration, allowance: FrameBudget) -> DrawOutcome {
         let Some(sending) = self.sending.as_mut().filter(|_| allowance.picture) else {
             return DrawOutcome::Nothing;
         };
         if !sending.has_begun() {
-            // Whatever happens from here on.
+            // The image must be removed however the program ends.
             self.tty.set_exit_sequence(&sending.any_removal());
             self.removing = false;
         }
@@ -159,42 +159,43 @@ impl FramePipeline {
         DrawOutcome::Slice
     }
 
-    /// Whether the last frame has been written.
+    /// Returns `true` if the last frame has been written.
     pub fn ready(&self) -> bool {
         self.writer.ready()
     }
 
-    /// Whether differences of the picture wait that can be seen, and bytes of frames sent so far.
+    /// Returns `true` if visible differences of the picture are pending, and the bytes of frames
+    /// sent so far.
     pub fn load(&self) -> (bool, u64) {
         (self.pacing.rest().visible, self.sent)
     }
 
-    /// What the user is told about the line.
+    /// Status of the connection, for display.
     pub fn reading(&self) -> Option<LinkStatus> {
         self.link.reading()
     }
 
-    /// The user has done something.
+    /// Records user input.
     pub fn act(&mut self, now: Duration) {
         self.link.act(now);
     }
 
-    /// The terminal has answered the question after a frame.
+    /// Records the acknowledgement of a frame.
     pub fn answered(&mut self, at: Duration) {
         self.link.on_ack(at);
     }
 
-    /// How long to wait for answers at the end; nothing if there are none.
+    /// Time to wait for acknowledgements at the end; `None` if none are outstanding.
     pub fn awaits(&self) -> Option<Duration> {
         self.link.awaits()
     }
 
-    /// Whether questions are still to be answered.
+    /// Returns `true` if acknowledgements are outstanding.
     pub fn is_waiting(&self) -> bool {
         self.link.is_waiting()
     }
 
-    /// Takes note of how things stand with the line.
+    /// Updates flow control: expires acknowledgements and reads the send queue.
     pub fn look(&mut self, now: Duration) {
         self.link.expire(now);
         if self.link.asks_kernel(now) {
@@ -202,7 +203,7 @@ impl FramePipeline {
         }
     }
 
-    /// When a new picture could be sent, or at least a text about it.
+    /// Time at which a new picture, or at least text, could be sent.
     pub fn snapshot_due(&self, now: Duration, answers: bool) -> Duration {
         match self.link.allowance(now, answers) {
             Some(_) => now,
@@ -210,8 +211,8 @@ impl FramePipeline {
         }
     }
 
-    /// When to draw again; `None`: when something happens. `changed`: the model is another one;
-    /// `answers`: what is drawn shows what the user has just done.
+    /// Time of the next draw; `None` until an event. `changed` is whether the model differs from
+    /// the last frame, `answers` whether the frame responds to user input.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
         let rest = self.pacing.rest();
         let text = changed || rest.text || !self.removal.is_empty();
@@ -232,15 +233,16 @@ impl FramePipeline {
         }
     }
 
-    /// Draws the model, if it has `changed`, and sends what the line has room for. `subject` counts up
-    /// when the picture is another one than the same with more samples. Only when [`FramePipeline::ready`].
+    /// Draws the model if it has `changed` and sends as much as the connection has room for.
+    /// `image_epoch` increases when the picture is replaced by one that is not a refinement.
+    /// Requires [`FramePipeline::ready`].
     pub fn draw(
         &mut self,
         model: &Model,
         now: Duration,
         changed: bool,
         answers: bool,
-        subject: u64,
+        image_epoch: u64,
     ) -> DrawOutcome {
         let Some(whole) = self.link.allowance(now, answers) else { return DrawOutcome::Nothing };
         let mut allowance = whole;
@@ -248,7 +250,7 @@ impl FramePipeline {
             if sending.is_open() {
                 return self.slice(now, whole);
             }
-            // What is crisp comes over the picture, or lies there already.
+            // The image covers the picture, or is about to.
             allowance.picture &= !sending.follows(true);
         }
         if changed {
@@ -261,7 +263,7 @@ impl FramePipeline {
             cursor: self.cursor,
             picture,
             uncovered,
-            subject,
+            subject: image_epoch,
             version,
             samples,
             settled,
@@ -286,7 +288,7 @@ impl FramePipeline {
                 return self.slice(now, whole);
             }
             return if self.pacing.rest().visible {
-                DrawOutcome::BranchStack
+                DrawOutcome::Deferred
             } else {
                 DrawOutcome::Same
             };
@@ -305,12 +307,12 @@ impl FramePipeline {
         if frame.picture { DrawOutcome::Picture } else { DrawOutcome::Text }
     }
 
-    /// Tells when the frame on its way has been written.
+    /// Receives the result of each written frame.
     pub fn written(&self) -> &Receiver<Written> {
         self.writer.written()
     }
 
-    /// Takes note that the frame on its way has been written; when that was.
+    /// Records that the frame was written; returns when.
     pub fn written_at(&mut self, frame: Written) -> io::Result<Instant> {
         if std::mem::take(&mut self.removing) {
             self.tty.set_exit_sequence(&[]);

@@ -1,53 +1,59 @@
-//! Written pictures made ready to be looked at.
+//! Preparation of exported images for the image viewer.
 
 use crate::dashboard::message::Message;
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::run::{Dashboard, TELL_INTERVAL};
+use crate::dashboard::run::{Dashboard, STATUS_INTERVAL};
 use crate::film::Display;
-use crate::terminal::cell_px;
 use crate::terminal::image::{ImageViewport, Protocol, ViewerImage};
-use std::path::Path;
+use crate::terminal::{Capabilities, cell_px};
+use crossbeam_channel::Sender;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-/// A still takes no longer than this to be sent, whatever the line carries.
-const LONGEST: Duration = Duration::from_secs(8);
+/// Longest time that the transfer of an image may take: slower connections get a smaller image.
+const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
+
+/// Returns the space for an image on a terminal of `screen` columns and rows, whose connection
+/// carries `line_rate` bytes per second; `None` is a local terminal.
+pub fn viewport(
+    terminal: &Capabilities,
+    screen: [u16; 2],
+    line_rate: Option<f64>,
+) -> ImageViewport {
+    // The font size may have changed since the start.
+    let cell_px = cell_px().or(terminal.cell_px);
+    let protocol = Protocol::of(&Capabilities { cell_px, ..terminal.clone() });
+    let most_bytes = line_rate.map(|rate| rate * MAX_TRANSFER_TIME.as_secs_f64());
+    ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, most_bytes }
+}
+
+/// Reads the image at `path` and encodes it for `viewport`, in a thread of its own. Sends a
+/// [`Message::ViewerImage`] to `results`.
+pub fn prepare(path: PathBuf, display: Display, viewport: ImageViewport, results: Sender<Message>) {
+    let (requested, failed) = (path.clone(), results.clone());
+    let started = thread::Builder::new().name("image viewer".into()).spawn(move || {
+        let image = ViewerImage::read(&path, &display, &viewport).map(Arc::new);
+        // At the end of the program the receiver is gone.
+        let _ = results.send(Message::ViewerImage(path, image));
+    });
+    if let Err(error) = started {
+        let _ = failed.send(Message::ViewerImage(requested, Err(error.to_string())));
+    }
+}
 
 impl Dashboard {
-    /// Reads the picture at `path` and makes it ready for a screen, in a thread of its own.
-    pub(super) fn prepare_still(&self, path: &Path, display: Display, screen: [u16; 2]) {
-        // The terminal's font may have another size than at the start.
-        let cell_px = cell_px().or(self.terminal.cell_px);
-        let mut terminal = self.terminal.clone();
-        terminal.cell_px = cell_px;
-        let most_bytes = self.frames.reading().map(|line| line.rate * LONGEST.as_secs_f64());
-        let protocol = Protocol::of(&terminal);
-        let window =
-            ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, most_bytes };
-        let (path, results) = (path.to_path_buf(), self.hands.results());
-        let failed = results.clone();
-        let asked = path.clone();
-        let started = thread::Builder::new().name("still".into()).spawn(move || {
-            let still = ViewerImage::read(&path, &display, &window).map(Arc::new);
-            // Nobody listens any more when the program ends.
-            let _ = results.send(Message::ViewerImage(path, still));
-        });
-        if let Err(error) = started {
-            let _ = failed.send(Message::ViewerImage(asked, Err(error.to_string())));
-        }
-    }
-
-    /// Tells the model now and then how much of a still has been sent.
-    pub(super) fn tell_of_still(&mut self, now: Duration) {
-        let Some(sent) = self.frames.still_sent() else { return };
+    /// Reports the progress of an image transfer to the model, at most once per [`STATUS_INTERVAL`].
+    pub(super) fn report_upload(&mut self, now: Duration) {
+        let Some(sent) = self.frames.uploaded() else { return };
         let known = match &self.model.overlay {
-            Some(Overlay::ViewerImage(looked)) => looked.sent,
+            Some(Overlay::ViewerImage(viewed)) => viewed.sent,
             _ => return,
         };
-        if sent != known && (sent == 1.0 || self.status_sent_at + TELL_INTERVAL <= now) {
+        if sent != known && (sent == 1.0 || self.status_sent_at + STATUS_INTERVAL <= now) {
             self.status_sent_at = now;
-            self.dispatch(Message::StillSent(sent));
+            self.dispatch(Message::ImageSent(sent));
         }
     }
 }

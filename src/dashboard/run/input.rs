@@ -1,4 +1,4 @@
-//! From what the terminal sends to the dashboard's messages.
+//! Conversion of terminal events to messages.
 
 use crate::dashboard::message::Message;
 use crate::terminal::event::{Mouse, MouseKind};
@@ -8,16 +8,16 @@ use std::io;
 use std::thread;
 use std::time::Instant;
 
-/// Something that the user did, and when it was read.
+/// A user event with its time of reading.
 #[derive(Debug)]
 pub struct Input {
-    /// When it was read; of what was joined, the first.
+    /// Time of reading; of joined events, that of the first.
     pub at: Instant,
-    /// What.
+    /// Message.
     pub message: Message,
 }
 
-/// Starts a thread that reads the terminal. After an error it ends.
+/// Starts a thread that reads the terminal until an error.
 pub fn read(mut keyboard: Keyboard) -> io::Result<Receiver<io::Result<Timed>>> {
     let (sender, receiver) = unbounded();
     thread::Builder::new().name("reader".into()).spawn(move || {
@@ -38,8 +38,8 @@ pub fn read(mut keyboard: Keyboard) -> io::Result<Receiver<io::Result<Timed>>> {
     Ok(receiver)
 }
 
-/// Adds `input` to what has not been acted upon yet. Of a drag only the newest place counts, of a
-/// resize the newest size; ticks of the wheel add up.
+/// Appends `input` to the pending events. Drags join to the newest position, resizes to the newest
+/// size; ticks of the wheel add up.
 pub fn join(queue: &mut Vec<Input>, input: Input) {
     if let Some(last) = queue.last_mut() {
         match (&mut last.message, &input.message) {
@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn drags_and_ticks_are_joined_and_nothing_else() {
+    fn only_drags_and_wheel_ticks_are_joined() {
         use MouseKind::{Drag, Press, Release, Scroll};
         let (left, right) = (Button::Left, Button::Right);
         let mut queue = Vec::new();
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn of_sizes_only_the_newest_counts_and_keys_stay_apart() {
+    fn resizes_are_joined_and_keys_are_not() {
         let mut queue = Vec::new();
         let now = Instant::now();
         let key = Key { code: Code::Left, ctrl: false, alt: false, shift: false };

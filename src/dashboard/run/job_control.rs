@@ -1,5 +1,4 @@
-//! What befalls a program in a terminal: it is stopped and goes on, the terminal changes its size, or
-//! is gone.
+//! Job control (suspend and resume), resizing, and loss of the terminal.
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::Dashboard;
@@ -10,64 +9,64 @@ use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A size counts when no other has come for so long,
+/// A resize takes effect after this time without another one,
 const SETTLED: Duration = Duration::from_millis(90);
-/// and while they go on coming, when the first has waited for so long.
+/// or at the latest this time after the first of a series.
 const LONGEST: Duration = Duration::from_millis(400);
-/// How long stopping waits for unsaved edits to be written.
+/// Longest wait for the autosave before suspending.
 const SECURED_WITHIN: Duration = Duration::from_secs(2);
-/// Who has not been stopped by then will not be.
+/// Longest wait for the stop signal to take effect.
 const STOPS_WITHIN: Duration = Duration::from_millis(500);
 
-/// The terminal and what comes from outside.
+/// Terminal and event sources.
 pub(super) struct TerminalIo {
-    /// What is written to.
+    /// Terminal for output.
     pub tty: Arc<Tty>,
-    /// What comes from the terminal.
+    /// Input events.
     pub input: Receiver<io::Result<Timed>>,
-    /// What comes from others.
+    /// Signals.
     pub signals: Receiver<SignalEvent>,
-    /// Somebody has given the terminal back, for good.
+    /// The terminal has been restored for good.
     pub left: Receiver<()>,
 }
 
-/// A size that may change again at once.
+/// Debounce of terminal sizes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ResizeDebounce(Option<(Duration, Duration)>);
 
 impl ResizeDebounce {
-    /// It has changed.
+    /// Records a resize.
     pub fn note(&mut self, now: Duration) {
         let first = self.0.map_or(now, |(first, _)| first);
         self.0 = Some((first, now));
     }
 
-    /// When it counts; `None`: it does not change.
+    /// Time at which the new size takes effect, if one is pending.
     pub fn due(&self) -> Option<Duration> {
         self.0.map(|(first, last)| (last + SETTLED).min(first + LONGEST))
     }
 }
 
 impl Dashboard {
-    /// Does what a signal says; the exit status if that is to end.
-    pub(super) fn handle_signal(&mut self, told: SignalEvent, line: &TerminalIo) -> Option<u8> {
-        match told {
+    /// Handles a signal. Returns the exit status if the program is to end.
+    pub(super) fn handle_signal(&mut self, event: SignalEvent, line: &TerminalIo) -> Option<u8> {
+        match event {
             SignalEvent::End(status) => Some(status),
             SignalEvent::Resized => {
                 self.resizing.note(self.began.elapsed());
                 None
             }
             SignalEvent::Stop => self.suspend(StopTarget::Itself, line),
-            // It was stopped without being asked: by SIGSTOP.
+            // Resumed after an unannounced SIGSTOP.
             SignalEvent::Continue => self.resume(line),
         }
     }
 
-    /// Gives the terminal back, stops, and takes it again when told to go on; the exit status if the
+    /// Restores the terminal, stops, and resumes when continued. Returns the exit status if the
     /// program is to end instead.
     pub(super) fn suspend(&mut self, whom: StopTarget, line: &TerminalIo) -> Option<u8> {
-        // It may never go on.
-        self.hands.flush(SECURED_WITHIN);
+        // The program may never be resumed.
+        self.effects.flush(SECURED_WITHIN);
         self.await_answers(&line.input);
         line.tty.suspend();
         let mut stopped = stop(whom).is_ok();
@@ -81,12 +80,12 @@ impl Dashboard {
         }
         let end = self.resume(line);
         if !stopped {
-            self.dispatch(Message::Trouble("there is no shell to go back to".to_string()));
+            self.dispatch(Message::Warning("there is no shell to go back to".to_string()));
         }
         end
     }
 
-    /// Takes the terminal, whatever has become of it, and draws everything anew.
+    /// Takes the terminal again and redraws everything.
     fn resume(&mut self, line: &TerminalIo) -> Option<u8> {
         if line.tty.resume().is_err() {
             return Some(HUNG_UP);
@@ -95,11 +94,11 @@ impl Dashboard {
         None
     }
 
-    /// The terminal may have another size; what it shows is not known.
+    /// Adopts the current terminal size and redraws everything.
     pub(super) fn resize(&mut self) {
         self.resizing = ResizeDebounce::default();
         self.frames.forget();
-        // Whether there is a terminal at all the next frame will tell.
+        // A missing terminal shows at the next frame.
         let screen = size().unwrap_or(self.model.screen);
         self.dispatch(Message::Resize(screen));
     }
@@ -110,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_storm_of_sizes_counts_once_it_is_over_or_has_been_long() {
+    fn resize_takes_effect_after_pause_or_limit() {
         let ms = Duration::from_millis;
         let mut resizing = ResizeDebounce::default();
         assert_eq!(resizing.due(), None);

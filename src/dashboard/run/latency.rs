@@ -1,38 +1,37 @@
-//! How long answers take: from the reading of an event to the moment when the frame that answers it
-//! has been handed to the terminal.
+//! Input latency: from reading an event to handing the frame that responds to it to the terminal.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// What answers an event.
+/// Response to an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Answer {
     /// The next frame.
     Screen,
-    /// The first frame with a picture of this scene, or of a later one.
+    /// The first frame with a picture of this generation or a later one.
     Picture(u64),
 }
 
-/// An event that waits for its answer.
+/// An event without response yet.
 #[derive(Clone, Copy, Debug)]
 struct Awaiting {
     read: Instant,
     answer: Answer,
 }
 
-/// An event that was answered.
+/// An event with its response time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Answered {
-    /// When it was read, after the start.
+    /// Time of reading, since the start.
     read: Duration,
     picture: bool,
     after: Duration,
 }
 
-/// Events and their answers. Always at work, because answers do not wait for the frame interval;
-/// what was answered is remembered only if somebody wants to know.
+/// Recorder of response times. It is always active, because responses bypass the frame interval;
+/// results are stored only on request.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,
@@ -42,17 +41,17 @@ pub struct LatencyRecorder {
     load: Load,
 }
 
-/// What the line has been given while differences waited that can be seen.
+/// Traffic while visible differences were pending.
 #[derive(Clone, Copy, Debug, Default)]
 struct Load {
-    /// When it was looked last, whether they waited then, and bytes that had been sent.
+    /// Last update: time, whether differences were pending, bytes sent.
     last: (Duration, bool, u64),
     waited: Duration,
     bytes: u64,
 }
 
 impl LatencyRecorder {
-    /// From now on; `remember`: for [`LatencyRecorder::write`].
+    /// Creates a recorder. `remember` is whether results are stored for [`LatencyRecorder::write`].
     pub fn new(remember: bool) -> Self {
         Self {
             began: Instant::now(),
@@ -63,18 +62,19 @@ impl LatencyRecorder {
         }
     }
 
-    /// An event was read and acted upon; `scene`: the number of the scene that it made.
+    /// Records an event that was read at `read` and handled. `scene` is the generation that it
+    /// created, if any.
     pub fn event(&mut self, read: Instant, scene: Option<u64>) {
         let answer = scene.map_or(Answer::Screen, Answer::Picture);
         self.awaiting.push(Awaiting { read, answer });
     }
 
-    /// Whether a frame that shows the picture of `scene` would answer somebody.
+    /// Returns `true` if a frame with the picture of `scene` would respond to an event.
     pub fn replies(&self, scene: u64) -> bool {
         self.awaiting.iter().any(|waiting| waiting.answered_by(scene))
     }
 
-    /// A frame that shows the picture of `scene` is on its way.
+    /// Records that a frame with the picture of `scene` is in flight.
     pub fn sent(&mut self, scene: u64) {
         let in_flight = &mut self.in_flight;
         self.awaiting.retain(|waiting| {
@@ -86,7 +86,7 @@ impl LatencyRecorder {
         });
     }
 
-    /// The frame on its way was written at `at`.
+    /// Records that the frame in flight was written at `at`.
     pub fn written(&mut self, at: Instant) {
         for waiting in self.in_flight.drain(..) {
             if let Some(answered) = &mut self.answered {
@@ -99,22 +99,22 @@ impl LatencyRecorder {
         }
     }
 
-    /// After a frame, if there was one: whether differences that can be seen wait still, and the bytes
-    /// sent so far.
+    /// Records the state after a frame: whether visible differences are pending, and the bytes sent
+    /// so far.
     pub fn line(&mut self, now: Duration, waits: bool, sent: u64) {
         let Load { last: (before, waited, known), .. } = self.load;
         if waited {
             self.load.waited += now.saturating_sub(before);
         }
-        // What leaves nothing to wait for is on the line when nothing waits.
+        // Bytes of the frame that clears the last difference do not count.
         if waits {
             self.load.bytes += sent - known;
         }
         self.load.last = (now, waits, sent);
     }
 
-    /// Writes one line per event: seconds from the start to its reading, what answered it, and
-    /// milliseconds until then. Events without an answer so far are left out.
+    /// Writes a CSV line per event: seconds from the start to its reading, kind of response, and
+    /// milliseconds of latency. Events without response are left out.
     pub fn write(&self, path: &Path) -> io::Result<()> {
         let mut file = BufWriter::new(File::create(path)?);
         writeln!(file, "read_seconds,answer,milliseconds")?;
@@ -126,9 +126,9 @@ impl LatencyRecorder {
         file.flush()
     }
 
-    /// The distribution, a line per kind of answer that there was, and what the line has been given.
+    /// Summary: a line per kind of response, and the traffic.
     pub fn summary(&self) -> Vec<String> {
-        let of = |wanted: bool, name: &str| {
+        let summary_of = |wanted: bool, name: &str| {
             let of_kind = self.answered.iter().flatten().filter(|a| a.picture == wanted);
             let mut after: Vec<_> = of_kind.map(|a| a.after).collect();
             after.sort_unstable();
@@ -144,7 +144,7 @@ impl LatencyRecorder {
             ))
         };
         let kinds = [(true, "event to picture"), (false, "event to screen")];
-        let replies = kinds.into_iter().filter_map(|(picture, name)| of(picture, name));
+        let replies = kinds.into_iter().filter_map(|(picture, name)| summary_of(picture, name));
         let Load { waited, bytes, .. } = self.load;
         let load = (self.answered.is_some() && !waited.is_zero()).then(|| {
             let seconds = waited.as_secs_f64();
@@ -165,7 +165,8 @@ impl Awaiting {
     }
 }
 
-/// The smallest value that at least `share` of the `sorted` ones do not exceed; 0 if there are none.
+/// Returns the smallest of the `sorted` values that at least `share` of them do not exceed; 0 if
+/// there are none.
 fn quantile(sorted: &[Duration], share: f64) -> Duration {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied().unwrap_or_default()
@@ -176,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_picture_answers_its_scene_and_those_before() {
+    fn picture_responds_to_its_generation_and_earlier() {
         let mut trace = LatencyRecorder::new(true);
         let start = trace.began;
         let at = |ms| start + Duration::from_millis(ms);
@@ -191,7 +192,7 @@ mod tests {
         assert!(trace.replies(1));
         trace.sent(1);
         assert!(!trace.replies(1), "it is on its way");
-        // Read while the frame is on its way: not answered by it.
+        // Events read while the frame is in flight are not answered by it.
         trace.event(at(9), None);
         trace.written(at(20));
         trace.sent(7);
@@ -226,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn the_line_counts_while_differences_wait() {
+    fn traffic_counts_while_differences_are_pending() {
         let mut trace = LatencyRecorder::new(true);
         let ms = Duration::from_millis;
         for (at, waits, sent) in
@@ -235,12 +236,12 @@ mod tests {
             trace.line(ms(at), waits, sent);
         }
         trace.line(ms(9000), false, 3500);
-        let told = "visible differences waited for 0.200 s, in which 2000 bytes were sent";
-        assert_eq!(trace.summary(), [told]);
+        let summary = "visible differences waited for 0.200 s, in which 2000 bytes were sent";
+        assert_eq!(trace.summary(), [summary]);
     }
 
     #[test]
-    fn nothing_is_remembered_unasked() {
+    fn nothing_is_stored_without_request() {
         let mut trace = LatencyRecorder::new(false);
         trace.event(trace.began, None);
         trace.sent(0);

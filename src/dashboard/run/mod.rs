@@ -1,5 +1,4 @@
-//! The dashboard at work: terminal, keys, renderer, files, time. One thread decides and draws; whatever
-//! could keep it waiting has a thread of its own.
+//! Event loop of the dashboard. One thread updates and draws; blocking work has threads of its own.
 
 mod autosave;
 mod diagnose;
@@ -28,7 +27,7 @@ use crate::terminal::{
     Capabilities, Environment, Event, Keyboard, Reply, Screen, Timed, probe, size,
 };
 use crossbeam_channel::{Receiver, after, never, select};
-use effects::{EffectRunner, EffectSetup};
+use effects::{EffectRunner, EffectSetup, Outcome};
 use frames::{DrawOutcome, FramePipeline};
 use input::Input;
 use job_control::{ResizeDebounce, TerminalIo};
@@ -42,45 +41,42 @@ use std::time::{Duration, Instant};
 pub use crate::dashboard::model::Colors;
 pub use diagnose::{TerminalReport, diagnose};
 
-/// What a dashboard is started with.
+/// Parameters of a dashboard.
 pub struct Setup {
-    /// The scene's file; or where it is and why it cannot be read.
+    /// The scene file, or its path and errors.
     pub file: Result<SceneFile, (PathBuf, SceneErrors)>,
-    /// The folder for unsaved edits that cannot be kept beside their scene.
+    /// Folder for recovery files that cannot be written beside their scene.
     pub state: Option<PathBuf>,
     /// Tracing threads, at least 1.
     pub threads: usize,
-    /// How scenes are compiled and sampled.
+    /// Options of scene compilation and sampling.
     pub options: Options,
-    /// How samples are allotted, and when the work is done at first.
+    /// Sample allocation and initial stop criteria.
     pub settings: Settings,
-    /// How many colours the terminal has; `None`: as it turns out.
+    /// Colour depth of the terminal; `None` to detect it.
     pub colors: Option<Colors>,
-    /// What the environment tells about the terminal.
+    /// Terminal-related environment variables.
     pub surroundings: Environment,
-    /// Bytes a second that are sent, whatever the line may carry; `None`: what it carries.
+    /// Fixed bandwidth in bytes per second; `None` to adapt to the connection.
     pub bandwidth: Option<f64>,
-    /// Where to write how long answers took.
+    /// File for input latencies.
     pub trace: Option<PathBuf>,
 }
 
-/// How a dashboard ended.
+/// Result of a dashboard.
 #[derive(Debug, Default)]
 pub struct Ended {
-    /// The exit status that a signal asks for.
+    /// Exit status, if a signal has ended it.
     pub signalled: Option<u8>,
-    /// Pictures that were written after the screen was left.
+    /// Exports that finished after the screen was restored.
     pub exported: Vec<Result<Exported, String>>,
-    /// Where unsaved edits are kept, which the next start offers.
+    /// Recovery file with unsaved edits, which the next start offers.
     pub kept: Option<PathBuf>,
-    /// How long answers took, a line each; empty unless asked for.
+    /// Summary of input latencies, one line each; empty unless requested.
     pub latencies: Vec<String>,
 }
 
-/// Runs a dashboard on the terminal of stdin and stdout until the user quits or a signal comes.
-///
-/// # Errors
-/// If the terminal cannot be used (any more) or there are no threads. The terminal is restored.
+/// Runs a dashboard on the terminal of stdin and stdout until the user quits or a signal arrives.
 pub fn run(setup: Setup) -> io::Result<Ended> {
     let Setup { file, state, threads, options, settings, colors, surroundings, bandwidth, trace } =
         setup;
@@ -92,10 +88,10 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         Ok(file) => (file.path().map(PathBuf::from), file.document().name().to_string()),
         Err(path) => (Some(path.clone()), String::new()),
     };
-    let mut hands = EffectRunner::new(EffectSetup { file, state, threads, options, settings })?;
+    let mut effects = EffectRunner::new(EffectSetup { file, state, threads, options, settings })?;
     if let Ok(scene) = &start {
-        // While the terminal is asked what it can do.
-        hands.show(Arc::clone(scene));
+        // Rendering starts while the terminal is probed.
+        effects.show(Arc::clone(scene));
     }
     let signals = signals::block()?;
     let screen = Screen::enter()?;
@@ -113,11 +109,11 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         colors: colors.unwrap_or(terminal.colors),
         stop: settings.stop,
         threads,
-        most_threads: std::thread::available_parallelism().map_or(threads, usize::from),
+        max_threads: std::thread::available_parallelism().map_or(threads, usize::from),
     });
     let mut dashboard = Dashboard {
         model,
-        hands,
+        effects,
         frames: FramePipeline::new(screen.tty(), &terminal, bandwidth)?,
         terminal,
         trace: LatencyRecorder::new(trace.is_some()),
@@ -130,20 +126,24 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         suspend: false,
         quit: false,
     };
-    // So that the renderer learns how large the picture is.
+    // The renderer learns the raster size.
     dashboard.dispatch(Message::Resize(dashboard.model.screen));
     let input = input::read(keyboard)?;
-    let line =
-        TerminalIo { tty: screen.tty(), input, signals: signals.told, left: screen.left().clone() };
+    let line = TerminalIo {
+        tty: screen.tty(),
+        input,
+        signals: signals.events,
+        left: screen.left().clone(),
+    };
     let result = dashboard.watch(&line);
-    // First of all, and whatever else there is to write.
-    dashboard.hands.flush(Duration::ZERO);
+    // Before anything else is written.
+    dashboard.effects.flush(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
         dashboard.await_answers(&line.input);
     }
-    // What is still to be written may take a while: it need not be waited for on an empty screen.
+    // The remaining writes may take a while: the screen is restored first.
     drop(screen);
-    let (finished, kept) = dashboard.hands.finish();
+    let (finished, kept) = dashboard.effects.finish();
     let exported = finished.into_iter().filter_map(|message| match message {
         Message::Exported(result) => Some(result),
         _ => None,
@@ -159,46 +159,46 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
 
 struct Dashboard {
     model: Model,
-    hands: EffectRunner,
+    effects: EffectRunner,
     frames: FramePipeline,
-    /// What the terminal can do, as far as it has said.
+    /// Capabilities of the terminal that are known so far.
     terminal: Capabilities,
     trace: LatencyRecorder,
     began: Instant,
-    /// The scene whose picture the model has: its number.
+    /// Generation of the visible picture.
     shown: u64,
-    /// Counts up when the picture is another one than the same with more samples.
+    /// Increases when the picture is replaced by one that is not a refinement of it.
     image_epoch: u64,
-    /// The terminal's size may change again at once.
+    /// Debounce of resize signals.
     resizing: ResizeDebounce,
-    /// When the line was told about last.
+    /// Time of the last status update of the connection.
     status_sent_at: Duration,
-    /// The screen may have to change.
+    /// The model has changed since the last frame.
     changed: bool,
     suspend: bool,
     quit: bool,
 }
 
 impl Dashboard {
-    /// Lets things happen until the end; the exit status of a signal.
+    /// Runs until the end; returns the exit status of a signal.
     fn watch(&mut self, line: &TerminalIo) -> io::Result<Option<u8>> {
-        let bell = self.hands.session().wakeup().clone();
-        let done = self.hands.done().clone();
+        let wakeup = self.effects.session().wakeup().clone();
+        let done = self.effects.done().clone();
         let written = self.frames.written().clone();
         let silence = never();
         let mut waiting = Vec::new();
-        // Who was told to end while the terminal was asked draws nothing any more.
-        while let Ok(told) = line.signals.try_recv() {
-            if let Some(status) = self.handle_signal(told, line) {
+        // A signal during the probe ends the program before the first frame.
+        while let Ok(event) = line.signals.try_recv() {
+            if let Some(status) = self.handle_signal(event, line) {
                 return Ok(Some(status));
             }
         }
         while !self.quit {
             let wait = self.draw();
-            // A picture is made when the last one has been taken: not before it can be shown.
-            let (bell, wants_snapshot) = match self.wants_snapshot() {
+            // Snapshots are requested only when the terminal can take them.
+            let (wakeup, wants_snapshot) = match self.wants_snapshot() {
                 None => (&silence, None),
-                Some(Duration::ZERO) => (&bell, None),
+                Some(Duration::ZERO) => (&wakeup, None),
                 wait => (&silence, wait),
             };
             let timer = match wait.into_iter().chain(wants_snapshot).min() {
@@ -211,9 +211,9 @@ impl Dashboard {
                     // The terminal is gone.
                     Ok(Err(_)) | Err(_) => return Ok(Some(HUNG_UP)),
                 },
-                recv(bell) -> rung => match rung {
+                recv(wakeup) -> notified => match notified {
                     Ok(()) => self.take_snapshot(),
-                    // Its panic has been told already.
+                    // Its panic has been reported already.
                     Err(_) => return Err(io::Error::other("the renderer has ended")),
                 },
                 recv(done) -> message => message.into_iter().for_each(|m| self.take_done(m)),
@@ -225,8 +225,8 @@ impl Dashboard {
                         }
                     }
                 }
-                recv(line.signals) -> told => {
-                    if let Some(status) = told.ok().and_then(|told| self.handle_signal(told, line)) {
+                recv(line.signals) -> event => {
+                    if let Some(status) = event.ok().and_then(|event| self.handle_signal(event, line)) {
                         return Ok(Some(status));
                     }
                 }
@@ -253,7 +253,7 @@ impl Dashboard {
         Ok(None)
     }
 
-    /// Something came from the terminal: an answer counts at once, what the user did is `waiting`.
+    /// Handles a terminal event: replies at once; user input joins `waiting`.
     fn enqueue(&mut self, Timed { at, event }: Timed, waiting: &mut Vec<Input>) {
         let message = match event {
             Event::Key(key) => Message::Key(key),
@@ -264,7 +264,7 @@ impl Dashboard {
                 return;
             }
             Event::Reply(reply @ (Reply::Graphics(true) | Reply::Version(_))) => {
-                // From behind a multiplexer, or late.
+                // Through a multiplexer, or late.
                 self.terminal.learn(&reply);
                 return;
             }
@@ -273,7 +273,8 @@ impl Dashboard {
         input::join(waiting, Input { at, message });
     }
 
-    /// At the end: what the terminal still has to answer shall not be typed into a shell.
+    /// Waits for outstanding replies of the terminal at the end, so that the shell does not read
+    /// them as input.
     fn await_answers(&mut self, input: &Receiver<io::Result<Timed>>) {
         let end = self.frames.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
@@ -287,31 +288,30 @@ impl Dashboard {
         }
     }
 
-    /// Takes what happened into the model and does what that asks for; the number of the scene if the
-    /// answer needs a new picture.
+    /// Updates the model with a message and runs the effects. Returns the generation of the scene if
+    /// the response needs a new picture.
     fn dispatch(&mut self, message: Message) -> Option<u64> {
         let mut awaited = None;
         let is_snapshot = matches!(message, Message::Snapshot(_));
         let version = self.model.picture_version;
         for effect in update(&mut self.model, message, self.began.elapsed()) {
-            self.quit |= effect == Effect::Quit;
-            self.suspend |= effect == Effect::Suspend;
-            if let Effect::Copy(path) = &effect {
-                self.frames.copy(&paths::full(path));
-            }
             let scene = match &effect {
                 Effect::Show(scene) => Some(Arc::clone(scene)),
                 _ => None,
             };
-            if let Effect::Look { path, display, screen } = &effect {
-                self.prepare_still(path, *display, *screen);
-            }
-            let number = self.hands.run_effect(effect);
-            // A change of light is seen at once in the picture that is there.
-            let snapshot = self.model.snapshot.as_deref();
-            let mixed = scene.is_some_and(|s| snapshot.is_some_and(|n| n.mix_for(&s).is_some()));
-            if number.is_some() && !mixed {
-                awaited = number;
+            match self.effects.run(effect, &mut self.frames, &self.terminal) {
+                Outcome::Done => {}
+                Outcome::Rendering(generation) => {
+                    // A change of lights is visible at once: the current picture is relit.
+                    let snapshot = self.model.snapshot.as_deref();
+                    let relit =
+                        scene.is_some_and(|s| snapshot.is_some_and(|n| n.mix_for(&s).is_some()));
+                    if !relit {
+                        awaited = Some(generation);
+                    }
+                }
+                Outcome::Suspend => self.suspend = true,
+                Outcome::Quit => self.quit = true,
             }
         }
         if version != self.model.picture_version && awaited.is_none() && !is_snapshot {
@@ -322,12 +322,12 @@ impl Dashboard {
     }
 
     fn take_done(&mut self, message: Message) {
-        self.hands.observe(&message);
+        self.effects.observe(&message);
         self.dispatch(message);
     }
 
     fn take_snapshot(&mut self) {
-        if let Some(snapshot) = self.hands.session().take() {
+        if let Some(snapshot) = self.effects.session().take() {
             let failed = matches!(snapshot.report.state, State::Failed(_));
             let raster = |s: &Snapshot| s.picture.as_ref().map(|p| [p.cols, p.rows]);
             if snapshot.picture.is_some() || failed {
@@ -340,23 +340,23 @@ impl Dashboard {
         }
     }
 
-    /// How long to wait before the next picture could be shown; `None`: until the terminal has taken
-    /// the last one.
+    /// Time until the next snapshot can be shown; `None` until the terminal has taken the last
+    /// frame.
     fn wants_snapshot(&self) -> Option<Duration> {
         let now = self.began.elapsed();
         let due = self.frames.snapshot_due(now, self.trace.replies(u64::MAX));
         self.frames.ready().then(|| due.saturating_sub(now))
     }
 
-    /// Time has passed: the model is told if it wanted to be.
+    /// Sends a tick to the model if it waits for this moment.
     fn wake(&mut self) {
         if self.model.next_timeout().is_some_and(|at| at <= self.began.elapsed()) {
             self.dispatch(Message::Tick);
         }
     }
 
-    /// Draws if there is something to draw and the terminal can take it. How long to wait for what
-    /// happens by itself, if anything.
+    /// Draws if the model has changed and the terminal can take a frame. Returns the time until the
+    /// next frame or timeout, if any.
     fn draw(&mut self) -> Option<Duration> {
         let now = self.began.elapsed();
         if let Some(due) = self.resizing.due() {
@@ -368,12 +368,12 @@ impl Dashboard {
         self.frames.look(now);
         let reading = self.frames.reading();
         let mode = |line: &Option<LinkStatus>| line.as_ref().map(|line| line.mode);
-        let other = mode(&reading) != mode(&self.model.line);
-        if other || self.changed && self.status_sent_at + TELL_INTERVAL <= now {
+        let other = mode(&reading) != mode(&self.model.link);
+        if other || self.changed && self.status_sent_at + STATUS_INTERVAL <= now {
             self.status_sent_at = now;
             self.dispatch(Message::LinkStatus(reading));
         }
-        self.tell_of_still(now);
+        self.report_upload(now);
         self.frames.follow(&self.model);
         let mut due = None;
         if self.frames.ready() && !self.quit {
@@ -386,13 +386,13 @@ impl Dashboard {
                 self.trace.line(now, waits, sent);
                 self.changed &= matches!(drawn, DrawOutcome::Nothing | DrawOutcome::Slice);
                 match drawn {
-                    DrawOutcome::Nothing | DrawOutcome::BranchStack | DrawOutcome::Slice => {}
+                    DrawOutcome::Nothing | DrawOutcome::Deferred | DrawOutcome::Slice => {}
                     DrawOutcome::Same => {
-                        // The screen was the answer already.
+                        // The screen already shows the response.
                         self.trace.sent(self.shown);
                         self.trace.written(Instant::now());
                     }
-                    // No picture answers by its number.
+                    // No picture has generation 0.
                     DrawOutcome::Text => self.trace.sent(0),
                     DrawOutcome::Picture => self.trace.sent(self.shown),
                 }
@@ -409,9 +409,9 @@ impl Dashboard {
     }
 }
 
-/// What the status line tells about the line to the terminal is not older than this.
-const TELL_INTERVAL: Duration = Duration::from_millis(500);
+/// Maximum age of the connection's status in the status line.
+const STATUS_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Without a better idea the work is done at half a step of an 8-bit file.
+/// Default stop criterion: half a level of an 8-bit file.
 pub const DEFAULT_STOP: Stop =
     Stop { spp: None, noise_codes: Some(0.5), rmse_linear: None, seconds: None };

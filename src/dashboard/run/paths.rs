@@ -1,22 +1,22 @@
-//! Names: of pictures that overwrite nothing, and for fetching them from afar.
+//! File names of exports that overwrite nothing, and paths for scp.
 
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The most pictures of one scene and format in one folder.
+/// Maximum number of exports of one scene and format in one folder.
 const MOST: u32 = 100_000;
 
-/// The first path of `STEM-1.EXTENSION`, `STEM-2.EXTENSION` and so on in `folder` at which `write` can
-/// make a new file. `write` has to fail if there is one already. So the name stands for nothing before
-/// the file is complete.
+/// Writes to the first free path of `STEM-1.EXTENSION`, `STEM-2.EXTENSION` and so on in `folder`.
+/// `write` must create the file atomically and fail if it exists, so a name never refers to an
+/// incomplete file.
 pub fn numbered<E>(
     folder: &Path,
     stem: &str,
     extension: &str,
     write: impl Fn(&Path) -> Result<(), E>,
 ) -> Option<Result<PathBuf, E>> {
-    // A link that leads nowhere is there, too.
+    // A dangling symbolic link counts as taken.
     let is_taken = |path: &Path| path.symlink_metadata().is_ok();
     for number in 1..=MOST {
         let path = folder.join(format!("{stem}-{number}.{extension}"));
@@ -25,7 +25,7 @@ pub fn numbered<E>(
         }
         match write(&path) {
             Ok(()) => return Some(Ok(path)),
-            // Somebody has taken the name meanwhile.
+            // Another program has taken the name meanwhile.
             Err(_) if is_taken(&path) => {}
             Err(error) => return Some(Err(error)),
         }
@@ -33,21 +33,22 @@ pub fn numbered<E>(
     None
 }
 
-/// The path from the root on.
+/// Returns the absolute path.
 pub fn full(path: &Path) -> String {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     path.to_string_lossy().into_owned()
 }
 
-/// Where scp finds `path` on this machine: `user@host:/absolute/path`, after `-P PORT ` if that is
-/// not the usual one; quoted for a shell where needed.
+/// Returns the scp source of `path` on this machine: `user@host:/absolute/path`, preceded by `-P
+/// PORT ` for a non-standard port; quoted for a shell where necessary.
 pub fn scp(path: &Path) -> String {
     let variable = |name| env::var(name).unwrap_or_default();
     let user = Some(variable("USER")).filter(|u| !u.is_empty()).unwrap_or(variable("LOGNAME"));
     scp_from(&variable("SSH_CONNECTION"), &user, &host_name(), &full(path))
 }
 
-/// `connection`: `SSH_CONNECTION` as sshd sets it, "client port server port"; else empty.
+/// Implements [`scp`]. `connection` is `SSH_CONNECTION` as set by sshd, "client port server port",
+/// or empty.
 fn scp_from(connection: &str, user: &str, host_name: &str, path: &str) -> String {
     let fields: Vec<_> = connection.split_whitespace().collect();
     let (host, port) = match fields[..] {
@@ -60,7 +61,7 @@ fn scp_from(connection: &str, user: &str, host_name: &str, path: &str) -> String
     if port == "22" { place } else { format!("-P {} {place}", quoted(port)) }
 }
 
-/// `text` as one word of a shell.
+/// Quotes `text` as one word of a shell.
 fn quoted(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "@:/._-+,=%".contains(c);
     if text.chars().all(plain) {
@@ -83,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_is_overwritten() {
+    fn exports_overwrite_nothing() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("room-2.png"), "old").unwrap();
         let write = |path: &Path| fs::File::create_new(path).map(drop);
@@ -94,7 +95,7 @@ mod tests {
         assert_eq!(names, ["room-1.png", "room-3.png", "room-4.png"]);
         assert_eq!(fs::read(folder.path().join("room-2.png")).unwrap(), b"old");
         assert!(numbered(&folder.path().join("nowhere"), "room", "png", write).unwrap().is_err());
-        // Who comes first has the name.
+        // A name that another program takes first is skipped.
         let late = |path: &Path| {
             let number = fs::read_dir(folder.path()).unwrap().count();
             if number < 6 {
@@ -107,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn where_scp_finds_it() {
+    fn scp_paths_include_host_and_port() {
         let over_ssh = "10.0.0.2 50312 192.168.1.7 22";
         for (connection, user, path, expected) in [
             (over_ssh, "ada", "/home/ada/a-1.png", "ada@192.168.1.7:/home/ada/a-1.png"),

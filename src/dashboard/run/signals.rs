@@ -1,5 +1,5 @@
-//! Signals: those that end the program, which the dashboard is told and has a while to do by itself,
-//! and those that tell of a new size, or to stop and to go on.
+//! Signals that end the program, with a grace period for the dashboard, and signals for resizing,
+//! stopping and continuing.
 
 use crate::terminal::Tty;
 use crossbeam_channel::{Receiver, unbounded};
@@ -12,92 +12,92 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-/// How long the dashboard may take to end after a signal.
+/// Grace period after a signal that ends the program.
 pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 
-/// What shells add to a signal's number to make an exit status.
+/// Offset between a signal's number and the exit status in shells.
 const SIGNALLED: i32 = 128;
 
-/// The exit status of a program whose terminal has gone: as if it had been told (SIGHUP).
+/// Exit status after losing the terminal, as for SIGHUP.
 pub(super) const HUNG_UP: u8 = (SIGNALLED + SIGHUP) as u8;
 
-/// What a signal says.
+/// Meaning of a signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SignalEvent {
-    /// End, with this exit status: 129, 130 or 143.
+    /// Terminate with this exit status: 129, 130 or 143.
     End(u8),
-    /// The terminal may have another size.
+    /// The terminal may have a new size.
     Resized,
-    /// Stop until told to go on.
+    /// Stop until continued.
     Stop,
-    /// Go on.
+    /// Continue.
     Continue,
 }
 
-/// What signals say.
+/// Stream of signal events.
 pub(super) struct Signals {
-    /// One after the other.
-    pub told: Receiver<SignalEvent>,
-    /// One of them says to end.
+    /// Events in order.
+    pub events: Receiver<SignalEvent>,
+    /// A terminating signal has arrived.
     ending: Arc<AtomicBool>,
 }
 
 impl Signals {
-    /// Whether one of them says to end.
+    /// Returns `true` if a terminating signal has arrived.
     pub fn is_ending(&self) -> bool {
         self.ending.load(Ordering::Acquire)
     }
 }
 
-/// Whom a stop concerns.
+/// Processes to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum StopTarget {
     /// This process.
     Itself,
-    /// Everybody whom the shell has started together, as when its user presses Ctrl-Z.
+    /// The process group, as for Ctrl-Z in a shell.
     Group,
 }
 
-/// Signals that come from here on wait to be heeded: to be called before the terminal is taken, which a
-/// signal that nobody waits for would not give back.
+/// Registers handlers, which queue signals until [`watch`]. To be called before the terminal is
+/// taken, because a default handler would not restore it.
 pub(super) fn block() -> io::Result<iterator::Signals> {
     iterator::Signals::new([SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])
 }
 
-/// Heeds signals. If the program is still there `patience` after it should have ended, the terminal is
-/// restored and the program ended from here.
+/// Starts the thread that handles signals. If the program is still running `patience` after a
+/// terminating signal, the thread restores the terminal and exits.
 pub(super) fn watch(
     mut signals: iterator::Signals,
     tty: Arc<Tty>,
     patience: Duration,
 ) -> io::Result<Signals> {
-    let (teller, told) = unbounded();
+    let (sender, events) = unbounded();
     let ending = Arc::new(AtomicBool::new(false));
-    let mark = Arc::clone(&ending);
+    let ending_flag = Arc::clone(&ending);
     thread::Builder::new().name("signals".into()).spawn(move || {
         for signal in signals.forever() {
-            let what = match signal {
+            let event = match signal {
                 SIGWINCH => SignalEvent::Resized,
                 SIGTSTP => SignalEvent::Stop,
                 SIGCONT => SignalEvent::Continue,
                 _ => SignalEvent::End((SIGNALLED + signal) as u8),
             };
-            // Nobody listens any more when the program ends.
-            let _ = teller.send(what);
-            mark.fetch_or(matches!(what, SignalEvent::End(_)), Ordering::Release);
-            if let SignalEvent::End(status) = what {
+            // At the end of the program the receiver is gone.
+            let _ = sender.send(event);
+            ending_flag.fetch_or(matches!(event, SignalEvent::End(_)), Ordering::Release);
+            if let SignalEvent::End(status) = event {
                 thread::sleep(patience);
                 tty.leave();
                 std::process::exit(status.into());
             }
         }
     })?;
-    Ok(Signals { told, ending })
+    Ok(Signals { events, ending })
 }
 
-/// Stops until somebody says to go on; a moment may pass before it happens. It does not happen if there
-/// is no shell that could say so: the kernel sees to that for every signal that stops but SIGSTOP. Of
-/// those SIGTSTP is listened to here, so it is another one.
+/// Stops the processes; the stop may take effect with a delay. It has no effect without a shell
+/// that could continue them: the kernel ignores every stop signal but SIGSTOP for orphaned process
+/// groups. SIGTSTP has a handler here, so SIGTTIN is sent.
 pub(super) fn stop(whom: StopTarget) -> io::Result<()> {
     match whom {
         StopTarget::Itself => kill_process(getpid(), Signal::TTIN)?,

@@ -1,4 +1,4 @@
-//! Frames on their way to the terminal: a slow one holds up its thread, never the dashboard.
+//! Thread that writes frames, so that a slow terminal does not block the dashboard.
 
 use crate::terminal::Tty;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -7,13 +7,13 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Instant;
 
-/// A frame that has been handed to the terminal, or not, and why.
+/// Result of writing a frame.
 pub struct Written {
-    /// When.
+    /// Time of completion.
     pub at: Instant,
-    /// Whether the terminal took it.
+    /// Result of the write.
     pub result: io::Result<()>,
-    /// The bytes, to be used again.
+    /// Buffer for reuse.
     buffer: Vec<u8>,
 }
 
@@ -22,7 +22,7 @@ pub struct Writer {
     frames: Sender<Vec<u8>>,
     written: Receiver<Written>,
     in_flight: bool,
-    /// An empty buffer for the next frame.
+    /// Empty buffer for the next frame.
     spare: Vec<u8>,
 }
 
@@ -42,34 +42,34 @@ impl Writer {
         Ok(Self { frames, written, in_flight: false, spare: Vec::new() })
     }
 
-    /// Whether a frame could be sent now: none is on its way.
+    /// Returns `true` if no frame is in flight.
     pub fn ready(&self) -> bool {
         !self.in_flight
     }
 
-    /// An empty buffer.
+    /// Returns an empty buffer.
     pub fn buffer(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.spare)
     }
 
-    /// Takes back an empty buffer.
+    /// Takes back an unused buffer.
     pub fn keep(&mut self, buffer: Vec<u8>) {
         self.spare = buffer;
     }
 
-    /// Sends a frame. Only when [`Writer::ready`].
+    /// Sends a frame. Requires [`Writer::ready`].
     pub fn send(&mut self, frame: Vec<u8>) {
         debug_assert!(self.ready(), "one frame at a time");
         // The thread ends only with this sender.
         self.in_flight = self.frames.send(frame).is_ok();
     }
 
-    /// Tells when the frame on its way has been written; pass what it tells to [`Writer::done`].
+    /// Receives the result of each frame; pass it to [`Writer::done`].
     pub fn written(&self) -> &Receiver<Written> {
         &self.written
     }
 
-    /// Takes note that the frame has been written; says when.
+    /// Records that the frame was written; returns when.
     pub fn done(&mut self, written: Written) -> io::Result<Instant> {
         self.in_flight = false;
         self.spare = written.buffer;

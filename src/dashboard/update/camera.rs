@@ -1,26 +1,25 @@
-//! Moving the camera by keys and by hand.
+//! Camera movement by keys and mouse.
 
 use crate::camera::Camera;
-use crate::dashboard::action::{Delta, Direction, StepSize};
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
 use crate::scene::Scene;
 use crate::scene::edit::{
     Edit, EditError, Target, bounds, focus_distance, recall_view, scene_bounds, step_length,
 };
 
-/// Degrees of a step around the pivot, of the picture about its centre.
+/// Degrees per step of an orbit or a roll.
 const ORBIT_DEGREES: f64 = 5.0;
-/// Degrees of a look aside.
+/// Degrees per step of a look.
 const LOOK_DEGREES: f64 = 3.0;
-/// Shares of the distance to the pivot.
+/// Step of a pan, as a fraction of the distance to the pivot.
 const PAN_SHARE: f64 = 0.05;
-/// Factors of the distance for a step nearer.
+/// Factors of the distance to the pivot per step of a dolly.
 const DOLLY: f64 = 0.9;
 const DOLLY_FINE: f64 = 0.99;
-/// Factor of the view's width for a step narrower.
+/// Factor of the view's width per step of the view angle.
 const ZOOM: f64 = 0.95;
 
-/// To the right and up as numbers.
+/// Returns the direction as components to the right and up.
 fn right_up(way: Direction) -> [f64; 2] {
     match way {
         Direction::Left => [-1.0, 0.0],
@@ -32,19 +31,18 @@ fn right_up(way: Direction) -> [f64; 2] {
 }
 
 impl UpdateContext<'_> {
-    /// Puts another camera in place of the scene's. Moves that follow each other are one step of undo,
-    /// whatever they are.
-    pub(super) fn set_camera(&mut self, hold: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
+    /// Replaces the camera. Consecutive moves of any kind are one undo step.
+    pub(super) fn set_camera(&mut self, coalesce: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
         let scene = self.scene();
         let camera = f(&scene.camera, focus_distance(scene));
         if camera == scene.camera {
             return;
         }
         let next = Scene { camera, ..Scene::clone(scene) };
-        // Of a camera without faults comes one without faults.
+        // A valid camera stays valid.
         let edit =
             Edit { scene: next, subject: Target::Camera, label: "camera".to_string(), note: None };
-        self.commit(Ok::<_, EditError>(edit), hold);
+        self.commit(Ok::<_, EditError>(edit), coalesce);
     }
 
     pub(super) fn orbit(&mut self, way: Direction) {
@@ -66,7 +64,7 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
     }
 
-    /// Turns of the wheel: towards the picture is nearer.
+    /// Dollies by ticks of the wheel; positive ticks move in.
     pub(super) fn dolly_by_wheel(&mut self, ticks: i32) {
         let factor = DOLLY.powi(ticks.clamp(-50, 50));
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
@@ -93,19 +91,19 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Repeat, |camera, _| camera.roll(degrees));
     }
 
-    pub(super) fn view_angle(&mut self, change: Delta) {
-        let factor = if change == Delta::Up { 1.0 / ZOOM } else { ZOOM };
-        self.set_camera(Coalesce::Repeat, |camera, _| camera.zoom(factor));
+    /// Widens the view angle by `steps`; negative steps narrow it.
+    pub(super) fn view_angle(&mut self, steps: i32) {
+        self.set_camera(Coalesce::Repeat, |camera, _| camera.zoom(ZOOM.powi(-steps)));
         let (key, degrees) = self.scene().camera.view_angle.key_degrees();
         self.say(format!("{key} view angle {degrees}°"));
     }
 
-    /// Fills the picture with the selection, or with the scene if the selection has no place.
+    /// Frames the selection, or the scene if the selection has no extent.
     pub(super) fn frame(&mut self) {
         let scene = self.scene();
         let ball = bounds(scene, &self.model.selection).unwrap_or_else(|| scene_bounds(scene));
         let [width, height] = scene.film.size.map(f64::from);
-        // A lamp is a point: it is shown with what is around it.
+        // A point light is framed with its surroundings.
         let radius = if ball.radius > 0.0 { ball.radius } else { 5.0 * step_length(scene) };
         self.set_camera(Coalesce::Single, |camera, _| {
             camera.framed(ball.center, radius, width / height)
@@ -130,8 +128,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// A drag by so many half cells to the right and down goes round the pivot: the whole picture's
-    /// width is half a turn. What is seen follows the hand.
+    /// Orbits by a drag of `right` and `down` half cells, such that the picture follows the mouse.
+    /// The picture's full width is half a turn.
     pub(super) fn orbit_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(180.0);
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -139,7 +137,8 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// The same for looking around.
+    /// Looks around by a drag of `right` and `down` half cells. The picture's full width is a
+    /// quarter turn.
     pub(super) fn look_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(90.0);
         self.set_camera(Coalesce::Gesture, |camera, _| {
@@ -147,7 +146,7 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// A drag that takes the point under the hand along, at the distance of the pivot.
+    /// Pans by a drag, such that the point under the mouse follows it at the distance of the pivot.
     pub(super) fn pan_by_hand(&mut self, right: f64, down: f64) {
         let share = self.per_half_cell(2.0 * self.half_width());
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -162,7 +161,7 @@ impl UpdateContext<'_> {
         scene.camera.half_size(width / height)[0]
     }
 
-    /// `across`, which the whole width of the picture stands for, per half cell.
+    /// Amount per half cell, if `across` is the amount for the picture's full width.
     pub(super) fn per_half_cell(&self, across: f64) -> f64 {
         self.model.layout().map_or(0.0, |layout| across / layout.raster[0] as f64)
     }

@@ -1,15 +1,14 @@
-//! What the picture shows: exposure, tone curve, channel, probe, kept against live.
+//! Display of the picture: exposure, tone curve, channel, probe, A/B comparison.
 
-use crate::dashboard::action::{Direction, StepSize};
 use crate::dashboard::message::{DisplayChannel, Effect};
 use crate::dashboard::model::{CompareView, Mode};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::update::{Direction, StepSize, UpdateContext};
 use crate::film::{LinearImage, Tone};
 use std::sync::Arc;
 
-/// Stops of a step.
+/// Stops per step.
 const EXPOSURE_STEP: f64 = 0.25;
-/// The most stops up or down: beyond it everything is white or black.
+/// Limit of the exposure in stops; beyond it the picture is white or black.
 const MOST_EXPOSURE: f64 = 20.0;
 
 impl UpdateContext<'_> {
@@ -68,7 +67,7 @@ impl UpdateContext<'_> {
         self.emit(Effect::Probe(pixel));
     }
 
-    /// By a cell of the picture, or by one pixel of the film.
+    /// Moves the probe by a cell of the picture (coarse) or a pixel of the film (fine).
     pub(super) fn move_probe(&mut self, way: Direction, pace: StepSize) {
         let Some([x, y]) = self.model.probe else {
             self.toggle_probe();
@@ -90,20 +89,20 @@ impl UpdateContext<'_> {
         self.set_probe(Some(to));
     }
 
-    pub(super) fn keep(&mut self) {
-        self.emit(Effect::Keep);
+    pub(super) fn pin(&mut self) {
+        self.emit(Effect::Pin);
     }
 
-    pub(super) fn kept(&mut self, picture: Arc<LinearImage>, spp: f64) {
+    pub(super) fn pinned(&mut self, picture: Arc<LinearImage>, spp: f64) {
         self.model.comparison.pinned = Some((picture, spp));
         self.repaint();
-        self.say(format!("kept at {spp:.0} spp · c flips · C shows the difference"));
+        self.say(format!("pinned at {spp:.0} spp · c flips · C shows the difference"));
     }
 
-    /// Shows the kept picture or the difference; the live one if it is that already.
+    /// Toggles between the live picture and `what`.
     pub(super) fn compare(&mut self, what: CompareView) {
         if self.model.comparison.pinned.is_none() {
-            self.say("No picture is kept yet · k keeps one");
+            self.say("No picture is pinned yet · k pins one");
             return;
         }
         let shown = &mut self.model.comparison.shown;

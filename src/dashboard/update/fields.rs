@@ -1,4 +1,4 @@
-//! The fields of the inspector and of forms: walking, stepping, typing.
+//! Fields of the inspector and of forms: moving, stepping, typing.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::Focus;
@@ -32,24 +32,24 @@ impl UpdateContext<'_> {
         }
     }
 
-    pub(super) fn walk_field(&mut self, steps: isize) {
+    pub(super) fn move_field_cursor(&mut self, steps: isize) {
         let lines = self.model.field_lines();
         self.set_cursor(walk_fields(&lines, self.cursor(), steps));
     }
 
-    /// The field under the cursor.
+    /// Field under the cursor.
     pub(super) fn field(&self) -> Option<FieldLine> {
         self.model.field_lines().get(self.cursor())?.field().cloned()
     }
 
-    /// The field's row of the scene's table: all its words and numbers.
+    /// Property of the field, with all of its words and numbers.
     fn row(&self, field: &FieldLine) -> Option<Property> {
         let rows = edit::rows(self.scene(), &field.subject).ok()?;
         rows.into_iter().find(|row| row.key == field.key)
     }
 
-    /// Begins to type into the field under the cursor: what stands there, or `typed` alone. A switch
-    /// is switched, a word is chosen from a list.
+    /// Opens the editor of the field under the cursor with its value, or with `typed` alone.
+    /// Toggles a switch; opens the list of a choice.
     pub(super) fn open_field(&mut self, typed: Option<char>) {
         let Some(field) = self.field() else { return };
         let words = self.row(&field).map(|row| row.words).unwrap_or_default();
@@ -80,8 +80,8 @@ impl UpdateContext<'_> {
         matches!(self.model.overlay, Some(Overlay::Form(_)))
     }
 
-    /// Puts what was typed into the field. Refused: the reason stands below it, and typing goes on.
-    /// Whether typing has ended.
+    /// Applies the typed value. Returns `true` if the editor has closed; on an error it stays open
+    /// and shows the reason.
     pub(super) fn apply_field(&mut self) -> bool {
         let Some(field) = self.field() else {
             self.set_editor(None);
@@ -100,16 +100,16 @@ impl UpdateContext<'_> {
                 self.record(edit, Coalesce::Single);
                 true
             }
-            Err(refusal) => {
+            Err(error) => {
                 if let Some(editor) = self.model.editor_mut() {
-                    editor.problem = Some(refusal.to_string());
+                    editor.problem = Some(error.to_string());
                 }
                 false
             }
         }
     }
 
-    /// What was typed for one number of several may also be all of them, or a colour in hex.
+    /// Sets a field. The text for a component may also be the whole list, or a colour in hex.
     fn set_field(&self, field: &FieldLine, text: &str) -> Result<Edit, EditError> {
         let scene = self.scene();
         let whole = text.contains(['#', ',', ';', ' ', '[']);
@@ -123,7 +123,7 @@ impl UpdateContext<'_> {
 
     pub(super) fn step_field(&mut self, steps: f64) {
         if matches!(self.model.overlay, Some(Overlay::Pick(_) | Overlay::Question(_))) {
-            self.walk(if steps > 0.0 { 1 } else { -1 });
+            self.move_cursor(if steps > 0.0 { 1 } else { -1 });
             return;
         }
         if self.model.overlay.is_some() && !self.in_form() {
@@ -143,7 +143,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Sets the word that was chosen from a list.
+    /// Sets the value that was chosen from a list.
     pub(super) fn set_word(&mut self, subject: &edit::Target, key: &str, word: &str) {
         let edit = edit::set(self.scene(), subject, key, word);
         self.commit(edit, Coalesce::Single);

@@ -1,4 +1,4 @@
-//! Undo, saving, reloading, quitting, and what became of the pictures that were written.
+//! Undo, saving, reloading, quitting, and results of exports.
 
 use crate::dashboard::message::{Effect, Exported};
 use crate::dashboard::model::{Tone, short_name};
@@ -13,15 +13,15 @@ use std::sync::Arc;
 impl UpdateContext<'_> {
     pub(super) fn undo(&mut self) {
         let undone = self.model.history.undo();
-        self.went_back(undone, "undone", "There is nothing to undo");
+        self.report_history_step(undone, "undone", "Nothing to undo");
     }
 
     pub(super) fn redo(&mut self) {
         let redone = self.model.history.redo();
-        self.went_back(redone, "done again", "There is nothing to do again");
+        self.report_history_step(redone, "redone", "Nothing to redo");
     }
 
-    fn went_back(&mut self, label: Option<String>, what: &str, nothing: &str) {
+    fn report_history_step(&mut self, label: Option<String>, what: &str, nothing: &str) {
         self.model.last_edit = None;
         match label {
             Some(label) => {
@@ -53,7 +53,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Has the scene written.
+    /// Requests that the scene is written.
     pub(super) fn write(&mut self, path: Option<PathBuf>, overwrite: bool) {
         let scene = Arc::clone(self.model.history.scene());
         self.emit(Effect::Save { scene, path, overwrite });
@@ -69,7 +69,7 @@ impl UpdateContext<'_> {
                 self.model.history.mark_saved(scene);
                 self.model.last_edit = None;
                 self.notify(Tone::Good, format!("saved {}", self.model.file.name), Some(3.0));
-                // What was edited while the file was written is not left behind.
+                // Edits made during the write keep the program running.
                 if std::mem::take(&mut self.model.quit_when_saved) && !self.model.is_unsaved() {
                     self.emit(Effect::Quit);
                 }
@@ -108,8 +108,7 @@ impl UpdateContext<'_> {
         if self.model.file.path.is_none() {
             self.say("This scene has no file to read yet");
         } else if self.model.is_unsaved() {
-            let text =
-                format!("LinkStatus {} again loses the unsaved edits.", self.model.file.name);
+            let text = format!("Reading {} again loses the unsaved edits.", self.model.file.name);
             self.ask(
                 text,
                 &[('k', "keep my edits", Answer::Nothing), ('r', "read the file", Answer::Load)],
@@ -143,7 +142,7 @@ impl UpdateContext<'_> {
     pub(super) fn loaded(&mut self, result: Result<Arc<Scene>, SceneErrors>) {
         match result {
             Ok(scene) => {
-                // Positions may be those of other things now: what is selected is found by name.
+                // Indices may have changed: the selection is found by name.
                 let title = self.model.selection.title(self.model.history.scene());
                 self.model.overlay = None;
                 self.end_mode();
@@ -195,7 +194,7 @@ impl UpdateContext<'_> {
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
             Ok(Exported { path, size: [width, height], spp, noise_codes, scp }) => {
-                // The render beside this one has ended if it was of this size.
+                // The export render of this size has finished.
                 if self.model.export.is_some_and(|e| e.size.map(|n| n as usize) == [width, height])
                 {
                     self.model.export = None;
@@ -224,8 +223,8 @@ impl UpdateContext<'_> {
         };
         let shown = path.display().to_string();
         if sanitized(&shown) != shown {
-            // Pasted into a shell it could do what nobody wants.
-            self.refuse("The path has characters in it that steer terminals: it is not copied");
+            // Control characters could run commands when pasted into a shell.
+            self.refuse("Path contains control characters; not copied");
             return;
         }
         self.emit(Effect::Copy(path));
@@ -233,7 +232,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// With a capital at the beginning.
+/// Returns `text` with its first letter in upper case.
 pub(super) fn capital(text: &str) -> String {
     let mut chars = text.chars();
     chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())

@@ -1,4 +1,4 @@
-//! New objects and lights: a kind from a list, then a form that the picture previews.
+//! New objects and lights: a kind from a list, then a form with a preview in the picture.
 
 use crate::dashboard::overlay::{Form, Overlay, Pick, PickFor};
 use crate::dashboard::update::{Coalesce, UpdateContext};
@@ -46,16 +46,16 @@ impl UpdateContext<'_> {
                 }));
                 self.show();
             }
-            Err(refusal) => self.refuse(&refusal.to_string()),
+            Err(error) => self.refuse(&error.to_string()),
         }
     }
 
-    /// Takes the new thing into the scene, as one step.
+    /// Adds the new object or light to the scene, as one undo step.
     pub(super) fn confirm_form(&mut self) {
         let Some(Overlay::Form(form)) = self.model.overlay.take() else { return };
         let base = Arc::clone(self.model.history.scene());
         let mut scene = form.scene;
-        // A material that was made for it and is not used after all.
+        // Materials that were created for the form but are unused.
         let unused: Vec<_> = scene
             .materials
             .keys()
@@ -74,7 +74,7 @@ impl UpdateContext<'_> {
         self.say(format!("{label} is there · m moves it · r turns it · u takes it back"));
     }
 
-    /// The scene as it was before.
+    /// Restores the scene and selection from before the form.
     pub(super) fn cancel_form(&mut self) {
         if let Some(Overlay::Form(form)) = self.model.overlay.take() {
             self.select(form.before);

@@ -1,4 +1,4 @@
-//! Looking at a picture that was written.
+//! Viewer of exported images.
 
 use crate::dashboard::message::Effect;
 use crate::dashboard::model::short_name;
@@ -9,49 +9,49 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 impl UpdateContext<'_> {
-    /// Shows the last picture that was written.
-    pub(super) fn look_at_export(&mut self) {
+    /// Shows the last exported image.
+    pub(super) fn view_last_export(&mut self) {
         match self.model.last_export.clone() {
-            Some(path) => self.look_at(path),
+            Some(path) => self.view_image(path),
             None => self.say("No picture was written yet · p writes one"),
         }
     }
 
-    fn look_at(&mut self, path: PathBuf) {
+    fn view_image(&mut self, path: PathBuf) {
         let (display, screen) = (self.model.display, self.model.screen);
-        self.emit(Effect::Look { path: path.clone(), display, screen });
+        self.emit(Effect::ViewImage { path: path.clone(), display, screen });
         self.model.drag = None;
         self.model.overlay =
             Some(Overlay::ViewerImage(ViewedImage { path, still: None, sent: 0.0 }));
         self.repaint();
     }
 
-    /// On a screen of another size.
-    pub(super) fn look_again(&mut self) {
-        if let Some(Overlay::ViewerImage(looked)) = &self.model.overlay {
-            self.look_at(looked.path.clone());
+    /// Prepares the viewed image again for a new screen size.
+    pub(super) fn refit_image(&mut self) {
+        if let Some(Overlay::ViewerImage(viewed)) = &self.model.overlay {
+            self.view_image(viewed.path.clone());
         }
     }
 
-    /// Back to the panels.
+    /// Returns to the panels.
     pub(super) fn close_viewer(&mut self) {
         self.model.overlay = None;
         self.repaint();
     }
 
-    /// A picture is ready, or cannot be read.
+    /// Shows an image that has been prepared, or reports why it has not.
     pub(super) fn still(&mut self, path: &Path, result: Result<Arc<ViewerImage>, String>) {
         let screen = self.model.screen;
-        let Some(Overlay::ViewerImage(looked)) = &mut self.model.overlay else { return };
-        if looked.path != path {
+        let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay else { return };
+        if viewed.path != path {
             return;
         }
         match result {
             Ok(still) if still.screen == screen => {
-                looked.still = Some(still);
+                viewed.still = Some(still);
                 self.repaint();
             }
-            // It was made before the screen changed.
+            // Prepared for the previous screen size.
             Ok(_) => {}
             Err(why) => {
                 let name = short_name(path);

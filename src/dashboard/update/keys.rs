@@ -1,14 +1,14 @@
-//! Keys: first to a line of text that is open, then through the key table.
+//! Key dispatch: first to an open text editor, then through the command table.
 
-use crate::dashboard::action::Action;
 use crate::dashboard::editor::Editor;
-use crate::dashboard::keymap::{Context, lookup};
+use crate::dashboard::key_context::KeyContext;
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::UpdateContext;
+use crate::dashboard::update::commands::{Command, lookup};
 use crate::terminal::event::{Code, Key};
 
-/// The character that a key types, if it is one that types.
+/// Returns the character that a key types, if any.
 fn typed(key: Key) -> Option<char> {
     match key {
         Key { code: Code::Char(c), ctrl: false, alt: false, .. } => Some(c),
@@ -17,7 +17,7 @@ fn typed(key: Key) -> Option<char> {
 }
 
 impl Model {
-    /// The line of text that keys go to.
+    /// Text editor that takes the keys, if one is open.
     pub(super) fn editor_mut(&mut self) -> Option<&mut Editor> {
         match &mut self.overlay {
             Some(Overlay::Palette(palette)) => Some(&mut palette.editor),
@@ -36,9 +36,9 @@ impl UpdateContext<'_> {
             self.model.notice = None;
         }
         if let Some(Overlay::ViewerImage(_)) = self.model.overlay {
-            match lookup(Context::Overlay, key) {
-                Some(action @ (Action::Suspend | Action::Quit)) => self.act(action, None),
-                _ => self.close_viewer(),
+            match lookup(KeyContext::Overlay, key).filter(|command| command.over_image) {
+                Some(command) => self.run(command),
+                None => self.close_viewer(),
             }
             return;
         }
@@ -53,24 +53,34 @@ impl UpdateContext<'_> {
         {
             return;
         }
-        let Some(action) = lookup(self.model.context(), key) else {
+        let Some(command) = lookup(self.model.context(), key) else {
             if self.model.overlay.is_none() && self.model.inspector.editor.is_none() {
                 self.say(format!("{key} does nothing here · ? all keys"));
             }
             return;
         };
-        // A value being typed is applied before anything else is done, or holds it back.
+        // A value being typed is applied before another command runs; an invalid one blocks it.
         if self.model.overlay.is_none()
             && self.model.inspector.editor.is_some()
-            && !self.ends_typing(action)
+            && !command.while_typing
             && !self.apply_field()
         {
             return;
         }
-        self.act(action, typed(key));
+        self.typed = typed(key);
+        self.run(command);
     }
 
-    /// Pasted text goes to a line of text; anywhere else it would be forty shortcuts.
+    /// Carries out a command, or refuses it if the model does not have what it needs.
+    pub(super) fn run(&mut self, command: &Command) {
+        if (command.available)(self.model) {
+            (command.run)(self);
+        } else {
+            self.refuse("There is no scene to work on until its file can be read: mend it");
+        }
+    }
+
+    /// Inserts pasted text into the open text editor; elsewhere it would run commands.
     pub(super) fn paste(&mut self, text: &str) {
         self.model.first_time = false;
         match self.model.editor_mut() {
@@ -82,19 +92,19 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Something was typed or pasted.
+    /// Updates what depends on the text being typed.
     fn text_changed(&mut self) {
         if let Some(Overlay::Palette(_)) = self.model.overlay {
             self.search();
         }
     }
 
-    /// A character where a list, a form or a question has the keys. Whether it meant something.
+    /// Applies a character to a list, form or question. Returns `true` if an overlay has taken it.
     fn typed_in_overlay(&mut self, c: char) -> bool {
         match &self.model.overlay {
             Some(Overlay::Question(question)) => {
-                let of = |(letter, ..): &(char, _, _)| letter.eq_ignore_ascii_case(&c);
-                if let Some(at) = question.answers.iter().position(of) {
+                let has_letter = |(letter, ..): &(char, _, _)| letter.eq_ignore_ascii_case(&c);
+                if let Some(at) = question.answers.iter().position(has_letter) {
                     self.answer(at);
                 }
             }

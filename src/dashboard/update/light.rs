@@ -1,4 +1,4 @@
-//! The keys that act on a light.
+//! Commands on lights.
 
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::edit::{Edit, EditError, Target, step, toggle};
@@ -20,8 +20,9 @@ impl UpdateContext<'_> {
         self.say(format!("{label} · ; ' dim, brighten · L on, off · m move"));
     }
 
-    /// The selected light, ambient light or background, else the first light.
-    fn the_light(&self) -> Result<Target, EditError> {
+    /// Target of light commands: the selected light, ambient light or background, otherwise the
+    /// first light.
+    fn target_light(&self) -> Result<Target, EditError> {
         match &self.model.selection {
             s @ (Target::Light(_) | Target::Ambient | Target::Background) => Ok(s.clone()),
             _ if !self.scene().lights.is_empty() => Ok(Target::Light(0)),
@@ -33,7 +34,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn intensity(&mut self, steps: f64) {
-        let edit = self.the_light().and_then(|light| {
+        let edit = self.target_light().and_then(|light| {
             let key = if matches!(light, Target::Light(_)) { "intensity" } else { "color" };
             step(self.scene(), &light, key, None, steps)
         });
@@ -41,7 +42,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn switch_light(&mut self) {
-        let edit = self.the_light().and_then(|light| match light {
+        let edit = self.target_light().and_then(|light| match light {
             Target::Light(_) => toggle(self.scene(), &light, "on", true),
             other => Err(EditError {
                 found: format!("{} has no switch", other.label(self.scene())),
@@ -51,25 +52,25 @@ impl UpdateContext<'_> {
         self.commit_light(edit, Coalesce::Single);
     }
 
-    fn commit_light(&mut self, edit: Result<Edit, EditError>, hold: Coalesce) {
+    fn commit_light(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
-        self.commit(edit, hold);
+        self.commit(edit, coalesce);
         let scene = self.scene();
-        let told = match subject {
+        let state = match subject {
             Some(Target::Light(i)) => scene.lights.get(i).map(|light| {
                 let off = if light.on { "" } else { ", off" };
                 format!("intensity {}{off}", number(light.intensity))
             }),
-            Some(Target::Ambient) => Some(of_color(scene.ambient.color.0)),
-            Some(Target::Background) => Some(of_color(scene.background.color.0)),
+            Some(Target::Ambient) => Some(color_text(scene.ambient.color.0)),
+            Some(Target::Background) => Some(color_text(scene.background.color.0)),
             _ => None,
         };
-        if let (Some(subject), Some(told)) = (subject, told) {
-            self.say(format!("{}: {told}", subject.label(self.scene())));
+        if let (Some(subject), Some(state)) = (subject, state) {
+            self.say(format!("{}: {state}", subject.label(self.scene())));
         }
     }
 }
 
-fn of_color(color: [f64; 3]) -> String {
+fn color_text(color: [f64; 3]) -> String {
     format!("color {}", color.map(number).join(" "))
 }

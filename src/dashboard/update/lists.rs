@@ -1,37 +1,41 @@
-//! Moving over lines and choosing: outline, inspector, palette, lists, help, questions.
+//! Cursor movement and choice in outline, inspector, palette, lists, help and questions.
 
-use crate::dashboard::action::Direction;
 use crate::dashboard::editor::Editor;
-use crate::dashboard::hints::help;
-use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::overlay::{Answer, Overlay, Palette, PickFor, Question};
 use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
 use crate::dashboard::update::UpdateContext;
+use crate::dashboard::update::commands::{COMMANDS, Chapter};
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
 
-/// A position moved by `steps`, kept below `len`.
+/// Returns `cursor` moved by `steps`, clamped to a list of `len` entries.
 fn moved(cursor: usize, steps: isize, len: usize) -> usize {
     cursor.saturating_add_signed(steps).min(len.saturating_sub(1))
 }
 
 impl UpdateContext<'_> {
-    /// Moves the cursor of whatever has it by `steps` lines.
-    pub(super) fn walk(&mut self, steps: isize) {
-        let rows = self.model.place().map_or(1, |place| usize::from(place.list.height));
-        let width = self.model.place().map_or(1, |place| place.list.width);
+    /// Moves the active cursor by `steps` lines.
+    pub(super) fn move_cursor(&mut self, steps: isize) {
+        let rows = self.model.overlay_layout().map_or(1, |place| usize::from(place.list.height));
+        let width = self.model.overlay_layout().map_or(1, |place| place.list.width);
         let inventory = self.model.inventory(width).len();
         match &mut self.model.overlay {
             Some(Overlay::Help { scroll }) => {
-                *scroll = moved(*scroll, steps, help().len().saturating_sub(rows) + 1);
+                *scroll = moved(
+                    *scroll,
+                    steps,
+                    (COMMANDS.len() + Chapter::ALL.len()).saturating_sub(rows) + 1,
+                );
             }
             Some(Overlay::Inventory { scroll }) => {
                 *scroll = moved(*scroll, steps, inventory.saturating_sub(rows) + 1);
             }
-            Some(Overlay::Quality { cursor }) => *cursor = moved(*cursor, steps, QUALITIES.len()),
+            Some(Overlay::NoiseTargets { cursor }) => {
+                *cursor = moved(*cursor, steps, QUALITIES.len())
+            }
             Some(Overlay::Palette(palette)) => {
                 palette.cursor = moved(palette.cursor, steps, palette.found.len());
                 palette.scroll =
@@ -47,25 +51,26 @@ impl UpdateContext<'_> {
             Some(Overlay::Prompt(_) | Overlay::ViewerImage(_)) => {}
             Some(Overlay::Form(_)) => {
                 if self.apply_field() {
-                    self.walk_field(steps);
+                    self.move_field_cursor(steps);
                 }
             }
-            None if self.model.focus == Focus::Outline => self.walk_outline(steps),
-            None => self.walk_field(steps),
+            None if self.model.focus == Focus::Outline => self.move_outline_cursor(steps),
+            None => self.move_field_cursor(steps),
         }
     }
 
-    pub(super) fn page(&mut self, way: Direction) {
-        let rows = match (self.model.place(), self.model.focus) {
+    /// Moves the cursor by `pages`; a page is one line less than the visible rows.
+    pub(super) fn page(&mut self, pages: isize) {
+        let rows = match (self.model.overlay_layout(), self.model.focus) {
             (Some(place), _) => place.list.height,
             (None, Focus::Outline) => self.model.outline_rows().map_or(1, |rows| rows.height),
             (None, _) => self.model.inspector_rows().map_or(1, |(rows, _)| rows.height),
         };
         let page = isize::from(i16::try_from(rows).unwrap_or(1)).max(2) - 1;
-        self.walk(if way == Direction::Up { -page } else { page });
+        self.move_cursor(pages * page);
     }
 
-    fn walk_outline(&mut self, steps: isize) {
+    fn move_outline_cursor(&mut self, steps: isize) {
         let lines = outline(self.scene());
         let entry = |line: &OutlineLine| match line {
             OutlineLine::Entry { subject, .. } => Some(subject.clone()),
@@ -79,20 +84,20 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens what is under the cursor.
-    pub(super) fn open(&mut self, typed: Option<char>) {
+    /// Opens or confirms the item under the cursor.
+    pub(super) fn open(&mut self) {
         match &self.model.overlay {
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
-            Some(Overlay::Quality { cursor }) => {
+            Some(Overlay::NoiseTargets { cursor }) => {
                 let noise_codes = Some(QUALITIES[*cursor]);
                 self.model.overlay = None;
                 self.set_stop(Stop { noise_codes, rmse_linear: None, ..self.model.stop });
             }
             Some(Overlay::Palette(palette)) => {
-                let row = palette.found.get(palette.cursor).map(|at| KEYMAP[*at]);
-                if let Some(row) = row {
+                if let Some(found) = palette.found.get(palette.cursor) {
+                    let command = &COMMANDS[*found];
                     self.model.overlay = None;
-                    self.act(row.action, None);
+                    self.run(command);
                 }
             }
             Some(Overlay::Pick(pick)) => {
@@ -109,7 +114,7 @@ impl UpdateContext<'_> {
                 if form.editor.is_none() {
                     self.confirm_form();
                 } else if self.apply_field() {
-                    self.walk_field(1);
+                    self.move_field_cursor(1);
                 }
             }
             Some(Overlay::Prompt(_)) => self.answer_prompt(),
@@ -119,14 +124,14 @@ impl UpdateContext<'_> {
                 if self.model.inspector.editor.is_some() {
                     self.apply_field();
                 } else {
-                    self.open_field(typed);
+                    self.open_field(self.typed);
                 }
             }
             None => self.inspect(),
         }
     }
 
-    /// Esc where an overlay lies.
+    /// Cancels the editor of a form, or else the overlay.
     pub(super) fn close_overlay(&mut self) {
         match &mut self.model.overlay {
             Some(Overlay::Form(form)) if form.editor.is_some() => form.editor = None,
@@ -138,23 +143,27 @@ impl UpdateContext<'_> {
         }
     }
 
+    pub(super) fn open_overlay(&mut self, overlay: Overlay) {
+        self.model.overlay = Some(overlay);
+    }
+
     pub(super) fn open_palette(&mut self) {
         self.model.overlay = Some(Overlay::Palette(Palette {
             editor: Editor::default(),
-            found: (0..KEYMAP.len()).collect(),
+            found: (0..COMMANDS.len()).collect(),
             cursor: 0,
             scroll: 0,
         }));
     }
 
-    /// Finds the actions that fit what is typed in the palette, the best first.
+    /// Finds the commands that match the palette's text, best first.
     pub(super) fn search(&mut self) {
         let Some(Overlay::Palette(palette)) = &mut self.model.overlay else { return };
         let text = palette.editor.text();
         let pattern = Pattern::parse(text, CaseMatching::Ignore, Normalization::Smart);
         let mut matcher = Matcher::new(Config::DEFAULT);
         let mut buffer = Vec::new();
-        let mut found: Vec<(u32, usize)> = KEYMAP
+        let mut found: Vec<(u32, usize)> = COMMANDS
             .iter()
             .enumerate()
             .filter_map(|(i, row)| {
@@ -163,14 +172,14 @@ impl UpdateContext<'_> {
                 Some((score, i))
             })
             .collect();
-        // Of equally good ones the first of the table comes first.
+        // Ties are in the order of the table.
         found.sort_by_key(|(score, i)| (std::cmp::Reverse(*score), *i));
         palette.found = found.into_iter().map(|(_, i)| i).collect();
         palette.cursor = 0;
         palette.scroll = 0;
     }
 
-    /// Goes to the next entry of a list that begins with this letter.
+    /// Moves to the next entry of a list that begins with this letter.
     pub(super) fn jump_to(&mut self, c: char) {
         let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
         let begins = |i: &usize| {
@@ -179,11 +188,11 @@ impl UpdateContext<'_> {
         };
         let after = (pick.cursor + 1..pick.entries.len()).find(begins);
         if let Some(to) = after.or_else(|| (0..pick.entries.len()).find(begins)) {
-            self.walk(to as isize - pick.cursor as isize);
+            self.move_cursor(to as isize - pick.cursor as isize);
         }
     }
 
-    /// Asks something. `Esc` leaves all as it is.
+    /// Asks a question. `Esc` changes nothing.
     pub(super) fn ask(&mut self, text: String, answers: &[(char, &str, Answer)]) {
         let answers =
             answers.iter().map(|(c, words, answer)| (*c, words.to_string(), answer.clone()));
@@ -205,8 +214,8 @@ impl UpdateContext<'_> {
             Answer::Load => self.emit(crate::dashboard::update::Effect::Load),
             Answer::Overwrite(path) => self.write(path, true),
             Answer::SaveAs => self.ask_path(),
-            Answer::TakeUp => self.take_up(),
-            Answer::Discard => self.discard_left_behind(),
+            Answer::Recover => self.recover(),
+            Answer::Discard => self.discard_orphaned_edits(),
         }
     }
 }

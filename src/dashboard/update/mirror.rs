@@ -1,4 +1,4 @@
-//! The keys that act on the mirror.
+//! Commands on the mirror.
 
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::edit::{self, Edit, EditError, Target};
@@ -20,22 +20,22 @@ impl UpdateContext<'_> {
         self.commit_mirror(edit, Coalesce::Single);
     }
 
-    /// Carries the edit out and tells what the mirror is like now.
-    fn commit_mirror(&mut self, edit: Result<Edit, EditError>, hold: Coalesce) {
+    /// Commits the edit and reports the mirror's new values.
+    fn commit_mirror(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
-        self.commit(edit, hold);
+        self.commit(edit, coalesce);
         let Some(Target::Material(name)) = subject else { return };
         let Some(material) = self.scene().materials.get(&name) else { return };
         let lobe = edit::rows(self.scene(), &Target::Material(name.clone()))
             .ok()
             .and_then(|rows| rows.into_iter().find(|row| row.key == "lobe"))
             .map_or_else(String::new, |row| format!(" · {}", row.value));
-        let told = format!(
+        let text = format!(
             "{}: roughness {} · reflection {}{lobe}",
             truncated(&name),
             number(material.roughness),
             number(material.reflection),
         );
-        self.say(told);
+        self.say(text);
     }
 }

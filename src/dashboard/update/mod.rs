@@ -1,10 +1,12 @@
-//! What every message does: a changed model and what is asked for. No clock, no file, no terminal.
+//! State transitions: a message changes the model and returns effects. No access to clock, files or
+//! terminal.
 
-mod actions;
 mod camera;
+pub mod commands;
 mod compare;
 mod fields;
 mod files;
+mod focus;
 mod form;
 mod image_viewer;
 mod keys;
@@ -32,63 +34,86 @@ use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Repeats of a key that come within this time are one step of undo: longer than the pause before
-/// a held key begins to repeat.
+/// Repeated keys within this time are one undo step. Longer than the delay before a held key
+/// repeats.
 const REPEAT_WINDOW: Duration = Duration::from_millis(700);
 
-/// What a model that has just been made asks for.
+/// Returns the initial effects of a new model.
 pub fn begin(model: &mut Model) -> Vec<Effect> {
-    let mut turn = UpdateContext::new(model, Duration::ZERO);
-    turn.emit(Effect::Stop(turn.model.stop));
-    if !turn.model.file.unreadable {
-        turn.show();
+    let mut context = UpdateContext::new(model, Duration::ZERO);
+    context.emit(Effect::Stop(context.model.stop));
+    if !context.model.file.unreadable {
+        context.show();
     }
-    turn.normalize();
-    turn.effects
+    context.normalize();
+    context.effects
 }
 
-/// Takes in a message at the time `now` (since any fixed moment) and says what is to be done.
+/// Updates the model with a message at time `now`, measured from any fixed origin, and returns the
+/// effects.
 pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
-    let mut turn = UpdateContext::new(model, now);
-    turn.forget_notice();
-    turn.take(message);
-    turn.normalize();
-    turn.effects
+    let mut context = UpdateContext::new(model, now);
+    context.expire_notice();
+    context.handle(message);
+    context.normalize();
+    context.effects
 }
 
-/// One message being taken in.
+/// Context of one update.
 struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
-    /// Whether lists are to be scrolled to their cursors.
+    /// Lists scroll to keep their cursor visible.
     follow: bool,
+    /// The character that ran the current command, if one did.
+    typed: Option<char>,
 }
 
-/// How an edit joins the one before.
+/// A direction on the screen or along the view.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Direction {
+    Left,
+    Right,
+    Up,
+    Down,
+    /// Away from the eye.
+    In,
+    /// Towards the eye.
+    Out,
+}
+
+/// Size of a step.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum StepSize {
+    Coarse,
+    Fine,
+}
+
+/// Coalescing of an edit with the previous undo step.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Coalesce {
-    /// It stands alone.
+    /// None.
     Single,
-    /// It joins edits of the same label a moment ago.
+    /// With recent edits of the same label.
     Repeat,
-    /// It joins edits of the same label until the gesture (a drag, a mode) ends.
+    /// With edits of the same label until the gesture (a drag or mode) ends.
     Gesture,
 }
 
 impl<'a> UpdateContext<'a> {
     fn new(model: &'a mut Model, now: Duration) -> Self {
-        Self { model, now, effects: Vec::new(), follow: true }
+        Self { model, now, effects: Vec::new(), follow: true, typed: None }
     }
 
-    fn take(&mut self, message: Message) {
+    fn handle(&mut self, message: Message) {
         match message {
             Message::Key(key) => self.key(key),
             Message::Mouse(mouse) => self.mouse(mouse),
             Message::Paste(text) => self.paste(&text),
             Message::Resize(screen) => {
                 self.model.screen = screen;
-                self.look_again();
+                self.refit_image();
                 self.repaint();
             }
             Message::Snapshot(snapshot) => {
@@ -101,12 +126,12 @@ impl<'a> UpdateContext<'a> {
                 self.model.snapshot = Some(snapshot);
                 self.repaint();
             }
-            Message::Kept(picture, spp) => self.kept(picture, spp),
+            Message::Pinned(picture, spp) => self.pinned(picture, spp),
             Message::Saved(scene, result) => self.saved(scene, result),
             Message::Loaded(result) => self.loaded(*result),
             Message::ChangedOnDisk => self.changed_on_disk(),
-            Message::OrphanedEdits(left) => self.left_behind(left),
-            Message::Trouble(text) => {
+            Message::OrphanedEdits(left) => self.orphaned_edits(left),
+            Message::Warning(text) => {
                 self.follow = false;
                 self.notify(Tone::Bad, capital(&text), None);
             }
@@ -118,21 +143,21 @@ impl<'a> UpdateContext<'a> {
                 }
             }
             Message::ViewerImage(path, result) => self.still(&path, result),
-            Message::StillSent(sent) => {
+            Message::ImageSent(sent) => {
                 self.follow = false;
-                if let Some(Overlay::ViewerImage(looked)) = &mut self.model.overlay {
-                    looked.sent = sent;
+                if let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay {
+                    viewed.sent = sent;
                 }
             }
             Message::LinkStatus(line) => {
                 self.follow = false;
-                self.model.line = line;
+                self.model.link = line;
             }
             Message::Tick => self.follow = false,
         }
     }
 
-    /// Asks for something. A newer wish of the same kind replaces an older one, except for files.
+    /// Adds an effect. It replaces an earlier one of its kind, except for writes to files.
     fn emit(&mut self, effect: Effect) {
         if !matches!(effect, Effect::Save { .. } | Effect::Export(_) | Effect::ExportSized { .. }) {
             self.effects.retain(|e| discriminant(e) != discriminant(&effect));
@@ -140,12 +165,12 @@ impl<'a> UpdateContext<'a> {
         self.effects.push(effect);
     }
 
-    /// The cells of the picture may have to be others.
+    /// Marks the cells of the picture as outdated.
     fn repaint(&mut self) {
         self.model.picture_version += 1;
     }
 
-    /// Has the scene rendered that is to be seen.
+    /// Requests that the current scene is rendered.
     fn show(&mut self) {
         let scene = Arc::clone(self.model.scene());
         self.emit(Effect::Show(scene));
@@ -156,18 +181,18 @@ impl<'a> UpdateContext<'a> {
         self.model.scene()
     }
 
-    /// Carries an edit out or says why it is refused. Whether the scene is another now.
-    fn commit(&mut self, edit: Result<Edit, EditError>, hold: Coalesce) -> bool {
+    /// Commits an edit or reports its error. Returns `true` if the scene has changed.
+    fn commit(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) -> bool {
         match edit {
-            Ok(edit) => self.record(edit, hold),
-            Err(refusal) => {
-                self.refuse(&refusal.to_string());
+            Ok(edit) => self.record(edit, coalesce),
+            Err(error) => {
+                self.refuse(&error.to_string());
                 false
             }
         }
     }
 
-    fn record(&mut self, edit: Edit, hold: Coalesce) -> bool {
+    fn record(&mut self, edit: Edit, coalesce: Coalesce) -> bool {
         if let Some(note) = &edit.note {
             self.say(note.clone());
         }
@@ -183,7 +208,7 @@ impl<'a> UpdateContext<'a> {
         }
         let model = &mut *self.model;
         let soon = |last: Duration| self.now.saturating_sub(last) <= REPEAT_WINDOW;
-        let joins = match hold {
+        let joins = match coalesce {
             Coalesce::Single => false,
             Coalesce::Repeat => model.last_edit.is_some_and(soon),
             Coalesce::Gesture => true,
@@ -191,21 +216,21 @@ impl<'a> UpdateContext<'a> {
         if !joins {
             model.history.end_gesture();
         }
-        let changed = model.history.record(scene, &edit.label, hold != Coalesce::Single);
-        model.last_edit = (hold == Coalesce::Repeat).then_some(self.now);
+        let changed = model.history.record(scene, &edit.label, coalesce != Coalesce::Single);
+        model.last_edit = (coalesce == Coalesce::Repeat).then_some(self.now);
         if changed {
             self.show();
         }
         changed
     }
 
-    /// The next edit is a step of its own.
+    /// Ends coalescing: the next edit is an undo step of its own.
     fn end_gesture(&mut self) {
         self.model.history.end_gesture();
         self.model.last_edit = None;
     }
 
-    /// As `commit`; afterwards what was edited is selected.
+    /// Commits an edit and selects its target.
     fn commit_and_select(&mut self, edit: Result<Edit, EditError>) -> bool {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         let changed = self.commit(edit, Coalesce::Single);
@@ -222,7 +247,7 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Tells something for some seconds, the longer the more there is to read.
+    /// Shows a notice for at least `seconds`, longer for long texts; `None` until the next key.
     fn notify(&mut self, tone: Tone, text: impl Into<String>, seconds: Option<f64>) {
         let text = sanitized(&text.into());
         let until = seconds.map(|seconds| {
@@ -244,16 +269,16 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Takes away a notice whose time is over.
-    fn forget_notice(&mut self) {
+    /// Removes an expired notice.
+    fn expire_notice(&mut self) {
         let over = |notice: &Notice| notice.until.is_some_and(|until| until <= self.now);
         if self.model.notice.as_ref().is_some_and(over) {
             self.model.notice = None;
         }
     }
 
-    /// Leaves the model sound: the selection exists, cursors are in their lists and in view, and the
-    /// renderer knows the raster.
+    /// Restores the model's invariants: the selection exists, cursors are in range and visible, and
+    /// the renderer knows the raster.
     fn normalize(&mut self) {
         if !self.model.selection.exists(self.model.scene()) {
             let last = |len: usize, of: fn(usize) -> Target| len.checked_sub(1).map(of);
@@ -271,23 +296,23 @@ impl<'a> UpdateContext<'a> {
             self.emit(Effect::Raster(raster));
             self.repaint();
         }
-        self.settle_panels();
-        self.journal();
+        self.normalize_panels();
+        self.autosave();
     }
 
-    fn settle_panels(&mut self) {
+    fn normalize_panels(&mut self) {
         let lines = self.model.field_lines();
         let follow = self.follow;
-        let place = self.model.place();
+        let place = self.model.overlay_layout();
         let inspector_rows = self.model.inspector_rows();
         if let Some(Overlay::Form(form)) = &mut self.model.overlay {
             let rows = place.map_or(0, |place| place.list.height);
-            settle_cursor(&mut form.cursor, &mut form.scroll, &lines, rows, follow);
+            normalize_cursor(&mut form.cursor, &mut form.scroll, &lines, rows, follow);
             return;
         }
         let rows = inspector_rows.map_or(0, |(rows, _)| rows.height);
         let Inspector { cursor, scroll, .. } = &mut self.model.inspector;
-        settle_cursor(cursor, scroll, &lines, rows, follow);
+        normalize_cursor(cursor, scroll, &lines, rows, follow);
         if let Some(rows) = self.model.outline_rows() {
             let lines = outline(self.model.scene());
             let rows = usize::from(rows.height);
@@ -299,7 +324,7 @@ impl<'a> UpdateContext<'a> {
     }
 }
 
-fn settle_cursor(
+fn normalize_cursor(
     cursor: &mut usize,
     scroll: &mut usize,
     lines: &[PanelLine],

@@ -1,4 +1,4 @@
-//! The mouse: clicks select, drags turn and move, the wheel goes nearer.
+//! Mouse: clicks select, drags orbit or move, the wheel dollies.
 
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{Drag, Mode};
@@ -12,10 +12,10 @@ use crate::terminal::Area;
 use crate::terminal::event::{Button, Mouse, MouseKind};
 use glam::DVec3;
 
-/// Lines that a tick of the wheel scrolls.
+/// Lines per tick of the wheel.
 const WHEEL_LINES: i32 = 3;
 
-/// The line of a list that a cell shows.
+/// Returns the line of a list at a cell.
 fn line_at(rows: Area, scroll: usize, mouse: Mouse) -> Option<usize> {
     let inside = rows.contains(mouse.column, mouse.row);
     inside.then(|| usize::from(mouse.row - rows.y) + scroll)
@@ -68,7 +68,7 @@ impl UpdateContext<'_> {
     }
 
     fn press_in_outline(&mut self, rows: Area, mouse: Mouse) {
-        // The rows are those of before the focus came here, which may unfold the panel.
+        // The rows are from before the focus change, which may unfold the panel.
         let lines = outline(self.scene());
         let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|at| lines.get(at));
         let subject = line.and_then(|line| match line {
@@ -98,15 +98,15 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// A click on the line under the cursor takes it, another one moves the cursor there.
+    /// Opens the clicked line if the cursor is on it, otherwise moves the cursor there.
     fn press_in_overlay(&mut self, mouse: Mouse) {
-        let Some(place) = self.model.place() else { return };
+        let Some(place) = self.model.overlay_layout() else { return };
         let (scroll, cursor, len) = match &self.model.overlay {
             Some(Overlay::Palette(palette)) => {
                 (palette.scroll, palette.cursor, palette.found.len())
             }
             Some(Overlay::Pick(pick)) => (pick.scroll, pick.cursor, pick.entries.len()),
-            Some(Overlay::Quality { cursor }) => (0, *cursor, QUALITIES.len()),
+            Some(Overlay::NoiseTargets { cursor }) => (0, *cursor, QUALITIES.len()),
             Some(Overlay::Question(question)) => (0, question.cursor, question.answers.len()),
             Some(Overlay::Form(form)) => {
                 let at = line_at(place.list, form.scroll, mouse);
@@ -125,8 +125,8 @@ impl UpdateContext<'_> {
         };
         if let Some(at) = line_at(place.list, scroll, mouse).filter(|at| *at < len) {
             match at == cursor {
-                true => self.open(None),
-                false => self.walk(at as isize - cursor as isize),
+                true => self.open(),
+                false => self.move_cursor(at as isize - cursor as isize),
             }
         }
     }
@@ -167,7 +167,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Whether all drags and keys are one step, until the mode ends.
+    /// Returns `true` in modes whose edits form one undo step until the mode ends.
     fn moves_or_turns(&self) -> bool {
         matches!(self.model.mode, Mode::Move | Mode::Rotate)
     }
@@ -208,7 +208,7 @@ impl UpdateContext<'_> {
                 self.model.overlay,
                 Some(Overlay::Help { .. } | Overlay::Inventory { .. })
             );
-            self.walk(if over_list { lines } else { -(ticks.clamp(-100, 100) as isize) });
+            self.move_cursor(if over_list { lines } else { -(ticks.clamp(-100, 100) as isize) });
             return;
         }
         let Some(layout) = self.model.layout().filter(|_| !self.model.file.unreadable) else {
@@ -239,7 +239,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// The object that the middle of a pixel of the film shows.
+/// Returns the object at the centre of a film pixel.
 fn seen_at(scene: &Scene, [x, y]: [usize; 2]) -> Option<usize> {
     let camera = &scene.camera;
     let [width, height] = scene.film.size.map(f64::from);

@@ -1,41 +1,39 @@
-//! Moving, turning, copying, removing what is selected.
+//! Moving, turning, duplicating and deleting the selection.
 
-use crate::dashboard::action::{Direction, StepSize};
 use crate::dashboard::model::Mode;
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
 use crate::scene::edit::{self, bounds, step_length};
 use glam::{DVec2, DVec3};
 
-/// Degrees of a step.
+/// Degrees per step.
 const TURN_DEGREES: f64 = 15.0;
 const TURN_DEGREES_FINE: f64 = 1.0;
-/// A drag at a flat angle to the ground would move things without end: at most so many times as far
-/// as across.
+/// Limit of the distance of a drag in depth relative to one across, at grazing view angles.
 const MOST_STRETCH: f64 = 4.0;
 
-/// The coordinate axis in the ground plane that is nearest to `v`.
+/// Returns the coordinate axis in the ground plane that is nearest to `v`.
 fn nearest_axis(v: DVec3) -> DVec3 {
     if v.x.abs() >= v.z.abs() { DVec3::X * v.x.signum() } else { DVec3::Z * v.z.signum() }
 }
 
 impl UpdateContext<'_> {
-    /// The directions in the ground that look like right and away in the picture, along the
-    /// coordinate axes, so that coordinates stay round.
+    /// Ground axes that point right and away in the picture. They are coordinate axes, so
+    /// coordinates stay round.
     fn ground_axes(&self) -> [DVec3; 2] {
         let [right, _, _] = self.scene().camera.frame();
         let right = nearest_axis(right);
-        // Away from one who has `right` on the right and stands upright.
+        // Direction of view of an upright observer with `right` on the right.
         [right, DVec3::Y.cross(right)]
     }
 
     pub(super) fn check_movable(&mut self) -> bool {
         let tried = edit::move_by(self.scene(), &self.model.selection, [0.0; 3]);
-        tried.map_err(|refusal| self.refuse(&refusal.to_string())).is_ok()
+        tried.map_err(|error| self.refuse(&error.to_string())).is_ok()
     }
 
     pub(super) fn check_turnable(&mut self) -> bool {
         let tried = edit::turn(self.scene(), &self.model.selection, 0.0);
-        tried.map_err(|refusal| self.refuse(&refusal.to_string())).is_ok()
+        tried.map_err(|error| self.refuse(&error.to_string())).is_ok()
     }
 
     pub(super) fn move_selection(&mut self, way: Direction, pace: StepSize) {
@@ -59,14 +57,14 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    /// In a mode or a drag all steps are one; otherwise (from the palette) those of a moment.
+    /// Coalescing of a step: the whole gesture in a mode or drag, otherwise recent steps.
     fn gesture(&self) -> Coalesce {
         let in_mode = matches!(self.model.mode, Mode::Move | Mode::Rotate);
         if in_mode || self.model.drag.is_some() { Coalesce::Gesture } else { Coalesce::Repeat }
     }
 
-    /// Moves the selection by a drag of so many half cells to the right and down: in the ground
-    /// plane, or up and down. It stays under the hand as far as that goes.
+    /// Moves the selection by a drag of `right` and `down` half cells in the ground plane, or
+    /// vertically if `upright`. The selection follows the mouse where possible.
     pub(super) fn move_by_hand(&mut self, right: f64, down: f64, upright: bool) {
         let scene = self.scene();
         let [x, _, forward] = scene.camera.frame();
@@ -92,7 +90,7 @@ impl UpdateContext<'_> {
 
     pub(super) fn turn_selection(&mut self, way: Direction, pace: StepSize) {
         let degrees = if pace == StepSize::Fine { TURN_DEGREES_FINE } else { TURN_DEGREES };
-        // Counter-clockwise from above: the near side goes to the right.
+        // Counter-clockwise from above: the near side moves right.
         self.turn_by(if way == Direction::Right { degrees } else { -degrees });
     }
 
@@ -101,7 +99,7 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    pub(super) fn drop_down(&mut self) {
+    pub(super) fn snap_to_ground(&mut self) {
         let edit = edit::snap_to_ground(self.scene(), &self.model.selection);
         self.commit(edit, Coalesce::Single);
     }

@@ -1,4 +1,4 @@
-//! Lines of text that are asked for: names, paths, when to stop, sizes.
+//! Prompts for names, paths, stop criteria and sizes.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::message::{Effect, Format};
@@ -62,7 +62,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn ask_stop(&mut self) {
-        let help = "noise 0.5 (codes), rmse 0.001 (linear), spp 1000, time 60 (seconds): one or \
+        let help = "noise 0.5 (8-bit levels), rmse 0.001 (linear), spp 1000, time 60 (seconds): one or \
                     more, whichever comes first; or none";
         let now = stop_text(&self.model.stop);
         self.prompt(PromptFor::StopAt, "stop at", help, now);
@@ -80,7 +80,7 @@ impl UpdateContext<'_> {
         self.prompt(PromptFor::ExportSized, "render at another size", help, text);
     }
 
-    /// Enter in a prompt.
+    /// Applies the answer of a prompt.
     pub(super) fn answer_prompt(&mut self) {
         let Some(Overlay::Prompt(prompt)) = &self.model.overlay else { return };
         let (purpose, text) = (prompt.purpose.clone(), prompt.editor.text().trim().to_string());
@@ -93,7 +93,7 @@ impl UpdateContext<'_> {
         };
         match (answered, &mut self.model.overlay) {
             (Err(problem), Some(Overlay::Prompt(prompt))) => prompt.editor.problem = Some(problem),
-            // What was answered may have asked something else.
+            // The answer may have opened another overlay.
             (Ok(()), overlay @ Some(Overlay::Prompt(_))) => *overlay = None,
             _ => {}
         }
@@ -107,7 +107,7 @@ impl UpdateContext<'_> {
         if path.extension().is_none() {
             path.set_extension("toml");
         }
-        // Its own file is saved as always: with a look whether somebody else wrote it.
+        // The scene's own file gets the usual check for changes by other programs.
         let own = self.model.file.path.as_ref() == Some(&path);
         self.write((!own).then_some(path), false);
         Ok(())
@@ -141,7 +141,7 @@ impl UpdateContext<'_> {
             return Err(format!("\"{}\" is too much.", truncated(more)));
         }
         let film = edit::set(self.scene(), &Target::Film, "size", size);
-        let scene = film.map_err(|refusal| refusal.to_string())?.scene;
+        let scene = film.map_err(|error| error.to_string())?.scene;
         let size = scene.film.size;
         self.model.export = Some(RunningExport { size, format, progress: 0.0 });
         let (display, stop) = (self.model.display, self.model.stop);
@@ -151,7 +151,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// A stop as it is typed: `noise 0.5 time 60`; `none`.
+/// Formats stop criteria: `noise 0.5 time 60`; `none`.
 pub(super) fn stop_text(stop: &Stop) -> String {
     let targets = [
         ("noise", stop.noise_codes),
@@ -164,7 +164,7 @@ pub(super) fn stop_text(stop: &Stop) -> String {
     if text.is_empty() { "none".to_string() } else { text }
 }
 
-/// What `stop_text` writes; commas may stand between.
+/// Parses the output of `stop_text`; commas may separate the items.
 fn parse_stop(text: &str) -> Result<Stop, String> {
     let mut stop = Stop::default();
     let mut words = text.split([' ', ',', '=']).filter(|word| !word.is_empty());
@@ -204,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stops_are_read_as_they_are_written() {
+    fn stop_criteria_round_trip_through_text() {
         let all = Stop {
             spp: Some(1000),
             noise_codes: Some(0.5),

@@ -1,4 +1,4 @@
-//! Unsaved edits: those of a program that was killed, and those of this one, which may be.
+//! Recovery of unsaved edits after a crash, and autosave.
 
 use crate::dashboard::message::{Effect, OrphanedEdits};
 use crate::dashboard::model::Tone;
@@ -8,10 +8,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 impl UpdateContext<'_> {
-    /// Edits were found that nobody saved.
-    pub(super) fn left_behind(&mut self, left: OrphanedEdits) {
+    /// Offers the orphaned edits of a crashed session.
+    pub(super) fn orphaned_edits(&mut self, left: OrphanedEdits) {
         self.follow = false;
-        self.model.left_behind = Some(left);
+        self.model.orphaned_edits = Some(left);
         if self.model.overlay.is_some() || self.model.editor().is_some() {
             let text = "Edits of a session that broke off are kept · : recover takes them up";
             self.notify(Tone::Plain, text, None);
@@ -21,7 +21,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn ask_recovery(&mut self) {
-        let Some(left) = &self.model.left_behind else {
+        let Some(left) = &self.model.orphaned_edits else {
             self.say("No session with this scene has broken off");
             return;
         };
@@ -38,20 +38,20 @@ impl UpdateContext<'_> {
         self.ask(
             text,
             &[
-                ('r', "recover them: undo leads back to the file", Answer::TakeUp),
+                ('r', "recover them: undo leads back to the file", Answer::Recover),
                 ('f', "look at the file, decide later", Answer::Nothing),
                 ('d', "discard them", Answer::Discard),
             ],
         );
     }
 
-    pub(super) fn take_up(&mut self) {
-        let Some(left) = self.model.left_behind.take() else { return };
+    pub(super) fn recover(&mut self) {
+        let Some(left) = self.model.orphaned_edits.take() else { return };
         let scene = left.scene;
         self.end_gesture();
         if std::mem::take(&mut self.model.file.unreadable) {
             self.model.history.restart(Arc::clone(&scene));
-            // What the file holds is no scene, so not this one.
+            // The contents of the file are not a scene, so the recovered scene is unsaved.
             self.model.history.mark_saved(Arc::default());
             self.model.file.saved = scene;
         } else if !self.model.history.record(scene, "recovered edits", false) {
@@ -59,37 +59,37 @@ impl UpdateContext<'_> {
             self.say("the file has them already");
             return;
         }
-        self.emit(Effect::TakeUp);
+        self.emit(Effect::Recover);
         self.show();
         self.say("recovered, not yet saved · Ctrl-s saves, u goes back");
     }
 
-    pub(super) fn discard_left_behind(&mut self) {
-        if self.model.left_behind.take().is_some() {
+    pub(super) fn discard_orphaned_edits(&mut self) {
+        if self.model.orphaned_edits.take().is_some() {
             self.emit(Effect::Discard);
             self.say("discarded");
         }
     }
 
-    /// Has what is unsaved kept where the next start finds it, or forgotten: what is left on purpose
-    /// is not kept.
-    pub(super) fn journal(&mut self) {
+    /// Requests an autosave of unsaved edits, or the removal of the recovery file. Edits discarded
+    /// on quitting are removed.
+    pub(super) fn autosave(&mut self) {
         let quit = self.effects.iter().position(|effect| *effect == Effect::Quit);
         let unsaved = quit.is_none() && !self.model.file.unreadable && self.model.is_unsaved();
         let scene = unsaved.then(|| Arc::clone(self.model.history.scene()));
-        let same = match (&scene, &self.model.journaled) {
+        let same = match (&scene, &self.model.autosaved) {
             (Some(now), Some(before)) => Arc::ptr_eq(now, before),
             (None, None) => true,
             _ => false,
         };
         if !same {
-            self.model.journaled.clone_from(&scene);
-            self.effects.insert(quit.unwrap_or(self.effects.len()), Effect::KeepEdits(scene));
+            self.model.autosaved.clone_from(&scene);
+            self.effects.insert(quit.unwrap_or(self.effects.len()), Effect::Autosave(scene));
         }
     }
 }
 
-/// `12 minutes ago`.
+/// Formats an age: `12 minutes ago`.
 fn ago(age: Duration) -> String {
     let minutes = age.as_secs() / 60;
     let (count, unit) = match minutes {
@@ -107,7 +107,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn ages_in_words() {
+    fn ages_are_formatted_in_words() {
         for (seconds, words) in [
             (59, "a moment ago"),
             (60, "1 minute ago"),

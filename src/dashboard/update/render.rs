@@ -1,6 +1,6 @@
-//! The work: pause, restart, targets, threads; exports; the terminal's colours.
+//! Commands on the render: pause, restart, stop criteria, threads, exports; colours of the
+//! terminal.
 
-use crate::dashboard::action::Delta;
 use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::Colors;
 use crate::dashboard::overlay::Overlay;
@@ -17,32 +17,31 @@ impl UpdateContext<'_> {
 
     pub(super) fn restart(&mut self) {
         self.emit(Effect::Restart);
-        self.say("begun anew");
+        self.say("restarted");
     }
 
     pub(super) fn set_stop(&mut self, stop: Stop) {
         self.model.stop = stop;
         self.emit(Effect::Stop(stop));
-        let told = stop_text(&stop);
-        let told = if told == "none" { "never".to_string() } else { format!("at {told}") };
-        self.say(format!("stops {told}"));
+        let text = stop_text(&stop);
+        let when = if text == "none" { "never".to_string() } else { format!("at {text}") };
+        self.say(format!("stops {when}"));
     }
 
-    /// Shows what each quality costs, with the cursor on the one the work stops at.
-    pub(super) fn open_qualities(&mut self) {
+    /// Opens the noise targets with the cursor on the current one.
+    pub(super) fn open_noise_targets(&mut self) {
         let wanted = self.model.stop.noise_codes.unwrap_or(0.5);
         let cursor = QUALITIES.iter().position(|codes| *codes <= wanted);
         self.model.overlay =
-            Some(Overlay::Quality { cursor: cursor.unwrap_or(QUALITIES.len() - 1) });
+            Some(Overlay::NoiseTargets { cursor: cursor.unwrap_or(QUALITIES.len() - 1) });
     }
 
-    pub(super) fn threads(&mut self, change: Delta) {
-        let more = if change == Delta::Up { 1 } else { -1 };
+    pub(super) fn threads(&mut self, more: isize) {
         let threads = self.model.threads.saturating_add_signed(more);
-        self.model.threads = threads.clamp(1, self.model.most_threads);
+        self.model.threads = threads.clamp(1, self.model.max_threads);
         self.emit(Effect::Threads(self.model.threads));
-        let of = self.model.most_threads;
-        self.say(format!("{} of {of} threads", self.model.threads));
+        let max = self.model.max_threads;
+        self.say(format!("{} of {max} threads", self.model.threads));
     }
 
     pub(super) fn priority(&mut self) {

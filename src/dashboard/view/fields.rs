@@ -1,4 +1,4 @@
-//! Fields with their values: the inspector, and the body of a form.
+//! Fields with their values, in the inspector and in forms.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::{Focus, Layout};
@@ -18,30 +18,30 @@ use ratatui::layout::Position;
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
 
-/// The unit of lengths: told under the cursor only.
+/// Unit of lengths, shown under the cursor only.
 const LENGTH: &str = "scene units";
 
 /// Fields in their area.
 pub struct Fields<'a> {
-    /// The lines.
+    /// Lines.
     pub lines: &'a [PanelLine],
-    /// Rows for them.
+    /// Rows of the lines.
     pub list: Area,
-    /// Rows for what is to be said about the one under the cursor.
+    /// Rows for help on the field under the cursor.
     pub help: Area,
-    /// Position of the cursor.
+    /// Line of the cursor.
     pub cursor: usize,
-    /// First line shown.
+    /// First visible line.
     pub scroll: usize,
-    /// The value being typed.
+    /// Editor of the field under the cursor.
     pub editor: Option<&'a Editor>,
-    /// What was wrong, if not with what is typed.
+    /// Problem other than with the text being typed.
     pub problem: Option<&'a str>,
-    /// Whether keys go here.
+    /// The fields take the keys.
     pub active: bool,
 }
 
-/// Draws the inspector, if it is not folded away. Where text is being typed, if it is.
+/// Draws the inspector, unless it is folded. Returns the position of the text cursor, if any.
 pub fn inspector(
     model: &Model,
     layout: &Layout,
@@ -67,7 +67,7 @@ pub fn inspector(
 }
 
 impl Fields<'_> {
-    /// Draws them. Where text is being typed, if it is.
+    /// Draws the fields. Returns the position of the text cursor, if any.
     pub fn draw(&self, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
         let rows = usize::from(self.list.height);
         let first = self.scroll.min(self.lines.len().saturating_sub(rows));
@@ -129,7 +129,7 @@ impl Fields<'_> {
             }
             given => to.put(&brief(given), value),
         };
-        // A word that nearly every number has would only be noise.
+        // A unit that nearly every number has would be noise.
         let telling = chosen || field.unit != LENGTH;
         let fits = to.left() >= columns(field.unit) + 2;
         if telling && fits && !field.unit.is_empty() && !field.value.is_empty() {
@@ -139,8 +139,7 @@ impl Fields<'_> {
         None
     }
 
-    /// What is to be said about the field under the cursor: what is wrong, else what it is and what
-    /// may be typed.
+    /// Draws help on the field under the cursor: its problem, or its description and valid input.
     fn say(&self, theme: &Theme, buffer: &mut Buffer) {
         let Some(field) = self.lines.get(self.cursor).and_then(PanelLine::field) else { return };
         let width = self.help.width.saturating_sub(2);
@@ -162,7 +161,7 @@ impl Fields<'_> {
     }
 }
 
-/// What may be typed, and what holds if nothing is.
+/// Returns the valid input and default of a field.
 fn expected(field: &FieldLine) -> String {
     match &field.default {
         Some(default) if !default.is_empty() && !field.is_default => {
@@ -178,7 +177,7 @@ fn heading(mut to: Row, title: &str, theme: &Theme) {
     to.put(&"─".repeat(rest), theme.border(false));
 }
 
-/// A line of text with its cursor, in all that is left of the row.
+/// Draws a text editor in the rest of the row. Returns the position of its cursor.
 pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     let width = to.left().saturating_sub(1);
     if width == 0 {
@@ -195,7 +194,7 @@ pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     Some(Position { x: x + column, y })
 }
 
-/// A number in at most six significant digits: what an editor then holds has all of them.
+/// Rounds a number to six significant digits for display; the editor shows all of them.
 fn brief(value: &str) -> Cow<'_, str> {
     /// Longest number shown with all its digits, in characters.
     const SHORT: usize = 9;

@@ -1,4 +1,4 @@
-//! Panels' borders with their titles, and the picture's panel.
+//! Borders and titles of panels, and the picture's panel.
 
 use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::message::DisplayChannel;
@@ -12,7 +12,7 @@ use ratatui::buffer::Buffer;
 use ratatui::style::{Modifier, Style};
 use ratatui::widgets::{Block, Clear, Widget};
 
-/// The border of a panel with its title.
+/// Draws the border of a panel with its title.
 pub fn panel(area: Area, title: &str, focused: bool, theme: &Theme, buffer: &mut Buffer) {
     Block::bordered()
         .border_type(theme.border_type(focused))
@@ -28,13 +28,13 @@ pub fn panel(area: Area, title: &str, focused: bool, theme: &Theme, buffer: &mut
     }
 }
 
-/// A box over the panels: nothing shines through.
+/// Draws an opaque box over the panels.
 pub fn overlay(area: Area, title: &str, theme: &Theme, buffer: &mut Buffer) {
     Clear.render(rect(area).intersection(buffer.area), buffer);
     panel(area, title, true, theme, buffer);
 }
 
-/// Lines above and below what is shown of a longer list: a mark on the right border.
+/// Draws the scroll bar of a list on its right border.
 pub fn scroll_mark(
     area: Area,
     (first, shown, all): (usize, usize, usize),
@@ -54,7 +54,7 @@ pub fn scroll_mark(
     }
 }
 
-/// The picture's panel: the file's name, what is shown, how.
+/// Draws the border of the picture's panel: file name, mode, channel and display.
 pub fn draw(
     model: &Model,
     layout: &Layout,
@@ -65,7 +65,7 @@ pub fn draw(
     let area = layout.picture;
     let bottom = area.height.saturating_sub(1);
     let inside = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
-    if model.only_picture {
+    if model.fullscreen {
         return;
     }
     let focused = crate::dashboard::view::is_active(model, Focus::Picture);
@@ -102,15 +102,16 @@ pub fn draw(
     }
 }
 
-/// What is shown, if it is not simply the picture (loud), and how it is displayed.
+/// Returns texts about the visible channel, which are emphasised unless it is the beauty, and about
+/// the display.
 fn chips(model: &Model) -> Vec<(String, bool)> {
     let mut chips = Vec::new();
     match (model.comparison.shown, model.channel) {
         (CompareView::Pinned, _) => {
             let spp = model.comparison.pinned.as_ref().map_or(0.0, |(_, spp)| *spp);
-            chips.push((format!("kept picture, {spp:.0} spp"), true));
+            chips.push((format!("pinned picture, {spp:.0} spp"), true));
         }
-        (CompareView::Difference, _) => chips.push(("live − kept".to_string(), true)),
+        (CompareView::Difference, _) => chips.push(("live − pinned".to_string(), true)),
         (CompareView::Live, DisplayChannel::Beauty) => {}
         (CompareView::Live, channel) => chips.push((channel.name().to_string(), true)),
     }
@@ -125,7 +126,7 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
     chips
 }
 
-/// What the arrows act on, if not on the camera.
+/// Returns the mode, if the arrows do not control the camera.
 fn mode(model: &Model) -> Option<String> {
     let selected = || model.selection.title(model.scene());
     Some(match model.mode {

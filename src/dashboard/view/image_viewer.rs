@@ -1,4 +1,4 @@
-//! A written picture on the whole screen.
+//! Viewer of an exported image on the whole screen.
 
 use crate::dashboard::model::{Model, short_name};
 use crate::dashboard::overlay::ViewedImage;
@@ -11,11 +11,11 @@ use crate::terminal::image::{Protocol, ViewerImage};
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Style};
 
-/// Draws it: in half blocks, over which it comes crisply where it can. The cells that show it, if they
-/// are a picture and not text.
+/// Draws the image in half blocks, which the terminal's image protocol replaces where supported.
+/// Returns the cells of the image, or `None` if only text is visible.
 pub fn draw(
     model: &Model,
-    looked: &ViewedImage,
+    viewed: &ViewedImage,
     theme: &Theme,
     buffer: &mut Buffer,
 ) -> Option<PictureCells> {
@@ -23,16 +23,16 @@ pub fn draw(
     let last = Area { x: 0, y: height.saturating_sub(1), width, height: 1 };
     let mut row = Row::new(buffer, last, 0);
     row.skip(1);
-    let Some(still) = &looked.still else {
-        row.put("reading ", theme.dim()).put(&short_name(&looked.path), theme.text());
+    let Some(still) = &viewed.still else {
+        row.put("reading ", theme.dim()).put(&short_name(&viewed.path), theme.text());
         return None;
     };
-    let (important, more) = told(looked, still);
-    row.put(&short_name(&looked.path), theme.text()).put("  ", theme.dim());
+    let (important, more) = description(viewed, still);
+    row.put(&short_name(&viewed.path), theme.text()).put("  ", theme.dim());
     row.put(&important, theme.text()).put("  ·  any key returns", theme.accent());
     row.put(more, theme.dim());
     let place = still.place;
-    if looked.sent >= 1.0 && still.placeholder(0).is_some() {
+    if viewed.sent >= 1.0 && still.placeholder(0).is_some() {
         for y in 0..place.height {
             let Some((symbol, color)) = still.placeholder(y) else { continue };
             for x in 0..place.width {
@@ -48,8 +48,8 @@ pub fn draw(
     Some(cells)
 }
 
-/// What is seen, and why it is not better.
-fn told(looked: &ViewedImage, still: &ViewerImage) -> (String, &'static str) {
+/// Returns a description of the image, and the reason for a reduced quality.
+fn description(viewed: &ViewedImage, still: &ViewerImage) -> (String, &'static str) {
     let [width, height] = still.size;
     let whole = format!("{width}×{height}");
     let size = match still.shown {
@@ -59,9 +59,9 @@ fn told(looked: &ViewedImage, still: &ViewerImage) -> (String, &'static str) {
     };
     match still.protocol {
         Protocol::Blocks => (size, "  ·  zerkalo doctor tells what crisp ones need"),
-        _ if looked.sent < 1.0 => {
+        _ if viewed.sent < 1.0 => {
             let kilobytes = still.transfer.bytes.len() as f64 * 1e-3;
-            (format!("{size}  {:.0} % of {kilobytes:.0} KB", 100.0 * looked.sent), "")
+            (format!("{size}  {:.0} % of {kilobytes:.0} KB", 100.0 * viewed.sent), "")
         }
         _ => (size, ""),
     }

@@ -1,4 +1,4 @@
-//! What the colours of a picture of numbers mean.
+//! Legend of false colours.
 
 use crate::dashboard::view::picture::paint;
 use crate::dashboard::view::text::{Row, columns, number};
@@ -8,10 +8,10 @@ use crate::terminal::cells::{PictureCells, Raster, Scale, difference, magnitude}
 use ratatui::buffer::Buffer;
 use ratatui::style::Style;
 
-/// Columns of the bar of colours.
+/// Columns of the colour bar.
 const BAR: usize = 12;
 
-/// The scale of a picture, with words.
+/// Scale of false colours with its unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Legend {
     low: String,
@@ -21,29 +21,30 @@ pub struct Legend {
 }
 
 impl Legend {
-    /// Of magnitudes on `scale`, told in `unit`.
+    /// Creates the legend of magnitudes on `scale` in `unit`.
     pub fn magnitude(scale: Scale, unit: &str) -> Self {
         let bar = bar(magnitude);
         let [low, high] = [scale.value(0.0), scale.value(1.0)].map(number);
         Self { low, high, unit: unit.to_string(), bar }
     }
 
-    /// Of differences up to `end` codes to both sides, `rms` of them over all.
+    /// Creates the legend of differences from `-end` to `end` in 8-bit levels, with their `rms`.
     pub fn difference(end: f64, rms: f64) -> Self {
         Self {
             low: format!("-{end}"),
             high: format!("+{end}"),
-            unit: format!("codes · RMS {}", number(rms)),
+            unit: format!("8-bit levels · RMS {}", number(rms)),
             bar: bar(|part| difference(2.0 * part - 1.0)),
         }
     }
 
-    /// Columns that it takes at most.
+    /// Maximum width in columns.
     fn columns(&self) -> usize {
         columns(&self.low) + columns(&self.high) + columns(&self.unit) + BAR + 5
     }
 
-    /// Draws it at the right end of `row` of `area`: all of it, or without the words, or nothing.
+    /// Draws the legend at the right end of `row` of `area`: whole, without the unit, or not at
+    /// all.
     pub fn draw(&self, area: Area, row: u16, theme: &Theme, buffer: &mut Buffer) {
         let mut line = Row::new(buffer, area, row);
         let words = columns(&self.unit) + 1;
@@ -64,7 +65,7 @@ impl Legend {
     }
 }
 
-/// The colours of 0 to 1 in a row of cells.
+/// Returns a row of cells with the colours of 0 to 1.
 fn bar(color: impl Fn(f64) -> [u8; 3]) -> Raster {
     Raster::from_fn(BAR, 2, |i| color((i % BAR) as f64 / (BAR - 1) as f64))
 }

@@ -1,4 +1,4 @@
-//! Text in the picture's place: why a file cannot be read, why a scene cannot be rendered.
+//! Messages in place of the picture: unreadable file, scene that cannot be rendered.
 
 use crate::dashboard::layout::Layout;
 use crate::dashboard::model::Model;
@@ -14,7 +14,7 @@ use ratatui::style::{Modifier, Style};
 
 type Lines = Vec<(String, Style)>;
 
-/// Lines of text in the picture's panel, with a margin where there is room.
+/// Draws lines of text in the picture's panel, with a margin if there is room.
 fn write(lines: &Lines, layout: &Layout, buffer: &mut Buffer) {
     let area = text_area(layout);
     for (row, (line, style)) in (0..area.height).zip(lines) {
@@ -33,7 +33,7 @@ fn text_area(layout: &Layout) -> Area {
     }
 }
 
-/// The messages about a file that could never be read.
+/// Draws the errors of a file that has never been readable.
 pub fn broken(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some(errors) = &model.file.broken else { return };
     let width = text_area(layout).width;
@@ -41,7 +41,7 @@ pub fn broken(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer
     let mut lines = vec![(format!("{} cannot be read", model.file.name), bold)];
     for message in errors.messages() {
         lines.push((String::new(), theme.text()));
-        lines.extend(told(message, width, theme));
+        lines.extend(formatted(message, width, theme));
     }
     lines.push((String::new(), theme.text()));
     let help = "Mend the file: it is read again as soon as it is written.";
@@ -49,8 +49,8 @@ pub fn broken(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer
     write(&lines, layout, buffer);
 }
 
-/// One message: where, what, the remedy.
-fn told(message: &Diagnostic, width: u16, theme: &Theme) -> Lines {
+/// Formats a diagnostic: location, problem, help.
+fn formatted(message: &Diagnostic, width: u16, theme: &Theme) -> Lines {
     let mut lines = Vec::new();
     if let Some((line, column)) = message.line_column {
         lines.push((format!("line {line}, column {column}"), theme.accent()));
@@ -68,8 +68,8 @@ fn told(message: &Diagnostic, width: u16, theme: &Theme) -> Lines {
     lines
 }
 
-/// Why the newest scene cannot be rendered, over the last picture that could; or that the file has
-/// become unreadable.
+/// Draws the reason why the current scene cannot be rendered or the file has become unreadable,
+/// over the last picture.
 pub fn failure(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let failed = model.snapshot.as_ref().and_then(|s| match &s.report.state {
         State::Failed(why) => Some(why),
@@ -83,7 +83,7 @@ pub fn failure(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffe
         write(&lines, layout, buffer);
     }
     if let Some(first) = model.file.broken.as_ref().and_then(|b| b.messages().first())
-        && !model.only_picture
+        && !model.fullscreen
     {
         let area = layout.picture;
         let edge = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };

@@ -1,7 +1,7 @@
-//! What the screen looks like: a model drawn into a buffer of cells.
+//! Drawing of the model into a buffer of cells.
 //!
-//! The picture is computed apart from everything around it ([`View::picture`]) and kept until it has
-//! to be another one.
+//! The picture is computed separately ([`View::picture`]) and cached until one of its inputs
+//! changes.
 
 mod fields;
 mod frame;
@@ -30,23 +30,23 @@ use ratatui::layout::{Position, Rect};
 use text::{Row, rect};
 use theme::Theme;
 
-/// Draws models.
+/// View of a model, with the cached picture.
 #[derive(Debug, Default)]
 pub struct View {
     imager: PictureView,
-    /// What the picture was made for.
+    /// Inputs of the cached picture.
     made_for: Option<Version>,
     picture: PictureCells,
-    /// Where the picture was drawn last, and which of its cells nothing lies over.
+    /// Rectangle of the last drawn picture, and mask of its visible cells.
     place: Rect,
     uncovered: Vec<bool>,
 }
 
-/// What the picture's cells depend on.
+/// Inputs of the picture's cells: version, raster size, colour depth.
 type Version = (u64, [usize; 2], Colors);
 
 impl View {
-    /// The cells of the picture, as they ought to be.
+    /// Cells of the picture.
     pub fn picture(&mut self, model: &Model, layout: &Layout) -> &PictureCells {
         let version = (model.picture_version, layout.raster, model.colors);
         if self.made_for != Some(version) {
@@ -58,18 +58,18 @@ impl View {
         &self.picture
     }
 
-    /// Where the picture was drawn last, and which of its cells, row by row, nothing was drawn over.
+    /// Rectangle of the last drawn picture, and row-major mask of its visible cells.
     pub fn place(&self) -> (Rect, &[bool]) {
         (self.place, &self.uncovered)
     }
 
-    /// Draws `model` on the whole of `buffer`, which is empty and as large as the model's screen.
-    /// Where text is being typed, if it is.
+    /// Draws `model` into `buffer`, which is empty and has the size of the model's screen. Returns
+    /// the position of the text cursor, if any.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme::new(model.colors);
-        if let Some(Overlay::ViewerImage(looked)) = &model.overlay {
-            let shown = image_viewer::draw(model, looked, &theme, buffer);
-            (self.place, self.uncovered) = match (shown, &looked.still) {
+        if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {
+            let shown = image_viewer::draw(model, viewed, &theme, buffer);
+            (self.place, self.uncovered) = match (shown, &viewed.still) {
                 (Some(cells), Some(still)) => picture::visible_mask(&cells, still.place, buffer),
                 _ => (Rect::ZERO, Vec::new()),
             };
@@ -91,7 +91,7 @@ impl View {
         }
         status::draw(model, layout.status, &theme, buffer);
         status::hints_line(model, layout.hints, &theme, buffer);
-        // A form has the place of the panels.
+        // A form replaces the panels.
         let mut cursor = None;
         if !matches!(model.overlay, Some(Overlay::Form(_))) {
             outline::draw(model, &layout, &theme, buffer);
@@ -109,12 +109,12 @@ impl View {
     }
 }
 
-/// Whether keys go to the panel `focus`.
+/// Returns `true` if the panel `focus` takes the keys.
 fn is_active(model: &Model, focus: Focus) -> bool {
     model.focus == focus && model.overlay.is_none()
 }
 
-/// One polite line, broken as often as it must be.
+/// Draws a message on a terminal that is too small.
 fn too_small([width, height]: [u16; 2], buffer: &mut Buffer) {
     let [columns, rows] = SMALLEST;
     let text = format!(

@@ -12,7 +12,7 @@ use crate::scene::edit::Target;
 use crate::terminal::cells::object_color;
 use ratatui::buffer::Buffer;
 
-/// Draws it, if it is not folded away.
+/// Draws the outline, unless it is folded.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some(area) = layout.outline else { return };
     let active = is_active(model, Focus::Outline);
@@ -21,7 +21,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     let lines = outline(model.scene());
     let rows = usize::from(inner.height);
     let first = model.outline_scroll.min(lines.len().saturating_sub(rows));
-    // The view of object ids needs a key to its colours.
+    // The channel of object ids needs a key to its colours.
     let with_ids =
         model.channel == DisplayChannel::Objects && model.comparison.shown == CompareView::Live;
     for (row, line) in (0..).zip(lines.iter().skip(first).take(rows)) {
@@ -47,7 +47,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
                     Some(style) => to.put(" ", name).put("■", style).put(" ", name),
                     None => to.put(if selected { " ▸ " } else { "   " }, name),
                 };
-                // The note gives way to the name.
+                // The name takes precedence over the note.
                 to.put_right(" ", 0, name).put_right(note, 2 + columns(label), noted);
                 to.put(label, name);
             }

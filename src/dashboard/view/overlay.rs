@@ -1,11 +1,11 @@
-//! What lies over the panels: help, lists, forms, prompts, questions.
+//! Overlays: help, lists, forms, prompts, questions.
 
 use crate::dashboard::hints::{HelpLine, help};
-use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::{ABOUT, Cost};
 use crate::dashboard::overlay::{Form, Overlay, Palette, Pick, Prompt, Question};
 use crate::dashboard::overlay_layout::{OverlayLayout, wrapped};
+use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::view::fields::{Fields, typed};
 use crate::dashboard::view::frame::{overlay, scroll_mark};
 use crate::dashboard::view::text::{Row, columns, cut, duration, durations};
@@ -15,25 +15,26 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::Style;
 
-/// Draws it. Where text is being typed, if it is.
+/// Draws the overlay. Returns the position of the text cursor, if any.
 pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
-    let place = model.place()?;
+    let place = model.overlay_layout()?;
     match model.overlay.as_ref()? {
         Overlay::Help { scroll } => keys(*scroll, &place, theme, buffer),
         Overlay::Inventory { scroll } => inventory(model, *scroll, &place, theme, buffer),
-        Overlay::Quality { cursor } => qualities(model, *cursor, &place, theme, buffer),
+        Overlay::NoiseTargets { cursor } => noise_targets(model, *cursor, &place, theme, buffer),
         Overlay::Palette(open) => return palette(open, &place, theme, buffer),
         Overlay::Pick(open) => pick(open, &place, theme, buffer),
         Overlay::Form(open) => return form(model, open, &place, theme, buffer),
         Overlay::Prompt(open) => return prompt(open, &place, theme, buffer),
-        // It has the whole screen.
+        // Drawn separately: it has the whole screen.
         Overlay::ViewerImage(_) => {}
         Overlay::Question(open) => question(open, &place, theme, buffer),
     }
     None
 }
 
-/// The part of `all` lines that is shown from `scroll` on: its first line and rows, with a mark.
+/// Returns the first visible line and the number of rows of a list of `all` lines, and draws its
+/// scroll bar.
 fn window(
     place: &OverlayLayout,
     scroll: usize,
@@ -60,7 +61,7 @@ fn keys(scroll: usize, place: &OverlayLayout, theme: &Theme, buffer: &mut Buffer
                 to.put(&"─".repeat(rest), theme.border(false));
             }
             HelpLine::Keys(keys, label) => {
-                // Keys that are told for many places give way to the label.
+                // The label takes precedence over long lists of keys.
                 let room = to.left().saturating_sub(3 + columns(label) + 2 + 1);
                 to.put_right(" ", 0, theme.text()).put_right(&cut(keys, room), 0, theme.accent());
                 to.skip(3).put(label, theme.text());
@@ -84,33 +85,32 @@ fn inventory(
     }
 }
 
-fn qualities(
+fn noise_targets(
     model: &Model,
     cursor: usize,
     place: &OverlayLayout,
     theme: &Theme,
     buffer: &mut Buffer,
 ) {
-    overlay(place.frame, "quality", theme, buffer);
-    for (row, quality) in (0..place.list.height).zip(model.qualities()) {
+    overlay(place.frame, "noise targets in 8-bit levels", theme, buffer);
+    for (row, noise_target) in (0..place.list.height).zip(model.noise_targets()) {
         let (mut to, name, rest) =
             chosen(place.list, row, usize::from(row) == cursor, theme, buffer);
-        let cost = match quality.cost {
+        let cost = match noise_target.cost {
             Cost::Reached(Some(seconds)) => format!("reached after {}", duration(seconds)),
             Cost::Reached(None) => "reached".to_string(),
             Cost::Left(from, to) => format!("{} more", durations(from, to)),
             Cost::Unknown => "not known yet".to_string(),
         };
-        let unit = if quality.noise_codes == 1.0 { "code" } else { "codes" };
-        let target = if quality.is_target { "→ " } else { "  " };
+        let target = if noise_target.is_target { "→ " } else { "  " };
         to.put_right("  ", 0, rest).put_right(&cost, 8, name).put_right("  ", 0, rest);
-        to.put(target, theme.good()).put_wide(&quality.noise_codes.to_string(), 5, name).skip(1);
-        to.put_wide(unit, 5, name).skip(2).put(quality.looks, rest);
+        to.put(target, theme.good()).put_wide(&noise_target.noise_codes.to_string(), 5, name);
+        to.skip(2).put(noise_target.looks, rest);
     }
     say(ABOUT, theme.dim(), place.help, buffer);
 }
 
-/// A row of a list with a cursor.
+/// Begins a row of a list with a cursor. Returns the row, and the styles of name and remainder.
 fn chosen<'a>(
     list: Area,
     row: u16,
@@ -147,13 +147,13 @@ fn palette(
     let (first, rows) = window(place, open.scroll, open.found.len(), theme, buffer);
     let shown = open.found.iter().enumerate().skip(first).take(rows);
     for (row, (i, found)) in (0..).zip(shown) {
-        let Some(action) = KEYMAP.get(*found) else { continue };
+        let Some(command) = COMMANDS.get(*found) else { continue };
         let (mut to, name, rest) = chosen(place.list, row, i == open.cursor, theme, buffer);
-        let keys = action.all_keys();
+        let keys = command.all_keys(str::to_string);
         let key = if i == open.cursor { name } else { theme.accent() };
-        to.put_right(" ", 0, key).put_right(&keys, columns(action.label) + 2, key);
-        to.put(action.label, name);
-        to.put_right("  ", 1, rest).put_right(action.chapter.title(), 1, rest);
+        to.put_right(" ", 0, key).put_right(&keys, columns(command.label) + 2, key);
+        to.put(command.label, name);
+        to.put_right("  ", 1, rest).put_right(command.chapter.title(), 1, rest);
     }
     cursor
 }
@@ -191,7 +191,7 @@ fn form(
     fields.draw(theme, buffer)
 }
 
-/// Text in the rows for what is to be said.
+/// Draws text in the help rows.
 fn say(text: &str, style: Style, help: Area, buffer: &mut Buffer) {
     let lines = wrapped(text, help.width);
     for (row, line) in (0..help.height).zip(&lines) {

@@ -1,4 +1,4 @@
-//! The picture: from the newest snapshot to a raster of half cells.
+//! Rasters of half cells from snapshots.
 
 use crate::dashboard::message::DisplayChannel;
 use crate::dashboard::model::{CompareView, Model};
@@ -15,22 +15,22 @@ use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use std::sync::Arc;
 
-/// Makes rasters of models, and remembers what is slow to make.
+/// Creates rasters of models; caches the pinned picture.
 #[derive(Debug, Default)]
 pub struct PictureView {
     legend: Option<Legend>,
-    kept: Option<PinnedCache>,
+    pinned: Option<PinnedCache>,
 }
 
-/// A kept picture of the size of the screen.
+/// The pinned picture, resampled to the screen.
 #[derive(Debug)]
 struct PinnedCache {
-    of: Arc<LinearImage>,
+    picture: Arc<LinearImage>,
     size: [usize; 2],
     radiance: Vec<[f32; 3]>,
 }
 
-/// Whether the picture will stay as it is until somebody does something.
+/// Returns `true` if the picture changes only by user input.
 pub fn is_settled(model: &Model) -> bool {
     if let Some(Overlay::ViewerImage(_)) = model.overlay {
         return true;
@@ -41,17 +41,17 @@ pub fn is_settled(model: &Model) -> bool {
 }
 
 impl PictureView {
-    /// What the colours of the last raster mean, if they stand for numbers.
+    /// Legend of the last raster, if its colours stand for numbers.
     pub fn legend(&self) -> Option<&Legend> {
         self.legend.as_ref()
     }
 
-    /// What the model shows, in columns and rows of half cells; empty if there is nothing to show.
+    /// Returns the raster of the visible channel or comparison; empty if there is nothing to show.
     pub fn raster(&mut self, model: &Model, size: [usize; 2]) -> Raster {
         self.legend = None;
         let made = match (model.comparison.shown, model.channel) {
             (CompareView::Pinned, _) => {
-                self.kept(model, size).map(|kept| shown(kept, &model.display, size))
+                self.pinned(model, size).map(|pinned| displayed(pinned, &model.display, size))
             }
             (CompareView::Difference, _) => self.difference(model, size),
             (CompareView::Live, channel) => self.live(model, channel, size),
@@ -64,11 +64,11 @@ impl PictureView {
         match channel {
             DisplayChannel::Beauty => {
                 let (radiance, from) = live_radiance(model, snapshot)?;
-                Some(resized(shown(&radiance, &model.display, from), size))
+                Some(resized(displayed(&radiance, &model.display, from), size))
             }
             DisplayChannel::Noise => {
                 let noise = &snapshot.tiles.noise_codes;
-                self.tiles(model, snapshot, "codes of noise", size, |i| {
+                self.tiles(model, snapshot, "8-bit levels of noise", size, |i| {
                     noise.get(i).map(|n| f64::from(*n))
                 })
             }
@@ -104,7 +104,7 @@ impl PictureView {
         }
     }
 
-    /// Values of tiles, by ratio.
+    /// Returns a raster of tile values on a logarithmic scale.
     fn tiles(
         &mut self,
         model: &Model,
@@ -117,7 +117,7 @@ impl PictureView {
         let all = tiles.columns * tiles.rows;
         let values: Vec<f64> = (0..all).map(&value).collect::<Option<_>>()?;
         let mut scale = Scale::logarithmic(values.iter().copied());
-        // Nothing is learned from what is below a thousandth of the largest.
+        // The scale spans at most a factor of 1000.
         scale.low = scale.low.max(1e-3 * scale.high);
         self.legend = Some(Legend::magnitude(scale, unit));
         let film = model.scene().film.size.map(|n| n as usize);
@@ -133,29 +133,32 @@ impl PictureView {
         })
     }
 
-    fn kept(&mut self, model: &Model, size: [usize; 2]) -> Option<&[[f32; 3]]> {
+    fn pinned(&mut self, model: &Model, size: [usize; 2]) -> Option<&[[f32; 3]]> {
         let (picture, _) = model.comparison.pinned.as_ref()?;
-        let same = |kept: &PinnedCache| Arc::ptr_eq(&kept.of, picture) && kept.size == size;
-        if !self.kept.as_ref().is_some_and(same) {
+        let same =
+            |cached: &PinnedCache| Arc::ptr_eq(&cached.picture, picture) && cached.size == size;
+        if !self.pinned.as_ref().is_some_and(same) {
             let radiance = picture.resampled(size[0], size[1]);
-            self.kept = Some(PinnedCache { of: Arc::clone(picture), size, radiance });
+            self.pinned = Some(PinnedCache { picture: Arc::clone(picture), size, radiance });
         }
-        self.kept.as_ref().map(|kept| &*kept.radiance)
+        self.pinned.as_ref().map(|cached| &*cached.radiance)
     }
 
-    /// Live less kept, in codes of luma, on a scale that reaches the largest difference.
+    /// Returns live minus pinned luma in 8-bit levels, on a scale that ends at the largest
+    /// difference.
     fn difference(&mut self, model: &Model, size: [usize; 2]) -> Option<Raster> {
         let snapshot = model.snapshot.as_deref()?;
         let (live, from) = live_radiance(model, snapshot)?;
-        let live = resized(shown(&live, &model.display, from), size);
-        let kept = shown(self.kept(model, size)?, &model.display, size);
+        let live = resized(displayed(&live, &model.display, from), size);
+        let pinned = displayed(self.pinned(model, size)?, &model.display, size);
         let (mut squares, mut largest) = (0.0, 0.0f64);
         let mut lumas = Vec::with_capacity(live.pixels.len());
-        for (live, kept) in live.pixels.iter().zip(&kept.pixels) {
-            let by = [0, 1, 2].map(|c| f64::from(live[c]) - f64::from(kept[c]));
-            squares += (by[0] * by[0] + by[1] * by[1] + by[2] * by[2]) / 3.0;
-            // Weights of Rec. 709.
-            let luma = 0.2126 * by[0] + 0.7152 * by[1] + 0.0722 * by[2];
+        for (live, pinned) in live.pixels.iter().zip(&pinned.pixels) {
+            let change = [0, 1, 2].map(|c| f64::from(live[c]) - f64::from(pinned[c]));
+            squares +=
+                (change[0] * change[0] + change[1] * change[1] + change[2] * change[2]) / 3.0;
+            // Luma weights of Rec. 709.
+            let luma = 0.2126 * change[0] + 0.7152 * change[1] + 0.0722 * change[2];
             largest = largest.max(luma.abs());
             lumas.push(luma);
         }
@@ -166,13 +169,13 @@ impl PictureView {
     }
 }
 
-/// The next of 1, 2, 5, 10, 20, 50, …
+/// Rounds up to one of 1, 2, 5, 10, 20, 50, …
 fn round_up(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
     [1.0, 2.0, 5.0].into_iter().map(|m| m * decade).find(|v| *v >= value).unwrap_or(10.0 * decade)
 }
 
-/// The snapshot's picture in the newest light, and its size.
+/// Returns the snapshot's picture with the current lights, and its size.
 fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [usize; 2])> {
     let picture = snapshot.picture.as_ref()?;
     let newest = snapshot.mix_for(model.scene());
@@ -180,13 +183,13 @@ fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [
     Some((mixed, [picture.cols, picture.rows]))
 }
 
-/// Radiance as displayed.
-fn shown(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 2]) -> Raster {
+/// Applies the display transform.
+fn displayed(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 2]) -> Raster {
     let to_8 = display.to_8();
     Raster::from_fn(width, height, |i| to_8(radiance[i].map(f64::from)))
 }
 
-/// For the moment after the terminal's size has changed: the raster stretched.
+/// Stretches a raster, for the time between a resize and the next snapshot.
 fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
     if [raster.width, raster.height] == [width, height] || raster.pixels.is_empty() {
         return raster;
@@ -197,7 +200,7 @@ fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
     })
 }
 
-/// Puts cells into `area`, from its upper left corner; what does not fit is left out.
+/// Draws cells into `area` from its upper left corner, clipped.
 pub fn paint(cells: &PictureCells, area: Area, buffer: &mut Buffer) {
     for row in 0..area.height.min(cells.rows) {
         for column in 0..area.width.min(cells.columns) {
@@ -211,7 +214,7 @@ pub fn paint(cells: &PictureCells, area: Area, buffer: &mut Buffer) {
     }
 }
 
-/// Where cells that were painted into `area` are now, and which of them nothing else was drawn over.
+/// Returns the rectangle of cells drawn into `area`, and a mask of those that are not covered.
 pub fn visible_mask(cells: &PictureCells, area: Area, buffer: &Buffer) -> (Rect, Vec<bool>) {
     let Area { x, y, width, height } = area;
     let (width, height) = (width.min(cells.columns), height.min(cells.rows));
@@ -256,10 +259,10 @@ mod tests {
     }
 
     #[test]
-    fn exposure_and_tone_curve_are_those_of_the_film() {
+    fn display_matches_film_exposure_and_tone_curve() {
         let display = Display { exposure_ev: 1.25, ..Display::default() };
         let radiance = [[0.01, 0.2, 3.0], [0.5, 0.0, 0.1]];
-        let raster = shown(&radiance, &display, [2, 1]);
+        let raster = displayed(&radiance, &display, [2, 1]);
         for (pixel, radiance) in raster.pixels.iter().zip(radiance) {
             assert_eq!(*pixel, display.codes_8(radiance.map(f64::from)));
         }

@@ -1,4 +1,4 @@
-//! How the error falls: noise against seconds, both by ratio, with the target and the way there.
+//! Convergence plot: noise against seconds on logarithmic axes, with the target and the estimate.
 
 use crate::dashboard::layout::Layout;
 use crate::dashboard::model::Model;
@@ -12,7 +12,7 @@ use ratatui::symbols::Marker;
 use ratatui::widgets::Widget;
 use ratatui::widgets::canvas::{Canvas, Line};
 
-/// Ends of an axis, natural numbers, the lower one first.
+/// Natural logarithms of the ends of an axis, the lower one first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Axis {
     low: f64,
@@ -20,26 +20,27 @@ struct Axis {
 }
 
 impl Axis {
-    /// Holds all of `values`, which are greater than 0, with some room around them.
+    /// Creates an axis that includes all of `values`, which are greater than 0, with a margin.
     fn around(values: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
         for value in values.filter(|v| *v > 0.0 && v.is_finite()) {
             low = low.min(value);
             high = high.max(value);
         }
-        // At least a factor of 2, and a tenth beyond the ends.
+        // At least a factor of 2, and a margin of a tenth.
         (low <= high).then(|| {
             let stretch = (2.0 * low / high).max(1.0).sqrt() * 1.1;
             Self { low: low / stretch, high: high * stretch }
         })
     }
 
-    /// Where a value lies, 0 low to 1 high; may lie outside.
+    /// Position of a value: 0 at the lower end, 1 at the upper; values outside of the axis are not
+    /// clamped.
     fn part(&self, value: f64) -> f64 {
         (value / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Round numbers to write beside it: powers of ten, or 1, 2, 5 of each if they are few.
+    /// Values of ticks: powers of ten, with their multiples by 2 and 5 if those are few.
     fn ticks(&self) -> Vec<f64> {
         let steps: &[f64] = if self.high / self.low < 50.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let first = self.low.log10().floor() as i32;
@@ -49,17 +50,17 @@ impl Axis {
     }
 }
 
-/// A tick's number without what is not needed: `0.5`, `20`.
+/// Formats a tick without trailing zeros: `0.5`, `20`.
 fn label(value: f64) -> String {
     if (1e-3..1e6).contains(&value) {
-        // Sixteen digits at most: sums of powers of ten are not exact.
+        // Sums of powers of ten are not exact.
         format!("{}", (value * 1e6).round() / 1e6)
     } else {
         format!("{value:.0e}")
     }
 }
 
-/// Draws it, if there is room for it.
+/// Draws the plot, if there is room.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some(area) = layout.plot else { return };
     panel(area, "convergence", false, theme, buffer);
@@ -74,10 +75,10 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     };
     let corner = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
     let mut title = Row::new(buffer, corner, 0);
-    title.skip(14).put_right(&format!(" {} codes ", number(last.noise_codes)), 0, theme.text());
+    title.skip(14).put_right(&format!(" {} levels ", number(last.noise_codes)), 0, theme.text());
     let target = model.stop.noise_codes.filter(|t| *t > 0.0);
     let eta = model.snapshot.as_ref().and_then(|s| s.report.eta_seconds);
-    // Where the target is reached if the middle guess holds.
+    // Point at which the target is reached by the mean estimate.
     let reached = match (target, eta) {
         (Some(target), Some((from, to))) if target < last.noise_codes => {
             Some((last.seconds + 0.5 * (from + to), target))
@@ -89,7 +90,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     let (Some(x), Some(y)) = (Axis::around(seconds), Axis::around(noise)) else { return };
     let Some(plot) = axes(inner, &x, &y, theme, buffer) else { return };
     let place = |seconds: f64, noise: f64| (x.part(seconds), y.part(noise));
-    // A canvas knows colours only.
+    // A canvas supports colours only.
     let color = |style: Style| style.fg.unwrap_or(Color::Reset);
     let line = |(x1, y1): (f64, f64), (x2, y2): (f64, f64), style| Line {
         x1,
@@ -131,10 +132,10 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
         .render(crate::dashboard::view::rect(plot), buffer);
 }
 
-/// Pieces of a broken line across the plot.
+/// Dashes of a dashed line across the plot.
 const DASHES: usize = 16;
 
-/// Draws both axes inside `area`; what is left for the plot itself.
+/// Draws both axes inside `area`. Returns the remaining area of the plot.
 fn axes(area: Area, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> Option<Area> {
     let ticks: Vec<_> = y.ticks().into_iter().map(|t| (t, label(t))).collect();
     let labels = ticks.iter().map(|(_, l)| columns(l)).max().unwrap_or(0) as u16;
@@ -153,7 +154,7 @@ fn axes(area: Area, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
     let mut free = plot.height;
     for (tick, text) in &ticks {
         let row = ((1.0 - y.part(*tick)) * f64::from(plot.height)) as u16;
-        // One row, one number.
+        // At most one label per row.
         if row < free {
             let indent = usize::from(labels) - columns(text);
             Row::new(buffer, area, row).skip(indent).put(text, theme.dim());
@@ -182,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn axes_hold_their_values_and_have_ticks() {
+    fn axes_include_values_and_have_ticks() {
         for values in [vec![0.02, 30.0], vec![1.0], vec![0.4, 0.5], vec![1e-3, 1e5]] {
             let axis = Axis::around(values.iter().copied()).unwrap();
             for value in &values {

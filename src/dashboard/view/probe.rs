@@ -1,4 +1,4 @@
-//! The probe: a mark on the picture and numbers beside it.
+//! The probe: a mark on the picture and its values.
 
 use crate::dashboard::layout::Layout;
 use crate::dashboard::model::Model;
@@ -11,10 +11,10 @@ use crate::terminal::Area;
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier, Style};
 
-/// Columns of the box with its border.
+/// Width of the box with its border.
 const WIDTH: u16 = 36;
 
-/// Draws both, while a pixel is probed.
+/// Draws mark and values, if a pixel is probed.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some([x, y]) = model.probe else { return };
     let film = model.scene().film.size;
@@ -36,7 +36,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
         }
         return;
     }
-    // In the corner that is farthest from the mark.
+    // In the corner farthest from the mark.
     let left = area.x + 2;
     let right = area.x + area.width - WIDTH - 2;
     let x_box = if column < area.x + area.width / 2 { right } else { left };
@@ -59,7 +59,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     }
 }
 
-/// Names and numbers.
+/// Labels and values.
 fn readout(model: &Model) -> Vec<(&'static str, String)> {
     let Some(probe) = model.probed() else {
         return vec![("samples", "none yet".to_string())];
@@ -68,14 +68,14 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
     let [a, b] = probe.samples;
     let mut lines = vec![
         ("radiance", three(probe.radiance)),
-        ("codes", probe.codes.map(|c| format!("{c:.1}")).join("  ")),
+        ("levels", probe.codes.map(|c| format!("{c:.1}")).join("  ")),
         ("samples", format!("{}", u64::from(a) + u64::from(b))),
     ];
     if let Some(difference) = probe.difference {
         lines.push(("error", format!("± {}", three(difference))));
     }
     if let Some(codes) = probe.tile_rmse_codes {
-        lines.push(("tile", format!("± {} codes", number(codes))));
+        lines.push(("tile", format!("± {} levels", number(codes))));
     }
     if let Some(name) = seen(model, probe.pixel) {
         lines.push(("object", name));
@@ -83,7 +83,7 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
     lines
 }
 
-/// What is seen at a pixel of the film.
+/// Returns the object at a film pixel.
 fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
     let guide = model.snapshot.as_ref()?.guide.as_deref()?;
     let [width, height] = model.scene().film.size.map(|n| n.max(1) as usize);
@@ -92,14 +92,14 @@ fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
     subject.exists(model.scene()).then(|| subject.label(model.scene()))
 }
 
-/// A cross whose colour stands out from what is below.
+/// Draws a cross in a contrasting colour.
 fn mark(column: u16, row: u16, theme: &Theme, buffer: &mut Buffer) {
     let Some(cell) = buffer.cell_mut((column, row)) else { return };
     let light = |color: Color| match color {
         Color::Rgb(r, g, b) => u32::from(r) * 2 + u32::from(g) * 7 + u32::from(b) > 1400,
         _ => false,
     };
-    // Both halves take part: the cross covers the middle.
+    // The cross covers both half cells.
     let style = match (cell.bg, cell.fg) {
         (Color::Rgb(..), fg) if cell.symbol() != " " && light(fg) != light(cell.bg) => {
             theme.accent()

@@ -1,7 +1,8 @@
-//! The two lowest lines: where the work stands, and what the keys do or what has just happened.
+//! Status line and hint line.
 
-use crate::dashboard::hints::{Hint, hints};
+use crate::dashboard::hints::hints;
 use crate::dashboard::model::{Model, Tone};
+use crate::dashboard::update::commands::Hint;
 use crate::dashboard::view::text::{Row, columns, duration, durations, number};
 use crate::dashboard::view::theme::Theme;
 use crate::render::schedule::StoppedBy;
@@ -14,12 +15,12 @@ use ratatui::style::{Modifier, Style};
 
 /// A part of the status line.
 struct Part {
-    /// The larger, the earlier it gives way.
+    /// Parts with larger values are dropped first.
     expendable: u8,
     text: Vec<(String, Style)>,
 }
 
-/// Draws where the work stands: as many parts as fit, whole ones only.
+/// Draws the status line with as many whole parts as fit.
 pub fn draw(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
     let mut parts = parts(model, theme);
     let width = |parts: &[Part]| -> usize {
@@ -78,7 +79,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     for warning in report.warnings() {
         parts.push(part(3, vec![(warning, theme.warn())]));
     }
-    if let Some(line) = &model.line {
+    if let Some(line) = &model.link {
         parts.push(part(6, vec![plain(rate(line.rate)), dim(" "), dim(mode(line.mode))]));
     }
     let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
@@ -92,7 +93,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     parts
 }
 
-/// `118 KB/s`, to two or three digits, so that it does not flicker.
+/// Formats a rate to two or three digits, which do not flicker: `118 KB/s`.
 fn rate(bytes_per_second: f64) -> String {
     let kilobytes = bytes_per_second / 1e3;
     match kilobytes {
@@ -102,7 +103,7 @@ fn rate(bytes_per_second: f64) -> String {
     }
 }
 
-/// How it is known what has arrived.
+/// Name of a pacing mode.
 fn mode(mode: PacingMode) -> &'static str {
     match mode {
         PacingMode::Unlimited => "here",
@@ -145,16 +146,16 @@ fn spp(model: &Model, report: &Report, theme: &Theme) -> Vec<(String, Style)> {
     text
 }
 
-/// `noise 0.84 → 0.5 codes in 3–5 s`.
+/// Formats the noise: `noise 0.84 → 0.5 levels in 3–5 s`.
 fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<(String, Style)> {
     let dim = |text: &str| (text.to_string(), theme.dim());
     let mut text = vec![dim("noise "), (number(codes), theme.text())];
     match model.stop.noise_codes.filter(|target| *target < codes) {
         Some(target) => {
             text.push((format!(" → {target}"), theme.good()));
-            text.push(dim(" codes"));
+            text.push(dim(" levels"));
         }
-        None => text.push(dim(" codes")),
+        None => text.push(dim(" levels")),
     }
     if let (Some((from, to)), State::Tracing) = (report.eta_seconds, &report.state) {
         let left = if to < 1.0 { "under 1 s".to_string() } else { durations(from, to) };
@@ -163,7 +164,7 @@ fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<
     text
 }
 
-/// Draws the notice, or else the hints for what the keys do now.
+/// Draws the notice, or else the hints.
 pub fn hints_line(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
     let mut row = Row::new(buffer, area, 0);
     row.skip(1);
@@ -176,26 +177,23 @@ pub fn hints_line(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer)
         row.put(mark, style).put(&notice.text, theme.text());
         return;
     }
-    let all = hints(model);
-    for (keys, _, does) in fitting(all, row.left()) {
-        row.put(keys, theme.accent().add_modifier(Modifier::BOLD)).put(" ", theme.dim());
-        row.put(does, theme.dim()).skip(3);
+    for hint in fitting(hints(model), row.left()) {
+        row.put(hint.keys, theme.accent().add_modifier(Modifier::BOLD)).put(" ", theme.dim());
+        row.put(hint.text, theme.dim()).skip(3);
     }
 }
 
-/// The hints that fit whole in `width` columns. The last ones, which lead to all others, stay.
-fn fitting(all: &[Hint], width: usize) -> Vec<Hint> {
-    let mut some = all.to_vec();
-    let taken = |hints: &[Hint]| -> usize {
-        let one = |(keys, _, does): &Hint| columns(keys) + 1 + columns(does) + 3;
-        hints.iter().map(one).sum::<usize>().saturating_sub(3)
+/// Removes hints until the others fit whole in `width` columns. The first one and the last two, which
+/// lead to all commands, are removed last.
+fn fitting(mut hints: Vec<&Hint>, width: usize) -> Vec<&Hint> {
+    let width_of = |hints: &[&Hint]| -> usize {
+        let columns_of = |hint: &&Hint| columns(hint.keys) + 1 + columns(hint.text) + 3;
+        hints.iter().map(columns_of).sum::<usize>().saturating_sub(3)
     };
-    while taken(&some) > width && !some.is_empty() {
-        // The first and the last two are the last to go.
-        let at = if some.len() > 3 { some.len() - 3 } else { some.len() - 1 };
-        some.remove(at);
+    while width_of(&hints) > width && !hints.is_empty() {
+        hints.remove(if hints.len() > 3 { hints.len() - 3 } else { hints.len() - 1 });
     }
-    some
+    hints
 }
 
 #[cfg(test)]
@@ -209,12 +207,14 @@ mod tests {
     }
 
     #[test]
-    fn hints_are_dropped_whole_and_the_way_to_help_stays() {
-        let all: &[Hint] =
-            &[("a", "a", "first"), ("b", "b", "second"), (":", ":", "all"), ("?", "?", "keys")];
-        assert_eq!(fitting(all, 80).len(), 4);
-        let some = fitting(all, 25);
-        assert_eq!(some.iter().map(|h| h.0).collect::<Vec<_>>(), ["a", ":", "?"]);
-        assert!(fitting(all, 3).is_empty());
+    fn hints_to_all_commands_are_dropped_last() {
+        let all = [("a", "first"), ("b", "second"), (":", "all"), ("?", "keys")]
+            .map(|(keys, text)| Hint { lines: &[], position: 0, keys, text });
+        let keys_fitting = |width| -> Vec<_> {
+            fitting(all.iter().collect(), width).iter().map(|hint| hint.keys).collect()
+        };
+        assert_eq!(keys_fitting(80).len(), 4);
+        assert_eq!(keys_fitting(25), ["a", ":", "?"]);
+        assert!(keys_fitting(3).is_empty());
     }
 }

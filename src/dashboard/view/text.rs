@@ -1,4 +1,4 @@
-//! Text in cells: measured in columns, cut with an ellipsis, never outside its area.
+//! Text in cells: measured in columns, truncated with an ellipsis, clipped to its area.
 
 use crate::terminal::Area;
 use crate::value::sanitized;
@@ -8,12 +8,12 @@ use ratatui::style::Style;
 use std::borrow::Cow;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
-/// Columns that `text` takes.
+/// Returns the width of `text` in columns.
 pub fn columns(text: &str) -> usize {
     text.width()
 }
 
-/// `text` in at most `width` columns, with an ellipsis if there was more.
+/// Truncates `text` to `width` columns, with an ellipsis if it is longer.
 pub fn cut(text: &str, width: usize) -> Cow<'_, str> {
     if columns(text) <= width {
         return Cow::Borrowed(text);
@@ -33,7 +33,7 @@ pub fn cut(text: &str, width: usize) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// `text` without its first `skipped` columns.
+/// Removes the first `skipped` columns of `text`.
 pub fn skip(text: &str, skipped: usize) -> &str {
     let mut used = 0;
     let start = text.char_indices().find(|(_, c)| {
@@ -44,7 +44,7 @@ pub fn skip(text: &str, skipped: usize) -> &str {
     start.map_or("", |(at, _)| &text[at..])
 }
 
-/// The same rectangle in ratatui's words.
+/// Converts an area to a ratatui rectangle.
 pub fn rect(area: Area) -> Rect {
     Rect { x: area.x, y: area.y, width: area.width, height: area.height }
 }
@@ -58,7 +58,7 @@ pub struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// Row `row` of `area`, from 0; nothing is drawn if it is outside of it.
+    /// Creates a writer for row `row` of `area`, from 0; outside of it, nothing is drawn.
     pub fn new(buffer: &'a mut Buffer, area: Area, row: u16) -> Self {
         let bounds = rect(area).intersection(buffer.area);
         let y = area.y.saturating_add(row);
@@ -67,22 +67,22 @@ impl<'a> Row<'a> {
         Self { buffer, x, end, y }
     }
 
-    /// Columns left.
+    /// Remaining columns.
     pub fn left(&self) -> usize {
         usize::from(self.end.saturating_sub(self.x))
     }
 
-    /// Where the next text begins.
+    /// Column of the next text.
     pub fn x(&self) -> u16 {
         self.x
     }
 
-    /// The row on the screen.
+    /// Row on the screen.
     pub fn y(&self) -> u16 {
         self.y
     }
 
-    /// Draws `text`, cut to what is left.
+    /// Draws `text`, truncated to the remaining columns.
     pub fn put(&mut self, text: &str, style: Style) -> &mut Self {
         let left = self.left();
         if left > 0 {
@@ -93,7 +93,7 @@ impl<'a> Row<'a> {
         self
     }
 
-    /// Draws `text` in exactly `width` columns, or what is left of them.
+    /// Draws `text` in exactly `width` columns, or in the remaining ones.
     pub fn put_wide(&mut self, text: &str, width: usize, style: Style) -> &mut Self {
         let width = width.min(self.left());
         let text = safe(text);
@@ -102,8 +102,8 @@ impl<'a> Row<'a> {
         self.put(&shown, style).skip(gap)
     }
 
-    /// Draws `text` at the right end, if it fits there with `gap` columns before it; it is then no
-    /// longer left for others.
+    /// Draws `text` at the right end, if it fits there with `gap` columns before it, and removes
+    /// its columns from the remaining ones.
     pub fn put_right(&mut self, text: &str, gap: usize, style: Style) -> &mut Self {
         let text = safe(text);
         let width = columns(&text);
@@ -114,13 +114,13 @@ impl<'a> Row<'a> {
         self
     }
 
-    /// Leaves out columns.
+    /// Skips columns.
     pub fn skip(&mut self, columns: usize) -> &mut Self {
         self.x += columns.min(self.left()) as u16;
         self
     }
 
-    /// Gives all that is left a style, whatever stands there.
+    /// Sets the style of the remaining columns.
     pub fn fill(&mut self, style: Style) -> &mut Self {
         let area = Rect { x: self.x, y: self.y, width: self.end - self.x, height: 1 };
         if area.width > 0 {
@@ -130,7 +130,7 @@ impl<'a> Row<'a> {
     }
 }
 
-/// What the buffer would leave out without a word stands there as an escape.
+/// Escapes control characters, which the buffer would drop silently.
 fn safe(text: &str) -> Cow<'_, str> {
     if text.chars().any(char::is_control) {
         Cow::Owned(sanitized(text))
@@ -139,7 +139,7 @@ fn safe(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// `value` to three digits.
+/// Formats `value` to three significant digits.
 pub fn number(value: f64) -> String {
     match value.abs() {
         v if v >= 9.995e5 || v < 5e-4 && v > 0.0 => format!("{value:.2e}"),
@@ -150,19 +150,19 @@ pub fn number(value: f64) -> String {
     }
 }
 
-/// A time as one would say it: `0.4 s`, `35 s`, `12 min`, `3.5 h`.
+/// Formats a duration: `0.4 s`, `35 s`, `12 min`, `3.5 h`.
 pub fn duration(seconds: f64) -> String {
     let (value, unit) = in_unit(seconds, seconds);
     format!("{value} {unit}")
 }
 
-/// A range of times: `3–5 s`.
+/// Formats a range of durations: `3–5 s`.
 pub fn durations(from: f64, to: f64) -> String {
     let ((from, _), (to, unit)) = (in_unit(from, to), in_unit(to, to));
     if from == to { format!("{to} {unit}") } else { format!("{from}–{to} {unit}") }
 }
 
-/// `seconds` in the unit that suits `reference` seconds.
+/// Formats `seconds` in the unit that suits `reference` seconds.
 fn in_unit(seconds: f64, reference: f64) -> (String, &'static str) {
     let (value, unit) = match reference {
         r if r < 99.5 => (seconds, "s"),
@@ -183,11 +183,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cuts_count_columns() {
+    fn truncation_counts_columns() {
         assert_eq!(cut("mirror", 6), "mirror");
         assert_eq!(cut("mirror", 5), "mirr…");
         assert_eq!(cut("鏡鏡鏡", 6), "鏡鏡鏡");
-        // A wide character does not fit half.
+        // Wide characters are not split.
         assert_eq!(cut("鏡鏡鏡", 4), "鏡…");
         assert_eq!(cut("鏡鏡鏡", 5), "鏡鏡…");
         assert_eq!([cut("abc", 1), cut("abc", 0)], ["…", ""]);
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_leaves_its_area() {
+    fn text_is_clipped_to_its_area() {
         let mut buffer = Buffer::empty(Rect::new(0, 0, 8, 2));
         let area = Area { x: 2, y: 1, width: 4, height: 1 };
         Row::new(&mut buffer, area, 0).put("abcdefgh", Style::new());
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_as_one_says_them() {
+    fn numbers_and_durations_are_formatted() {
         let numbers = [0.0, 0.012_34, 0.5, 1.0 / 3.0, 9.999, 12.34, 99.96, 1234.0, 3e6, 1e-5];
         let expected =
             ["0.00", "0.012", "0.50", "0.33", "10.0", "12.3", "100", "1234", "3.00e6", "1.00e-5"];

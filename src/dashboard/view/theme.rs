@@ -1,7 +1,7 @@
-//! Colours and marks of everything but the picture, at each level of colours.
+//! Colours and text attributes of the user interface, at each colour depth.
 //!
-//! Whether the terminal is dark or light is not known: the tones are readable on both, and text that
-//! matters most has the terminal's own colour.
+//! The tones are readable on dark and light backgrounds. The most important text has the terminal's
+//! default colour.
 
 use crate::terminal::cells::{Colors, nearest_indexed};
 use ratatui::style::{Color, Modifier, Style};
@@ -13,7 +13,7 @@ pub struct Theme {
     colors: Colors,
 }
 
-/// A tone at 24 bits, of 256, of 16.
+/// A tone in 24 bits, in the 256-colour palette and in 16 colours.
 type Tone = ([u8; 3], u8, Color);
 
 const ACCENT: Tone = ([98, 160, 242], 75, Color::Cyan);
@@ -26,7 +26,7 @@ const SELECTED_GROUND: Tone = ([40, 62, 98], 24, Color::Reset);
 const SELECTED_TEXT: Tone = ([242, 245, 250], 255, Color::Reset);
 
 impl Theme {
-    /// For a terminal of `colors`.
+    /// Creates the theme of a colour depth.
     pub fn new(colors: Colors) -> Self {
         Self { colors }
     }
@@ -40,7 +40,7 @@ impl Theme {
         }
     }
 
-    /// In a tone; `plain` where there are no colours.
+    /// Returns the style of a tone, with the attributes `plain` on terminals without colours.
     fn toned(&self, tone: Tone, plain: Modifier) -> Style {
         match self.color(tone) {
             Some(color) => Style::new().fg(color),
@@ -48,12 +48,12 @@ impl Theme {
         }
     }
 
-    /// Values and names, also over a border.
+    /// Values, names and titles.
     pub fn text(&self) -> Style {
         Style::new().fg(Color::Reset).remove_modifier(Modifier::DIM)
     }
 
-    /// What may be overlooked: labels, units, defaults.
+    /// Secondary text: labels, units, defaults.
     pub fn dim(&self) -> Style {
         self.toned(DIM, Modifier::DIM)
     }
@@ -63,27 +63,27 @@ impl Theme {
         self.dim().remove_modifier(Modifier::DIM).add_modifier(Modifier::BOLD)
     }
 
-    /// What is active, and keys.
+    /// Active elements and keys.
     pub fn accent(&self) -> Style {
         self.toned(ACCENT, Modifier::BOLD)
     }
 
-    /// Reached, done.
+    /// Success.
     pub fn good(&self) -> Style {
         self.toned(GOOD, Modifier::BOLD)
     }
 
-    /// To be noticed.
+    /// Warnings.
     pub fn warn(&self) -> Style {
         self.toned(WARN, Modifier::BOLD)
     }
 
-    /// Refused, failed.
+    /// Refusals and failures.
     pub fn bad(&self) -> Style {
         self.toned(BAD, Modifier::BOLD)
     }
 
-    /// A whole row under the cursor. `active`: keys go there.
+    /// Row under the cursor; `active` is whether it takes the keys.
     pub fn selected(&self, active: bool) -> Style {
         match (active, self.colors) {
             (false, _) => self.accent().add_modifier(Modifier::BOLD),
@@ -95,12 +95,12 @@ impl Theme {
         }
     }
 
-    /// Lines around panels.
+    /// Borders of panels.
     pub fn border(&self, focused: bool) -> Style {
         if focused { self.accent() } else { self.toned(BORDER, Modifier::DIM) }
     }
 
-    /// How they are drawn: where colours cannot be trusted the lines tell which panel has the focus.
+    /// Border type: on terminals with few or no colours it marks the panel with the focus.
     pub fn border_type(&self, focused: bool) -> BorderType {
         match (focused, self.colors) {
             (true, Colors::Sixteen | Colors::Mono) => BorderType::Thick,
@@ -108,12 +108,12 @@ impl Theme {
         }
     }
 
-    /// The level of colours.
+    /// Colour depth.
     pub fn colors(&self) -> Colors {
         self.colors
     }
 
-    /// A patch of a colour, if the terminal can show it.
+    /// Style of a colour swatch, if the terminal can show the colour.
     pub fn swatch(&self, [r, g, b]: [u8; 3]) -> Option<Style> {
         match self.colors {
             Colors::True => Some(Style::new().fg(Color::Rgb(r, g, b))),

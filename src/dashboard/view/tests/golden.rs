@@ -1,4 +1,4 @@
-//! The text of every screen against `tests/screens`.
+//! Text of every screen, compared with `tests/screens`.
 
 use crate::dashboard::view::tests::states::{STATES, tracing};
 use crate::dashboard::view::tests::{drawn, row_text};
@@ -9,7 +9,7 @@ use std::path::Path;
 const SIZES: [[u16; 2]; 5] = [[200, 60], [120, 36], [80, 24], [40, 12], [39, 11]];
 
 #[test]
-fn screens_look_as_they_did() {
+fn screens_match_golden_files() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/screens");
     let bless = std::env::var_os("ZERKALO_BLESS").is_some();
     let mut different = Vec::new();
@@ -40,7 +40,7 @@ fn screens_look_as_they_did() {
     assert!(different.is_empty(), "{}\nZERKALO_BLESS=1 takes them over", different.join("\n"));
 }
 
-/// No screen is left over from a state that is no more.
+/// Every file in `tests/screens` belongs to a state.
 #[test]
 fn every_screen_has_its_state() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/screens");

@@ -1,6 +1,6 @@
-//! Screens: what is drawn in each state at each size.
+//! Screens in each state at each size.
 //!
-//! The text of every screen stands in `tests/screens`; `ZERKALO_BLESS=1` writes it anew.
+//! `tests/screens` holds the text of every screen; `ZERKALO_BLESS=1` rewrites it.
 
 mod golden;
 mod paint;
@@ -13,7 +13,7 @@ use crate::dashboard::view::View;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 
-/// The screen of a model.
+/// Draws the screen of a model.
 fn drawn(model: &Model) -> (Buffer, Option<Position>) {
     let [width, height] = model.screen;
     let mut buffer = Buffer::empty(Rect { x: 0, y: 0, width, height });
@@ -21,12 +21,12 @@ fn drawn(model: &Model) -> (Buffer, Option<Position>) {
     (buffer, cursor)
 }
 
-/// The text of a row, without blanks at its end.
+/// Returns the text of a row without trailing blanks.
 fn row_text(buffer: &Buffer, y: u16) -> String {
     let mut text = String::new();
     let mut hidden = 0;
     for x in buffer.area.left()..buffer.area.right() {
-        // What a wide character covers is no cell of its own.
+        // Cells covered by a wide character are skipped.
         if hidden > 0 {
             hidden -= 1;
             continue;

@@ -1,6 +1,6 @@
-//! Screens with real pictures as files of terminal codes, to look at:
-//! `ZERKALO_SCREENS=folder cargo test --lib paint -- --ignored`, then `cat` one in a terminal of its
-//! size.
+//! Screens with rendered pictures as files of terminal sequences, for visual inspection:
+//! `ZERKALO_SCREENS=folder cargo test --lib paint -- --ignored`, then `cat` one in a terminal of
+//! its size.
 
 use crate::dashboard::model::{Colors, Model};
 use crate::dashboard::view::tests::drawn;

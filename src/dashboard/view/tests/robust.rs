@@ -1,4 +1,4 @@
-//! No size and no colours are too few for any state.
+//! Every state is drawn at every size and colour depth.
 
 use crate::dashboard::model::Colors;
 use crate::dashboard::view::tests::drawn;
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
     #[test]
-    fn nothing_panics_and_nothing_steers_the_terminal(
+    fn every_state_draws_without_control_characters(
         width in 0u16..=300, height in 0u16..=100, state in 0..STATES.len(), colors in 0usize..4,
     ) {
         let mut model = tracing([width, height]);
@@ -24,9 +24,9 @@ proptest! {
     }
 }
 
-/// The sizes around every threshold of the layout.
+/// Sizes around every threshold of the layout.
 #[test]
-fn small_sizes() {
+fn every_state_draws_at_threshold_sizes() {
     for (_, make) in STATES {
         for width in (0..46).chain([71, 72, 73, 99, 100]) {
             for height in (0..20).step_by(1 + usize::from(width > 41)) {

@@ -1,7 +1,6 @@
-//! Models in every state that has a look of its own.
+//! Models in every visually distinct state.
 
 use crate::dashboard::editor::Editor;
-use crate::dashboard::keymap::KEYMAP;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::message::{DisplayChannel, Format, Message, OrphanedEdits};
 use crate::dashboard::model::{
@@ -12,6 +11,7 @@ use crate::dashboard::overlay::{
 };
 use crate::dashboard::panel_lines::{PanelLine, scrolled};
 use crate::dashboard::testing::report;
+use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::update::update;
 use crate::film::{LightWeights, Probe};
 use crate::render::schedule::{Spp, Stop, StoppedBy};
@@ -21,10 +21,10 @@ use crate::scene::{Scene, built_in};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A name, and what makes the state of a model that has been tracing for a while.
+/// A name, and the changes to a model that has been tracing for a while.
 pub type Named = (&'static str, fn(&mut Model));
 
-/// The built-in scene after 212 samples, nothing pressed since long.
+/// Creates a model of the built-in scene after 212 samples.
 pub fn tracing(screen: [u16; 2]) -> Model {
     let mut model = Model::new(Start {
         path: Some("scenes/mirror-room.toml".into()),
@@ -34,7 +34,7 @@ pub fn tracing(screen: [u16; 2]) -> Model {
         colors: Colors::True,
         stop: Stop { noise_codes: Some(0.5), ..Stop::default() },
         threads: 2,
-        most_threads: 2,
+        max_threads: 2,
     });
     model.first_time = false;
     for spp in [2, 4, 8, 16, 32, 64, 96, 128, 160, 212] {
@@ -89,7 +89,7 @@ fn select(model: &mut Model, object: &str) {
     model.selection = found.unwrap_or_else(|| panic!("{object} in the built-in scene"));
 }
 
-/// The first object that is no mirror.
+/// Selects the first object that is not a mirror.
 fn select_first(model: &mut Model) {
     let name = Target::Object(0).label(model.scene());
     select(model, &name);
@@ -225,22 +225,22 @@ pub const STATES: &[Named] = &[
     ("noise", |m| m.channel = DisplayChannel::Noise),
     ("samples", |m| m.channel = DisplayChannel::Samples),
     ("objects", |m| m.channel = DisplayChannel::Objects),
-    ("kept", |m| m.comparison.shown = CompareView::Pinned),
-    ("only-picture", |m| m.only_picture = true),
+    ("pinned", |m| m.comparison.shown = CompareView::Pinned),
+    ("fullscreen", |m| m.fullscreen = true),
     ("notice", |m| {
         notice(
             m,
             Tone::Good,
-            "wrote mirror-room-1.png, 640×480, 212 spp, noise 0.9 codes — scp ada@sun:/home/ada/mirror-room-1.png .",
+            "wrote mirror-room-1.png, 640×480, 212 spp, noise 0.9 levels — scp ada@sun:/home/ada/mirror-room-1.png .",
         );
     }),
     ("notice-of-a-refusal", |m| notice(m, Tone::Bad, "nothing is selected that can be deleted")),
     ("help", |m| m.overlay = Some(Overlay::Help { scroll: 0 })),
     ("help-scrolled", |m| m.overlay = Some(Overlay::Help { scroll: 60 })),
     ("inventory", |m| m.overlay = Some(Overlay::Inventory { scroll: 0 })),
-    ("quality", |m| m.overlay = Some(Overlay::Quality { cursor: 3 })),
+    ("noise-targets", |m| m.overlay = Some(Overlay::NoiseTargets { cursor: 3 })),
     ("palette", |m| {
-        let found = (0..KEYMAP.len()).filter(|i| KEYMAP[*i].label.contains("light")).collect();
+        let found = (0..COMMANDS.len()).filter(|i| COMMANDS[*i].label.contains("light")).collect();
         let editor = Editor::new("light");
         m.overlay = Some(Overlay::Palette(Palette { editor, found, cursor: 1, scroll: 0 }));
     }),
@@ -266,7 +266,7 @@ pub const STATES: &[Named] = &[
     ("stop-at-refused", |m| {
         let help = "noise 0.5, spp 1000, time 60, or none.";
         let problem =
-            "`noise low` is no number of codes. Type noise 0.5, spp 1000, time 60, or none.";
+            "`noise low` is no number of levels. Type noise 0.5, spp 1000, time 60, or none.";
         prompt(m, PromptFor::StopAt, ["stop at", help, "noise low"], Some(problem));
     }),
     ("quit", |m| {
@@ -278,7 +278,7 @@ pub const STATES: &[Named] = &[
         ];
         m.overlay = Some(Overlay::Question(Question { text, answers, cursor: 0 }));
     }),
-    ("left-behind", |m| {
+    ("orphaned-edits", |m| {
         let age = Duration::from_secs(720);
         let left = OrphanedEdits { scene: Arc::new(built_in()), age, changed: true };
         update(m, Message::OrphanedEdits(left), Duration::ZERO);

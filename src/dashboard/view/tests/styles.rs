@@ -1,4 +1,4 @@
-//! Looks that text does not tell.
+//! Styles, which the text of screens does not cover.
 
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{Colors, Model};
@@ -19,9 +19,9 @@ fn corner(buffer: &Buffer, area: Area) -> (String, Color, Modifier) {
     (cell.symbol().to_string(), cell.fg, cell.modifier)
 }
 
-/// Exactly one panel's border differs from those of all others, and it is that with the focus.
+/// Exactly one panel's border differs from all others: that of the panel with the focus.
 #[test]
-fn the_focus_is_seen_at_every_level_of_colours() {
+fn focus_is_visible_at_every_colour_depth() {
     for colors in Colors::ALL {
         for focus in [Focus::Picture, Focus::Outline, Focus::Inspector] {
             for screen in [[200, 60], [120, 36], [80, 24]] {
@@ -52,9 +52,9 @@ fn the_focus_is_seen_at_every_level_of_colours() {
     }
 }
 
-/// Without colours nothing has a colour; with 16 nothing has more.
+/// Each colour depth uses only its own colours.
 #[test]
-fn colours_keep_to_their_level() {
+fn colours_stay_within_colour_depth() {
     for (name, make) in STATES {
         for colors in Colors::ALL {
             let mut model = tracing([120, 36]);
@@ -81,7 +81,7 @@ fn colours_keep_to_their_level() {
 }
 
 #[test]
-fn what_is_under_the_cursor_stands_out() {
+fn cursor_row_is_highlighted() {
     for colors in Colors::ALL {
         let mut model = state("inspector", [120, 36]);
         model.colors = colors;
@@ -97,7 +97,7 @@ fn what_is_under_the_cursor_stands_out() {
 }
 
 #[test]
-fn defaults_are_dimmed_and_refusals_are_red() {
+fn defaults_are_dimmed_and_problems_red() {
     let model = state("typing-refused", [120, 36]);
     let (buffer, cursor) = drawn(&model);
     let (_, help) = model.inspector_rows().unwrap();
@@ -128,9 +128,9 @@ fn defaults_are_dimmed_and_refusals_are_red() {
     assert!(defaults.iter().all(|color| *color != Color::Reset), "{defaults:?}");
 }
 
-/// At 80 columns no hint and no part of the status is cut in the middle.
+/// At 80 columns hints and status parts are not truncated.
 #[test]
-fn the_lowest_lines_hold_whole_words() {
+fn status_and_hints_are_not_truncated() {
     for (name, make) in STATES {
         for width in [40, 60, 80, 120] {
             let mut model = tracing([width, 24]);

@@ -1,0 +1,378 @@
+//! The command table: one row a command, with its keys, label, hints, availability and function.
+//!
+//! Key dispatch, hint line, help, palette and docs/keys.md read it.
+
+use crate::dashboard::key_context::KeyContext::{self, *};
+use crate::dashboard::message::{Effect, Format};
+use crate::dashboard::model::{CompareView, Mode, Model};
+use crate::dashboard::overlay::Overlay;
+use crate::dashboard::update::Direction::{Down, In, Left, Out, Right, Up};
+use crate::dashboard::update::StepSize::{Coarse, Fine};
+use crate::dashboard::update::UpdateContext;
+use crate::terminal::event::Key;
+use std::collections::HashMap;
+use std::sync::OnceLock;
+use {Chapter as C, HintLine as H};
+
+/// Chapters of the help.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Chapter {
+    /// Camera and viewpoints.
+    Camera,
+    /// Lights.
+    Light,
+    /// The mirror.
+    Mirror,
+    /// Objects.
+    Objects,
+    /// Panels, fields and the selection.
+    Panels,
+    /// Undo, files and quitting.
+    File,
+    /// Display, export and comparison of the picture.
+    Picture,
+    /// Progress and resources of rendering.
+    Render,
+    /// Help.
+    Help,
+}
+
+/// Hint lines, of which the dashboard shows one at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum HintLine {
+    /// Before the first key press.
+    First,
+    /// The picture has the focus.
+    Picture,
+    /// The selection is being moved.
+    Moving,
+    /// The selection is being turned.
+    Turning,
+    /// The camera flies.
+    Flying,
+    /// The probe moves over the picture.
+    Probing,
+    /// The outline has the focus.
+    Outline,
+    /// The inspector has the focus.
+    Inspector,
+    /// A list or question is open.
+    List,
+    /// A form is open.
+    Form,
+    /// Text is being typed.
+    Typing,
+    /// Help or inventory is open.
+    Reading,
+}
+
+/// A short description of a command and its neighbours in the table, for the hint line.
+#[derive(Clone, Copy, Debug)]
+pub struct Hint {
+    /// Hint lines that show it.
+    pub lines: &'static [HintLine],
+    /// Sorting key within a line.
+    pub position: u8,
+    /// Keys as displayed: `PgUp PgDn`.
+    pub keys: &'static str,
+    /// Effect of the keys, in a word or two.
+    pub text: &'static str,
+}
+
+/// A row of the command table.
+#[derive(Clone, Copy, Debug)]
+pub struct Command {
+    /// Chapter of the help.
+    pub chapter: Chapter,
+    /// Description in a few words, for help, palette and docs/keys.md. Unique.
+    pub label: &'static str,
+    /// Names of keys, separated by spaces, per context. Empty: the palette alone runs the command.
+    pub keys: &'static [(KeyContext, &'static str)],
+    /// Hints that stand for the command and its neighbours.
+    pub hints: &'static [Hint],
+    /// The command does not need the value that is being typed to be applied first.
+    pub(super) while_typing: bool,
+    /// The command also runs from the viewer of exported images, which any other key closes.
+    pub(super) over_image: bool,
+    /// Returns `true` if the model has what the command needs.
+    pub(super) available: fn(&Model) -> bool,
+    /// Carries the command out.
+    pub(super) run: fn(&mut UpdateContext<'_>),
+}
+
+const fn command(
+    chapter: Chapter,
+    label: &'static str,
+    keys: &'static [(KeyContext, &'static str)],
+    run: fn(&mut UpdateContext<'_>),
+) -> Command {
+    Command {
+        chapter,
+        label,
+        keys,
+        hints: &[],
+        while_typing: false,
+        over_image: false,
+        available: with_scene,
+        run,
+    }
+}
+
+const fn hint(
+    lines: &'static [HintLine],
+    position: u8,
+    keys: &'static str,
+    text: &'static str,
+) -> Hint {
+    Hint { lines, position, keys, text }
+}
+
+fn with_scene(model: &Model) -> bool {
+    !model.file.unreadable
+}
+
+/// Palettes and questions are answered even without a scene.
+fn with_scene_or_choice(model: &Model) -> bool {
+    with_scene(model) || matches!(model.overlay, Some(Overlay::Palette(_) | Overlay::Question(_)))
+}
+
+fn always(_: &Model) -> bool {
+    true
+}
+
+/// Every command, in the order of the help.
+#[rustfmt::skip] // A table reads best with one row a line.
+pub static COMMANDS: &[Command] = &[
+    command(C::Camera, "orbit left", &[(Picture, "Left")], |c| c.orbit(Left)).hints(&[hint(&[H::First], 1, "arrows", "turn"), hint(&[H::Picture], 1, "arrows", "orbit")]),
+    command(C::Camera, "orbit right", &[(Picture, "Right")], |c| c.orbit(Right)),
+    command(C::Camera, "orbit up", &[(Picture, "Up")], |c| c.orbit(Up)),
+    command(C::Camera, "orbit down", &[(Picture, "Down")], |c| c.orbit(Down)),
+    command(C::Camera, "dolly in", &[(Picture, "PageUp")], |c| c.dolly(In, Coarse)).hints(&[hint(&[H::Picture], 2, "PgUp PgDn", "dolly")]),
+    command(C::Camera, "dolly out", &[(Picture, "PageDown")], |c| c.dolly(Out, Coarse)),
+    command(C::Camera, "dolly in, fine", &[(Picture, "Shift-PageUp")], |c| c.dolly(In, Fine)),
+    command(C::Camera, "dolly out, fine", &[(Picture, "Shift-PageDown")], |c| c.dolly(Out, Fine)),
+    command(C::Camera, "pan left", &[(Picture, "Shift-Left")], |c| c.pan(Left)).hints(&[hint(&[H::Picture], 3, "Shift", "pan")]),
+    command(C::Camera, "pan right", &[(Picture, "Shift-Right")], |c| c.pan(Right)),
+    command(C::Camera, "pan up", &[(Picture, "Shift-Up")], |c| c.pan(Up)),
+    command(C::Camera, "pan down", &[(Picture, "Shift-Down")], |c| c.pan(Down)),
+    command(C::Camera, "look left", &[(Picture, "Ctrl-Left"), (Flying, "Left")], |c| c.look(Left)).hints(&[hint(&[H::Flying], 4, "arrows", "look")]),
+    command(C::Camera, "look right", &[(Picture, "Ctrl-Right"), (Flying, "Right")], |c| c.look(Right)),
+    command(C::Camera, "look up", &[(Picture, "Ctrl-Up"), (Flying, "Up")], |c| c.look(Up)),
+    command(C::Camera, "look down", &[(Picture, "Ctrl-Down"), (Flying, "Down")], |c| c.look(Down)),
+    command(C::Camera, "roll left", &[(Picture, "Alt-Left")], |c| c.roll(Left)),
+    command(C::Camera, "roll right", &[(Picture, "Alt-Right")], |c| c.roll(Right)),
+    command(C::Camera, "narrower view angle", &[(Picture, "Alt-Up")], |c| c.view_angle(-1)),
+    command(C::Camera, "wider view angle", &[(Picture, "Alt-Down")], |c| c.view_angle(1)),
+    command(C::Camera, "fly the camera", &[(Anywhere, "w")], |c| c.enter_mode(Mode::Fly)),
+    command(C::Camera, "fly forward", &[(Flying, "w")], |c| c.fly(In)).hints(&[hint(&[H::Flying], 1, "w s", "forward, back")]),
+    command(C::Camera, "fly back", &[(Flying, "s")], |c| c.fly(Out)),
+    command(C::Camera, "fly left", &[(Flying, "a")], |c| c.fly(Left)).hints(&[hint(&[H::Flying], 2, "a d", "left, right")]),
+    command(C::Camera, "fly right", &[(Flying, "d")], |c| c.fly(Right)),
+    command(C::Camera, "fly up", &[(Flying, "r PageUp")], |c| c.fly(Up)).hints(&[hint(&[H::Flying], 3, "r f", "up, down")]),
+    command(C::Camera, "fly down", &[(Flying, "f PageDown")], |c| c.fly(Down)),
+    command(C::Camera, "frame the selection", &[(Anywhere, "f")], |c| c.frame()).hints(&[hint(&[H::Outline], 6, "f", "frame")]),
+    command(C::Camera, "camera as in the file", &[(Picture, "Home")], |c| c.reset_camera()),
+    command(C::Camera, "store this viewpoint", &[(Anywhere, "n")], |c| c.ask_view_name()),
+    command(C::Camera, "go to viewpoint 1", &[(Anywhere, "1")], |c| c.recall_view(1)),
+    command(C::Camera, "go to viewpoint 2", &[(Anywhere, "2")], |c| c.recall_view(2)),
+    command(C::Camera, "go to viewpoint 3", &[(Anywhere, "3")], |c| c.recall_view(3)),
+    command(C::Camera, "go to viewpoint 4", &[(Anywhere, "4")], |c| c.recall_view(4)),
+    command(C::Camera, "go to viewpoint 5", &[(Anywhere, "5")], |c| c.recall_view(5)),
+    command(C::Camera, "go to viewpoint 6", &[(Anywhere, "6")], |c| c.recall_view(6)),
+    command(C::Camera, "go to viewpoint 7", &[(Anywhere, "7")], |c| c.recall_view(7)),
+    command(C::Camera, "go to viewpoint 8", &[(Anywhere, "8")], |c| c.recall_view(8)),
+    command(C::Camera, "go to viewpoint 9", &[(Anywhere, "9")], |c| c.recall_view(9)),
+
+    command(C::Light, "select the next light", &[(Anywhere, "l")], |c| c.next_light()).hints(&[hint(&[H::Picture], 5, "l ; '", "light")]),
+    command(C::Light, "light brighter", &[(Anywhere, "'")], |c| c.intensity(1.0)),
+    command(C::Light, "light darker", &[(Anywhere, ";")], |c| c.intensity(-1.0)),
+    command(C::Light, "light brighter, fine", &[(Anywhere, "Alt-'")], |c| c.intensity(0.1)),
+    command(C::Light, "light darker, fine", &[(Anywhere, "Alt-;")], |c| c.intensity(-0.1)),
+    command(C::Light, "light on or off", &[(Anywhere, "L")], |c| c.switch_light()),
+    command(C::Light, "add a light", &[(Anywhere, "A")], |c| c.pick_light()),
+
+    command(C::Mirror, "mirror rougher", &[(Anywhere, "] .")], |c| c.roughness(1.0)).hints(&[hint(&[H::First, H::Picture], 4, "[ ]", "roughness")]),
+    command(C::Mirror, "mirror smoother", &[(Anywhere, "[ ,")], |c| c.roughness(-1.0)),
+    command(C::Mirror, "mirror rougher, fine", &[(Anywhere, "} >")], |c| c.roughness(0.1)),
+    command(C::Mirror, "mirror smoother, fine", &[(Anywhere, "{ <")], |c| c.roughness(-0.1)),
+    command(C::Mirror, "mirror reflects more", &[(Anywhere, ")")], |c| c.reflection(1.0)),
+    command(C::Mirror, "mirror reflects less", &[(Anywhere, "(")], |c| c.reflection(-1.0)),
+    command(C::Mirror, "next lobe of the mirror", &[(Anywhere, "b \\")], |c| c.next_lobe()),
+
+    command(C::Objects, "add an object", &[(Anywhere, "a")], |c| c.pick_object()).hints(&[hint(&[H::First, H::Picture], 6, "a", "add")]),
+    command(C::Objects, "duplicate the selection", &[(Anywhere, "D")], |c| c.duplicate()).hints(&[hint(&[H::Outline], 4, "D", "duplicate")]),
+    command(C::Objects, "delete the selection", &[(Anywhere, "x Delete")], |c| c.delete()).hints(&[hint(&[H::Outline], 5, "x", "delete")]),
+    command(C::Objects, "rename the selection", &[(Anywhere, "e F2")], |c| c.ask_name()).hints(&[hint(&[H::Outline], 3, "e", "rename")]),
+    command(C::Objects, "move the selection", &[(Anywhere, "m")], |c| c.enter_mode(Mode::Move)).hints(&[hint(&[H::First, H::Picture, H::Outline], 7, "m", "move")]),
+    command(C::Objects, "move left", &[(Moving, "Left")], |c| c.move_selection(Left, Coarse)).hints(&[hint(&[H::Moving], 1, "arrows", "in the plane")]),
+    command(C::Objects, "move right", &[(Moving, "Right")], |c| c.move_selection(Right, Coarse)),
+    command(C::Objects, "move away", &[(Moving, "Up")], |c| c.move_selection(In, Coarse)),
+    command(C::Objects, "move nearer", &[(Moving, "Down")], |c| c.move_selection(Out, Coarse)),
+    command(C::Objects, "raise", &[(Moving, "PageUp")], |c| c.move_selection(Up, Coarse)).hints(&[hint(&[H::Moving], 2, "PgUp PgDn", "height")]),
+    command(C::Objects, "lower", &[(Moving, "PageDown")], |c| c.move_selection(Down, Coarse)),
+    command(C::Objects, "move left, fine", &[(Moving, "Shift-Left")], |c| c.move_selection(Left, Fine)).hints(&[hint(&[H::Moving], 3, "Shift", "fine")]),
+    command(C::Objects, "move right, fine", &[(Moving, "Shift-Right")], |c| c.move_selection(Right, Fine)),
+    command(C::Objects, "move away, fine", &[(Moving, "Shift-Up")], |c| c.move_selection(In, Fine)),
+    command(C::Objects, "move nearer, fine", &[(Moving, "Shift-Down")], |c| c.move_selection(Out, Fine)),
+    command(C::Objects, "raise, fine", &[(Moving, "Shift-PageUp")], |c| c.move_selection(Up, Fine)),
+    command(C::Objects, "lower, fine", &[(Moving, "Shift-PageDown")], |c| c.move_selection(Down, Fine)),
+    command(C::Objects, "turn the selection", &[(Anywhere, "r")], |c| c.enter_mode(Mode::Rotate)),
+    command(C::Objects, "turn left", &[(Turning, "Left")], |c| c.turn_selection(Left, Coarse)).hints(&[hint(&[H::Turning], 1, "Left Right", "turn 15°")]),
+    command(C::Objects, "turn right", &[(Turning, "Right")], |c| c.turn_selection(Right, Coarse)),
+    command(C::Objects, "turn left, fine", &[(Turning, "Shift-Left")], |c| c.turn_selection(Left, Fine)).hints(&[hint(&[H::Turning], 2, "Shift", "1°")]),
+    command(C::Objects, "turn right, fine", &[(Turning, "Shift-Right")], |c| c.turn_selection(Right, Fine)),
+    command(C::Objects, "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::Moving], 4, "g", "snap to ground")]),
+    command(C::Objects, "give it a material of its own", &[(Anywhere, "M")], |c| c.own_material()),
+
+    command(C::Panels, "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).hints(&[hint(&[H::Picture], 8, "Tab", "panels")]),
+    command(C::Panels, "panel or field before", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)),
+    command(C::Panels, "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Turning, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).available(always).while_typing().hints(&[
+        hint(&[H::Moving, H::Turning, H::Flying, H::Probing], 9, "Esc", "done"),
+        hint(&[H::Outline, H::Inspector], 9, "Esc", "picture"),
+        hint(&[H::List, H::Form], 9, "Esc", "cancel"),
+        hint(&[H::Typing], 9, "Esc", "leave as it was"),
+        hint(&[H::Reading], 9, "Esc", "close"),
+    ]),
+    command(C::Panels, "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).available(with_scene_or_choice).while_typing().hints(&[
+        hint(&[H::Outline], 2, "Enter", "inspect"),
+        hint(&[H::Inspector], 4, "Enter 0-9", "type"),
+        hint(&[H::List], 2, "Enter", "take"),
+        hint(&[H::Form], 3, "type", "a value"),
+        hint(&[H::Form], 4, "Enter", "add"),
+        hint(&[H::Typing], 1, "Enter", "apply"),
+    ]),
+    command(C::Panels, "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).available(always).hints(&[
+        hint(&[H::Outline], 1, "Up Down", "select"),
+        hint(&[H::Inspector, H::Form], 1, "Up Down", "field"),
+        hint(&[H::List], 1, "Up Down", "choose"),
+        hint(&[H::Reading], 1, "Up Down", "scroll"),
+    ]),
+    command(C::Panels, "line below", &[(Outline, "Down"), (Inspector, "Down"), (Overlay, "Down")], |c| c.move_cursor(1)).available(always),
+    command(C::Panels, "page up", &[(Outline, "PageUp"), (Inspector, "PageUp"), (Overlay, "PageUp")], |c| c.page(-1)).available(always),
+    command(C::Panels, "page down", &[(Outline, "PageDown"), (Inspector, "PageDown"), (Overlay, "PageDown")], |c| c.page(1)).available(always),
+    command(C::Panels, "first line", &[(Outline, "Home"), (Inspector, "Home"), (Overlay, "Home")], |c| c.move_cursor(isize::MIN / 2)).available(always),
+    command(C::Panels, "last line", &[(Outline, "End"), (Inspector, "End"), (Overlay, "End")], |c| c.move_cursor(isize::MAX / 2)).available(always),
+    command(C::Panels, "field up", &[(Inspector, "Right"), (Overlay, "Right")], |c| c.step_field(1.0)).hints(&[hint(&[H::Inspector, H::Form], 2, "Left Right", "step")]),
+    command(C::Panels, "field down", &[(Inspector, "Left"), (Overlay, "Left")], |c| c.step_field(-1.0)),
+    command(C::Panels, "field up, fine", &[(Inspector, "Shift-Right"), (Overlay, "Shift-Right")], |c| c.step_field(0.1)).hints(&[hint(&[H::Inspector], 3, "Shift", "fine")]),
+    command(C::Panels, "field down, fine", &[(Inspector, "Shift-Left"), (Overlay, "Shift-Left")], |c| c.step_field(-0.1)),
+    command(C::Panels, "field back to its default", &[(Inspector, "Backspace")], |c| c.clear_field()).hints(&[hint(&[H::Inspector], 5, "Backspace", "default")]),
+    command(C::Panels, "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()),
+
+    command(C::File, "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::Picture], 9, "u", "undo")]),
+    command(C::File, "redo", &[(Anywhere, "U Ctrl-r")], |c| c.redo()),
+    command(C::File, "save", &[(Anywhere, "Ctrl-s")], |c| c.save()),
+    command(C::File, "save as", &[(Anywhere, "W")], |c| c.ask_path()),
+    command(C::File, "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(always),
+    command(C::File, "recover edits of a broken session", &[], |c| c.ask_recovery()).available(always),
+    command(C::File, "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).available(always).over_image(),
+    command(C::File, "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).available(always).over_image().hints(&[hint(&[H::First], 13, "q", "quit")]),
+
+    command(C::Picture, "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).hints(&[hint(&[H::Picture], 10, "p", "PNG")]),
+    command(C::Picture, "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)),
+    command(C::Picture, "look at the last picture", &[(Anywhere, "o")], |c| c.view_last_export()),
+    command(C::Picture, "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()),
+    command(C::Picture, "render at another size", &[(Anywhere, "Ctrl-e")], |c| c.ask_export_size()),
+    command(C::Picture, "cancel the running export", &[(Anywhere, "Ctrl-x")], |c| c.cancel_export()),
+    command(C::Picture, "exposure up", &[(Anywhere, "= +")], |c| c.exposure(1.0)),
+    command(C::Picture, "exposure down", &[(Anywhere, "-")], |c| c.exposure(-1.0)),
+    command(C::Picture, "exposure 0", &[(Anywhere, "0")], |c| c.reset_exposure()),
+    command(C::Picture, "next tone curve", &[(Anywhere, "t")], |c| c.next_tone()),
+    command(C::Picture, "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).hints(&[hint(&[H::Probing], 3, "v", "views")]),
+    command(C::Picture, "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)),
+    command(C::Picture, "probe a pixel", &[(Anywhere, "i")], |c| c.toggle_probe()),
+    command(C::Picture, "probe left", &[(Probing, "Left")], |c| c.move_probe(Left, Coarse)).hints(&[hint(&[H::Probing], 1, "arrows", "move")]),
+    command(C::Picture, "probe right", &[(Probing, "Right")], |c| c.move_probe(Right, Coarse)),
+    command(C::Picture, "probe up", &[(Probing, "Up")], |c| c.move_probe(Up, Coarse)),
+    command(C::Picture, "probe down", &[(Probing, "Down")], |c| c.move_probe(Down, Coarse)),
+    command(C::Picture, "probe left by one pixel", &[(Probing, "Shift-Left")], |c| c.move_probe(Left, Fine)).hints(&[hint(&[H::Probing], 2, "Shift", "one pixel")]),
+    command(C::Picture, "probe right by one pixel", &[(Probing, "Shift-Right")], |c| c.move_probe(Right, Fine)),
+    command(C::Picture, "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe(Up, Fine)),
+    command(C::Picture, "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe(Down, Fine)),
+    command(C::Picture, "pin this picture", &[(Anywhere, "k")], |c| c.pin()),
+    command(C::Picture, "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(CompareView::Pinned)),
+    command(C::Picture, "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(CompareView::Difference)),
+
+    command(C::Render, "pause or resume", &[(Anywhere, "Space")], |c| c.pause()),
+    command(C::Render, "restart the picture", &[(Anywhere, "R")], |c| c.restart()),
+    command(C::Render, "stop at …", &[(Anywhere, "T")], |c| c.ask_stop()),
+    command(C::Render, "noise targets and their times", &[(Anywhere, "N")], |c| c.open_noise_targets()),
+    command(C::Render, "more threads", &[], |c| c.threads(1)),
+    command(C::Render, "fewer threads", &[], |c| c.threads(-1)),
+    command(C::Render, "low or normal priority", &[], |c| c.priority()),
+    command(C::Render, "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).available(always),
+
+    command(C::Help, "all keys", &[(Anywhere, "? F1")], |c| c.open_overlay(Overlay::Help { scroll: 0 })).available(always).hints(&[hint(&[H::First, H::Picture], 12, "?", "keys")]),
+    command(C::Help, "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.open_palette()).available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::Picture], 11, ":", "all")]),
+    command(C::Help, "what the scene contains", &[], |c| c.open_overlay(Overlay::Inventory { scroll: 0 })),
+];
+
+impl Chapter {
+    /// Every chapter with its heading, in the order of the help.
+    pub const ALL: [(Self, &'static str); 9] = [
+        (Self::Camera, "camera"),
+        (Self::Light, "light"),
+        (Self::Mirror, "mirror"),
+        (Self::Objects, "objects"),
+        (Self::Panels, "panels"),
+        (Self::File, "file"),
+        (Self::Picture, "picture"),
+        (Self::Render, "rendering"),
+        (Self::Help, "help"),
+    ];
+
+    /// Heading of the chapter.
+    pub fn title(self) -> &'static str {
+        Self::ALL[self as usize].1
+    }
+
+    /// Commands of the chapter, in the order of the table.
+    pub fn commands(self) -> impl Iterator<Item = &'static Command> {
+        COMMANDS.iter().filter(move |command| command.chapter == self)
+    }
+}
+
+impl Command {
+    const fn available(self, available: fn(&Model) -> bool) -> Self {
+        Self { available, ..self }
+    }
+
+    const fn hints(self, hints: &'static [Hint]) -> Self {
+        Self { hints, ..self }
+    }
+
+    const fn while_typing(self) -> Self {
+        Self { while_typing: true, ..self }
+    }
+
+    const fn over_image(self) -> Self {
+        Self { over_image: true, ..self }
+    }
+
+    /// All keys of the command with their contexts, each key formatted by `key`:
+    /// `Left in the picture`, `U Ctrl-r`.
+    pub fn all_keys(&self, key: impl Fn(&str) -> String) -> String {
+        let in_context = |(context, names): &(KeyContext, &'static str)| {
+            let keys: Vec<_> = names.split(' ').map(&key).collect();
+            format!("{} {}", keys.join(" "), context.place()).trim_end().to_string()
+        };
+        self.keys.iter().map(in_context).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Returns the command that `key` runs in `context`.
+pub fn lookup(context: KeyContext, key: Key) -> Option<&'static Command> {
+    static KEYMAP: OnceLock<HashMap<(KeyContext, Key), &'static Command>> = OnceLock::new();
+    let keymap = KEYMAP.get_or_init(|| {
+        let mut keymap = HashMap::new();
+        for command in COMMANDS {
+            for (context, names) in command.keys {
+                // A test of the table finds names that are not keys.
+                let keys = names.split(' ').filter_map(|name| name.parse().ok());
+                keymap.extend(keys.map(|key| ((*context, key), command)));
+            }
+        }
+        keymap
+    });
+    context.chain().iter().find_map(|context| keymap.get(&(*context, key)).copied())
+}

@@ -1,0 +1,77 @@
+//! Focus and modes: which panel and which part of the scene the keys act on.
+
+use crate::dashboard::layout::Focus;
+use crate::dashboard::model::{CompareView, Inspector, Mode};
+use crate::dashboard::update::UpdateContext;
+
+impl UpdateContext<'_> {
+    /// Enters a mode and gives the focus to the picture.
+    pub(super) fn enter_mode(&mut self, mode: Mode) {
+        let movable = match mode {
+            Mode::Move => self.check_movable(),
+            Mode::Rotate => self.check_turnable(),
+            _ => true,
+        };
+        if movable {
+            self.end_mode();
+            self.model.focus = Focus::Picture;
+            self.model.mode = mode;
+        }
+    }
+
+    /// Leaves the innermost of: editor, overlay, mode, panel, full screen, comparison.
+    pub(super) fn leave(&mut self) {
+        if self.model.overlay.is_some() {
+            self.close_overlay();
+        } else if self.model.inspector.editor.is_some() {
+            self.model.inspector.editor = None;
+        } else if self.model.mode != Mode::Orbit {
+            self.end_mode();
+        } else if self.model.focus != Focus::Picture {
+            self.model.focus = Focus::Picture;
+        } else if self.model.fullscreen {
+            self.toggle_fullscreen();
+        } else if self.model.comparison.shown != CompareView::Live {
+            self.model.comparison.shown = CompareView::Live;
+            self.repaint();
+        }
+    }
+
+    /// Ends the mode: the picture's keys control the camera again.
+    pub(super) fn end_mode(&mut self) {
+        self.end_gesture();
+        if self.model.mode == Mode::Probe {
+            self.set_probe(None);
+        }
+        self.model.mode = Mode::Orbit;
+    }
+
+    pub(super) fn next_panel(&mut self, by: isize) {
+        if self.model.overlay.is_some() {
+            self.move_cursor(by);
+            return;
+        }
+        let panels = [Focus::Picture, Focus::Outline, Focus::Inspector];
+        let at = panels.iter().position(|focus| *focus == self.model.focus).unwrap_or(0);
+        let next = (at as isize + by).rem_euclid(panels.len() as isize) as usize;
+        self.set_focus(panels[next]);
+    }
+
+    pub(super) fn set_focus(&mut self, focus: Focus) {
+        if focus != Focus::Picture {
+            self.end_mode();
+            self.model.fullscreen = false;
+        }
+        if focus != Focus::Inspector {
+            self.model.inspector.editor = None;
+        }
+        self.model.focus = focus;
+    }
+
+    pub(super) fn toggle_fullscreen(&mut self) {
+        self.model.fullscreen = !self.model.fullscreen;
+        self.model.focus = Focus::Picture;
+        self.model.inspector =
+            Inspector { editor: None, ..std::mem::take(&mut self.model.inspector) };
+    }
+}
