@@ -12,10 +12,10 @@ pub mod flow;
 pub mod image;
 mod keyboard;
 mod probe;
+mod screen;
 mod sequence;
 #[cfg(test)]
 mod tests;
-mod tty;
 
 use crate::terminal::event::{Key, Mouse};
 pub use area::Area;
@@ -25,7 +25,7 @@ pub use decode::Decoder;
 pub use keyboard::{Keyboard, Timed};
 pub(crate) use probe::cursor_question;
 pub use probe::probe;
-pub use tty::{ENTER, LEAVE, Screen, Tty, cell_px, size};
+pub use screen::{ENTER, LEAVE, Screen, Tty, cell_px, size};
 
 /// What a terminal sends.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,7 +7,7 @@
 use crate::terminal::capabilities::{Capabilities, Environment, Multiplexer};
 use crate::terminal::cells::Colors;
 use crate::terminal::keyboard::{Keyboard, Timed};
-use crate::terminal::tty::Tty;
+use crate::terminal::screen::Tty;
 use crate::terminal::{Event, Reply};
 use std::io;
 use std::time::{Duration, Instant};
