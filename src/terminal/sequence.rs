@@ -125,7 +125,7 @@ fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Opti
         (b"?$", 'y', &[mode, setting]) => Reply::Mode { mode, setting },
         (b"?", 'S', &[1, 0, colors]) => Reply::SixelColors(colors),
         (b"?", 'S', &[2, 0, width, height]) => Reply::SixelSize([width, height]),
-        (b"", 'R', &[row, column]) => Reply::Cursor { row, column },
+        (b"", 'R', &[row @ (1..), column @ (1..)]) => Reply::Cursor { row, column },
         (b"", 't', &[6, height, width]) => Reply::CellSize([width, height]),
         (b"", 'n' | 't' | 'x' | 'c', _) => Reply::Other,
         (b"", ..) => return key(params, last).map(Event::Key),
