@@ -2,6 +2,11 @@
 //!
 //! The map of the rooms, and who may import whom, stands in ARCHITECTURE.md; a test holds it.
 
+#[cfg(not(unix))]
+compile_error!(
+    "zerkalo needs a Unix system (Linux, macOS, BSD): it uses POSIX terminals, signals and file locks."
+);
+
 pub mod asset;
 pub mod bvh;
 pub mod camera;

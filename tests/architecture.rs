@@ -76,6 +76,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("clap", &["command"]),
     ("colorous", &["terminal"]),
     ("crossbeam_channel", &["render", "dashboard", "terminal"]),
+    ("crossterm", &["terminal"]),
     ("csv", &["command"]),
     ("epaint_default_fonts", &["measure"]),
     ("exr", &["film"]),
@@ -104,6 +105,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("toml_edit", &["scene"]),
     ("tui_input", &["dashboard"]),
     ("unicode_width", &["dashboard", "terminal"]),
+    ("vte", &["terminal"]),
     ("wide", &["lanes"]),
 ];
 

@@ -14,13 +14,13 @@ pub struct Area {
 }
 
 impl Area {
-    /// Whether the cell in this column and row lies in it.
+    /// Returns `true` if the cell in this column and row is inside.
     pub fn contains(&self, column: u16, row: u16) -> bool {
         (self.x..self.x + self.width).contains(&column)
             && (self.y..self.y + self.height).contains(&row)
     }
 
-    /// What is left inside a border of one cell.
+    /// Returns the area inside a border of one cell.
     pub fn inner(&self) -> Self {
         Self {
             x: self.x + 1,

@@ -1,9 +1,9 @@
-//! What the terminal can do, and what lies between it and the program.
+//! Capabilities of the terminal and of a multiplexer before it, by environment and replies.
 
 use crate::terminal::cells::Colors;
 use std::time::Duration;
 
-/// A program between the dashboard and the terminal that keeps a screen of its own.
+/// Program between the dashboard and the terminal that keeps a screen of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Multiplexer {
     /// tmux.
@@ -12,54 +12,54 @@ pub enum Multiplexer {
     Screen,
 }
 
-/// What the environment tells about the terminal.
+/// Environment variables that describe the terminal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Environment {
     /// `TERM`.
     pub term: String,
     /// `COLORTERM`.
     pub color_term: String,
-    /// `NO_COLOR` is set and not empty.
+    /// `true` if `NO_COLOR` is set and not empty.
     pub no_color: bool,
-    /// `SSH_CONNECTION`: address and port of the client, then of the server; `None`: not over SSH.
+    /// `SSH_CONNECTION`: address and port of the client, then of the server; `None` without SSH.
     pub ssh: Option<String>,
-    /// By `TMUX`, `STY` or `TERM`.
+    /// Multiplexer by `TMUX`, `STY` or `TERM`.
     pub multiplexer: Option<Multiplexer>,
 }
 
-/// What is known about the terminal. A `None` means that it did not say.
+/// Capabilities of the terminal. `None` means that it has not replied.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capabilities {
-    /// What the environment tells.
-    pub surroundings: Environment,
-    /// How many colours it has, by environment and answers.
+    /// Environment variables.
+    pub environment: Environment,
+    /// Number of colours, by environment and replies.
     pub colors: Colors,
-    /// A frame can be shown at once (mode 2026).
+    /// `true` if it knows synchronised updates (mode 2026).
     pub synchronised: bool,
-    /// Name and version.
+    /// Name and version (XTVERSION).
     pub version: Option<String>,
-    /// The background, sRGB.
+    /// Background, 8-bit sRGB (OSC 11).
     pub background: Option<[u8; 3]>,
-    /// Pictures by kitty's protocol.
+    /// `true` if it knows kitty's graphics protocol.
     pub kitty_graphics: bool,
-    /// Pictures by kitty's protocol can stand among text, as they must inside tmux.
+    /// `true` if kitty's images can be placed by Unicode placeholders, as tmux requires.
     pub placeholders: bool,
-    /// Pictures by sixel.
+    /// `true` if it knows sixel.
     pub sixel: bool,
-    /// How many colours those have.
+    /// Most colours of a sixel image.
     pub sixel_colors: Option<u16>,
-    /// How many pixels, in a row and in a column.
+    /// Largest width and height of a sixel image in pixels.
     pub sixel_px: Option<[u16; 2]>,
     /// Width and height of a cell in pixels.
     pub cell_px: Option<[u16; 2]>,
-    /// How long the answer to the first question took.
+    /// Round trip of the first request.
     pub round_trip: Option<Duration>,
-    /// How long a question that only the outermost terminal can answer took, inside a multiplexer.
+    /// Round trip of a request that passes through the multiplexer to the outermost terminal.
     pub passthrough: Option<Duration>,
 }
 
 impl Environment {
-    /// As the `variable`s of the environment have it.
+    /// Reads the environment. `variable` returns the value of a variable.
     pub fn of(variable: impl Fn(&str) -> Option<String>) -> Self {
         let variable = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = variable("TERM").unwrap_or_default();
@@ -79,9 +79,9 @@ impl Environment {
         }
     }
 
-    /// How many colours the environment promises.
+    /// Returns the number of colours by the environment alone.
     pub fn colors(&self) -> Colors {
-        /// Terminals that have 24-bit colour and do not say so by their name's ending.
+        /// Values of `TERM` with 24-bit colour that do not end in `-direct` or `-truecolor`.
         const TRUE: [&str; 8] = [
             "xterm-kitty",
             "alacritty",
@@ -109,11 +109,11 @@ impl Environment {
 }
 
 impl Capabilities {
-    /// Of a terminal that has not been asked.
-    pub fn from_environment(surroundings: Environment) -> Self {
+    /// Creates the capabilities of a terminal that has not replied yet.
+    pub fn from_environment(environment: Environment) -> Self {
         Self {
-            colors: surroundings.colors(),
-            surroundings,
+            colors: environment.colors(),
+            environment,
             synchronised: false,
             version: None,
             background: None,
@@ -133,15 +133,15 @@ impl Capabilities {
 mod tests {
     use super::*;
 
-    fn surroundings(variables: &[(&str, &str)]) -> Environment {
+    fn environment(variables: &[(&str, &str)]) -> Environment {
         Environment::of(|name| {
-            let found = variables.iter().find(|(known, _)| *known == name);
-            found.map(|(_, value)| value.to_string())
+            let variable = variables.iter().find(|(known, _)| *known == name);
+            variable.map(|(_, value)| value.to_string())
         })
     }
 
     #[test]
-    fn colours_follow_the_environment() {
+    fn colors_follow_the_environment() {
         for (term, color_term, no_color, expected) in [
             ("xterm-256color", "truecolor", "", Colors::True),
             ("xterm-256color", "24bit", "", Colors::True),
@@ -154,13 +154,13 @@ mod tests {
             ("", "", "", Colors::Indexed),
         ] {
             let found =
-                surroundings(&[("TERM", term), ("COLORTERM", color_term), ("NO_COLOR", no_color)]);
+                environment(&[("TERM", term), ("COLORTERM", color_term), ("NO_COLOR", no_color)]);
             assert_eq!(found.colors(), expected, "{term} {color_term} {no_color}");
         }
     }
 
     #[test]
-    fn multiplexers_tell_themselves_by_several_signs() {
+    fn multiplexer_is_detected_by_any_variable() {
         for (variables, expected) in [
             (&[("TERM", "tmux-256color")][..], Some(Multiplexer::Tmux)),
             (&[("TERM", "screen-256color"), ("TMUX", "/x,1,0")], Some(Multiplexer::Tmux)),
@@ -168,9 +168,9 @@ mod tests {
             (&[("TERM", "xterm"), ("STY", "1.pts-0")], Some(Multiplexer::Screen)),
             (&[("TERM", "xterm"), ("TMUX", "")], None),
         ] {
-            assert_eq!(surroundings(variables).multiplexer, expected, "{variables:?}");
+            assert_eq!(environment(variables).multiplexer, expected, "{variables:?}");
         }
-        let ssh = surroundings(&[("SSH_CONNECTION", "10.0.0.1 5000 10.0.0.2 22")]).ssh;
+        let ssh = environment(&[("SSH_CONNECTION", "10.0.0.1 5000 10.0.0.2 22")]).ssh;
         assert_eq!(ssh.as_deref(), Some("10.0.0.1 5000 10.0.0.2 22"));
     }
 }

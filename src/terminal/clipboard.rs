@@ -1,9 +1,10 @@
-//! The clipboard of the terminal, which is where the user sits.
+//! Clipboard of the terminal, on the user's machine.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-/// What a terminal puts into its clipboard (OSC 52), if it allows that; `text` cannot get out of it.
+/// Returns the sequence that copies `text` into the clipboard (OSC 52), if the terminal permits it.
+/// Base64 keeps control characters of `text` inside the sequence.
 pub(crate) fn copied(text: &str) -> String {
     format!("\x1b]52;c;{}\x07", STANDARD.encode(text))
 }
@@ -13,7 +14,7 @@ mod tests {
     use super::copied;
 
     #[test]
-    fn whatever_is_copied_stays_inside() {
+    fn copied_text_cannot_end_the_sequence() {
         assert_eq!(copied("\u{7}/ä?"), "\x1b]52;c;By/DpD8=\x07");
     }
 }

@@ -1,18 +1,18 @@
-//! Keys and mouse as the dashboard knows them, whichever library reads the terminal.
+//! Keys and mouse events, independent of the terminal's protocol.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// What was pressed.
+/// Key without modifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Code {
-    /// A character, as typed: a capital stands for itself, without `shift`.
+    /// A character as typed. A capital letter has no `shift`.
     Char(char),
     /// Enter.
     Enter,
     /// Escape.
     Esc,
-    /// Tabulator; with `shift` the way back.
+    /// Tab; with `shift` back-tab.
     Tab,
     /// Backspace.
     Backspace,
@@ -41,24 +41,24 @@ pub enum Code {
 /// A key press with its modifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Key {
-    /// What was pressed.
+    /// Key without modifiers.
     pub code: Code,
-    /// With Control.
+    /// Control is pressed.
     pub ctrl: bool,
-    /// With Alt.
+    /// Alt is pressed.
     pub alt: bool,
-    /// With Shift; never set for characters.
+    /// Shift is pressed; `false` for characters.
     pub shift: bool,
 }
 
 impl Key {
-    /// Without modifiers.
+    /// Creates a key press without modifiers.
     pub fn plain(code: Code) -> Self {
         Self { code, ctrl: false, alt: false, shift: false }
     }
 }
 
-/// What the mouse did.
+/// Kind of a mouse event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MouseKind {
     /// A button went down.
@@ -82,10 +82,10 @@ pub enum Button {
     Right,
 }
 
-/// What the mouse did, and where.
+/// Mouse event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mouse {
-    /// What.
+    /// Kind.
     pub kind: MouseKind,
     /// Column of the cell, from 0.
     pub column: u16,
@@ -95,7 +95,7 @@ pub struct Mouse {
     pub modified: bool,
 }
 
-/// Names of keys that are no characters.
+/// Names of keys without a character.
 const NAMED: &[(&str, Code)] = &[
     ("Enter", Code::Enter),
     ("Esc", Code::Esc),
@@ -113,7 +113,7 @@ const NAMED: &[(&str, Code)] = &[
     ("Space", Code::Char(' ')),
 ];
 
-/// As in the key table and in help: `Ctrl-s`, `Shift-Left`, `a`, `?`, `Space`.
+/// Formats a key as in the key table and in help: `Ctrl-s`, `Shift-Left`, `a`, `?`, `Space`.
 impl fmt::Display for Key {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         for (on, name) in [(self.ctrl, "Ctrl-"), (self.alt, "Alt-"), (self.shift, "Shift-")] {
@@ -137,24 +137,24 @@ impl FromStr for Key {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let mut key = Self { code: Code::Esc, ctrl: false, alt: false, shift: false };
-        let mut rest = text;
+        let mut name = text;
         for (prefix, flag) in
             [("Ctrl-", &mut key.ctrl), ("Alt-", &mut key.alt), ("Shift-", &mut key.shift)]
         {
-            if let Some(after) = rest.strip_prefix(prefix) {
+            if let Some(after) = name.strip_prefix(prefix) {
                 *flag = true;
-                rest = after;
+                name = after;
             }
         }
-        let mut chars = rest.chars();
+        let mut chars = name.chars();
         key.code = match (chars.next(), chars.next()) {
             (Some(only), None) => Code::Char(only),
             (Some('F'), Some('0'..='9')) => {
-                Code::F(rest[1..].parse().map_err(|_| format!("no key is called {text:?}"))?)
+                Code::F(name[1..].parse().map_err(|_| format!("no key is called {text:?}"))?)
             }
             _ => NAMED
                 .iter()
-                .find(|(name, _)| *name == rest)
+                .find(|(known, _)| *known == name)
                 .map(|(_, code)| *code)
                 .ok_or_else(|| format!("no key is called {text:?}"))?,
         };
@@ -167,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_keys_are_each_others_inverse() {
+    fn key_names_round_trip() {
         for name in [
             "a",
             "A",

@@ -1,4 +1,4 @@
-//! What the terminal sends, as it comes.
+//! Input of the terminal, read and decoded with timeouts.
 
 use crate::terminal::decode::Decoder;
 use crate::terminal::{Environment, Event};
@@ -6,21 +6,21 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::{self, Stdin};
 use std::time::{Duration, Instant};
 
-/// How long after ESC a byte may come that belongs to it.
+/// Longest pause between ESC and a byte that belongs to it.
 const ESCAPE_WAIT: Duration = Duration::from_millis(40);
-/// The same over SSH, where a sequence may come in two pieces.
+/// Longest such pause over SSH, where packets can split a sequence.
 const ESCAPE_WAIT_OVER_SSH: Duration = Duration::from_millis(120);
 
-/// Something that came, and when.
+/// Event with the time at which it was read.
 #[derive(Debug)]
 pub struct Timed {
-    /// When it was read.
+    /// Time of reading.
     pub at: Instant,
-    /// What.
+    /// Event.
     pub event: Event,
 }
 
-/// The terminal that stdin comes from.
+/// Reader of the terminal on stdin.
 pub struct Keyboard {
     stdin: Stdin,
     decoder: Decoder,
@@ -29,9 +29,9 @@ pub struct Keyboard {
 }
 
 impl Keyboard {
-    /// Of a terminal in such surroundings.
-    pub fn new(surroundings: &Environment) -> Self {
-        let wait = if surroundings.ssh.is_some() { ESCAPE_WAIT_OVER_SSH } else { ESCAPE_WAIT };
+    /// Creates a reader for a terminal with this `environment`.
+    pub fn new(environment: &Environment) -> Self {
+        let wait = if environment.ssh.is_some() { ESCAPE_WAIT_OVER_SSH } else { ESCAPE_WAIT };
         Self {
             stdin: io::stdin(),
             decoder: Decoder::new(wait),
@@ -40,7 +40,7 @@ impl Keyboard {
         }
     }
 
-    /// Waits for something to come, at most until `deadline`; then nothing may have come.
+    /// Waits for events until `deadline`. Returns none if none has come.
     ///
     /// # Errors
     /// If the terminal is gone.
@@ -50,10 +50,10 @@ impl Keyboard {
         }
         loop {
             let now = Instant::now();
-            let left = deadline.map(|deadline| deadline.saturating_duration_since(now));
+            let time_left = deadline.map(|deadline| deadline.saturating_duration_since(now));
             let patience = self.decoder.patience();
-            let gives_up = patience.is_some_and(|p| left.is_none_or(|left| p <= left));
-            let wait = if gives_up { patience } else { left };
+            let gives_up = patience.is_some_and(|p| time_left.is_none_or(|left| p <= left));
+            let wait = if gives_up { patience } else { time_left };
             let Some(ready) = self.is_ready(wait)? else { continue };
             let events = if ready {
                 let read = match rustix::io::read(&self.stdin, &mut *self.buffer) {
@@ -75,12 +75,12 @@ impl Keyboard {
         }
     }
 
-    /// What came before anybody was there to act on it: the next [`Keyboard::wait`] returns it.
+    /// Keeps events for the next [`Keyboard::wait`].
     pub fn keep(&mut self, early: Vec<Timed>) {
         self.early.extend(early);
     }
 
-    /// Whether there is something to read within `wait`; `None`: a signal came between.
+    /// Returns `true` if input comes within `wait`, `None` if a signal interrupted.
     fn is_ready(&self, wait: Option<Duration>) -> io::Result<Option<bool>> {
         let wait = wait.map(|wait| Timespec {
             tv_sec: wait.as_secs() as _,

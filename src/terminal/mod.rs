@@ -1,5 +1,5 @@
-//! The terminal at the other end of the line: what it sends, what it can do, how it is taken and given
-//! back. Nothing here knows what is shown.
+//! Terminal driver: decoding of input, probing of capabilities, raw mode and restoration, cells and
+//! images as bytes, frame differences, flow control. It knows no scene and no renderer.
 
 mod area;
 mod capabilities;
@@ -12,10 +12,10 @@ pub mod flow;
 pub mod image;
 mod keyboard;
 mod probe;
+mod screen;
 mod sequence;
 #[cfg(test)]
 mod tests;
-mod tty;
 
 use crate::terminal::event::{Key, Mouse};
 pub use area::Area;
@@ -23,56 +23,56 @@ pub use capabilities::{Capabilities, Environment, Multiplexer};
 pub(crate) use clipboard::copied;
 pub use decode::Decoder;
 pub use keyboard::{Keyboard, Timed};
-pub(crate) use probe::cursor_question;
+pub(crate) use probe::cursor_request;
 pub use probe::probe;
-pub use tty::{ENTER, LEAVE, Screen, Tty, cell_px, size};
+pub use screen::{ENTER, LEAVE, Screen, Tty, cell_px, size};
 
-/// What a terminal sends.
+/// Input of a terminal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// A key was pressed.
+    /// Key press.
     Key(Key),
-    /// The mouse did something.
+    /// Mouse event.
     Mouse(Mouse),
-    /// Text was pasted.
+    /// Pasted text.
     Paste(String),
-    /// An answer to a question.
+    /// Reply to a request.
     Reply(Reply),
 }
 
-/// An answer of a terminal.
+/// Reply of a terminal to a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reply {
-    /// Where the cursor is, from 1 (CPR).
+    /// Position of the cursor, counted from 1 (CPR).
     Cursor {
         /// Row.
         row: u16,
         /// Column.
         column: u16,
     },
-    /// What it is and can do (DA1), such as 4: sixel.
+    /// Device attributes (DA1), such as 4 for sixel.
     Attributes(Vec<u16>),
-    /// Whether a private mode is known (DECRPM): 0 no, 1 set, 2 reset, 3 always set, 4 never.
+    /// State of a private mode (DECRPM).
     Mode {
         /// The mode.
         mode: u16,
-        /// What is known about it.
+        /// 0 unknown, 1 set, 2 reset, 3 always set, 4 never set.
         setting: u16,
     },
-    /// The colour of the background, sRGB.
+    /// Colour of the background, 8-bit sRGB (OSC 11).
     Background([u8; 3]),
     /// Name and version (XTVERSION).
     Version(String),
-    /// A valid answer to DECRQSS.
+    /// Valid reply to DECRQSS.
     Setting(String),
-    /// An answer to a question about kitty's graphics: whether it was `OK`.
+    /// Reply of kitty's graphics protocol; `true` for `OK`.
     Graphics(bool),
     /// Width and height of a cell in pixels.
     CellSize([u16; 2]),
-    /// How many colours a sixel picture has (XTSMGRAPHICS).
+    /// Most colours of a sixel image (XTSMGRAPHICS).
     SixelColors(u16),
-    /// How many pixels in a row and in a column of it.
+    /// Largest width and height of a sixel image in pixels (XTSMGRAPHICS).
     SixelSize([u16; 2]),
-    /// Anything else.
+    /// Any other reply.
     Other,
 }

@@ -1,11 +1,104 @@
-//! Whole escape sequences, read: ECMA-48 and what xterm and kitty have added ("Control Sequences",
-//! invisible-island.net/xterm/ctlseqs; sw.kovidgoyal.net/kitty/keyboard-protocol).
+//! Interpretation of characters and escape sequences: ECMA-48 and the extensions of xterm and kitty
+//! ("Control Sequences", invisible-island.net/xterm/ctlseqs; sw.kovidgoyal.net/kitty/keyboard-protocol).
 
 use crate::terminal::event::{Button, Code, Key, Mouse, MouseKind};
 use crate::terminal::{Event, Reply};
+use vte::{Params, Perform};
 
-/// The key of a character as it comes over the line.
-pub fn character(c: char) -> Option<Key> {
+/// Receiver of the parts into which [`vte::Parser`] divides the input.
+#[derive(Debug)]
+pub struct Interpreter {
+    /// Events in the order of input.
+    pub events: Vec<Event>,
+    /// `true` if the next key has Alt, because ESC came before it.
+    pub alt: bool,
+    /// `true` if the last character has ended or was invalid.
+    pub is_character_complete: bool,
+    /// `true` if the last control sequence begins a bracketed paste.
+    pub is_paste: bool,
+    /// `true` if the device control string that is parsed was an APC string in the input.
+    pub is_apc: bool,
+    /// Reply in the last string.
+    pub reply: Reply,
+    /// Data of the device control string that is parsed.
+    data: Vec<u8>,
+    /// Reader of `data`.
+    to_reply: fn(String) -> Reply,
+}
+
+impl Default for Interpreter {
+    fn default() -> Self {
+        Self {
+            events: Vec::new(),
+            alt: false,
+            is_character_complete: false,
+            is_paste: false,
+            is_apc: false,
+            reply: Reply::Other,
+            data: Vec::new(),
+            to_reply: |_| Reply::Other,
+        }
+    }
+}
+
+impl Interpreter {
+    /// Adds a key press.
+    pub fn press(&mut self, key: Key) {
+        let alt = std::mem::take(&mut self.alt);
+        self.events.push(Event::Key(Key { alt: key.alt | alt, ..key }));
+    }
+}
+
+impl Perform for Interpreter {
+    fn print(&mut self, c: char) {
+        self.is_character_complete = true;
+        // The parser replaces invalid UTF-8; nothing was typed then.
+        if let Some(key) = character(c).filter(|_| c != char::REPLACEMENT_CHARACTER) {
+            self.press(key);
+        }
+        self.alt = false;
+    }
+
+    fn execute(&mut self, byte: u8) {
+        self.print(char::from(byte));
+    }
+
+    fn csi_dispatch(&mut self, params: &Params, intermediates: &[u8], _: bool, last: char) {
+        let params: Vec<_> = params.iter().collect();
+        self.is_paste = intermediates.is_empty() && last == '~' && *params == [[200]];
+        self.events.extend(control_sequence(&params, intermediates, last));
+    }
+
+    fn hook(&mut self, params: &Params, intermediates: &[u8], _: bool, last: char) {
+        let first = params.iter().next().map_or(0, |param| param[0]);
+        self.data.clear();
+        self.to_reply = match (self.is_apc, first, intermediates, last) {
+            (true, 0, b"", 'G') => |data| Reply::Graphics(data.ends_with(";OK")),
+            (false, 0, b">", '|') => Reply::Version,
+            (false, 1, b"$", 'r') => Reply::Setting,
+            _ => |_| Reply::Other,
+        };
+    }
+
+    fn put(&mut self, byte: u8) {
+        self.data.push(byte);
+    }
+
+    fn unhook(&mut self) {
+        let data = String::from_utf8_lossy(&self.data).into_owned();
+        self.reply = (self.to_reply)(data);
+    }
+
+    fn osc_dispatch(&mut self, params: &[&[u8]], _: bool) {
+        self.reply = match params {
+            [b"11", color] => parse_color(color).map_or(Reply::Other, Reply::Background),
+            _ => Reply::Other,
+        };
+    }
+}
+
+/// Returns the key of a character.
+fn character(c: char) -> Option<Key> {
     let ctrl = |c: char| Key { ctrl: true, ..Key::plain(Code::Char(c)) };
     Some(match c {
         '\r' => Key::plain(Code::Enter),
@@ -19,167 +112,104 @@ pub fn character(c: char) -> Option<Key> {
     })
 }
 
-/// What follows `ESC [`, up to its final byte.
-pub fn control(sequence: &[u8]) -> Option<Event> {
-    let (last, parameters) = sequence.split_last()?;
-    let text = std::str::from_utf8(parameters).ok()?;
-    let reply = |reply| Some(Event::Reply(reply));
-    match (text.as_bytes().first(), last) {
-        (Some(b'<'), b'M' | b'm') => return mouse(&text[1..], *last == b'm').map(Event::Mouse),
-        (Some(b'?'), b'c') => {
-            return reply(Reply::Attributes(numbers(&text[1..]).into_iter().flatten().collect()));
+/// Interprets a control sequence. `params` are its parameters with their subparameters,
+/// `intermediates` its private marker and intermediate bytes, `last` is its final byte.
+fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Option<Event> {
+    let numbers: Vec<_> = params.iter().map(|param| param[0]).collect();
+    let reply = match (intermediates, last, &numbers[..]) {
+        (b"<", 'M' | 'm', [button, column, row]) => {
+            return mouse(*button, [*column, *row], last == 'm').map(Event::Mouse);
         }
-        (Some(b'?'), b'y') => {
-            let [mode, setting] = pair(text[1..].strip_suffix('$')?)?;
-            return reply(Reply::Mode { mode, setting });
-        }
-        (Some(b'?'), b'S') => {
-            return reply(match numbers(&text[1..])[..] {
-                [Some(1), Some(0), Some(colors)] => Reply::SixelColors(colors),
-                [Some(2), Some(0), Some(width), Some(height)] => Reply::SixelSize([width, height]),
-                _ => Reply::Other,
-            });
-        }
-        (Some(b'?' | b'>' | b'=' | b'<'), _) => return reply(Reply::Other),
-        _ => {}
-    }
-    match last {
-        b'I' | b'O' if text.is_empty() => None,
-        b'R' => match pair(text) {
-            Some([row, column]) => reply(Reply::Cursor { row, column }),
-            None => key(Code::F(3), text),
-        },
-        b'n' | b't' | b'y' | b'x' | b'c' => reply(match numbers(text)[..] {
-            [Some(6), Some(height), Some(width)] if *last == b't' => {
-                Reply::CellSize([width, height])
-            }
-            _ => Reply::Other,
-        }),
-        b'u' => unicode_key(text),
-        b'~' => {
-            let code = match numbers(text)[..] {
-                // modifyOtherKeys of xterm: 27 ; modifiers ; character.
-                [Some(27), Some(modifiers), Some(c)] => {
-                    return character(char::from_u32(u32::from(c))?)
-                        .map(|key| Event::Key(modified(key, modifiers)));
-                }
-                [Some(n), ..] => match n {
-                    1 | 7 => Code::Home,
-                    3 => Code::Delete,
-                    4 | 8 => Code::End,
-                    5 => Code::PageUp,
-                    6 => Code::PageDown,
-                    11..=15 => Code::F(n as u8 - 10),
-                    17..=21 => Code::F(n as u8 - 11),
-                    23 | 24 => Code::F(n as u8 - 12),
-                    _ => return None,
-                },
-                _ => return None,
-            };
-            key(code, text)
-        }
-        b'Z' => Some(Event::Key(Key { shift: true, ..Key::plain(Code::Tab) })),
-        _ => key(named(*last)?, text),
-    }
-}
-
-/// What follows `ESC O`.
-pub fn single(last: u8, parameters: &[u8]) -> Option<Event> {
-    let code = match last {
-        b'M' => Code::Enter,
-        b'I' => Code::Tab,
-        // Keys of a number pad in application mode.
-        b'j'..=b'y' => Code::Char(char::from(last - b'j' + b'*')),
-        b'R' => Code::F(3),
-        _ => named(last)?,
-    };
-    let modifiers = std::str::from_utf8(parameters).ok()?.parse().unwrap_or(1);
-    Some(Event::Key(modified(Key::plain(code), modifiers)))
-}
-
-/// What follows `ESC [ [` on the Linux console.
-pub fn console(last: u8) -> Option<Event> {
-    (b'A'..=b'E').contains(&last).then(|| Event::Key(Key::plain(Code::F(last - b'A' + 1))))
-}
-
-/// The three bytes after `ESC [ M`.
-pub fn old_mouse(bytes: &[u8]) -> Option<Event> {
-    let [button, column, row] =
-        bytes.iter().map(|b| b.checked_sub(32)).collect::<Option<Vec<_>>>()?[..]
-    else {
-        return None;
-    };
-    let released = button & 0b11 == 3 && button & 64 == 0;
-    let button = if released { button & !0b11 } else { button };
-    let place = [u16::from(column), u16::from(row)];
-    decoded_mouse(u16::from(button), place, released).map(Event::Mouse)
-}
-
-/// The contents of a string that `ESC` and `kind` have begun.
-pub fn text(kind: u8, contents: &[u8]) -> Option<Event> {
-    let text = String::from_utf8_lossy(contents);
-    let reply = match kind {
-        b']' => match text.strip_prefix("11;").and_then(color) {
-            Some(rgb) => Reply::Background(rgb),
-            None => Reply::Other,
-        },
-        b'P' => {
-            if let Some(version) = text.strip_prefix(">|") {
-                Reply::Version(version.to_string())
-            } else if let Some(setting) = text.strip_prefix("1$r") {
-                Reply::Setting(setting.to_string())
-            } else {
-                Reply::Other
-            }
-        }
-        _ if text.starts_with('G') => Reply::Graphics(text.ends_with(";OK")),
+        (b"<", 'M' | 'm', _) => return None,
+        (b"?", 'c', _) => Reply::Attributes(numbers),
+        (b"?$", 'y', &[mode, setting]) => Reply::Mode { mode, setting },
+        (b"?", 'S', &[1, 0, colors]) => Reply::SixelColors(colors),
+        (b"?", 'S', &[2, 0, width, height]) => Reply::SixelSize([width, height]),
+        (b"", 'R', &[row @ (1..), column @ (1..)]) => Reply::Cursor { row, column },
+        (b"", 't', &[6, height, width]) => Reply::CellSize([width, height]),
+        (b"", 'n' | 't' | 'x' | 'c', _) => Reply::Other,
+        (b"", ..) => return key(params, last).map(Event::Key),
         _ => Reply::Other,
     };
     Some(Event::Reply(reply))
 }
 
-/// Keys that are told by the last byte alone.
-fn named(last: u8) -> Option<Code> {
+/// Returns the key of a control sequence; `None` for a release.
+fn key(params: &[&[u16]], last: char) -> Option<Key> {
+    let number = params[0][0];
+    let key = match (last, number) {
+        // modifyOtherKeys of xterm: 27 ; modifiers ; character.
+        ('~', 27) => character(char::from_u32(params.get(2)?[0].into())?)?,
+        ('~', 1 | 7) => Key::plain(Code::Home),
+        ('~', 3) => Key::plain(Code::Delete),
+        ('~', 4 | 8) => Key::plain(Code::End),
+        ('~', 5) => Key::plain(Code::PageUp),
+        ('~', 6) => Key::plain(Code::PageDown),
+        ('~', 11..=15) => Key::plain(Code::F(number as u8 - 10)),
+        ('~', 17..=21) => Key::plain(Code::F(number as u8 - 11)),
+        ('~', 23 | 24) => Key::plain(Code::F(number as u8 - 12)),
+        // kitty's keyboard protocol: code point, or 57344 and above for keys without character. The
+        // parser saturates larger code points at 65535.
+        ('u', 0 | 57_344..) => return None,
+        ('u', 27) => Key::plain(Code::Esc),
+        ('u', _) => character(char::from_u32(number.into())?)?,
+        ('Z', _) => Key { shift: true, ..Key::plain(Code::Tab) },
+        _ => Key::plain(named(last)?),
+    };
+    match params.get(1) {
+        Some([_, 3, ..]) => None,
+        Some([modifiers, ..]) => Some(modified(key, *modifiers)),
+        _ => Some(key),
+    }
+}
+
+/// Interprets `ESC O modifiers last` (SS3), which keypads and some function keys send.
+pub fn single_shift(modifiers: u16, last: u8) -> Option<Event> {
+    let code = match last {
+        b'M' => Code::Enter,
+        b'I' => Code::Tab,
+        // Keys of a number pad in application mode.
+        b'j'..=b'y' => Code::Char(char::from(last - b'j' + b'*')),
+        _ => named(char::from(last))?,
+    };
+    Some(Event::Key(modified(Key::plain(code), modifiers)))
+}
+
+/// Interprets the byte after `ESC [ [` (Linux console).
+pub fn console_key(last: u8) -> Option<Event> {
+    (b'A'..=b'E').contains(&last).then(|| Event::Key(Key::plain(Code::F(last - b'A' + 1))))
+}
+
+/// Interprets the bytes for button, column and row after `ESC [ M` (X10 mouse protocol).
+pub fn x10_mouse(bytes: &[u8]) -> Option<Event> {
+    let [button, column, row] =
+        bytes.iter().map(|b| b.checked_sub(32).map(u16::from)).collect::<Option<Vec<_>>>()?[..]
+    else {
+        return None;
+    };
+    let is_release = button & 0b11 == 3 && button & 64 == 0;
+    let button = if is_release { button & !0b11 } else { button };
+    mouse(button, [column, row], is_release).map(Event::Mouse)
+}
+
+/// Returns the key that the final byte alone denotes.
+fn named(last: char) -> Option<Code> {
     Some(match last {
-        b'A' => Code::Up,
-        b'B' => Code::Down,
-        b'C' => Code::Right,
-        b'D' => Code::Left,
-        b'H' => Code::Home,
-        b'F' => Code::End,
-        b'P' => Code::F(1),
-        b'Q' => Code::F(2),
-        b'S' => Code::F(4),
+        'A' => Code::Up,
+        'B' => Code::Down,
+        'C' => Code::Right,
+        'D' => Code::Left,
+        'H' => Code::Home,
+        'F' => Code::End,
+        'P' => Code::F(1),
+        'Q' => Code::F(2),
+        'R' => Code::F(3),
+        'S' => Code::F(4),
         _ => return None,
     })
 }
 
-/// A key whose second parameter tells its modifiers; `None` for what is not a press.
-fn key(code: Code, parameters: &str) -> Option<Event> {
-    let second = parameters.split(';').nth(1).unwrap_or("1");
-    with_modifiers(Key::plain(code), second).map(Event::Key)
-}
-
-/// `codepoint ; modifiers` as kitty and xterm tell it, each with parts that do not matter here.
-fn unicode_key(parameters: &str) -> Option<Event> {
-    let mut fields = parameters.split(';');
-    let code: u32 = fields.next()?.split(':').next()?.parse().ok()?;
-    let key = match code {
-        27 => Key::plain(Code::Esc),
-        57_344.. => return None,
-        code => character(char::from_u32(code)?)?,
-    };
-    with_modifiers(key, fields.next().unwrap_or("1")).map(Event::Key)
-}
-
-/// `modifiers` or `modifiers:kind`, where kind 3 is a release.
-fn with_modifiers(key: Key, text: &str) -> Option<Key> {
-    let (modifiers, kind) = text.split_once(':').unwrap_or((text, "1"));
-    let modifiers = if modifiers.is_empty() { 1 } else { modifiers.parse().ok()? };
-    (kind != "3").then(|| modified(key, modifiers))
-}
-
-/// Modifiers are told as 1 more than their bits: Shift 1, Alt 2, Control 4.
+/// Adds modifiers to a key. `modifiers` is 1 more than the sum of Shift 1, Alt 2 and Control 4.
 fn modified(key: Key, modifiers: u16) -> Key {
     let bits = modifiers.saturating_sub(1);
     let is_character = matches!(key.code, Code::Char(_));
@@ -196,30 +226,22 @@ fn modified(key: Key, modifiers: u16) -> Key {
     }
 }
 
-/// `button ; column ; row` of the mouse protocol 1006.
-fn mouse(parameters: &str, released: bool) -> Option<Mouse> {
-    match numbers(parameters)[..] {
-        [Some(button), Some(column), Some(row)] => decoded_mouse(button, [column, row], released),
-        _ => None,
-    }
-}
-
-/// Bits of the button: 0 to 2 which, 4 Shift, 8 Alt, 16 Control, 32 motion, 64 wheel. Places count
-/// from 1.
-fn decoded_mouse(button: u16, [column, row]: [u16; 2], released: bool) -> Option<Mouse> {
-    let which = match button & 0b11 {
+/// Interprets a mouse report. Bits of `button`: 0 to 2 the button, 4 Shift, 8 Alt, 16 Control,
+/// 32 motion, 64 wheel. Column and row count from 1.
+fn mouse(button: u16, [column, row]: [u16; 2], is_release: bool) -> Option<Mouse> {
+    let pressed = match button & 0b11 {
         0 => Button::Left,
         1 => Button::Middle,
         2 => Button::Right,
         _ => return None,
     };
-    let kind = match (button & 64 != 0, button & 32 != 0, which) {
+    let kind = match (button & 64 != 0, button & 32 != 0, pressed) {
         (true, _, Button::Left) => MouseKind::Scroll(1),
         (true, _, Button::Middle) => MouseKind::Scroll(-1),
         (true, ..) => return None,
-        (false, true, which) => MouseKind::Drag(which),
-        (false, false, which) if released => MouseKind::Release(which),
-        (false, false, which) => MouseKind::Press(which),
+        (false, true, pressed) => MouseKind::Drag(pressed),
+        (false, false, pressed) if is_release => MouseKind::Release(pressed),
+        (false, false, pressed) => MouseKind::Press(pressed),
     };
     if button >= 128 {
         return None;
@@ -228,25 +250,14 @@ fn decoded_mouse(button: u16, [column, row]: [u16; 2], released: bool) -> Option
     Some(Mouse { kind, column: column.checked_sub(1)?, row: row.checked_sub(1)?, modified })
 }
 
-/// Parameters between semicolons; what comes after a colon in one does not matter.
-fn numbers(text: &str) -> Vec<Option<u16>> {
-    text.split(';').map(|field| field.split(':').next()?.parse().ok()).collect()
-}
-
-fn pair(text: &str) -> Option<[u16; 2]> {
-    match numbers(text)[..] {
-        [Some(first), Some(second)] => Some([first, second]),
-        _ => None,
-    }
-}
-
-/// `rgb:RRRR/GGGG/BBBB`, each with 1 to 4 digits, as sRGB.
-fn color(text: &str) -> Option<[u8; 3]> {
+/// Parses `rgb:RRRR/GGGG/BBBB`, each channel with 1 to 4 hexadecimal digits, as 8-bit sRGB.
+fn parse_color(text: &[u8]) -> Option<[u8; 3]> {
     let channel = |digits: &str| {
-        let most = 16u32.checked_pow(digits.len() as u32).filter(|_| digits.len() <= 4)? - 1;
+        let max = 16u32.checked_pow(digits.len() as u32).filter(|_| digits.len() <= 4)? - 1;
         let value = u32::from_str_radix(digits, 16).ok()?;
-        Some(((value * 255 + most / 2) / most) as u8)
+        Some(((value * 255 + max / 2) / max) as u8)
     };
+    let text = std::str::from_utf8(text).ok()?;
     let mut channels = text.strip_prefix("rgb:")?.split('/').map(channel);
     let rgb = [channels.next()??, channels.next()??, channels.next()??];
     channels.next().is_none().then_some(rgb)

@@ -1,4 +1,4 @@
-//! Keys and replies in every order and in every way to come: no key is lost, none is made up.
+//! Decoding of keys and replies in any order and any split: no key is lost and none is invented.
 
 use crate::terminal::cells::Colors;
 use crate::terminal::event::{Button, Code, MouseKind};
@@ -10,7 +10,7 @@ use std::time::Duration;
 
 const WAIT: Duration = Duration::from_millis(40);
 
-/// What keyboards send, and the names of the keys.
+/// Bytes that keyboards send, and the names of the keys.
 const KEYS: &[(&str, &str)] = &[
     ("a", "a"),
     ("A", "A"),
@@ -61,7 +61,7 @@ const KEYS: &[(&str, &str)] = &[
     ("\x1b[27;5;97~", "Ctrl-a"),
 ];
 
-/// What terminals answer, known or not: what makes other readers lose keys or see some.
+/// Replies of terminals, known and unknown, on which other decoders lose or invent keys.
 const REPLIES: &[&str] = &[
     "\x1b[?2026;2$y",
     "\x1b[?2026;0$y",
@@ -109,26 +109,26 @@ fn keys(events: &[Event]) -> Vec<String> {
 fn all_at_once(bytes: &str) -> Vec<Event> {
     let mut decoder = Decoder::new(WAIT);
     let events = decoder.take(bytes.as_bytes());
-    assert_eq!(decoder.patience(), None, "{bytes:?} is left half-way");
+    assert_eq!(decoder.patience(), None, "{bytes:?} is incomplete");
     events
 }
 
 #[test]
-fn every_key_is_known() {
+fn key_sequences_decode_to_their_keys() {
     for (bytes, name) in KEYS {
         assert_eq!(keys(&all_at_once(bytes)), [*name], "{bytes:?}");
     }
 }
 
 #[test]
-fn replies_are_no_keys() {
+fn replies_produce_no_keys() {
     for reply in REPLIES {
         assert_eq!(keys(&all_at_once(reply)), [""; 0], "{reply:?}");
     }
 }
 
 #[test]
-fn replies_say_what_they_say() {
+fn replies_are_decoded() {
     let rgb = |r, g, b| Reply::Background([r, g, b]);
     for (bytes, reply) in [
         ("\x1b[24;80R", Reply::Cursor { row: 24, column: 80 }),
@@ -151,12 +151,12 @@ fn replies_say_what_they_say() {
 }
 
 #[test]
-fn answers_make_capabilities() {
+fn replies_set_capabilities() {
     let mut found = Capabilities::from_environment(Environment::default());
     assert_eq!(found.colors, Colors::Indexed);
-    let answers = "\x1bP1$r0;48:2::1:2:3m\x1b\\\x1bP>|XTerm(379)\x1b\\\x1b]11;rgb:ff/ff/ff\x07\
+    let replies = "\x1bP1$r0;48:2::1:2:3m\x1b\\\x1bP>|XTerm(379)\x1b\\\x1b]11;rgb:ff/ff/ff\x07\
                    \x1b[?2026;2$y\x1b_Gi=31;OK\x1b\\\x1b[6;20;10t\x1b[?62;4c";
-    for event in all_at_once(answers) {
+    for event in all_at_once(replies) {
         if let Event::Reply(reply) = event {
             found.learn(&reply);
         }
@@ -172,7 +172,7 @@ fn answers_make_capabilities() {
         ..Capabilities::from_environment(Environment::default())
     };
     assert_eq!(found, expected);
-    // Of what answers through tmux only some show pictures among text.
+    // Only some terminals behind tmux show pictures among text.
     let multiplexer = Some(Multiplexer::Tmux);
     for (version, expected) in [
         ("tmux 3.3a", false),
@@ -180,22 +180,22 @@ fn answers_make_capabilities() {
         ("kitty(0.28.0)", true),
         ("ghostty 1.2", true),
     ] {
-        let tmux = Environment { multiplexer, ..Environment::default() };
-        let mut behind = Capabilities::from_environment(tmux);
-        behind.learn(&Reply::Version("tmux 3.3a".into()));
-        behind.learn(&Reply::Version(version.into()));
-        assert_eq!(behind.placeholders, expected, "{version}");
-        assert_eq!(behind.version.as_deref(), Some("tmux 3.3a"));
+        let environment = Environment { multiplexer, ..Environment::default() };
+        let mut tmux_client = Capabilities::from_environment(environment);
+        tmux_client.learn(&Reply::Version("tmux 3.3a".into()));
+        tmux_client.learn(&Reply::Version(version.into()));
+        assert_eq!(tmux_client.placeholders, expected, "{version}");
+        assert_eq!(tmux_client.version.as_deref(), Some("tmux 3.3a"));
     }
-    // What the user has forbidden no answer brings back.
-    let mut without =
+    // No reply overrides `NO_COLOR`.
+    let mut no_color =
         Capabilities::from_environment(Environment { no_color: true, ..Default::default() });
-    without.learn(&Reply::Setting("48;2;1;2;3m".into()));
-    assert_eq!(without.colors, Colors::Mono);
+    no_color.learn(&Reply::Setting("48;2;1;2;3m".into()));
+    assert_eq!(no_color.colors, Colors::Mono);
 }
 
 #[test]
-fn mice_of_both_protocols() {
+fn mouse_reports_of_both_protocols_are_decoded() {
     let mouse = |kind, column, row, modified| Event::Mouse(Mouse { kind, column, row, modified });
     let left = Button::Left;
     for (bytes, expected) in [
@@ -216,18 +216,18 @@ fn mice_of_both_protocols() {
 }
 
 #[test]
-fn releases_are_no_keys() {
+fn key_releases_are_ignored() {
     assert_eq!(keys(&all_at_once("\x1b[97;1:3u\x1b[1;1:3A\x1b[97;1:2u")), ["a"]);
 }
 
 #[test]
-fn escape_alone_is_a_key_after_a_while() {
+fn lone_escape_is_a_key_after_timeout() {
     let mut decoder = Decoder::new(WAIT);
     assert_eq!(decoder.take(b"\x1b"), []);
     assert_eq!(decoder.patience(), Some(WAIT));
     assert_eq!(keys(&decoder.give_up()), ["Esc"]);
     assert_eq!(decoder.patience(), None);
-    // A key that is typed after it is that key.
+    // A key typed afterwards is decoded by itself.
     for next in ["[", "]", "q", "O", "P", "_", "]]]", "[["] {
         assert_eq!(decoder.take(b"\x1b"), []);
         assert_eq!(keys(&decoder.give_up()), ["Esc"]);
@@ -239,7 +239,7 @@ fn escape_alone_is_a_key_after_a_while() {
 }
 
 #[test]
-fn the_rest_of_a_reply_whose_escape_came_long_ago_is_no_key() {
+fn reply_after_given_up_escape_produces_no_keys() {
     for reply in REPLIES.iter().filter(|reply| reply.len() > 3 && !reply.starts_with("\x1b[=")) {
         let mut decoder = Decoder::new(WAIT);
         decoder.take(b"\x1b");
@@ -253,16 +253,16 @@ fn the_rest_of_a_reply_whose_escape_came_long_ago_is_no_key() {
 }
 
 #[test]
-fn what_never_ends_is_given_up() {
-    for begun in ["\x1b[12;", "\x1b]11;rgb:", "\x1bP1$r", "\x1b_Gi=", "\x1bO1", "\u{e9}"] {
+fn incomplete_sequences_are_given_up() {
+    for prefix in ["\x1b[12;", "\x1b]11;rgb:", "\x1bP1$r", "\x1b_Gi=", "\x1bO1", "\u{e9}"] {
         let mut decoder = Decoder::new(WAIT);
-        let bytes = begun.as_bytes();
-        // Of the character only its first byte.
-        let bytes = if begun.starts_with('\x1b') { bytes } else { &bytes[..1] };
-        assert_eq!(decoder.take(bytes), [], "{begun:?}");
+        let bytes = prefix.as_bytes();
+        // Only the first byte of the character.
+        let bytes = if prefix.starts_with('\x1b') { bytes } else { &bytes[..1] };
+        assert_eq!(decoder.take(bytes), [], "{prefix:?}");
         assert!(decoder.patience().is_some_and(|p| p >= Duration::from_millis(500)));
-        assert_eq!(keys(&decoder.give_up()), [""; 0], "{begun:?}");
-        assert_eq!(keys(&decoder.take(b"q")), ["q"], "{begun:?}");
+        assert_eq!(keys(&decoder.give_up()), [""; 0], "{prefix:?}");
+        assert_eq!(keys(&decoder.take(b"q")), ["q"], "{prefix:?}");
     }
     for (introducer, key) in [("\x1b[", "Alt-["), ("\x1bO", "Alt-O"), ("\x1b]", "Alt-]")] {
         let mut decoder = Decoder::new(WAIT);
@@ -272,24 +272,24 @@ fn what_never_ends_is_given_up() {
 }
 
 #[test]
-fn pasted_text_is_no_keys() {
+fn pasted_text_produces_no_keys() {
     let text = "qqq\x1b[A]]]\r\x1b[24;80R漢";
     let pasted = all_at_once(&format!("\x1b[200~{text}\x1b[201~x"));
     assert_eq!(pasted[0], Event::Paste(text.to_string()));
     assert_eq!(keys(&pasted[1..]), ["x"]);
-    // Nor is more of it than anybody would keep.
-    let much = "m".repeat(3 << 20);
-    let pasted = all_at_once(&format!("\x1b[200~{much}\x1b[201~x"));
+    // A longer paste is truncated.
+    let long = "m".repeat(3 << 20);
+    let pasted = all_at_once(&format!("\x1b[200~{long}\x1b[201~x"));
     assert!(matches!(&pasted[0], Event::Paste(kept) if kept.len() == 1 << 20));
     assert_eq!(keys(&pasted[1..]), ["x"]);
-    // Nor if its end never comes.
+    // A paste without end is reported after a pause.
     let mut decoder = Decoder::new(WAIT);
     assert_eq!(decoder.take(b"\x1b[200~half"), []);
     assert_eq!(decoder.give_up(), [Event::Paste("half".into())]);
 }
 
 #[test]
-fn a_flood_of_replies_hides_no_key() {
+fn reply_flood_hides_no_key() {
     let mut bytes = String::new();
     let mut expected = Vec::new();
     for i in 0..20_000 {
@@ -301,76 +301,138 @@ fn a_flood_of_replies_hides_no_key() {
         }
     }
     assert_eq!(keys(&all_at_once(&bytes)), expected);
-    // A reply without end takes no memory without end.
+    // An endless reply takes bounded memory.
     let mut decoder = Decoder::new(WAIT);
     decoder.take(b"\x1b]52;c;");
     (0..1000).for_each(|_| assert_eq!(decoder.take(&[b'A'; 1 << 12]), []));
     assert_eq!(keys(&decoder.take(b"\x07q")), ["q"]);
 }
 
-/// A key or a reply: its bytes, and the key's name.
-fn thing() -> impl Strategy<Value = (&'static str, Option<&'static str>)> {
+/// Strategy for a key or a reply: its bytes, and the key's name.
+fn key_or_reply() -> impl Strategy<Value = (&'static str, Option<&'static str>)> {
     prop_oneof![
         select(KEYS).prop_map(|(bytes, name)| (bytes, Some(name))),
         select(REPLIES).prop_map(|bytes| (bytes, None)),
     ]
 }
 
+/// Strategy for bytes: keys, replies, mouse reports and pastes, whole or cut off, and noise.
+fn any_input() -> impl Strategy<Value = Vec<u8>> {
+    const OTHERS: &[&str] = &[
+        "\x1b[<0;3;4M",
+        "\x1b[M !!",
+        "\x1b[200~a\x1b[A\x1b[20\x1b[201~",
+        "\x1bX",
+        "\x1b^",
+        "\x18",
+    ];
+    let sequence = prop_oneof![key_or_reply().prop_map(|(bytes, _)| bytes), select(OTHERS)].boxed();
+    prop_oneof![
+        sequence.clone().prop_map(|bytes| bytes.as_bytes().to_vec()),
+        (sequence, 0usize..8)
+            .prop_map(|(bytes, cut)| { bytes.as_bytes()[..cut.min(bytes.len())].to_vec() }),
+        vec(any::<u8>(), 0..6),
+        vec(select(&b"\x1b\x1b\x1b[]OP_\\\x07\x18\r1;:?<>$~uMA\xc3\xa9\x9c"[..]), 0..10),
+    ]
+}
+
+/// Feeds `bytes` in pieces that end at `cuts`, each taken modulo the length.
+fn in_pieces(decoder: &mut Decoder, bytes: &[u8], cuts: &[usize]) -> Vec<Event> {
+    let mut cuts: Vec<_> = cuts.iter().map(|cut| cut % (bytes.len() + 1)).collect();
+    cuts.extend([0, bytes.len()]);
+    cuts.sort_unstable();
+    cuts.windows(2).flat_map(|piece| decoder.take(&bytes[piece[0]..piece[1]])).collect()
+}
+
+/// Sequences that `vte` alone reads otherwise (module `decode`).
+#[test]
+fn keyboard_sequences_beyond_vte_are_decoded() {
+    for (bytes, expected) in [
+        ("\x1b\x1ba", &["Esc", "Alt-a"][..]),
+        ("\x1bXq", &["Alt-X", "q"]),
+        ("\x1b^q", &["Alt-^", "q"]),
+        ("\x1b q", &["Alt-Space", "q"]),
+        ("\x1b/q", &["Alt-/", "q"]),
+        ("\x1b\x7fq", &["Alt-Backspace", "q"]),
+        ("\x1b\rq", &["Alt-Enter", "q"]),
+        ("\x1b\\q", &["Alt-\\", "q"]),
+        ("\x1bÜq", &["Alt-Ü", "q"]),
+        ("\x1b[1;\rq", &["Enter", "q"]),
+        ("\x1b[1\x7fq", &["Backspace", "q"]),
+        ("\x1b[12Üq", &["Ü", "q"]),
+        ("\x1b[\rq", &["Alt-[", "Enter", "q"]),
+        ("\x1b[\x1b[A", &["Alt-[", "Up"]),
+        ("\x1b[1<Aq", &["q"]),
+        ("\x1bO5Pq", &["Ctrl-F1", "q"]),
+        ("\x1bP>|Ü1\x1b\\q", &["q"]),
+        ("\x1b_GÜ;OK\x1b\\q", &["q"]),
+        ("\x1b]11;Ü\x1b\\q", &["q"]),
+        ("\x1bP1$r\x1b[A", &["Up"]),
+        ("\x1b]11;\x18q", &["q"]),
+    ] {
+        assert_eq!(keys(&all_at_once(bytes)), expected, "{bytes:?}");
+    }
+}
+
 proptest! {
-    /// Cut into pieces anywhere, with pauses shorter than what anybody waits.
     #[test]
-    fn no_key_is_lost_and_none_made_up(
-        things in vec(thing(), 1..40),
+    fn any_split_of_keys_and_replies_yields_the_keys(
+        input in vec(key_or_reply(), 1..40),
         cuts in vec(0usize..1000, 0..60),
     ) {
-        let bytes: Vec<u8> = things.iter().flat_map(|(bytes, _)| bytes.bytes()).collect();
-        let expected: Vec<_> = things.iter().filter_map(|(_, name)| *name).collect();
-        let mut cuts: Vec<_> = cuts.into_iter().map(|cut| cut % (bytes.len() + 1)).collect();
-        cuts.extend([0, bytes.len()]);
-        cuts.sort_unstable();
+        let bytes: Vec<u8> = input.iter().flat_map(|(bytes, _)| bytes.bytes()).collect();
+        let expected: Vec<_> = input.iter().filter_map(|(_, name)| *name).collect();
         let mut decoder = Decoder::new(WAIT);
-        let mut events = Vec::new();
-        for piece in cuts.windows(2) {
-            events.extend(decoder.take(&bytes[piece[0]..piece[1]]));
-        }
+        let events = in_pieces(&mut decoder, &bytes, &cuts);
         prop_assert_eq!(keys(&events), expected);
         prop_assert_eq!(decoder.patience(), None);
     }
 
-    /// However it comes, what was sent byte by byte says the same as what was sent at once.
+    /// The input mixes sequences, their beginnings and random bytes.
     #[test]
-    fn any_bytes_are_read_alike_in_pieces(bytes in vec(any::<u8>(), 0..200)) {
+    fn any_split_of_any_bytes_yields_the_same_events(
+        input in vec(any_input(), 0..40),
+        cuts in vec(0usize..1000, 0..60),
+    ) {
+        let bytes = input.concat();
         let mut decoder = Decoder::new(WAIT);
         let mut whole = decoder.take(&bytes);
+        let patience = decoder.patience();
         whole.extend(decoder.give_up());
-        let mut in_pieces = Vec::new();
-        let mut decoder = Decoder::new(WAIT);
-        for byte in &bytes {
-            in_pieces.extend(decoder.take(&[*byte]));
+        for cuts in [cuts, (0..bytes.len()).collect()] {
+            let mut decoder = Decoder::new(WAIT);
+            let mut events = in_pieces(&mut decoder, &bytes, &cuts);
+            prop_assert_eq!(decoder.patience(), patience);
+            events.extend(decoder.give_up());
+            prop_assert_eq!(&events, &whole);
         }
-        in_pieces.extend(decoder.give_up());
-        prop_assert_eq!(whole, in_pieces);
-        // And leaves a reader that reads on.
+    }
+
+    #[test]
+    fn any_bytes_leave_the_decoder_ready(bytes in vec(any::<u8>(), 0..200)) {
+        let mut decoder = Decoder::new(WAIT);
+        decoder.take(&bytes);
+        decoder.give_up();
         let after = keys(&decoder.take(b" q"));
         prop_assert_eq!(after.last().map(String::as_str), Some("q"));
     }
 
-    /// Long pauses between whole things: replies that come when nobody asks any more.
+    /// Long pauses separate the sequences.
     #[test]
-    fn late_replies_are_passed_over(things in vec(thing(), 1..40)) {
+    fn late_replies_produce_no_keys(input in vec(key_or_reply(), 1..40)) {
         let mut decoder = Decoder::new(WAIT);
         let mut events = Vec::new();
-        for (bytes, _) in &things {
+        for (bytes, _) in &input {
             events.extend(decoder.take(bytes.as_bytes()));
             events.extend(decoder.give_up());
         }
-        let expected: Vec<_> = things.iter().filter_map(|(_, name)| *name).collect();
+        let expected: Vec<_> = input.iter().filter_map(|(_, name)| *name).collect();
         prop_assert_eq!(keys(&events), expected);
     }
 }
 
 #[test]
-fn modifiers_of_characters_are_told_once() {
+fn shifted_character_is_its_capital_without_modifier() {
     let found = all_at_once("\x1b[65;2u");
     assert_eq!(found, [Event::Key(Key::plain(Code::Char('A')))]);
 }

@@ -19,8 +19,8 @@ fn the_built_in_scene_opens_and_quits() {
     terminal.send("q");
     let (status, bytes) = terminal.end();
     assert_eq!(status, 0);
-    assert!(bytes.starts_with(ENTER), "{:?}", &bytes[..100]);
-    assert!(bytes.ends_with(LEAVE), "{:?}", &bytes[bytes.len() - 100..]);
+    assert!(bytes.starts_with(ENTER.as_str()), "{:?}", &bytes[..100]);
+    assert!(bytes.ends_with(LEAVE.as_str()), "{:?}", &bytes[bytes.len() - 100..]);
     assert_eq!(fs::read_dir(desk.path(".")).unwrap().count(), 0, "nothing was written");
 }
 
@@ -33,7 +33,7 @@ fn signals_give_the_terminal_back() {
         signal(name, terminal.process_id());
         let (status, bytes) = terminal.end();
         assert_eq!(status, expected, "{name}");
-        assert!(bytes.ends_with(LEAVE), "{name}");
+        assert!(bytes.ends_with(LEAVE.as_str()), "{name}");
     }
 }
 
@@ -62,10 +62,11 @@ fn a_panic_is_told_on_a_restored_terminal() {
         Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &[], answers: true };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 0, "{bytes}");
-    let [entered, left, told, after] = [ENTER, LEAVE, "as the test wants it", "still alive"]
-        .map(|part| bytes.find(part).unwrap_or_else(|| panic!("no {part:?} in {bytes:?}")));
+    let [entered, left, told, after] =
+        [ENTER.as_str(), LEAVE.as_str(), "as the test wants it", "still alive"]
+            .map(|part| bytes.find(part).unwrap_or_else(|| panic!("no {part:?} in {bytes:?}")));
     assert!(entered < left && left < told && told < after, "{bytes:?}");
-    assert_eq!(bytes.matches(LEAVE).count(), 1);
+    assert_eq!(bytes.matches(LEAVE.as_str()).count(), 1);
 }
 
 #[test]
@@ -101,7 +102,7 @@ fn a_missing_file_is_told_outside() {
     let desk = Desk::new();
     let (status, bytes) = desk.open(&["nowhere.toml"], [80, 24]).end();
     assert_eq!(status, 1);
-    assert!(bytes.contains("nowhere.toml") && !bytes.contains(ENTER), "{bytes:?}");
+    assert!(bytes.contains("nowhere.toml") && !bytes.contains(ENTER.as_str()), "{bytes:?}");
 }
 
 #[test]
@@ -197,7 +198,7 @@ fn a_signal_is_heeded_while_the_terminal_is_asked() {
         signal("TERM", terminal.process_id());
         let (status, bytes) = terminal.end();
         assert_eq!(status, 143);
-        assert!(bytes.ends_with(LEAVE));
+        assert!(bytes.ends_with(LEAVE.as_str()));
         !bytes.contains("room.toml")
     });
     assert!(heeded, "it goes on asking");

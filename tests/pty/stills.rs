@@ -92,7 +92,7 @@ fn kittys_protocol_shows_the_file_itself() {
     terminal.send("q");
     let (status, bytes) = terminal.end();
     assert_eq!((status, bytes.matches(REMOVAL).count()), (0, 1), "nothing is left to remove");
-    assert!(bytes.ends_with(LEAVE));
+    assert!(bytes.ends_with(LEAVE.as_str()));
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn a_signal_takes_the_picture_away() {
     let (status, bytes) = terminal.end();
     assert_eq!(status, 143);
     assert!(
-        bytes.ends_with(&format!("\x1b\\{REMOVAL}{LEAVE}")),
+        bytes.ends_with(&format!("\x1b\\{REMOVAL}{LEAVE}", LEAVE = *LEAVE)),
         "{:?}",
         &bytes[bytes.len() - 200..]
     );
@@ -170,7 +170,7 @@ fn sixel_shows_the_file_in_strips() {
         let (strips, after) = bytes.rsplit_once("\x1bP").unwrap();
         assert!(strips.contains("\x1bP") || ended);
         let (_, after) = after.split_once("\x1b\\").unwrap();
-        assert!(after.contains("\x1b[2J") && after.ends_with(LEAVE));
+        assert!(after.contains("\x1b[2J") && after.ends_with(LEAVE.as_str()));
         assert_eq!(status, 0);
     }
 }

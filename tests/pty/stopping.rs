@@ -17,7 +17,7 @@ fn shell(desk: &Desk) -> Terminal {
 /// Whether the last of both that was sent is `LEAVE`.
 fn is_left(terminal: &Terminal) -> bool {
     let bytes = String::from_utf8_lossy(&terminal.bytes()).into_owned();
-    bytes.rfind(LEAVE) > bytes.rfind(ENTER)
+    bytes.rfind(LEAVE.as_str()) > bytes.rfind(ENTER.as_str())
 }
 
 fn pause_and_go_on(how: impl Fn(&mut Terminal)) {
@@ -116,7 +116,7 @@ fn edits_outlive_a_kill_and_are_offered_to_the_next() {
     let (status, bytes) = terminal.end();
     assert_eq!(status, 143);
     let told = "unsaved edits are kept in ";
-    assert!(bytes.find(told) > bytes.rfind(LEAVE), "{bytes:?}");
+    assert!(bytes.find(told) > bytes.rfind(LEAVE.as_str()), "{bytes:?}");
     assert_eq!(fs::read_to_string(desk.path("room.toml")).unwrap(), BUILT_IN);
 
     let mut terminal = desk.open(&["room.toml"], [120, 36]);
@@ -175,7 +175,7 @@ fn doctor_restores_the_terminal_and_tells_what_it_found() {
     let start = Start { command: &command, folder, size, env: &env, answers: true };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 0, "{bytes}");
-    let report = &bytes[bytes.find(LEAVE).expect("the terminal is left") + LEAVE.len()..];
+    let report = &bytes[bytes.find(LEAVE.as_str()).expect("the terminal is left") + LEAVE.len()..];
     assert!(!report.contains('\x1b'), "{report:?}");
     for part in [
         "TERM=xterm-256color",

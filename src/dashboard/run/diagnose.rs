@@ -4,7 +4,7 @@ use crate::dashboard::run::signals::{block, watch};
 use crate::terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
 use crate::terminal::{
     Capabilities, Environment, Event, Keyboard, Multiplexer, Reply, Screen, Tty, cell_px,
-    cursor_question, probe, size,
+    cursor_request, probe, size,
 };
 use rustix::termios::tcgetwinsize;
 use std::io;
@@ -47,11 +47,11 @@ pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<Terminal
     watch(signals, screen.tty(), Duration::ZERO)?;
     let mut keyboard = Keyboard::new(&surroundings);
     let mut terminal = probe(&tty, &mut keyboard, surroundings, &|| false)?;
-    let multiplexer = terminal.surroundings.multiplexer;
+    let multiplexer = terminal.environment.multiplexer;
     if multiplexer.is_some() && terminal.passthrough.is_none() {
         terminal.passthrough = answer(&tty, &mut keyboard, multiplexer, &[], PATIENCE)?;
     }
-    let queue = terminal.surroundings.ssh.as_deref().and_then(TcpSendQueue::find);
+    let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
     let mode = InitialLink::of(&terminal, queue.is_some(), None).mode;
     // Replies of a multiplexer do not measure the connection.
     let through = match mode {
@@ -88,7 +88,7 @@ fn answer(
     patience: Duration,
 ) -> io::Result<Option<Duration>> {
     let asked = Instant::now();
-    tty.write(&[before, cursor_question(through).as_bytes()].concat())?;
+    tty.write(&[before, cursor_request(through).as_bytes()].concat())?;
     loop {
         let came = keyboard.wait(Some(asked + patience))?;
         let is_answer = |event: &Event| matches!(event, Event::Reply(Reply::Cursor { .. }));

@@ -7,7 +7,7 @@ use crate::dashboard::run::writer::{Writer, Written};
 use crate::dashboard::view::{View, is_settled};
 use crate::terminal::diff::{FrameDiff, TargetFrame};
 use crate::terminal::flow::{FlowControl, FrameBudget, InitialLink, LinkStatus, TcpSendQueue};
-use crate::terminal::{Capabilities, Tty, copied, cursor_question};
+use crate::terminal::{Capabilities, Tty, copied, cursor_request};
 use crossbeam_channel::Receiver;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
@@ -74,7 +74,7 @@ pub enum DrawOutcome {
 impl FramePipeline {
     /// Creates a pipeline for an empty screen. `bandwidth` is a fixed rate in bytes per second.
     pub fn new(tty: Arc<Tty>, terminal: &Capabilities, bandwidth: Option<f64>) -> io::Result<Self> {
-        let queue = terminal.surroundings.ssh.as_deref().and_then(TcpSendQueue::find);
+        let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
         Ok(Self {
             view: View::default(),
             pacing: FrameDiff::new(),
@@ -151,7 +151,7 @@ impl FramePipeline {
             self.link.sent_unasked(now, bytes.len());
         } else {
             if let Some(through) = self.link.ack_request() {
-                bytes.extend(cursor_question(through).as_bytes());
+                bytes.extend(cursor_request(through).as_bytes());
             }
             self.link.sent(now, bytes.len(), true, 0);
         }
@@ -299,7 +299,7 @@ impl FramePipeline {
         self.removing |= !std::mem::take(&mut self.removal).is_empty();
         bytes.extend(std::mem::take(&mut self.copied).as_bytes());
         if let Some(through) = self.link.ack_request() {
-            bytes.extend(cursor_question(through).as_bytes());
+            bytes.extend(cursor_request(through).as_bytes());
         }
         self.sent += bytes.len() as u64;
         self.link.sent(now, bytes.len(), frame.picture, frame.flushed);

@@ -1,47 +1,47 @@
-//! Ordered dithering to 256 colours, for pictures that do not change any more.
+//! Ordered dithering to 256 colours, for pictures that no longer change.
 //!
-//! Thomas Knoll's pattern dithering: a few colours of the table whose mean is the wanted colour,
-//! sorted by lightness, of which the place in an ordered pattern takes one. The mean is one of linear
-//! light, as the eye mixes it.
+//! Thomas Knoll's pattern dithering: for each pixel a few colours of the table are chosen whose mean in
+//! linear light approximates the pixel. They are sorted by lightness, and the pixel's position in an
+//! ordered pattern selects one.
 
 use crate::terminal::cells::Raster;
 use crate::terminal::cells::oklab::{code, linear};
 use crate::terminal::cells::palette256;
 
-/// Colours that are mixed: the cells of the pattern.
+/// Number of mixed colours, one per cell of the pattern.
 const MIXED: usize = 4;
 /// Bayer's pattern of order 2.
 const PATTERN: [[usize; 2]; 2] = [[0, 2], [3, 1]];
-/// How much of the error so far the next colour makes good. 1 reproduces the mean best but mixes
-/// colours that are far apart, which looks coarse at the size of a cell.
+/// Share of the error so far that the next colour compensates. 1 reproduces the mean best but mixes
+/// distant colours, which looks coarse at the size of a cell.
 const STRENGTH: f32 = 0.5;
 
-/// A number of the table of 256 for each pixel.
+/// Returns an index into the table of 256 for each pixel.
 pub fn dithered(raster: &Raster) -> Vec<u8> {
     let mut last = None;
     let mut mixed = [0; MIXED];
     let mut indices = Vec::with_capacity(raster.pixels.len());
-    for (at, rgb) in raster.pixels.iter().enumerate() {
+    for (i, rgb) in raster.pixels.iter().enumerate() {
         if last != Some(*rgb) {
             mixed = mixture(*rgb);
             last = Some(*rgb);
         }
-        let (x, y) = (at % raster.width, at / raster.width);
+        let (x, y) = (i % raster.width, i / raster.width);
         indices.push(mixed[PATTERN[y % 2][x % 2]]);
     }
     indices
 }
 
-/// Colours whose mean is about `rgb`, from dark to light.
+/// Returns table colours whose mean approximates `rgb`, from dark to light.
 fn mixture(rgb: [u8; 3]) -> [u8; MIXED] {
-    let wanted = linear(rgb);
+    let target = linear(rgb);
     let mut missing = [0.0f32; 3];
     let mut mixed = [0; MIXED];
     for index in &mut mixed {
-        let goal = [0, 1, 2].map(|c| code(wanted[c] + STRENGTH * missing[c]));
+        let goal = [0, 1, 2].map(|c| code(target[c] + STRENGTH * missing[c]));
         *index = palette256::nearest(goal);
-        let got = linear(palette256::rgb(*index));
-        (0..3).for_each(|c| missing[c] += wanted[c] - got[c]);
+        let chosen = linear(palette256::rgb(*index));
+        (0..3).for_each(|c| missing[c] += target[c] - chosen[c]);
     }
     mixed.sort_by(|a, b| palette256::lightness(*a).total_cmp(&palette256::lightness(*b)));
     mixed
@@ -52,9 +52,9 @@ mod tests {
     use super::*;
     use crate::terminal::cells::Oklab;
 
-    /// The mean over the pattern is closer to a colour between two of the table than either.
+    /// The mean over the pattern is closer than the nearest table colour.
     #[test]
-    fn means_come_closer() {
+    fn dithered_mean_is_closer_than_nearest_color() {
         let (mut plain, mut mixed) = (0.0, 0.0);
         for step in 0..64u8 {
             let rgb = [40 + 3 * step, 90 + step, 200 - 2 * step];
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_of_the_table_stay() {
+    fn table_colors_are_not_dithered() {
         for index in 16..=255 {
             assert_eq!(mixture(palette256::rgb(index)), [index; MIXED]);
         }

@@ -1,30 +1,30 @@
-//! Pictures of numbers: false colour with a scale that says which colour means what.
+//! False-colour images of numbers, with their scales.
 //!
-//! Magnitudes use the map *inferno* (Stéfan van der Walt and Nathaniel Smith, 2015), because it
-//! goes evenly through lightness, so equal steps look equal, also without colour vision.
+//! Magnitudes use the map *inferno* (Stéfan van der Walt and Nathaniel Smith, 2015). Its lightness rises
+//! evenly, so that equal steps look equal, also without colour vision.
 
 use crate::terminal::cells::Raster;
 
-/// Which numbers the colours of a picture stand for.
+/// Mapping of numbers to a colour map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// At the dark end.
+    /// Number at the dark end.
     pub low: f64,
-    /// At the bright end.
+    /// Number at the bright end.
     pub high: f64,
-    /// Equal ratios instead of equal steps are equally far apart; `low` is greater than 0 then.
+    /// Logarithmic instead of linear; `low` is then greater than 0.
     pub logarithmic: bool,
-    /// The dark end is on top: near is bright.
+    /// Reversed: `low` is bright.
     pub reversed: bool,
 }
 
 impl Scale {
-    /// Equal steps from `low` to `high`.
+    /// Creates a linear scale from `low` to `high`.
     pub fn linear(low: f64, high: f64) -> Self {
         Self { low, high, logarithmic: false, reversed: false }
     }
 
-    /// Equal ratios around the positive ones of `values`; from 1 to 10 if there are none.
+    /// Creates a logarithmic scale over the positive finite `values`; from 1 to 10 if there are none.
     pub fn logarithmic(values: impl IntoIterator<Item = f64>) -> Self {
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
         for value in values.into_iter().filter(|v| *v > 0.0 && v.is_finite()) {
@@ -37,7 +37,7 @@ impl Scale {
         Self { low, high, logarithmic: true, reversed: false }
     }
 
-    /// Where `value` lies, 0 dark to 1 bright; a value that is no number is dark.
+    /// Returns the position of `value`, from 0 (dark) to 1 (bright). NaN counts as `low`'s end.
     pub fn part(&self, value: f64) -> f64 {
         let [low, high, value] =
             [self.low, self.high, value].map(|v| if self.logarithmic { v.ln() } else { v });
@@ -46,7 +46,7 @@ impl Scale {
         if self.reversed { 1.0 - part } else { part }
     }
 
-    /// The number at `part` of the way from dark to bright.
+    /// Returns the number at position `part`, from 0 (dark) to 1 (bright).
     pub fn value(&self, part: f64) -> f64 {
         let part = if self.reversed { 1.0 - part } else { part };
         if self.logarithmic {
@@ -56,23 +56,22 @@ impl Scale {
         }
     }
 
-    /// The colour of a value.
+    /// Returns the colour of a value.
     pub fn color(&self, value: f64) -> [u8; 3] {
         magnitude(self.part(value))
     }
 }
 
-/// The colour of a magnitude, 0 dark to 1 bright.
+/// Returns the colour of a magnitude, from 0 (dark) to 1 (bright).
 pub fn magnitude(part: f64) -> [u8; 3] {
     let color = colorous::INFERNO.eval_continuous(part.clamp(0.0, 1.0));
     [color.r, color.g, color.b]
 }
 
-/// The colour of no difference.
+/// Colour of no difference.
 const DIFFERENCE_MIDDLE: [u8; 3] = [24, 24, 27];
 
-/// The colour of a signed difference, -1 (blue: darker) over 0 (nearly black) to 1 (orange:
-/// brighter).
+/// Returns the colour of a signed difference: -1 (darker) is blue, 0 nearly black, 1 (brighter) orange.
 pub fn difference(part: f64) -> [u8; 3] {
     const LESS: [u8; 3] = [96, 178, 255];
     const MORE: [u8; 3] = [255, 152, 64];
@@ -84,17 +83,17 @@ pub fn difference(part: f64) -> [u8; 3] {
     })
 }
 
-/// Colours for things by number: neighbours in number are far apart in hue.
+/// Returns a colour for an object by number. Consecutive numbers have distant hues.
 pub fn object_color(id: u32) -> [u8; 3] {
-    // Steps of the golden angle through hues never come back to where they were; lightness and
-    // strength take turns so that even close hues stay apart.
+    // Steps of the golden angle never return to the same hue; lightness and chroma alternate so that
+    // even close hues differ.
     let hue = (f64::from(id) * 0.618_033_988_749_895).fract() * std::f64::consts::TAU;
     let lightness = [0.74, 0.58, 0.86][id as usize % 3];
     let chroma = [0.13, 0.15, 0.09][id as usize % 3];
     displayable(lightness, chroma, hue)
 }
 
-/// sRGB of OKLab in polar form; chroma is lowered until it can be shown.
+/// Converts OKLab in polar form to sRGB. Chroma is lowered until the colour is within the gamut.
 fn displayable(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
     let mut chroma = chroma;
     loop {
@@ -106,7 +105,7 @@ fn displayable(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
     }
 }
 
-/// Ottosson's inverse.
+/// Converts OKLab to linear sRGB (Ottosson 2020).
 fn linear_from_oklab(l: f64, a: f64, b: f64) -> [f64; 3] {
     let [l, m, s] = [
         l + 0.396_337_777_4 * a + 0.215_803_757_3 * b,
@@ -121,30 +120,29 @@ fn linear_from_oklab(l: f64, a: f64, b: f64) -> [f64; 3] {
     ]
 }
 
-/// What stands for "nothing was hit".
-const NOTHING: [u8; 3] = [14, 14, 16];
+/// Colour of a pixel without hit.
+const NO_HIT: [u8; 3] = [14, 14, 16];
 
-/// Which thing is seen, `None`: none.
+/// Returns an image of object numbers; `None` is a pixel without hit.
 pub fn objects(width: usize, height: usize, ids: &[Option<u32>]) -> Raster {
-    Raster::from_fn(width, height, |i| ids.get(i).copied().flatten().map_or(NOTHING, object_color))
+    Raster::from_fn(width, height, |i| ids.get(i).copied().flatten().map_or(NO_HIT, object_color))
 }
 
-/// Unit normals, each component from -1..=1 to 0..=255.
+/// Returns an image of unit normals, each component mapped from -1..=1 to 0..=255.
 pub fn normals(width: usize, height: usize, normals: &[Option<[f32; 3]>]) -> Raster {
     Raster::from_fn(width, height, |i| {
-        normals.get(i).copied().flatten().map_or(NOTHING, |normal| {
+        normals.get(i).copied().flatten().map_or(NO_HIT, |normal| {
             normal.map(|n| (255.0 * (0.5 * n + 0.5)).round().clamp(0.0, 255.0) as u8)
         })
     })
 }
 
-/// Distances, near bright, and the scale they are shown on: by ratio, from the nearest to the
-/// farthest.
+/// Returns an image of distances and its scale: logarithmic from nearest (bright) to farthest.
 pub fn depth(width: usize, height: usize, distances: &[Option<f32>]) -> (Raster, Scale) {
     let known = distances.iter().flatten().map(|d| f64::from(*d));
     let scale = Scale { reversed: true, ..Scale::logarithmic(known) };
     let raster = Raster::from_fn(width, height, |i| {
-        distances.get(i).copied().flatten().map_or(NOTHING, |d| scale.color(f64::from(d)))
+        distances.get(i).copied().flatten().map_or(NO_HIT, |d| scale.color(f64::from(d)))
     });
     (raster, scale)
 }
@@ -155,7 +153,7 @@ mod tests {
     use crate::terminal::cells::Oklab;
 
     #[test]
-    fn scales_and_their_inverse() {
+    fn scale_and_its_inverse_agree() {
         let log = Scale::logarithmic([0.0, 8.0, f64::INFINITY, 0.5, f64::NAN]);
         assert_eq!((log.low, log.high), (0.5, 8.0));
         for scale in [log, Scale::linear(-3.0, 9.0), Scale { reversed: true, ..log }] {
@@ -169,13 +167,12 @@ mod tests {
         assert_eq!([log.part(0.1), log.part(100.0)], [0.0, 1.0]);
         let none = Scale::logarithmic([]);
         assert_eq!((none.low, none.high), (1.0, 10.0));
-        // All alike: something is shown.
+        // A single value is bright.
         assert_eq!(Scale::logarithmic([4.0]).part(4.0), 1.0);
     }
 
-    /// Equal steps of the value are about equally large steps of lightness.
     #[test]
-    fn magnitudes_are_even() {
+    fn equal_steps_of_magnitude_are_equal_steps_of_lightness() {
         let lightness: Vec<_> =
             (0..=16).map(|i| Oklab::of(magnitude(f64::from(i) / 16.0)).l).collect();
         for pair in lightness.windows(2).skip(2) {
@@ -185,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn differences_are_even_on_both_sides() {
+    fn difference_colors_are_symmetric() {
         assert_eq!(difference(0.0), DIFFERENCE_MIDDLE);
         assert_eq!(difference(f64::NAN), DIFFERENCE_MIDDLE);
         let middle = Oklab::of(DIFFERENCE_MIDDLE);
@@ -194,26 +191,26 @@ mod tests {
     }
 
     #[test]
-    fn things_are_told_apart() {
-        // Any two of the first 12, and neighbours in number for ever.
-        let far = |a, b| Oklab::of(object_color(a)).distance(Oklab::of(object_color(b)));
+    fn object_colors_are_distinguishable() {
+        // Any two of the first 12, and any two consecutive ones.
+        let distance = |a, b| Oklab::of(object_color(a)).distance(Oklab::of(object_color(b)));
         for a in 0..12 {
             for b in 0..a {
-                assert!(far(a, b) > 0.06, "{a} {b} {}", far(a, b));
+                assert!(distance(a, b) > 0.06, "{a} {b} {}", distance(a, b));
             }
         }
         for a in 0..1000 {
-            assert!(far(a, a + 1) > 0.15, "{a}");
+            assert!(distance(a, a + 1) > 0.15, "{a}");
         }
     }
 
     #[test]
-    fn normals_and_depth() {
+    fn normals_depth_and_objects_map_to_colors() {
         let raster = normals(2, 1, &[Some([1.0, 0.0, -1.0]), None]);
-        assert_eq!(raster.pixels, [[255, 128, 0], NOTHING]);
+        assert_eq!(raster.pixels, [[255, 128, 0], NO_HIT]);
         let (raster, scale) = depth(3, 1, &[Some(1.0), Some(4.0), None]);
         assert_eq!((scale.low, scale.high), (1.0, 4.0));
-        assert_eq!(raster.pixels, [magnitude(1.0), magnitude(0.0), NOTHING]);
-        assert_eq!(objects(1, 1, &[None]).pixels, [NOTHING]);
+        assert_eq!(raster.pixels, [magnitude(1.0), magnitude(0.0), NO_HIT]);
+        assert_eq!(objects(1, 1, &[None]).pixels, [NO_HIT]);
     }
 }

@@ -1,7 +1,7 @@
-//! Pictures as cells: colours of half cells in, glyphs and colours of terminal cells out.
+//! Conversion of images to terminal cells: pixels of half a cell in, glyphs and colours out.
 //!
 //! A cell is about twice as high as it is wide, so each shows two square pixels, one above the other.
-//! Nothing here knows a scene, a terminal or a screen's layout.
+//! The module is independent of scenes and of the screen's layout.
 
 mod dither;
 mod false_color;
@@ -17,24 +17,24 @@ pub use oklab::Oklab;
 pub(crate) use oklab::{code, linear};
 pub use palette256::nearest as nearest_indexed;
 
-/// How many colours the terminal has.
+/// Colours of a terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Colors {
-    /// 24 bits.
+    /// 24-bit sRGB.
     True,
-    /// The 256 of xterm.
+    /// The 256-colour table of xterm.
     Indexed,
-    /// The 16 of every terminal.
+    /// The 16 ANSI colours.
     Sixteen,
-    /// None.
+    /// No colours.
     Mono,
 }
 
 impl Colors {
-    /// All of them, in the order of the action that walks them.
+    /// All variants, in the order in which the colour key cycles through them.
     pub const ALL: [Self; 4] = [Self::True, Self::Indexed, Self::Sixteen, Self::Mono];
 
-    /// Its name.
+    /// Returns the name for users.
     pub fn name(self) -> &'static str {
         match self {
             Self::True => "24-bit colour",
@@ -57,7 +57,7 @@ pub struct Raster {
 }
 
 impl Raster {
-    /// An image of `width` x `height` pixels made by `pixel(index)`, row by row.
+    /// Creates an image of `width` x `height` pixels. `pixel(index)` returns them row by row.
     pub fn from_fn(width: usize, height: usize, pixel: impl FnMut(usize) -> [u8; 3]) -> Self {
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
     }
@@ -67,19 +67,19 @@ impl Raster {
     }
 }
 
-/// A colour of a cell.
+/// Foreground or background colour of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum CellColor {
-    /// What the terminal has by itself.
+    /// Default colour of the terminal.
     #[default]
     Plain,
     /// 24-bit sRGB.
     Rgb([u8; 3]),
-    /// Number in the terminal's table of 256.
+    /// Index into the terminal's table of 256.
     Indexed(u8),
 }
 
-/// What stands in one cell of the picture.
+/// Cell of the picture: glyph and colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PictureCell {
     /// One column wide.
@@ -91,9 +91,9 @@ pub struct PictureCell {
 }
 
 impl PictureCell {
-    /// How the upper and the lower half look in a terminal of dark ground that follows xterm.
+    /// Returns the colours of the upper and the lower half in a dark terminal with xterm's colours.
     pub fn halves(&self) -> [Oklab; 2] {
-        let rgb = |ink, plain| match ink {
+        let rgb = |color, plain| match color {
             CellColor::Plain => plain,
             CellColor::Rgb(rgb) => rgb,
             CellColor::Indexed(index) => palette256::rgb(index),
@@ -108,7 +108,7 @@ impl PictureCell {
 }
 
 impl PictureCell {
-    /// The colours of the upper and the lower half, if it shows two of 24 bits.
+    /// Returns the colours of the upper and the lower half, if both are 24-bit colours.
     pub fn colors(&self) -> Option<[[u8; 3]; 2]> {
         let halves = match self.glyph {
             '▀' => [self.fg, self.bg],
@@ -130,11 +130,11 @@ impl Default for PictureCell {
     }
 }
 
-/// What a glyph without colour is assumed to look like, and the ground behind it.
+/// Assumed default foreground and background of a terminal, sRGB.
 const PLAIN_FG: [u8; 3] = [229; 3];
 const PLAIN_BG: [u8; 3] = [0; 3];
 
-/// A picture as cells.
+/// Image as terminal cells.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct PictureCells {
     /// Cells in a row.
@@ -146,8 +146,8 @@ pub struct PictureCells {
 }
 
 impl PictureCells {
-    /// `raster` in a terminal of `colors`. `settled`: the picture will not change soon, so it may be
-    /// dithered where colours are few; dithering a picture that changes would make it flicker.
+    /// Converts `raster` for a terminal with `colors`. `settled` is `true` if the picture will not change
+    /// soon; it is then dithered in 256 colours. Dithering would make a changing picture flicker.
     ///
     /// The last row of cells is half empty if the raster has an odd number of rows.
     pub fn new(raster: &Raster, colors: Colors, settled: bool) -> Self {
@@ -167,7 +167,7 @@ impl PictureCells {
                     None => cell(upper, lower),
                     Some(indices) => {
                         let index = |y: usize| indices[y * raster.width + x];
-                        joined(
+                        two_halves(
                             CellColor::Indexed(index(2 * y)),
                             lower.map(|_| CellColor::Indexed(index(2 * y + 1))),
                         )
@@ -178,7 +178,7 @@ impl PictureCells {
         Self { columns: raster.width as u16, rows: rows as u16, cells }
     }
 
-    /// The cell in `column` of `row`, if there is one.
+    /// Returns the cell at `column` and `row`; `None` outside the image.
     pub fn cell(&self, column: u16, row: u16) -> Option<&PictureCell> {
         let inside = column < self.columns && row < self.rows;
         inside.then(|| {
@@ -187,8 +187,9 @@ impl PictureCells {
     }
 }
 
-/// Two colours in one cell, if there is a lower one; a single colour needs no glyph.
-fn joined(upper: CellColor, lower: Option<CellColor>) -> PictureCell {
+/// Creates a cell of two halves; `lower` is `None` below the last row of pixels. Equal halves need no
+/// glyph.
+fn two_halves(upper: CellColor, lower: Option<CellColor>) -> PictureCell {
     match lower {
         Some(lower) if lower == upper => {
             PictureCell { glyph: ' ', fg: CellColor::Plain, bg: upper }
@@ -200,10 +201,10 @@ fn joined(upper: CellColor, lower: Option<CellColor>) -> PictureCell {
 
 fn pair(upper: [u8; 3], lower: [u8; 3], colors: Colors) -> PictureCell {
     match colors {
-        Colors::True => joined(CellColor::Rgb(upper), Some(CellColor::Rgb(lower))),
+        Colors::True => two_halves(CellColor::Rgb(upper), Some(CellColor::Rgb(lower))),
         Colors::Indexed => {
             let index = |rgb| CellColor::Indexed(palette256::nearest(rgb));
-            joined(index(upper), Some(index(lower)))
+            two_halves(index(upper), Some(index(lower)))
         }
         Colors::Sixteen => palette16::pair(upper, lower),
         Colors::Mono => palette16::pair_mono(upper, lower),

@@ -1,4 +1,4 @@
-//! OKLab: a space in which distances are about as large as differences look.
+//! OKLab, a colour space in which distances approximate visible differences.
 //!
 //! Björn Ottosson, "A perceptual color space for image processing" (2020), with the matrices for
 //! linear sRGB as he published them in 2021.
@@ -6,7 +6,7 @@
 use crate::value::linear_from_srgb;
 use std::sync::LazyLock;
 
-/// A colour.
+/// Colour in OKLab.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Oklab {
     /// Lightness, 0 black to 1 white.
@@ -17,17 +17,17 @@ pub struct Oklab {
     pub b: f32,
 }
 
-/// Linear light, 0..=1, of 8-bit sRGB codes (IEC 61966-2-1).
+/// Linear light, 0..=1, of 8-bit sRGB levels (IEC 61966-2-1).
 static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f64 / 255.0) as f32));
 
-/// Linear light, 0..=1, of 8-bit sRGB.
+/// Returns the linear light, 0..=1, of 8-bit sRGB.
 pub(crate) fn linear(rgb: [u8; 3]) -> [f32; 3] {
     let table = &*LINEAR;
     rgb.map(|code| table[usize::from(code)])
 }
 
-/// The 8-bit sRGB code whose linear light is nearest; `linear` is clamped to 0..=1.
+/// Returns the 8-bit sRGB level with the nearest linear light. `linear` is clamped to 0..=1.
 pub(crate) fn code(linear: f32) -> u8 {
     let table = &*LINEAR;
     let above = table.partition_point(|l| *l < linear).min(255);
@@ -36,12 +36,12 @@ pub(crate) fn code(linear: f32) -> u8 {
 }
 
 impl Oklab {
-    /// Of 8-bit sRGB.
+    /// Converts 8-bit sRGB.
     pub fn of(rgb: [u8; 3]) -> Self {
         Self::of_linear(linear(rgb))
     }
 
-    /// Of linear sRGB, usually 0..=1.
+    /// Converts linear sRGB, usually 0..=1.
     pub fn of_linear([r, g, b]: [f32; 3]) -> Self {
         let l = (0.412_221_47 * r + 0.536_332_54 * g + 0.051_445_993 * b).cbrt();
         let m = (0.211_903_5 * r + 0.680_699_5 * g + 0.107_396_96 * b).cbrt();
@@ -53,7 +53,7 @@ impl Oklab {
         }
     }
 
-    /// How different two colours look; black and white are 1 apart, 0.02 is just seen side by side.
+    /// Returns the distance of two colours. Black and white are 1 apart; 0.02 is just visible side by side.
     pub fn distance(self, other: Self) -> f32 {
         self.distance_squared(other).sqrt()
     }
@@ -73,9 +73,9 @@ mod tests {
         assert!(worst < tolerance, "{got:?}, not {:?}", [l, a, b]);
     }
 
-    /// The table of XYZ and OKLab pairs in the publication, rounded there to three places.
+    /// Pairs of XYZ and OKLab from the publication, rounded there to three places.
     #[test]
-    fn published_pairs() {
+    fn oklab_matches_published_pairs() {
         // Linear sRGB from CIE XYZ at D65 (IEC 61966-2-1).
         let from_xyz = |[x, y, z]: [f32; 3]| {
             [
@@ -94,9 +94,9 @@ mod tests {
         }
     }
 
-    /// The primaries as CSS Color 4 and its test suite have them.
+    /// Primaries of CSS Color 4 and its test suite.
     #[test]
-    fn primaries() {
+    fn oklab_of_primaries_matches_css() {
         near(Oklab::of([255, 255, 255]), [1.0, 0.0, 0.0], 1e-4);
         near(Oklab::of([0, 0, 0]), [0.0, 0.0, 0.0], 1e-6);
         near(Oklab::of([255, 0, 0]), [0.627_96, 0.224_86, 0.125_85], 1e-4);
@@ -105,12 +105,12 @@ mod tests {
     }
 
     #[test]
-    fn codes_and_linear_light_are_each_others_inverse() {
+    fn levels_and_linear_light_round_trip() {
         for c in 0..=255u8 {
             assert_eq!(code(linear([c; 3])[0]), c);
         }
         assert_eq!([code(-1.0), code(2.0), code(f32::NAN)], [0, 255, 0]);
-        // The border between two codes lies in the middle.
+        // The threshold between two levels is their midpoint.
         let [low, high] = [100, 101].map(|c| linear([c; 3])[0]);
         assert_eq!([code(0.51 * low + 0.49 * high), code(0.49 * low + 0.51 * high)], [100, 101]);
     }

@@ -1,12 +1,12 @@
-//! Few colours or none: the density of glyphs carries what colours cannot.
+//! Cells in 16 colours or none, with shading glyphs of different density.
 
 use crate::terminal::cells::oklab::{Oklab, code, linear};
 use crate::terminal::cells::palette_cache::PaletteCache;
 use crate::terminal::cells::{CellColor, PLAIN_BG, PLAIN_FG, PictureCell, palette256};
 use std::sync::LazyLock;
 
-/// Glyphs and how much of their cell they cover. Shades are what their names say; the others were
-/// measured in DejaVu Sans Mono.
+/// Glyphs and the share of their cell that they cover. Shades are nominal (25, 50, 75 %); the others
+/// were measured in DejaVu Sans Mono.
 const COVERAGE: [(char, f32); 9] = [
     (' ', 0.0),
     ('.', 0.025),
@@ -20,18 +20,18 @@ const COVERAGE: [(char, f32); 9] = [
 ];
 /// Glyphs for mixtures of two colours.
 const SHADES: [char; 3] = ['░', '▒', '▓'];
-/// Colours that others are mixed with: black, greys and white, which keep the hue.
+/// Background colours of mixtures: black, greys and white, which keep the hue.
 const NEUTRAL: [u8; 4] = [0, 7, 8, 15];
-/// By how much two half blocks must be nearer than one shade before they are taken: a picture that
-/// changes should not flicker between them.
+/// OKLab distance by which two half blocks must be closer than one shade to be chosen, so that a
+/// changing picture does not flicker between them.
 const HALVES_GAIN: f32 = 0.05;
 
-/// How much of its cell a glyph covers, 0..=1; half blocks are not asked for.
+/// Returns the share of its cell that a glyph covers, 0..=1. Half blocks are not in the table.
 pub fn coverage(glyph: char) -> f32 {
     COVERAGE.iter().find(|(known, _)| *known == glyph).map_or(0.5, |(_, part)| *part)
 }
 
-/// How a cell looks of which the part `coverage` is `fg` and the rest `bg`.
+/// Returns the mean colour of a cell with share `coverage` of `fg` on `bg`.
 pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
     let (fg, bg) = (linear(fg), linear(bg));
     Oklab::of_linear([0, 1, 2].map(|c| coverage * fg[c] + (1.0 - coverage) * bg[c]))
@@ -50,7 +50,7 @@ static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     (0..16).map(flat).chain(mixed).collect()
 });
 
-/// What [`CELLS`] look like.
+/// Colours of [`CELLS`].
 static SHADED: LazyLock<PaletteCache> = LazyLock::new(|| {
     let look = |cell: &PictureCell| match (cell.fg, cell.bg) {
         (CellColor::Indexed(fg), CellColor::Indexed(bg)) => {
@@ -62,7 +62,7 @@ static SHADED: LazyLock<PaletteCache> = LazyLock::new(|| {
     PaletteCache::new(CELLS.iter().map(look).collect())
 });
 
-/// What the 16 colours look like.
+/// The 16 colours in OKLab.
 static BARE: LazyLock<PaletteCache> = LazyLock::new(|| {
     PaletteCache::new((0..16).map(|index| Oklab::of(palette256::rgb(index))).collect())
 });
@@ -71,24 +71,24 @@ fn flat(index: u8) -> PictureCell {
     PictureCell { glyph: ' ', fg: CellColor::Plain, bg: CellColor::Indexed(index) }
 }
 
-/// The nearest of the 16 colours.
+/// Returns the nearest of the 16 colours.
 pub fn nearest(rgb: [u8; 3]) -> u8 {
     BARE.nearest(rgb) as u8
 }
 
-/// Two halves in 16 colours: one shade of two colours for both, or a colour for each.
+/// Returns a cell for two halves in 16 colours: one shade of two colours, or a half block.
 pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
-    let wanted = [upper, lower].map(Oklab::of);
+    let target = [upper, lower].map(Oklab::of);
     let [a, b] = [upper, lower].map(linear);
     let shade = SHADED.nearest([0, 1, 2].map(|c| code(0.5 * (a[c] + b[c]))));
-    // Halves that look alike are never better apart.
-    if wanted[0].distance(wanted[1]) < HALVES_GAIN {
+    // Similar halves are never better as a half block.
+    if target[0].distance(target[1]) < HALVES_GAIN {
         return CELLS[shade];
     }
     let [top, bottom] = [upper, lower].map(nearest);
-    let error = |looks: [Oklab; 2]| wanted[0].distance(looks[0]) + wanted[1].distance(looks[1]);
-    let of_halves = error([top, bottom].map(|index| BARE.look(index.into())));
-    if top != bottom && of_halves + HALVES_GAIN < error([SHADED.look(shade); 2]) {
+    let error = |looks: [Oklab; 2]| target[0].distance(looks[0]) + target[1].distance(looks[1]);
+    let halves_error = error([top, bottom].map(|index| BARE.look(index.into())));
+    if top != bottom && halves_error + HALVES_GAIN < error([SHADED.look(shade); 2]) {
         return PictureCell {
             glyph: '▀',
             fg: CellColor::Indexed(top),
@@ -98,23 +98,23 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     CELLS[shade]
 }
 
-/// Two halves without colours, by lightness.
+/// Returns a cell for two halves without colours, by lightness.
 pub fn pair_mono(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     static LIGHTNESS: LazyLock<Vec<(char, f32)>> = LazyLock::new(|| {
         COVERAGE.map(|(glyph, part)| (glyph, mixture(PLAIN_FG, PLAIN_BG, part).l)).to_vec()
     });
     let [top, bottom] = [upper, lower].map(|rgb| Oklab::of(rgb).l);
-    let wanted = mixture(upper, lower, 0.5).l;
+    let target = mixture(upper, lower, 0.5).l;
     let (glyph, look) = LIGHTNESS
         .iter()
-        .min_by(|a, b| (a.1 - wanted).abs().total_cmp(&(b.1 - wanted).abs()))
+        .min_by(|a, b| (a.1 - target).abs().total_cmp(&(b.1 - target).abs()))
         .copied()
         .unwrap_or((' ', 0.0));
-    let of_shade = (top - look).abs() + (bottom - look).abs();
+    let shade_error = (top - look).abs() + (bottom - look).abs();
     let white = LIGHTNESS.last().map_or(1.0, |(_, l)| *l);
     let halves = |glyph, light: f32, dark: f32| {
         let error = (light - white).abs() + dark;
-        (error + HALVES_GAIN < of_shade).then_some(glyph)
+        (error + HALVES_GAIN < shade_error).then_some(glyph)
     };
     let glyph = if top > bottom { halves('▀', top, bottom) } else { halves('▄', bottom, top) }
         .unwrap_or(glyph);
@@ -126,23 +126,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lightness_without_colours_rises_with_density() {
+    fn mono_glyph_density_rises_with_lightness() {
         let mut last = 0.0;
-        for code in 0..=255u8 {
-            let cell = pair_mono([code; 3], [code; 3]);
+        for level in 0..=255u8 {
+            let cell = pair_mono([level; 3], [level; 3]);
             assert_eq!((cell.fg, cell.bg), (CellColor::Plain, CellColor::Plain));
-            assert!(coverage(cell.glyph) >= last, "{code}: {}", cell.glyph);
+            assert!(coverage(cell.glyph) >= last, "{level}: {}", cell.glyph);
             last = coverage(cell.glyph);
         }
         assert_eq!(last, 1.0);
         assert_eq!(pair_mono([0; 3], [0; 3]).glyph, ' ');
-        // An edge between light and dark keeps its place within the cell.
+        // An edge within the cell is a half block.
         assert_eq!(pair_mono([255; 3], [0; 3]).glyph, '▀');
         assert_eq!(pair_mono([0; 3], [255; 3]).glyph, '▄');
     }
 
     #[test]
-    fn sixteen_colours_keep_hues_and_edges() {
+    fn sixteen_colors_keep_hues_and_edges() {
         let flat = |rgb| pair(rgb, rgb);
         assert_eq!(flat([255, 0, 0]), super::flat(9));
         assert_eq!(flat([0, 0, 0]), super::flat(0));
@@ -163,15 +163,14 @@ mod tests {
         );
     }
 
-    /// Shades bring the picture much closer than the bare 16 colours.
     #[test]
-    fn shades_pay() {
+    fn shades_are_closer_than_sixteen_colors_alone() {
         let (mut bare, mut shaded) = (0.0, 0.0);
         for i in 0..512usize {
             let rgb = [i / 64, i / 8 % 8, i % 8].map(|c| (c * 36) as u8);
-            let wanted = Oklab::of(rgb);
-            bare += Oklab::of(palette256::rgb(nearest(rgb))).distance(wanted);
-            shaded += pair(rgb, rgb).halves()[0].distance(wanted);
+            let target = Oklab::of(rgb);
+            bare += Oklab::of(palette256::rgb(nearest(rgb))).distance(target);
+            shaded += pair(rgb, rgb).halves()[0].distance(target);
         }
         assert!(shaded < 0.6 * bare, "{shaded} of {bare}");
     }

@@ -1,17 +1,17 @@
-//! The 256 colours of xterm: 16 that users choose, a cube of 216, 24 greys.
+//! The 256 colours of xterm: 16 that users configure, a cube of 216, and 24 greys.
 
 use crate::terminal::cells::oklab::Oklab;
 use crate::terminal::cells::palette_cache::PaletteCache;
 use std::sync::LazyLock;
 
-/// Codes along each edge of the cube.
+/// 8-bit levels along each edge of the cube.
 const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
-/// Where the cube begins: the colours before it look different from user to user.
+/// First index of the cube. The 16 colours before it vary between users.
 const FIRST: u8 = 16;
-/// Where the greys begin.
+/// First index of the greys.
 const GREYS: u8 = 232;
 
-/// The 16 colours of xterm, which other terminals vary.
+/// The 16 ANSI colours as xterm has them.
 const ANSI: [[u8; 3]; 16] = [
     [0, 0, 0],
     [205, 0, 0],
@@ -31,7 +31,7 @@ const ANSI: [[u8; 3]; 16] = [
     [255, 255, 255],
 ];
 
-/// sRGB of a colour of the table.
+/// Returns the sRGB of a table colour.
 pub fn rgb(index: u8) -> [u8; 3] {
     match index {
         ..FIRST => ANSI[usize::from(index)],
@@ -43,17 +43,17 @@ pub fn rgb(index: u8) -> [u8; 3] {
     }
 }
 
-/// The colours from [`FIRST`] on.
+/// Colours from [`FIRST`] on.
 static CHOICES: LazyLock<PaletteCache> =
     LazyLock::new(|| PaletteCache::new((FIRST..=255).map(|index| Oklab::of(rgb(index))).collect()));
 
-/// The colour of cube and greys that looks most like `rgb`, which is taken to 6 bits a channel. (Two
-/// neighbours in the table are 10 codes and more apart.)
+/// Returns the colour of cube and greys nearest to `rgb`, which is rounded to 6 bits a channel.
+/// Neighbours in the table differ by at least 10 of 255 levels.
 pub fn nearest(rgb: [u8; 3]) -> u8 {
     FIRST + CHOICES.nearest(rgb) as u8
 }
 
-/// How light a colour of cube or greys looks, 0..=1.
+/// Returns the OKLab lightness of a colour of cube or greys, 0..=1.
 pub fn lightness(index: u8) -> f32 {
     CHOICES.look(usize::from(index.saturating_sub(FIRST))).l
 }
@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_is_xterms() {
+    fn table_matches_xterm() {
         assert_eq!(rgb(16), [0, 0, 0]);
         assert_eq!(rgb(21), [0, 0, 255]);
         assert_eq!(rgb(67), [95, 135, 175]);
@@ -73,23 +73,23 @@ mod tests {
     }
 
     #[test]
-    fn colours_of_the_table_are_their_own_nearest() {
+    fn table_colors_are_their_own_nearest() {
         for index in FIRST..=255 {
             assert_eq!(nearest(rgb(index)), index);
         }
     }
 
-    /// Against the whole table at full precision: never visibly worse.
+    /// The cached choice is never visibly worse than a search at full precision.
     #[test]
-    fn the_nearest_is_near() {
+    fn nearest_color_matches_exact_search() {
         let mut exact_hits = 0;
         let mut state = 1u32;
         for _ in 0..4000 {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let [r, g, b, _] = state.to_be_bytes();
-            let wanted = Oklab::of([r, g, b]);
-            let [found, best] = [nearest([r, g, b]), FIRST + CHOICES.search(wanted) as u8];
-            let distance = |index| Oklab::of(rgb(index)).distance(wanted);
+            let target = Oklab::of([r, g, b]);
+            let [found, best] = [nearest([r, g, b]), FIRST + CHOICES.search(target) as u8];
+            let distance = |index| Oklab::of(rgb(index)).distance(target);
             assert!(distance(found) < distance(best) + 0.02, "{:?}", [r, g, b]);
             exact_hits += u32::from(found == best);
         }

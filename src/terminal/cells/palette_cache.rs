@@ -1,51 +1,50 @@
-//! Which of a few colours looks most like another, remembered.
+//! Cache of the nearest palette colour.
 
 use crate::terminal::cells::oklab::Oklab;
 use std::sync::atomic::{AtomicU16, Ordering};
 
-/// Bits of each channel that are distinguished. Taking a colour to them moves it by at most 2 codes.
+/// Bits of each channel in the key. Rounding to them moves a colour by at most 2 of 255 levels.
 const BITS: usize = 6;
 
-/// Colours to choose from.
+/// Palette with a cache of nearest colours.
 pub struct PaletteCache {
     looks: Vec<Oklab>,
-    /// For each of the 2^18 boxes of sRGB the number of the nearest choice, plus 1; 0: not looked for
-    /// yet.
+    /// Index of the nearest choice plus 1, for each of the 2^18 boxes of sRGB; 0 if not searched yet.
     known: Vec<AtomicU16>,
 }
 
 impl PaletteCache {
-    /// From colours that look like this; 65,535 at most, and one at least.
+    /// Creates a palette of 1 to 65,535 colours.
     pub fn new(looks: Vec<Oklab>) -> Self {
         Self { looks, known: (0..1 << (3 * BITS)).map(|_| AtomicU16::new(0)).collect() }
     }
 
-    /// How choice `index` looks.
+    /// Returns colour `index`.
     pub fn look(&self, index: usize) -> Oklab {
         self.looks[index]
     }
 
-    /// The number of the choice that looks most like `rgb`, which is taken to 6 bits a channel.
+    /// Returns the index of the colour nearest to `rgb`, which is rounded to 6 bits a channel.
     pub fn nearest(&self, rgb: [u8; 3]) -> usize {
         let coarse = rgb.map(|c| usize::from(c) >> (8 - BITS));
         let known = &self.known[(coarse[0] << (2 * BITS)) | (coarse[1] << BITS) | coarse[2]];
-        // Threads that meet here find the same answer.
+        // Concurrent threads store the same index.
         match known.load(Ordering::Relaxed) {
             0 => {
-                // Boxes are spread over the whole range, so that black and white stay what they are.
-                let found = self.search(Oklab::of(coarse.map(|c| ((c * 255 + 31) / 63) as u8)));
-                known.store(found as u16 + 1, Ordering::Relaxed);
-                found
+                // Boxes span the whole range, so that black and white are exact.
+                let index = self.search(Oklab::of(coarse.map(|c| ((c * 255 + 31) / 63) as u8)));
+                known.store(index as u16 + 1, Ordering::Relaxed);
+                index
             }
-            found => usize::from(found) - 1,
+            stored => usize::from(stored) - 1,
         }
     }
 
-    /// The number of the choice that looks most like `wanted`.
-    pub fn search(&self, wanted: Oklab) -> usize {
+    /// Returns the index of the colour nearest to `target`.
+    pub fn search(&self, target: Oklab) -> usize {
         let mut best = (f32::INFINITY, 0);
         for (index, look) in self.looks.iter().enumerate() {
-            let distance = wanted.distance_squared(*look);
+            let distance = target.distance_squared(*look);
             if distance < best.0 {
                 best = (distance, index);
             }

@@ -10,7 +10,7 @@ fn checker(width: usize, height: usize) -> Raster {
 }
 
 #[test]
-fn two_pixels_to_a_cell() {
+fn cell_shows_two_pixels() {
     let cells = PictureCells::new(&checker(3, 4), Colors::True, false);
     assert_eq!((cells.columns, cells.rows, cells.cells.len()), (3, 2, 6));
     let [red, sky] = [CellColor::Rgb(RED), CellColor::Rgb(SKY)];
@@ -20,7 +20,7 @@ fn two_pixels_to_a_cell() {
 }
 
 #[test]
-fn equal_halves_need_no_glyph() {
+fn equal_halves_are_a_space() {
     let cells = PictureCells::new(&Raster::from_fn(1, 2, |_| SKY), Colors::True, false);
     assert_eq!(
         cells.cells,
@@ -29,7 +29,7 @@ fn equal_halves_need_no_glyph() {
 }
 
 #[test]
-fn an_odd_last_row_leaves_the_lower_half_alone() {
+fn odd_last_row_leaves_lower_half_plain() {
     for colors in Colors::ALL {
         for settled in [false, true] {
             let cells = PictureCells::new(&checker(2, 3), colors, settled);
@@ -43,7 +43,7 @@ fn an_odd_last_row_leaves_the_lower_half_alone() {
 }
 
 #[test]
-fn no_size_is_too_small() {
+fn any_size_is_converted() {
     for (width, height) in [(0, 0), (0, 3), (3, 0), (1, 1)] {
         for colors in Colors::ALL {
             let cells = PictureCells::new(&Raster::from_fn(width, height, |_| SKY), colors, true);
@@ -52,7 +52,7 @@ fn no_size_is_too_small() {
     }
 }
 
-/// Mean OKLab distance of a picture with gradients from what is shown of it.
+/// Returns the mean OKLab distance between an image with gradients and its cells.
 fn mean_error(colors: Colors, settled: bool) -> f32 {
     let (width, height) = (64, 64);
     let raster = Raster::from_fn(width, height, |i| {
@@ -69,7 +69,7 @@ fn mean_error(colors: Colors, settled: bool) -> f32 {
 }
 
 #[test]
-fn fewer_colours_are_further_off_but_not_far() {
+fn error_of_fewer_colors_is_bounded() {
     assert_eq!(mean_error(Colors::True, false), 0.0);
     let errors = [
         mean_error(Colors::Indexed, false),
@@ -81,10 +81,10 @@ fn fewer_colours_are_further_off_but_not_far() {
     }
 }
 
-/// `cargo test --release --lib how_long -- --ignored --nocapture`
+/// Run by `cargo test --release --lib conversion_time -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
-fn how_long_a_picture_takes() {
+fn picture_conversion_time() {
     let (width, height) = (160, 90);
     for colors in Colors::ALL {
         for settled in [false, true] {

@@ -25,8 +25,8 @@ impl InitialLink {
     /// user wants to be sent in a second, whatever the line may carry.
     pub fn of(terminal: &Capabilities, queue: bool, rate: Option<f64>) -> Self {
         let otherwise = if queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
-        let multiplexer = terminal.surroundings.multiplexer;
-        let (mode, round_trip) = match (rate, &terminal.surroundings.ssh) {
+        let multiplexer = terminal.environment.multiplexer;
+        let (mode, round_trip) = match (rate, &terminal.environment.ssh) {
             (Some(_), _) => (PacingMode::FixedRate, None),
             (None, None) => (PacingMode::Unlimited, None),
             (None, Some(_)) => match (multiplexer, terminal.passthrough, terminal.round_trip) {

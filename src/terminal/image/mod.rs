@@ -74,7 +74,7 @@ pub struct ViewerImage {
 impl Protocol {
     /// What the terminal has.
     pub fn of(terminal: &Capabilities) -> Self {
-        match terminal.surroundings.multiplexer {
+        match terminal.environment.multiplexer {
             None if terminal.kitty_graphics => Self::Kitty,
             Some(Multiplexer::Tmux) if terminal.kitty_graphics && terminal.placeholders => {
                 Self::KittyThroughTmux

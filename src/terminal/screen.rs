@@ -1,0 +1,364 @@
+//! The terminal while a program fills its screen, and its restoration: raw mode, alternate screen,
+//! mouse, bracketed paste.
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+use crossterm::style::{Attribute, SetAttribute};
+use crossterm::terminal::{
+    self, Clear, ClearType, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen,
+};
+use crossterm::{Command, cursor};
+use rustix::termios::{OptionalActions, QueueSelector, Termios, tcflush, tcgetattr, tcsetattr};
+use std::fmt;
+use std::io::{self, Write};
+use std::panic;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Bracketed paste and the mouse, on or off. The mouse reports buttons, the wheel and drags (mode
+/// 1002) with decimal coordinates (1006). `EnableMouseCapture` of crossterm also sets 1003, which
+/// sends every motion over the connection.
+struct Input {
+    is_on: bool,
+}
+
+impl Command for Input {
+    fn write_ansi(&self, out: &mut impl fmt::Write) -> fmt::Result {
+        out.write_str(match self.is_on {
+            true => "\x1b[?2004h\x1b[?1002h\x1b[?1006h",
+            false => "\x1b[?1006l\x1b[?1002l\x1b[?2004l",
+        })
+    }
+}
+
+/// Bytes that take the terminal: alternate screen, hidden cursor, bracketed paste and mouse, an
+/// empty screen.
+pub static ENTER: LazyLock<String> = LazyLock::new(|| {
+    let mut out = String::new();
+    append(&mut out, EnterAlternateScreen);
+    append(&mut out, cursor::Hide);
+    append(&mut out, Input { is_on: true });
+    append(&mut out, Clear(ClearType::All));
+    out
+});
+
+/// Bytes that restore the terminal: the end of a frame that was cut off, default colours and
+/// attributes, and the inverse of [`ENTER`] in the opposite order.
+pub static LEAVE: LazyLock<String> = LazyLock::new(|| {
+    let mut out = String::new();
+    append(&mut out, EndSynchronizedUpdate);
+    append(&mut out, SetAttribute(Attribute::Reset));
+    append(&mut out, Input { is_on: false });
+    append(&mut out, cursor::Show);
+    append(&mut out, LeaveAlternateScreen);
+    out
+});
+
+/// Appends the bytes of a command of crossterm.
+pub(crate) fn append(out: &mut String, command: impl Command) {
+    command.write_ansi(out).expect("a `String` takes any text");
+}
+
+/// Longest wait for a frame that the terminal is slow to take, before the terminal is restored.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// The terminal while the program fills its screen. Dropping it restores the terminal; a panic in
+/// any thread does so, too.
+pub struct Screen {
+    tty: Arc<Tty>,
+    left: Receiver<()>,
+}
+
+/// Writer to the terminal, shared by threads.
+pub struct Tty {
+    out: Mutex<Box<dyn Write + Send>>,
+    entered: AtomicBool,
+    /// Modes of stdin before [`Screen::enter`].
+    modes_before: Option<Termios>,
+    leaving: Sender<()>,
+    /// Bytes to send before [`LEAVE`].
+    exit_sequence: Mutex<Vec<u8>>,
+}
+
+/// Returns columns and rows of the terminal, 80 and 24 if it reports none.
+///
+/// # Errors
+/// If neither the process nor stdout has a terminal.
+pub fn size() -> io::Result<[u16; 2]> {
+    let size = terminal::window_size()?;
+    let is_known = size.columns > 0 && size.rows > 0;
+    Ok(if is_known { [size.columns, size.rows] } else { [80, 24] })
+}
+
+/// Returns width and height of a cell in pixels, if the terminal reports its size in pixels.
+pub fn cell_px() -> Option<[u16; 2]> {
+    let size = terminal::window_size().ok()?;
+    let cell = |px: u16, cells: u16| px.checked_div(cells).filter(|px| *px > 0);
+    Some([cell(size.width, size.columns)?, cell(size.height, size.rows)?])
+}
+
+/// Repeats a change of modes that a signal has interrupted.
+fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
+    loop {
+        match change() {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            done => return done,
+        }
+    }
+}
+
+/// Sets raw mode. crossterm restores the modes that it finds, and a shell may have left its own, so
+/// `modes_before` is set first.
+fn set_raw_mode(modes_before: &Termios) -> io::Result<()> {
+    uninterrupted(terminal::disable_raw_mode)?;
+    uninterrupted(|| Ok(tcsetattr(io::stdin(), OptionalActions::Now, modes_before)?))?;
+    uninterrupted(terminal::enable_raw_mode)
+}
+
+impl Screen {
+    /// Takes the terminal of stdin and stdout.
+    ///
+    /// # Errors
+    /// If stdin is no terminal or stdout cannot be written.
+    pub fn enter() -> io::Result<Self> {
+        let modes_before = tcgetattr(io::stdin())?;
+        set_raw_mode(&modes_before)?;
+        // From here on `Drop` restores the terminal, also if entering fails half-way.
+        Self::over(Box::new(io::stdout()), Some(modes_before))
+    }
+
+    fn over(out: Box<dyn Write + Send>, modes_before: Option<Termios>) -> io::Result<Self> {
+        let (leaving, left) = bounded(1);
+        let tty = Arc::new(Tty {
+            out: Mutex::new(out),
+            entered: AtomicBool::new(true),
+            modes_before,
+            leaving,
+            exit_sequence: Mutex::default(),
+        });
+        // Prepared now: a panic hook shall do little.
+        LazyLock::force(&LEAVE);
+        let screen = Self { tty, left };
+        let tty = Arc::clone(&screen.tty);
+        let report = panic::take_hook();
+        panic::set_hook(Box::new(move |panic| {
+            // First, so that the message is not lost with the alternate screen.
+            tty.leave();
+            report(panic);
+        }));
+        screen.tty.write(ENTER.as_bytes())?;
+        Ok(screen)
+    }
+
+    /// Channel that receives a message when a panic in some thread has restored the terminal.
+    pub fn left(&self) -> &Receiver<()> {
+        &self.left
+    }
+
+    /// Returns the writer to the terminal.
+    pub fn tty(&self) -> Arc<Tty> {
+        Arc::clone(&self.tty)
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        self.tty.leave();
+    }
+}
+
+impl Tty {
+    /// Writes `bytes` in one call. Does nothing after the terminal was restored.
+    ///
+    /// # Errors
+    /// If the terminal is gone.
+    pub fn write(&self, bytes: &[u8]) -> io::Result<()> {
+        let mut out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.entered.load(Ordering::Acquire) {
+            out.write_all(bytes)?;
+            out.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Sets the bytes that are sent first when the terminal is restored, in place of earlier ones.
+    pub fn set_exit_sequence(&self, bytes: &[u8]) {
+        let mut exit_sequence = self.exit_sequence.lock().unwrap_or_else(PoisonError::into_inner);
+        exit_sequence.clear();
+        exit_sequence.extend(bytes);
+    }
+
+    /// Restores the terminal for good. Does nothing the second time.
+    pub fn leave(&self) {
+        if self.suspend() {
+            let _ = self.leaving.try_send(());
+        }
+    }
+
+    /// Restores the terminal until [`Tty::resume`]. Returns `false` if it was restored already.
+    pub fn suspend(&self) -> bool {
+        if !self.entered.swap(false, Ordering::AcqRel) {
+            return false;
+        }
+        // A terminal that has stopped reading shall not keep the program from ending.
+        if let Some(mut out) = self.lock_within(PATIENCE) {
+            let mut exit_sequence =
+                self.exit_sequence.lock().unwrap_or_else(PoisonError::into_inner);
+            let bytes = [&*exit_sequence, LEAVE.as_bytes()].concat();
+            exit_sequence.clear();
+            // If the terminal has gone there is nothing left to restore.
+            let _ = out.write_all(&bytes).and_then(|()| out.flush());
+        }
+        if self.modes_before.is_some() {
+            let _ = uninterrupted(terminal::disable_raw_mode);
+            // Unread input, such as late replies, is not for the shell.
+            let _ = tcflush(io::stdin(), QueueSelector::IFlush);
+        }
+        true
+    }
+
+    /// Takes the terminal again, whatever modes other programs have set.
+    ///
+    /// # Errors
+    /// If it is gone.
+    pub fn resume(&self) -> io::Result<()> {
+        if let Some(modes_before) = &self.modes_before {
+            set_raw_mode(modes_before)?;
+        }
+        let mut out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
+        self.entered.store(true, Ordering::Release);
+        out.write_all(ENTER.as_bytes())?;
+        out.flush()
+    }
+
+    fn lock_within(&self, limit: Duration) -> Option<MutexGuard<'_, Box<dyn Write + Send>>> {
+        let end = Instant::now() + limit;
+        loop {
+            match self.out.try_lock() {
+                Ok(out) => return Some(out),
+                Err(TryLockError::Poisoned(out)) => return Some(out.into_inner()),
+                Err(TryLockError::WouldBlock) if Instant::now() >= end => return None,
+                Err(TryLockError::WouldBlock) => thread::sleep(Duration::from_millis(5)),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Writer whose text is still readable after it was given away.
+    #[derive(Clone, Default)]
+    struct SharedWriter(Arc<Mutex<Vec<u8>>>);
+
+    impl SharedWriter {
+        fn text(&self) -> String {
+            String::from_utf8(self.0.lock().unwrap().clone()).unwrap()
+        }
+    }
+
+    impl Write for SharedWriter {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// Returns a screen and its output.
+    fn screen() -> (Screen, SharedWriter) {
+        let out = SharedWriter::default();
+        (Screen::over(Box::new(out.clone()), None).unwrap(), out)
+    }
+
+    /// Returns `parts` after each other, each `[` standing for [`ENTER`] and `]` for [`LEAVE`].
+    fn expected(parts: &str) -> String {
+        parts.replace(']', "LEAVE").replace('[', &ENTER).replace("LEAVE", &LEAVE)
+    }
+
+    #[test]
+    fn enter_and_leave_keep_their_bytes() {
+        assert_eq!(*ENTER, "\x1b[?1049h\x1b[?25l\x1b[?2004h\x1b[?1002h\x1b[?1006h\x1b[2J");
+        let leave = "\x1b[?2026l\x1b[0m\x1b[?1006l\x1b[?1002l\x1b[?2004l\x1b[?25h\x1b[?1049l";
+        assert_eq!(*LEAVE, leave);
+    }
+
+    #[test]
+    fn screen_is_left_once() {
+        let (screen, out) = screen();
+        let tty = screen.tty();
+        tty.write(b"frame").unwrap();
+        drop(screen);
+        tty.leave();
+        tty.write(b"a frame that comes too late").unwrap();
+        assert_eq!(out.text(), expected("[frame]"));
+    }
+
+    #[test]
+    fn exit_sequence_is_sent_once_before_leaving() {
+        let (screen, out) = screen();
+        let tty = screen.tty();
+        tty.set_exit_sequence(b"old");
+        tty.set_exit_sequence(b"the picture goes");
+        tty.suspend();
+        tty.resume().unwrap();
+        drop(screen);
+        assert_eq!(out.text(), expected("[the picture goes][]"));
+    }
+
+    #[test]
+    fn suspended_screen_is_resumed() {
+        let (screen, out) = screen();
+        let tty = screen.tty();
+        assert!(tty.suspend() && !tty.suspend());
+        tty.write(b"a frame while suspended").unwrap();
+        tty.resume().unwrap();
+        tty.write(b"frame").unwrap();
+        assert!(screen.left().try_recv().is_err());
+        drop(screen);
+        assert_eq!(out.text(), expected("[][frame]"));
+    }
+
+    #[test]
+    fn leave_resets_every_mode_of_enter() {
+        let modes = |text: &str, end: char| -> Vec<String> {
+            let modes = text.split("\x1b[?").skip(1).filter_map(|mode| mode.split_once(end));
+            modes.map(|(mode, _)| mode.to_string()).collect()
+        };
+        // The cursor is the one mode that is on outside.
+        let mut set = modes(&ENTER, 'h');
+        set.retain(|mode| !mode.contains('l'));
+        let mut reset = modes(&LEAVE, 'l');
+        // Each frame sets and resets 2026, unless it is cut off.
+        reset.retain(|mode| !mode.contains('h') && mode != "2026");
+        reset.reverse();
+        assert_eq!(set, ["1049", "2004", "1002", "1006"]);
+        assert_eq!(set, reset);
+        assert!(ENTER.contains("\x1b[?25l") && LEAVE.contains("\x1b[?25h"));
+    }
+
+    #[test]
+    fn panic_in_any_thread_restores_the_terminal_and_is_reported() {
+        let (screen, out) = screen();
+        assert!(screen.left().try_recv().is_err());
+        thread::spawn(|| panic!("as the test wants it")).join().unwrap_err();
+        screen.left().recv_timeout(Duration::from_secs(10)).expect("a message about the panic");
+        assert_eq!(out.text(), expected("[]"));
+        drop(screen);
+        assert_eq!(out.text(), expected("[]"));
+    }
+
+    #[test]
+    fn terminal_that_does_not_read_does_not_delay_the_end() {
+        let (screen, _) = screen();
+        let tty = screen.tty();
+        let _busy = tty.out.lock().unwrap();
+        let start = Instant::now();
+        assert!(tty.lock_within(Duration::from_millis(20)).is_none());
+        assert!(start.elapsed() < PATIENCE);
+    }
+}
