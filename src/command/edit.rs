@@ -89,7 +89,12 @@ fn opened(
     state: Option<&Path>,
 ) -> Result<Result<SceneFile, (PathBuf, SceneErrors)>, Failure> {
     match SceneFile::open_with(path, assets) {
-        Ok(file) => Ok(Ok(file)),
+        Ok(file) => {
+            if let Some(warning) = file.document().migration_warning() {
+                warn(&format!("warning: {warning}"));
+            }
+            Ok(Ok(file))
+        }
         Err(errors) => {
             let readable = File::open(path).and_then(|file| file.metadata());
             match readable.is_ok_and(|metadata| metadata.is_file()) {

@@ -243,7 +243,7 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
     let is_link = path.symlink_metadata().is_ok_and(|m| m.file_type().is_symlink());
     let file = match is_link.then(|| fs::canonicalize(path)) {
         Some(Ok(real)) => real,
-        Some(Err(_)) => return Err(failed("it is a link that leads nowhere".to_string())),
+        Some(Err(_)) => return Err(failed("it is a symbolic link without a target".to_string())),
         None => path.to_path_buf(),
     };
     let existing = fs::metadata(&file).ok();

@@ -36,10 +36,7 @@ impl Scene {
         add(
             materials(&|m| {
                 let alpha = m.alpha.filter(|a| *a > 2.0 && m.has_microfacets())?;
-                Some((
-                    "alpha",
-                    format!("alpha is {}, grooves far steeper than they are wide", number(alpha)),
-                ))
+                Some(("alpha", format!("alpha is {}, grooves far deeper than wide", number(alpha))))
             }),
             "Surfaces have an alpha from 0 to about 1.",
         );

@@ -25,21 +25,21 @@ pub struct Object {
 
 /// Keys of `[[object]]`.
 pub const OBJECT_FIELDS: &[Field] = &[
-    Field::optional("name", ValueType::Text, "", "a number", "Name; no two objects have the same."),
+    Field::optional("name", ValueType::Text, "", "a number", "Name, unique in the scene."),
     Field::optional(
         "material",
         ValueType::Text,
         "",
         "a matt light grey, the default of every material key",
-        "Name of one of the `[materials.NAME]`.",
+        "Name of a material, `[materials.NAME]`.",
     ),
-    Field::required("shape", ValueType::OneOf(KINDS), "", "What it looks like: exactly one kind."),
+    Field::required("shape", ValueType::OneOf(KINDS), "", "Shape: exactly one kind."),
     Field::optional(
         "transform",
         ValueType::ListOf(TRANSFORM_OP_FIELDS),
         "",
-        "it stays as its shape says",
-        "Steps that move, turn and scale it, the first step first.",
+        "the identity",
+        "Steps that translate, rotate and scale it, applied in order.",
     ),
 ];
 

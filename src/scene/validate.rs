@@ -140,7 +140,7 @@ impl Scene {
                 None => format!("a {} has none", object.shape.key()),
             };
             let found = format!(
-                "the {} of material \"{}\" asks for texture coordinates (mapping = \"uv\"), and {what}",
+                "the {} of material \"{}\" needs texture coordinates (mapping = \"uv\"), and {what}",
                 asking[part].unwrap_or_default(),
                 truncated(materials[part]),
             );

@@ -70,8 +70,8 @@ fn perform(
             ("rename", edit::rename(scene, &subject, names[other % names.len()]))
         }
         14 => ("own material", edit::own_material(scene, &subject)),
-        15 => ("store view", edit::store_view(scene, (at % 2 == 0).then_some("left"))),
-        16 => ("recall view", edit::recall_view(scene, "left")),
+        15 => ("store camera", edit::store_view(scene, (at % 2 == 0).then_some("left"))),
+        16 => ("recall camera", edit::recall_view(scene, "left")),
         17 => ("roughen", edit::adjust_roughness(scene, Some(&subject), amount.trunc())),
         18 => ("reflect", edit::reflect(scene, Some(&subject), amount.trunc())),
         19 => ("next lobe", edit::next_lobe(scene, None, amount > 0.0)),
@@ -150,8 +150,8 @@ fn any_sequence_leaves_a_valid_scene_and_can_be_undone() {
         "delete",
         "rename",
         "own material",
-        "store view",
-        "recall view",
+        "store camera",
+        "recall camera",
         "roughen",
         "reflect",
         "next lobe",

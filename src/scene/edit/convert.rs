@@ -23,7 +23,7 @@ pub(super) const KIND: Field = Field::required(
         Field::required("directional", ValueType::Text, "", "Light from infinitely far away."),
     ]),
     "",
-    "Where the light comes from.",
+    "Kind of light source.",
 );
 
 /// The choice between a camera's target and direction, a row of the inspector that files do not
@@ -31,11 +31,11 @@ pub(super) const KIND: Field = Field::required(
 pub(super) const AIM: Field = Field::required(
     "aim",
     ValueType::OneOf(&[
-        Field::required("target", ValueType::Text, "", "It looks at a point."),
-        Field::required("direction", ValueType::Text, "", "It looks in a direction."),
+        Field::required("target", ValueType::Text, "", "Directed at a point."),
+        Field::required("direction", ValueType::Text, "", "A fixed direction."),
     ]),
     "",
-    "Whether the camera looks at a point or in a direction.",
+    "Target point or fixed direction of the camera.",
 );
 
 /// Returns which of the two exclusive kinds a light or a camera has.

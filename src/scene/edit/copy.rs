@@ -145,7 +145,7 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
             n => Some(format!("{shown} and {} more {many} now.", n - 3)),
         }
     };
-    let whole = told(&whole, ["has the default finish", "have the default finish"]);
+    let whole = told(&whole, ["has the default material", "have the default material"]);
     let parts = told(
         &parts,
         [
@@ -258,7 +258,7 @@ mod tests {
         assert_eq!(edit.subject, Target::Object(2));
         let edit = delete(&scene, &Target::Material("red".into())).unwrap();
         assert_eq!(edit.scene.objects[2].material, "");
-        assert_eq!(edit.note.as_deref(), Some("ball has the default finish now."));
+        assert_eq!(edit.note.as_deref(), Some("ball has the default material now."));
         assert_eq!(edit.subject, Target::Material("yellow".into()));
         let edit = delete(&scene, &Target::Light(0)).unwrap();
         assert_eq!(edit.subject, Target::Camera);
@@ -334,6 +334,6 @@ mod tests {
         assert_eq!(edit.note.as_deref(), Some(note));
         let edit = delete(&scene, &Target::Material("blue".into())).unwrap();
         assert_eq!(edit.scene.objects[0].materials(), ["", "red", "red"]);
-        assert_eq!(edit.note.as_deref(), Some("dice has the default finish now."));
+        assert_eq!(edit.note.as_deref(), Some("dice has the default material now."));
     }
 }

@@ -17,7 +17,7 @@ use glam::{DVec2, DVec3};
 /// or above.
 pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {
-        return Err(EditError::new("only objects can be dropped", "Select an object."));
+        return Err(EditError::new("only objects can be snapped to ground", "Select an object."));
     };
     let object = scene.objects.get(*index).ok_or_else(|| EditError::gone(subject))?;
     let form = object.form();
@@ -50,7 +50,7 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
     let rest = below.or_else(|| heights(false).into_iter().reduce(f64::min));
     let Some(rest) = rest else {
         let help = "Add a platform or a plane first.";
-        return Err(EditError::new("nothing is under it to rest on", help));
+        return Err(EditError::new("there is no surface below or above it", help));
     };
     let mut next = scene.clone();
     let dropped = &mut next.objects[*index];
@@ -237,6 +237,6 @@ mod tests {
         assert!(refusal.found.contains("no lowest point"), "{refusal}");
         let alone = Scene { objects: vec![scene.objects[2].clone()], ..Scene::default() };
         let refusal = snap_to_ground(&alone, &Target::Object(0)).unwrap_err();
-        assert!(refusal.found.contains("nothing is under it"), "{refusal}");
+        assert!(refusal.found.contains("no surface below"), "{refusal}");
     }
 }

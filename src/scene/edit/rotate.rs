@@ -15,7 +15,7 @@ use glam::DVec3;
 /// For targets that cannot be rotated.
 pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditError> {
     if !degrees.is_finite() {
-        return Err(EditError::new("that is no angle to turn by", ""));
+        return Err(EditError::new("the angle is not a finite number", ""));
     }
     let mut next = scene.clone();
     match subject {

@@ -114,11 +114,11 @@ pub(super) fn replace(
         }
     }
     if !insert_value(&mut values, key, Some(value)) {
-        return Err(EditError::new(&format!("there is no place for {key} here"), ""));
+        return Err(EditError::new(&format!("{key} cannot be set here"), ""));
     }
     let edit = finish(scene, subject, key, values)?;
     Ok(match gone {
-        Some(rival) => edit.with_note(format!("{rival} is gone: {first} stands in its place.")),
+        Some(rival) => edit.with_note(format!("{first} replaces {rival}.")),
         None => edit,
     })
 }
@@ -242,7 +242,7 @@ mod tests {
         let gold = set(&scene, &red, "metal", "gold").unwrap().scene;
         let edit = set(&gold, &red, "f0", "0.5 0.5 0.5").unwrap();
         assert!(edit.scene.materials["red"].metal.is_none());
-        assert!(edit.note.unwrap().contains("metal is gone"));
+        assert!(edit.note.unwrap().contains("f0 replaces metal"));
         let edit = set(&scene, &Target::Camera, "direction", "0 0 -1").unwrap();
         assert_eq!(edit.scene.camera.target, None);
     }

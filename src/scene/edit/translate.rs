@@ -16,7 +16,7 @@ use glam::DVec3;
 /// For targets that cannot be moved, and beyond the largest coordinate.
 pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, EditError> {
     if by.iter().any(|x| !x.is_finite()) {
-        return Err(EditError::new("that is no distance to move by", ""));
+        return Err(EditError::new("the distance is not a finite number", ""));
     }
     let mut next = scene.clone();
     match subject {

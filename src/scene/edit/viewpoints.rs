@@ -16,11 +16,11 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
         None => free_view(scene, "view"),
     };
     if kept.is_empty() {
-        return Err(EditError::new("a view needs a name", ""));
+        return Err(EditError::new("a camera needs a name", ""));
     }
     let mut next = scene.clone();
     let old = next.cameras.insert(kept.clone(), scene.camera.clone());
-    let label = format!("store view {kept}");
+    let label = format!("store camera {kept}");
     let edit = Edit::checked(next, Target::View(kept.clone()), label)?;
     let replaced = old.is_some_and(|old| old != scene.camera);
     Ok(if replaced { edit.with_note(format!("View {kept} was replaced.")) } else { edit })
@@ -34,7 +34,7 @@ pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
     let subject = Target::View(name.to_string());
     let view = scene.cameras.get(name).ok_or_else(|| EditError::gone(&subject))?;
     let next = Scene { camera: view.clone(), ..scene.clone() };
-    Edit::checked(next, Target::Camera, format!("recall view {}", subject.label(scene)))
+    Edit::checked(next, Target::Camera, format!("recall camera {}", subject.label(scene)))
 }
 
 #[cfg(test)]

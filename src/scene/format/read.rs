@@ -104,9 +104,14 @@ impl<'a> SourceScene<'a> {
     pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
         let (name, text, root) = (self.name, self.text, self.root.get_ref());
         let mut warnings = with_locations(name, text, root, self.scene.warnings());
-        warnings.extend(migrate::warning(name, text, root, &self.former_words));
+        warnings.extend(self.migration_warning());
         warnings.sort_by_key(|warning| warning.line_column);
         warnings
+    }
+
+    /// Returns the warning about former words, if the file has any.
+    pub(crate) fn migration_warning(&self) -> Option<Diagnostic> {
+        migrate::warning(self.name, self.text, self.root.get_ref(), &self.former_words)
     }
 }
 
