@@ -24,7 +24,7 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn what_is_kept_is_found_once_its_keeper_is_gone() {
+fn recovery_file_is_found_after_its_process_ends() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.toml");
     let mut keeper = of(&path);
@@ -54,7 +54,7 @@ fn what_is_kept_is_found_once_its_keeper_is_gone() {
 }
 
 #[test]
-fn sessions_side_by_side_have_files_of_their_own() {
+fn concurrent_sessions_write_separate_recovery_files() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.toml");
     let mut keepers: Vec<_> = (0..9).map(|_| of(&path)).collect();
@@ -79,7 +79,7 @@ fn sessions_side_by_side_have_files_of_their_own() {
 }
 
 #[test]
-fn a_file_that_others_take_away_is_made_anew() {
+fn deleted_recovery_file_is_written_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.toml");
     let mut keeper = of(&path);
@@ -104,7 +104,7 @@ fn a_file_that_others_take_away_is_made_anew() {
 }
 
 #[test]
-fn what_cannot_be_read_is_told_and_stays() {
+fn unreadable_recovery_file_is_reported_and_stays() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.toml");
     let hidden = |n: &str| folder.path().join(format!(".a.toml.unsaved{n}"));
@@ -131,7 +131,7 @@ fn what_cannot_be_read_is_told_and_stays() {
 
 #[test]
 #[cfg(unix)]
-fn links_lead_to_the_same_edits_and_nothing_is_read_through_a_planted_one() {
+fn symbolic_links_share_recovery_and_planted_links_are_not_followed() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let folder = tempfile::tempdir().unwrap();
     let other = tempfile::tempdir().unwrap();
@@ -155,7 +155,7 @@ fn links_lead_to_the_same_edits_and_nothing_is_read_through_a_planted_one() {
 }
 
 #[test]
-fn where_the_scene_cannot_have_them_beside_it_the_state_folder_has() {
+fn state_folder_is_used_if_the_scene_folder_is_not_writable() {
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("deep/state");
     // The folder does not exist, so that it cannot be written.
@@ -174,7 +174,7 @@ fn where_the_scene_cannot_have_them_beside_it_the_state_folder_has() {
 }
 
 #[test]
-fn names_as_long_as_they_can_be() {
+fn recovery_of_longest_file_names() {
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("state");
     let long = folder.path().join("ä".repeat(125) + ".toml");
@@ -185,7 +185,7 @@ fn names_as_long_as_they_can_be() {
 }
 
 #[test]
-fn the_state_folder_is_where_the_user_wants_it() {
+fn state_folder_follows_xdg_variables() {
     let with = |state: Option<&str>, home: Option<&str>| {
         state_folder(|name| match name {
             "XDG_STATE_HOME" => state.map(OsString::from),
@@ -199,7 +199,7 @@ fn the_state_folder_is_where_the_user_wants_it() {
 }
 
 #[test]
-fn only_old_leftovers_are_swept_away() {
+fn only_old_unlocked_temporary_files_are_removed() {
     let folder = tempfile::tempdir().unwrap();
     let old = SystemTime::now() - Duration::from_secs(3600);
     let file = |name: &str| {

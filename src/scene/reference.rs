@@ -209,7 +209,7 @@ mod tests {
 
     /// Rows that say "see below" refer to a later part of the same section.
     #[test]
-    fn what_is_said_to_be_below_is_there() {
+    fn reference_rows_refer_to_later_sections() {
         let text = reference();
         let mut words = 0;
         for section in text.split("\n## ").flat_map(|part| part.split("\n### ")) {

@@ -66,7 +66,7 @@ fn texture(key: &str, kind: &str) -> &'static [Field] {
 }
 
 #[test]
-fn tables_name_the_keys_that_are_read() {
+fn field_tables_match_deserialised_keys() {
     same_keys::<Scene>("scene", FIELDS);
     same_keys::<FilmSettings>("film", FILM_FIELDS);
     same_keys::<IntegratorSettings>("trace", TRACE_FIELDS);
@@ -94,7 +94,7 @@ fn tables_name_the_keys_that_are_read() {
 }
 
 #[test]
-fn tables_tell_the_defaults_that_hold() {
+fn field_tables_match_defaults() {
     same_defaults::<FilmSettings>("film", FILM_FIELDS, "");
     same_defaults::<IntegratorSettings>("trace", TRACE_FIELDS, "");
     same_defaults::<Background>("background", BACKGROUND_FIELDS, "");
@@ -114,7 +114,7 @@ fn tables_tell_the_defaults_that_hold() {
 }
 
 #[test]
-fn every_word_is_read() {
+fn every_documented_choice_is_read() {
     fn words<T: DeserializeOwned>(fields: &[Field]) {
         for field in fields {
             if let ValueType::Choice(choices) = field.takes {
@@ -152,7 +152,7 @@ fn read(kind: &Field, values: &toml::Table) -> Result<Shape, toml::de::Error> {
 }
 
 #[test]
-fn shapes_have_sound_examples_and_honest_tables() {
+fn shape_examples_and_tables_are_valid() {
     for (kind, (key, text)) in KINDS.iter().zip(EXAMPLES) {
         assert_eq!(kind.name, *key);
         let ValueType::Table(fields) = kind.takes else { panic!("{key}") };
@@ -187,7 +187,7 @@ fn shapes_have_sound_examples_and_honest_tables() {
 }
 
 #[test]
-fn every_number_of_every_shape_is_checked() {
+fn every_shape_number_is_range_checked() {
     for (kind, (key, text)) in KINDS.iter().zip(EXAMPLES) {
         let ValueType::Table(fields) = kind.takes else { panic!("{key}") };
         for field in fields {
@@ -234,7 +234,7 @@ fn faults_of(part: &str) -> Vec<(String, String)> {
 }
 
 #[test]
-fn faults_of_parts_say_which_part() {
+fn errors_in_parts_name_the_part() {
     for (part, key, words) in [
         ("{ shape.sphere = { center = [0, 0, 0], radius = -1 } }", "shape.sphere.radius", "-1"),
         ("{ shape.platform = { center = [0, 0, 0], size = [1, 1] } }", "shape", "flat"),
@@ -276,7 +276,7 @@ fn faults_of_parts_say_which_part() {
 }
 
 #[test]
-fn compounds_may_be_nested_so_deep_and_no_deeper() {
+fn compound_nesting_depth_is_limited() {
     let sphere =
         || -> Shape { toml::from_str("sphere = { center = [0, 0, 0], radius = 1 }").unwrap() };
     let part = |shape| CsgOperand { shape, material: String::new(), transform: Vec::new() };

@@ -1,4 +1,4 @@
-//! Broken files: seeded mutations of good ones. Nothing panics, nothing hangs, memory stays small.
+//! Fuzz tests: seeded mutations of valid files cause no panic, no hang and no large allocation.
 
 mod files;
 mod mutate;
@@ -12,20 +12,21 @@ use zerkalo::scene::Scene;
 /// Mutations of each kind of file.
 const CASES: u64 = 5_000;
 
-/// The longest that one file may take.
+/// Longest time for one file.
 const LONGEST: Duration = Duration::from_secs(1);
 
-/// The most memory that the whole test may ever have taken [KiB].
+/// Largest peak memory of the whole test [KiB].
 const MEMORY_KIB: u64 = 512 << 10;
 
-/// The most memory that this process has had so far [KiB], where the system tells.
+/// Returns the peak memory of this process [KiB], where the system reports it.
 fn peak_kib() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
     line.and_then(|l| l.trim().split(' ').next()?.parse().ok()).unwrap_or(0)
 }
 
-/// Reads `CASES` mutations of `seeds`; `read` says whether the file was taken. How many were.
+/// Reads `CASES` mutations of `seeds`; `read` returns `true` if the file was accepted. Returns the
+/// number of accepted files.
 fn storm(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> bool) -> u64 {
     for (i, seed) in seeds.iter().enumerate() {
         assert!(read(seed), "seed {i} of {name} is not good");
@@ -37,7 +38,7 @@ fn storm(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> bool) -> 
         let other = &seeds[random.below(seeds.len())];
         let mut bytes = random.mutated(seed, other);
         if name == "png" && case % 4 != 0 {
-            // Else the checksums would hide almost everything behind them.
+            // Otherwise the checksums would hide almost all other errors.
             files::repair_png(&mut bytes);
         }
         let begin = Instant::now();
@@ -50,12 +51,13 @@ fn storm(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> bool) -> 
     taken
 }
 
-/// The mutations reach behind the first check, and do not pass all of them.
+/// Asserts that some mutations are accepted and some are not, so that the checks after the first
+/// are reached.
 fn balanced(taken: u64) {
     assert!(taken > CASES / 50 && taken < CASES, "{taken} of {CASES} were taken");
 }
 
-/// Whether a file with these bytes is taken, written to `path` first.
+/// Returns `true` if a file with these bytes, written to `path` first, is accepted.
 fn mesh(path: &Path, bytes: &[u8]) -> bool {
     std::fs::write(path, bytes).unwrap();
     match Assets::default().mesh(path) {
@@ -138,7 +140,7 @@ fn jpeg() {
 #[test]
 fn toml() {
     let seeds = files::toml();
-    // In the folder of the meshes that some name.
+    // In the folder of the meshes that some scenes name.
     let name = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/a.toml");
     balanced(storm("toml", &seeds, |bytes| {
         std::str::from_utf8(bytes).is_ok_and(|text| Scene::parse(text, name).is_ok())

@@ -273,7 +273,7 @@ mod tests {
     use crate::shape::KINDS;
 
     #[test]
-    fn every_kind_becomes_every_other_in_its_place() {
+    fn converted_shapes_keep_place_and_size() {
         let scene = built_in();
         for object in 0..scene.objects.len() {
             let subject = Target::Object(object);
@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn lights_keep_side_and_brightness() {
+    fn converted_lights_keep_side_and_brightness() {
         let mut scene = built_in();
         scene.lights[0].falloff = Falloff::InverseSquare;
         scene.lights[0].intensity = 40.0;
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_keep_the_picture() {
+    fn converted_cameras_keep_the_picture() {
         let scene = built_in();
         let camera = |scene: &Scene| scene.camera.clone();
         let free = set(&scene, &Target::Camera, "aim", "direction").unwrap().scene;

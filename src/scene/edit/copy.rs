@@ -231,7 +231,7 @@ mod tests {
     use crate::scene::built_in;
 
     #[test]
-    fn copies_stand_apart_under_their_own_name() {
+    fn duplicates_are_apart_and_have_unique_names() {
         let scene = built_in();
         let edit = duplicate(&scene, &Target::Object(3)).unwrap();
         assert_eq!(edit.subject, Target::Object(6));
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn deleting_selects_the_neighbour_and_names_who_lost_a_material() {
+    fn delete_selects_neighbour_and_notes_lost_materials() {
         let scene = built_in();
         let edit = delete(&scene, &Target::Object(5)).unwrap();
         assert_eq!((edit.subject, edit.scene.objects.len()), (Target::Object(4), 5));
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn names_change_everywhere() {
+    fn rename_material_updates_objects() {
         let scene = built_in();
         let red = Target::Material("red".into());
         let edit = rename(&scene, &red, " crimson ").unwrap();
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn one_object_gets_a_material_of_its_own() {
+    fn own_material_copies_a_shared_material() {
         let scene = built_in();
         let edit = own_material(&scene, &Target::Object(2)).unwrap();
         assert_eq!(edit.scene.objects[2].material, "ball");
@@ -317,7 +317,7 @@ mod tests {
     ";
 
     #[test]
-    fn parts_follow_the_name_of_their_material() {
+    fn rename_material_updates_parts() {
         let scene = Scene::parse(COMPOUND, "test").unwrap();
         let edit = rename(&scene, &Target::Material("red".into()), "crimson").unwrap();
         assert_eq!(edit.scene.objects[0].materials(), ["blue", "crimson", "crimson"]);
@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_lose_the_material_that_is_deleted() {
+    fn delete_material_clears_parts() {
         let scene = Scene::parse(COMPOUND, "test").unwrap();
         let edit = delete(&scene, &Target::Material("red".into())).unwrap();
         assert_eq!(edit.scene.objects[0].materials(), ["blue"; 3]);

@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn dropped_things_stand_exactly() {
+    fn snap_to_ground_rests_exactly_on_the_surface() {
         let scene = built_in();
         for i in 2..6 {
             for by in [[0.0, 1.23, 0.0], [0.0, -0.217, 0.0], [0.1, 0.777, 0.1]] {
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cube_lands_on_a_table_and_is_lifted_onto_the_ground_from_below() {
+    fn snap_to_ground_finds_table_and_ground_above() {
         let text = "[[object]]\nshape.plane = { point = [0, -1, 0], normal = [0, 1, 0] }\n\
                     [[object]]\nshape.box = { center = [0, 0, 0], size = [2, 0.5, 2] }\n\
                     [[object]]\nshape.cube = { corner = [-0.5, 3, 0.5], edge = 1 }\n\

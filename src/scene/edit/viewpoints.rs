@@ -43,7 +43,7 @@ mod tests {
     use crate::scene::built_in;
 
     #[test]
-    fn views_are_kept_and_come_back() {
+    fn cameras_are_stored_and_recalled() {
         let scene = built_in();
         let edit = store_view(&scene, None).unwrap();
         assert_eq!(edit.subject, Target::View("view".into()));

@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn entries_find_their_origin() {
+    fn list_entries_align_with_their_origin() {
         for (old, new, expected) in [
             ("a/1 b/2 c/3", "a/1 b/9 c/3", vec![Some(0), Some(1), Some(2)]),
             ("a/1 b/2 c/3", "a/1 c/3", vec![Some(0), Some(2)]),
