@@ -54,7 +54,7 @@ impl AssetResolver {
     pub(super) fn loses(&self, name: &str, scene: &Path) -> bool {
         let there = fs::canonicalize(folder_of(scene).join(name));
         fs::canonicalize(self.folder().join(name))
-            .is_ok_and(|here| there.ok().is_none_or(|there| there != here))
+            .is_ok_and(|target| there.ok().is_none_or(|there| there != target))
     }
 
     fn folder(&self) -> PathBuf {

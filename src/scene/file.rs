@@ -50,19 +50,19 @@ pub enum SaveError {
 
 impl fmt::Display for SaveError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let shown = |path: &PathBuf| sanitized(&path.display().to_string());
+        let printable = |path: &PathBuf| sanitized(&path.display().to_string());
         match self {
             Self::Untitled => f.write_str("this scene has no file yet; save it under a name"),
             Self::Changed(path) => write!(
                 f,
                 "{} was changed by another program; reload it, overwrite it, or save under another \
                  name",
-                shown(path)
+                printable(path)
             ),
             Self::Exists(path) => {
-                write!(f, "{} exists; overwrite it or choose another name", shown(path))
+                write!(f, "{} exists; overwrite it or choose another name", printable(path))
             }
-            Self::Failed { path, what } => write!(f, "cannot write {}: {what}", shown(path)),
+            Self::Failed { path, what } => write!(f, "cannot write {}: {what}", printable(path)),
         }
     }
 }
@@ -282,8 +282,9 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
     let explained = |error: io::Error| failed(explain(&error, directory));
     let temporary = written.map_err(explained)?;
     // A file that was created in the meantime is not overwritten either.
-    let put = if overwrite { temporary.persist(&file) } else { temporary.persist_noclobber(&file) };
-    put.map_err(|e| match e.error.kind() {
+    let persisted =
+        if overwrite { temporary.persist(&file) } else { temporary.persist_noclobber(&file) };
+    persisted.map_err(|e| match e.error.kind() {
         ErrorKind::AlreadyExists => SaveError::Exists(path.to_path_buf()),
         _ => explained(e.error),
     })?;
@@ -295,15 +296,15 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
 }
 
 fn explain(error: &io::Error, directory: &Path) -> String {
-    let shown = sanitized(&directory.display().to_string());
+    let directory = sanitized(&directory.display().to_string());
     match error.kind() {
-        ErrorKind::NotFound => format!("the directory {shown} does not exist; create it first"),
-        ErrorKind::NotADirectory => format!("{shown} is not a directory"),
+        ErrorKind::NotFound => format!("the directory {directory} does not exist; create it first"),
+        ErrorKind::NotADirectory => format!("{directory} is not a directory"),
         ErrorKind::PermissionDenied => {
-            format!("no permission to write in the directory {shown}; save somewhere else")
+            format!("no permission to write in the directory {directory}; save somewhere else")
         }
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-            format!("no space is left in {shown}")
+            format!("no space is left in {directory}")
         }
         _ => error.to_string(),
     }

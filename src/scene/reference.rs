@@ -218,9 +218,10 @@ mod tests {
                 let (name, rest) = line.split_once('`').unwrap();
                 if rest.starts_with(" | a word, see below |") {
                     let below = &section[at..];
-                    let told = [":\n\n- `\"", ": the same words as above.\n"];
-                    let told = told.map(|told| below.contains(&format!("\n`{name}`{told}")));
-                    assert!(told.contains(&true), "{line}");
+                    let notations = [":\n\n- `\"", ": the same words as above.\n"];
+                    let found =
+                        notations.map(|notation| below.contains(&format!("\n`{name}`{notation}")));
+                    assert!(found.contains(&true), "{line}");
                     words += 1;
                 }
             }

@@ -18,11 +18,11 @@ fn keys_of<T: DeserializeOwned>() -> Vec<String> {
 }
 
 fn same_keys<T: DeserializeOwned>(what: &str, fields: &[Field]) {
-    let mut real = keys_of::<T>();
-    let mut told: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
-    real.sort();
-    told.sort();
-    assert_eq!(real, told, "{what}");
+    let mut serde_keys = keys_of::<T>();
+    let mut documented: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
+    serde_keys.sort();
+    documented.sort();
+    assert_eq!(serde_keys, documented, "{what}");
 }
 
 /// Compares documented defaults with what is read when only the keys in `needed` are given.
@@ -125,8 +125,9 @@ fn every_documented_choice_is_read() {
                 let line = format!("{} = \"no such word\"", field.name);
                 let error = toml::from_str::<T>(&line).err().map(|e| e.message().to_string());
                 let error = error.unwrap_or_else(|| panic!("{line} was read"));
-                let told = choices.iter().filter(|c| error.contains(&format!("`{}`", c.name)));
-                assert_eq!(told.count(), choices.len(), "{error}");
+                let documented =
+                    choices.iter().filter(|c| error.contains(&format!("`{}`", c.name)));
+                assert_eq!(documented.count(), choices.len(), "{error}");
                 assert_eq!(error.matches('`').count(), 2 * choices.len() + 2, "{error}");
             }
         }
@@ -164,11 +165,11 @@ fn shape_examples_and_tables_are_valid() {
         assert!(scene.is_ok(), "{key}: {}", scene.unwrap_err());
 
         let written = toml::Table::try_from(&shape).unwrap();
-        let mut real: Vec<_> = written[*key].as_table().unwrap().keys().cloned().collect();
-        let mut told: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
-        real.sort();
-        told.sort();
-        assert_eq!(real, told, "{key}");
+        let mut serde_keys: Vec<_> = written[*key].as_table().unwrap().keys().cloned().collect();
+        let mut documented: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
+        serde_keys.sort();
+        documented.sort();
+        assert_eq!(serde_keys, documented, "{key}");
         for field in fields {
             let mut without = given.clone();
             without.remove(field.name);
@@ -219,8 +220,11 @@ fn every_shape_number_is_range_checked() {
                 let mut values = example(kind, text);
                 values.insert(field.name.into(), value.clone());
                 let faults = read(kind, &values).unwrap().faults();
-                let at = format!("{key}.{}", field.name);
-                assert!(faults.len() == 1 && faults[0].key == at, "{at} = {value}: {faults:?}");
+                let key_path = format!("{key}.{}", field.name);
+                assert!(
+                    faults.len() == 1 && faults[0].key == key_path,
+                    "{key_path} = {value}: {faults:?}"
+                );
             }
         }
     }

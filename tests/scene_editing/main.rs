@@ -33,14 +33,14 @@ fn edited(text: &str, edit: impl FnOnce(&mut Scene)) -> String {
 fn difference<'a>(a: &'a str, b: &'a str) -> (Vec<&'a str>, Vec<&'a str>) {
     let missing = |from: &'a str, other: &str| {
         let mut others: Vec<&str> = other.lines().collect();
-        let gone = |line: &&str| match others.iter().position(|o| o == line) {
+        let is_missing = |line: &&str| match others.iter().position(|o| o == line) {
             Some(at) => {
                 others.remove(at);
                 false
             }
             None => true,
         };
-        from.lines().filter(gone).collect::<Vec<_>>()
+        from.lines().filter(is_missing).collect::<Vec<_>>()
     };
     (missing(b, a), missing(a, b))
 }

@@ -82,7 +82,7 @@ fn perform(
 /// Number of performed and of refused calls of each operation.
 type Tally = BTreeMap<&'static str, [u32; 2]>;
 
-fn go(text: &str, acts: &[Act], tally: &mut Tally) -> Result<(), TestCaseError> {
+fn check_sequence(text: &str, acts: &[Act], tally: &mut Tally) -> Result<(), TestCaseError> {
     let mut document = Document::parse(text.to_string(), "scene.toml").unwrap();
     let mut history = History::new(Arc::new(document.scene().clone()));
     for (i, act) in acts.iter().enumerate() {
@@ -128,7 +128,7 @@ fn random_edits_leave_valid_scenes_and_can_be_undone() {
     let sequences = (0..3usize, prop::collection::vec(act(), 1..60));
     let result = runner.run(&sequences, |(which, acts)| {
         let text = [BUILT_IN, LAYOUTS[1], TRANSFORMS][which];
-        go(text, &acts, &mut tally.borrow_mut())
+        check_sequence(text, &acts, &mut tally.borrow_mut())
     });
     result.unwrap_or_else(|e| panic!("{e}"));
     let tally = tally.into_inner();

@@ -75,9 +75,9 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     let material = match material {
         Some(shared) => shared.to_string(),
         None => {
-            let own = free_material(scene, &name);
-            next.materials.insert(own.clone(), fresh_material(scene));
-            own
+            let unique_name = free_material(scene, &name);
+            next.materials.insert(unique_name.clone(), fresh_material(scene));
+            unique_name
         }
     };
     let transform = if shape.anchor_points_mut().is_empty() {

@@ -136,17 +136,17 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
         if object.material == name { &mut whole } else { &mut parts }.push(label);
         object.rename_material(name, "");
     }
-    let told = |labels: &[String], [one, many]: [&str; 2]| {
-        let shown = labels.iter().take(3).cloned().collect::<Vec<_>>().join(", ");
+    let note_for = |labels: &[String], [one, many]: [&str; 2]| {
+        let names = labels.iter().take(3).cloned().collect::<Vec<_>>().join(", ");
         match labels.len() {
             0 => None,
-            1 => Some(format!("{shown} {one} now.")),
-            2 | 3 => Some(format!("{shown} {many} now.")),
-            n => Some(format!("{shown} and {} more {many} now.", n - 3)),
+            1 => Some(format!("{names} {one} now.")),
+            2 | 3 => Some(format!("{names} {many} now.")),
+            n => Some(format!("{names} and {} more {many} now.", n - 3)),
         }
     };
-    let whole = told(&whole, ["has the default material", "have the default material"]);
-    let parts = told(
+    let whole = note_for(&whole, ["has the default material", "have the default material"]);
+    let parts = note_for(
         &parts,
         [
             "has the material of the whole in its parts",

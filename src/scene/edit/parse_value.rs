@@ -30,12 +30,12 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
         ValueType::Text => name(field.name, unquoted(text)).map(Value::String),
         ValueType::Switch => {
             let words = ["true", "on", "yes", "1", "false", "off", "no", "0"];
-            let at = choose(text, &words).ok_or_else(wrong)?;
-            Ok(Value::Boolean(at < 4))
+            let index = choose(text, &words).ok_or_else(wrong)?;
+            Ok(Value::Boolean(index < 4))
         }
         ValueType::Choice(choices) => {
             let words: Vec<_> = choices.iter().map(|c| c.name).collect();
-            word(field, unquoted(text), &words).map(|at| Value::String(words[at].to_string()))
+            word(field, unquoted(text), &words).map(|index| Value::String(words[index].to_string()))
         }
         ValueType::Whole(range) => list(1).and_then(|list| whole(list[0], range)),
         ValueType::Wholes(n, range) => {

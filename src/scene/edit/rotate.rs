@@ -51,13 +51,13 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
 /// Makes `rotate_y` and `translate` (unless neutral) the last steps of the object, so that it is
 /// rotated about the vertical through its middle.
 fn turn_by_steps(object: &mut Object, degrees: f64) {
-    let (angle, shift, own) = match object.transform[..] {
+    let (angle, shift, own_len) = match object.transform[..] {
         [.., TransformOp::RotateY(angle), TransformOp::Translate(shift)] => (angle, shift, 2),
         [.., TransformOp::RotateY(angle)] => (angle, [0.0; 3], 1),
         _ => (0.0, [0.0; 3], 0),
     };
-    let kept = object.transform.len() - own;
-    object.transform.truncate(kept);
+    let kept_len = object.transform.len() - own_len;
+    object.transform.truncate(kept_len);
     let form = object.form();
     let (middle, scale) = match form.bounds() {
         Some((low, high)) => (low + (high - low) / 2.0, (high - low).max_element()),

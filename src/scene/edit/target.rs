@@ -142,9 +142,9 @@ impl Target {
     }
 
     /// Returns the target of a problem and the key in it, which may be empty.
-    pub fn of_finding(finding: &Problem) -> Option<(Self, String)> {
-        let subject = Self::of_path(&finding.path)?;
-        let rest = finding.path.get(subject.path().len()..).unwrap_or_default();
+    pub fn of_finding(problem: &Problem) -> Option<(Self, String)> {
+        let subject = Self::of_path(&problem.path)?;
+        let rest = problem.path.get(subject.path().len()..).unwrap_or_default();
         Some((subject, rest.join(".")))
     }
 

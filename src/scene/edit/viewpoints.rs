@@ -11,19 +11,19 @@ use crate::scene::edit::{Edit, EditError, Target};
 /// # Errors
 /// If the name is not printable.
 pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError> {
-    let kept = match given {
+    let name = match given {
         Some(given) => name("name", given)?,
         None => free_view(scene, "view"),
     };
-    if kept.is_empty() {
+    if name.is_empty() {
         return Err(EditError::new("a camera needs a name", ""));
     }
     let mut next = scene.clone();
-    let old = next.cameras.insert(kept.clone(), scene.camera.clone());
-    let label = format!("store camera {kept}");
-    let edit = Edit::checked(next, Target::View(kept.clone()), label)?;
+    let old = next.cameras.insert(name.clone(), scene.camera.clone());
+    let label = format!("store camera {name}");
+    let edit = Edit::checked(next, Target::View(name.clone()), label)?;
     let replaced = old.is_some_and(|old| old != scene.camera);
-    Ok(if replaced { edit.with_note(format!("View {kept} was replaced.")) } else { edit })
+    Ok(if replaced { edit.with_note(format!("View {name} was replaced.")) } else { edit })
 }
 
 /// Makes the stored camera `name` the camera of the picture.
