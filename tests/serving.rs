@@ -251,7 +251,7 @@ impl Bench {
     /// Returns `true` if the film is reused for the edited scene, after a check of its picture;
     /// `None` if the edit is invalid.
     fn holds(&mut self, changed: &Table, what: &str) -> Option<bool> {
-        let edited = scene(changed, &self.base.library)?;
+        let edited = scene(changed, &self.base.resolver)?;
         self.tried += 1;
         if !self.film.try_reuse(&Arc::new(edited.clone())) {
             return Some(false);

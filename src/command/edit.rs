@@ -107,12 +107,12 @@ fn opened(
 
 /// A hint at edits of a scene whose file is gone, if there are any.
 fn lost(path: &Path, state: Option<&Path>) -> String {
-    let found = Recovery::of(Some(path), "", state).find();
+    let found = Recovery::new(Some(path), "", state).find();
     let hint = |path: &Path| {
         let path = sanitized(&path.display().to_string());
         format!("\nUnsaved edits of it are kept in {path}, which is a scene file itself.")
     };
-    found.lost.first().map_or(String::new(), |lost| hint(lost.path()))
+    found.orphans.first().map_or(String::new(), |lost| hint(lost.path()))
 }
 
 /// `mirror-room-1.png  640x480  212 spp  noise 0.50 codes`

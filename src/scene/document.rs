@@ -44,7 +44,7 @@ impl Document {
     pub fn read_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         let name = path.display().to_string();
         read_text(path)
-            .and_then(|text| Self::parse_in(text, &name, AssetResolver::of(path, assets)))
+            .and_then(|text| Self::parse_in(text, &name, AssetResolver::new(path, assets)))
     }
 
     /// Reads and validates a scene from `text`; diagnostics call it `name`.
@@ -52,11 +52,11 @@ impl Document {
     /// # Errors
     /// As [`Scene::read`].
     pub fn parse(text: String, name: &str) -> Result<Self, SceneErrors> {
-        Self::parse_in(text, name, AssetResolver::of(Path::new(name), Arc::default()))
+        Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }
 
-    fn parse_in(text: String, name: &str, library: AssetResolver) -> Result<Self, SceneErrors> {
-        let source = SourceScene::parse(&text, name, library)?;
+    fn parse_in(text: String, name: &str, resolver: AssetResolver) -> Result<Self, SceneErrors> {
+        let source = SourceScene::parse(&text, name, resolver)?;
         let warnings = source.warnings();
         let migration_warning = source.migration_warning();
         let (scene, former_words) = (source.scene, source.former_words);

@@ -113,7 +113,7 @@ impl SceneFile {
     /// # Errors
     /// As [`Scene::parse`].
     pub fn parse(&self, text: &str, name: &str) -> Result<Scene, SceneErrors> {
-        Scene::parse_in(text, name, self.document.scene().library.clone())
+        Scene::parse_in(text, name, self.document.scene().resolver.clone())
     }
 
     /// Returns the hash of the bytes that this program last read from or wrote to the file; `None`
@@ -168,7 +168,7 @@ impl SceneFile {
         if let Ok(Some(found)) = content(&path) {
             self.fingerprint = found;
         }
-        *self = Self::open_with(&path, self.document.scene().library.assets())?;
+        *self = Self::open_with(&path, self.document.scene().resolver.assets())?;
         Ok(())
     }
 
@@ -201,10 +201,11 @@ impl SceneFile {
         scene: &Scene,
         overwrite: bool,
     ) -> Result<(), SaveError> {
-        let library = &scene.library;
+        let resolver = &scene.resolver;
         let meshes = scene.objects.iter().filter_map(|object| object.shape.file());
         let images = scene.materials.values().flat_map(|material| material.files());
-        if let Some(file) = meshes.chain(images).find(|file| library.loses(file, path)) {
+        if let Some(file) = meshes.chain(images).find(|file| resolver.breaks_when_moved(file, path))
+        {
             let file = sanitized(file);
             return Err(SaveError::Failed {
                 path: path.to_path_buf(),
@@ -214,7 +215,7 @@ impl SceneFile {
         let mut document = self.document.clone().renamed(&path.display().to_string());
         document.apply(scene);
         replace(path, document.text(), overwrite)?;
-        library.move_to(path);
+        resolver.move_to(path);
         self.path = Some(path.to_path_buf());
         self.fingerprint = fnv1a64(document.text().as_bytes());
         self.document = document;

@@ -47,7 +47,7 @@ struct Saved {
 #[derive(Debug, Default)]
 pub struct RecoveryFile {
     /// Orphaned edits, the newest first.
-    pub lost: Vec<Orphan>,
+    pub orphans: Vec<Orphan>,
     /// Files that cannot be read, and the reason. They stay on disk.
     pub unreadable: Vec<(PathBuf, String)>,
     /// `true` if another running process has unsaved edits of the scene.
@@ -81,7 +81,7 @@ pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathB
 impl Recovery {
     /// Creates the recovery of the scene in the file at `path`, or, without a file, of the scene
     /// called `name`. `state` is [`state_folder`].
-    pub fn of(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
+    pub fn new(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
         let mut candidates = Vec::new();
         let called = match path {
             Some(path) => {
@@ -153,14 +153,14 @@ impl Recovery {
                 }
                 match read_orphan(&path) {
                     Ok(Some(lost)) if lost.text.trim().is_empty() => lost.kept.remove(),
-                    Ok(Some(lost)) => found.lost.push(lost),
+                    Ok(Some(lost)) => found.orphans.push(lost),
                     Ok(None) => {}
                     Err(error) if error.kind() == ErrorKind::WouldBlock => found.elsewhere = true,
                     Err(error) => found.unreadable.push((path, error.to_string())),
                 }
             }
         }
-        found.lost.sort_by_key(|lost| std::cmp::Reverse(lost.written));
+        found.orphans.sort_by_key(|lost| std::cmp::Reverse(lost.written));
         found
     }
 

@@ -69,12 +69,12 @@ impl Scene {
     /// Loads the files that the scene names, unless they are loaded already. Errors in them are
     /// found by the next validation.
     pub fn resolve(&mut self) {
-        let library = &self.library;
+        let resolver = &self.resolver;
         for object in &mut self.objects {
-            object.shape.resolve(|name| library.mesh(name));
+            object.shape.resolve(|name| resolver.mesh(name));
         }
         for material in self.materials.values_mut() {
-            material.resolve(|name| library.image(name));
+            material.resolve(|name| resolver.image(name));
         }
     }
 
