@@ -1,4 +1,4 @@
-//! Objects: a shape with a transform and a material.
+//! Objects: a shape, where it stands, what it is made of.
 
 use crate::primitive::Form;
 use crate::shape::{KINDS, Shape, TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
@@ -6,40 +6,40 @@ use crate::value::{Field, ValidationError, Validator, ValueType};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 
-/// An object: a shape with a transform and a material.
+/// A thing: a shape, where it stands, what it is made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Object {
-    /// Name, unique in the scene; empty if it has none.
+    /// Name, unique in the scene; empty: none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
-    /// Key of `materials`; empty means the default material.
+    /// Key of `materials`; empty: the default finish.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub material: String,
-    /// Shape, in the object's space.
+    /// What it looks like.
     pub shape: Shape,
-    /// Transform from the object's space to the scene's: steps, the first one applied first.
+    /// Steps that move, turn and scale it, the first step first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub transform: Vec<TransformOp>,
 }
 
-/// Keys of `[[object]]`.
+/// The keys of `[[object]]`.
 pub const OBJECT_FIELDS: &[Field] = &[
-    Field::optional("name", ValueType::Text, "", "a number", "Name, unique in the scene."),
+    Field::optional("name", ValueType::Text, "", "a number", "Name; no two objects have the same."),
     Field::optional(
         "material",
         ValueType::Text,
         "",
         "a matt light grey, the default of every material key",
-        "Name of a material, `[materials.NAME]`.",
+        "Name of one of the `[materials.NAME]`.",
     ),
-    Field::required("shape", ValueType::OneOf(KINDS), "", "Shape: exactly one kind."),
+    Field::required("shape", ValueType::OneOf(KINDS), "", "What it looks like: exactly one kind."),
     Field::optional(
         "transform",
         ValueType::ListOf(TRANSFORM_OP_FIELDS),
         "",
-        "the identity",
-        "Steps that translate, rotate and scale it, applied in order.",
+        "it stays as its shape says",
+        "Steps that move, turn and scale it, the first step first.",
     ),
 ];
 

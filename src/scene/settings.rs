@@ -1,71 +1,70 @@
-//! Settings of the whole picture: film, integrator, background, ambient light.
+//! What holds for the whole picture: raster, tracing, background, ambient light.
 
 use crate::primitive::Acceleration;
 use crate::value::{Choice, Color, Field, NumberRange, ValidationError, Validator, ValueType};
 use serde::{Deserialize, Serialize};
 
-/// Film settings: size, pixel filter, sample limit of glossy pixels.
+/// The picture's raster.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FilmSettings {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Pixel filter.
+    /// How samples spread over a pixel.
     pub filter: Filter,
     /// Largest number of samples per pixel spent on glossy pictures; 0 is no cap.
     pub rays_per_pixel: u32,
 }
 
-/// Pixel filter: distribution of samples over a pixel.
+/// How samples spread over a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {
-    /// Uniform over the pixel's square.
+    /// Evenly over the pixel's square.
     Box,
-    /// All samples at the pixel's centre, without anti-aliasing.
+    /// All in its centre: no anti-aliasing.
     Point,
 }
 
-/// Integrator settings, the table `[trace]`.
+/// How far paths are followed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IntegratorSettings {
     /// Kinds of rays that are traced.
     pub ray_types: RayTypes,
-    /// Largest number of surfaces that a path hits after the first; 0 disables reflection and
-    /// transmission.
+    /// The most surfaces that a path meets after the first: 0 is no reflection and no transmission.
     pub max_depth: u32,
-    /// Paths with a smaller throughput end.
+    /// A path ends when what it could still add is weighted by less than this.
     pub min_throughput: f64,
-    /// Treatment of sampled reflections below the surface's horizon.
+    /// What becomes of a reflected ray that would dip under the surface.
     pub below_horizon: BelowHorizon,
-    /// Acceleration structure. Every choice renders the same image; only speed differs.
+    /// How rays are kept from things that they cannot meet.
     pub acceleration: Acceleration,
 }
 
-/// Kinds of rays that are traced.
+/// What is traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RayTypes {
-    /// Camera rays only, without shadows and reflections.
+    /// Camera rays only: no shadows, no reflections.
     Primary,
     /// Camera rays and shadow rays.
     Shadows,
-    /// Camera, shadow, reflected and transmitted rays.
+    /// Everything.
     Full,
 }
 
-/// Treatment of sampled reflections below the surface's horizon.
+/// What becomes of a reflected ray that would dip under the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BelowHorizon {
-    /// Mirrored at the surface, which conserves energy.
+    /// It is mirrored at the surface: no light is lost.
     Fold,
-    /// Dropped, which loses energy.
+    /// It is lost.
     Absorb,
 }
 
-/// Radiance of rays that hit no surface.
+/// What a ray sees that meets nothing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Background {
@@ -73,11 +72,11 @@ pub struct Background {
     pub color: Color,
 }
 
-/// Ambient light: uniform, without shadows.
+/// Light from everywhere, without shadows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Ambient {
-    /// Intensity i_a in k_a i_a.
+    /// i_a of k_a i_a.
     pub color: Color,
 }
 
@@ -111,10 +110,10 @@ impl Default for Ambient {
     }
 }
 
-/// Largest number of pixels: 8192 x 8192.
+/// The most pixels of a picture: 8192 x 8192.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// Keys of `[film]`.
+/// The keys of `[film]`.
 pub const FILM_FIELDS: &[Field] = &[
     Field::preset(
         "size",
@@ -126,12 +125,12 @@ pub const FILM_FIELDS: &[Field] = &[
     Field::preset(
         "filter",
         ValueType::Choice(&[
-            Choice { name: "box", doc: "uniform over the pixel's square" },
-            Choice { name: "point", doc: "all at the pixel's centre: no anti-aliasing" },
+            Choice { name: "box", doc: "evenly over the pixel's square" },
+            Choice { name: "point", doc: "all in its centre: no anti-aliasing" },
         ]),
         "",
         "\"box\"",
-        "Distribution of samples over a pixel.",
+        "How samples spread over a pixel.",
     ),
     Field::preset(
         "rays_per_pixel",
@@ -142,62 +141,62 @@ pub const FILM_FIELDS: &[Field] = &[
     ),
 ];
 
-/// Keys of `[trace]`.
+/// The keys of `[trace]`.
 pub const TRACE_FIELDS: &[Field] = &[
     Field::preset(
         "ray_types",
         ValueType::Choice(&[
             Choice { name: "primary", doc: "camera rays only: no shadows, no reflections" },
             Choice { name: "shadows", doc: "camera rays and shadow rays" },
-            Choice { name: "full", doc: "camera, shadow, reflected and transmitted rays" },
+            Choice { name: "full", doc: "everything" },
         ]),
         "",
         "\"full\"",
-        "Kinds of rays that are traced.",
+        "What is traced at all.",
     ),
     Field::preset(
         "max_depth",
         ValueType::Whole(NumberRange::closed(0.0, 10000.0)),
         "surfaces",
         "16",
-        "Largest number of surfaces that a path hits after the first; 0: no reflection, no transmission.",
+        "The most surfaces that a path meets after the first; 0: no reflection, no transmission.",
     ),
     Field::preset(
         "min_throughput",
         ValueType::Number(NumberRange::SHARE),
         "",
         "0.0",
-        "Paths whose throughput is smaller end.",
+        "A path ends when what it could still add is weighted by less than this.",
     ),
     Field::preset(
         "below_horizon",
         ValueType::Choice(&[
-            Choice { name: "fold", doc: "mirrored at the surface: no light is lost" },
-            Choice { name: "absorb", doc: "dropped: its light is lost" },
+            Choice { name: "fold", doc: "it is mirrored at the surface: no light is lost" },
+            Choice { name: "absorb", doc: "it is lost" },
         ]),
         "",
         "\"fold\"",
-        "Treatment of sampled reflections below the surface's horizon.",
+        "What becomes of a reflected ray that would dip under the surface.",
     ),
     Field::preset(
         "acceleration",
         ValueType::Choice(Acceleration::CHOICES),
         "",
         "\"auto\"",
-        "Acceleration structure. Every choice renders the same image; only speed differs.",
+        "How rays are kept from things that they cannot meet. It changes the time, never the picture.",
     ),
 ];
 
-/// Keys of `[background]`.
+/// The keys of `[background]`.
 pub const BACKGROUND_FIELDS: &[Field] = &[Field::preset(
     "color",
     ValueType::Color(NumberRange::LIGHT),
     "radiance",
     "[0.0, 0.0, 0.0]",
-    "Radiance of rays that hit no surface.",
+    "What a ray sees that meets nothing.",
 )];
 
-/// Keys of `[ambient]`.
+/// The keys of `[ambient]`.
 pub const AMBIENT_FIELDS: &[Field] = &[Field::preset(
     "color",
     ValueType::Color(NumberRange::LIGHT),
@@ -207,7 +206,7 @@ pub const AMBIENT_FIELDS: &[Field] = &[Field::preset(
 )];
 
 impl FilmSettings {
-    /// Returns the errors in the film settings.
+    /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
         let [width, height] = self.size;
         let checks =
@@ -225,7 +224,7 @@ impl FilmSettings {
 }
 
 impl IntegratorSettings {
-    /// Returns the errors in the integrator settings.
+    /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
         Validator::new(TRACE_FIELDS)
             .numbers("max_depth", &[f64::from(self.max_depth)])
@@ -235,14 +234,14 @@ impl IntegratorSettings {
 }
 
 impl Background {
-    /// Returns the errors in the background.
+    /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
         Validator::new(BACKGROUND_FIELDS).numbers("color", &self.color.0).validate()
     }
 }
 
 impl Ambient {
-    /// Returns the errors in the ambient light.
+    /// What is wrong with it.
     pub fn faults(&self) -> Vec<ValidationError> {
         Validator::new(AMBIENT_FIELDS).numbers("color", &self.color.0).validate()
     }
