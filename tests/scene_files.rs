@@ -1,4 +1,4 @@
-//! The scene files that come with the program, and those that must be refused.
+//! The scene files in `scenes`, and the invalid ones in `tests/bad-scenes`.
 
 use std::path::{Path, PathBuf};
 use zerkalo::primitive::Form;
@@ -14,7 +14,7 @@ fn files(folder: &str) -> Vec<PathBuf> {
     paths
 }
 
-/// Compares `text` with the file at `path`; with ZERKALO_BLESS set writes it there instead.
+/// Compares `text` with the file at `path`; writes it there instead if `ZERKALO_BLESS` is set.
 fn golden(path: &Path, text: &str) {
     if std::env::var_os("ZERKALO_BLESS").is_some() {
         std::fs::write(path, text).unwrap();
@@ -30,7 +30,7 @@ fn golden(path: &Path, text: &str) {
 }
 
 #[test]
-fn every_bad_scene_is_refused_with_its_words() {
+fn every_bad_scene_gives_its_expected_errors() {
     let paths = files("tests/bad-scenes");
     assert!(paths.len() >= 40, "only {} bad scenes", paths.len());
     for path in paths {
@@ -45,16 +45,16 @@ fn every_bad_scene_is_refused_with_its_words() {
     }
 }
 
-/// Scenes that are meant to be warned about, and the words of the warning.
+/// Scenes with an intended warning, and a part of its text.
 const WARNED: &[(&str, &str)] = &[
     ("brighter-than-its-light.toml", "more than the light"),
-    // Colours up to 7, as its formula has them.
+    // Colours up to 7, as its formula gives them.
     ("reflecting-tracks.toml", "more than the light"),
     ("reflecting-tracks-lit.toml", "more than the light"),
 ];
 
 #[test]
-fn every_scene_can_be_read_and_says_what_it_shows() {
+fn every_scene_reads_and_has_a_title_comment() {
     let paths = files("scenes");
     assert!(paths.len() >= 30, "only {} scenes", paths.len());
     for path in paths {
@@ -78,11 +78,11 @@ fn every_scene_can_be_read_and_says_what_it_shows() {
 }
 
 #[test]
-fn the_reference_is_fresh() {
+fn scene_format_reference_is_up_to_date() {
     golden(Path::new("docs/scene-format.md"), &zerkalo::scene::reference());
 }
 
-/// The corners of an object of the mirror room.
+/// Returns the corners of an object of the mirror room.
 fn corners(scene: &Scene, name: &str) -> Vec<[f64; 3]> {
     let object = scene.objects.iter().find(|o| o.name == name).unwrap();
     match object.shape.form() {
@@ -92,7 +92,7 @@ fn corners(scene: &Scene, name: &str) -> Vec<[f64; 3]> {
 }
 
 #[test]
-fn the_mirror_room_is_the_one_that_is_measured() {
+fn mirror_room_has_published_coordinates() {
     let physical = Scene::read("scenes/mirror-room-physical.toml".as_ref()).unwrap();
     let beautiful = Scene::read("scenes/mirror-room.toml".as_ref()).unwrap();
     let shapes = |scene: &Scene| scene.objects.iter().map(|o| o.shape.clone()).collect::<Vec<_>>();
@@ -113,14 +113,14 @@ fn the_mirror_room_is_the_one_that_is_measured() {
     assert_eq!(has("prism", &prism).len(), 6);
     let pyramid = [[1.05, 0.0, 0.85], [1.95, 0.0, -0.05], [1.3, 0.7, 0.6], [1.7, 0.7, 0.2]];
     assert_eq!(has("pyramid", &pyramid).len(), 8);
-    // The near right edge of the cube: (0.4, 0.4) turned by 30 degrees about the vertical.
+    // The near right edge of the cube: (0.4, 0.4) rotated by 30 degrees about the vertical.
     let (sin, cos) = 30f64.to_radians().sin_cos();
     let (x, z) = (0.5 + 0.4 * (cos + sin), -0.3 + 0.4 * (cos - sin));
     assert_eq!(has("cube", &[[x, 0.0, z], [x, 0.8, z]]).len(), 8);
 }
 
 #[test]
-fn places_are_found_for_warnings() {
+fn warnings_have_line_and_column() {
     let text = "# Dubious.\n[[object]]\nname = \"ball\"\nshape.sphere = { center = [0, 0, 0], radius = 1 }\n\n\
                 [[light]]\nname = \"lamp\"\npoint.position = [0, 5, 0]\nintensity = 0\n\n\
                 [[light]]\npoint.position = [0, 5, 0]\nintensity = 0\n\n\
@@ -135,7 +135,7 @@ fn places_are_found_for_warnings() {
 }
 
 #[test]
-fn what_cannot_be_read_is_told() {
+fn unreadable_scene_files_are_reported() {
     let missing = Scene::read("scenes/no-such.toml".as_ref()).unwrap_err().to_string();
     assert!(missing.starts_with("scenes/no-such.toml  there is no such file."), "{missing}");
     let scene = |text: &str| Scene::parse(text, "s.toml");
@@ -143,12 +143,12 @@ fn what_cannot_be_read_is_told() {
     let many = scene(&many).unwrap_err();
     assert_eq!(many.messages().len(), 50);
     assert!(many.to_string().ends_with("… and 30 more."), "{many}");
-    // A byte order mark and Windows line ends are no faults, and do not count as columns.
+    // A byte order mark and Windows line ends are valid and do not count as columns.
     let marked = "\u{feff}[[object]]\r\nshape.sphere = { center = [0, 0, 0], radius = 1 }\r\n";
     assert!(scene(marked).is_ok());
     let error = scene(&marked.replace("[[object]]", "wrong = 1")).unwrap_err();
     assert_eq!(error.messages()[0].line_column, Some((1, 1)));
-    // Without a material, a camera, a light: the defaults.
+    // Defaults apply without a material, a camera and a light.
     let bare = scene(marked).unwrap();
     assert_eq!(bare.objects[0].material, "");
     assert_eq!(bare.faults(), []);
@@ -156,13 +156,13 @@ fn what_cannot_be_read_is_told() {
 
 #[cfg(unix)]
 #[test]
-fn an_endless_device_is_not_read_to_its_end() {
+fn endless_device_is_read_up_to_the_size_limit() {
     let error = Scene::read("/dev/zero".as_ref()).unwrap_err().to_string();
     assert!(error.contains("larger than 64 MiB"), "{error}");
 }
 
 #[test]
-fn the_tracks_are_where_their_formula_puts_them() {
+fn reflecting_tracks_follow_their_formula() {
     for file in ["scenes/reflecting-tracks.toml", "scenes/reflecting-tracks-lit.toml"] {
         let scene = Scene::read(file.as_ref()).unwrap();
         assert_eq!(scene.objects.len(), 401);

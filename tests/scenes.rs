@@ -1,5 +1,6 @@
-//! Every scene of the folder `scenes`: what it is compiled to, and that its picture stays what it is.
-//! `ZERKALO_BLESS=1 cargo test --test scenes` writes the expected values anew.
+//! Every scene of the folder `scenes`: its inventory and its picture.
+//!
+//! `ZERKALO_BLESS=1 cargo test --test scenes` writes the expected values.
 
 #[path = "common/normal.rs"]
 mod normal;
@@ -18,21 +19,21 @@ use zerkalo::render::RenderState;
 use zerkalo::scene::Scene;
 use zerkalo::world::{self, AnyWorld, Precision};
 
-/// Raster and samples per replicate of the pictures that are compared.
+/// Size and samples per replicate of the compared pictures.
 const SIZE: [u32; 2] = [48, 32];
 const COUNT: u32 = 32;
 /// Side of the blocks whose mean colours are compared, in pixels.
 const BLOCK: usize = 8;
-/// The reference is the mean over renderings with these seeds.
+/// Seeds of the renderings whose mean is the reference.
 const REFERENCE_SEEDS: std::ops::Range<u64> = 1..65;
-/// Means are stored to this many decimals.
+/// Decimals of the stored means.
 const DECIMALS: usize = 6;
 
 fn golden(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name)
 }
 
-/// The expected text, after writing it if that is asked for.
+/// Returns the expected text; writes it first if `ZERKALO_BLESS` is set.
 fn expected(name: &str, actual: impl FnOnce() -> String) -> String {
     if std::env::var_os("ZERKALO_BLESS").is_some() {
         fs::write(golden(name), actual()).unwrap();
@@ -45,7 +46,7 @@ fn compiled(scene: &Scene) -> AnyWorld {
 }
 
 #[test]
-fn every_scene_is_compiled_to_what_it_requires() {
+fn every_scene_compiles_to_its_inventory() {
     let mut actual = String::new();
     for (name, scene) in all_shipped() {
         writeln!(actual, "{name}: {}", compiled(&scene).inventory()).unwrap();
@@ -57,8 +58,9 @@ fn every_scene_is_compiled_to_what_it_requires() {
     assert_eq!(actual.lines().count(), expected.lines().count());
 }
 
-/// Mean colour of each block and the squared standard error of that mean, row by row. The pixels are
-/// independent, and the half difference of the replicates has the variance of their mean.
+/// Returns the mean colour of each block and the squared standard error of that mean, row by row.
+/// The pixels are independent, and half the difference of the replicates has the variance of their
+/// mean.
 fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     let [columns, rows] = SIZE.map(|n| n as usize / BLOCK);
     let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(rendering, part));
@@ -75,8 +77,8 @@ fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     blocks
 }
 
-/// The reference of a scene: for each block a line of three means and the three standard errors that
-/// one rendering's means have.
+/// Returns the reference of a scene: for each block a line with three means and the three standard
+/// errors of the means of one rendering.
 fn reference(scene: &Scene) -> String {
     let pool = pool(2);
     let seeds = REFERENCE_SEEDS.count() as f64;
@@ -118,21 +120,21 @@ fn parse_references(text: &str) -> References {
     references
 }
 
-/// The number of standard errors that the largest of `n` deviations exceeds as rarely as one deviation
-/// exceeds four (Sidak).
+/// Returns the number of standard errors that the largest of `n` deviations exceeds as rarely as
+/// one deviation exceeds four (Sidak).
 fn threshold(n: usize) -> f64 {
     two_sided_z(1.0 - (1.0 - tail(4.0)).powf(1.0 / n as f64))
 }
 
 #[test]
-fn thresholds_are_those_of_the_normal_distribution() {
+fn thresholds_follow_the_normal_distribution() {
     assert!((tail(4.0) / 6.334e-5 - 1.0).abs() < 1e-3);
     assert!((threshold(1) - 4.0).abs() < 1e-9);
     assert!((threshold(2880) - 5.59).abs() < 0.02, "{}", threshold(2880));
 }
 
 #[test]
-fn every_scene_renders_as_it_did() {
+fn every_scene_renders_its_golden_picture() {
     let scenes: Vec<_> =
         all_shipped().into_iter().map(|(name, scene)| (name, sized(scene, SIZE))).collect();
     let text = expected("scenes.txt", || {
@@ -142,7 +144,7 @@ fn every_scene_renders_as_it_did() {
     let references = parse_references(&text);
     let values = references.values().flatten().count() * 3;
     let threshold = threshold(values);
-    // The reference is a mean over so many renderings, rounded.
+    // The reference is a rounded mean over this many renderings.
     let with_reference = (1.0 + 1.0 / REFERENCE_SEEDS.count() as f64).sqrt();
     let rounding = 10f64.powi(-(DECIMALS as i32));
     let mut wrong = Vec::new();
@@ -175,7 +177,7 @@ fn every_scene_renders_as_it_did() {
 }
 
 #[test]
-fn the_furnace_is_exactly_1() {
+fn furnace_radiance_is_exactly_1() {
     let scene = shipped("furnace.toml");
     for precision in [Precision::Single, Precision::Double] {
         let rendering = rendered(&scene, 3, precision, 16);
@@ -188,9 +190,9 @@ fn the_furnace_is_exactly_1() {
     }
 }
 
-/// Without anti-aliasing and lobes nothing is left to chance.
+/// Without anti-aliasing and lobes no sample is random.
 #[test]
-fn without_chance_both_replicates_are_equal() {
+fn deterministic_scenes_have_equal_replicates() {
     for (name, mut scene) in all_shipped() {
         scene = sized(scene, SIZE);
         without_chance(&mut scene);
@@ -204,7 +206,7 @@ fn without_chance_both_replicates_are_equal() {
 }
 
 #[test]
-fn double_precision_is_chosen_where_the_proportions_need_it() {
+fn auto_precision_is_double_for_extreme_proportions() {
     let chosen = |scene: &Scene| match compiled(scene) {
         AnyWorld::Single(_) => Precision::Single,
         AnyWorld::Double(_) => Precision::Double,

@@ -1,5 +1,5 @@
-//! When a film is said to serve an edited scene, its samples mixed for that scene are the picture that a fresh render
-//! gives. Every key of every description is edited, found by the tables of fields.
+//! Relighting: if a film can be reused for an edited scene, its samples mixed for that scene are
+//! the picture of a fresh render. Every key of every description, from the field tables, is edited.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -24,7 +24,8 @@ use zerkalo::world::Precision;
 const SEED: u64 = 11;
 const SAMPLES: u32 = 2;
 
-/// One of each kind on a grid before the camera, of all kinds of finish, under all kinds of light.
+/// Returns a scene with one object of each kind on a grid before the camera, with all kinds of
+/// material, under all kinds of light.
 fn base() -> Scene {
     let mut text = "
         film = { size = [30, 20], rays_per_pixel = 64 }
@@ -115,7 +116,7 @@ fn rendered(scene: &Scene, pool: &rayon::ThreadPool) -> RenderState {
     rendering
 }
 
-/// Another value for `key` of `scene`; whether that gives a scene is seen later.
+/// Returns another value for `key` of `scene`, which may be invalid.
 fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value> {
     let names: Vec<String> =
         scene["materials"].as_table().unwrap().keys().cloned().chain([String::new()]).collect();
@@ -219,7 +220,7 @@ fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value
     })
 }
 
-/// Edits `key`: another value, or none.
+/// Sets `key` to another value or removes it.
 fn edit(changed: &mut Table, key: &Key, numbers: &mut Numbers) {
     if numbers.below(8) == 0 {
         return put(changed, &key.path, None);
@@ -235,7 +236,7 @@ struct Bench {
     pool: rayon::ThreadPool,
     tried: usize,
     served: usize,
-    /// The last parts of the keys, whose edits were served or not.
+    /// Last parts of the keys whose edits the film was reused for, and of the others.
     by_key: [BTreeSet<String>; 2],
 }
 
@@ -246,9 +247,10 @@ impl Bench {
         Self { base, film, pool, tried: 0, served: 0, by_key: Default::default() }
     }
 
-    /// Whether the film serves the edited scene; then the picture has to be its own.
+    /// Returns `true` if the film is reused for the edited scene, after a check of its picture;
+    /// `None` if the edit is invalid.
     fn holds(&mut self, changed: &Table, what: &str) -> Option<bool> {
-        let edited = scene(changed, &self.base.library)?;
+        let edited = scene(changed, &self.base.resolver)?;
         self.tried += 1;
         if !self.film.try_reuse(&Arc::new(edited.clone())) {
             return Some(false);
@@ -259,7 +261,8 @@ impl Bench {
         assert_eq!(relit.len(), fresh.len(), "{what}");
         let brightest = fresh.iter().flatten().fold(1.0f64, |m, x| m.max(*x));
         for (relit, fresh) in relit.iter().flatten().zip(fresh.iter().flatten()) {
-            // Rounding of the samples to the film's steps, and of shares in single precision.
+            // Tolerance for the rounding of samples to the film's steps and of weights in single
+            // precision.
             assert!((relit - fresh).abs() < 1e-6 * brightest, "{what}: {relit} is {fresh} afresh");
         }
         Some(true)
@@ -267,7 +270,7 @@ impl Bench {
 }
 
 #[test]
-fn what_is_served_is_the_picture_of_the_edited_scene() {
+fn relit_film_equals_render_of_the_edited_scene() {
     let mut bench = Bench::new();
     let mut numbers = Numbers::new(5);
     let plain = table(&bench.base);
@@ -283,7 +286,7 @@ fn what_is_served_is_the_picture_of_the_edited_scene() {
             }
         }
     }
-    // Several edits at once, of what may be served more often than of the rest.
+    // Several edits at once, more often of keys that allow relighting.
     let mild = |key: &&Key| {
         matches!(key.path[0].as_str(), "light" | "ambient" | "background" | "materials")
     };
@@ -312,9 +315,9 @@ fn what_is_served_is_the_picture_of_the_edited_scene() {
     }
 }
 
-/// The material that only a part of a compound names.
+/// A material that only a part of a compound names.
 #[test]
-fn the_finish_of_a_part_is_part_of_the_picture() {
+fn material_of_a_compound_part_prevents_relighting() {
     let mut bench = Bench::new();
     for name in ["inner", "cut"] {
         let mut edited = bench.base.clone();

@@ -355,6 +355,22 @@ mod tests {
     }
 
     #[test]
+    fn former_names_of_accelerations_and_settings_are_accepted() {
+        for structure in Acceleration::ALL {
+            for name in structure.former_name().into_iter().chain([structure.name()]) {
+                let args = render(&["--acceleration", name]).unwrap();
+                assert_eq!(args.acceleration, Some(structure), "{name}");
+            }
+        }
+        assert!(render(&["--acceleration", "tree"]).is_err());
+        for (former, present) in
+            [("level", "ray-types"), ("depth", "max-depth"), ("min-weight", "min-throughput")]
+        {
+            assert_eq!(former.parse::<Experiment>(), present.parse::<Experiment>(), "{former}");
+        }
+    }
+
+    #[test]
     fn sizes_have_two_sides() {
         assert_eq!(render(&["--size", "640x480"]).unwrap().picture.size, Some([640, 480]));
         for wrong in ["640", "640x", "x480", "640x-1", "640X480", "1x1x1", "5000000000x1", ""] {

@@ -91,7 +91,12 @@ fn open(
     state: Option<&Path>,
 ) -> Result<Result<SceneFile, (PathBuf, SceneErrors)>, Failure> {
     match SceneFile::open_with(path, assets) {
-        Ok(file) => Ok(Ok(file)),
+        Ok(file) => {
+            if let Some(warning) = file.document().migration_warning() {
+                warn(&format!("warning: {warning}"));
+            }
+            Ok(Ok(file))
+        }
         Err(errors) => {
             let readable = File::open(path).and_then(|file| file.metadata());
             match readable.is_ok_and(|metadata| metadata.is_file()) {
@@ -104,12 +109,12 @@ fn open(
 
 /// Hint at unsaved edits of a scene whose file is gone; empty without any.
 fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
-    let found = Recovery::of(Some(path), "", state).find();
+    let found = Recovery::new(Some(path), "", state).find();
     let hint = |path: &Path| {
         let path = sanitized(&path.display().to_string());
         format!("\nUnsaved edits of it are kept in {path}, which is a scene file itself.")
     };
-    found.lost.first().map_or(String::new(), |lost| hint(lost.path()))
+    found.orphans.first().map_or(String::new(), |lost| hint(lost.path()))
 }
 
 /// `mirror-room-1.png  640x480  212 spp  noise 0.50 8-bit levels`

@@ -23,7 +23,7 @@ impl PartialEq for AssetResolver {
 impl AssetResolver {
     /// Creates the resolver of a scene that is stored in the file `scene`; `assets` caches what is
     /// read.
-    pub fn of(scene: &Path, assets: Arc<Assets>) -> Self {
+    pub fn new(scene: &Path, assets: Arc<Assets>) -> Self {
         let out = Self { folder: Arc::default(), assets };
         out.move_to(scene);
         out
@@ -51,10 +51,10 @@ impl AssetResolver {
 
     /// Returns `true` if `name` leads to a file from the present folder, but not to the same file
     /// from the folder of `scene`.
-    pub(super) fn loses(&self, name: &str, scene: &Path) -> bool {
+    pub(super) fn breaks_when_moved(&self, name: &str, scene: &Path) -> bool {
         let there = fs::canonicalize(folder_of(scene).join(name));
         fs::canonicalize(self.folder().join(name))
-            .is_ok_and(|here| there.ok().is_none_or(|there| there != here))
+            .is_ok_and(|target| there.ok().is_none_or(|there| there != target))
     }
 
     fn folder(&self) -> PathBuf {

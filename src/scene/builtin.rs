@@ -20,7 +20,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_can_be_read_without_a_warning() {
+    fn builtin_scenes_read_without_warnings() {
         assert!(built_in().objects.len() >= 6);
         for text in [BUILT_IN, starter()] {
             let scene = Scene::parse(text, "text").unwrap_or_else(|e| panic!("{e}"));
@@ -30,7 +30,7 @@ mod tests {
     }
 
     #[test]
-    fn the_starter_names_every_shape() {
+    fn starter_scene_names_every_shape() {
         for (key, _) in crate::shape::EXAMPLES {
             assert!(starter().contains(key), "{key}");
         }

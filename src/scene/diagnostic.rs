@@ -65,16 +65,15 @@ impl SceneErrors {
     }
 
     /// Creates an error about one location in the file.
-    pub(super) fn at(file: &str, place: Option<(usize, usize)>, found: String, help: &str) -> Self {
+    pub(super) fn at(
+        file: &str,
+        line_column: Option<(usize, usize)>,
+        found: String,
+        help: &str,
+    ) -> Self {
         let (file, help) = (file.to_string(), help.to_string());
         Self {
-            messages: vec![Diagnostic {
-                file,
-                line_column: place,
-                subject: String::new(),
-                found,
-                help,
-            }],
+            messages: vec![Diagnostic { file, line_column, subject: String::new(), found, help }],
         }
     }
 

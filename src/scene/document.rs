@@ -22,6 +22,8 @@ pub struct Document {
     former_words: Vec<FormerWord>,
     /// Warnings about the text as read.
     warnings: Vec<Diagnostic>,
+    /// The one of the warnings that is about words of earlier versions.
+    migration_warning: Option<Diagnostic>,
     text: String,
     scene: Scene,
 }
@@ -42,7 +44,7 @@ impl Document {
     pub fn read_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         let name = path.display().to_string();
         read_text(path)
-            .and_then(|text| Self::parse_in(text, &name, AssetResolver::of(path, assets)))
+            .and_then(|text| Self::parse_in(text, &name, AssetResolver::new(path, assets)))
     }
 
     /// Reads and validates a scene from `text`; diagnostics call it `name`.
@@ -50,18 +52,20 @@ impl Document {
     /// # Errors
     /// As [`Scene::read`].
     pub fn parse(text: String, name: &str) -> Result<Self, SceneErrors> {
-        Self::parse_in(text, name, AssetResolver::of(Path::new(name), Arc::default()))
+        Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }
 
-    fn parse_in(text: String, name: &str, library: AssetResolver) -> Result<Self, SceneErrors> {
-        let source = SourceScene::parse(&text, name, library)?;
+    fn parse_in(text: String, name: &str, resolver: AssetResolver) -> Result<Self, SceneErrors> {
+        let source = SourceScene::parse(&text, name, resolver)?;
         let warnings = source.warnings();
+        let migration_warning = source.migration_warning();
         let (scene, former_words) = (source.scene, source.former_words);
         Ok(Self {
             name: name.to_string(),
             origin: (text.clone(), scene.clone()),
             former_words,
             warnings,
+            migration_warning,
             text,
             scene,
         })
@@ -75,6 +79,7 @@ impl Document {
             origin: (text.clone(), scene.clone()),
             former_words: Vec::new(),
             warnings: Vec::new(),
+            migration_warning: None,
             text,
             scene: scene.clone(),
         }
@@ -116,6 +121,11 @@ impl Document {
     /// line and column, and one about words of earlier versions.
     pub fn warnings(&self) -> &[Diagnostic] {
         &self.warnings
+    }
+
+    /// Returns the warning about words of earlier versions in the file as it was read.
+    pub fn migration_warning(&self) -> Option<&Diagnostic> {
+        self.migration_warning.as_ref()
     }
 }
 

@@ -50,19 +50,19 @@ pub enum SaveError {
 
 impl fmt::Display for SaveError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let shown = |path: &PathBuf| sanitized(&path.display().to_string());
+        let printable = |path: &PathBuf| sanitized(&path.display().to_string());
         match self {
             Self::Untitled => f.write_str("this scene has no file yet; save it under a name"),
             Self::Changed(path) => write!(
                 f,
                 "{} was changed by another program; reload it, overwrite it, or save under another \
                  name",
-                shown(path)
+                printable(path)
             ),
             Self::Exists(path) => {
-                write!(f, "{} exists; overwrite it or choose another name", shown(path))
+                write!(f, "{} exists; overwrite it or choose another name", printable(path))
             }
-            Self::Failed { path, what } => write!(f, "cannot write {}: {what}", shown(path)),
+            Self::Failed { path, what } => write!(f, "cannot write {}: {what}", printable(path)),
         }
     }
 }
@@ -113,7 +113,7 @@ impl SceneFile {
     /// # Errors
     /// As [`Scene::parse`].
     pub fn parse(&self, text: &str, name: &str) -> Result<Scene, SceneErrors> {
-        Scene::parse_in(text, name, self.document.scene().library.clone())
+        Scene::parse_in(text, name, self.document.scene().resolver.clone())
     }
 
     /// Returns the hash of the bytes that this program last read from or wrote to the file; `None`
@@ -168,7 +168,7 @@ impl SceneFile {
         if let Ok(Some(found)) = content(&path) {
             self.fingerprint = found;
         }
-        *self = Self::open_with(&path, self.document.scene().library.assets())?;
+        *self = Self::open_with(&path, self.document.scene().resolver.assets())?;
         Ok(())
     }
 
@@ -201,10 +201,11 @@ impl SceneFile {
         scene: &Scene,
         overwrite: bool,
     ) -> Result<(), SaveError> {
-        let library = &scene.library;
+        let resolver = &scene.resolver;
         let meshes = scene.objects.iter().filter_map(|object| object.shape.file());
         let images = scene.materials.values().flat_map(|material| material.files());
-        if let Some(file) = meshes.chain(images).find(|file| library.loses(file, path)) {
+        if let Some(file) = meshes.chain(images).find(|file| resolver.breaks_when_moved(file, path))
+        {
             let file = sanitized(file);
             return Err(SaveError::Failed {
                 path: path.to_path_buf(),
@@ -214,7 +215,7 @@ impl SceneFile {
         let mut document = self.document.clone().renamed(&path.display().to_string());
         document.apply(scene);
         replace(path, document.text(), overwrite)?;
-        library.move_to(path);
+        resolver.move_to(path);
         self.path = Some(path.to_path_buf());
         self.fingerprint = fnv1a64(document.text().as_bytes());
         self.document = document;
@@ -243,7 +244,7 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
     let is_link = path.symlink_metadata().is_ok_and(|m| m.file_type().is_symlink());
     let file = match is_link.then(|| fs::canonicalize(path)) {
         Some(Ok(real)) => real,
-        Some(Err(_)) => return Err(failed("it is a link that leads nowhere".to_string())),
+        Some(Err(_)) => return Err(failed("it is a symbolic link without a target".to_string())),
         None => path.to_path_buf(),
     };
     let existing = fs::metadata(&file).ok();
@@ -282,8 +283,9 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
     let explained = |error: io::Error| failed(explain(&error, directory));
     let temporary = written.map_err(explained)?;
     // A file that was created in the meantime is not overwritten either.
-    let put = if overwrite { temporary.persist(&file) } else { temporary.persist_noclobber(&file) };
-    put.map_err(|e| match e.error.kind() {
+    let persisted =
+        if overwrite { temporary.persist(&file) } else { temporary.persist_noclobber(&file) };
+    persisted.map_err(|e| match e.error.kind() {
         ErrorKind::AlreadyExists => SaveError::Exists(path.to_path_buf()),
         _ => explained(e.error),
     })?;
@@ -295,15 +297,15 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
 }
 
 fn explain(error: &io::Error, directory: &Path) -> String {
-    let shown = sanitized(&directory.display().to_string());
+    let directory = sanitized(&directory.display().to_string());
     match error.kind() {
-        ErrorKind::NotFound => format!("the directory {shown} does not exist; create it first"),
-        ErrorKind::NotADirectory => format!("{shown} is not a directory"),
+        ErrorKind::NotFound => format!("the directory {directory} does not exist; create it first"),
+        ErrorKind::NotADirectory => format!("{directory} is not a directory"),
         ErrorKind::PermissionDenied => {
-            format!("no permission to write in the directory {shown}; save somewhere else")
+            format!("no permission to write in the directory {directory}; save somewhere else")
         }
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-            format!("no space is left in {shown}")
+            format!("no space is left in {directory}")
         }
         _ => error.to_string(),
     }

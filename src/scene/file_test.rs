@@ -24,7 +24,7 @@ fn count(directory: &Path) -> usize {
 }
 
 #[test]
-fn saving_there_and_back_gives_the_same_bytes() {
+fn saving_and_undoing_gives_the_same_bytes() {
     let directory = tempfile::tempdir().unwrap();
     let (path, mut file) = opened(directory.path());
     let start = file.document().scene().clone();
@@ -38,7 +38,7 @@ fn saving_there_and_back_gives_the_same_bytes() {
 }
 
 #[test]
-fn another_writer_is_noticed() {
+fn changes_by_other_programs_are_detected() {
     let directory = tempfile::tempdir().unwrap();
     let (path, mut file) = opened(directory.path());
     let theirs = BUILT_IN.replace("[640, 480]", "[320, 240]");
@@ -60,7 +60,7 @@ fn another_writer_is_noticed() {
 }
 
 #[test]
-fn a_broken_file_is_told_once_and_harms_nothing() {
+fn broken_file_is_reported_once_and_document_stays() {
     let directory = tempfile::tempdir().unwrap();
     let (path, mut file) = opened(directory.path());
     fs::write(&path, BUILT_IN.replace("radius = 0.5", "radius = -0.5")).unwrap();
@@ -74,7 +74,7 @@ fn a_broken_file_is_told_once_and_harms_nothing() {
 }
 
 #[test]
-fn saving_under_another_name_overwrites_nothing_unasked() {
+fn save_as_does_not_overwrite_unless_asked() {
     let directory = tempfile::tempdir().unwrap();
     let mut file = SceneFile::untitled(BUILT_IN.to_string(), "mirror-room.toml").unwrap();
     let scene = edited(&file, 3);
@@ -95,7 +95,7 @@ fn saving_under_another_name_overwrites_nothing_unasked() {
 }
 
 #[test]
-fn what_cannot_be_written_says_why() {
+fn failed_saves_give_the_cause() {
     let directory = tempfile::tempdir().unwrap();
     let (path, mut file) = opened(directory.path());
     let scene = edited(&file, 3);
@@ -114,7 +114,7 @@ fn what_cannot_be_written_says_why() {
 
 #[test]
 #[cfg(unix)]
-fn links_and_permissions_stay() {
+fn saving_keeps_links_and_permissions() {
     use std::os::unix::fs::PermissionsExt;
     let directory = tempfile::tempdir().unwrap();
     let (path, _) = opened(directory.path());

@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_go_back_and_forth() {
+    fn undo_and_redo_restore_scenes() {
         let mut history = History::new(scene(0));
         assert!(history.is_saved() && history.undo().is_none() && history.redo().is_none());
         assert!(history.record(scene(1), "one", false));
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gesture_is_one_step() {
+    fn steps_of_a_gesture_are_coalesced() {
         let mut history = History::new(scene(0));
         for i in 1..50 {
             history.record(scene(i), "drag", true);
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn saved_is_what_the_scene_says_not_how_it_came() {
+    fn is_saved_compares_scenes_not_steps() {
         let mut history = History::new(scene(0));
         history.record(scene(1), "one", true);
         history.mark_saved(Arc::clone(history.scene()));
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_bounded() {
+    fn history_memory_is_bounded() {
         let mut large = (*scene(0)).clone();
         let text = "object = [{ shape.sphere = { center = [0, 0, 0], radius = 1 } }]";
         let ball = Scene::parse(text, "").unwrap().objects.remove(0);

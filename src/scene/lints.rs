@@ -9,8 +9,8 @@ impl Scene {
     /// Returns one warning for each kind of doubtful value: the first case, and the number of
     /// others. [`Document::warnings`](crate::scene::Document::warnings) adds file, line and column.
     pub fn warnings(&self) -> Vec<Problem> {
-        let materials = |dubious: &dyn Fn(&Material) -> Option<(&'static str, String)>| {
-            let mut cases = self.materials.iter().filter_map(|(n, m)| Some((n, dubious(m)?)));
+        let materials = |lint: &dyn Fn(&Material) -> Option<(&'static str, String)>| {
+            let mut cases = self.materials.iter().filter_map(|(n, m)| Some((n, lint(m)?)));
             let (name, (key, found)) = cases.next()?;
             Some((
                 vec!["materials".to_string(), name.clone(), key.to_string()],
@@ -18,7 +18,7 @@ impl Scene {
                 cases.count(),
             ))
         };
-        let mut findings = Vec::new();
+        let mut problems = Vec::new();
         let mut add = |case: Option<(Vec<String>, String, usize)>, help: &str| {
             let Some((path, found, others)) = case else { return };
             let path: Vec<&str> = path.iter().map(String::as_str).collect();
@@ -27,7 +27,7 @@ impl Scene {
                 1 => " (and one more like it)".to_string(),
                 n => format!(" (and {n} more like it)"),
             };
-            findings.push(self.finding(&path, found + &more, help.to_string()));
+            problems.push(self.problem(&path, found + &more, help.to_string()));
         };
         add(
             materials(&brighter_than_its_light),
@@ -36,10 +36,7 @@ impl Scene {
         add(
             materials(&|m| {
                 let alpha = m.alpha.filter(|a| *a > 2.0 && m.has_microfacets())?;
-                Some((
-                    "alpha",
-                    format!("alpha is {}, grooves far steeper than they are wide", number(alpha)),
-                ))
+                Some(("alpha", format!("alpha is {}, grooves far deeper than wide", number(alpha))))
             }),
             "Surfaces have an alpha from 0 to about 1.",
         );
@@ -61,7 +58,7 @@ impl Scene {
             }),
             "The picture will be black. A light begins with [[light]].",
         );
-        findings
+        problems
     }
 
     fn dark_light(&self) -> Option<(Vec<String>, String, usize)> {

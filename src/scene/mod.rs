@@ -69,7 +69,7 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// Resolver of the files that the scene names.
     #[serde(skip)]
-    pub library: AssetResolver,
+    pub resolver: AssetResolver,
 }
 
 #[cfg(test)]

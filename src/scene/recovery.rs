@@ -16,7 +16,7 @@ use tempfile::NamedTempFile;
 
 /// Largest number of recovery files of one scene in one folder, from crashed or concurrent
 /// sessions.
-const MOST: u32 = 9;
+const MAX_FILES: u32 = 9;
 /// Size above which a file is not read [bytes].
 const MAX_BYTES: u64 = 64 << 20;
 /// Start of the first line; the fingerprint of the scene's file follows.
@@ -26,14 +26,14 @@ const NO_FILE: &str = "none";
 /// Prefix and suffix of the names of temporary files.
 pub(super) const TEMPORARY: [&str; 2] = [".zerkalo-", ".tmp"];
 /// Age above which an unlocked temporary file is removed.
-const SWEPT_AFTER: Duration = Duration::from_secs(60);
+const STALE_AFTER: Duration = Duration::from_secs(60);
 
 /// Writer and finder of the recovery files of one scene.
 #[derive(Debug)]
 pub struct Recovery {
     /// Candidate folders and file names, in order of preference.
-    homes: Vec<(PathBuf, OsString)>,
-    own: Option<Saved>,
+    candidates: Vec<(PathBuf, OsString)>,
+    saved: Option<Saved>,
 }
 
 /// A recovery file and the handle that holds its lock.
@@ -47,7 +47,7 @@ struct Saved {
 #[derive(Debug, Default)]
 pub struct RecoveryFile {
     /// Orphaned edits, the newest first.
-    pub lost: Vec<Orphan>,
+    pub orphans: Vec<Orphan>,
     /// Files that cannot be read, and the reason. They stay on disk.
     pub unreadable: Vec<(PathBuf, String)>,
     /// `true` if another running process has unsaved edits of the scene.
@@ -81,32 +81,32 @@ pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathB
 impl Recovery {
     /// Creates the recovery of the scene in the file at `path`, or, without a file, of the scene
     /// called `name`. `state` is [`state_folder`].
-    pub fn of(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
-        let mut homes = Vec::new();
+    pub fn new(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
+        let mut candidates = Vec::new();
         let called = match path {
             Some(path) => {
                 // Every path to the same file gives the same name.
-                let real = fs::canonicalize(path).or_else(|_| std::path::absolute(path));
-                let real = real.unwrap_or_else(|_| path.to_path_buf());
-                let name = real.file_name().unwrap_or(OsStr::new("scene")).to_os_string();
+                let canonical = fs::canonicalize(path).or_else(|_| std::path::absolute(path));
+                let canonical = canonical.unwrap_or_else(|_| path.to_path_buf());
+                let name = canonical.file_name().unwrap_or(OsStr::new("scene")).to_os_string();
                 let mut hidden = OsString::from(".");
                 hidden.push(&name);
                 hidden.push(".unsaved");
-                let folder = real.parent().filter(|folder| !folder.as_os_str().is_empty());
-                homes.push((folder.unwrap_or(Path::new(".")).to_path_buf(), hidden));
-                let hash = fnv1a64(real.as_os_str().as_encoded_bytes());
+                let folder = canonical.parent().filter(|folder| !folder.as_os_str().is_empty());
+                candidates.push((folder.unwrap_or(Path::new(".")).to_path_buf(), hidden));
+                let hash = fnv1a64(canonical.as_os_str().as_encoded_bytes());
                 format!("{:.40}-{hash:016x}", name.to_string_lossy())
             }
             None => format!("{:.40}", name.replace('/', "-")),
         };
-        homes
+        candidates
             .extend(state.map(|folder| (folder.to_path_buf(), format!("{called}.unsaved").into())));
-        Self { homes, own: None }
+        Self { candidates, saved: None }
     }
 
     /// Returns the path of the recovery file, if there is one.
     pub fn path(&self) -> Option<&Path> {
-        self.own.as_ref().map(|own| own.path.as_path())
+        self.saved.as_ref().map(|saved| saved.path.as_path())
     }
 
     /// Writes `text`, the file that saving would write over one with the fingerprint `base`.
@@ -116,17 +116,17 @@ impl Recovery {
     pub fn keep(&mut self, text: &str, base: Option<u64>) -> io::Result<()> {
         let base = base.map_or(NO_FILE.to_string(), |base| format!("{base:016x}"));
         let text = format!("{HEAD}{base}.\n{text}");
-        if let Some(own) = self.own.as_mut().filter(|own| own.is_there()) {
-            let folder = own.path.parent().unwrap_or(Path::new("."));
-            own.file = filled(folder, &text)?.persist(&own.path)?;
+        if let Some(saved) = self.saved.as_mut().filter(|saved| saved.has_its_name()) {
+            let folder = saved.path.parent().unwrap_or(Path::new("."));
+            saved.file = locked_temporary(folder, &text)?.persist(&saved.path)?;
             return Ok(());
         }
-        self.own = None;
+        self.saved = None;
         let mut failed = io::Error::new(ErrorKind::NotFound, "no folder to keep them in");
-        for (folder, name) in &self.homes {
-            match begun(folder, name, &text) {
+        for (folder, name) in &self.candidates {
+            match create_numbered(folder, name, &text) {
                 Ok(kept) => {
-                    self.own = Some(kept);
+                    self.saved = Some(kept);
                     return Ok(());
                 }
                 Err(error) => failed = error,
@@ -137,37 +137,37 @@ impl Recovery {
 
     /// Removes the recovery file, since no edits are unsaved.
     pub fn forget(&mut self) {
-        if let Some(own) = self.own.take() {
-            own.remove();
+        if let Some(saved) = self.saved.take() {
+            saved.remove();
         }
     }
 
     /// Finds the orphaned edits of the scene. Empty files are removed.
     pub fn find(&self) -> RecoveryFile {
         let mut found = RecoveryFile::default();
-        for (folder, name) in &self.homes {
-            for number in 1..=MOST {
+        for (folder, name) in &self.candidates {
+            for number in 1..=MAX_FILES {
                 let path = folder.join(numbered(name, number));
                 if self.path() == Some(&*path) {
                     continue;
                 }
-                match left_behind(&path) {
+                match read_orphan(&path) {
                     Ok(Some(lost)) if lost.text.trim().is_empty() => lost.kept.remove(),
-                    Ok(Some(lost)) => found.lost.push(lost),
+                    Ok(Some(lost)) => found.orphans.push(lost),
                     Ok(None) => {}
                     Err(error) if error.kind() == ErrorKind::WouldBlock => found.elsewhere = true,
                     Err(error) => found.unreadable.push((path, error.to_string())),
                 }
             }
         }
-        found.lost.sort_by_key(|lost| std::cmp::Reverse(lost.written));
+        found.orphans.sort_by_key(|lost| std::cmp::Reverse(lost.written));
         found
     }
 
     /// Makes the orphaned edits those of this session.
     pub fn take_up(&mut self, lost: Orphan) {
         self.forget();
-        self.own = Some(lost.kept);
+        self.saved = Some(lost.kept);
     }
 }
 
@@ -185,14 +185,14 @@ impl Orphan {
 
 impl Saved {
     /// Returns `true` if the path still leads to the locked file.
-    fn is_there(&self) -> bool {
+    fn has_its_name(&self) -> bool {
         let named = fs::symlink_metadata(&self.path);
-        self.file.metadata().is_ok_and(|own| named.is_ok_and(|named| is_same(&own, &named)))
+        self.file.metadata().is_ok_and(|saved| named.is_ok_and(|named| is_same(&saved, &named)))
     }
 
     /// Removes the file before its lock is released.
     fn remove(self) {
-        if self.is_there() {
+        if self.has_its_name() {
             // A file that cannot be removed is found, and reported, at the next start.
             let _ = fs::remove_file(&self.path);
         }
@@ -225,7 +225,7 @@ pub(super) fn lock(temporary: &NamedTempFile) {
 }
 
 /// Creates a locked temporary file in `folder` with the content `text`, readable by the user only.
-fn filled(folder: &Path, text: &str) -> io::Result<NamedTempFile> {
+fn locked_temporary(folder: &Path, text: &str) -> io::Result<NamedTempFile> {
     let [prefix, suffix] = TEMPORARY;
     let mut file = tempfile::Builder::new().prefix(prefix).suffix(suffix).tempfile_in(folder)?;
     lock(&file);
@@ -235,14 +235,14 @@ fn filled(folder: &Path, text: &str) -> io::Result<NamedTempFile> {
 }
 
 /// Writes `text` to a new file under the first free name.
-fn begun(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved> {
+fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved> {
     let mut folders = DirBuilder::new();
     folders.recursive(true);
     #[cfg(unix)]
     std::os::unix::fs::DirBuilderExt::mode(&mut folders, 0o700);
     folders.create(folder)?;
-    let mut file = filled(folder, text)?;
-    for number in 1..=MOST {
+    let mut file = locked_temporary(folder, text)?;
+    for number in 1..=MAX_FILES {
         let path = folder.join(numbered(name, number));
         match file.persist_noclobber(&path) {
             Ok(file) => return Ok(Saved { path, file }),
@@ -251,7 +251,10 @@ fn begun(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved> {
         }
     }
     let name = name.display();
-    Err(io::Error::new(ErrorKind::AlreadyExists, format!("{MOST} files {name} are there already")))
+    Err(io::Error::new(
+        ErrorKind::AlreadyExists,
+        format!("{MAX_FILES} files {name} are there already"),
+    ))
 }
 
 /// Opens for writing as well, without which some file systems grant no lock.
@@ -263,7 +266,7 @@ fn open(path: &Path) -> io::Result<File> {
 ///
 /// # Errors
 /// [`ErrorKind::WouldBlock`] if a running process holds the lock; otherwise if it cannot be read.
-fn left_behind(path: &Path) -> io::Result<Option<Orphan>> {
+fn read_orphan(path: &Path) -> io::Result<Option<Orphan>> {
     // Another process may replace the file after it was opened: then the new one is read.
     for _ in 0..5 {
         // The type is checked before opening, since opening a pipe can block forever.
@@ -283,7 +286,7 @@ fn left_behind(path: &Path) -> io::Result<Option<Orphan>> {
             // File systems without locks report an error: the file counts as unlocked.
             Ok(()) | Err(TryLockError::Error(_)) => {}
         }
-        if kept.is_there() {
+        if kept.has_its_name() {
             return read(kept).map(Some);
         }
     }
@@ -326,7 +329,7 @@ pub fn remove_stale(folder: &Path) {
             continue;
         };
         let age = metadata.modified().ok().and_then(|written| written.elapsed().ok());
-        if age.is_some_and(|age| age >= SWEPT_AFTER)
+        if age.is_some_and(|age| age >= STALE_AFTER)
             && open(&entry.path()).is_ok_and(|file| file.try_lock().is_ok())
         {
             let _ = fs::remove_file(entry.path());

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 fn of(path: &Path) -> Recovery {
-    Recovery::of(Some(path), "", None)
+    Recovery::new(Some(path), "", None)
 }
 
 fn texts(found: &RecoveryFile) -> Vec<&str> {
-    found.lost.iter().map(|lost| lost.text.as_str()).collect()
+    found.orphans.iter().map(|lost| lost.text.as_str()).collect()
 }
 
 fn names(folder: &Path) -> Vec<String> {
@@ -24,27 +24,27 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn what_is_kept_is_found_once_its_keeper_is_gone() {
+fn recovery_file_is_found_after_its_process_ends() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.toml");
     let mut keeper = of(&path);
-    assert!(keeper.find().lost.is_empty());
+    assert!(keeper.find().orphans.is_empty());
     for text in ["one\n", "two\n", "three\r\nwithout end"] {
         keeper.keep(text, Some(0xabc)).unwrap();
         assert_eq!(names(folder.path()), [".a.toml.unsaved"], "nothing half-written is left");
         let found = of(&path).find();
-        assert!(found.lost.is_empty() && found.elsewhere && found.unreadable.is_empty());
+        assert!(found.orphans.is_empty() && found.elsewhere && found.unreadable.is_empty());
     }
     drop(keeper);
     let seeker = of(&path);
     let found = seeker.find();
     assert_eq!(texts(&found), ["three\r\nwithout end"]);
-    assert_eq!((found.lost[0].base, found.elsewhere), (Some(0xabc), false));
+    assert_eq!((found.orphans[0].base, found.elsewhere), (Some(0xabc), false));
     // A pending orphan is hidden from other sessions.
     assert!(of(&path).find().elsewhere);
     drop(found);
     let mut heir = of(&path);
-    let lost = heir.find().lost.pop().unwrap();
+    let lost = heir.find().orphans.pop().unwrap();
     heir.take_up(lost);
     assert!(of(&path).find().elsewhere);
     heir.keep("four", None).unwrap();
@@ -54,7 +54,7 @@ fn what_is_kept_is_found_once_its_keeper_is_gone() {
 }
 
 #[test]
-fn sessions_side_by_side_have_files_of_their_own() {
+fn concurrent_sessions_write_separate_recovery_files() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.toml");
     let mut keepers: Vec<_> = (0..9).map(|_| of(&path)).collect();
@@ -72,14 +72,14 @@ fn sessions_side_by_side_have_files_of_their_own() {
     keepers.truncate(2);
     let found = of(&path).find();
     assert!(found.elsewhere);
-    assert_eq!(found.lost.len(), 6);
-    assert!(found.lost.windows(2).all(|pair| pair[0].written >= pair[1].written));
-    found.lost.into_iter().for_each(crate::scene::Orphan::discard);
+    assert_eq!(found.orphans.len(), 6);
+    assert!(found.orphans.windows(2).all(|pair| pair[0].written >= pair[1].written));
+    found.orphans.into_iter().for_each(crate::scene::Orphan::discard);
     assert_eq!(names(folder.path()), [".a.toml.unsaved", ".a.toml.unsaved-2", ".a.toml.unsaved-5"]);
 }
 
 #[test]
-fn a_file_that_others_take_away_is_made_anew() {
+fn deleted_recovery_file_is_written_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.toml");
     let mut keeper = of(&path);
@@ -104,7 +104,7 @@ fn a_file_that_others_take_away_is_made_anew() {
 }
 
 #[test]
-fn what_cannot_be_read_is_told_and_stays() {
+fn unreadable_recovery_file_is_reported_and_stays() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.toml");
     let hidden = |n: &str| folder.path().join(format!(".a.toml.unsaved{n}"));
@@ -117,7 +117,7 @@ fn what_cannot_be_read_is_told_and_stays() {
     large.set_len((64 << 20) + 1).unwrap();
     let found = of(&path).find();
     assert_eq!(texts(&found), ["plain = true"], "empty ones are nothing");
-    assert_eq!(found.lost[0].base, None);
+    assert_eq!(found.orphans[0].base, None);
     let why: Vec<_> = found.unreadable.iter().map(|(_, why)| why.as_str()).collect();
     assert_eq!(
         why,
@@ -131,7 +131,7 @@ fn what_cannot_be_read_is_told_and_stays() {
 
 #[test]
 #[cfg(unix)]
-fn links_lead_to_the_same_edits_and_nothing_is_read_through_a_planted_one() {
+fn symbolic_links_share_recovery_and_planted_links_are_not_followed() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let folder = tempfile::tempdir().unwrap();
     let other = tempfile::tempdir().unwrap();
@@ -155,12 +155,12 @@ fn links_lead_to_the_same_edits_and_nothing_is_read_through_a_planted_one() {
 }
 
 #[test]
-fn where_the_scene_cannot_have_them_beside_it_the_state_folder_has() {
+fn state_folder_is_used_if_the_scene_folder_is_not_writable() {
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("deep/state");
     // The folder does not exist, so that it cannot be written.
     let gone = PathBuf::from("/proc/nowhere/a.toml");
-    let with = |path: Option<&Path>| Recovery::of(path, "mirror/room.toml", Some(&state));
+    let with = |path: Option<&Path>| Recovery::new(path, "mirror/room.toml", Some(&state));
     let mut keeper = with(Some(&gone));
     keeper.keep("one", None).unwrap();
     assert!(keeper.path().unwrap().starts_with(&state));
@@ -170,22 +170,22 @@ fn where_the_scene_cannot_have_them_beside_it_the_state_folder_has() {
     let mut untitled = with(None);
     untitled.keep("two", None).unwrap();
     assert!(untitled.path().unwrap().ends_with("mirror-room.toml.unsaved"));
-    assert!(Recovery::of(None, "a", None).keep("three", None).is_err());
+    assert!(Recovery::new(None, "a", None).keep("three", None).is_err());
 }
 
 #[test]
-fn names_as_long_as_they_can_be() {
+fn recovery_of_longest_file_names() {
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("state");
     let long = folder.path().join("ä".repeat(125) + ".toml");
-    let mut keeper = Recovery::of(Some(&long), "", Some(&state));
+    let mut keeper = Recovery::new(Some(&long), "", Some(&state));
     keeper.keep("one", None).unwrap();
     assert!(keeper.path().unwrap().starts_with(&state));
     assert_eq!(names(folder.path()), ["state"]);
 }
 
 #[test]
-fn the_state_folder_is_where_the_user_wants_it() {
+fn state_folder_follows_xdg_variables() {
     let with = |state: Option<&str>, home: Option<&str>| {
         state_folder(|name| match name {
             "XDG_STATE_HOME" => state.map(OsString::from),
@@ -199,7 +199,7 @@ fn the_state_folder_is_where_the_user_wants_it() {
 }
 
 #[test]
-fn only_old_leftovers_are_swept_away() {
+fn only_old_unlocked_temporary_files_are_removed() {
     let folder = tempfile::tempdir().unwrap();
     let old = SystemTime::now() - Duration::from_secs(3600);
     let file = |name: &str| {

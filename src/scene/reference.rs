@@ -9,67 +9,70 @@ const INTRODUCTION: &str = "\
 # Scene files
 
 <!-- Generated from the tables in the program; do not edit.
-     ZERKALO_BLESS=1 cargo test --test scene_files writes it anew. -->
+     ZERKALO_BLESS=1 cargo test --test scene_files regenerates it. -->
 
 A scene file is [TOML](https://toml.io) text in UTF-8. Only objects are needed: every other table
 and every key with a default may be left out. Unknown keys are errors.
 
 - The coordinate system is right-handed: x to the right, y up, z towards the viewer. *Near* is +z.
 - Lengths are in scene units, whatever those are; |coordinates| are at most 1e9.
-- Angles are in degrees. Turns are counter-clockwise for one who looks against the axis: from
-  above, for a turn about the vertical.
+- Angles are in degrees. Rotations are counter-clockwise seen against the axis: from above, for a
+  rotation about the vertical.
 - A colour is `[red, green, blue]`, linear, or `\"#rrggbb\"`, sRGB. It may exceed 1.
-- What a surface shows is a sum: `ambient` x colour x ambient light, and for each light `diffuse`
-  x colour x cosine plus `specular` x highlight, `reflection` x what is mirrored, and
-  `transmission` x what shows through. The parts are not weighted against each other, and the sum
-  may exceed 1; it is clipped only when it is shown.
-- A solid with `transmission` is filled with what has its index of refraction `ior`: light is bent by
-  Snell's law where it enters and leaves, and totally reflected past the critical angle. Where such
-  solids overlap, the one listed last fills the space and the surfaces of the others are not there:
-  a bubble is listed after its ball. At most four at one point are told apart. A compound is one
-  solid, whose first part with `transmission` gives the index. An open surface (plane, platform,
-  rectangle) is a thin pane: nothing bends.
-- A transparent solid reflects on its outer side only, and past the critical angle; with `fresnel =
-  \"dielectric\"` both sides share the light between `reflection` (x F) and `transmission` (x 1 - F)
-  as physics has it, so that glass has both at 1. What is transmitted is neither blurred nor
-  coloured. Transparent things cast shadows like all others.
-- Where a transparent surface lies on another one, within rounding, as the bottom of a glass on a table,
-  the picture is the limit of a vanishing gap between the two things: light leaves the glass and then
-  meets the table, whichever of the two faces rounding puts in front. Between two glasses that touch
-  there is such a gap, too, whatever their indices: for one body that fills both, let them overlap. Of
-  solids on the same side of a common face, such as a box in the corner of a larger one, the transparent
-  one lies outside of the opaque one, and of transparent ones the one listed last. An open transparent
-  surface that lies on an opaque one is in front of it on either side, and so is the one of two that is
-  listed last. Which of two opaque surfaces in
-  the same place is seen is left to rounding, but is the same for every `acceleration`, number of
-  threads and width of lanes; where it matters, move one of them by a thousandth of its size, or make
+- The radiance of a surface is a sum: `ambient` x colour x ambient light; for each light `diffuse`
+  x colour x cosine plus `specular` x highlight; `reflection` x reflected radiance; `transmission`
+  x transmitted radiance. The weights are not energy-conserving: the sum may exceed 1, and it is
+  clipped only for display.
+- A solid with `transmission` is a dielectric with the index of refraction `ior`: light is refracted
+  by Snell's law where it enters and leaves, and totally reflected past the critical angle. Where
+  such solids overlap, the one listed last fills the space and hides the surfaces of the others: a
+  bubble is listed after its ball. At most four solids at one point are distinguished. A compound is
+  one solid, whose first part with `transmission` gives the index. An open surface (plane, platform,
+  rectangle) is a thin pane without refraction.
+- A transparent solid reflects on its outer side only, and past the critical angle. With `fresnel =
+  \"dielectric\"` both sides divide the light physically between `reflection` (x F) and
+  `transmission` (x 1 - F), so that glass has both at 1. Transmitted light is neither blurred nor
+  coloured. Transparent objects cast shadows like all others.
+- Where a transparent surface coincides with another one, within rounding, as the bottom of a glass on
+  a table, the picture is the limit of a vanishing gap between them: light leaves the glass and then
+  hits the table, whichever face rounding puts in front. Two glasses that touch have such a gap, too,
+  whatever their indices: for one body that fills both, let them overlap. Of solids on the same side
+  of a common face, such as a box in the corner of a larger one, the transparent one lies outside the
+  opaque one, and of transparent ones the one listed last. An open transparent surface on an opaque
+  one is in front of it on either side; of two, the one listed last. Which of two coincident opaque
+  surfaces is visible is left to rounding, but is the same for every `acceleration`, number of
+  threads and SIMD width; where it matters, move one of them by a thousandth of its size, or make
   both one compound, which shows the part listed first.
-- A lamp that lies on a surface, within rounding, lights what a lamp would light that is moved off it
-  towards what it lights, by a distance that vanishes. So a lamp on the ceiling lights all of the room.
-  The surface that it lies on stays dark. A solid is in the way of what is behind it; an open surface
-  (plane, platform, rectangle) has no inside, so that a lamp on it lights both sides: to light one,
-  move the lamp off it.
-- A texture multiplies the `color` of its material in the ambient and the diffuse part, so that white
-  shows it as it is: `color = [1.0, 1.0, 1.0]` with `texture.image = { file = \"wood.png\", scale =
+- A light on a surface, within rounding, acts as a light at a vanishing distance from it, on the side
+  of the lit point. So a light on the ceiling lights all of the room; the surface itself stays dark.
+  A solid occludes what is behind it. An open surface (plane, platform, rectangle) has no inside, so
+  that a light on it lights both sides: to light one, move the light off it.
+- A texture multiplies the `color` of its material in the ambient and the diffuse part. White leaves
+  it unchanged: `color = [1.0, 1.0, 1.0]` with `texture.image = { file = \"wood.png\", scale =
   [2.0, 2.0] }` or `texture.checker = { even = \"#ffffff\", odd = \"#202020\" }`. A bump,
-  `bump.image = { file = \"bricks.png\", height = 0.02 }`, turns the normals that light sees, in
-  highlights, reflections and refraction as well; the shape itself, its outline and its shadows stay.
-  Where a bump would turn a normal away from the viewer it is turned less.
-- Textures lie in the shape's own space, before its `transform`: an object takes its texture and its
-  bumps along. There u points to the right, v up; on a plane, platform or rectangle up is along its `up`,
-  or away from the viewer where it lies flat; around a cylinder or cone it is along the axis; a cube,
-  prism or pyramid is taken before its `rotation`. So `mapping = \"box\"` puts an image upright on every
-  side, as large as `scale` says, whatever the size of the thing.
-- `roughness` is the radius of the cone's base at unit distance, the tangent of half its opening
-  angle. The square lobe has the side that gives the same area, sqrt(pi) x roughness; the
-  microfacet lobes take the slope of equal second moment, `alpha` = roughness / (2 sqrt 2), unless
-  `alpha` is given. So a change of the lobe keeps the blur comparable.
-- A light with falloff `none` gives a white matt surface that faces it the brightness `intensity`,
-  wherever it stands. With `inverse-square` the intensity is a radiant intensity [W/sr]: the
+  `bump.image = { file = \"bricks.png\", height = 0.02 }`, perturbs the shading normals, in
+  highlights, reflections and refraction as well; shape, outline and shadows stay. A normal is
+  perturbed less where it would turn away from the viewer.
+- Textures are mapped in the shape's own space, before its `transform`, and move with the object.
+  There u points to the right, v up; on a plane, platform or rectangle up is along its `up`, or away
+  from the viewer where it lies flat; around a cylinder or cone it is along the axis; a cube, prism or
+  pyramid is mapped before its `rotation`. So `mapping = \"box\"` puts an image upright on every side,
+  in the size given by `scale`, whatever the size of the object.
+- `roughness` is the tangent of the half-angle of the reflection cone, not a microfacet alpha. The
+  square lobe has a square base of the same area, with the side sqrt(pi) x roughness; the microfacet
+  lobes have the slope of equal second moment, `alpha` = roughness / (2 sqrt 2), unless `alpha` is
+  given. So a change of the lobe keeps the blur comparable.
+- A light with falloff `none` gives a white matt surface that faces it the radiance `intensity` at any
+  distance. With `inverse-square` the intensity is a radiant intensity [W/sr]: the
   irradiance is intensity x cosine / distance squared.
 
-`zerkalo new FILE` writes a small scene with comments, `zerkalo check FILE` tells what is wrong
-with one.
+- Files of earlier versions open, too: `zerkalo check` names the first word that has another name now,
+  and saving writes the present words. `index` became `ior`, `reflectance` `f0`, `depth` `max_depth`,
+  `min_weight` `min_throughput`, `level` `ray_types`, `horizon` `below_horizon`, `unit_cylinder`
+  `unit_frustum`, `[views.NAME]` `[cameras.NAME]`, filter `center` `point`; accelerations `projected`,
+  `object`, `world` and `hierarchy` became `screen-bounds`, `obb`, `aabb` and `bvh`.
+
+`zerkalo new FILE` writes a small scene with comments, `zerkalo check FILE` validates one.
 ";
 
 /// Returns the reference of the scene format, as Markdown.
@@ -206,7 +209,7 @@ mod tests {
 
     /// Rows that say "see below" refer to a later part of the same section.
     #[test]
-    fn what_is_said_to_be_below_is_there() {
+    fn reference_rows_refer_to_later_sections() {
         let text = reference();
         let mut words = 0;
         for section in text.split("\n## ").flat_map(|part| part.split("\n### ")) {
@@ -215,9 +218,10 @@ mod tests {
                 let (name, rest) = line.split_once('`').unwrap();
                 if rest.starts_with(" | a word, see below |") {
                     let below = &section[at..];
-                    let told = [":\n\n- `\"", ": the same words as above.\n"];
-                    let told = told.map(|told| below.contains(&format!("\n`{name}`{told}")));
-                    assert!(told.contains(&true), "{line}");
+                    let notations = [":\n\n- `\"", ": the same words as above.\n"];
+                    let found =
+                        notations.map(|notation| below.contains(&format!("\n`{name}`{notation}")));
+                    assert!(found.contains(&true), "{line}");
                     words += 1;
                 }
             }

@@ -18,11 +18,11 @@ fn keys_of<T: DeserializeOwned>() -> Vec<String> {
 }
 
 fn same_keys<T: DeserializeOwned>(what: &str, fields: &[Field]) {
-    let mut real = keys_of::<T>();
-    let mut told: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
-    real.sort();
-    told.sort();
-    assert_eq!(real, told, "{what}");
+    let mut serde_keys = keys_of::<T>();
+    let mut documented: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
+    serde_keys.sort();
+    documented.sort();
+    assert_eq!(serde_keys, documented, "{what}");
 }
 
 /// Compares documented defaults with what is read when only the keys in `needed` are given.
@@ -66,7 +66,7 @@ fn texture(key: &str, kind: &str) -> &'static [Field] {
 }
 
 #[test]
-fn tables_name_the_keys_that_are_read() {
+fn field_tables_match_deserialised_keys() {
     same_keys::<Scene>("scene", FIELDS);
     same_keys::<FilmSettings>("film", FILM_FIELDS);
     same_keys::<IntegratorSettings>("trace", TRACE_FIELDS);
@@ -94,7 +94,7 @@ fn tables_name_the_keys_that_are_read() {
 }
 
 #[test]
-fn tables_tell_the_defaults_that_hold() {
+fn field_tables_match_defaults() {
     same_defaults::<FilmSettings>("film", FILM_FIELDS, "");
     same_defaults::<IntegratorSettings>("trace", TRACE_FIELDS, "");
     same_defaults::<Background>("background", BACKGROUND_FIELDS, "");
@@ -114,7 +114,7 @@ fn tables_tell_the_defaults_that_hold() {
 }
 
 #[test]
-fn every_word_is_read() {
+fn every_documented_choice_is_read() {
     fn words<T: DeserializeOwned>(fields: &[Field]) {
         for field in fields {
             if let ValueType::Choice(choices) = field.takes {
@@ -125,8 +125,9 @@ fn every_word_is_read() {
                 let line = format!("{} = \"no such word\"", field.name);
                 let error = toml::from_str::<T>(&line).err().map(|e| e.message().to_string());
                 let error = error.unwrap_or_else(|| panic!("{line} was read"));
-                let told = choices.iter().filter(|c| error.contains(&format!("`{}`", c.name)));
-                assert_eq!(told.count(), choices.len(), "{error}");
+                let documented =
+                    choices.iter().filter(|c| error.contains(&format!("`{}`", c.name)));
+                assert_eq!(documented.count(), choices.len(), "{error}");
                 assert_eq!(error.matches('`').count(), 2 * choices.len() + 2, "{error}");
             }
         }
@@ -152,7 +153,7 @@ fn read(kind: &Field, values: &toml::Table) -> Result<Shape, toml::de::Error> {
 }
 
 #[test]
-fn shapes_have_sound_examples_and_honest_tables() {
+fn shape_examples_and_tables_are_valid() {
     for (kind, (key, text)) in KINDS.iter().zip(EXAMPLES) {
         assert_eq!(kind.name, *key);
         let ValueType::Table(fields) = kind.takes else { panic!("{key}") };
@@ -164,11 +165,11 @@ fn shapes_have_sound_examples_and_honest_tables() {
         assert!(scene.is_ok(), "{key}: {}", scene.unwrap_err());
 
         let written = toml::Table::try_from(&shape).unwrap();
-        let mut real: Vec<_> = written[*key].as_table().unwrap().keys().cloned().collect();
-        let mut told: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
-        real.sort();
-        told.sort();
-        assert_eq!(real, told, "{key}");
+        let mut serde_keys: Vec<_> = written[*key].as_table().unwrap().keys().cloned().collect();
+        let mut documented: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
+        serde_keys.sort();
+        documented.sort();
+        assert_eq!(serde_keys, documented, "{key}");
         for field in fields {
             let mut without = given.clone();
             without.remove(field.name);
@@ -187,7 +188,7 @@ fn shapes_have_sound_examples_and_honest_tables() {
 }
 
 #[test]
-fn every_number_of_every_shape_is_checked() {
+fn every_shape_number_is_range_checked() {
     for (kind, (key, text)) in KINDS.iter().zip(EXAMPLES) {
         let ValueType::Table(fields) = kind.takes else { panic!("{key}") };
         for field in fields {
@@ -219,8 +220,11 @@ fn every_number_of_every_shape_is_checked() {
                 let mut values = example(kind, text);
                 values.insert(field.name.into(), value.clone());
                 let faults = read(kind, &values).unwrap().faults();
-                let at = format!("{key}.{}", field.name);
-                assert!(faults.len() == 1 && faults[0].key == at, "{at} = {value}: {faults:?}");
+                let key_path = format!("{key}.{}", field.name);
+                assert!(
+                    faults.len() == 1 && faults[0].key == key_path,
+                    "{key_path} = {value}: {faults:?}"
+                );
             }
         }
     }
@@ -234,7 +238,7 @@ fn faults_of(part: &str) -> Vec<(String, String)> {
 }
 
 #[test]
-fn faults_of_parts_say_which_part() {
+fn errors_in_parts_name_the_part() {
     for (part, key, words) in [
         ("{ shape.sphere = { center = [0, 0, 0], radius = -1 } }", "shape.sphere.radius", "-1"),
         ("{ shape.platform = { center = [0, 0, 0], size = [1, 1] } }", "shape", "flat"),
@@ -276,7 +280,7 @@ fn faults_of_parts_say_which_part() {
 }
 
 #[test]
-fn compounds_may_be_nested_so_deep_and_no_deeper() {
+fn compound_nesting_depth_is_limited() {
     let sphere =
         || -> Shape { toml::from_str("sphere = { center = [0, 0, 0], radius = 1 }").unwrap() };
     let part = |shape| CsgOperand { shape, material: String::new(), transform: Vec::new() };

@@ -61,7 +61,7 @@ impl Scene {
         })
     }
 
-    pub(super) fn finding(&self, path: &[&str], found: String, help: String) -> Problem {
+    pub(super) fn problem(&self, path: &[&str], found: String, help: String) -> Problem {
         let path = keys(path);
         Problem { subject: self.subject(&path), path, found, help }
     }
@@ -69,23 +69,23 @@ impl Scene {
     /// Loads the files that the scene names, unless they are loaded already. Errors in them are
     /// found by the next validation.
     pub fn resolve(&mut self) {
-        let library = &self.library;
+        let resolver = &self.resolver;
         for object in &mut self.objects {
-            object.shape.resolve(|name| library.mesh(name));
+            object.shape.resolve(|name| resolver.mesh(name));
         }
         for material in self.materials.values_mut() {
-            material.resolve(|name| library.image(name));
+            material.resolve(|name| resolver.image(name));
         }
     }
 
     /// Validates the scene. A scene that was read is valid; an edited one may not be.
     pub fn faults(&self) -> Vec<Problem> {
-        let mut findings = Vec::new();
+        let mut problems = Vec::new();
         let mut add = |path: &[&str], faults: Vec<ValidationError>| {
-            findings.extend(faults.into_iter().map(|fault| {
+            problems.extend(faults.into_iter().map(|fault| {
                 let mut all = path.to_vec();
                 all.extend(fault.key.split('.').filter(|k| !k.is_empty()));
-                self.finding(&all, fault.found, format!("Expected {}.", fault.expected))
+                self.problem(&all, fault.found, format!("Expected {}.", fault.expected))
             }));
         };
         add(&["film"], self.film.faults());
@@ -105,19 +105,19 @@ impl Scene {
         for (i, object) in self.objects.iter().enumerate() {
             add(&["object", &i.to_string()], object.faults());
         }
-        if findings.is_empty() {
-            self.missing_coordinates(&mut findings);
+        if problems.is_empty() {
+            self.missing_coordinates(&mut problems);
         }
-        self.missing_materials(&mut findings);
-        self.same_names("light", self.lights.iter().map(|l| &l.name), &mut findings);
-        self.same_names("object", self.objects.iter().map(|o| &o.name), &mut findings);
-        findings
+        self.missing_materials(&mut problems);
+        self.same_names("light", self.lights.iter().map(|l| &l.name), &mut problems);
+        self.same_names("object", self.objects.iter().map(|o| &o.name), &mut problems);
+        problems
     }
 
     /// Finds materials whose textures need coordinates that the object's shape does not have. The
     /// shapes must be valid.
-    fn missing_coordinates(&self, findings: &mut Vec<Problem>) {
-        let asks = |name: &str| {
+    fn missing_coordinates(&self, problems: &mut Vec<Problem>) {
+        let uv_key = |name: &str| {
             let material = self.materials.get(name)?;
             let texture = material.texture.as_ref().map(|t| t.placement().mapping);
             let bump = material.bump.as_ref().map(|b| b.placement().mapping);
@@ -127,32 +127,32 @@ impl Scene {
         };
         for (i, object) in self.objects.iter().enumerate() {
             let materials = object.shape.part_materials(&object.material);
-            let asking: Vec<_> = materials.iter().map(|name| asks(name)).collect();
-            if asking.iter().all(Option::is_none) {
+            let uv_keys: Vec<_> = materials.iter().map(|name| uv_key(name)).collect();
+            if uv_keys.iter().all(Option::is_none) {
                 continue;
             }
             let spaces = object.shape.texture_spaces();
-            let lacking = |k: &usize| asking[*k].is_some() && !spaces[*k].has_uv();
-            let Some(part) = (0..spaces.len()).find(lacking) else { continue };
+            let lacks_uv = |k: &usize| uv_keys[*k].is_some() && !spaces[*k].has_uv();
+            let Some(part) = (0..spaces.len()).find(lacks_uv) else { continue };
             let what = match object.shape.file() {
                 Some(file) => format!("there are none in \"{}\"", truncated(file)),
                 None if spaces.len() > 1 => format!("parts of a {} have none", object.shape.key()),
                 None => format!("a {} has none", object.shape.key()),
             };
             let found = format!(
-                "the {} of material \"{}\" asks for texture coordinates (mapping = \"uv\"), and {what}",
-                asking[part].unwrap_or_default(),
+                "the {} of material \"{}\" needs texture coordinates (mapping = \"uv\"), and {what}",
+                uv_keys[part].unwrap_or_default(),
                 truncated(materials[part]),
             );
             let help =
                 "Expected a mesh whose file has them, a rectangle or a platform. On other shapes \
                         another mapping works: \"auto\" takes the one that suits the shape."
                     .to_string();
-            findings.push(self.finding(&["object", &i.to_string(), "material"], found, help));
+            problems.push(self.problem(&["object", &i.to_string(), "material"], found, help));
         }
     }
 
-    fn missing_materials(&self, findings: &mut Vec<Problem>) {
+    fn missing_materials(&self, problems: &mut Vec<Problem>) {
         let mut named = Vec::new();
         for (i, object) in self.objects.iter().enumerate() {
             named.push((format!("object.{i}.material"), object.material.as_str()));
@@ -177,7 +177,7 @@ impl Scene {
                 help += &format!(" Did you mean \"{}\"?", truncated(meant));
             }
             let found = format!("material \"{}\" is not defined", truncated(name));
-            findings.push(self.finding(&key.split('.').collect::<Vec<_>>(), found, help));
+            problems.push(self.problem(&key.split('.').collect::<Vec<_>>(), found, help));
         }
     }
 
@@ -185,14 +185,14 @@ impl Scene {
         &self,
         list: &str,
         names: impl Iterator<Item = &'a String>,
-        findings: &mut Vec<Problem>,
+        problems: &mut Vec<Problem>,
     ) {
         let mut first = HashMap::new();
         for (i, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
             if let Some(other) = first.get(name) {
                 let found = format!("{list} {} has the same name", other + 1);
                 let help = "Expected a name of its own, or none.".to_string();
-                findings.push(self.finding(&[list, &i.to_string(), "name"], found, help));
+                problems.push(self.problem(&[list, &i.to_string(), "name"], found, help));
             } else {
                 first.insert(name, i);
             }

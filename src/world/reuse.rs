@@ -28,7 +28,7 @@ impl LightGroups {
             lights: _,
             materials: _,
             objects,
-            library: _,
+            resolver: _,
         } = scene;
         uncapped(film) == uncapped(&compiled.film)
             && *trace == compiled.trace

@@ -20,10 +20,10 @@ pub fn table(scene: &Scene) -> Table {
     Table::try_from(scene).expect("scenes are tables")
 }
 
-/// The scene in `table` with the files of `library`; `None` if it has faults.
-pub fn scene(table: &Table, library: &AssetResolver) -> Option<Scene> {
+/// The scene in `table`, with the files of `resolver`; `None` if it has errors.
+pub fn scene(table: &Table, resolver: &AssetResolver) -> Option<Scene> {
     let mut scene: Scene = table.clone().try_into().ok()?;
-    scene.library = library.clone();
+    scene.resolver = resolver.clone();
     scene.resolve();
     scene.faults().is_empty().then_some(scene)
 }

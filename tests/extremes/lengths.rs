@@ -66,7 +66,7 @@ fn stretched(base: &Scene, factor: f64) -> Scene {
     let mut all = BTreeSet::new();
     directions(FIELDS, 0, &mut all);
     assert!(met.iter().map(String::as_str).eq(all), "the scene has only {met:?}");
-    scene(&changed, &base.library).unwrap_or_else(|| panic!("{factor:e}: the scene is refused"))
+    scene(&changed, &base.resolver).unwrap_or_else(|| panic!("{factor:e}: the scene is refused"))
 }
 
 #[test]

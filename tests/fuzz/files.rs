@@ -1,9 +1,9 @@
-//! Good files of every kind, small, with everything that readers look at.
+//! Small valid files of every format, covering everything that the readers parse.
 
 use image::{DynamicImage, ImageFormat};
 use std::io::Cursor;
 
-/// A ball of triangles: corners, and the corners of each triangle.
+/// Returns a sphere of triangles: corners, and the corners of each triangle.
 fn ball(rings: usize, sides: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let mut points = Vec::new();
     for ring in 0..=rings {
@@ -29,7 +29,7 @@ fn ball(rings: usize, sides: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
 pub const MTL: &str = "# colours\nnewmtl red\nKa 0 0 0\nKd 0.8 0.1 0.1\nNs 10\nillum 2\n\
                        map_Kd a.png\nnewmtl grey\nKd 0.5\nd 1.0\n";
 
-/// With and without materials, normals and texture coordinates.
+/// Returns OBJ files with and without materials, normals and texture coordinates.
 pub fn obj() -> Vec<Vec<u8>> {
     let (points, triangles) = ball(4, 6);
     let mut plain = String::from("# a ball\no ball\n");
@@ -51,7 +51,7 @@ pub fn obj() -> Vec<Vec<u8>> {
     vec![full.into(), plain.into()]
 }
 
-/// ASCII, little-endian and big-endian.
+/// Returns PLY files: ASCII, little-endian and big-endian.
 pub fn ply() -> Vec<Vec<u8>> {
     let (points, triangles) = ball(4, 6);
     ["ascii", "binary_little_endian", "binary_big_endian"]
@@ -87,7 +87,7 @@ pub fn ply() -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// ASCII and binary.
+/// Returns STL files: ASCII and binary.
 pub fn stl() -> Vec<Vec<u8>> {
     let (points, triangles) = ball(4, 6);
     let mut text = String::from("solid ball\n");
@@ -107,7 +107,8 @@ pub fn stl() -> Vec<Vec<u8>> {
     vec![text.into(), bytes]
 }
 
-/// The description and the buffer of a glTF file; `uri` is the entry that says where the buffer is.
+/// Returns the description and the buffer of a glTF file; `uri` is the entry that locates the
+/// buffer.
 fn description(uri: &str) -> (String, Vec<u8>) {
     let (points, triangles) = ball(4, 6);
     let mut buffer = Vec::new();
@@ -139,7 +140,7 @@ fn description(uri: &str) -> (String, Vec<u8>) {
     (text, buffer)
 }
 
-/// Binary glTF.
+/// Returns binary glTF files.
 pub fn glb() -> Vec<Vec<u8>> {
     let (mut text, mut buffer) = description("");
     while text.len() % 4 != 0 {
@@ -159,7 +160,7 @@ pub fn glb() -> Vec<Vec<u8>> {
     vec![out]
 }
 
-/// A glTF with its buffer inside.
+/// Returns glTF files with an embedded buffer.
 pub fn gltf() -> Vec<Vec<u8>> {
     let (_, buffer) = description("");
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -188,7 +189,7 @@ fn picture(width: u32, height: u32) -> image::RgbImage {
     })
 }
 
-/// Coloured, grey, deep, transparent.
+/// Returns PNG images: coloured, grey, 16 bits, with alpha.
 pub fn png() -> Vec<Vec<u8>> {
     let image = DynamicImage::ImageRgb8(picture(33, 17));
     [image.to_luma8().into(), image.to_rgba8().into(), image.to_luma16().into(), image]
@@ -196,7 +197,7 @@ pub fn png() -> Vec<Vec<u8>> {
         .into()
 }
 
-/// Makes the checksum of every chunk right that can be found (CRC-32 of type and data).
+/// Corrects the checksum of every chunk that can be found (CRC-32 of type and data).
 pub fn repair_png(bytes: &mut [u8]) {
     let mut at = 8;
     while let Some(length) = bytes.get(at..at + 4) {
@@ -216,13 +217,13 @@ pub fn repair_png(bytes: &mut [u8]) {
     }
 }
 
-/// Coloured and grey.
+/// Returns JPEG images: coloured and grey.
 pub fn jpeg() -> Vec<Vec<u8>> {
     let image = DynamicImage::ImageRgb8(picture(50, 40));
     [image.to_luma8().into(), image].map(|i| encoded(i, ImageFormat::Jpeg)).into()
 }
 
-/// The scenes that come with the program.
+/// Returns the scenes that come with the program.
 pub fn toml() -> Vec<Vec<u8>> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes");
     let mut paths: Vec<_> = std::fs::read_dir(folder)
@@ -231,7 +232,7 @@ pub fn toml() -> Vec<Vec<u8>> {
         .filter(|p| p.extension().is_some_and(|e| e == "toml"))
         .collect();
     paths.sort();
-    // Long ones would only make the same mistakes more slowly.
+    // Long files would only find the same errors more slowly.
     let texts = paths.iter().map(|p| std::fs::read(p).unwrap()).filter(|t| t.len() < 20_000);
     texts.collect()
 }

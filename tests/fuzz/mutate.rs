@@ -1,9 +1,9 @@
-//! Mutations as broken writers, transfers and editors make them.
+//! Mutations of files, as faulty writers, transfers and editors cause them.
 
-/// A sequence of random numbers (SplitMix64: Steele et al. 2014).
+/// Random number generator (SplitMix64: Steele et al. 2014).
 pub struct Random(u64);
 
-/// What numbers in a text become.
+/// Replacements of numbers in a text.
 const NUMBERS: &[&str] = &[
     "0",
     "-1",
@@ -27,7 +27,7 @@ const NUMBERS: &[&str] = &[
 ];
 
 impl Random {
-    /// One of the sequences.
+    /// Creates the generator with the given seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15))
     }
@@ -40,12 +40,12 @@ impl Random {
         z ^ z >> 31
     }
 
-    /// A number below `n`, which is not 0.
+    /// Returns a number below `n`, which is greater than 0.
     pub fn below(&mut self, n: usize) -> usize {
         (self.next() % n as u64) as usize
     }
 
-    /// `bytes` after one to four mutations, with pieces of `other` now and then.
+    /// Returns `bytes` after one to four mutations, sometimes with pieces of `other`.
     pub fn mutated(&mut self, bytes: &[u8], other: &[u8]) -> Vec<u8> {
         let mut out = bytes.to_vec();
         for _ in 0..=self.below(4) {
@@ -90,7 +90,7 @@ impl Random {
         }
     }
 
-    /// The first number in a text behind `at` becomes another.
+    /// Replaces the first number in a text after `at`.
     fn number(&mut self, out: &mut Vec<u8>, at: usize) {
         let digit = |b: &u8| b.is_ascii_digit() || matches!(b, b'.' | b'-');
         let Some(begin) = out[at..].iter().position(digit).map(|b| b + at) else { return };

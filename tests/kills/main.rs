@@ -229,11 +229,11 @@ fn is_whole_png(bytes: &[u8]) -> bool {
 
 /// What the next start has: what was kept, or else the file.
 fn effective(scene: &Path) -> Result<String, String> {
-    let mut found = Recovery::of(Some(scene), "", None).find();
-    if found.elsewhere || !found.unreadable.is_empty() || found.lost.len() > 1 {
+    let mut found = Recovery::new(Some(scene), "", None).find();
+    if found.elsewhere || !found.unreadable.is_empty() || found.orphans.len() > 1 {
         return Err(format!("found: {found:?}"));
     }
-    match found.lost.pop() {
+    match found.orphans.pop() {
         Some(lost) => Ok(lost.text.clone()),
         None => fs::read_to_string(scene).map_err(|error| error.to_string()),
     }

@@ -2,7 +2,7 @@
 
 use crate::common::Numbers;
 use crate::layouts::Layout;
-use crate::things::{Stock, library, material, resolved};
+use crate::things::{Stock, material, resolved, resolver};
 use crate::words::{Own, chance, direction, log, pick, table};
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -91,7 +91,7 @@ fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
         lights: lights(numbers, &spots, layout),
         materials,
         objects,
-        library: library(),
+        resolver: resolver(),
         ..Scene::default()
     };
     if chance(numbers, 1, 4) {

@@ -31,9 +31,9 @@ const IMAGES: &[&str] = &[
 ];
 
 /// The files that were read, shared by all scenes.
-pub fn library() -> AssetResolver {
+pub fn resolver() -> AssetResolver {
     static ASSETS: OnceLock<Arc<Assets>> = OnceLock::new();
-    AssetResolver::of(Path::new("test"), ASSETS.get_or_init(Arc::default).clone())
+    AssetResolver::new(Path::new("test"), ASSETS.get_or_init(Arc::default).clone())
 }
 
 /// A coefficient: zero, one, between, and rarely above.
@@ -308,7 +308,8 @@ fn object_of(
 
 /// The object with its files.
 pub fn resolved(object: &Object) -> Object {
-    let mut scene = Scene { objects: vec![object.clone()], library: library(), ..Scene::default() };
+    let mut scene =
+        Scene { objects: vec![object.clone()], resolver: resolver(), ..Scene::default() };
     scene.resolve();
     scene.objects.remove(0)
 }

@@ -1,6 +1,6 @@
 //! Scene files in the layouts that TOML allows.
 
-/// One scene in the layouts that TOML allows, with comments in every place.
+/// One scene in the layouts that TOML allows, with comments in every position.
 pub const LAYOUTS: &[&str] = &[
     // Headers, dotted keys, inline tables.
     r##"# What this file shows.
@@ -44,7 +44,7 @@ shape.platform = { center = [0, 0, 0], size = [8, 8] }
 
 # The end.
 "##,
-    // Everything in headers of its own; tables out of order; no line end at the end.
+    // Only headers; tables out of order; no line end at the end of the file.
     r##"# Headers.
 [[object]]
 name = "ball"
@@ -85,7 +85,7 @@ reflection = 0.5
 size = [0x140, 2_40]
 [[object]]
 shape = { platform = { center = [0, 0, 0], size = [8, 8] } }"##,
-    // Inline as far as it goes.
+    // Inline tables wherever possible.
     r##"film.size = [320, 240]
 camera = { target = [0, 0, 0], view_angle = { vertical = 40.0 } }
 materials = { red = { color = [1, 0, 0] }, 'a.b "c"' = { reflection = 0.5 } }

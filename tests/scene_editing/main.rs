@@ -1,4 +1,5 @@
-//! Scene files after edits: only what changed is written, and what is written reads back.
+//! Edits written to scene files: only changed values are written, and the text reads back as the
+//! scene.
 
 mod layouts;
 mod navigation;
@@ -17,7 +18,7 @@ fn document(text: &str) -> Document {
     Document::parse(text.to_string(), "scene.toml").unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Applies `edit` and returns the text, having checked that it reads back as the edited scene.
+/// Applies `edit` and returns the text, after a check that it reads back as the edited scene.
 fn edited(text: &str, edit: impl FnOnce(&mut Scene)) -> String {
     let mut document = document(text);
     let mut scene = document.scene().clone();
@@ -28,18 +29,18 @@ fn edited(text: &str, edit: impl FnOnce(&mut Scene)) -> String {
     document.text().to_string()
 }
 
-/// The lines of `b` that are not in `a` and the lines of `a` that are not in `b`.
+/// Returns the lines of `b` that are missing in `a` and the lines of `a` that are missing in `b`.
 fn difference<'a>(a: &'a str, b: &'a str) -> (Vec<&'a str>, Vec<&'a str>) {
     let missing = |from: &'a str, other: &str| {
         let mut others: Vec<&str> = other.lines().collect();
-        let gone = |line: &&str| match others.iter().position(|o| o == line) {
+        let is_missing = |line: &&str| match others.iter().position(|o| o == line) {
             Some(at) => {
                 others.remove(at);
                 false
             }
             None => true,
         };
-        from.lines().filter(gone).collect::<Vec<_>>()
+        from.lines().filter(is_missing).collect::<Vec<_>>()
     };
     (missing(b, a), missing(a, b))
 }
@@ -53,10 +54,10 @@ fn layouts_describe_the_same_scene() {
 }
 
 #[test]
-fn without_an_edit_the_text_stays() {
+fn unedited_scene_keeps_its_text() {
     for text in LAYOUTS {
         assert_eq!(edited(text, |_| {}), *text);
-        // There and back, too.
+        // An edit and its reversal, too.
         let mut document = document(text);
         let origin = document.scene().clone();
         document.apply(&Scene { objects: Vec::new(), ..origin.clone() });
@@ -67,7 +68,7 @@ fn without_an_edit_the_text_stays() {
 }
 
 #[test]
-fn a_number_changes_alone() {
+fn edited_number_changes_no_other_text() {
     let text = LAYOUTS[0];
     let after = edited(text, |s| s.camera.target = Some([0.0, 0.25, 0.0]));
     assert_eq!(
@@ -91,7 +92,7 @@ fn a_number_changes_alone() {
 }
 
 #[test]
-fn colours_keep_their_notation_while_they_can() {
+fn edited_colours_keep_their_notation() {
     let red = |color| edited(LAYOUTS[0], |s| s.materials.get_mut("red").unwrap().color = color);
     let after = red(Color::from_hex("#80ff00").unwrap());
     assert_eq!(after, LAYOUTS[0].replace("\"#ff0000\" # pure", "\"#80ff00\" # pure"));
@@ -100,7 +101,7 @@ fn colours_keep_their_notation_while_they_can() {
 }
 
 #[test]
-fn removed_objects_take_their_comments_along_and_leave_the_files() {
+fn removed_objects_take_their_comments_and_leave_file_comments() {
     let text = LAYOUTS[0];
     let after = edited(text, |s| drop(s.objects.remove(0)));
     let (new, gone) = difference(text, &after);
@@ -111,7 +112,7 @@ fn removed_objects_take_their_comments_along_and_leave_the_files() {
     assert!(after.contains("# --- objects ---\n\n# A cube,\n# turned.\n[[object]]"), "{after}");
     let ball = "# Shows a ball.\n\n# The ball.\n[[object]]\n\
                 shape.sphere = { center = [0, 0, 0], radius = 1 }\n";
-    // The comment that opens the file stays although the first table goes.
+    // The comment that opens the file stays although the first table is removed.
     let after = edited(&format!("{ball}\n[film]\nsize = [20, 20]\n"), |s| {
         s.objects.clear();
     });
@@ -123,7 +124,7 @@ fn removed_objects_take_their_comments_along_and_leave_the_files() {
 }
 
 #[test]
-fn added_objects_come_last_in_the_style_of_the_reference() {
+fn added_objects_come_last_in_reference_style() {
     let ball = Object {
         name: "new".into(),
         material: "red".into(),
@@ -144,7 +145,7 @@ fn added_objects_come_last_in_the_style_of_the_reference() {
 }
 
 #[test]
-fn kinds_and_keys_change_places_with_their_comments() {
+fn replaced_kinds_and_keys_keep_comments() {
     let after = edited(LAYOUTS[0], |s| {
         s.objects[0].shape = Shape::Plane(Plane { point: [0.0; 3], normal: [0.0, 1.0, 0.0] });
         s.camera.target = None;
@@ -161,7 +162,7 @@ fn kinds_and_keys_change_places_with_their_comments() {
 }
 
 #[test]
-fn renamed_materials_and_views_keep_their_comments_and_their_place() {
+fn renamed_materials_and_cameras_keep_comments_and_order() {
     let text = LAYOUTS[0].replace("color = \"#ff0000\" # pure", "# Of fire.\ncolor = \"#ff0000\"");
     let text = text.replace("[materials.red]", "# Red.\n[materials.red] # bright");
     let after = edited(&text, |s| {
@@ -181,7 +182,7 @@ fn renamed_materials_and_views_keep_their_comments_and_their_place() {
 }
 
 #[test]
-fn views_are_written_as_tables_of_their_own() {
+fn stored_cameras_are_written_as_tables() {
     let after = edited(LAYOUTS[0], |s| *s = store_view(s, Some("from the left")).unwrap().scene);
     let written = "[cameras.\"from the left\"]\ntarget = [0.0, 0.0, 0.0]\n";
     let (new, gone) = difference(LAYOUTS[0], &after);
@@ -204,7 +205,7 @@ fn views_are_written_as_tables_of_their_own() {
 }
 
 #[test]
-fn moved_objects_keep_their_comments() {
+fn reordered_objects_keep_comments() {
     for text in LAYOUTS {
         let after = edited(text, |s| s.objects.rotate_left(1));
         let (new, gone) = difference(text.trim_end(), after.trim_end());
@@ -214,7 +215,7 @@ fn moved_objects_keep_their_comments() {
 }
 
 #[test]
-fn line_ends_and_marks_stay() {
+fn line_ends_and_byte_order_mark_stay() {
     let dos = LAYOUTS[0].replace('\n', "\r\n");
     let after = edited(&dos, |s| s.film.size = [64, 48]);
     assert_eq!(after, dos.replace("[320, 240]", "[64, 48]"));
@@ -224,7 +225,7 @@ fn line_ends_and_marks_stay() {
 }
 
 #[test]
-fn the_emptiest_scene_can_be_written() {
+fn empty_scene_is_written() {
     let document = Document::new(&Scene::default(), "empty.toml");
     assert_eq!(document.text(), "[film]\nsize = [640, 480]\n");
     assert_eq!(self::document(document.text()).scene(), &Scene::default());
@@ -234,7 +235,7 @@ fn the_emptiest_scene_can_be_written() {
 
 proptest! {
     #[test]
-    fn any_scene_can_be_written_and_read(scene in random::scene()) {
+    fn random_scenes_survive_writing_and_reading(scene in random::scene()) {
         prop_assert_eq!(scene.faults(), []);
         let document = Document::new(&scene, "scene.toml");
         let again = Scene::parse(document.text(), "scene.toml");

@@ -1,15 +1,15 @@
-//! Cameras moved by hand: what each movement keeps, and that none ever leads nowhere.
+//! Camera movements: invariants of each, and valid cameras after all of them.
 
 use glam::DVec3;
 use proptest::prelude::*;
 use zerkalo::camera::{Camera, ViewAngle};
 
-/// The camera of the mirror room.
+/// Returns the camera of the mirror room.
 fn aimed() -> Camera {
     Camera { eye: [0.6, 1.4, 4.5], target: Some([0.0, 0.8, -0.5]), ..Camera::default() }
 }
 
-/// The same with a direction, and the distance that its target had.
+/// Returns the same camera with a direction instead of a target, and the distance of its target.
 fn free() -> (Camera, f64) {
     let view = aimed().view().unwrap();
     let direction = Some(view.to_array());
@@ -32,13 +32,13 @@ fn degrees_between(a: &Camera, b: &Camera) -> f64 {
     a.view().unwrap().angle_between(b.view().unwrap()).to_degrees()
 }
 
-/// Height of the view above the level plane, in degrees.
+/// Returns the elevation of the view direction, in degrees.
 fn pitch(camera: &Camera) -> f64 {
     camera.view().unwrap().y.asin().to_degrees()
 }
 
 #[test]
-fn an_orbit_keeps_pivot_and_distance_and_comes_round() {
+fn orbit_keeps_pivot_and_distance() {
     let start = aimed();
     let mut camera = start.clone();
     for i in 0..72 {
@@ -59,7 +59,7 @@ fn an_orbit_keeps_pivot_and_distance_and_comes_round() {
 }
 
 #[test]
-fn the_poles_are_never_reached() {
+fn orbit_never_reaches_the_poles() {
     for start in [aimed(), free().0] {
         let mut camera = start.clone();
         for _ in 0..40 {
@@ -77,7 +77,7 @@ fn the_poles_are_never_reached() {
 }
 
 #[test]
-fn numbers_stay_short() {
+fn camera_coordinates_stay_short() {
     let mut camera = aimed();
     for _ in 0..100 {
         camera = camera.orbit(1.7, 0.3, 1.0).pan(0.013, 0.02, 1.0).dolly(0.99, 1.0).look(0.1, 0.2);
@@ -88,7 +88,7 @@ fn numbers_stay_short() {
 }
 
 #[test]
-fn pan_and_fly_take_the_target_along() {
+fn pan_and_fly_move_the_target() {
     let start = aimed();
     for camera in [start.pan(0.1, -0.2, 1.0), start.fly([0.5, 0.25, -1.0])] {
         assert!(degrees_between(&camera, &start) < 1e-4);
@@ -102,7 +102,7 @@ fn pan_and_fly_take_the_target_along() {
 }
 
 #[test]
-fn a_dolly_never_comes_through() {
+fn dolly_never_passes_the_pivot() {
     let mut camera = aimed();
     for _ in 0..1000 {
         camera = camera.dolly(0.8, 1.0);
@@ -140,7 +140,7 @@ fn look_roll_and_zoom() {
 }
 
 #[test]
-fn what_is_framed_fills_the_picture() {
+fn framed_target_fills_the_picture() {
     for aspect in [4.0 / 3.0, 0.5] {
         for view_angle in [ViewAngle::Vertical(40.0), ViewAngle::Horizontal(70.0)] {
             for start in [aimed(), free().0] {

@@ -1,4 +1,4 @@
-//! Random sequences of everything that can be done to a scene.
+//! Random sequences of all edit operations.
 
 use super::LAYOUTS;
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ use zerkalo::scene::{BUILT_IN, Document, History, Scene};
 
 const TRANSFORMS: &str = include_str!("../../scenes/transform.toml");
 
-/// Random numbers that say what is done to what and how much.
+/// Random numbers that select an operation, its target, its parameter and its amount.
 type Act = (u8, usize, usize, f64);
 
 fn act() -> impl Strategy<Value = Act> {
@@ -26,7 +26,7 @@ fn pick<T: Clone>(list: &[T], at: usize) -> Option<T> {
     list.get(at.checked_rem(list.len())?).cloned()
 }
 
-/// One operation; its name, for the tally, and what came of it.
+/// Performs one operation. Returns its name, for the tally, and its result.
 fn perform(
     scene: &Scene,
     (what, at, other, amount): Act,
@@ -70,8 +70,8 @@ fn perform(
             ("rename", edit::rename(scene, &subject, names[other % names.len()]))
         }
         14 => ("own material", edit::own_material(scene, &subject)),
-        15 => ("store view", edit::store_view(scene, (at % 2 == 0).then_some("left"))),
-        16 => ("recall view", edit::recall_view(scene, "left")),
+        15 => ("store camera", edit::store_view(scene, (at % 2 == 0).then_some("left"))),
+        16 => ("recall camera", edit::recall_view(scene, "left")),
         17 => ("roughen", edit::adjust_roughness(scene, Some(&subject), amount.trunc())),
         18 => ("reflect", edit::reflect(scene, Some(&subject), amount.trunc())),
         19 => ("next lobe", edit::next_lobe(scene, None, amount > 0.0)),
@@ -79,10 +79,10 @@ fn perform(
     }
 }
 
-/// How often each operation was done and refused.
+/// Number of performed and of refused calls of each operation.
 type Tally = BTreeMap<&'static str, [u32; 2]>;
 
-fn go(text: &str, acts: &[Act], tally: &mut Tally) -> Result<(), TestCaseError> {
+fn check_sequence(text: &str, acts: &[Act], tally: &mut Tally) -> Result<(), TestCaseError> {
     let mut document = Document::parse(text.to_string(), "scene.toml").unwrap();
     let mut history = History::new(Arc::new(document.scene().clone()));
     for (i, act) in acts.iter().enumerate() {
@@ -119,7 +119,7 @@ fn go(text: &str, acts: &[Act], tally: &mut Tally) -> Result<(), TestCaseError> 
 }
 
 #[test]
-fn any_sequence_leaves_a_valid_scene_and_can_be_undone() {
+fn random_edits_leave_valid_scenes_and_can_be_undone() {
     let tally = RefCell::new(Tally::new());
     let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
         cases: 120,
@@ -128,12 +128,12 @@ fn any_sequence_leaves_a_valid_scene_and_can_be_undone() {
     let sequences = (0..3usize, prop::collection::vec(act(), 1..60));
     let result = runner.run(&sequences, |(which, acts)| {
         let text = [BUILT_IN, LAYOUTS[1], TRANSFORMS][which];
-        go(text, &acts, &mut tally.borrow_mut())
+        check_sequence(text, &acts, &mut tally.borrow_mut())
     });
     result.unwrap_or_else(|e| panic!("{e}"));
     let tally = tally.into_inner();
     println!("done and refused: {tally:?}");
-    // A tally that leaves something out would be a test of less than it says.
+    // An operation missing in the tally would go untested.
     for name in [
         "step",
         "fine step",
@@ -150,8 +150,8 @@ fn any_sequence_leaves_a_valid_scene_and_can_be_undone() {
         "delete",
         "rename",
         "own material",
-        "store view",
-        "recall view",
+        "store camera",
+        "recall camera",
         "roughen",
         "reflect",
         "next lobe",

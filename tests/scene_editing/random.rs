@@ -1,4 +1,4 @@
-//! Random scenes without faults, and random edits.
+//! Random valid scenes and random edits.
 
 use proptest::prelude::*;
 use zerkalo::camera::{Camera, ViewAngle};
@@ -43,7 +43,7 @@ fn shape() -> impl Strategy<Value = Shape> {
     prop_oneof![4 => simple(), 1 => compound(2)]
 }
 
-/// Solids combined, `levels` deep at most.
+/// Returns compounds of solids, nested at most `levels` deep.
 fn compound(levels: u32) -> BoxedStrategy<Shape> {
     let solid = || {
         simple().prop_filter("flat", |shape| {
@@ -238,7 +238,7 @@ fn unique<'a>(names: impl Iterator<Item = &'a mut String>) {
     }
 }
 
-/// Names made unique, materials dealt out to the objects.
+/// Makes names unique and assigns materials to the objects.
 pub fn tidy(mut scene: Scene) -> Scene {
     unique(scene.objects.iter_mut().map(|o| &mut o.name));
     unique(scene.lights.iter_mut().map(|l| &mut l.name));
@@ -268,7 +268,7 @@ pub fn scene() -> impl Strategy<Value = Scene> {
     )
 }
 
-/// What somebody may do to a scene, as a small number.
+/// Applies the edit with the number `what` to a scene.
 pub fn edit(scene: &mut Scene, other: &Scene, (what, at): (u8, usize)) {
     let n = scene.objects.len();
     let some = |n: usize| if n == 0 { 0 } else { at % n };

@@ -34,7 +34,7 @@ impl Autosave {
     /// is the user's state folder.
     pub fn new(path: Option<&Path>, name: &str, state: Option<PathBuf>) -> Self {
         Self {
-            recovery: Recovery::of(path, name, state.as_deref()),
+            recovery: Recovery::new(path, name, state.as_deref()),
             state,
             pending: None,
             found: Vec::new(),
@@ -54,7 +54,7 @@ impl Autosave {
     /// Records that `scene` was written to the file at `path`.
     pub fn saved(&mut self, scene: &Arc<Scene>, path: &Path) {
         self.recovery.forget();
-        self.recovery = Recovery::of(Some(path), "", self.state.as_deref());
+        self.recovery = Recovery::new(Some(path), "", self.state.as_deref());
         self.pending.take_if(|pending| *pending.scene == **scene);
     }
 
@@ -111,7 +111,7 @@ impl Autosave {
             .into_iter()
             .flatten()
             .for_each(remove_stale);
-        let RecoveryFile { mut lost, unreadable, elsewhere } = self.recovery.find();
+        let RecoveryFile { orphans: mut lost, unreadable, elsewhere } = self.recovery.find();
         let mut messages: Vec<_> = unreadable
             .iter()
             .map(|(path, why)| {

@@ -75,9 +75,9 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     let material = match material {
         Some(shared) => shared.to_string(),
         None => {
-            let own = free_material(scene, &name);
-            next.materials.insert(own.clone(), fresh_material(scene));
-            own
+            let unique_name = free_material(scene, &name);
+            next.materials.insert(unique_name.clone(), fresh_material(scene));
+            unique_name
         }
     };
     let transform = if shape.anchor_points_mut().is_empty() {
@@ -217,7 +217,7 @@ mod tests {
     use crate::scene::built_in;
 
     #[test]
-    fn every_kind_stands_free_and_in_view() {
+    fn added_objects_are_visible_and_intersect_nothing() {
         let scene = built_in();
         for word in object_kinds() {
             let edit = add_object(&scene, &word.name, None).unwrap();
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn ten_cubes_find_ten_places() {
+    fn ten_added_cubes_do_not_intersect() {
         let mut scene = built_in();
         for _ in 0..10 {
             scene = add_object(&scene, "cube", Some("red")).unwrap().scene;
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_scene_gets_things_before_the_camera() {
+    fn objects_added_to_an_empty_scene_are_in_view() {
         for word in object_kinds() {
             let edit = add_object(&Scene::default(), &word.name, None).unwrap();
             assert_eq!(edit.scene.faults(), []);
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn lights_come_from_the_side_that_is_dark() {
+    fn added_lights_alternate_sides() {
         let scene = built_in();
         for word in light_kinds() {
             let edit = add_light(&scene, &word.name).unwrap();

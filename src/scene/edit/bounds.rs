@@ -100,7 +100,7 @@ mod tests {
     use crate::scene::built_in;
 
     #[test]
-    fn solids_give_the_scene_its_size() {
+    fn scene_bounds_enclose_the_solids() {
         let mut scene = built_in();
         let room = scene_bounds(&scene);
         assert!(room.radius > 1.5 && room.radius < 3.0, "{room:?}");
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pivot_is_in_front_of_the_eye() {
+    fn focus_distance_is_positive() {
         let mut scene = built_in();
         let target = focus_distance(&scene);
         let w = scene.camera.view().unwrap();

@@ -23,7 +23,7 @@ pub(super) const KIND: Field = Field::required(
         Field::required("directional", ValueType::Text, "", "Light from infinitely far away."),
     ]),
     "",
-    "Where the light comes from.",
+    "Kind of light source.",
 );
 
 /// The choice between a camera's target and direction, a row of the inspector that files do not
@@ -31,11 +31,11 @@ pub(super) const KIND: Field = Field::required(
 pub(super) const AIM: Field = Field::required(
     "aim",
     ValueType::OneOf(&[
-        Field::required("target", ValueType::Text, "", "It looks at a point."),
-        Field::required("direction", ValueType::Text, "", "It looks in a direction."),
+        Field::required("target", ValueType::Text, "", "Directed at a point."),
+        Field::required("direction", ValueType::Text, "", "A fixed direction."),
     ]),
     "",
-    "Whether the camera looks at a point or in a direction.",
+    "Target point or fixed direction of the camera.",
 );
 
 /// Returns which of the two exclusive kinds a light or a camera has.
@@ -273,7 +273,7 @@ mod tests {
     use crate::shape::KINDS;
 
     #[test]
-    fn every_kind_becomes_every_other_in_its_place() {
+    fn converted_shapes_keep_place_and_size() {
         let scene = built_in();
         for object in 0..scene.objects.len() {
             let subject = Target::Object(object);
@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn lights_keep_side_and_brightness() {
+    fn converted_lights_keep_side_and_brightness() {
         let mut scene = built_in();
         scene.lights[0].falloff = Falloff::InverseSquare;
         scene.lights[0].intensity = 40.0;
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_keep_the_picture() {
+    fn converted_cameras_keep_the_picture() {
         let scene = built_in();
         let camera = |scene: &Scene| scene.camera.clone();
         let free = set(&scene, &Target::Camera, "aim", "direction").unwrap().scene;

@@ -136,17 +136,17 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
         if object.material == name { &mut whole } else { &mut parts }.push(label);
         object.rename_material(name, "");
     }
-    let told = |labels: &[String], [one, many]: [&str; 2]| {
-        let shown = labels.iter().take(3).cloned().collect::<Vec<_>>().join(", ");
+    let note_for = |labels: &[String], [one, many]: [&str; 2]| {
+        let names = labels.iter().take(3).cloned().collect::<Vec<_>>().join(", ");
         match labels.len() {
             0 => None,
-            1 => Some(format!("{shown} {one} now.")),
-            2 | 3 => Some(format!("{shown} {many} now.")),
-            n => Some(format!("{shown} and {} more {many} now.", n - 3)),
+            1 => Some(format!("{names} {one} now.")),
+            2 | 3 => Some(format!("{names} {many} now.")),
+            n => Some(format!("{names} and {} more {many} now.", n - 3)),
         }
     };
-    let whole = told(&whole, ["has the default finish", "have the default finish"]);
-    let parts = told(
+    let whole = note_for(&whole, ["has the default material", "have the default material"]);
+    let parts = note_for(
         &parts,
         [
             "has the material of the whole in its parts",
@@ -231,7 +231,7 @@ mod tests {
     use crate::scene::built_in;
 
     #[test]
-    fn copies_stand_apart_under_their_own_name() {
+    fn duplicates_are_apart_and_have_unique_names() {
         let scene = built_in();
         let edit = duplicate(&scene, &Target::Object(3)).unwrap();
         assert_eq!(edit.subject, Target::Object(6));
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn deleting_selects_the_neighbour_and_names_who_lost_a_material() {
+    fn delete_selects_neighbour_and_notes_lost_materials() {
         let scene = built_in();
         let edit = delete(&scene, &Target::Object(5)).unwrap();
         assert_eq!((edit.subject, edit.scene.objects.len()), (Target::Object(4), 5));
@@ -258,7 +258,7 @@ mod tests {
         assert_eq!(edit.subject, Target::Object(2));
         let edit = delete(&scene, &Target::Material("red".into())).unwrap();
         assert_eq!(edit.scene.objects[2].material, "");
-        assert_eq!(edit.note.as_deref(), Some("ball has the default finish now."));
+        assert_eq!(edit.note.as_deref(), Some("ball has the default material now."));
         assert_eq!(edit.subject, Target::Material("yellow".into()));
         let edit = delete(&scene, &Target::Light(0)).unwrap();
         assert_eq!(edit.subject, Target::Camera);
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn names_change_everywhere() {
+    fn rename_material_updates_objects() {
         let scene = built_in();
         let red = Target::Material("red".into());
         let edit = rename(&scene, &red, " crimson ").unwrap();
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn one_object_gets_a_material_of_its_own() {
+    fn own_material_copies_a_shared_material() {
         let scene = built_in();
         let edit = own_material(&scene, &Target::Object(2)).unwrap();
         assert_eq!(edit.scene.objects[2].material, "ball");
@@ -317,7 +317,7 @@ mod tests {
     ";
 
     #[test]
-    fn parts_follow_the_name_of_their_material() {
+    fn rename_material_updates_parts() {
         let scene = Scene::parse(COMPOUND, "test").unwrap();
         let edit = rename(&scene, &Target::Material("red".into()), "crimson").unwrap();
         assert_eq!(edit.scene.objects[0].materials(), ["blue", "crimson", "crimson"]);
@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_lose_the_material_that_is_deleted() {
+    fn delete_material_clears_parts() {
         let scene = Scene::parse(COMPOUND, "test").unwrap();
         let edit = delete(&scene, &Target::Material("red".into())).unwrap();
         assert_eq!(edit.scene.objects[0].materials(), ["blue"; 3]);
@@ -334,6 +334,6 @@ mod tests {
         assert_eq!(edit.note.as_deref(), Some(note));
         let edit = delete(&scene, &Target::Material("blue".into())).unwrap();
         assert_eq!(edit.scene.objects[0].materials(), ["", "red", "red"]);
-        assert_eq!(edit.note.as_deref(), Some("dice has the default finish now."));
+        assert_eq!(edit.note.as_deref(), Some("dice has the default material now."));
     }
 }

@@ -55,8 +55,8 @@ pub fn step(
         }
     };
     // A direction of zeros is invalid: such a step is dropped.
-    let lost = matches!(field.takes, ValueType::Direction) && next.iter().all(|x| *x == 0.0);
-    let next = if lost { numbers.clone() } else { next };
+    let is_zero = matches!(field.takes, ValueType::Direction) && next.iter().all(|x| *x == 0.0);
+    let next = if is_zero { numbers.clone() } else { next };
     let whole = matches!(field.takes, ValueType::Whole(_) | ValueType::Wholes(..));
     let one = |x: f64| if whole { Value::Integer(x as i64) } else { Value::Float(x) };
     let value = match given {
@@ -87,7 +87,7 @@ pub fn toggle(
     };
     let value = get(&values, key);
     let optional = matches!(field.preset, DefaultValue::Without(_));
-    let (words, at): (Vec<&str>, Option<usize>) = match field.takes {
+    let (words, index): (Vec<&str>, Option<usize>) = match field.takes {
         ValueType::Switch => {
             let on = value.and_then(Value::as_bool).unwrap_or(false);
             return crate::scene::edit::set(scene, subject, key, if on { "false" } else { "true" });
@@ -98,42 +98,42 @@ pub fn toggle(
                 None => chosen(subject, &values),
             };
             let words: Vec<_> = kinds.iter().map(|k| k.name).collect();
-            let at = words.iter().position(|w| Some(*w) == now);
-            return match next(at, words.len(), forward, optional) {
-                Some(at) => convert::switch(scene, subject, key, words[at]),
+            let index = words.iter().position(|w| Some(*w) == now);
+            return match next(index, words.len(), forward, optional) {
+                Some(index) => convert::switch(scene, subject, key, words[index]),
                 None => crate::scene::edit::set(scene, subject, key, ""),
             };
         }
         ValueType::Choice(choices) => {
             let words: Vec<_> = choices.iter().map(|c| c.name).collect();
             let now = value.and_then(Value::as_str);
-            let at = words.iter().position(|w| Some(*w) == now);
-            (words, at)
+            let index = words.iter().position(|w| Some(*w) == now);
+            (words, index)
         }
         _ if is_material(subject, field) => {
             let words: Vec<_> = scene.materials.keys().map(String::as_str).collect();
             let now = value.and_then(Value::as_str);
-            let at = words.iter().position(|w| Some(*w) == now);
-            (words, at)
+            let index = words.iter().position(|w| Some(*w) == now);
+            (words, index)
         }
         _ => {
             let found = format!("{} has no words to choose from", field.name);
             return Err(EditError::new(&found, &format!("Type {}.", field.takes)));
         }
     };
-    let text = next(at, words.len(), forward, optional).map_or("", |at| words[at]);
+    let text = next(index, words.len(), forward, optional).map_or("", |index| words[index]);
     crate::scene::edit::set(scene, subject, key, text)
 }
 
-/// Returns the index after (or before) `at` in a cycle of `n` choices; `optional` adds the choice
+/// Returns the index after (or before) `index` in a cycle of `n` choices; `optional` adds the choice
 /// `None`.
-fn next(at: Option<usize>, n: usize, forward: bool, optional: bool) -> Option<usize> {
-    match (at, forward) {
+fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option<usize> {
+    match (index, forward) {
         _ if n == 0 => None,
         (None, true) => Some(0),
         (None, false) => Some(n - 1),
-        (Some(at), true) if at + 1 < n => Some(at + 1),
-        (Some(at), false) if at > 0 => Some(at - 1),
+        (Some(index), true) if index + 1 < n => Some(index + 1),
+        (Some(index), false) if index > 0 => Some(index - 1),
         (Some(_), _) if optional => None,
         (Some(_), true) => Some(0),
         (Some(_), false) => Some(n - 1),

@@ -23,7 +23,7 @@ fn with(subject: &Target, key: &str, text: &str) -> Scene {
 }
 
 #[test]
-fn each_kind_of_number_has_a_step_that_makes_sense() {
+fn arrow_steps_of_each_number_kind() {
     let ball = Target::Object(2);
     let red = Target::Material("red".into());
     let lamp = Target::Light(0);
@@ -78,7 +78,7 @@ fn each_kind_of_number_has_a_step_that_makes_sense() {
 }
 
 #[test]
-fn one_number_of_several_moves_alone() {
+fn arrow_step_of_one_component() {
     let ball = Target::Object(2);
     let edit = step(&built_in(), &ball, "shape.sphere.center", Some(2), -1.0).unwrap();
     assert_eq!(value(&edit.scene, &ball, "shape.sphere.center"), "-0.9, 0.5, -0.1");
@@ -92,7 +92,7 @@ fn one_number_of_several_moves_alone() {
 }
 
 #[test]
-fn ladders_lead_back_and_their_values_are_short() {
+fn increment_ladders_are_reversible_and_round() {
     let ball = Target::Object(2);
     let key = "shape.sphere.radius";
     for width in [1.0, 0.1] {
@@ -122,7 +122,7 @@ fn text_to(text: &str) -> f64 {
 }
 
 #[test]
-fn a_key_that_is_left_out_starts_from_what_holds() {
+fn arrow_step_of_missing_key_starts_from_default() {
     let red = Target::Material("red".into());
     let scene = with(&red, "roughness", "0.2");
     // 0.2 / (2 sqrt 2) is 0.0707.
@@ -132,7 +132,7 @@ fn a_key_that_is_left_out_starts_from_what_holds() {
 
 /// Many steps up and down for every number of every row leave the scene valid.
 #[test]
-fn no_step_is_refused_at_an_end() {
+fn arrow_steps_stop_at_range_ends() {
     let scene = built_in();
     for (_, subject) in outline(&scene) {
         for row in rows(&scene, &subject).unwrap() {
@@ -154,7 +154,7 @@ fn no_step_is_refused_at_an_end() {
 }
 
 #[test]
-fn words_go_round() {
+fn choices_cycle() {
     let red = Target::Material("red".into());
     let mut scene = built_in();
     let mut seen = Vec::new();

@@ -89,7 +89,7 @@ mod tests {
     use crate::scene::built_in;
 
     #[test]
-    fn the_mirror_is_found() {
+    fn mirror_prefers_selection_then_rectangle() {
         let mut scene = built_in();
         let at = |scene: &Scene, subject: Option<Target>| mirror(scene, subject.as_ref()).unwrap();
         assert_eq!(at(&scene, None), "mirror");
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_are_mirrors_too() {
+    fn mirror_is_found_in_compound_parts() {
         let text = "
             [materials.glossy]
             reflection = 0.5
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn roughness_goes_up_from_zero_and_back() {
+    fn adjust_roughness_from_zero_and_back() {
         let mut scene = built_in();
         scene.materials.get_mut("mirror").unwrap().roughness = 0.0;
         let start = scene.clone();
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn lobes_and_reflection() {
+    fn next_lobe_cycles_and_reflect_steps() {
         let mut scene = built_in();
         let mut lobes = Vec::new();
         for _ in 0..5 {

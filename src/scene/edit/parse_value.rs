@@ -30,12 +30,12 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
         ValueType::Text => name(field.name, unquoted(text)).map(Value::String),
         ValueType::Switch => {
             let words = ["true", "on", "yes", "1", "false", "off", "no", "0"];
-            let at = choose(text, &words).ok_or_else(wrong)?;
-            Ok(Value::Boolean(at < 4))
+            let index = choose(text, &words).ok_or_else(wrong)?;
+            Ok(Value::Boolean(index < 4))
         }
         ValueType::Choice(choices) => {
             let words: Vec<_> = choices.iter().map(|c| c.name).collect();
-            word(field, unquoted(text), &words).map(|at| Value::String(words[at].to_string()))
+            word(field, unquoted(text), &words).map(|index| Value::String(words[index].to_string()))
         }
         ValueType::Whole(range) => list(1).and_then(|list| whole(list[0], range)),
         ValueType::Wholes(n, range) => {
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_read_as_people_type_them() {
+    fn typed_numbers_are_parsed() {
         let one = field(ValueType::Number(NumberRange::FINITE));
         for (text, expected) in
             [("0.5", 0.5), (".5", 0.5), (" 5. ", 5.0), ("1e-3", 1e-3), ("+2", 2.0), ("[3]", 3.0)]
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_and_words() {
+    fn typed_colours_and_choices_are_parsed() {
         let color = field(ValueType::Color(NumberRange::SHARE));
         assert_eq!(floats(&parse(&color, "#ff0000").unwrap()), Some(vec![1.0, 0.0, 0.0]));
         assert_eq!(floats(&parse(&color, ".5 0 1").unwrap()), Some(vec![0.5, 0.0, 1.0]));
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn values_are_shown_short() {
+    fn printed_values_are_short() {
         let list = |list: &[f64]| Value::Array(list.iter().map(|x| Value::Float(*x)).collect());
         let color = ValueType::Color(NumberRange::LIGHT);
         assert_eq!(show(ValueType::Direction, &list(&[0.1, -3.0, 1e9])), "0.1, -3, 1e9");
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn names_stay_printable() {
+    fn names_with_control_characters_are_refused() {
         assert_eq!(name("name", " café 2 "), Ok("café 2".into()));
         for bad in ["a\nb", "\u{1b}[31m", "a\u{202e}b", &"x".repeat(61)] {
             assert!(name("name", bad).is_err(), "{bad:?}");

@@ -17,7 +17,7 @@ use glam::{DVec2, DVec3};
 /// or above.
 pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {
-        return Err(EditError::new("only objects can be dropped", "Select an object."));
+        return Err(EditError::new("only objects can be snapped to ground", "Select an object."));
     };
     let object = scene.objects.get(*index).ok_or_else(|| EditError::gone(subject))?;
     let form = object.form();
@@ -50,7 +50,7 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
     let rest = below.or_else(|| heights(false).into_iter().reduce(f64::min));
     let Some(rest) = rest else {
         let help = "Add a platform or a plane first.";
-        return Err(EditError::new("nothing is under it to rest on", help));
+        return Err(EditError::new("there is no surface below or above it", help));
     };
     let mut next = scene.clone();
     let dropped = &mut next.objects[*index];
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn dropped_things_stand_exactly() {
+    fn snap_to_ground_rests_exactly_on_the_surface() {
         let scene = built_in();
         for i in 2..6 {
             for by in [[0.0, 1.23, 0.0], [0.0, -0.217, 0.0], [0.1, 0.777, 0.1]] {
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cube_lands_on_a_table_and_is_lifted_onto_the_ground_from_below() {
+    fn snap_to_ground_finds_table_and_ground_above() {
         let text = "[[object]]\nshape.plane = { point = [0, -1, 0], normal = [0, 1, 0] }\n\
                     [[object]]\nshape.box = { center = [0, 0, 0], size = [2, 0.5, 2] }\n\
                     [[object]]\nshape.cube = { corner = [-0.5, 3, 0.5], edge = 1 }\n\
@@ -237,6 +237,6 @@ mod tests {
         assert!(refusal.found.contains("no lowest point"), "{refusal}");
         let alone = Scene { objects: vec![scene.objects[2].clone()], ..Scene::default() };
         let refusal = snap_to_ground(&alone, &Target::Object(0)).unwrap_err();
-        assert!(refusal.found.contains("nothing is under it"), "{refusal}");
+        assert!(refusal.found.contains("no surface below"), "{refusal}");
     }
 }

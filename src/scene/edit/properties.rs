@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn nested_tables_are_flat_and_their_kind_shows() {
+    fn rows_flatten_nested_tables_and_show_kinds() {
         let scene = built_in();
         let keys = |subject: &Target| -> Vec<String> {
             rows(&scene, subject).unwrap().into_iter().map(|r| r.key).collect()
@@ -301,7 +301,7 @@ mod tests {
 
     /// Every shown value can be typed back without a change.
     #[test]
-    fn every_value_can_be_typed_again() {
+    fn every_row_value_can_be_typed_back() {
         let mut scene = built_in();
         let steps = "[{ rotate = { axis = [1, 0, 0], degrees = 5 } }, { scale = 2.0 }]";
         let text = format!(

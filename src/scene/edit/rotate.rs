@@ -15,7 +15,7 @@ use glam::DVec3;
 /// For targets that cannot be rotated.
 pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditError> {
     if !degrees.is_finite() {
-        return Err(EditError::new("that is no angle to turn by", ""));
+        return Err(EditError::new("the angle is not a finite number", ""));
     }
     let mut next = scene.clone();
     match subject {
@@ -51,13 +51,13 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
 /// Makes `rotate_y` and `translate` (unless neutral) the last steps of the object, so that it is
 /// rotated about the vertical through its middle.
 fn turn_by_steps(object: &mut Object, degrees: f64) {
-    let (angle, shift, own) = match object.transform[..] {
+    let (angle, shift, own_len) = match object.transform[..] {
         [.., TransformOp::RotateY(angle), TransformOp::Translate(shift)] => (angle, shift, 2),
         [.., TransformOp::RotateY(angle)] => (angle, [0.0; 3], 1),
         _ => (0.0, [0.0; 3], 0),
     };
-    let kept = object.transform.len() - own;
-    object.transform.truncate(kept);
+    let kept_len = object.transform.len() - own_len;
+    object.transform.truncate(kept_len);
     let form = object.form();
     let (middle, scale) = match form.bounds() {
         Some((low, high)) => (low + (high - low) / 2.0, (high - low).max_element()),
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn shapes_with_a_rotation_use_it() {
+    fn turn_changes_the_rotation_key_of_a_shape() {
         let scene = built_in();
         let edit = turn(&scene, &Target::Object(3), 5.0).unwrap();
         let Shape::Cube(cube) = &edit.scene.objects[3].shape else { panic!() };
@@ -109,7 +109,7 @@ mod tests {
     /// Every kind, with and without a transform, keeps its position, and a full turn in small steps
     /// is the identity.
     #[test]
-    fn turns_are_about_the_middle_and_come_round() {
+    fn turn_keeps_the_middle_and_full_turn_is_identity() {
         for kind in KINDS {
             let base = DVec3::new(3.0, 0.0, -2.0);
             let shape = Shape::fitted_to(kind.name, base, DVec3::new(1.0, 0.5, 2.0)).unwrap();
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn lights_turn_about_the_scene() {
+    fn turn_rotates_lights_about_the_scene() {
         let scene = built_in();
         let mut round = scene.clone();
         for _ in 0..72 {

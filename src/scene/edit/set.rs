@@ -114,11 +114,11 @@ pub(super) fn replace(
         }
     }
     if !insert_value(&mut values, key, Some(value)) {
-        return Err(EditError::new(&format!("there is no place for {key} here"), ""));
+        return Err(EditError::new(&format!("{key} cannot be set here"), ""));
     }
     let edit = finish(scene, subject, key, values)?;
     Ok(match gone {
-        Some(rival) => edit.with_note(format!("{rival} is gone: {first} stands in its place.")),
+        Some(rival) => edit.with_note(format!("{first} replaces {rival}.")),
         None => edit,
     })
 }
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn typed_values_arrive() {
+    fn typed_values_are_set() {
         let scene = built_in();
         let edit = set(&scene, &ball(), "shape.sphere.radius", " .75").unwrap();
         assert_eq!(edit.label, "radius of ball");
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn refusals_say_what_was_found_and_what_is_expected() {
+    fn refused_values_name_finding_and_expectation() {
         for (subject, key, text, words) in [
             (ball(), "shape.sphere.radius", "-1", "radius is -1. Expected a number greater than 0"),
             (ball(), "shape.sphere.radius", "big", "radius cannot be \"big\". Expected a number"),
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn empty_text_brings_the_default_back() {
+    fn empty_text_restores_the_default() {
         let scene = built_in();
         let red = Target::Material("red".into());
         let edit = set(&scene, &red, "exponent", "").unwrap();
@@ -236,19 +236,19 @@ mod tests {
     }
 
     #[test]
-    fn rivals_give_way() {
+    fn setting_a_key_removes_exclusive_keys() {
         let scene = built_in();
         let red = Target::Material("red".into());
         let gold = set(&scene, &red, "metal", "gold").unwrap().scene;
         let edit = set(&gold, &red, "f0", "0.5 0.5 0.5").unwrap();
         assert!(edit.scene.materials["red"].metal.is_none());
-        assert!(edit.note.unwrap().contains("metal is gone"));
+        assert!(edit.note.unwrap().contains("f0 replaces metal"));
         let edit = set(&scene, &Target::Camera, "direction", "0 0 -1").unwrap();
         assert_eq!(edit.scene.camera.target, None);
     }
 
     #[test]
-    fn steps_come_and_go() {
+    fn transform_steps_are_appended_and_removed() {
         let scene = built_in();
         let turned = set(&scene, &ball(), "transform", "rotate_y").unwrap().scene;
         let turned = set(&turned, &ball(), "transform.0.rotate_y", "30").unwrap().scene;

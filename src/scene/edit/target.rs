@@ -142,9 +142,9 @@ impl Target {
     }
 
     /// Returns the target of a problem and the key in it, which may be empty.
-    pub fn of_finding(finding: &Problem) -> Option<(Self, String)> {
-        let subject = Self::of_path(&finding.path)?;
-        let rest = finding.path.get(subject.path().len()..).unwrap_or_default();
+    pub fn of_finding(problem: &Problem) -> Option<(Self, String)> {
+        let subject = Self::of_path(&problem.path)?;
+        let rest = problem.path.get(subject.path().len()..).unwrap_or_default();
         Some((subject, rest.join(".")))
     }
 
@@ -200,7 +200,7 @@ mod tests {
     use std::collections::HashSet;
 
     #[test]
-    fn the_outline_has_everything_once_and_in_order() {
+    fn outline_lists_every_target_once_in_order() {
         let mut scene = built_in();
         scene.cameras.insert("left".into(), scene.camera.clone());
         let list = outline(&scene);
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn findings_and_messages_lead_to_their_subject() {
+    fn problems_and_diagnostics_lead_to_their_target() {
         let mut scene = built_in();
         scene.lights[0].name.clear();
         scene.cameras.insert("left".into(), scene.camera.clone());

@@ -56,7 +56,7 @@ pub(super) fn read(scene: &Scene, subject: &Target) -> Result<Table, EditError> 
 /// Returns a copy of `scene` with the values of `subject` replaced.
 pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Scene, EditError> {
     fn fill<T: DeserializeOwned>(part: Option<&mut T>, values: Table) -> Result<(), EditError> {
-        let wrong = |e: toml::de::Error| EditError::new(e.message(), "The scene stays as it was.");
+        let wrong = |e: toml::de::Error| EditError::new(e.message(), "The scene is unchanged.");
         if let Some(part) = part {
             // By way of text, so that the deserialiser of files is used and no second one is
             // compiled.

@@ -16,7 +16,7 @@ use glam::DVec3;
 /// For targets that cannot be moved, and beyond the largest coordinate.
 pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, EditError> {
     if by.iter().any(|x| !x.is_finite()) {
-        return Err(EditError::new("that is no distance to move by", ""));
+        return Err(EditError::new("the distance is not a finite number", ""));
     }
     let mut next = scene.clone();
     match subject {
@@ -94,7 +94,7 @@ mod tests {
     use crate::shape::Shape;
 
     #[test]
-    fn objects_move_by_their_own_keys_or_a_last_translation() {
+    fn objects_move_by_shape_key_or_last_translation() {
         let scene = built_in();
         let ball = Target::Object(2);
         let edit = move_by(&scene, &ball, [0.1, 0.0, -0.2]).unwrap();
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn lights_move_and_turn() {
+    fn point_lights_move_and_directional_lights_rotate() {
         let mut scene = built_in();
         let lamp = Target::Light(0);
         let edit = move_by(&scene, &lamp, [0.0, 0.1, 0.0]).unwrap();
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_of_the_world_is_a_refusal() {
+    fn move_beyond_coordinate_range_is_refused() {
         let scene = built_in();
         assert!(move_by(&scene, &Target::Object(2), [1e10, 0.0, 0.0]).is_err());
         assert!(move_by(&scene, &Target::Object(2), [f64::NAN, 0.0, 0.0]).is_err());

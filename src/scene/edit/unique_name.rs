@@ -38,7 +38,7 @@ mod tests {
     use super::free_name;
 
     #[test]
-    fn numbers_count_up() {
+    fn unique_names_count_up() {
         let taken = ["cube", "cube 2", "a 7", "7"];
         let free = |wanted| free_name(wanted, |name| taken.contains(&name));
         assert_eq!(free("ball"), "ball");

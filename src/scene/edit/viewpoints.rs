@@ -11,19 +11,19 @@ use crate::scene::edit::{Edit, EditError, Target};
 /// # Errors
 /// If the name is not printable.
 pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError> {
-    let kept = match given {
+    let name = match given {
         Some(given) => name("name", given)?,
         None => free_view(scene, "view"),
     };
-    if kept.is_empty() {
-        return Err(EditError::new("a view needs a name", ""));
+    if name.is_empty() {
+        return Err(EditError::new("a camera needs a name", ""));
     }
     let mut next = scene.clone();
-    let old = next.cameras.insert(kept.clone(), scene.camera.clone());
-    let label = format!("store view {kept}");
-    let edit = Edit::checked(next, Target::View(kept.clone()), label)?;
+    let old = next.cameras.insert(name.clone(), scene.camera.clone());
+    let label = format!("store camera {name}");
+    let edit = Edit::checked(next, Target::View(name.clone()), label)?;
     let replaced = old.is_some_and(|old| old != scene.camera);
-    Ok(if replaced { edit.with_note(format!("View {kept} was replaced.")) } else { edit })
+    Ok(if replaced { edit.with_note(format!("View {name} was replaced.")) } else { edit })
 }
 
 /// Makes the stored camera `name` the camera of the picture.
@@ -34,7 +34,7 @@ pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
     let subject = Target::View(name.to_string());
     let view = scene.cameras.get(name).ok_or_else(|| EditError::gone(&subject))?;
     let next = Scene { camera: view.clone(), ..scene.clone() };
-    Edit::checked(next, Target::Camera, format!("recall view {}", subject.label(scene)))
+    Edit::checked(next, Target::Camera, format!("recall camera {}", subject.label(scene)))
 }
 
 #[cfg(test)]
@@ -43,7 +43,7 @@ mod tests {
     use crate::scene::built_in;
 
     #[test]
-    fn views_are_kept_and_come_back() {
+    fn cameras_are_stored_and_recalled() {
         let scene = built_in();
         let edit = store_view(&scene, None).unwrap();
         assert_eq!(edit.subject, Target::View("view".into()));

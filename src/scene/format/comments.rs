@@ -6,7 +6,7 @@ use toml_edit::{DocumentMut, Item, Table};
 #[derive(Default)]
 pub(crate) struct CommentKeeper {
     /// Position of the removed table, and the comment.
-    kept: Vec<(isize, String)>,
+    comments: Vec<(isize, String)>,
 }
 
 impl CommentKeeper {
@@ -14,9 +14,9 @@ impl CommentKeeper {
     pub(crate) fn removed(&mut self, item: &Item) {
         match item {
             Item::Table(table) => {
-                let apart = split(prefix(table)).0;
-                if let Some(position) = table.position().filter(|_| apart.contains('#')) {
-                    self.kept.push((position, apart.to_string()));
+                let separate = split(prefix(table)).0;
+                if let Some(position) = table.position().filter(|_| separate.contains('#')) {
+                    self.comments.push((position, separate.to_string()));
                 }
                 for (_, inner) in table.iter() {
                     self.removed(inner);
@@ -33,17 +33,17 @@ impl CommentKeeper {
 
     /// Restores the comments above the next remaining table, or at the end of the file.
     pub(crate) fn put_back(self, document: &mut DocumentMut) {
-        let mut kept = self.kept;
-        kept.sort_by_key(|(position, _)| -position);
-        for (position, comment) in kept {
+        let mut comments = self.comments;
+        comments.sort_by_key(|(position, _)| -position);
+        for (position, comment) in comments {
             let mut after: Option<isize> = None;
-            each(document.as_table_mut(), &mut |table| {
+            for_each_table(document.as_table_mut(), &mut |table| {
                 if let Some(p) = table.position().filter(|p| *p > position) {
                     after = Some(after.map_or(p, |a| a.min(p)));
                 }
             });
             match after {
-                Some(after) => each(document.as_table_mut(), &mut |table| {
+                Some(after) => for_each_table(document.as_table_mut(), &mut |table| {
                     if table.position() == Some(after) {
                         put_above(table, &comment);
                     }
@@ -61,19 +61,19 @@ impl CommentKeeper {
 }
 
 /// Calls `act` for every table with a header and a position in the file.
-fn each(table: &mut Table, act: &mut dyn FnMut(&mut Table)) {
+fn for_each_table(table: &mut Table, act: &mut dyn FnMut(&mut Table)) {
     for (_, item) in table.iter_mut() {
         match item {
             Item::Table(inner) => {
                 if !inner.is_dotted() && !inner.is_implicit() {
                     act(inner);
                 }
-                each(inner, act);
+                for_each_table(inner, act);
             }
             Item::ArrayOfTables(list) => {
                 for inner in list.iter_mut() {
                     act(inner);
-                    each(inner, act);
+                    for_each_table(inner, act);
                 }
             }
             _ => {}
@@ -89,20 +89,20 @@ fn prefix(table: &Table) -> &str {
 /// table.
 fn split(above: &str) -> (&str, &str) {
     let mut cut = 0;
-    let mut at = 0;
+    let mut end = 0;
     for line in above.split_inclusive('\n') {
-        at += line.len();
+        end += line.len();
         if line.trim().is_empty() {
-            cut = at;
+            cut = end;
         }
     }
     above.split_at(cut)
 }
 
 fn put_above(table: &mut Table, comment: &str) {
-    let own = prefix(table);
-    let own = own.strip_prefix('\n').unwrap_or(own);
-    let joined = format!("{comment}{own}");
+    let table_comment = prefix(table);
+    let table_comment = table_comment.strip_prefix('\n').unwrap_or(table_comment);
+    let joined = format!("{comment}{table_comment}");
     table.decor_mut().set_prefix(joined);
 }
 
@@ -119,11 +119,11 @@ pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
         return;
     };
     // The comment that opens the file stays on top.
-    let (apart, own) = split(prefix(&tables[top]));
-    let (apart, own) = (apart.to_string(), own.to_string());
-    if top > 0 && apart.contains('#') {
-        tables[top].decor_mut().set_prefix(format!("\n{own}"));
-        put_above(&mut tables[0], &apart);
+    let (separate, table_comment) = split(prefix(&tables[top]));
+    let (separate, table_comment) = (separate.to_string(), table_comment.to_string());
+    if top > 0 && separate.contains('#') {
+        tables[top].decor_mut().set_prefix(format!("\n{table_comment}"));
+        put_above(&mut tables[0], &separate);
     }
     for table in tables.iter_mut() {
         forget_place(table);
@@ -134,5 +134,5 @@ pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
 /// Removes the position of a table, which then follows the one before it.
 fn forget_place(table: &mut Table) {
     table.set_position(None);
-    each(table, &mut |inner| inner.set_position(None));
+    for_each_table(table, &mut |inner| inner.set_position(None));
 }

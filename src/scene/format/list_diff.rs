@@ -26,8 +26,8 @@ pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
         }
         let after = from[..j].iter().rev().find_map(|i| *i).map_or(0, |i| i + 1);
         let before = from[j..].iter().find_map(|i| *i).unwrap_or(old.len());
-        let near = after..before.max(after);
-        if let Some(i) = near.into_iter().find(|i| free[*i] && alike(&old[*i], &new[j])) {
+        let between = after..before.max(after);
+        if let Some(i) = between.into_iter().find(|i| free[*i] && alike(&old[*i], &new[j])) {
             free[i] = false;
             from[j] = Some(i);
         }
@@ -41,12 +41,12 @@ fn name(entry: &Value) -> Option<&str> {
 
 /// Returns `true` if one entry may be an edit of the other: both without a name, or only renamed.
 fn alike(a: &Value, b: &Value) -> bool {
-    let rest = |entry: &Value| {
+    let without_name = |entry: &Value| {
         let mut table: Table = entry.as_table().cloned().unwrap_or_default();
         table.remove("name");
         table
     };
-    name(a).is_none() && name(b).is_none() || rest(a) == rest(b)
+    name(a).is_none() && name(b).is_none() || without_name(a) == without_name(b)
 }
 
 #[cfg(test)]
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn entries_find_their_origin() {
+    fn list_entries_align_with_their_origin() {
         for (old, new, expected) in [
             ("a/1 b/2 c/3", "a/1 b/9 c/3", vec![Some(0), Some(1), Some(2)]),
             ("a/1 b/2 c/3", "a/1 c/3", vec![Some(0), Some(2)]),

@@ -17,7 +17,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike};
 /// Makes `document`, which describes the scene `old`, describe `new`.
 pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml::Table) {
     let mut rewriter = Rewriter { keeper: CommentKeeper::default() };
-    rewriter.table(document.as_table_mut(), true, old, new, &Keys::These(schema::FIELDS));
+    rewriter.table(document.as_table_mut(), true, old, new, &Keys::Fixed(schema::FIELDS));
     rewriter.keeper.put_back(document);
     if document.as_table().iter().all(|(_, item)| is_nothing(item)) {
         // A file without any key is not a scene.
@@ -42,19 +42,19 @@ fn is_nothing(item: &Item) -> bool {
 /// Keys of a table and the types of their values.
 enum Keys {
     /// Keys of these fields.
-    These(&'static [Field]),
+    Fixed(&'static [Field]),
     /// Any keys; each holds a table with these fields.
-    Any(&'static [Field]),
+    Named(&'static [Field]),
 }
 
 impl Keys {
     /// Returns the keys of `old` and `new` in the order in which new ones are written.
     fn of(&self, old: &toml::Table, new: &toml::Table) -> Vec<(String, ValueType)> {
         match self {
-            Self::These(fields) => fields.iter().map(|f| (f.name.to_string(), f.takes)).collect(),
-            Self::Any(fields) => {
-                let gone = old.keys().filter(|k| !new.contains_key(*k));
-                gone.chain(new.keys()).map(|k| (k.clone(), ValueType::Table(fields))).collect()
+            Self::Fixed(fields) => fields.iter().map(|f| (f.name.to_string(), f.takes)).collect(),
+            Self::Named(fields) => {
+                let removed = old.keys().filter(|k| !new.contains_key(*k));
+                removed.chain(new.keys()).map(|k| (k.clone(), ValueType::Table(fields))).collect()
             }
         }
     }
@@ -76,46 +76,47 @@ impl Rewriter {
     ) {
         let renamed;
         let old = match keys {
-            Keys::Any(_) => {
+            Keys::Named(_) => {
                 renamed = rename(table, old, new);
                 &renamed
             }
-            Keys::These(_) => old,
+            Keys::Fixed(_) => old,
         };
-        let mut gone = Vec::new();
-        let mut come = Vec::new();
+        let mut removed = Vec::new();
+        let mut added = Vec::new();
         for (key, takes) in keys.of(old, new) {
             match (old.get(&key), new.get(&key)) {
-                (Some(_), None) if table.contains_key(&key) => gone.push(key),
+                (Some(_), None) if table.contains_key(&key) => removed.push(key),
                 (old, Some(new)) if old != Some(new) => match table.get_mut(&key) {
                     Some(item) => self.item(item, headers, old, new, takes),
-                    None => come.push((key, takes, new)),
+                    None => added.push((key, takes, new)),
                 },
                 _ => {}
             }
         }
         // A key that replaces another one (a shape of another kind, a direction instead of a
         // target) takes over its comments.
-        let heir = if gone.len() == 1 { come.first().map(|(key, ..)| key.clone()) } else { None };
-        for key in gone {
+        let successor =
+            if removed.len() == 1 { added.first().map(|(key, ..)| key.clone()) } else { None };
+        for key in removed {
             let decor = table.key(&key).map(|k| k.leaf_decor().clone());
             let Some(item) = table.remove(&key) else { continue };
             self.keeper.removed(&item);
-            if let (Some(heir), Some(decor), Item::Value(value)) = (&heir, decor, &item) {
-                let Some((_, takes, new)) = come.iter().find(|(key, ..)| key == heir) else {
+            if let (Some(successor), Some(decor), Item::Value(value)) = (&successor, decor, &item) {
+                let Some((_, takes, new)) = added.iter().find(|(key, ..)| key == successor) else {
                     continue;
                 };
                 let mut item = fresh(*takes, new, false);
                 if let Some(new_value) = item.as_value_mut() {
                     *new_value.decor_mut() = value.decor().clone();
                 }
-                table.insert(heir, item);
-                if let Some(mut key) = table.key_mut(heir) {
+                table.insert(successor, item);
+                if let Some(mut key) = table.key_mut(successor) {
                     *key.leaf_decor_mut() = decor;
                 }
             }
         }
-        for (key, takes, value) in come {
+        for (key, takes, value) in added {
             if !table.contains_key(&key) {
                 table.insert(&key, fresh(takes, value, headers));
             }
@@ -139,12 +140,12 @@ impl Rewriter {
                 Value::Table(b),
             ) => {
                 if let Some(table) = item.as_table_like_mut() {
-                    self.table(table, headers_inside, a, b, &Keys::These(fields));
+                    self.table(table, headers_inside, a, b, &Keys::Fixed(fields));
                 }
             }
             (ValueType::Named(fields), Some(Value::Table(a)), Value::Table(b)) => {
                 if let Some(table) = item.as_table_like_mut() {
-                    self.table(table, headers_inside, a, b, &Keys::Any(fields));
+                    self.table(table, headers_inside, a, b, &Keys::Named(fields));
                 }
             }
             (
@@ -167,7 +168,7 @@ impl Rewriter {
         let from = align(old, new);
         let edit = |rewriter: &mut Self, table: &mut dyn TableLike, i: usize, j: usize, headers| {
             if let (Value::Table(a), Value::Table(b)) = (&old[i], &new[j]) {
-                rewriter.table(table, headers, a, b, &Keys::These(fields));
+                rewriter.table(table, headers, a, b, &Keys::Fixed(fields));
             }
         };
         match item {
@@ -184,8 +185,8 @@ impl Rewriter {
                         None => next.push(fresh_entry(takes, &new[j])),
                     }
                 }
-                let gone: ArrayOfTables = tables.into_iter().flatten().collect();
-                self.keeper.removed(&Item::ArrayOfTables(gone));
+                let removed: ArrayOfTables = tables.into_iter().flatten().collect();
+                self.keeper.removed(&Item::ArrayOfTables(removed));
                 crate::scene::format::comments::in_order(&mut next, &from);
                 list.extend(next);
             }
@@ -223,8 +224,8 @@ impl Rewriter {
 fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
     let mut renamed = old.clone();
     for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {
-        let mut come = new.iter().filter(|(key, _)| !renamed.contains_key(*key));
-        let Some((is, _)) = come.find(|(_, other)| *other == value) else { continue };
+        let mut added = new.iter().filter(|(key, _)| !renamed.contains_key(*key));
+        let Some((is, _)) = added.find(|(_, other)| *other == value) else { continue };
         let decor =
             table.key(was).map(|key| (key.leaf_decor().clone(), key.dotted_decor().clone()));
         let Some(item) = table.remove(was) else { continue };

@@ -25,8 +25,8 @@ impl Scene {
     /// types, values out of range, undefined names. Values are validated only if keys and types are
     /// right.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
-        let library = AssetResolver::of(path, Arc::default());
-        read_text(path).and_then(|t| Self::parse_in(&t, &path.display().to_string(), library))
+        let resolver = AssetResolver::new(path, Arc::default());
+        read_text(path).and_then(|t| Self::parse_in(&t, &path.display().to_string(), resolver))
     }
 
     /// Reads and validates a scene from `text`; diagnostics call it `name`, and file names are
@@ -35,16 +35,16 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`].
     pub fn parse(text: &str, name: &str) -> Result<Self, SceneErrors> {
-        Self::parse_in(text, name, AssetResolver::of(Path::new(name), Arc::default()))
+        Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }
 
-    /// Does the same as [`Scene::parse`], with the files that the scene names in `library`.
+    /// Does the same as [`Scene::parse`], with the files that the scene names in `resolver`.
     pub(crate) fn parse_in(
         text: &str,
         name: &str,
-        library: AssetResolver,
+        resolver: AssetResolver,
     ) -> Result<Self, SceneErrors> {
-        SourceScene::parse(text, name, library).map(|source| source.scene)
+        SourceScene::parse(text, name, resolver).map(|source| source.scene)
     }
 }
 
@@ -66,7 +66,7 @@ impl<'a> SourceScene<'a> {
     pub(crate) fn parse(
         text: &'a str,
         name: &'a str,
-        library: AssetResolver,
+        resolver: AssetResolver,
     ) -> Result<Self, SceneErrors> {
         let (mut root, syntax) = DeTable::parse_recoverable(text);
         let start = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
@@ -92,7 +92,7 @@ impl<'a> SourceScene<'a> {
             let line_column = error.span().map(|span| line_column(text, span.start));
             SceneErrors::at(name, line_column, error.message().to_string(), "")
         })?;
-        scene.library = library;
+        scene.resolver = resolver;
         scene.resolve();
         match scene.faults() {
             problems if problems.is_empty() => Ok(Self { scene, former_words, name, text, root }),
@@ -104,9 +104,14 @@ impl<'a> SourceScene<'a> {
     pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
         let (name, text, root) = (self.name, self.text, self.root.get_ref());
         let mut warnings = with_locations(name, text, root, self.scene.warnings());
-        warnings.extend(migrate::warning(name, text, root, &self.former_words));
+        warnings.extend(self.migration_warning());
         warnings.sort_by_key(|warning| warning.line_column);
         warnings
+    }
+
+    /// Returns the warning about former words, if the file has any.
+    pub(crate) fn migration_warning(&self) -> Option<Diagnostic> {
+        migrate::warning(self.name, self.text, self.root.get_ref(), &self.former_words)
     }
 }
 

@@ -21,7 +21,7 @@ pub const FIELDS: &[Field] = &[
         ValueType::Table(camera::FIELDS),
         "",
         "at [0.0, 1.0, 5.0], directed at the origin",
-        "The view: a pinhole camera.",
+        "Pinhole camera that the picture is taken from.",
     ),
     Field::optional(
         "cameras",
@@ -73,8 +73,8 @@ fn phrase(keys: &[String]) -> String {
     }
     match keys {
         [transform, step, rest @ ..] if transform == "transform" => {
-            let rest: String = rest.iter().map(|key| format!(".{key}")).collect();
-            format!("step {} of transform{rest}", number(step))
+            let suffix: String = rest.iter().map(|key| format!(".{key}")).collect();
+            format!("step {} of transform{suffix}", number(step))
         }
         keys => keys.join("."),
     }
@@ -119,7 +119,7 @@ impl SchemaChecker<'_> {
         self.add(span, format!("{name} is {}", describe(value)), format!("Expected {expected}."));
     }
 
-    /// Adds an error about an unknown key. Returns the key that was probably meant.
+    /// Adds an error about an unknown key. Returns the key that was probably intended.
     fn unknown(
         &mut self,
         key: &Spanned<toml::de::DeString>,
@@ -127,9 +127,9 @@ impl SchemaChecker<'_> {
     ) -> Option<&'static str> {
         let names = || fields.iter().map(|f| f.name);
         let mut help = format!("Known: {}.", names().collect::<Vec<_>>().join(", "));
-        let meant = nearest(key.get_ref(), names());
-        if let Some(meant) = meant {
-            help += &format!(" Did you mean {meant:?}?");
+        let intended = nearest(key.get_ref(), names());
+        if let Some(intended) = intended {
+            help += &format!(" Did you mean {intended:?}?");
         }
         let place = match self.inner() {
             inner if inner.is_empty() => String::new(),
@@ -137,19 +137,19 @@ impl SchemaChecker<'_> {
         };
         let found = format!("unknown key \"{}\"{place}", truncated(key.get_ref()));
         self.add(key.span(), found, help);
-        meant
+        intended
     }
 
     fn table(&mut self, table: &DeTable, span: ops::Range<usize>, fields: &'static [Field]) {
-        let mut meant = Vec::new();
+        let mut intended = Vec::new();
         for (key, value) in table {
             match fields.iter().find(|f| f.name == key.get_ref().as_ref()) {
                 Some(field) => self.field(field, value),
-                None => meant.extend(self.unknown(key, fields)),
+                None => intended.extend(self.unknown(key, fields)),
             }
         }
         for field in fields.iter().filter(|f| f.preset == DefaultValue::Required) {
-            if !table.contains_key(field.name) && !meant.contains(&field.name) {
+            if !table.contains_key(field.name) && !intended.contains(&field.name) {
                 let place = match self.inner() {
                     inner if inner.is_empty() => String::new(),
                     inner => format!(" in {inner}"),
@@ -236,8 +236,8 @@ impl SchemaChecker<'_> {
             (takes, value) if fits(takes, value) => {}
             (ValueType::Choice(choices), DeValue::String(word)) => {
                 let mut help = format!("Expected {}.", field.takes);
-                if let Some(meant) = nearest(word, choices.iter().map(|c| c.name)) {
-                    help += &format!(" Did you mean {meant:?}?");
+                if let Some(intended) = nearest(word, choices.iter().map(|c| c.name)) {
+                    help += &format!(" Did you mean {intended:?}?");
                 }
                 self.add(span, format!("{} is {}", self.inner(), describe(value)), help);
             }
@@ -318,7 +318,7 @@ fn describe_list(list: &[Spanned<DeValue>]) -> String {
     if list.is_empty() {
         return "an empty list".to_string();
     }
-    let shown: Vec<_> = list
+    let items: Vec<_> = list
         .iter()
         .take(4)
         .map(|entry| match entry.get_ref() {
@@ -331,6 +331,6 @@ fn describe_list(list: &[Spanned<DeValue>]) -> String {
             DeValue::Table(_) => "a table".to_string(),
         })
         .collect();
-    let rest = if list.len() > shown.len() { ", …" } else { "" };
-    format!("[{}{rest}]", shown.join(", "))
+    let ellipsis = if list.len() > items.len() { ", …" } else { "" };
+    format!("[{}{ellipsis}]", items.join(", "))
 }

@@ -14,8 +14,8 @@ pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
     }
     let before = &text[..at];
     let line = before.rfind('\n').map_or(0, |newline| newline + 1);
-    let shown = before[line..].trim_start_matches('\u{feff}');
-    (before.matches('\n').count() + 1, shown.chars().count() + 1)
+    let visible = before[line..].trim_start_matches('\u{feff}');
+    (before.matches('\n').count() + 1, visible.chars().count() + 1)
 }
 
 /// Returns the span of the value at `path`, or of its nearest ancestor in the file.

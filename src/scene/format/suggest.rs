@@ -42,7 +42,7 @@ mod tests {
     use super::{distance, nearest};
 
     #[test]
-    fn distances() {
+    fn edit_distances() {
         for (a, b, expected) in [
             ("", "", 0),
             ("", "abc", 3),
@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn only_near_words_are_offered() {
+    fn suggestions_are_near_words() {
         let words = ["ebony", "ivory", "board"];
         assert_eq!(nearest("ivroy", words), Some("ivory"));
         assert_eq!(nearest("xylophone", words), None);
