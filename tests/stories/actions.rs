@@ -284,7 +284,7 @@ fn file_stories() -> Vec<Story> {
             d.disk.contains_key(Path::new("copy.toml")) && d.model.file.name == "copy.toml"
         }),
         story("read the file again", c(), "Ctrl-o", |_, d| d.asked(|e| *e == Effect::Load)),
-        story("recover edits of a broken session", c(), ":", |_, d| {
+        story("recover edits of a crashed session", c(), ":", |_, d| {
             d.notice().contains("No session")
         }),
         story("suspend to the shell", c(), "Ctrl-z", |_, d| d.asked(|e| *e == Effect::Suspend)),

@@ -26,7 +26,7 @@ impl UpdateContext<'_> {
         self.prompt(
             PromptFor::SaveAs,
             "save as",
-            "A path. An existing file is not overwritten unasked.",
+            "A path. An existing file is overwritten only after confirmation.",
             path,
         );
     }
@@ -43,7 +43,7 @@ impl UpdateContext<'_> {
         match name {
             Some(name) => {
                 let title = format!("rename {}", subject.label(self.scene()));
-                let help = "A name that nothing else of its kind has.";
+                let help = "A name that is unique among its kind.";
                 self.prompt(PromptFor::Rename(subject), &title, help, name);
             }
             None => {
@@ -57,7 +57,7 @@ impl UpdateContext<'_> {
         let count = self.scene().views.len();
         let free = (count + 1..).map(|n| format!("view {n}"));
         let name = free.into_iter().find(|name| !self.scene().views.contains_key(name));
-        let help = "A name for this viewpoint; keys 1 to 9 go back to it.";
+        let help = "A name for this viewpoint; keys 1 to 9 recall it.";
         self.prompt(PromptFor::StoreView, "store this viewpoint", help, name.unwrap_or_default());
     }
 
@@ -137,7 +137,7 @@ impl UpdateContext<'_> {
             Some(other) => return Err(format!("\"{}\" is neither png nor exr.", truncated(other))),
         };
         if let Some(more) = words.next() {
-            return Err(format!("\"{}\" is too much.", truncated(more)));
+            return Err(format!("Unexpected \"{}\".", truncated(more)));
         }
         let film = edit::set(self.scene(), &Target::Film, "size", size);
         let scene = film.map_err(|error| error.to_string())?.scene;
@@ -195,7 +195,7 @@ fn parse_stop(text: &str) -> Result<Stop, String> {
             }
         }
     }
-    if any { Ok(stop) } else { Err("Type one, or none to trace on and on.".to_string()) }
+    if any { Ok(stop) } else { Err("Type one, or none for no limit.".to_string()) }
 }
 
 #[cfg(test)]

@@ -58,7 +58,7 @@ fn description(viewed: &ViewedImage, still: &ViewerImage) -> (String, &'static s
         [w, h] => format!("{w}×{h} of {whole}"),
     };
     match still.protocol {
-        Protocol::Blocks => (size, "  ·  zerkalo doctor tells what crisp ones need"),
+        Protocol::Blocks => (size, "  ·  zerkalo doctor lists what sharp images need"),
         _ if viewed.sent < 1.0 => {
             let kilobytes = still.transfer.bytes.len() as f64 * 1e-3;
             (format!("{size}  {:.0} % of {kilobytes:.0} KB", 100.0 * viewed.sent), "")

@@ -106,12 +106,12 @@ fn rate(bytes_per_second: f64) -> String {
 /// Name of a pacing mode.
 fn mode(mode: PacingMode) -> &'static str {
     match mode {
-        PacingMode::Unlimited => "here",
-        PacingMode::AckClocked(None) => "answered",
-        PacingMode::AckClocked(Some(Multiplexer::Tmux)) => "answered through tmux",
-        PacingMode::AckClocked(Some(Multiplexer::Screen)) => "answered through screen",
-        PacingMode::SendQueue => "by the kernel's queue",
-        PacingMode::FixedRate => "fixed",
+        PacingMode::Unlimited => "local",
+        PacingMode::AckClocked(None) => "acknowledged",
+        PacingMode::AckClocked(Some(Multiplexer::Tmux)) => "acknowledged through tmux",
+        PacingMode::AckClocked(Some(Multiplexer::Screen)) => "acknowledged through screen",
+        PacingMode::SendQueue => "send queue",
+        PacingMode::FixedRate => "fixed rate",
     }
 }
 
