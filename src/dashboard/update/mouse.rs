@@ -5,7 +5,6 @@ use crate::dashboard::model::{Drag, Mode};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::panel_lines::{OutlineLine, PanelLine, outline};
 use crate::dashboard::update::UpdateContext;
-use crate::render::session::QUALITIES;
 use crate::scene::Scene;
 use crate::scene::edit::Target;
 use crate::terminal::Area;
@@ -101,32 +100,28 @@ impl UpdateContext<'_> {
     /// Opens the clicked line if the cursor is on it, otherwise moves the cursor there.
     fn press_in_overlay(&mut self, mouse: Mouse) {
         let Some(place) = self.model.overlay_layout() else { return };
-        let (scroll, cursor, len) = match &self.model.overlay {
-            Some(Overlay::Palette(palette)) => {
-                (palette.scroll, palette.cursor, palette.found.len())
-            }
-            Some(Overlay::Pick(pick)) => (pick.scroll, pick.cursor, pick.entries.len()),
-            Some(Overlay::NoiseTargets { cursor }) => (0, *cursor, QUALITIES.len()),
-            Some(Overlay::Question(question)) => (0, question.cursor, question.answers.len()),
+        match &self.model.overlay {
             Some(Overlay::Form(form)) => {
-                let at = line_at(place.list, form.scroll, mouse);
                 let (cursor, typing) = (form.cursor, form.editor.is_some());
+                let line = line_at(place.list, form.scroll, mouse);
                 let lines = self.model.field_lines();
-                let at = at.filter(|at| lines.get(*at).and_then(PanelLine::field).is_some());
-                match at {
-                    Some(at) if at == cursor && !typing => self.open_field(None),
-                    Some(at) if self.apply_field() => self.set_cursor(at),
+                match line.filter(|i| lines.get(*i).and_then(PanelLine::field).is_some()) {
+                    Some(line) if line == cursor && !typing => self.open_field(None),
+                    Some(line) if self.apply_field() => self.set_cursor(line),
                     _ => {}
                 }
                 return;
             }
             Some(Overlay::ViewerImage(_)) => return self.close_viewer(),
-            _ => return,
-        };
-        if let Some(at) = line_at(place.list, scroll, mouse).filter(|at| *at < len) {
-            match at == cursor {
+            _ => {}
+        }
+        let list = self.model.overlay.as_mut().and_then(Overlay::list);
+        let Some((&mut cursor, scroll, len)) = list else { return };
+        let scroll = scroll.map_or(0, |scroll| *scroll);
+        if let Some(line) = line_at(place.list, scroll, mouse).filter(|line| *line < len) {
+            match line == cursor {
                 true => self.open(),
-                false => self.move_cursor(at as isize - cursor as isize),
+                false => self.move_cursor(line as isize - cursor as isize),
             }
         }
     }

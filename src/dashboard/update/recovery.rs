@@ -12,7 +12,7 @@ impl UpdateContext<'_> {
     pub(super) fn orphaned_edits(&mut self, left: OrphanedEdits) {
         self.follow = false;
         self.model.orphaned_edits = Some(left);
-        if self.model.overlay.is_some() || self.model.editor().is_some() {
+        if self.model.is_busy() {
             let text = "Unsaved edits of a crashed session were found · : recover restores them";
             self.notify(Tone::Plain, text, None);
         } else {
