@@ -65,7 +65,7 @@ pub struct ViewedImage {
     /// Path of the file.
     pub path: PathBuf,
     /// The image; `None` while it is read.
-    pub still: Option<Arc<ViewerImage>>,
+    pub image: Option<Arc<ViewerImage>>,
     /// Transferred share, 0..=1.
     pub sent: f64,
 }

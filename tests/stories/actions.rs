@@ -225,8 +225,8 @@ fn object_stories() -> Vec<Story> {
         }),
         story("snap the selection to ground", BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),
         story("give it a material of its own", BALL, "M", |a, d| {
-            let own = &d.scene().objects[1].material;
-            own != "red" && d.scene().materials[own] == a.materials["red"]
+            let material = &d.scene().objects[1].material;
+            material != "red" && d.scene().materials[material] == a.materials["red"]
         }),
     ]
 }

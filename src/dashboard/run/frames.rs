@@ -112,14 +112,14 @@ impl FramePipeline {
 
     /// Follows the image in the model's viewer.
     pub fn follow(&mut self, model: &Model) {
-        let still = match &model.overlay {
-            Some(Overlay::ViewerImage(viewed)) => viewed.still.as_ref(),
+        let image = match &model.overlay {
+            Some(Overlay::ViewerImage(viewed)) => viewed.image.as_ref(),
             _ => None,
         };
-        let same = |upload: &ImageUpload| still.is_some_and(|still| upload.is_of(still));
+        let same = |upload: &ImageUpload| image.is_some_and(|image| upload.is_of(image));
         if !self.upload.as_ref().is_some_and(same) {
             self.give_up();
-            self.upload = still.map(|still| ImageUpload::new(Arc::clone(still)));
+            self.upload = image.map(|image| ImageUpload::new(Arc::clone(image)));
         }
     }
 

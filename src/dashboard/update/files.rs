@@ -197,14 +197,14 @@ impl UpdateContext<'_> {
             self.say("No picture was written yet · p writes one");
             return;
         };
-        let shown = path.display().to_string();
-        if sanitized(&shown) != shown {
+        let text = path.display().to_string();
+        if sanitized(&text) != text {
             // Control characters could run commands when pasted into a shell.
             self.refuse("Path contains control characters; not copied");
             return;
         }
         self.emit(Effect::Copy(path));
-        self.say(format!("the path of {shown} is in the terminal's clipboard, if it allows that"));
+        self.say(format!("the path of {text} is in the terminal's clipboard, if it allows that"));
     }
 }
 

@@ -66,9 +66,9 @@ impl UpdateContext<'_> {
             OutlineLine::Heading(_) => None,
         };
         let before = outline_position(&lines, &self.model.selection).unwrap_or(0);
-        let at = lines[..before].iter().filter_map(entry).count();
+        let position = lines[..before].iter().filter_map(entry).count();
         let subjects: Vec<_> = lines.iter().filter_map(entry).collect();
-        if let Some(subject) = subjects.get(moved(at, steps, subjects.len())) {
+        if let Some(subject) = subjects.get(moved(position, steps, subjects.len())) {
             self.select(subject.clone());
         }
     }

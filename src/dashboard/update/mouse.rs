@@ -69,7 +69,7 @@ impl UpdateContext<'_> {
     fn press_in_outline(&mut self, rows: Area, mouse: Mouse) {
         // The rows are from before the focus change, which may unfold the panel.
         let lines = outline(self.scene());
-        let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|at| lines.get(at));
+        let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
         let subject = line.and_then(|line| match line {
             OutlineLine::Entry { subject, .. } => Some(subject.clone()),
             OutlineLine::Heading(_) => None,
@@ -86,13 +86,14 @@ impl UpdateContext<'_> {
 
     fn press_in_inspector(&mut self, rows: Area, mouse: Mouse) {
         let lines = self.model.field_lines();
-        let at = line_at(rows, self.model.inspector.scroll, mouse);
-        let at = at.filter(|at| lines.get(*at).and_then(PanelLine::field).is_some());
-        let again = self.model.focus == Focus::Inspector && at == Some(self.model.inspector.cursor);
+        let line = line_at(rows, self.model.inspector.scroll, mouse);
+        let line = line.filter(|line| lines.get(*line).and_then(PanelLine::field).is_some());
+        let again =
+            self.model.focus == Focus::Inspector && line == Some(self.model.inspector.cursor);
         self.set_focus(Focus::Inspector);
-        match at {
+        match line {
             Some(_) if again => self.open_field(None),
-            Some(at) => self.set_cursor(at),
+            Some(line) => self.set_cursor(line),
             None => {}
         }
     }
@@ -240,7 +241,7 @@ fn seen_at(scene: &Scene, [x, y]: [usize; 2]) -> Option<usize> {
     let [width, height] = scene.film.size.map(f64::from);
     let half = camera.half_size(width / height);
     let [right, up, forward] = camera.frame();
-    let across = |at: usize, size: f64| (2.0 * (at as f64 + 0.5) / size) - 1.0;
+    let across = |pixel: usize, size: f64| (2.0 * (pixel as f64 + 0.5) / size) - 1.0;
     let direction =
         forward + right * (half[0] * across(x, width)) - up * (half[1] * across(y, height));
     let origin = DVec3::from_array(camera.eye) + direction * camera.near;

@@ -108,8 +108,8 @@ impl UpdateContext<'_> {
             path.set_extension("toml");
         }
         // The scene's own file gets the usual check for changes by other programs.
-        let own = self.model.file.path.as_ref() == Some(&path);
-        self.write((!own).then_some(path), false);
+        let is_own_file = self.model.file.path.as_ref() == Some(&path);
+        self.write((!is_own_file).then_some(path), false);
         Ok(())
     }
 
@@ -122,7 +122,8 @@ impl UpdateContext<'_> {
     fn store_view(&mut self, text: &str) -> Result<(), String> {
         let edit = edit::store_view(self.scene(), Some(text)).map_err(|e| e.to_string())?;
         self.record(edit, Coalesce::Single);
-        let number = self.scene().views.keys().position(|name| name == text).map_or(0, |at| at + 1);
+        let number =
+            self.scene().views.keys().position(|name| name == text).map_or(0, |index| index + 1);
         let key = if number <= 9 { format!(" · key {number}") } else { String::new() };
         self.say(format!("viewpoint {} is stored{key}", truncated(text)));
         Ok(())
