@@ -72,18 +72,18 @@ pub fn help() -> Vec<HelpLine> {
 /// The text of docs/keys.md.
 pub fn reference() -> String {
     let mut page = "# Keys\n\n\
-        Made from the key table of the program. Every action is also found by typing a part of its \
-        name after `:`; actions without a key only there.\n"
+        Generated from the command table. Every action is also found by typing a part of its name \
+        after `:`; actions without a key only there.\n"
         .to_string();
     // A vertical bar would end a cell of the Markdown table.
     let quoted = |key: &str| format!("`{}`", key.replace('|', "\\|"));
     for (chapter, title) in Chapter::ALL {
-        page += &format!("\n## {title}\n\n| keys | what they do |\n|---|---|\n");
+        page += &format!("\n## {title}\n\n| keys | action |\n|---|---|\n");
         for command in chapter.commands() {
             page += &format!("| {} | {} |\n", command.all_keys(quoted), command.label);
         }
     }
-    page += "\n## Mouse\n\n| mouse | what it does |\n|---|---|\n";
+    page += "\n## Mouse\n\n| mouse | effect |\n|---|---|\n";
     for (mouse, effect) in MOUSE {
         page += &format!("| {mouse} | {effect} |\n");
     }

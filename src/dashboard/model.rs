@@ -330,6 +330,11 @@ impl Model {
         }
     }
 
+    /// Returns `true` while an overlay or a text editor is open, which notices must not interrupt.
+    pub fn is_busy(&self) -> bool {
+        self.overlay.is_some() || self.editor().is_some()
+    }
+
     /// Values of the probed pixel, if the snapshot has them.
     pub fn probed(&self) -> Option<&Probe> {
         let probe = self.snapshot.as_ref()?.probe.as_ref()?;

@@ -1,6 +1,7 @@
 //! Overlays over the panels, which take the keys: help, lists, forms, prompts, questions.
 
 use crate::dashboard::editor::Editor;
+use crate::render::session::QUALITIES;
 use crate::scene::Scene;
 use crate::scene::edit::Target;
 use crate::terminal::image::ViewerImage;
@@ -41,13 +42,30 @@ pub enum Overlay {
     ViewerImage(ViewedImage),
 }
 
+impl Overlay {
+    /// Cursor, first visible line and length of a list; `None` for other overlays.
+    pub fn list(&mut self) -> Option<(&mut usize, Option<&mut usize>, usize)> {
+        match self {
+            Self::NoiseTargets { cursor } => Some((cursor, None, QUALITIES.len())),
+            Self::Palette(Palette { cursor, scroll, found, .. }) => {
+                Some((cursor, Some(scroll), found.len()))
+            }
+            Self::Pick(Pick { cursor, scroll, entries, .. }) => {
+                Some((cursor, Some(scroll), entries.len()))
+            }
+            Self::Question(Question { cursor, answers, .. }) => Some((cursor, None, answers.len())),
+            _ => None,
+        }
+    }
+}
+
 /// An exported image in the viewer.
 #[derive(Clone, Debug)]
 pub struct ViewedImage {
     /// Path of the file.
     pub path: PathBuf,
     /// The image; `None` while it is read.
-    pub still: Option<Arc<ViewerImage>>,
+    pub image: Option<Arc<ViewerImage>>,
     /// Transferred share, 0..=1.
     pub sent: f64,
 }

@@ -193,8 +193,9 @@ pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
 /// the ends.
 pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].field().is_some()).collect();
-    let at = fields.iter().position(|i| *i >= cursor).unwrap_or(fields.len().saturating_sub(1));
-    let to = at.saturating_add_signed(steps).min(fields.len().saturating_sub(1));
+    let position =
+        fields.iter().position(|i| *i >= cursor).unwrap_or(fields.len().saturating_sub(1));
+    let to = position.saturating_add_signed(steps).min(fields.len().saturating_sub(1));
     fields.get(to).copied().unwrap_or(0)
 }
 

@@ -137,8 +137,8 @@ fn relit_picture_equals_fresh_render() {
         assert_eq!(end.report.noise, expected.report.noise, "after {wait_us:?}");
         assert_eq!(end.report.spp, expected.report.spp);
         assert_eq!(end.report.samples, expected.report.samples);
-        let shown = session.with(|r, _| r.film.pixel(50, 40, &r.mix));
-        assert_eq!(shown, fresh.with(|r, _| r.film.pixel(50, 40, &r.mix)));
+        let pixel = session.with(|r, _| r.film.pixel(50, 40, &r.mix));
+        assert_eq!(pixel, fresh.with(|r, _| r.film.pixel(50, 40, &r.mix)));
     }
 }
 
@@ -353,11 +353,11 @@ fn finished_or_paused_session_stays_asleep() {
     let generation = session.set_scene(Arc::new(scene()));
     session.set_view(View { raster: Some([8, 8]), probe: None });
     resting(&session, generation);
-    let rest = switches_in(&session);
+    let idle_switches = switches_in(&session);
     session.set_stop(Stop::default());
     session.pause();
     wait(&session, |s| s.report.state == State::Paused);
-    assert_eq!((rest, switches_in(&session)), (0, 0));
+    assert_eq!((idle_switches, switches_in(&session)), (0, 0));
 }
 
 /// Returns the number of wake-ups of the session's threads during an interval. It is the minimum of
@@ -367,19 +367,22 @@ fn switches_in(session: &Session) -> u64 {
     let ids = session
         .with(|_, _| {
             let of_pool = std::fs::read_dir("/proc/self/task").unwrap();
-            let own = std::fs::read_link("/proc/thread-self").unwrap();
-            let own = own.file_name().unwrap().to_owned();
-            of_pool.map(|e| e.unwrap().file_name()).filter(|id| *id == own).collect::<Vec<_>>()
+            let own_thread = std::fs::read_link("/proc/thread-self").unwrap();
+            let own_thread = own_thread.file_name().unwrap().to_owned();
+            of_pool
+                .map(|e| e.unwrap().file_name())
+                .filter(|id| *id == own_thread)
+                .collect::<Vec<_>>()
         })
         .unwrap();
     let count = || -> u64 {
-        let of = |id: &std::ffi::OsString| {
+        let switches_of = |id: &std::ffi::OsString| {
             let path = std::path::Path::new("/proc/self/task").join(id).join("status");
             let status = std::fs::read_to_string(path).unwrap();
             let lines = status.lines().filter(|line| line.contains("ctxt_switches"));
             lines.map(|l| l.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap()).sum::<u64>()
         };
-        ids.iter().map(of).sum()
+        ids.iter().map(switches_of).sum()
     };
     let wakes = |_| {
         std::thread::sleep(Duration::from_millis(100));

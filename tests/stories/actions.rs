@@ -225,8 +225,8 @@ fn object_stories() -> Vec<Story> {
         }),
         story("snap the selection to ground", BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),
         story("give it a material of its own", BALL, "M", |a, d| {
-            let own = &d.scene().objects[1].material;
-            own != "red" && d.scene().materials[own] == a.materials["red"]
+            let material = &d.scene().objects[1].material;
+            material != "red" && d.scene().materials[material] == a.materials["red"]
         }),
     ]
 }
@@ -284,7 +284,7 @@ fn file_stories() -> Vec<Story> {
             d.disk.contains_key(Path::new("copy.toml")) && d.model.file.name == "copy.toml"
         }),
         story("read the file again", c(), "Ctrl-o", |_, d| d.asked(|e| *e == Effect::Load)),
-        story("recover edits of a broken session", c(), ":", |_, d| {
+        story("recover edits of a crashed session", c(), ":", |_, d| {
             d.notice().contains("No session")
         }),
         story("suspend to the shell", c(), "Ctrl-z", |_, d| d.asked(|e| *e == Effect::Suspend)),

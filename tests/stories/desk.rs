@@ -147,9 +147,9 @@ impl Desk {
     fn answers(&mut self, effect: Effect) -> Option<Message> {
         Some(match effect {
             Effect::Save { scene, path, overwrite } => {
-                let own = path.is_none();
+                let is_own_file = path.is_none();
                 let path = path.unwrap_or_else(|| FILE.into());
-                let result = if self.disk.contains_key(&path) && !own && !overwrite {
+                let result = if self.disk.contains_key(&path) && !is_own_file && !overwrite {
                     Err(SaveError::Exists(path))
                 } else {
                     self.document.apply(&scene);
@@ -230,9 +230,9 @@ impl Desk {
     /// Finds a command by its label in the palette and runs it.
     pub fn palette(&mut self, label: &str) -> &mut Self {
         self.keys(": ").keys(&format!("`{label}`"));
-        let at = COMMANDS.iter().position(|row| row.label == label);
+        let index = COMMANDS.iter().position(|row| row.label == label);
         let Some(Overlay::Palette(palette)) = &self.model.overlay else { panic!("no palette") };
-        let downs = palette.found.iter().position(|found| Some(*found) == at);
+        let downs = palette.found.iter().position(|found| Some(*found) == index);
         let downs = downs.unwrap_or_else(|| panic!("{label} is not found by its own name"));
         assert!(downs < 10, "{label} is {downs} lines down");
         for _ in 0..downs {
@@ -256,15 +256,15 @@ impl Desk {
     pub fn drag(&mut self, button: Button, from: [u16; 2], by: [i16; 2]) -> &mut Self {
         self.mouse(MouseKind::Press(button), from[0], from[1]);
         let steps = by[0].abs().max(by[1].abs()).max(1);
-        let at = |i: i16| {
+        let cell_of_step = |i: i16| {
             let along = |c: usize| from[c].saturating_add_signed(by[c] * i / steps);
             [along(0), along(1)]
         };
         for i in 1..=steps {
-            let [column, row] = at(i);
+            let [column, row] = cell_of_step(i);
             self.mouse(MouseKind::Drag(button), column, row);
         }
-        let [column, row] = at(steps);
+        let [column, row] = cell_of_step(steps);
         self.mouse(MouseKind::Release(button), column, row)
     }
 

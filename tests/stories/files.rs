@@ -146,7 +146,7 @@ fn unreadable_file_loads_after_it_is_fixed() {
     assert!(errors.contains("room.toml:33") && errors.contains("radius is -1"), "{errors}");
     let effects = press(&mut model, "Left a ] x m Ctrl-s Enter Tab Down Right p");
     assert!(effects.is_empty(), "{effects:?}");
-    assert!(model.notice.as_ref().unwrap().text.contains("mend"));
+    assert!(model.notice.as_ref().unwrap().text.contains("No scene"));
     assert_eq!(press(&mut model, "Ctrl-o"), [Effect::Load]);
     let scene = Arc::new(Scene::parse(ROOM, FILE).unwrap());
     let loaded = Message::Loaded(Box::new(Ok(Arc::clone(&scene))));

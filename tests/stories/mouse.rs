@@ -39,11 +39,11 @@ fn click_selects_visible_object() {
 #[test]
 fn drag_is_one_undo_step() {
     let mut desk = Desk::new(ROOM);
-    let at = middle(&desk);
-    desk.drag(Button::Left, at, [12, -4]);
+    let cell = middle(&desk);
+    desk.drag(Button::Left, cell, [12, -4]);
     let eye = desk.scene().camera.eye;
     assert!(eye[0] < -0.5, "what is seen follows the hand: {eye:?}");
-    desk.drag(Button::Right, at, [5, 5]);
+    desk.drag(Button::Right, cell, [5, 5]);
     assert!(desk.scene().camera.target.unwrap()[1] > 1.0, "the picture goes down, the eye up");
     desk.keys("u");
     assert_eq!(desk.scene().camera.eye, eye, "the second drag");
@@ -57,16 +57,16 @@ fn drag_moves_selection_under_mouse() {
     let mut desk = Desk::new(ROOM);
     desk.select(Target::Object(1));
     desk.keys("m");
-    let at = middle(&desk);
+    let cell = middle(&desk);
     let columns = f64::from(desk.model.layout().unwrap().image.width);
-    desk.drag(Button::Left, at, [10, 0]);
+    desk.drag(Button::Left, cell, [10, 0]);
     let [x, y, z] = center(&desk);
     // At distance 5 the picture is 5 x 2 tan 20° x 4/3 wide.
     let expected = 10.0 / columns * 10.0 * 20f64.to_radians().tan() * 4.0 / 3.0;
     assert!((x - expected).abs() < 0.02 && y == 1.0 && z == 0.0, "{x} {expected}");
-    desk.drag(Button::Left, at, [0, 6]);
+    desk.drag(Button::Left, cell, [0, 6]);
     assert!(center(&desk)[2] > 0.3, "nearer");
-    desk.drag(Button::Right, at, [0, -6]);
+    desk.drag(Button::Right, cell, [0, -6]);
     assert!(center(&desk)[1] > 1.2, "higher");
     desk.keys("Right Esc u");
     assert_eq!(desk.text(), ROOM, "one step from entering the mode to leaving it");

@@ -79,9 +79,9 @@ fn orphaned_edits_can_be_recovered_later() {
     assert!(question.text.contains("changed since"), "{}", question.text);
     desk.keys("`f` Left");
     assert!(!desk.asked(|e| matches!(e, Effect::Recover | Effect::Discard)));
-    desk.palette("recover edits of a broken session").keys("`d`");
+    desk.palette("recover edits of a crashed session").keys("`d`");
     assert!(desk.asked(|e| *e == Effect::Discard) && desk.model.is_unsaved());
-    desk.palette("recover edits of a broken session");
+    desk.palette("recover edits of a crashed session");
     assert!(desk.model.overlay.is_none() && desk.notice().contains("No session"));
 }
 
@@ -93,7 +93,7 @@ fn orphaned_edits_do_not_interrupt_typing() {
     assert!(matches!(desk.model.overlay, Some(Overlay::Pick(_))));
     assert!(desk.notice().contains("recover"));
     desk.keys("Esc");
-    desk.palette("recover edits of a broken session").keys("`r`");
+    desk.palette("recover edits of a crashed session").keys("`r`");
     assert_eq!(desk.scene().trace.max_depth, 7);
 }
 

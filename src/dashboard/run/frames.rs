@@ -24,22 +24,22 @@ const QUESTION_BYTES: usize = 16;
 /// Pipeline of frames to the terminal.
 pub struct FramePipeline {
     view: View,
-    pacing: FrameDiff,
-    link: FlowControl,
+    diff: FrameDiff,
+    flow: FlowControl,
     queue: Option<TcpSendQueue>,
     synchronised: bool,
     writer: Writer,
     /// Bytes sent so far.
     sent: u64,
-    wanted: Buffer,
+    target: Buffer,
     /// Position of the text cursor, if visible.
     cursor: Option<Position>,
-    facts: FrameMeta,
+    meta: FrameMeta,
     /// Clipboard sequence to send with the next frame.
-    copied: String,
+    clipboard: String,
     tty: Arc<Tty>,
     /// Upload of the image in the viewer.
-    sending: Option<ImageUpload>,
+    upload: Option<ImageUpload>,
     /// Sequence that removes the previous image; sent before the next frame.
     removal: Vec<u8>,
     /// The removal has been sent.
@@ -77,18 +77,18 @@ impl FramePipeline {
         let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
         Ok(Self {
             view: View::default(),
-            pacing: FrameDiff::new(),
-            link: FlowControl::new(InitialLink::of(terminal, queue.is_some(), bandwidth)),
+            diff: FrameDiff::new(),
+            flow: FlowControl::new(InitialLink::of(terminal, queue.is_some(), bandwidth)),
             queue,
             synchronised: terminal.synchronised,
             writer: Writer::new(Arc::clone(&tty))?,
             sent: 0,
-            wanted: Buffer::empty(Rect::ZERO),
+            target: Buffer::empty(Rect::ZERO),
             cursor: None,
-            facts: FrameMeta::default(),
-            copied: String::new(),
+            meta: FrameMeta::default(),
+            clipboard: String::new(),
             tty,
-            sending: None,
+            upload: None,
             removal: Vec::new(),
             removing: false,
         })
@@ -96,64 +96,64 @@ impl FramePipeline {
 
     /// Copies `text` to the clipboard of the terminal, with the next frame.
     pub fn copy(&mut self, text: &str) {
-        self.copied = copied(text);
+        self.clipboard = copied(text);
     }
 
     /// Forgets the contents of the screen, so that the next frame redraws all of it.
     pub fn forget(&mut self) {
-        self.pacing = FrameDiff::new();
+        self.diff = FrameDiff::new();
         self.give_up();
     }
 
     /// Transferred share of the viewed image, 0..=1.
     pub fn uploaded(&self) -> Option<f64> {
-        self.sending.as_ref().map(ImageUpload::share)
+        self.upload.as_ref().map(ImageUpload::share)
     }
 
     /// Follows the image in the model's viewer.
     pub fn follow(&mut self, model: &Model) {
-        let still = match &model.overlay {
-            Some(Overlay::ViewerImage(viewed)) => viewed.still.as_ref(),
+        let image = match &model.overlay {
+            Some(Overlay::ViewerImage(viewed)) => viewed.image.as_ref(),
             _ => None,
         };
-        let same = |sending: &ImageUpload| still.is_some_and(|still| sending.is_of(still));
-        if !self.sending.as_ref().is_some_and(same) {
+        let same = |upload: &ImageUpload| image.is_some_and(|image| upload.is_of(image));
+        if !self.upload.as_ref().is_some_and(same) {
             self.give_up();
-            self.sending = still.map(|still| ImageUpload::new(Arc::clone(still)));
+            self.upload = image.map(|image| ImageUpload::new(Arc::clone(image)));
         }
     }
 
     /// Stops an upload and removes what was sent of it.
     fn give_up(&mut self) {
-        if let Some(sending) = self.sending.take() {
-            let (removal, destroys) = sending.removal();
+        if let Some(upload) = self.upload.take() {
+            let (removal, destroys) = upload.removal();
             self.removal.extend(removal);
             if destroys {
-                self.pacing = FrameDiff::new();
+                self.diff = FrameDiff::new();
             }
         }
     }
 
     /// Sends the next slice of an image.
-    fn slice(&mut self, now: Duration, allowance: FrameBudget) -> DrawOutcome {
-        let Some(sending) = self.sending.as_mut().filter(|_| allowance.picture) else {
+    fn slice(&mut self, now: Duration, budget: FrameBudget) -> DrawOutcome {
+        let Some(upload) = self.upload.as_mut().filter(|_| budget.picture) else {
             return DrawOutcome::Nothing;
         };
-        if !sending.has_begun() {
+        if !upload.has_begun() {
             // The image must be removed however the program ends.
-            self.tty.set_exit_sequence(&sending.any_removal());
+            self.tty.set_exit_sequence(&upload.any_removal());
             self.removing = false;
         }
         let mut bytes = self.writer.buffer();
-        sending.next(allowance.bytes.saturating_sub(QUESTION_BYTES), &mut bytes);
-        self.pacing.moved();
-        if sending.is_open() {
-            self.link.sent_unasked(now, bytes.len());
+        upload.next(budget.bytes.saturating_sub(QUESTION_BYTES), &mut bytes);
+        self.diff.moved();
+        if upload.is_open() {
+            self.flow.sent_unasked(now, bytes.len());
         } else {
-            if let Some(through) = self.link.ack_request() {
+            if let Some(through) = self.flow.ack_request() {
                 bytes.extend(cursor_request(through).as_bytes());
             }
-            self.link.sent(now, bytes.len(), true, 0);
+            self.flow.sent(now, bytes.len(), true, 0);
         }
         self.writer.send(bytes);
         DrawOutcome::Slice
@@ -167,69 +167,69 @@ impl FramePipeline {
     /// Returns `true` if visible differences of the picture are pending, and the bytes of frames
     /// sent so far.
     pub fn load(&self) -> (bool, u64) {
-        (self.pacing.rest().visible, self.sent)
+        (self.diff.rest().visible, self.sent)
     }
 
     /// Status of the connection, for display.
     pub fn reading(&self) -> Option<LinkStatus> {
-        self.link.reading()
+        self.flow.reading()
     }
 
     /// Records user input.
     pub fn act(&mut self, now: Duration) {
-        self.link.act(now);
+        self.flow.act(now);
     }
 
     /// Records the acknowledgement of a frame.
     pub fn answered(&mut self, at: Duration) {
-        self.link.on_ack(at);
+        self.flow.on_ack(at);
     }
 
     /// Time to wait for acknowledgements at the end; `None` if none are outstanding.
     pub fn awaits(&self) -> Option<Duration> {
-        self.link.awaits()
+        self.flow.awaits()
     }
 
     /// Returns `true` if acknowledgements are outstanding.
     pub fn is_waiting(&self) -> bool {
-        self.link.is_waiting()
+        self.flow.is_waiting()
     }
 
     /// Updates flow control: expires acknowledgements and reads the send queue.
     pub fn look(&mut self, now: Duration) {
-        self.link.expire(now);
-        if self.link.asks_kernel(now) {
-            self.link.held_back(now, self.queue.as_ref().and_then(TcpSendQueue::bytes));
+        self.flow.expire(now);
+        if self.flow.asks_kernel(now) {
+            self.flow.held_back(now, self.queue.as_ref().and_then(TcpSendQueue::bytes));
         }
     }
 
     /// Time at which a new picture, or at least text, could be sent.
     pub fn snapshot_due(&self, now: Duration, answers: bool) -> Duration {
-        match self.link.allowance(now, answers) {
+        match self.flow.allowance(now, answers) {
             Some(_) => now,
-            None => self.link.wakes_at(now, true),
+            None => self.flow.wakes_at(now, true),
         }
     }
 
     /// Time of the next draw; `None` until an event. `changed` is whether the model differs from
     /// the last frame, `answers` whether the frame responds to user input.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
-        let rest = self.pacing.rest();
-        let text = changed || rest.text || !self.removal.is_empty();
-        let may = || self.link.allowance(now, false).is_some_and(|allowance| allowance.picture);
-        if let Some(sending) = &self.sending
-            && (sending.is_open() || !text && sending.follows(rest.visible))
+        let pending = self.diff.rest();
+        let text = changed || pending.text || !self.removal.is_empty();
+        let may = || self.flow.allowance(now, false).is_some_and(|budget| budget.picture);
+        if let Some(upload) = &self.upload
+            && (upload.is_open() || !text && upload.follows(pending.visible))
         {
-            let slice = || if may() { now } else { self.link.wakes_at(now, false) };
-            return sending.is_unfinished().then(slice);
+            let slice = || if may() { now } else { self.flow.wakes_at(now, false) };
+            return upload.is_unfinished().then(slice);
         }
-        if !text && !rest.visible {
-            let hidden = rest.hidden?.max(self.link.flush_at());
-            return Some(if may() { hidden } else { hidden.max(self.link.wakes_at(now, false)) });
+        if !text && !pending.visible {
+            let hidden = pending.hidden?.max(self.flow.flush_at());
+            return Some(if may() { hidden } else { hidden.max(self.flow.wakes_at(now, false)) });
         }
-        match self.link.allowance(now, answers) {
-            Some(allowance) if allowance.picture || text => Some(now),
-            _ => Some(self.link.wakes_at(now, text)),
+        match self.flow.allowance(now, answers) {
+            Some(budget) if budget.picture || text => Some(now),
+            _ => Some(self.flow.wakes_at(now, text)),
         }
     }
 
@@ -244,22 +244,22 @@ impl FramePipeline {
         answers: bool,
         image_epoch: u64,
     ) -> DrawOutcome {
-        let Some(whole) = self.link.allowance(now, answers) else { return DrawOutcome::Nothing };
-        let mut allowance = whole;
-        if let Some(sending) = &self.sending {
-            if sending.is_open() {
+        let Some(whole) = self.flow.allowance(now, answers) else { return DrawOutcome::Nothing };
+        let mut budget = whole;
+        if let Some(upload) = &self.upload {
+            if upload.is_open() {
                 return self.slice(now, whole);
             }
             // The image covers the picture, or is about to.
-            allowance.picture &= !sending.follows(true);
+            budget.picture &= !upload.follows(true);
         }
         if changed {
             self.redraw(model);
         }
         let (picture, uncovered) = self.view.place();
-        let FrameMeta { version, samples, settled } = self.facts;
-        let wanted = TargetFrame {
-            cells: &self.wanted,
+        let FrameMeta { version, samples, settled } = self.meta;
+        let target = TargetFrame {
+            cells: &self.target,
             cursor: self.cursor,
             picture,
             uncovered,
@@ -274,20 +274,20 @@ impl FramePipeline {
             bytes.extend(SYNCHRONISED[0]);
         }
         let empty = bytes.len();
-        let frame = self.pacing.frame(&wanted, now, allowance, self.link.threshold(), &mut bytes);
-        if let Some(sending) = &mut self.sending {
-            sending.seen |= frame.picture;
+        let frame = self.diff.frame(&target, now, budget, self.flow.threshold(), &mut bytes);
+        if let Some(upload) = &mut self.upload {
+            upload.seen |= frame.picture;
         }
-        if bytes.len() == empty && self.copied.is_empty() && self.removal.is_empty() {
+        if bytes.len() == empty && self.clipboard.is_empty() && self.removal.is_empty() {
             bytes.clear();
             self.writer.keep(bytes);
-            let rest = self.pacing.rest();
+            let pending = self.diff.rest();
             let follows =
-                |sending: &ImageUpload| sending.is_unfinished() && sending.follows(rest.visible);
-            if !rest.text && self.sending.as_ref().is_some_and(follows) {
+                |upload: &ImageUpload| upload.is_unfinished() && upload.follows(pending.visible);
+            if !pending.text && self.upload.as_ref().is_some_and(follows) {
                 return self.slice(now, whole);
             }
-            return if self.pacing.rest().visible {
+            return if self.diff.rest().visible {
                 DrawOutcome::Deferred
             } else {
                 DrawOutcome::Same
@@ -297,12 +297,12 @@ impl FramePipeline {
             bytes.extend(SYNCHRONISED[1]);
         }
         self.removing |= !std::mem::take(&mut self.removal).is_empty();
-        bytes.extend(std::mem::take(&mut self.copied).as_bytes());
-        if let Some(through) = self.link.ack_request() {
+        bytes.extend(std::mem::take(&mut self.clipboard).as_bytes());
+        if let Some(through) = self.flow.ack_request() {
             bytes.extend(cursor_request(through).as_bytes());
         }
         self.sent += bytes.len() as u64;
-        self.link.sent(now, bytes.len(), frame.picture, frame.flushed);
+        self.flow.sent(now, bytes.len(), frame.picture, frame.flushed);
         self.writer.send(bytes);
         if frame.picture { DrawOutcome::Picture } else { DrawOutcome::Text }
     }
@@ -322,10 +322,10 @@ impl FramePipeline {
 
     fn redraw(&mut self, model: &Model) {
         let [width, height] = model.screen;
-        self.wanted.resize(Rect { x: 0, y: 0, width, height });
-        self.wanted.reset();
-        self.cursor = self.view.draw(model, &mut self.wanted);
-        self.facts = FrameMeta {
+        self.target.resize(Rect { x: 0, y: 0, width, height });
+        self.target.reset();
+        self.cursor = self.view.draw(model, &mut self.target);
+        self.meta = FrameMeta {
             version: model.picture_version,
             samples: model.snapshot.as_ref().map_or(0.0, |s| s.report.spp.mean),
             settled: is_settled(model),

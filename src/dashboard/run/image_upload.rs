@@ -11,7 +11,7 @@ const END: &[u8] = b"\x1b\\";
 /// An image and the progress of its upload.
 #[derive(Debug)]
 pub struct ImageUpload {
-    still: Arc<ViewerImage>,
+    image: Arc<ViewerImage>,
     sent: usize,
     /// A sequence is incomplete: only its remainder can be sent.
     open: bool,
@@ -21,13 +21,13 @@ pub struct ImageUpload {
 
 impl ImageUpload {
     /// Creates an upload with nothing sent.
-    pub fn new(still: Arc<ViewerImage>) -> Self {
-        Self { still, sent: 0, open: false, seen: false }
+    pub fn new(image: Arc<ViewerImage>) -> Self {
+        Self { image, sent: 0, open: false, seen: false }
     }
 
-    /// Returns `true` if `still` is the uploaded image.
-    pub fn is_of(&self, still: &Arc<ViewerImage>) -> bool {
-        Arc::ptr_eq(&self.still, still)
+    /// Returns `true` if `image` is the uploaded image.
+    pub fn is_of(&self, image: &Arc<ViewerImage>) -> bool {
+        Arc::ptr_eq(&self.image, image)
     }
 
     /// Returns `true` if a sequence is incomplete.
@@ -42,7 +42,7 @@ impl ImageUpload {
 
     /// Returns `true` if the upload is incomplete.
     pub fn is_unfinished(&self) -> bool {
-        self.sent < self.still.transfer.bytes.len()
+        self.sent < self.image.transfer.bytes.len()
     }
 
     /// Returns `true` if the image covers the half blocks, or is about to. `waits` is whether
@@ -53,13 +53,13 @@ impl ImageUpload {
 
     /// Transferred share, 0..=1.
     pub fn share(&self) -> f64 {
-        let all = self.still.transfer.bytes.len().max(1);
+        let all = self.image.transfer.bytes.len().max(1);
         self.sent as f64 / all as f64
     }
 
     /// Appends the next slice of about `room` bytes to `out`.
     pub fn next(&mut self, room: usize, out: &mut Vec<u8>) {
-        let transfer = &self.still.transfer;
+        let transfer = &self.image.transfer;
         let (range, open) = transfer.slice(self.sent, room.min(SLICE));
         out.extend(&transfer.bytes[range.clone()]);
         (self.sent, self.open) = (range.end, open);
@@ -67,7 +67,7 @@ impl ImageUpload {
 
     /// Sequence that removes the transferred part, and whether the cells below must be redrawn.
     pub fn removal(&self) -> (Vec<u8>, bool) {
-        let transfer = &self.still.transfer;
+        let transfer = &self.image.transfer;
         if !self.has_begun() {
             return (Vec::new(), false);
         }
@@ -77,7 +77,7 @@ impl ImageUpload {
 
     /// Sequence that removes the image at any stage of the upload.
     pub fn any_removal(&self) -> Vec<u8> {
-        let clear: &[u8] = if self.still.transfer.destroys { b"\x1b[2J" } else { b"" };
-        [END, &self.still.transfer.remove, clear].concat()
+        let clear: &[u8] = if self.image.transfer.destroys { b"\x1b[2J" } else { b"" };
+        [END, &self.image.transfer.remove, clear].concat()
     }
 }

@@ -49,36 +49,40 @@ impl ResizeDebounce {
 
 impl Dashboard {
     /// Handles a signal. Returns the exit status if the program is to end.
-    pub(super) fn handle_signal(&mut self, event: SignalEvent, line: &TerminalIo) -> Option<u8> {
+    pub(super) fn handle_signal(
+        &mut self,
+        event: SignalEvent,
+        terminal_io: &TerminalIo,
+    ) -> Option<u8> {
         match event {
             SignalEvent::End(status) => Some(status),
             SignalEvent::Resized => {
                 self.resizing.note(self.began.elapsed());
                 None
             }
-            SignalEvent::Stop => self.suspend(StopTarget::Itself, line),
+            SignalEvent::Stop => self.suspend(StopTarget::Itself, terminal_io),
             // Resumed after an unannounced SIGSTOP.
-            SignalEvent::Continue => self.resume(line),
+            SignalEvent::Continue => self.resume(terminal_io),
         }
     }
 
     /// Restores the terminal, stops, and resumes when continued. Returns the exit status if the
     /// program is to end instead.
-    pub(super) fn suspend(&mut self, whom: StopTarget, line: &TerminalIo) -> Option<u8> {
+    pub(super) fn suspend(&mut self, target: StopTarget, terminal_io: &TerminalIo) -> Option<u8> {
         // The program may never be resumed.
         self.effects.flush(SECURED_WITHIN);
-        self.await_answers(&line.input);
-        line.tty.suspend();
-        let mut stopped = stop(whom).is_ok();
+        self.await_answers(&terminal_io.input);
+        terminal_io.tty.suspend();
+        let mut stopped = stop(target).is_ok();
         while stopped {
-            match line.signals.recv_timeout(STOPS_WITHIN) {
+            match terminal_io.signals.recv_timeout(STOPS_WITHIN) {
                 Ok(SignalEvent::End(status)) => return Some(status),
                 Ok(SignalEvent::Continue) => break,
                 Ok(SignalEvent::Resized | SignalEvent::Stop) => {}
                 Err(_) => stopped = false,
             }
         }
-        let end = self.resume(line);
+        let end = self.resume(terminal_io);
         if !stopped {
             self.dispatch(Message::Warning("there is no shell to go back to".to_string()));
         }
@@ -86,8 +90,8 @@ impl Dashboard {
     }
 
     /// Takes the terminal again and redraws everything.
-    fn resume(&mut self, line: &TerminalIo) -> Option<u8> {
-        if line.tty.resume().is_err() {
+    fn resume(&mut self, terminal_io: &TerminalIo) -> Option<u8> {
+        if terminal_io.tty.resume().is_err() {
             return Some(HUNG_UP);
         }
         self.resize();

@@ -178,26 +178,26 @@ mod tests {
 
     #[test]
     fn picture_responds_to_its_generation_and_earlier() {
-        let mut trace = LatencyRecorder::new(true);
-        let start = trace.began;
+        let mut recorder = LatencyRecorder::new(true);
+        let start = recorder.began;
         let at = |ms| start + Duration::from_millis(ms);
-        assert!(!trace.replies(0));
-        trace.event(at(0), Some(1));
-        trace.event(at(5), Some(2));
-        trace.event(at(6), None);
-        assert!(trace.replies(0));
-        trace.sent(0);
-        trace.written(at(7));
-        assert!(!trace.replies(0));
-        assert!(trace.replies(1));
-        trace.sent(1);
-        assert!(!trace.replies(1), "it is on its way");
+        assert!(!recorder.replies(0));
+        recorder.event(at(0), Some(1));
+        recorder.event(at(5), Some(2));
+        recorder.event(at(6), None);
+        assert!(recorder.replies(0));
+        recorder.sent(0);
+        recorder.written(at(7));
+        assert!(!recorder.replies(0));
+        assert!(recorder.replies(1));
+        recorder.sent(1);
+        assert!(!recorder.replies(1), "it is on its way");
         // Events read while the frame is in flight are not answered by it.
-        trace.event(at(9), None);
-        trace.written(at(20));
-        trace.sent(7);
-        trace.written(at(30));
-        let replies: Vec<_> = trace
+        recorder.event(at(9), None);
+        recorder.written(at(20));
+        recorder.sent(7);
+        recorder.written(at(30));
+        let replies: Vec<_> = recorder
             .answered
             .as_ref()
             .unwrap()
@@ -206,14 +206,14 @@ mod tests {
             .collect();
         assert_eq!(replies, [(6, false, 1), (0, true, 20), (5, true, 25), (9, false, 21)]);
         assert_eq!(
-            trace.summary(),
+            recorder.summary(),
             [
                 "event to picture: 2 events, median 20.0 ms, p99 25.0 ms, max 25.0 ms",
                 "event to screen: 2 events, median 1.0 ms, p99 21.0 ms, max 21.0 ms",
             ]
         );
         let path = tempfile::tempdir().unwrap().path().join("trace.csv");
-        assert!(trace.write(&path).is_err(), "no such folder");
+        assert!(recorder.write(&path).is_err(), "no such folder");
     }
 
     #[test]
@@ -228,24 +228,24 @@ mod tests {
 
     #[test]
     fn traffic_counts_while_differences_are_pending() {
-        let mut trace = LatencyRecorder::new(true);
+        let mut recorder = LatencyRecorder::new(true);
         let ms = Duration::from_millis;
         for (at, waits, sent) in
             [(0, false, 100), (1000, true, 1100), (1100, true, 2100), (1200, false, 3000)]
         {
-            trace.line(ms(at), waits, sent);
+            recorder.line(ms(at), waits, sent);
         }
-        trace.line(ms(9000), false, 3500);
+        recorder.line(ms(9000), false, 3500);
         let summary = "visible differences waited for 0.200 s, in which 2000 bytes were sent";
-        assert_eq!(trace.summary(), [summary]);
+        assert_eq!(recorder.summary(), [summary]);
     }
 
     #[test]
     fn nothing_is_stored_without_request() {
-        let mut trace = LatencyRecorder::new(false);
-        trace.event(trace.began, None);
-        trace.sent(0);
-        trace.written(trace.began);
-        assert!(trace.summary().is_empty());
+        let mut recorder = LatencyRecorder::new(false);
+        recorder.event(recorder.began, None);
+        recorder.sent(0);
+        recorder.written(recorder.began);
+        assert!(recorder.summary().is_empty());
     }
 }

@@ -116,7 +116,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         effects,
         frames: FramePipeline::new(screen.tty(), &terminal, bandwidth)?,
         terminal,
-        trace: LatencyRecorder::new(trace.is_some()),
+        latency: LatencyRecorder::new(trace.is_some()),
         began: Instant::now(),
         shown: 0,
         image_epoch: 0,
@@ -129,17 +129,17 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     // The renderer learns the raster size.
     dashboard.dispatch(Message::Resize(dashboard.model.screen));
     let input = input::read(keyboard)?;
-    let line = TerminalIo {
+    let terminal_io = TerminalIo {
         tty: screen.tty(),
         input,
         signals: signals.events,
         left: screen.left().clone(),
     };
-    let result = dashboard.watch(&line);
+    let result = dashboard.watch(&terminal_io);
     // Before anything else is written.
     dashboard.effects.flush(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
-        dashboard.await_answers(&line.input);
+        dashboard.await_answers(&terminal_io.input);
     }
     // The remaining writes may take a while: the screen is restored first.
     drop(screen);
@@ -151,8 +151,8 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     let mut ended =
         Ended { signalled: result?, exported: exported.collect(), kept, latencies: Vec::new() };
     if let Some(path) = trace {
-        dashboard.trace.write(&path)?;
-        ended.latencies = dashboard.trace.summary();
+        dashboard.latency.write(&path)?;
+        ended.latencies = dashboard.latency.summary();
     }
     Ok(ended)
 }
@@ -163,7 +163,7 @@ struct Dashboard {
     frames: FramePipeline,
     /// Capabilities of the terminal that are known so far.
     terminal: Capabilities,
-    trace: LatencyRecorder,
+    latency: LatencyRecorder,
     began: Instant,
     /// Generation of the visible picture.
     shown: u64,
@@ -181,15 +181,15 @@ struct Dashboard {
 
 impl Dashboard {
     /// Runs until the end; returns the exit status of a signal.
-    fn watch(&mut self, line: &TerminalIo) -> io::Result<Option<u8>> {
+    fn watch(&mut self, terminal_io: &TerminalIo) -> io::Result<Option<u8>> {
         let wakeup = self.effects.session().wakeup().clone();
         let done = self.effects.done().clone();
         let written = self.frames.written().clone();
         let silence = never();
         let mut waiting = Vec::new();
         // A signal during the probe ends the program before the first frame.
-        while let Ok(event) = line.signals.try_recv() {
-            if let Some(status) = self.handle_signal(event, line) {
+        while let Ok(event) = terminal_io.signals.try_recv() {
+            if let Some(status) = self.handle_signal(event, terminal_io) {
                 return Ok(Some(status));
             }
         }
@@ -206,8 +206,8 @@ impl Dashboard {
                 None => never(),
             };
             select! {
-                recv(line.input) -> came => match came {
-                    Ok(Ok(came)) => self.enqueue(came, &mut waiting),
+                recv(terminal_io.input) -> event => match event {
+                    Ok(Ok(event)) => self.enqueue(event, &mut waiting),
                     // The terminal is gone.
                     Ok(Err(_)) | Err(_) => return Ok(Some(HUNG_UP)),
                 },
@@ -220,32 +220,32 @@ impl Dashboard {
                 recv(written) -> frame => {
                     if let Ok(frame) = frame {
                         match self.frames.written_at(frame) {
-                            Ok(at) => self.trace.written(at),
+                            Ok(at) => self.latency.written(at),
                             Err(_) => return Ok(Some(HUNG_UP)),
                         }
                     }
                 }
-                recv(line.signals) -> event => {
-                    if let Some(status) = event.ok().and_then(|event| self.handle_signal(event, line)) {
+                recv(terminal_io.signals) -> event => {
+                    if let Some(status) = event.ok().and_then(|event| self.handle_signal(event, terminal_io)) {
                         return Ok(Some(status));
                     }
                 }
-                recv(line.left) -> _ => return Err(io::Error::other("the dashboard has failed")),
+                recv(terminal_io.left) -> _ => return Err(io::Error::other("the dashboard has failed")),
                 recv(timer) -> _ => self.wake(),
             }
-            while let Ok(Ok(came)) = line.input.try_recv() {
-                self.enqueue(came, &mut waiting);
+            while let Ok(Ok(event)) = terminal_io.input.try_recv() {
+                self.enqueue(event, &mut waiting);
             }
             for Input { at, message } in waiting.drain(..) {
                 self.frames.act(self.began.elapsed());
                 let scene = self.dispatch(message);
-                self.trace.event(at, scene);
+                self.latency.event(at, scene);
             }
             while let Ok(message) = done.try_recv() {
                 self.take_done(message);
             }
             if std::mem::take(&mut self.suspend)
-                && let Some(status) = self.suspend(StopTarget::Group, line)
+                && let Some(status) = self.suspend(StopTarget::Group, terminal_io)
             {
                 return Ok(Some(status));
             }
@@ -279,7 +279,7 @@ impl Dashboard {
         let end = self.frames.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
             match input.recv_timeout(left) {
-                Ok(Ok(came)) => self.enqueue(came, &mut Vec::new()),
+                Ok(Ok(event)) => self.enqueue(event, &mut Vec::new()),
                 _ => break,
             }
             if !self.frames.is_waiting() {
@@ -344,7 +344,7 @@ impl Dashboard {
     /// frame.
     fn wants_snapshot(&self) -> Option<Duration> {
         let now = self.began.elapsed();
-        let due = self.frames.snapshot_due(now, self.trace.replies(u64::MAX));
+        let due = self.frames.snapshot_due(now, self.latency.replies(u64::MAX));
         self.frames.ready().then(|| due.saturating_sub(now))
     }
 
@@ -377,26 +377,26 @@ impl Dashboard {
         self.frames.follow(&self.model);
         let mut due = None;
         if self.frames.ready() && !self.quit {
-            let answers = self.trace.replies(self.shown);
+            let answers = self.latency.replies(self.shown);
             due = self.frames.due(now, self.changed, answers);
             if due.is_some_and(|at| at <= now) {
                 let drawn =
                     self.frames.draw(&self.model, now, self.changed, answers, self.image_epoch);
                 let (waits, sent) = self.frames.load();
-                self.trace.line(now, waits, sent);
+                self.latency.line(now, waits, sent);
                 self.changed &= matches!(drawn, DrawOutcome::Nothing | DrawOutcome::Slice);
                 match drawn {
                     DrawOutcome::Nothing | DrawOutcome::Deferred | DrawOutcome::Slice => {}
                     DrawOutcome::Same => {
                         // The screen already shows the response.
-                        self.trace.sent(self.shown);
-                        self.trace.written(Instant::now());
+                        self.latency.sent(self.shown);
+                        self.latency.written(Instant::now());
                     }
                     // No picture has generation 0.
-                    DrawOutcome::Text => self.trace.sent(0),
-                    DrawOutcome::Picture => self.trace.sent(self.shown),
+                    DrawOutcome::Text => self.latency.sent(0),
+                    DrawOutcome::Picture => self.latency.sent(self.shown),
                 }
-                let answers = self.trace.replies(self.shown);
+                let answers = self.latency.replies(self.shown);
                 due = if self.frames.ready() {
                     self.frames.due(now, self.changed, answers)
                 } else {

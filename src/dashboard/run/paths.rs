@@ -56,8 +56,8 @@ fn scp_from(connection: &str, user: &str, host_name: &str, path: &str) -> String
         [_, _, host, port] => (host.to_string(), port),
         _ => (host_name.to_string(), "22"),
     };
-    let at = if user.is_empty() { String::new() } else { format!("{user}@") };
-    let place = quoted(&format!("{at}{host}:{path}"));
+    let user_prefix = if user.is_empty() { String::new() } else { format!("{user}@") };
+    let place = quoted(&format!("{user_prefix}{host}:{path}"));
     if port == "22" { place } else { format!("-P {} {place}", quoted(port)) }
 }
 

@@ -98,8 +98,8 @@ pub(super) fn watch(
 /// Stops the processes; the stop may take effect with a delay. It has no effect without a shell
 /// that could continue them: the kernel ignores every stop signal but SIGSTOP for orphaned process
 /// groups. SIGTSTP has a handler here, so SIGTTIN is sent.
-pub(super) fn stop(whom: StopTarget) -> io::Result<()> {
-    match whom {
+pub(super) fn stop(target: StopTarget) -> io::Result<()> {
+    match target {
         StopTarget::Itself => kill_process(getpid(), Signal::TTIN)?,
         StopTarget::Group => kill_current_process_group(Signal::TTIN)?,
     }

@@ -204,7 +204,7 @@ pub static COMMANDS: &[Command] = &[
     command(C::Objects, "delete the selection", &[(Anywhere, "x Delete")], |c| c.delete()).hints(&[hint(&[H::Outline], 5, "x", "delete")]),
     command(C::Objects, "rename the selection", &[(Anywhere, "e F2")], |c| c.ask_name()).hints(&[hint(&[H::Outline], 3, "e", "rename")]),
     command(C::Objects, "move the selection", &[(Anywhere, "m")], |c| c.enter_mode(Mode::Move)).hints(&[hint(&[H::First, H::Picture, H::Outline], 7, "m", "move")]),
-    command(C::Objects, "move left", &[(Moving, "Left")], |c| c.move_selection(Left, Coarse)).hints(&[hint(&[H::Moving], 1, "arrows", "in the plane")]),
+    command(C::Objects, "move left", &[(Moving, "Left")], |c| c.move_selection(Left, Coarse)).hints(&[hint(&[H::Moving], 1, "arrows", "in plane")]),
     command(C::Objects, "move right", &[(Moving, "Right")], |c| c.move_selection(Right, Coarse)),
     command(C::Objects, "move away", &[(Moving, "Up")], |c| c.move_selection(In, Coarse)),
     command(C::Objects, "move nearer", &[(Moving, "Down")], |c| c.move_selection(Out, Coarse)),
@@ -264,7 +264,7 @@ pub static COMMANDS: &[Command] = &[
     command(C::File, "save", &[(Anywhere, "Ctrl-s")], |c| c.save()),
     command(C::File, "save as", &[(Anywhere, "W")], |c| c.ask_path()),
     command(C::File, "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(always),
-    command(C::File, "recover edits of a broken session", &[], |c| c.ask_recovery()).available(always),
+    command(C::File, "recover edits of a crashed session", &[], |c| c.ask_recovery()).available(always),
     command(C::File, "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).available(always).over_image(),
     command(C::File, "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).available(always).over_image().hints(&[hint(&[H::First], 13, "q", "quit")]),
 

@@ -2,7 +2,7 @@
 
 use crate::dashboard::message::{DisplayChannel, Effect};
 use crate::dashboard::model::{CompareView, Mode};
-use crate::dashboard::update::{Direction, StepSize, UpdateContext};
+use crate::dashboard::update::{Direction, StepSize, UpdateContext, cycled};
 use crate::film::{LinearImage, Tone};
 use std::sync::Arc;
 
@@ -28,9 +28,8 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn next_tone(&mut self) {
-        let tones = Tone::NAMED;
-        let at = tones.iter().position(|(_, tone)| *tone == self.model.display.tone).unwrap_or(0);
-        let (name, tone) = tones[(at + 1) % tones.len()];
+        let current = |(_, tone): &(_, Tone)| *tone == self.model.display.tone;
+        let (name, tone) = *cycled(&Tone::NAMED, current, 1);
         self.model.display.tone = tone;
         self.set_display();
         self.say(format!("tone curve: {name}"));
@@ -42,10 +41,8 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn next_channel(&mut self, by: isize) {
-        let all = DisplayChannel::ALL;
-        let at = all.iter().position(|channel| *channel == self.model.channel).unwrap_or(0);
-        let next = (at as isize + by).rem_euclid(all.len() as isize) as usize;
-        self.model.channel = all[next];
+        let current = |channel: &DisplayChannel| *channel == self.model.channel;
+        self.model.channel = *cycled(&DisplayChannel::ALL, current, by);
         self.repaint();
         self.say(format!("view: {}", self.model.channel.name()));
     }

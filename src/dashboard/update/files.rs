@@ -10,6 +10,11 @@ use crate::value::sanitized;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+const KEEP_FILE: (char, &str, Answer) = ('k', "keep the file on disk", Answer::Nothing);
+const KEEP_EDITS: (char, &str, Answer) = ('k', "keep my edits", Answer::Nothing);
+const OVERWRITE: (char, &str, Answer) = ('o', "overwrite it", Answer::Overwrite(None));
+const SAVE_AS: (char, &str, Answer) = ('s', "save under another name", Answer::SaveAs);
+
 impl UpdateContext<'_> {
     pub(super) fn undo(&mut self) {
         let undone = self.model.history.undo();
@@ -40,14 +45,7 @@ impl UpdateContext<'_> {
                 "{} on disk has an error now. Saving puts this scene in its place.",
                 self.model.file.name
             );
-            self.ask(
-                text,
-                &[
-                    ('k', "keep the file on disk", Answer::Nothing),
-                    ('o', "overwrite it", Answer::Overwrite(None)),
-                    ('s', "save under another name", Answer::SaveAs),
-                ],
-            );
+            self.ask(text, &[KEEP_FILE, OVERWRITE, SAVE_AS]);
         } else {
             self.write(None, false);
         }
@@ -77,25 +75,13 @@ impl UpdateContext<'_> {
             Err(SaveError::Untitled) => self.ask_path(),
             Err(error @ SaveError::Changed(_)) => {
                 let text = capital(&error.to_string());
-                self.ask(
-                    text,
-                    &[
-                        ('k', "keep the file on disk", Answer::Nothing),
-                        ('o', "overwrite it", Answer::Overwrite(None)),
-                        ('s', "save under another name", Answer::SaveAs),
-                        ('r', "reload it and lose my edits", Answer::Load),
-                    ],
-                );
+                let reload = ('r', "reload it and lose my edits", Answer::Load);
+                self.ask(text, &[KEEP_FILE, OVERWRITE, SAVE_AS, reload]);
             }
             Err(SaveError::Exists(path)) => {
                 let text = format!("{} exists.", sanitized(&path.display().to_string()));
-                self.ask(
-                    text,
-                    &[
-                        ('s', "another name", Answer::SaveAs),
-                        ('o', "overwrite it", Answer::Overwrite(Some(path))),
-                    ],
-                );
+                let overwrite = ('o', "overwrite it", Answer::Overwrite(Some(path)));
+                self.ask(text, &[('s', "another name", Answer::SaveAs), overwrite]);
             }
             Err(error @ SaveError::Failed { .. }) => {
                 self.model.quit_when_saved = false;
@@ -109,17 +95,14 @@ impl UpdateContext<'_> {
             self.say("This scene has no file to read yet");
         } else if self.model.is_unsaved() {
             let text = format!("Reading {} again loses the unsaved edits.", self.model.file.name);
-            self.ask(
-                text,
-                &[('k', "keep my edits", Answer::Nothing), ('r', "read the file", Answer::Load)],
-            );
+            self.ask(text, &[KEEP_EDITS, ('r', "read the file", Answer::Load)]);
         } else {
             self.emit(Effect::Load);
         }
     }
 
     pub(super) fn changed_on_disk(&mut self) {
-        if self.model.overlay.is_some() || self.model.editor().is_some() {
+        if self.model.is_busy() {
             let text = format!("{} has changed on disk · Ctrl-o reads it", self.model.file.name);
             self.notify(Tone::Plain, text, None);
         } else if self.model.is_unsaved() {
@@ -127,13 +110,8 @@ impl UpdateContext<'_> {
                 "{} has changed on disk, and here are unsaved edits.",
                 self.model.file.name
             );
-            self.ask(
-                text,
-                &[
-                    ('k', "keep my edits", Answer::Nothing),
-                    ('r', "read the file and lose my edits", Answer::Load),
-                ],
-            );
+            let reload = ('r', "read the file and lose my edits", Answer::Load);
+            self.ask(text, &[KEEP_EDITS, reload]);
         } else {
             self.emit(Effect::Load);
         }
@@ -213,22 +191,20 @@ impl UpdateContext<'_> {
             }
         }
     }
-}
 
-impl UpdateContext<'_> {
     pub(super) fn copy_path(&mut self) {
         let Some(path) = self.model.last_export.clone() else {
             self.say("No picture was written yet · p writes one");
             return;
         };
-        let shown = path.display().to_string();
-        if sanitized(&shown) != shown {
+        let text = path.display().to_string();
+        if sanitized(&text) != text {
             // Control characters could run commands when pasted into a shell.
             self.refuse("Path contains control characters; not copied");
             return;
         }
         self.emit(Effect::Copy(path));
-        self.say(format!("the path of {shown} is in the terminal's clipboard, if it allows that"));
+        self.say(format!("the path of {text} is in the terminal's clipboard, if it allows that"));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{CompareView, Inspector, Mode};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::update::{UpdateContext, cycled};
 
 impl UpdateContext<'_> {
     /// Enters a mode and gives the focus to the picture.
@@ -52,9 +52,7 @@ impl UpdateContext<'_> {
             return;
         }
         let panels = [Focus::Picture, Focus::Outline, Focus::Inspector];
-        let at = panels.iter().position(|focus| *focus == self.model.focus).unwrap_or(0);
-        let next = (at as isize + by).rem_euclid(panels.len() as isize) as usize;
-        self.set_focus(panels[next]);
+        self.set_focus(*cycled(&panels, |focus| *focus == self.model.focus, by));
     }
 
     pub(super) fn set_focus(&mut self, focus: Focus) {

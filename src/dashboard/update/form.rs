@@ -71,7 +71,7 @@ impl UpdateContext<'_> {
         self.record(edit, Coalesce::Single);
         self.select(form.subject);
         let label = self.model.selection.label(self.scene());
-        self.say(format!("{label} is there · m moves it · r turns it · u takes it back"));
+        self.say(format!("{label} added · m moves it · r turns it · u undoes"));
     }
 
     /// Restores the scene and selection from before the form.

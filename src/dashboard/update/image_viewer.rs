@@ -22,7 +22,7 @@ impl UpdateContext<'_> {
         self.emit(Effect::ViewImage { path: path.clone(), display, screen });
         self.model.drag = None;
         self.model.overlay =
-            Some(Overlay::ViewerImage(ViewedImage { path, still: None, sent: 0.0 }));
+            Some(Overlay::ViewerImage(ViewedImage { path, image: None, sent: 0.0 }));
         self.repaint();
     }
 
@@ -40,15 +40,15 @@ impl UpdateContext<'_> {
     }
 
     /// Shows an image that has been prepared, or reports why it has not.
-    pub(super) fn still(&mut self, path: &Path, result: Result<Arc<ViewerImage>, String>) {
+    pub(super) fn image_ready(&mut self, path: &Path, result: Result<Arc<ViewerImage>, String>) {
         let screen = self.model.screen;
         let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay else { return };
         if viewed.path != path {
             return;
         }
         match result {
-            Ok(still) if still.screen == screen => {
-                viewed.still = Some(still);
+            Ok(image) if image.screen == screen => {
+                viewed.image = Some(image);
                 self.repaint();
             }
             // Prepared for the previous screen size.

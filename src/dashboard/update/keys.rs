@@ -76,7 +76,7 @@ impl UpdateContext<'_> {
         if (command.available)(self.model) {
             (command.run)(self);
         } else {
-            self.refuse("There is no scene to work on until its file can be read: mend it");
+            self.refuse("No scene: fix the errors in its file first");
         }
     }
 

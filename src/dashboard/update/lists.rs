@@ -19,39 +19,28 @@ fn moved(cursor: usize, steps: isize, len: usize) -> usize {
 impl UpdateContext<'_> {
     /// Moves the active cursor by `steps` lines.
     pub(super) fn move_cursor(&mut self, steps: isize) {
-        let rows = self.model.overlay_layout().map_or(1, |place| usize::from(place.list.height));
-        let width = self.model.overlay_layout().map_or(1, |place| place.list.width);
+        let list = self.model.overlay_layout().map(|layout| layout.list);
+        let (width, rows) = list.map_or((1, 1), |list| (list.width, usize::from(list.height)));
         let inventory = self.model.inventory(width).len();
         match &mut self.model.overlay {
             Some(Overlay::Help { scroll }) => {
-                *scroll = moved(
-                    *scroll,
-                    steps,
-                    (COMMANDS.len() + Chapter::ALL.len()).saturating_sub(rows) + 1,
-                );
+                let lines = COMMANDS.len() + Chapter::ALL.len();
+                *scroll = moved(*scroll, steps, lines.saturating_sub(rows) + 1);
             }
             Some(Overlay::Inventory { scroll }) => {
                 *scroll = moved(*scroll, steps, inventory.saturating_sub(rows) + 1);
             }
-            Some(Overlay::NoiseTargets { cursor }) => {
-                *cursor = moved(*cursor, steps, QUALITIES.len())
-            }
-            Some(Overlay::Palette(palette)) => {
-                palette.cursor = moved(palette.cursor, steps, palette.found.len());
-                palette.scroll =
-                    scrolled(palette.scroll, palette.cursor, palette.found.len(), rows);
-            }
-            Some(Overlay::Pick(pick)) => {
-                pick.cursor = moved(pick.cursor, steps, pick.entries.len());
-                pick.scroll = scrolled(pick.scroll, pick.cursor, pick.entries.len(), rows);
-            }
-            Some(Overlay::Question(question)) => {
-                question.cursor = moved(question.cursor, steps, question.answers.len());
-            }
-            Some(Overlay::Prompt(_) | Overlay::ViewerImage(_)) => {}
             Some(Overlay::Form(_)) => {
                 if self.apply_field() {
                     self.move_field_cursor(steps);
+                }
+            }
+            Some(overlay) => {
+                if let Some((cursor, scroll, len)) = overlay.list() {
+                    *cursor = moved(*cursor, steps, len);
+                    if let Some(scroll) = scroll {
+                        *scroll = scrolled(*scroll, *cursor, len, rows);
+                    }
                 }
             }
             None if self.model.focus == Focus::Outline => self.move_outline_cursor(steps),
@@ -77,9 +66,9 @@ impl UpdateContext<'_> {
             OutlineLine::Heading(_) => None,
         };
         let before = outline_position(&lines, &self.model.selection).unwrap_or(0);
-        let at = lines[..before].iter().filter_map(entry).count();
+        let position = lines[..before].iter().filter_map(entry).count();
         let subjects: Vec<_> = lines.iter().filter_map(entry).collect();
-        if let Some(subject) = subjects.get(moved(at, steps, subjects.len())) {
+        if let Some(subject) = subjects.get(moved(position, steps, subjects.len())) {
             self.select(subject.clone());
         }
     }

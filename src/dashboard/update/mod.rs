@@ -142,7 +142,7 @@ impl<'a> UpdateContext<'a> {
                     export.progress = progress;
                 }
             }
-            Message::ViewerImage(path, result) => self.still(&path, result),
+            Message::ViewerImage(path, result) => self.image_ready(&path, result),
             Message::ImageSent(sent) => {
                 self.follow = false;
                 if let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay {
@@ -318,10 +318,17 @@ impl<'a> UpdateContext<'a> {
             let rows = usize::from(rows.height);
             let scroll = &mut self.model.outline_scroll;
             *scroll = (*scroll).min(lines.len().saturating_sub(rows));
-            let at = outline_position(&lines, &self.model.selection).filter(|_| follow);
-            *scroll = at.map_or(*scroll, |at| scrolled(*scroll, at, lines.len(), rows));
+            let line = outline_position(&lines, &self.model.selection).filter(|_| follow);
+            *scroll = line.map_or(*scroll, |line| scrolled(*scroll, line, lines.len(), rows));
         }
     }
+}
+
+/// Returns the item `by` places after the current one, cyclically; the first item counts as current
+/// if none is.
+fn cycled<T>(items: &[T], is_current: impl Fn(&T) -> bool, by: isize) -> &T {
+    let position = items.iter().position(is_current).unwrap_or(0) as isize;
+    &items[(position + by).rem_euclid(items.len() as isize) as usize]
 }
 
 fn normalize_cursor(

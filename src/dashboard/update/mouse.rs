@@ -5,7 +5,6 @@ use crate::dashboard::model::{Drag, Mode};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::panel_lines::{OutlineLine, PanelLine, outline};
 use crate::dashboard::update::UpdateContext;
-use crate::render::session::QUALITIES;
 use crate::scene::Scene;
 use crate::scene::edit::Target;
 use crate::terminal::Area;
@@ -70,7 +69,7 @@ impl UpdateContext<'_> {
     fn press_in_outline(&mut self, rows: Area, mouse: Mouse) {
         // The rows are from before the focus change, which may unfold the panel.
         let lines = outline(self.scene());
-        let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|at| lines.get(at));
+        let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
         let subject = line.and_then(|line| match line {
             OutlineLine::Entry { subject, .. } => Some(subject.clone()),
             OutlineLine::Heading(_) => None,
@@ -87,13 +86,14 @@ impl UpdateContext<'_> {
 
     fn press_in_inspector(&mut self, rows: Area, mouse: Mouse) {
         let lines = self.model.field_lines();
-        let at = line_at(rows, self.model.inspector.scroll, mouse);
-        let at = at.filter(|at| lines.get(*at).and_then(PanelLine::field).is_some());
-        let again = self.model.focus == Focus::Inspector && at == Some(self.model.inspector.cursor);
+        let line = line_at(rows, self.model.inspector.scroll, mouse);
+        let line = line.filter(|line| lines.get(*line).and_then(PanelLine::field).is_some());
+        let again =
+            self.model.focus == Focus::Inspector && line == Some(self.model.inspector.cursor);
         self.set_focus(Focus::Inspector);
-        match at {
+        match line {
             Some(_) if again => self.open_field(None),
-            Some(at) => self.set_cursor(at),
+            Some(line) => self.set_cursor(line),
             None => {}
         }
     }
@@ -101,32 +101,28 @@ impl UpdateContext<'_> {
     /// Opens the clicked line if the cursor is on it, otherwise moves the cursor there.
     fn press_in_overlay(&mut self, mouse: Mouse) {
         let Some(place) = self.model.overlay_layout() else { return };
-        let (scroll, cursor, len) = match &self.model.overlay {
-            Some(Overlay::Palette(palette)) => {
-                (palette.scroll, palette.cursor, palette.found.len())
-            }
-            Some(Overlay::Pick(pick)) => (pick.scroll, pick.cursor, pick.entries.len()),
-            Some(Overlay::NoiseTargets { cursor }) => (0, *cursor, QUALITIES.len()),
-            Some(Overlay::Question(question)) => (0, question.cursor, question.answers.len()),
+        match &self.model.overlay {
             Some(Overlay::Form(form)) => {
-                let at = line_at(place.list, form.scroll, mouse);
                 let (cursor, typing) = (form.cursor, form.editor.is_some());
+                let line = line_at(place.list, form.scroll, mouse);
                 let lines = self.model.field_lines();
-                let at = at.filter(|at| lines.get(*at).and_then(PanelLine::field).is_some());
-                match at {
-                    Some(at) if at == cursor && !typing => self.open_field(None),
-                    Some(at) if self.apply_field() => self.set_cursor(at),
+                match line.filter(|i| lines.get(*i).and_then(PanelLine::field).is_some()) {
+                    Some(line) if line == cursor && !typing => self.open_field(None),
+                    Some(line) if self.apply_field() => self.set_cursor(line),
                     _ => {}
                 }
                 return;
             }
             Some(Overlay::ViewerImage(_)) => return self.close_viewer(),
-            _ => return,
-        };
-        if let Some(at) = line_at(place.list, scroll, mouse).filter(|at| *at < len) {
-            match at == cursor {
+            _ => {}
+        }
+        let list = self.model.overlay.as_mut().and_then(Overlay::list);
+        let Some((&mut cursor, scroll, len)) = list else { return };
+        let scroll = scroll.map_or(0, |scroll| *scroll);
+        if let Some(line) = line_at(place.list, scroll, mouse).filter(|line| *line < len) {
+            match line == cursor {
                 true => self.open(),
-                false => self.move_cursor(at as isize - cursor as isize),
+                false => self.move_cursor(line as isize - cursor as isize),
             }
         }
     }
@@ -245,7 +241,7 @@ fn seen_at(scene: &Scene, [x, y]: [usize; 2]) -> Option<usize> {
     let [width, height] = scene.film.size.map(f64::from);
     let half = camera.half_size(width / height);
     let [right, up, forward] = camera.frame();
-    let across = |at: usize, size: f64| (2.0 * (at as f64 + 0.5) / size) - 1.0;
+    let across = |pixel: usize, size: f64| (2.0 * (pixel as f64 + 0.5) / size) - 1.0;
     let direction =
         forward + right * (half[0] * across(x, width)) - up * (half[1] * across(y, height));
     let origin = DVec3::from_array(camera.eye) + direction * camera.near;

@@ -108,7 +108,7 @@ impl UpdateContext<'_> {
         let edit = edit::duplicate(self.scene(), &self.model.selection);
         if self.commit_and_select(edit) {
             let label = self.model.selection.label(self.scene());
-            self.say(format!("{label} is there · m moves it"));
+            self.say(format!("{label} added · m moves it"));
         }
     }
 
@@ -117,7 +117,7 @@ impl UpdateContext<'_> {
         let edit = edit::delete(self.scene(), &self.model.selection);
         let noted = edit.as_ref().is_ok_and(|edit| edit.note.is_some());
         if self.commit_and_select(edit) && !noted {
-            self.say(format!("{label} is gone · u brings it back"));
+            self.say(format!("{label} deleted · u undoes"));
         }
     }
 

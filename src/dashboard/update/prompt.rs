@@ -26,7 +26,7 @@ impl UpdateContext<'_> {
         self.prompt(
             PromptFor::SaveAs,
             "save as",
-            "A path. An existing file is not overwritten unasked.",
+            "A path. An existing file is overwritten only after confirmation.",
             path,
         );
     }
@@ -43,7 +43,7 @@ impl UpdateContext<'_> {
         match name {
             Some(name) => {
                 let title = format!("rename {}", subject.label(self.scene()));
-                let help = "A name that nothing else of its kind has.";
+                let help = "A name that is unique among its kind.";
                 self.prompt(PromptFor::Rename(subject), &title, help, name);
             }
             None => {
@@ -57,7 +57,7 @@ impl UpdateContext<'_> {
         let count = self.scene().cameras.len();
         let free = (count + 1..).map(|n| format!("view {n}"));
         let name = free.into_iter().find(|name| !self.scene().cameras.contains_key(name));
-        let help = "A name for this viewpoint; keys 1 to 9 go back to it.";
+        let help = "A name for this viewpoint; keys 1 to 9 recall it.";
         self.prompt(PromptFor::StoreView, "store this viewpoint", help, name.unwrap_or_default());
     }
 
@@ -108,8 +108,8 @@ impl UpdateContext<'_> {
             path.set_extension("toml");
         }
         // The scene's own file gets the usual check for changes by other programs.
-        let own = self.model.file.path.as_ref() == Some(&path);
-        self.write((!own).then_some(path), false);
+        let is_own_file = self.model.file.path.as_ref() == Some(&path);
+        self.write((!is_own_file).then_some(path), false);
         Ok(())
     }
 
@@ -123,7 +123,7 @@ impl UpdateContext<'_> {
         let edit = edit::store_view(self.scene(), Some(text)).map_err(|e| e.to_string())?;
         self.record(edit, Coalesce::Single);
         let number =
-            self.scene().cameras.keys().position(|name| name == text).map_or(0, |at| at + 1);
+            self.scene().cameras.keys().position(|name| name == text).map_or(0, |index| index + 1);
         let key = if number <= 9 { format!(" · key {number}") } else { String::new() };
         self.say(format!("viewpoint {} is stored{key}", truncated(text)));
         Ok(())
@@ -138,7 +138,7 @@ impl UpdateContext<'_> {
             Some(other) => return Err(format!("\"{}\" is neither png nor exr.", truncated(other))),
         };
         if let Some(more) = words.next() {
-            return Err(format!("\"{}\" is too much.", truncated(more)));
+            return Err(format!("Unexpected \"{}\".", truncated(more)));
         }
         let film = edit::set(self.scene(), &Target::Film, "size", size);
         let scene = film.map_err(|error| error.to_string())?.scene;
@@ -196,7 +196,7 @@ fn parse_stop(text: &str) -> Result<Stop, String> {
             }
         }
     }
-    if any { Ok(stop) } else { Err("Type one, or none to trace on and on.".to_string()) }
+    if any { Ok(stop) } else { Err("Type one, or none for no limit.".to_string()) }
 }
 
 #[cfg(test)]

@@ -12,8 +12,8 @@ impl UpdateContext<'_> {
     pub(super) fn orphaned_edits(&mut self, left: OrphanedEdits) {
         self.follow = false;
         self.model.orphaned_edits = Some(left);
-        if self.model.overlay.is_some() || self.model.editor().is_some() {
-            let text = "Edits of a session that broke off are kept · : recover takes them up";
+        if self.model.is_busy() {
+            let text = "Unsaved edits of a crashed session were found · : recover restores them";
             self.notify(Tone::Plain, text, None);
         } else {
             self.ask_recovery();
@@ -22,23 +22,23 @@ impl UpdateContext<'_> {
 
     pub(super) fn ask_recovery(&mut self) {
         let Some(left) = &self.model.orphaned_edits else {
-            self.say("No session with this scene has broken off");
+            self.say("No session with this scene has crashed");
             return;
         };
         let mut text = format!(
-            "A session with {} broke off {} with unsaved edits.",
+            "A session with {} ended unexpectedly {} with unsaved edits.",
             self.model.file.name,
             ago(left.age)
         );
         if self.model.file.unreadable {
-            text += " The file has been spoilt since.";
+            text += " The file has become unreadable since.";
         } else if left.changed {
             text += " The file has been changed since.";
         }
         self.ask(
             text,
             &[
-                ('r', "recover them: undo leads back to the file", Answer::Recover),
+                ('r', "recover them: undo returns to the file", Answer::Recover),
                 ('f', "look at the file, decide later", Answer::Nothing),
                 ('d', "discard them", Answer::Discard),
             ],
@@ -61,7 +61,7 @@ impl UpdateContext<'_> {
         }
         self.emit(Effect::Recover);
         self.show();
-        self.say("recovered, not yet saved · Ctrl-s saves, u goes back");
+        self.say("recovered, not yet saved · Ctrl-s saves, u undoes");
     }
 
     pub(super) fn discard_orphaned_edits(&mut self) {

@@ -4,8 +4,8 @@
 use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::Colors;
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::prompt::stop_text;
+use crate::dashboard::update::{UpdateContext, cycled};
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
 
@@ -67,8 +67,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn next_colors(&mut self) {
-        let at = Colors::ALL.iter().position(|colors| *colors == self.model.colors).unwrap_or(0);
-        self.model.colors = Colors::ALL[(at + 1) % Colors::ALL.len()];
+        self.model.colors = *cycled(&Colors::ALL, |colors| *colors == self.model.colors, 1);
         self.repaint();
         self.say(self.model.colors.name());
     }

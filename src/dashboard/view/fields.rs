@@ -81,13 +81,13 @@ impl Fields<'_> {
             match line {
                 PanelLine::Heading(title) => heading(to, title, theme),
                 PanelLine::Field(field) => {
-                    let at = self.field(field, i == self.cursor, labels, to, theme);
-                    typing = typing.or(at);
+                    let position = self.field(field, i == self.cursor, labels, to, theme);
+                    typing = typing.or(position);
                 }
             }
         }
-        let shown = (first, rows, self.lines.len());
-        scroll_mark(self.list, shown, theme.border(self.active), buffer);
+        let window = (first, rows, self.lines.len());
+        scroll_mark(self.list, window, theme.border(self.active), buffer);
         if self.active {
             self.say(theme, buffer);
         }
@@ -173,8 +173,8 @@ fn expected(field: &FieldLine) -> String {
 
 fn heading(mut to: Row, title: &str, theme: &Theme) {
     to.put(" ", theme.heading()).put(title, theme.heading()).put(" ", theme.heading());
-    let rest = to.left().saturating_sub(1);
-    to.put(&"─".repeat(rest), theme.border(false));
+    let left = to.left().saturating_sub(1);
+    to.put(&"─".repeat(left), theme.border(false));
 }
 
 /// Draws a text editor in the rest of the row. Returns the position of its cursor.

@@ -49,8 +49,8 @@ pub fn scroll_mark(
     let most = all - shown;
     let top = (rows - length) * first.min(most) / most;
     for row in top..top + length {
-        let at = Area { x: area.x + area.width, width: 1, ..area };
-        Row::new(buffer, at, row as u16).put("┃", style);
+        let bar = Area { x: area.x + area.width, width: 1, ..area };
+        Row::new(buffer, bar, row as u16).put("┃", style);
     }
 }
 

@@ -23,18 +23,18 @@ pub fn draw(
     let last = Area { x: 0, y: height.saturating_sub(1), width, height: 1 };
     let mut row = Row::new(buffer, last, 0);
     row.skip(1);
-    let Some(still) = &viewed.still else {
+    let Some(image) = &viewed.image else {
         row.put("reading ", theme.dim()).put(&short_name(&viewed.path), theme.text());
         return None;
     };
-    let (important, more) = description(viewed, still);
+    let (important, more) = description(viewed, image);
     row.put(&short_name(&viewed.path), theme.text()).put("  ", theme.dim());
     row.put(&important, theme.text()).put("  ·  any key returns", theme.accent());
     row.put(more, theme.dim());
-    let place = still.place;
-    if viewed.sent >= 1.0 && still.placeholder(0).is_some() {
+    let place = image.place;
+    if viewed.sent >= 1.0 && image.placeholder(0).is_some() {
         for y in 0..place.height {
-            let Some((symbol, color)) = still.placeholder(y) else { continue };
+            let Some((symbol, color)) = image.placeholder(y) else { continue };
             for x in 0..place.width {
                 if let Some(cell) = buffer.cell_mut((place.x + x, place.y + y)) {
                     cell.set_symbol(&symbol).set_style(Style::new().fg(Color::Indexed(color)));
@@ -43,24 +43,24 @@ pub fn draw(
         }
         return None;
     }
-    let cells = PictureCells::new(&still.raster, model.colors, true);
+    let cells = PictureCells::new(&image.raster, model.colors, true);
     paint(&cells, place, buffer);
     Some(cells)
 }
 
 /// Returns a description of the image, and the reason for a reduced quality.
-fn description(viewed: &ViewedImage, still: &ViewerImage) -> (String, &'static str) {
-    let [width, height] = still.size;
+fn description(viewed: &ViewedImage, image: &ViewerImage) -> (String, &'static str) {
+    let [width, height] = image.size;
     let whole = format!("{width}×{height}");
-    let size = match still.shown {
-        [w, h] if [w, h] == still.size => whole,
-        _ if still.protocol == Protocol::Blocks => format!("{whole} in half blocks"),
+    let size = match image.shown {
+        [w, h] if [w, h] == image.size => whole,
+        _ if image.protocol == Protocol::Blocks => format!("{whole} in half blocks"),
         [w, h] => format!("{w}×{h} of {whole}"),
     };
-    match still.protocol {
-        Protocol::Blocks => (size, "  ·  zerkalo doctor tells what crisp ones need"),
+    match image.protocol {
+        Protocol::Blocks => (size, "  ·  zerkalo doctor lists what sharp images need"),
         _ if viewed.sent < 1.0 => {
-            let kilobytes = still.transfer.bytes.len() as f64 * 1e-3;
+            let kilobytes = image.transfer.bytes.len() as f64 * 1e-3;
             (format!("{size}  {:.0} % of {kilobytes:.0} KB", 100.0 * viewed.sent), "")
         }
         _ => (size, ""),

@@ -44,7 +44,7 @@ pub fn broken(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer
         lines.extend(formatted(message, width, theme));
     }
     lines.push((String::new(), theme.text()));
-    let help = "Mend the file: it is read again as soon as it is written.";
+    let help = "Fix the file: it is reloaded as soon as it is written.";
     lines.extend(wrapped(help, width).into_iter().map(|line| (line, theme.text())));
     write(&lines, layout, buffer);
 }

@@ -68,9 +68,9 @@ impl View {
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme::new(model.colors);
         if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {
-            let shown = image_viewer::draw(model, viewed, &theme, buffer);
-            (self.place, self.uncovered) = match (shown, &viewed.still) {
-                (Some(cells), Some(still)) => picture::visible_mask(&cells, still.place, buffer),
+            let cells = image_viewer::draw(model, viewed, &theme, buffer);
+            (self.place, self.uncovered) = match (cells, &viewed.image) {
+                (Some(cells), Some(image)) => picture::visible_mask(&cells, image.place, buffer),
                 _ => (Rect::ZERO, Vec::new()),
             };
             return None;

@@ -126,8 +126,8 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
                 let [a, b] = [pair[0], pair[1]].map(|p| place(p.seconds, p.noise_codes));
                 canvas.draw(&line(a, b, theme.accent()));
             }
-            let at = place(last.seconds, last.noise_codes);
-            canvas.draw(&line(at, at, theme.accent()));
+            let point = place(last.seconds, last.noise_codes);
+            canvas.draw(&line(point, point, theme.accent()));
         })
         .render(crate::dashboard::view::rect(plot), buffer);
 }
@@ -169,8 +169,8 @@ fn axes(area: Area, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
         let start = column.saturating_sub(columns(&text) as u16 / 2).max(area.x);
         let end = start + columns(&text) as u16;
         if start >= free && end <= area.x + area.width && column < plot.x + plot.width {
-            let at = Area { x: start, width: end - start, ..area };
-            Row::new(buffer, at, plot.height + 1).put(&text, theme.dim());
+            let label_area = Area { x: start, width: end - start, ..area };
+            Row::new(buffer, label_area, plot.height + 1).put(&text, theme.dim());
             Row::new(buffer, Area { x: column, width: 1, ..area }, plot.height).put("┬", line);
             free = end + 1;
         }

@@ -106,12 +106,12 @@ fn rate(bytes_per_second: f64) -> String {
 /// Name of a pacing mode.
 fn mode(mode: PacingMode) -> &'static str {
     match mode {
-        PacingMode::Unlimited => "here",
-        PacingMode::AckClocked(None) => "answered",
-        PacingMode::AckClocked(Some(Multiplexer::Tmux)) => "answered through tmux",
-        PacingMode::AckClocked(Some(Multiplexer::Screen)) => "answered through screen",
-        PacingMode::SendQueue => "by the kernel's queue",
-        PacingMode::FixedRate => "fixed",
+        PacingMode::Unlimited => "local",
+        PacingMode::AckClocked(None) => "acknowledged",
+        PacingMode::AckClocked(Some(Multiplexer::Tmux)) => "acknowledged through tmux",
+        PacingMode::AckClocked(Some(Multiplexer::Screen)) => "acknowledged through screen",
+        PacingMode::SendQueue => "send queue",
+        PacingMode::FixedRate => "fixed rate",
     }
 }
 
@@ -202,8 +202,8 @@ mod tests {
 
     #[test]
     fn rates_have_few_digits() {
-        let shown = [2000.0, 9940.0, 29_600.0, 118_400.0, 2.34e6].map(rate);
-        assert_eq!(shown, ["2.0 KB/s", "9.9 KB/s", "30 KB/s", "118 KB/s", "2.3 MB/s"]);
+        let rates = [2000.0, 9940.0, 29_600.0, 118_400.0, 2.34e6].map(rate);
+        assert_eq!(rates, ["2.0 KB/s", "9.9 KB/s", "30 KB/s", "118 KB/s", "2.3 MB/s"]);
     }
 
     #[test]

@@ -87,8 +87,8 @@ impl<'a> Row<'a> {
         let left = self.left();
         if left > 0 {
             let text = safe(text);
-            let shown = cut(&text, left);
-            (self.x, _) = self.buffer.set_stringn(self.x, self.y, shown, left, style);
+            let visible = cut(&text, left);
+            (self.x, _) = self.buffer.set_stringn(self.x, self.y, visible, left, style);
         }
         self
     }
@@ -97,9 +97,9 @@ impl<'a> Row<'a> {
     pub fn put_wide(&mut self, text: &str, width: usize, style: Style) -> &mut Self {
         let width = width.min(self.left());
         let text = safe(text);
-        let shown = cut(&text, width);
-        let gap = width - columns(&shown).min(width);
-        self.put(&shown, style).skip(gap)
+        let visible = cut(&text, width);
+        let gap = width - columns(&visible).min(width);
+        self.put(&visible, style).skip(gap)
     }
 
     /// Draws `text` at the right end, if it fits there with `gap` columns before it, and removes
