@@ -1,15 +1,18 @@
 //! A sample is a pure function of seed, pixel, replicate and index: the film is the same bytes
 //! whichever thread traced it, in whatever order, in packets of whatever form, in whatever parts.
 
+#[path = "common/mod.rs"]
+mod common;
 mod support;
 #[path = "common/told.rs"]
 mod told;
 
+use common::Numbers;
 use std::fs;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use support::{Rng, all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
+use support::{all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
 use told::told;
 use zerkalo::film::Film;
 use zerkalo::render::RenderState;
@@ -60,7 +63,7 @@ fn extreme_29_determinism() {
             let expected = whole(&scene, precision, 19).bytes();
             for threads in [1, 2, 7] {
                 let pool = pool(threads);
-                let mut rng = Rng(threads as u64);
+                let mut rng = Numbers::new(threads as u64);
                 let mut rendering = begin(&scene, SEED, precision);
                 for replicate in [1, 0] {
                     let mut wave = wave(&rendering.film, replicate, 0, 19);
@@ -86,7 +89,7 @@ fn extreme_29_parts_added_in_any_order_are_the_whole() {
             let films = parts.map(|ranges| of_ranges(&scene, precision, &ranges));
             let mut order = [0, 1, 2, 3];
             for seed in 0..6 {
-                Rng(seed).shuffle(&mut order);
+                Numbers::new(seed).shuffle(&mut order);
                 let mut sum = Film::new(films[0].header().clone());
                 order.iter().for_each(|i| sum.add(&films[*i]).unwrap());
                 assert!(sum.bytes() == expected, "{name} in {precision:?}, order {order:?}");

@@ -1,9 +1,12 @@
 //! The film from outside: the same bits in any order, sums that do not stall, files that hold what
 //! they should.
 
+#[path = "common/mod.rs"]
+mod common;
 #[path = "common/told.rs"]
 mod told;
 
+use common::Numbers;
 use proptest::prelude::*;
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -31,19 +34,15 @@ fn all_tiles(film: &Film) -> Vec<usize> {
     (0..film.tile_count()).collect()
 }
 
-/// Numbers for tests (SplitMix64).
-fn mixed_bits(x: u64) -> u64 {
-    let z = x.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+fn random_bits(seed: u64) -> u64 {
+    Numbers::new(seed).bits()
 }
 
 /// Sample `index` of a pixel, a pure function: `[group][channel]`; one in about 2000 is bad.
 fn sample(x: usize, y: usize, replicate: usize, index: u32) -> Option<[f64; 6]> {
     let at = ((x * 64 + y) * 2 + replicate) as u64 * 1_000_003 + u64::from(index);
-    let value = |c: u64| mixed_bits(at * 8 + c) as f64 / 1.8e19;
-    (!mixed_bits(at).is_multiple_of(2000)).then(|| [0, 1, 2, 3, 4, 5].map(value))
+    let value = |c: u64| random_bits(at * 8 + c) as f64 / 1.8e19;
+    (!random_bits(at).is_multiple_of(2000)).then(|| [0, 1, 2, 3, 4, 5].map(value))
 }
 
 fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: usize, index: u32) {
@@ -177,7 +176,7 @@ proptest! {
             .flat_map(|tile| [(tile, 0, 0..3), (tile, 0, 3..12), (tile, 1, 0..8), (tile, 1, 8..12)])
             .collect();
         waves.sort_by_key(|(tile, replicate, range)| {
-            mixed_bits(seed ^ (*tile as u64 * 100 + *replicate as u64 * 50 + u64::from(range.start)))
+            random_bits(seed ^ (*tile as u64 * 100 + *replicate as u64 * 50 + u64::from(range.start)))
         });
         for (tile, replicate, range) in waves {
             trace(&mut film, &[tile], replicate, range);

@@ -1,5 +1,7 @@
 //! Broken files: seeded mutations of good ones. Nothing panics, nothing hangs, memory stays small.
 
+#[path = "../common/mod.rs"]
+mod common;
 mod files;
 mod mutate;
 

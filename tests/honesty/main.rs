@@ -1,6 +1,8 @@
 //! The error that the program tells is the error that is left, and the picture is not biased: shown
 //! on a scene whose every pixel is known in closed form, and on the mirror room.
 
+#[path = "../common/mod.rs"]
+mod common;
 mod scenes;
 #[path = "../support/mod.rs"]
 mod support;
