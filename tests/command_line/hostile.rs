@@ -146,7 +146,7 @@ fn the_environment_steers_no_terminal() {
     let run = Run::from(command.output().unwrap());
     assert_eq!(run.status, 0, "{}", run.err);
     check("doctor", &run);
-    assert!(run.out.contains("not asked"), "{}", run.out);
+    assert!(run.out.contains("not queried"), "{}", run.out);
 }
 
 /// Devices, pipes and folders are no meshes, whatever they are called, and are not waited for.
