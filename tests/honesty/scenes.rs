@@ -1,4 +1,4 @@
-//! Random scenes for the honesty survey: sparse pictures, whose noise sits in a few pixels, and dense ones.
+//! Random scenes for the honesty survey: sparse pictures, whose noise is concentrated in few pixels, and dense ones.
 
 use crate::common::Numbers;
 use crate::support::{parsed, shipped, sized};
@@ -34,10 +34,10 @@ fn random_color(n: &mut Numbers) -> String {
     format!("{:.3?}", [0; 3].map(|_| n.between(0.05, 0.95)))
 }
 
-/// Half the height of what the camera at (0, 0, 10) sees of z = 0, with 40 degrees from top to bottom.
+/// Half of the visible height at z = 0 for the camera at (0, 0, 10) with a vertical view angle of 40 degrees.
 const HALF_HEIGHT: f64 = 3.64;
 
-/// The scene number `seed`; kinds take turns.
+/// Scene number `seed`; kinds take turns.
 pub fn scene(seed: u64) -> Sample {
     let kind = (seed % KINDS.len() as u64) as usize;
     let mut n = Numbers::new(seed.wrapping_mul(0x9e37_79b9) ^ 0x5eed);
@@ -134,7 +134,7 @@ fn checkerboard(n: &mut Numbers, size: [u32; 2]) -> Scene {
     parsed(&text)
 }
 
-/// Lit balls, small beside the picture or all over it.
+/// Lit balls, in a small part of the picture or all over it.
 fn crowd(n: &mut Numbers, size: [u32; 2], mirrors: bool) -> Scene {
     let mut text = head(size, "[0.0, 0.0, 0.0]", 0.05);
     text += "[[light]]\npoint = { position = [3.0, 5.0, 8.0] }\nintensity = 1.0\n";
@@ -150,11 +150,11 @@ fn crowd(n: &mut Numbers, size: [u32; 2], mirrors: bool) -> Scene {
     let spread = if mirrors { 3.0 } else { n.between(0.5, 2.5) };
     let (count, radius) = (whole(n, 200, 1500), spread * n.log_uniform(0.01, 0.06));
     for _ in 0..count {
-        let at = [0; 3].map(|_| spread * (n.unit() + n.unit() + n.unit() - 1.5) / 0.9);
+        let center = [0; 3].map(|_| spread * (n.unit() + n.unit() + n.unit() - 1.5) / 0.9);
         let kind = whole(n, 0, kinds - 1);
         write!(
             text,
-            "[[object]]\nmaterial = \"m{kind}\"\nshape.sphere = {{ center = {at:?}, radius = {radius} }}\n"
+            "[[object]]\nmaterial = \"m{kind}\"\nshape.sphere = {{ center = {center:?}, radius = {radius} }}\n"
         )
         .unwrap();
     }

@@ -1,5 +1,5 @@
-//! The error that is reported against the error that is left, over random sparse and dense scenes, and the rays that
-//! an adaptive picture takes against those of a uniform one with the same true error.
+//! Reported against true errors over random sparse and dense scenes, and rays of adaptive pictures against those of
+//! uniform ones with the same true error.
 //!
 //! The short form runs with all tests. The long form prints a table of 200 scenes:
 //! `cargo test --test honesty survey -- --ignored --nocapture`.
@@ -41,7 +41,7 @@ impl Reference {
     }
 }
 
-/// Follows a schedule; `each` sees every state between two decisions and returns whether to end.
+/// Follows a schedule. `each` receives the state after every decision and returns `true` to end.
 fn run(
     sample: &Sample,
     seed: u64,
@@ -77,18 +77,18 @@ struct Outcome {
     rays: f64,
 }
 
-/// Rays at which a uniform picture has the error `wanted`, interpolated between its waves; those of the last wave
-/// where it does not come so far.
-fn uniform_rays(sample: &Sample, seed: u64, reference: &Reference, wanted: f64) -> f64 {
+/// Number of rays at which a uniform picture has the error `target`, interpolated between its waves; that of the last
+/// wave if it does not reach `target`.
+fn uniform_rays(sample: &Sample, seed: u64, reference: &Reference, target: f64) -> f64 {
     let stop = Stop { spp: Some(2 * LIMIT_SPP), noise_codes: Some(1e-9), ..Stop::default() };
     let mut curve: Vec<(f64, f64)> = Vec::new();
     run(sample, seed, false, stop, |rendering, schedule| {
         curve.push((schedule.rays() as f64, reference.error(rendering)));
-        curve.last().is_some_and(|(_, error)| *error <= wanted)
+        curve.last().is_some_and(|(_, error)| *error <= target)
     });
     match curve.as_slice() {
-        [.., (r0, e0), (r1, e1)] if e1 <= &wanted && e0 > e1 => {
-            let share = (e0 / wanted).ln() / (e0 / e1.max(1e-9)).ln();
+        [.., (r0, e0), (r1, e1)] if e1 <= &target && e0 > e1 => {
+            let share = (e0 / target).ln() / (e0 / e1.max(1e-9)).ln();
             r0 * (r1 / r0).powf(share)
         }
         [.., (rays, _)] => *rays,
@@ -96,7 +96,7 @@ fn uniform_rays(sample: &Sample, seed: u64, reference: &Reference, wanted: f64) 
     }
 }
 
-fn examine(number: u64, reference_count: u32) -> Outcome {
+fn survey(number: u64, reference_count: u32) -> Outcome {
     let sample = scene(number);
     let reference = Reference::new(&sample, reference_count);
     let target = [1.0, 0.5, 0.25][(number / 10 % 3) as usize];
@@ -120,8 +120,8 @@ fn examine(number: u64, reference_count: u32) -> Outcome {
     Outcome { name: sample.name, ratio, pixels: noise.effective_pixels.codes, rays }
 }
 
-/// The true error agrees with the reported one within what few pixels leave uncertain (both are means of as many squares,
-/// each uncertain by 1 / sqrt(2 k)), and adaptivity costs at most half as many rays again as uniform sampling.
+/// Checks that the true error agrees with the reported one within their uncertainty (both are means of k squares, uncertain
+/// by 1 / sqrt(2 k)), and that adaptivity costs at most 1.5 times the rays of uniform sampling.
 fn assert_honest(outcomes: &[Outcome]) {
     let mut scores = Vec::new();
     for Outcome { name, ratio, pixels, rays } in outcomes.iter().filter(|o| o.pixels >= 16.0) {
@@ -142,7 +142,7 @@ fn assert_honest(outcomes: &[Outcome]) {
 #[test]
 fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     let cheap = (0..40).filter(|number| number % 10 <= 5 || *number == 8 || *number == 9);
-    let outcomes: Vec<Outcome> = cheap.step_by(2).map(|number| examine(number, 1024)).collect();
+    let outcomes: Vec<Outcome> = cheap.step_by(2).map(|number| survey(number, 1024)).collect();
     assert_honest(&outcomes);
 }
 
@@ -150,19 +150,19 @@ fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
 #[test]
 #[ignore = "an hour: cargo test --test honesty survey -- --ignored --nocapture"]
 fn survey_of_200_scenes() {
-    let outcomes: Vec<Outcome> = (0..200).map(|number| examine(number, 4096)).collect();
-    let many = || outcomes.iter().filter(|o| o.ratio.is_finite());
-    let inside = many().filter(|o| (0.9..=1.15).contains(&o.ratio)).count();
-    let extreme = many().map(|o| o.ratio).fold(0.0, f64::max);
-    let dearest = many().map(|o| o.rays).fold(0.0, f64::max);
+    let outcomes: Vec<Outcome> = (0..200).map(|number| survey(number, 4096)).collect();
+    let finite = || outcomes.iter().filter(|o| o.ratio.is_finite());
+    let inside = finite().filter(|o| (0.9..=1.15).contains(&o.ratio)).count();
+    let extreme = finite().map(|o| o.ratio).fold(0.0, f64::max);
+    let highest = finite().map(|o| o.rays).fold(0.0, f64::max);
     println!(
-        "{inside} of {} within 0.9 to 1.15, at most {extreme:.2}; at most {dearest:.2} times the uniform rays",
-        many().count()
+        "{inside} of {} within 0.9 to 1.15, at most {extreme:.2}; at most {highest:.2} times the uniform rays",
+        finite().count()
     );
     assert_honest(&outcomes);
 }
 
-/// One white ball of about a pixel on a dark ground: its tile is noisy in validation pixels only.
+/// White ball of about a pixel on a dark background: its tile is noisy in validation pixels only.
 #[test]
 fn single_ball_ends_with_few_samples() {
     let text = "
@@ -188,8 +188,8 @@ fn single_ball_ends_with_few_samples() {
     }
 }
 
-/// The mean of a closed glossy room is the same with and without adaptivity: skewed noise in the estimates that decide
-/// biases no tile by more than its own chance.
+/// The mean of a closed glossy room is the same with and without adaptivity: skewed noise in the allocation estimates
+/// biases no tile by more than its own noise.
 #[test]
 fn adaptive_mean_of_a_closed_room_is_unbiased() {
     let mut sample = scene(7);
