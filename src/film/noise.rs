@@ -32,9 +32,9 @@ use crate::film::tile::Tile;
 /// Mean square error over pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mse {
-    /// In linear radiance.
+    /// Error in linear radiance, squared.
     pub linear: f64,
-    /// As displayed, in squared 8-bit levels.
+    /// Displayed error, in squared 8-bit levels.
     pub codes: f64,
 }
 

@@ -15,17 +15,17 @@ use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Precision, Radiance, World};
 /// Origin and unit direction.
 pub type Line = (DVec3, DVec3);
 
-/// Where a ray met something.
+/// Hit of a ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Met {
     pub t: f64,
-    /// Position of the form in the list that the geometry was made of.
+    /// Index of the form in the list of the geometry.
     pub form: usize,
     pub point: DVec3,
     pub normal: DVec3,
 }
 
-/// Packets of `lines`, the last one filled up with its last ray, and the range each is for.
+/// Packets of `lines`, the last one filled up with its last ray, each with its range of rays.
 pub fn packets<L: SimdFloat>(lines: &[Line]) -> impl Iterator<Item = (Ray<L>, usize)> + '_ {
     lines.chunks(L::WIDTH).map(|lines| {
         let at = |i: usize| lines[i.min(lines.len() - 1)];
@@ -40,7 +40,7 @@ pub fn to_dvec3<L: SimdFloat>(v: Vec3<L>, lane: usize) -> DVec3 {
     DVec3::from(v.lane(lane).map(Float::to_f64))
 }
 
-/// The surfaces of all lanes, item by item.
+/// Surfaces of all lanes, lane by lane.
 pub fn surface<L: SimdFloat>(
     geometry: &Aggregate<L>,
     ray: &Ray<L>,
@@ -61,7 +61,7 @@ pub fn surface<L: SimdFloat>(
     all
 }
 
-/// The nearest things, ray by ray.
+/// Closest hits, ray by ray.
 pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Option<Met>> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
@@ -80,7 +80,7 @@ pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Opt
     out
 }
 
-/// Whether anything lies nearer than `limit`, ray by ray.
+/// Occlusion within the distance `limit`, ray by ray.
 pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64) -> Vec<bool> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
@@ -90,7 +90,7 @@ pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64
     out
 }
 
-/// One form of every registered kind, by its example.
+/// Form of the example of every registered kind.
 pub fn every_kind() -> Vec<(&'static str, Form)> {
     let form = |text: &str| scene(&format!("[[object]]\n{text}")).objects[0].shape.form();
     EXAMPLES.iter().map(|(key, example)| (*key, form(example))).collect()
@@ -101,16 +101,16 @@ pub fn scene(text: &str) -> Scene {
     Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Centre and radius of a sphere around a bounded form's box.
+/// Centre and radius of a sphere around the bounding box of a form.
 pub fn ball(form: &Form) -> Option<(DVec3, f64)> {
     form.bounds().map(|(low, high)| (0.5 * (low + high), 0.5 * (high - low).length()))
 }
 
-/// A compiled scene that answers with radiance.
+/// Compiled scene that is traced for radiance.
 pub struct Traced {
     world: AnyWorld,
     mix: Vec<[f64; 3]>,
-    /// What the compilation subtracted from every coordinate.
+    /// Origin that the compilation subtracted from every coordinate.
     origin: DVec3,
 }
 
@@ -131,7 +131,7 @@ impl Traced {
         self.centered(&lines)
     }
 
-    /// The same for lines around the scene's centre.
+    /// Radiance along lines relative to the scene's centre.
     pub fn centered(&self, lines: &[Line]) -> Vec<[f64; 3]> {
         match &self.world {
             AnyWorld::Single(w) => self.of(w, lines),
@@ -139,7 +139,7 @@ impl Traced {
         }
     }
 
-    /// Where the scene's centre lies.
+    /// Centre of the scene.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
@@ -165,8 +165,8 @@ impl Traced {
     }
 }
 
-/// A ray of one kind or another around a form: through it, beside it, from inside, along the axes,
-/// from points of its surface, with zeros of both signs.
+/// Random ray around a form: through it, past it, from inside, along the axes, from points of its surface,
+/// with zeros of both signs.
 pub fn any_line(numbers: &mut Numbers, form: &Form) -> Line {
     let (center, radius) = ball(form).unwrap_or((DVec3::ZERO, 2.0));
     let axis = |numbers: &mut Numbers| {
@@ -212,7 +212,7 @@ pub fn any_line(numbers: &mut Numbers, form: &Form) -> Line {
     }
 }
 
-/// Every kind as it is, turned, and scaled unevenly (spheres become ellipsoids).
+/// Forms of every kind: untransformed, rotated, and scaled unevenly (spheres become ellipsoids).
 pub fn forms() -> Vec<(String, Form)> {
     let mut out = Vec::new();
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);

@@ -1,23 +1,23 @@
-//! The values of a scene, found by the tables of fields: what a test changes without a list of its own.
+//! Keys and values of a scene, enumerated by the tables of fields, for tests that change all of them.
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use toml::{Table, Value};
 use zerkalo::scene::{AssetResolver, FIELDS, Scene};
 use zerkalo::value::{Field, ValueType};
 
-/// A key of a scene: the keys that lead to it, positions in lists as numbers, and what it takes.
+/// Key of a scene: its path, with positions in lists as numbers, and its type.
 #[derive(Clone, Debug)]
 pub struct Key {
     pub path: Vec<String>,
     pub takes: ValueType,
 }
 
-/// The scene as a table.
+/// Converts a scene to a table.
 pub fn table(scene: &Scene) -> Table {
     Table::try_from(scene).expect("scenes are tables")
 }
 
-/// The scene in `table`, with the files of `library`; `None`: it has faults.
+/// Scene of `table`, with the files of `library`; `None` if it has faults.
 pub fn scene(table: &Table, library: &AssetResolver) -> Option<Scene> {
     let mut scene: Scene = table.clone().try_into().ok()?;
     scene.library = library.clone();
@@ -25,8 +25,8 @@ pub fn scene(table: &Table, library: &AssetResolver) -> Option<Scene> {
     scene.faults().is_empty().then_some(scene)
 }
 
-/// Every key that the tables name in what `scene` holds, given or left out; a table in a list or under a name once
-/// for each that there is. Of what holds others, it as a whole as well.
+/// All keys of the tables of fields for the contents of `scene`, given or omitted. Tables in lists or under names occur
+/// once for each entry. Tables and lists occur as a whole as well.
 pub fn keys(scene: &Table) -> Vec<Key> {
     let mut out = Vec::new();
     walk(FIELDS, scene, &[], &mut out);
@@ -76,7 +76,7 @@ fn walk(fields: &[Field], table: &Table, path: &[String], out: &mut Vec<Key>) {
     }
 }
 
-/// What stands at `path`.
+/// Value at `path`.
 pub fn at<'a>(table: &'a mut Table, path: &[String]) -> Option<&'a mut Value> {
     let (first, rest) = path.split_first()?;
     let mut value = table.get_mut(first)?;
@@ -90,7 +90,7 @@ pub fn at<'a>(table: &'a mut Table, path: &[String]) -> Option<&'a mut Value> {
     Some(value)
 }
 
-/// Puts `value` at `path`, or takes what is there away. The table around it is there.
+/// Sets the value at `path`, or removes it. Its parent table exists.
 pub fn put(table: &mut Table, path: &[String], value: Option<Value>) {
     let (last, above) = path.split_last().expect("a key");
     let around =

@@ -1,10 +1,10 @@
-//! Lines for the table of extremes in docs/accuracy.md, which `benches/accuracy.sh extremes` collects.
-//! A test tells what came out once it has passed.
+//! Lines of the table of extremes in docs/accuracy.md, collected by `benches/accuracy.sh extremes`. A test
+//! prints its result when it has passed.
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use zerkalo::lanes::SimdFloat;
 
-/// For the column `what` (`single`, `double`, `both`, `auto`, `about`, `criterion`) of an extreme's row.
+/// Prints `words` for the column `what` (`single`, `double`, `both`, `auto`, `about`, `criterion`) of the row `number`.
 pub fn told(number: usize, what: &str, words: &str) {
     println!("extreme {number:02} | {what} | {words}");
 }
@@ -14,6 +14,5 @@ pub fn precision<L: SimdFloat>() -> &'static str {
     if L::EPSILON < 1e-10 { "double" } else { "single" }
 }
 
-/// What extremes single precision is not asked to meet: `precision.rs` shows that `auto` leaves them to
-/// double.
+/// Result in single precision of extremes that `auto` leaves to double precision, as `precision.rs` shows.
 pub const LEFT: &str = "left to double";

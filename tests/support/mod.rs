@@ -1,4 +1,4 @@
-//! Renderings that tests drive wave by wave, without clock or channels.
+//! Renders that tests run wave by wave, without clock or channels.
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use std::fs;
@@ -12,13 +12,13 @@ use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Acceleration, Filter, Scene};
 use zerkalo::world::{self, Precision};
 
-/// A scene of the folder `scenes`.
+/// Scene of the folder `scenes`.
 pub fn shipped(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
     Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Every scene of the folder `scenes`, by name.
+/// All scenes of the folder `scenes`, with their names.
 pub fn all_shipped() -> Vec<(String, Scene)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
@@ -30,23 +30,23 @@ pub fn all_shipped() -> Vec<(String, Scene)> {
     paths.iter().map(|path| (name(path), shipped(&name(path)))).collect()
 }
 
-/// Smaller, in another raster; the field of view stays as the scene has it.
+/// `scene` with another film size; the field of view stays.
 pub fn sized(mut scene: Scene, size: [u32; 2]) -> Scene {
     scene.film.size = size;
     scene
 }
 
-/// A scene in a text.
+/// Scene of a text.
 pub fn parsed(text: &str) -> Scene {
     Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// A rendering without samples.
+/// Render state without samples.
 pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> RenderState {
     begin_with(scene, SampleSettings { seed, kind: SamplerKind::Sobol }, precision)
 }
 
-/// A rendering without samples, with a sampler of its own.
+/// Render state without samples, with the given sampler.
 pub fn begin_with(scene: &Scene, sampling: SampleSettings, precision: Precision) -> RenderState {
     let world = world::Options { precision };
     RenderState::new(scene, &Options { world, sampling, display: Display::default() }, None)
@@ -57,7 +57,7 @@ pub fn pool(threads: usize) -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
 }
 
-/// The same samples in every tile, in the film's order.
+/// Wave of the same samples in every tile, in the film's order.
 pub fn wave(film: &Film, replicate: usize, first: u32, count: u32) -> Wave {
     let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first, count }).collect();
     Wave { replicate, jobs, estimate: false }
@@ -68,7 +68,7 @@ pub fn trace(rendering: &mut RenderState, wave: &Wave, pool: &rayon::ThreadPool)
     rendering.trace_wave(wave, pool, &AtomicBool::new(false))
 }
 
-/// Samples `first .. first + count` of both replicates in every pixel.
+/// Traces the samples `first .. first + count` of both replicates in every pixel.
 pub fn uniform(rendering: &mut RenderState, first: u32, count: u32, pool: &rayon::ThreadPool) {
     for replicate in [0, 1] {
         let wave = wave(&rendering.film, replicate, first, count);
@@ -76,29 +76,29 @@ pub fn uniform(rendering: &mut RenderState, first: u32, count: u32, pool: &rayon
     }
 }
 
-/// Both replicates of `scene`, `count` samples each.
+/// Render of `scene` with `count` samples in each replicate.
 pub fn rendered(scene: &Scene, seed: u64, precision: Precision, count: u32) -> RenderState {
     let mut rendering = begin(scene, seed, precision);
     uniform(&mut rendering, 0, count, &pool(2));
     rendering
 }
 
-/// Both replicates of `scene` by one thread, accelerated in one of the ways.
+/// Single-threaded render of `scene` with the acceleration structure `kind` and `count` samples in each replicate.
 pub fn accelerated(
     scene: &Scene,
-    by: Acceleration,
+    kind: Acceleration,
     precision: Precision,
     count: u32,
 ) -> RenderState {
     let mut scene = scene.clone();
-    scene.trace.acceleration = by;
+    scene.trace.acceleration = kind;
     let mut rendering = begin(&scene, 5, precision);
     uniform(&mut rendering, 0, count, &pool(1));
     rendering
 }
 
-/// Takes from a scene all that is left to chance: anti-aliasing, lobes, and beyond two surfaces that let
-/// light through the choice of one of two rays.
+/// Removes all random choices from a scene: anti-aliasing, lobes, and the choice between reflection and
+/// refraction beyond two transmitting surfaces.
 pub fn without_chance(scene: &mut Scene) {
     scene.film.filter = Filter::Center;
     for material in scene.materials.values_mut() {
@@ -109,7 +109,7 @@ pub fn without_chance(scene: &mut Scene) {
     }
 }
 
-/// Follows a schedule that stops for anything but time.
+/// Follows a schedule without a time limit to its end.
 pub fn follow(
     rendering: &mut RenderState,
     settings: Settings,
@@ -127,17 +127,17 @@ pub fn follow(
     }
 }
 
-/// Settings that minimise the error in codes.
+/// Settings that minimise the displayed error.
 pub fn settings(adaptive: bool, rays_per_pixel: u32, stop: Stop) -> Settings {
     Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel, stop }
 }
 
-/// The radiance of every pixel, row by row.
-pub fn picture(rendering: &RenderState, part: Replicates) -> Vec<[f64; 3]> {
+/// Radiance of every pixel, `[row][column]`.
+pub fn picture(rendering: &RenderState, replicates: Replicates) -> Vec<[f64; 3]> {
     let mut row = Vec::new();
     let mut all = Vec::new();
     for y in 0..rendering.film.height() {
-        rendering.film.row(y, part, &rendering.mix, &mut row);
+        rendering.film.row(y, replicates, &rendering.mix, &mut row);
         all.extend_from_slice(&row);
     }
     all
