@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Measures what docs/accuracy.md names and puts the tables and drawings there anew. For a quiet machine.
+# Measures the blocks of docs/accuracy.md and replaces its tables and plots. Needs a quiet machine.
 #
 #     cargo build --release
 #     benches/accuracy.sh [KEY...]      only the blocks with these keys
 #
-# In docs/accuracy.md a block between `<!-- measured: KEY SCENE OPTIONS -->` and `<!-- end -->` is replaced by what
-# `zerkalo measure scenes/SCENE.toml OPTIONS` prints; the drawing goes to docs/images/accuracy-KEY.svg, the numbers to
-# benches/runs/DATE-accuracy-KEY.csv. The block `<!-- extremes -->` (its key is `extremes`) is replaced by what the
-# tests of extremes tell; that takes no quiet machine.
+# A block of docs/accuracy.md between `<!-- measured: KEY SCENE OPTIONS -->` and `<!-- end -->` is replaced by the output
+# of `zerkalo measure scenes/SCENE.toml OPTIONS`; the plot goes to docs/images/accuracy-KEY.svg, the numbers go to
+# benches/runs/DATE-accuracy-KEY.csv. The block `<!-- extremes -->` (its key is `extremes`) is replaced by the results
+# that the tests of extremes print; it does not need a quiet machine.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -17,7 +17,7 @@ zerkalo="${ZERKALO:-target/release/zerkalo}"
 scratch="$(mktemp -d)"
 trap 'rm -rf "$scratch"' EXIT
 
-# Puts the text of the second file after the line of the page that the first one holds, up to the block's end.
+# Replaces the block whose first line is in file $1 by the text of file $2.
 replace() {
     awk -v begin="$(cat "$1")" -v text="$2" '
         $0 == begin {

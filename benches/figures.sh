@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Prints the figures that docs/accuracy.md and the README quote: speed, memory, time to equal error.
+# Prints the figures of docs/accuracy.md and the README: speed, memory, time to equal error.
 # Usage: benches/figures.sh [RUNS]   (default 5; medians are printed)
 # Needs the release build: cargo build --release
 set -euo pipefail

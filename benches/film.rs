@@ -1,4 +1,4 @@
-//! What the film costs beside tracing: noise of a tile, the display's picture, adding, files.
+//! Cost of the film besides tracing: noise of a tile, display picture, addition, files.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -7,7 +7,7 @@ use zerkalo::film::{
     Thumbnail, Tone,
 };
 
-/// A noisy gradient of `groups` lights, 64 + 64 samples in every pixel.
+/// Film of a noisy gradient with `groups` light groups and 64 + 64 samples in every pixel.
 fn film(width: usize, height: usize, groups: usize) -> Film {
     let scales = vec![2f64.powi(28); groups];
     let mut film = Film::new(Header { width, height, scales, seed: 1, precision: "single".into() });
@@ -22,8 +22,8 @@ fn film(width: usize, height: usize, groups: usize) -> Film {
                 .map(|c| {
                     state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
                     let noise = (state >> 40) as f64 / 16_777_216.0;
-                    let plain = (x * (c + 1) + y) as f64 / (width * (c + 1) + height) as f64;
-                    (64.0 * 2f64.powi(28) * (plain + 0.02 * noise) / groups as f64) as i64
+                    let gradient = (x * (c + 1) + y) as f64 / (width * (c + 1) + height) as f64;
+                    (64.0 * 2f64.powi(28) * (gradient + 0.02 * noise) / groups as f64) as i64
                 })
                 .collect();
             tile.add(replicate, pixel, &values);

@@ -1,5 +1,5 @@
-//! How soon a session answers: pictures, edits, tasks, on a film of the given size (without one:
-//! 640x480 and 3840x2160). Prints milliseconds: median, 99th percentile, longest.
+//! Latency of a session: pictures, edits and tasks on a film of the given size (default: 640x480 and
+//! 3840x2160). Prints milliseconds: median, 99th percentile, maximum.
 //!
 //!     cargo bench --bench session -- 3840x2160
 
@@ -58,13 +58,13 @@ fn figures(size: [u32; 2]) {
     first_pictures(&mut session, &other, "with other light groups");
     first_pictures(&mut session, &scene, "and back");
 
-    tell("snapshots while tracing, apart", &snapshots(&session, Duration::from_secs(4)));
-    tell("task to its answer", &tasks(&session, 60));
-    tell("edit to its first picture", &edits(&mut session, &mut scene, 20));
+    print("snapshots while tracing, apart", &snapshots(&session, Duration::from_secs(4)));
+    print("task to its answer", &tasks(&session, 60));
+    print("edit to its first picture", &edits(&mut session, &mut scene, 20));
     wait(&session, |s| s.report.spp.min >= 4);
     let (shown, judged) = relights(&mut session, &mut scene, 10);
-    tell("intensity to its snapshot", &shown);
-    tell("intensity to its noise", &judged);
+    print("intensity to its snapshot", &shown);
+    print("intensity to its noise", &judged);
     let costs = session.with(|rendering, _| {
         let film = &rendering.film;
         let timed = |f: &dyn Fn()| {
@@ -78,17 +78,17 @@ fn figures(size: [u32; 2]) {
         ]
     });
     let [thumbnail, linear] = costs.unwrap();
-    tell("a thumbnail from nothing, one thread", &thumbnail);
-    tell("a linear picture, one thread", &linear);
+    print("a thumbnail from nothing, one thread", &thumbnail);
+    print("a linear picture, one thread", &linear);
     let report = session.with(|_, report| report.clone()).unwrap();
     println!("  {:.1} Msamples/s, {:.0} spp", report.samples_per_second() * 1e-6, report.spp.mean);
 }
 
-fn tell(what: &str, times: &[Duration]) {
+fn print(label: &str, times: &[Duration]) {
     let mut ms: Vec<f64> = times.iter().map(|t| t.as_secs_f64() * 1e3).collect();
     ms.sort_by(f64::total_cmp);
-    let at = |share: f64| ms[((ms.len() - 1) as f64 * share).round() as usize];
-    println!("  {what:42} {:8.1} {:8.1} {:8.1}", at(0.5), at(0.99), at(1.0));
+    let quantile = |share: f64| ms[((ms.len() - 1) as f64 * share).round() as usize];
+    println!("  {label:42} {:8.1} {:8.1} {:8.1}", quantile(0.5), quantile(0.99), quantile(1.0));
 }
 
 fn wait(session: &Session, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {
@@ -105,10 +105,10 @@ fn first_pictures(session: &mut Session, scene: &Scene, which: &str) {
     let start = Instant::now();
     let generation = session.set_scene(Arc::new(scene.clone()));
     wait(session, |s| s.report.generation == generation);
-    tell(&format!("{which}: coarse picture"), &[start.elapsed()]);
-    let of_this = |s: &Snapshot| s.report.generation == generation;
-    wait(session, |s| of_this(s) && s.report.first_picture_seconds.is_some());
-    tell(&format!("{which}: every pixel"), &[start.elapsed()]);
+    print(&format!("{which}: coarse picture"), &[start.elapsed()]);
+    let is_current = |s: &Snapshot| s.report.generation == generation;
+    wait(session, |s| is_current(s) && s.report.first_picture_seconds.is_some());
+    print(&format!("{which}: every pixel"), &[start.elapsed()]);
 }
 
 fn snapshots(session: &Session, during: Duration) -> Vec<Duration> {
@@ -129,7 +129,7 @@ fn tasks(session: &Session, count: usize) -> Vec<Duration> {
         let (answer, result) = channel();
         let start = Instant::now();
         session.submit(move |film| {
-            answer.send(film.map(|(_, report)| report.samples)).expect("somebody waits");
+            answer.send(film.map(|(_, report)| report.samples)).expect("the bench waits");
         });
         assert!(result.recv().unwrap().is_some());
         start.elapsed()
@@ -164,8 +164,8 @@ fn relights(
         let snapshot = wait(session, |s| s.report.generation == generation);
         assert!(snapshot.report.samples > 0, "the film was restarted");
         let shown = start.elapsed();
-        let of_this = |s: &Snapshot| s.report.generation == generation;
-        wait(session, |s| of_this(s) && s.report.noise.is_some());
+        let is_current = |s: &Snapshot| s.report.generation == generation;
+        wait(session, |s| is_current(s) && s.report.noise.is_some());
         (shown, start.elapsed())
     };
     (0..count).map(&mut relight).unzip()

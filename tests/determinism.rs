@@ -1,16 +1,19 @@
 //! A sample is a pure function of seed, pixel, replicate and index. The bytes of the film do not depend on
 //! thread, order, packet layout or division into parts.
 
+#[path = "common/mod.rs"]
+mod common;
 #[path = "common/report.rs"]
 mod report;
 mod support;
 
+use common::Numbers;
 use report::report;
 use std::fs;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use support::{Rng, all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
+use support::{all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
 use zerkalo::film::Film;
 use zerkalo::render::RenderState;
 use zerkalo::scene::Scene;
@@ -60,7 +63,7 @@ fn extreme_29_determinism() {
             let expected = film_of_samples(&scene, precision, 19).bytes();
             for threads in [1, 2, 7] {
                 let pool = pool(threads);
-                let mut rng = Rng(threads as u64);
+                let mut rng = Numbers::new(threads as u64);
                 let mut rendering = begin(&scene, SEED, precision);
                 for replicate in [1, 0] {
                     let mut wave = wave(&rendering.film, replicate, 0, 19);
@@ -86,7 +89,7 @@ fn extreme_29_sum_of_parts_does_not_depend_on_order() {
             let films = parts.map(|ranges| film_of_ranges(&scene, precision, &ranges));
             let mut order = [0, 1, 2, 3];
             for seed in 0..6 {
-                Rng(seed).shuffle(&mut order);
+                Numbers::new(seed).shuffle(&mut order);
                 let mut sum = Film::new(films[0].header().clone());
                 order.iter().for_each(|i| sum.add(&films[*i]).unwrap());
                 assert!(sum.bytes() == expected, "{name} in {precision:?}, order {order:?}");

@@ -1,9 +1,11 @@
-//! The film from outside: the same bits in any order, sums that do not stall, files that hold what
-//! they should.
+//! The film's public interface: order of addition, precision of sums, contents of files.
 
+#[path = "common/mod.rs"]
+mod common;
 #[path = "common/report.rs"]
 mod report;
 
+use common::Numbers;
 use proptest::prelude::*;
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -31,19 +33,15 @@ fn all_tiles(film: &Film) -> Vec<usize> {
     (0..film.tile_count()).collect()
 }
 
-/// Numbers for tests (SplitMix64).
-fn mixed_bits(x: u64) -> u64 {
-    let z = x.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+fn random_bits(seed: u64) -> u64 {
+    Numbers::new(seed).bits()
 }
 
-/// Sample `index` of a pixel, a pure function: `[group][channel]`; one in about 2000 is bad.
+/// Sample `index` of a pixel, a pure function: `[group][channel]`; one in about 2000 is invalid.
 fn sample(x: usize, y: usize, replicate: usize, index: u32) -> Option<[f64; 6]> {
-    let at = ((x * 64 + y) * 2 + replicate) as u64 * 1_000_003 + u64::from(index);
-    let value = |c: u64| mixed_bits(at * 8 + c) as f64 / 1.8e19;
-    (!mixed_bits(at).is_multiple_of(2000)).then(|| [0, 1, 2, 3, 4, 5].map(value))
+    let seed = ((x * 64 + y) * 2 + replicate) as u64 * 1_000_003 + u64::from(index);
+    let value = |c: u64| random_bits(seed * 8 + c) as f64 / 1.8e19;
+    (!random_bits(seed).is_multiple_of(2000)).then(|| [0, 1, 2, 3, 4, 5].map(value))
 }
 
 fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: usize, index: u32) {
@@ -60,7 +58,7 @@ fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: u
     }
 }
 
-/// Adds samples `range` of one replicate to the tiles in the order given.
+/// Adds samples `range` of one replicate to `tiles`, in that order.
 fn trace(film: &mut Film, tiles: &[usize], replicate: usize, range: Range<u32>) {
     for slot in film.slots(tiles) {
         trace_slot(slot, replicate, range.clone());
@@ -80,7 +78,7 @@ fn trace_slot(slot: TileHandle, replicate: usize, range: Range<u32>) {
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_bytes() {
+fn threads_do_not_change_the_bytes() {
     let expected = whole().bytes();
     for threads in [1, 2, 7] {
         let mut film = new_film();
@@ -102,7 +100,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
     }
 }
 
-/// Takes the first sample of replicate A by lattices.
+/// Adds the first sample of replicate A by lattices.
 fn trace_lattices(film: &mut Film, steps: &[usize]) {
     let all = all_tiles(film);
     let mut before = 0;
@@ -150,12 +148,12 @@ fn disjoint_ranges_in_any_order_equal_the_whole() {
     let bad = whole.bad_samples();
     assert!(bad.count > 4 && !bad.first.is_empty(), "{bad:?}");
     assert_eq!(whole.samples(), (WIDTH * HEIGHT * 24) as u64);
-    // Bytes tell different films apart.
+    // Different films have different bytes.
     assert!(part(&ranges[0]).bytes() != part(&ranges[1]).bytes());
 }
 
 #[test]
-fn a_first_pass_by_lattices_is_the_first_sample() {
+fn first_pass_by_lattices_equals_the_first_sample() {
     let mut film = new_film();
     trace_lattices(&mut film, &[16, 8, 2, 1]);
     let mut straight = new_film();
@@ -170,14 +168,14 @@ fn a_first_pass_by_lattices_is_the_first_sample() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
     #[test]
-    fn any_order_of_tiles_and_waves_gives_the_same_bytes(seed in any::<u64>()) {
+    fn order_of_tiles_and_waves_does_not_change_the_bytes(seed in any::<u64>()) {
         let mut film = new_film();
         let mut waves: Vec<_> = all_tiles(&film)
             .into_iter()
             .flat_map(|tile| [(tile, 0, 0..3), (tile, 0, 3..12), (tile, 1, 0..8), (tile, 1, 8..12)])
             .collect();
         waves.sort_by_key(|(tile, replicate, range)| {
-            mixed_bits(seed ^ (*tile as u64 * 100 + *replicate as u64 * 50 + u64::from(range.start)))
+            random_bits(seed ^ (*tile as u64 * 100 + *replicate as u64 * 50 + u64::from(range.start)))
         });
         for (tile, replicate, range) in waves {
             trace(&mut film, &[tile], replicate, range);
@@ -191,11 +189,11 @@ fn extreme_28_milliard_samples() {
     let scale = 2f64.powi(28);
     let mut film = film_of(1, 1, &[scale]);
     let white = LightWeights { weights: vec![[1.0; 3]] };
-    let of = |value: f64| (value * scale).round() as i64;
+    let fixed_point = |value: f64| (value * scale).round() as i64;
     let tile = film.slots(&[0]).remove(0).prepare();
-    // Red: 0.7. Green: 0, 0.0014, ..., 1.3986, of mean 0.6993. Blue: next to nothing.
+    // Red: 0.7. Green: 0, 0.0014, ..., 1.3986, of mean 0.6993. Blue: 1e-8.
     for k in 0..1000 {
-        let values = [0.7, f64::from(k) * 1.4e-3, 1e-8].map(of);
+        let values = [0.7, f64::from(k) * 1.4e-3, 1e-8].map(fixed_point);
         tile.add(0, 0, &values.map(|v| v * 999_999));
         let before = tile.pixel(0, 0).to_vec();
         tile.add(0, 0, &values);
@@ -207,8 +205,8 @@ fn extreme_28_milliard_samples() {
     assert!((red / 0.7 - 1.0).abs() < 1e-8, "{red}");
     assert!((green / 0.6993 - 1.0).abs() < 1e-8, "{green}");
     assert!((blue - 1e-8).abs() <= 0.5 / scale, "{blue}");
-    let off = (red / 0.7 - 1.0).abs().max((green / 0.6993 - 1.0).abs());
-    report::report(28, "both", &format!("{off:.0e} off (relative)"));
+    let error = (red / 0.7 - 1.0).abs().max((green / 0.6993 - 1.0).abs());
+    report::report(28, "both", &format!("{error:.0e} off (relative)"));
 }
 
 #[test]
@@ -225,7 +223,7 @@ fn extreme_28_saturation_is_flagged() {
     tile.add(0, 0, &[(7e8 * scale) as i64, 0, 0]);
     assert_eq!((tile.saturated(), film.saturated()), (1, 1));
     assert_eq!(film.pixel(0, 0, &white)[0], i64::MAX as f64 / scale / 50.0);
-    // It stays flagged when added to a film, in either order.
+    // The flag survives addition to a film, in either order.
     let mut other = film_of(1, 1, &[scale]);
     let tile = other.slots(&[0]).remove(0).prepare();
     tile.add(0, 0, &[1, 0, 0]);
@@ -241,7 +239,7 @@ fn extreme_28_saturation_is_flagged() {
 }
 
 #[test]
-fn dim_and_bright_lights_keep_the_same_bits() {
+fn strength_of_lights_does_not_change_the_bits() {
     let white = LightWeights { weights: vec![[1.0; 3]] };
     let shown = |exponent: i32| {
         let light = 2f64.powi(exponent);
@@ -299,8 +297,8 @@ fn png_files_hold_the_displayed_picture() {
                 match depth {
                     Depth::Eight => assert_eq!(bytes[i * 3 + c], quantised_8(codes[c])),
                     Depth::Sixteen => {
-                        let at = (i * 3 + c) * 2;
-                        let value = u16::from_be_bytes([bytes[at], bytes[at + 1]]);
+                        let offset = (i * 3 + c) * 2;
+                        let value = u16::from_be_bytes([bytes[offset], bytes[offset + 1]]);
                         assert_eq!(value, quantised_16(codes[c]));
                     }
                 }
@@ -316,7 +314,7 @@ fn png_files_hold_the_displayed_picture() {
         let mut expected = metadata();
         expected.sort();
         assert_eq!(found, expected);
-        // For readers that do not know the sRGB chunk.
+        // Chunks for readers without support of the sRGB chunk.
         let raw = fs::read(&path).unwrap();
         let holds = |data: &[u8]| raw.windows(data.len()).any(|window| window == data);
         assert!(holds(b"gAMA\x00\x00\xb1\x8f") && holds(b"cHRM\x00\x00\x7a\x26\x00\x00\x80\x84"));
@@ -325,7 +323,7 @@ fn png_files_hold_the_displayed_picture() {
 }
 
 #[test]
-fn exr_files_hold_everything_linear() {
+fn exr_files_hold_linear_layers() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.exr");
     let mut film = whole();
@@ -347,17 +345,19 @@ fn exr_files_hold_everything_linear() {
     };
     let mut row = vec![];
     for (x, y) in [(0, 0), (36, 20), (17, 3), (2, 19)] {
-        for (layer, part) in [("", Replicates::Both), ("A.", Replicates::A), ("B.", Replicates::B)]
+        for (layer, replicates) in
+            [("", Replicates::Both), ("A.", Replicates::A), ("B.", Replicates::B)]
         {
-            film.row(y, part, &mix(), &mut row);
+            film.row(y, replicates, &mix(), &mut row);
             for (c, color) in ["R", "G", "B"].into_iter().enumerate() {
                 let got = value(&format!("{layer}{color}"), x, y).to_f32();
                 assert_eq!(got, row[x][c] as f32, "{layer}{color} at {x} {y}");
             }
         }
         for color in ["R", "G", "B"] {
-            let of = |layer: &str| value(&format!("{layer}{color}"), x, y).to_f32();
-            let (picture, lamp, window) = (of(""), of("light_lamp."), of("light_____-2."));
+            let layer_value = |layer: &str| value(&format!("{layer}{color}"), x, y).to_f32();
+            let (picture, lamp, window) =
+                (layer_value(""), layer_value("light_lamp."), layer_value("light_____-2."));
             assert!((lamp + window - picture).abs() < 1e-6 && lamp > 0.0 && window > 0.0);
         }
         let count = if x < 16 && y < 16 { 27 } else { 24 };

@@ -1,5 +1,5 @@
-//! What changes a picture, and what only seems to: lights are mixed after tracing, their unit and the
-//! place of the scene do not matter, levels and limits of tracing do what they say.
+//! Invariances of pictures (light weights, unit of light, translation) and effects of the tracing limits
+//! (ray types, depth, least weight, horizon, cap on glossy tiles).
 
 mod support;
 
@@ -19,7 +19,7 @@ fn small(name: &str) -> Scene {
     sized(shipped(name), SIZE)
 }
 
-/// The picture of a scene with a few samples, radiance by channel.
+/// Radiance of a picture with a few samples, `[row][column][channel]`.
 fn values(scene: &Scene, precision: Precision) -> Vec<f64> {
     picture(&rendered(scene, 4, precision, 8), Replicates::Both).concat()
 }
@@ -36,7 +36,7 @@ fn has(scene: &Scene, part: &str) -> bool {
     world.inventory().parts().iter().any(|p| p == part)
 }
 
-/// The scene of three lights, with a background.
+/// Scene of three lights with a background.
 fn lit() -> Scene {
     let mut scene = small("light-groups.toml");
     scene.background.color = Color([0.1, 0.2, 0.3]);
@@ -44,7 +44,7 @@ fn lit() -> Scene {
 }
 
 #[test]
-fn lights_are_changed_without_tracing_again() {
+fn light_weights_replace_retracing() {
     let before = lit();
     let mut changes: Vec<(&str, Scene)> = Vec::new();
     let mut change = |what, edit: &dyn Fn(&mut Scene)| {
@@ -85,8 +85,7 @@ fn lights_are_changed_without_tracing_again() {
     }
 }
 
-/// A ball under lights of different colours and strengths, more than have groups
-/// of their own.
+/// Ball under lights of different colours and strengths, more than there are light groups.
 fn many_lights() -> Scene {
     let mut scene = lit();
     let light = scene.lights[0].clone();
@@ -103,7 +102,7 @@ fn many_lights() -> Scene {
 }
 
 #[test]
-fn the_unit_of_light_does_not_matter() {
+fn unit_of_light_does_not_change_the_picture() {
     let mut falloff = small("mirror-room-physical.toml");
     falloff.background.color = Color([0.5, 0.25, 0.125]);
     for (what, scene) in [("few", lit()), ("many", many_lights()), ("falloff", falloff)] {
@@ -129,8 +128,8 @@ fn the_unit_of_light_does_not_matter() {
     }
 }
 
-/// The same scene elsewhere.
-fn moved(scene: &Scene, by: [f64; 3]) -> Scene {
+/// `scene`, translated by `by`.
+fn translated(scene: &Scene, by: [f64; 3]) -> Scene {
     let mut scene = scene.clone();
     let shift = |p: &mut [f64; 3]| (0..3).for_each(|i| p[i] += by[i]);
     for object in &mut scene.objects {
@@ -147,9 +146,9 @@ fn moved(scene: &Scene, by: [f64; 3]) -> Scene {
 }
 
 #[test]
-fn a_million_units_away_the_picture_is_the_same() {
+fn translation_by_a_million_units_does_not_change_the_picture() {
     let by = [1e6, -1e6, 3e6];
-    // Coordinates of which no bit is lost there.
+    // Coordinates that keep all bits under the translation.
     let dyadic = parsed(
         r#"
 [film]
@@ -177,18 +176,19 @@ shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
     );
     for precision in PRECISIONS {
         let here = rendered(&dyadic, 4, precision, 8).film.bytes();
-        let there = rendered(&moved(&dyadic, by), 4, precision, 8).film.bytes();
+        let there = rendered(&translated(&dyadic, by), 4, precision, 8).film.bytes();
         assert!(here == there, "{precision:?}");
     }
-    // Others are rounded there to 2^-32 of a unit, which double precision shows; in single it is hidden,
-    // unless a number lies so close to the middle between two that it is rounded to the other one (a
-    // coefficient of a thin ellipsoid in extents.toml: 2.7e-8). A sample at an edge may fall to the other
-    // side: near the horizon of a checked floor (gallery-glass.toml) one in ten thousand does, so a
-    // five-hundredth of its pixels may be off, by no more than one sample each; in no other scene does one.
+    // Other coordinates are rounded to 2^-32 of a unit, which is visible in double precision. Single precision
+    // hides it, unless a number is so close to the middle between two that it is rounded to the other one (a
+    // coefficient of a thin ellipsoid in extents.toml: 2.7e-8). A sample at an edge may change sides: near the
+    // horizon of a checked floor (gallery-glass.toml) one in ten thousand does, so a five-hundredth of its
+    // pixels may differ, by at most one sample each. In all other scenes none does.
     for (name, scene) in all_shipped() {
         let scene = sized(scene, SIZE);
         for precision in PRECISIONS {
-            let (here, there) = (values(&scene, precision), values(&moved(&scene, by), precision));
+            let (here, there) =
+                (values(&scene, precision), values(&translated(&scene, by), precision));
             let mut apart: Vec<f64> = here
                 .chunks(3)
                 .zip(there.chunks(3))
@@ -213,7 +213,7 @@ shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
 }
 
 #[test]
-fn levels_add_shadows_and_reflections() {
+fn ray_types_add_shadows_and_reflections() {
     for precision in PRECISIONS {
         let [primary, shadows, full] =
             ["primary", "shadows", "full"].map(|l| small(&format!("level-{l}.toml")));
@@ -221,7 +221,7 @@ fn levels_add_shadows_and_reflections() {
         unreflected.trace.max_depth = 0;
         assert_eq!(primary.trace.ray_types, RayTypes::Primary);
         let [lit, shadowed, reflected] = [&primary, &shadows, &full].map(|s| values(s, precision));
-        // Shadows only take light away, reflections only add it.
+        // Shadows only remove light, reflections only add it.
         assert!(shadowed.iter().zip(&lit).all(|(s, l)| s <= l));
         assert!(shadowed.iter().zip(&reflected).all(|(s, r)| s <= r));
         assert!(difference(&shadowed, &lit) > 0.1 && difference(&shadowed, &reflected) > 0.1);
@@ -235,9 +235,9 @@ fn levels_add_shadows_and_reflections() {
     assert!(!has(&Scene { lights: Vec::new(), ..shadows }, "shadows only"));
 }
 
-/// What deeper paths add is at most rho^(K+1) / (1 - rho) of the brightest surface.
+/// Paths deeper than K add at most rho^(K+1) / (1 - rho) of the brightest surface.
 #[test]
-fn depth_is_honoured_and_what_it_cuts_is_bounded() {
+fn depth_limits_paths_and_its_bias_is_bounded() {
     const RHO: f64 = 0.9;
     let with_depth = |depth: u32| {
         let mut scene = small("facing-mirrors.toml");
@@ -245,7 +245,7 @@ fn depth_is_honoured_and_what_it_cuts_is_bounded() {
         scene
     };
     let all = values(&with_depth(400), Precision::Double);
-    // Surfaces return light of at most 0.8 + 0.2 and highlights of 0.2 x 0.8 besides.
+    // Surfaces reflect at most 0.8 + 0.2, and highlights of 0.2 x 0.8.
     let brightest = 1.2;
     let mut before = 0.0;
     for depth in [0, 1, 2, 5, 17, 60] {
@@ -259,13 +259,13 @@ fn depth_is_honoured_and_what_it_cuts_is_bounded() {
         assert!(sum > before || depth == 60, "depth {depth} adds nothing");
         before = sum;
         let world = AnyWorld::compile(&scene, &world::Options::default());
-        let told = world.biases().concat();
-        assert!(told.contains(&format!("max_depth {depth} cuts longer paths")), "{told}");
+        let biases = world.biases().concat();
+        assert!(biases.contains(&format!("max_depth {depth} cuts longer paths")), "{biases}");
     }
 }
 
 #[test]
-fn min_throughput_is_honoured_and_what_it_cuts_is_bounded() {
+fn min_throughput_limits_paths_and_its_bias_is_bounded() {
     const RHO: f64 = 0.9;
     let with_least = |least: f64| {
         let mut scene = small("facing-mirrors.toml");
@@ -274,7 +274,7 @@ fn min_throughput_is_honoured_and_what_it_cuts_is_bounded() {
     };
     let all = values(&with_least(0.0), Precision::Double);
     for least in [0.95, 0.89, 0.5, 0.01] {
-        // Paths of up to K reflections weigh at least as much: the same as this depth.
+        // Paths of up to this depth have at least the weight `least`.
         let depth = (f64::ln(least) / RHO.ln()).floor() as u32;
         let mut by_depth = with_least(0.0);
         by_depth.trace.max_depth = depth;
@@ -289,7 +289,7 @@ fn min_throughput_is_honoured_and_what_it_cuts_is_bounded() {
 }
 
 #[test]
-fn the_horizon_folds_or_absorbs() {
+fn horizon_folds_or_absorbs_rays() {
     for precision in PRECISIONS {
         let (fold, absorb) = (small("horizon-fold.toml"), small("horizon-absorb.toml"));
         assert!(has(&absorb, "absorbing horizon") && !has(&fold, "absorbing horizon"));
@@ -300,11 +300,11 @@ fn the_horizon_folds_or_absorbs() {
                 ..absorb.trace
             }
         );
-        // The rays that do not dip are the same: absorbing only takes light away.
-        let [kept, lost] = [&fold, &absorb].map(|s| values(s, precision));
-        assert!(lost.iter().zip(&kept).all(|(lost, kept)| lost <= kept));
-        assert!(difference(&kept, &lost) > 0.2);
-        // Before an even background folding loses nothing: ice, and what it mirrors of the sky.
+        // Rays above the surface are the same: absorption only removes light.
+        let [folded, absorbed] = [&fold, &absorb].map(|s| values(s, precision));
+        assert!(absorbed.iter().zip(&folded).all(|(absorbed, folded)| absorbed <= folded));
+        assert!(difference(&folded, &absorbed) > 0.2);
+        // Folding conserves energy under a constant background: ice and the reflected sky.
         let mut sky = fold.clone();
         sky.objects.truncate(1);
         sky.background.color = Color([1.0; 3]);
@@ -326,7 +326,7 @@ fn rays_per_pixel_caps_glossy_tiles() {
             rendering.film.touched().map(|(_, tile)| tile.counts().iter().sum()).collect();
         let capped = counts.iter().filter(|n| **n == 16).count();
         assert!(capped > counts.len() / 2, "adaptive {adaptive}: {counts:?}");
-        // Every other tile sees no lobe and goes on; none falls short of the cap.
+        // Other tiles have no glossy lobe and get more samples; none falls short of the cap.
         assert!(counts.iter().all(|n| *n >= 16), "adaptive {adaptive}: {counts:?}");
         let uncapped =
             follow(&mut begin(&scene, 1, Precision::Auto), settings(adaptive, 0, stop), &pool(2));

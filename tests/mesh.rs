@@ -1,28 +1,16 @@
 //! Rays and triangle meshes: nothing slips through, and neither company nor vector width decides what
 //! is met.
 
+#[path = "common/mod.rs"]
+mod common;
+
+use common::Numbers;
 use std::sync::Arc;
 use zerkalo::asset::Assets;
 use zerkalo::asset::Mesh;
 use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
 use zerkalo::primitive::triangle_mesh;
-
-/// Random numbers from 0 to 1 (xorshift: Marsaglia 2003).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() * n as f64) as usize
-    }
-}
 
 /// A closed ball around the origin, written as OBJ and read: with slivers round the poles, a
 /// thousand times as long as wide.
@@ -65,19 +53,19 @@ fn unit(v: [f64; 3]) -> [f64; 3] {
 /// Rays from inside a closed mesh to its corners, to its edges and into its triangles: none may miss,
 /// together or apart.
 fn nothing_slips_through<L: SimdFloat>(mesh: &Mesh, rays: usize) {
-    let mut random = Random(0x5EED);
+    let mut random = Numbers::new(0x5EED);
     let triangles = &mesh.mesh().triangles;
     let corner = |i: u32| mesh.mesh().positions[i as usize].map(f64::from);
     let limit = L::from_f64(L::MAX);
     for packet in 0..rays / L::WIDTH {
-        let origin: [f64; 3] = std::array::from_fn(|_| 0.5 * (random.next() - 0.5));
+        let origin: [f64; 3] = std::array::from_fn(|_| 0.5 * (random.unit() - 0.5));
         // Half of the packets have their rays close together.
         let near = random.below(triangles.len());
         let directions: Vec<[f64; 3]> = (0..L::WIDTH)
             .map(|_| {
                 let one = if packet % 2 == 0 { near } else { random.below(triangles.len()) };
                 let [a, b, c] = triangles[one].map(corner);
-                let (f, g) = (random.next(), random.next());
+                let (f, g) = (random.unit(), random.unit());
                 let to: [f64; 3] = match packet % 3 {
                     0 => a,
                     1 => std::array::from_fn(|i| a[i] + f * (b[i] - a[i])),
@@ -123,10 +111,10 @@ fn no_ray_slips_between_triangles() {
 #[test]
 fn a_tree_finds_what_a_list_finds() {
     let mesh = ball(12, 20);
-    let mut random = Random(77);
+    let mut random = Numbers::new(77);
     for _ in 0..2_000 {
-        let origin: [f64; 3] = std::array::from_fn(|_| 4.0 * (random.next() - 0.5));
-        let direction = unit(std::array::from_fn(|_| random.next() - 0.5));
+        let origin: [f64; 3] = std::array::from_fn(|_| 4.0 * (random.unit() - 0.5));
+        let direction = unit(std::array::from_fn(|_| random.unit() - 0.5));
         let ray = Ray { origin: Vec3::<f64>::of(origin), direction: Vec3::<f64>::of(direction) };
         let found = triangle_mesh::closest(&mesh, &ray, f64::MAX);
         // Möller and Trumbore's test of every triangle.

@@ -1,4 +1,4 @@
-//! The film that a session fills is the same whatever happens meanwhile.
+//! The film of a session is independent of threads, interruptions and earlier scenes.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -47,13 +47,13 @@ fn scene() -> Arc<Scene> {
     Arc::new(Scene::parse(SCENE, "test").unwrap())
 }
 
-/// Waits for the end of scene `generation`.
+/// Waits for the end of the render of `generation`.
 fn finished(session: &Session, generation: u64) -> Report {
     let end = Instant::now() + Duration::from_secs(60);
     while Instant::now() < end {
         let Some(snapshot) = session.wait(Duration::from_millis(100)) else { continue };
-        let resting = matches!(snapshot.report.state, State::Finished(_));
-        if resting && snapshot.report.generation == generation {
+        let is_finished = matches!(snapshot.report.state, State::Finished(_));
+        if is_finished && snapshot.report.generation == generation {
             return snapshot.report;
         }
     }
@@ -64,7 +64,7 @@ fn bytes(session: &Session) -> Vec<u8> {
     session.with(|rendering, _| rendering.film.bytes()).expect("a film")
 }
 
-fn undisturbed(threads: usize, adaptive: bool) -> Vec<u8> {
+fn uninterrupted(threads: usize, adaptive: bool) -> Vec<u8> {
     let mut session = session(threads, adaptive);
     let generation = session.set_scene(scene());
     let report = finished(&session, generation);
@@ -75,26 +75,26 @@ fn undisturbed(threads: usize, adaptive: bool) -> Vec<u8> {
 #[test]
 fn threads_do_not_change_the_film() {
     for adaptive in [false, true] {
-        let one = undisturbed(1, adaptive);
+        let one = uninterrupted(1, adaptive);
         for threads in [2, 7] {
             assert!(
-                one == undisturbed(threads, adaptive),
+                one == uninterrupted(threads, adaptive),
                 "{threads} threads, adaptive {adaptive}"
             );
         }
     }
-    assert!(undisturbed(1, false) != undisturbed(1, true), "adaptivity changes nothing");
+    assert!(uninterrupted(1, false) != uninterrupted(1, true), "adaptivity changes nothing");
 }
 
 #[test]
 fn interruptions_and_earlier_scenes_do_not_change_the_film() {
-    let expected = undisturbed(2, true);
+    let expected = uninterrupted(2, true);
     let mut session = session(2, true);
     let mut other = (*scene()).clone();
     other.camera.eye[0] += 0.1;
     let other = Arc::new(other);
     for pause_us in [0, 50, 300, 2000] {
-        // Cut off in its compilation, its first picture, or later; its film is used again.
+        // Cancelled during compilation, first pass or later; its film's memory is reused.
         session.set_scene(Arc::clone(&other));
         std::thread::sleep(Duration::from_micros(pause_us));
         let generation = session.set_scene(scene());

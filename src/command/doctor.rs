@@ -1,5 +1,5 @@
-//! `zerkalo doctor`: what the terminal and the line to it can do, how the dashboard will use them, and
-//! what would make it better.
+//! `zerkalo doctor`: report on the terminal and the connection, their use by the dashboard, and hints for
+//! improvements.
 
 use crate::command::args::DoctorArgs;
 use crate::command::{Failure, print_line};
@@ -15,74 +15,77 @@ use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Columns of the report, and of the names in it.
+/// Width of the report, in columns.
 const COLUMNS: usize = 80;
+/// Width of the names in the report, in columns.
 const NAME: usize = 17;
 
 pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
-    let surroundings = Environment::of(variable);
-    let why_not = if surroundings.term == "dumb" {
-        Some("it understands nothing, and the dashboard does not open in it")
+    let environment = Environment::of(variable);
+    let obstacle = if environment.term == "dumb" {
+        Some("it supports no control sequences, and the dashboard does not open in it")
     } else if !io::stdin().is_terminal() || !io::stdout().is_terminal() {
         Some("stdin or stdout is no terminal")
     } else {
         None
     };
-    let examined = match why_not {
-        Some(why) => Err(why),
-        None => Ok(diagnose(surroundings.clone(), args.rate)
+    let diagnosis = match obstacle {
+        Some(reason) => Err(reason),
+        None => Ok(diagnose(environment.clone(), args.rate)
             .map_err(|error| Failure::Failed(format!("the terminal cannot be used: {error}")))?),
     };
     let state = state_folder(|name| env::var_os(name));
-    let found = DoctorReport {
-        surroundings,
-        examined,
-        asked_for_rate: args.rate,
+    let report = DoctorReport {
+        environment,
+        diagnosis,
+        rate_requested: args.rate,
         locale: ["LC_ALL", "LC_CTYPE", "LANG"]
             .into_iter()
             .find_map(|name| variable(name).map(|value| (name, value))),
-        kept: state.as_deref().map(kept_in).unwrap_or_default(),
+        unsaved_files: state.as_deref().map(kept_in).unwrap_or_default(),
         state,
     };
-    print_line(&found.report());
+    print_line(&report.report());
     Ok(())
 }
 
-/// Everything that is reported.
+/// Contents of the report.
 struct DoctorReport {
-    surroundings: Environment,
-    /// What the terminal answered, or why it was not asked.
-    examined: Result<TerminalReport, &'static str>,
-    asked_for_rate: bool,
-    /// The variable that tells the character encoding, and its value.
+    environment: Environment,
+    /// Replies of the terminal, or the reason why it was not queried.
+    diagnosis: Result<TerminalReport, &'static str>,
+    rate_requested: bool,
+    /// Variable that names the character encoding, and its value.
     locale: Option<(&'static str, String)>,
     state: Option<PathBuf>,
     /// Files of unsaved edits in `state`.
-    kept: Vec<PathBuf>,
+    unsaved_files: Vec<PathBuf>,
 }
 
 impl DoctorReport {
     fn report(&self) -> String {
         let mut lines = vec![format!("zerkalo {}", env!("CARGO_PKG_VERSION")), String::new()];
-        let row = |name: &str, what: String| indented(&format!("{name:<NAME$}"), &what);
+        let row = |name: &str, value: String| indented(&format!("{name:<NAME$}"), &value);
         lines.push(row("terminal", self.terminal()));
-        lines.push(row("between", self.between()));
+        lines.push(row("multiplexer", self.multiplexer()));
         lines.push(row("colours", self.colors()));
-        if let Ok(TerminalReport { terminal, mode, cells, pixels, rate }) = &self.examined {
+        if let Ok(TerminalReport { terminal, mode, cells, pixels, rate }) = &self.diagnosis {
             lines.push(row("background", background(terminal)));
             lines.push(row("size", size(*cells, *pixels)));
             lines.push(row("whole frames", whole_frames(terminal)));
             lines.push(row("still pictures", stills(terminal)));
             lines.push(row("keyboard", "plain key sequences; nothing special is needed".into()));
-            lines.push(row("known arrived by", arrival(*mode)));
+            lines.push(row("acknowledgement", acknowledgement(*mode)));
             lines.push(row("round trip", round_trip(terminal)));
             lines.push(row("rate", self.rate(*mode, *rate)));
         }
-        lines.push(row("line", self.line()));
+        lines.push(row("connection", self.connection()));
         lines.push(row("text", self.text()));
         lines.push(row("unsaved edits", self.unsaved()));
-        lines.extend(self.kept.iter().map(|path| row("", format!("kept: {}", shown(path)))));
+        lines.extend(
+            self.unsaved_files.iter().map(|path| row("", format!("file: {}", shown(path)))),
+        );
         let hints = self.hints();
         if !hints.is_empty() {
             lines.extend([String::new(), "hints".to_string()]);
@@ -91,14 +94,14 @@ impl DoctorReport {
         lines.join("\n")
     }
 
-    /// The terminal, if it was asked.
-    fn asked(&self) -> Option<&Capabilities> {
-        self.examined.as_ref().ok().map(|examined| &examined.terminal)
+    /// Capabilities of the terminal, if it was queried.
+    fn capabilities(&self) -> Option<&Capabilities> {
+        self.diagnosis.as_ref().ok().map(|diagnosis| &diagnosis.terminal)
     }
 
-    /// How many colours the dashboard takes it to have.
+    /// Number of colours that the dashboard uses.
     fn level(&self) -> Colors {
-        self.asked().map_or(self.surroundings.colors(), |terminal| terminal.colors)
+        self.capabilities().map_or(self.environment.colors(), |terminal| terminal.colors)
     }
 
     fn is_utf8(&self) -> bool {
@@ -107,69 +110,70 @@ impl DoctorReport {
     }
 
     fn terminal(&self) -> String {
-        let term = match self.surroundings.term.as_str() {
+        let term = match self.environment.term.as_str() {
             "" => "TERM is not set".to_string(),
             term => format!("TERM={}", sanitized(term)),
         };
-        match (&self.examined, self.asked().and_then(|terminal| terminal.version.as_ref())) {
+        match (&self.diagnosis, self.capabilities().and_then(|terminal| terminal.version.as_ref()))
+        {
             (Ok(_), Some(version)) => format!("{} ({term})", sanitized(version)),
-            (Ok(_), None) => format!("{term}; it does not tell its name"),
-            (Err(why), _) => format!("{term}; not asked: {why}"),
+            (Ok(_), None) => format!("{term}; it does not report its name"),
+            (Err(reason), _) => format!("{term}; not queried: {reason}"),
         }
     }
 
-    fn between(&self) -> String {
-        match self.surroundings.multiplexer {
-            None => "nothing".to_string(),
+    fn multiplexer(&self) -> String {
+        match self.environment.multiplexer {
+            None => "none".to_string(),
             Some(multiplexer) => {
                 let name = match multiplexer {
                     Multiplexer::Tmux => "tmux",
                     Multiplexer::Screen => "GNU Screen",
                 };
-                let passes = self.asked().map(|terminal| terminal.passthrough.is_some());
+                let passes = self.capabilities().map(|terminal| terminal.passthrough.is_some());
                 match passes {
                     None => name.to_string(),
-                    Some(true) => format!("{name}, which lets questions through"),
-                    Some(false) => format!("{name}, which lets no questions through"),
+                    Some(true) => format!("{name}, which passes queries through"),
+                    Some(false) => format!("{name}, which passes no queries through"),
                 }
             }
         }
     }
 
-    /// The level, and why: the first that says so of NO_COLOR, COLORTERM, TERM, the terminal.
+    /// Number of colours and its source: NO_COLOR, COLORTERM, TERM or the terminal's reply.
     fn colors(&self) -> String {
-        let Environment { term, color_term, no_color, .. } = &self.surroundings;
+        let Environment { term, color_term, no_color, .. } = &self.environment;
         let level = self.level();
-        let promised = self.surroundings.colors();
-        let why = if *no_color {
+        let promised = self.environment.colors();
+        let source = if *no_color {
             "NO_COLOR is set".to_string()
         } else if level != promised {
-            "the terminal took a 24-bit colour and said so".to_string()
+            "the terminal confirmed a 24-bit colour".to_string()
         } else if ["truecolor", "24bit"].contains(&color_term.as_str()) {
             format!("COLORTERM={color_term}")
         } else if level == Colors::Indexed {
-            "nothing says that it has more".to_string()
+            "no sign of more".to_string()
         } else {
             format!("TERM={}", sanitized(term))
         };
-        format!("{}: {why}; --color overrides, # switches in the dashboard", level.name())
+        format!("{}: {source}; --color overrides, # switches in the dashboard", level.name())
     }
 
     fn text(&self) -> String {
         match &self.locale {
-            None => "LC_ALL, LC_CTYPE and LANG do not tell the encoding".to_string(),
+            None => "LC_ALL, LC_CTYPE and LANG do not name the encoding".to_string(),
             Some((name, value)) => {
-                let what = if self.is_utf8() { "UTF-8" } else { "not UTF-8" };
-                format!("{what}: {name}={}", sanitized(value))
+                let encoding = if self.is_utf8() { "UTF-8" } else { "not UTF-8" };
+                format!("{encoding}: {name}={}", sanitized(value))
             }
         }
     }
 
-    fn line(&self) -> String {
-        match &self.surroundings.ssh {
+    fn connection(&self) -> String {
+        match &self.environment.ssh {
             None => "this machine".to_string(),
-            Some(connection) => {
-                let client = connection.split_whitespace().next().unwrap_or_default();
+            Some(variable) => {
+                let client = variable.split_whitespace().next().unwrap_or_default();
                 format!("SSH from {}", sanitized(client))
             }
         }
@@ -177,13 +181,13 @@ impl DoctorReport {
 
     fn rate(&self, mode: PacingMode, rate: Option<f64>) -> String {
         let kilobytes = |rate: f64| format!("{:.0} KB/s", 1e-3 * rate);
-        match (rate, self.asked_for_rate) {
+        match (rate, self.rate_requested) {
             (Some(rate), _) => format!("{}, measured", kilobytes(rate)),
-            (None, true) => "cannot be measured: the terminal itself does not answer".to_string(),
+            (None, true) => "cannot be measured: the terminal does not reply".to_string(),
             (None, false) if mode == PacingMode::FixedRate => {
                 format!("{}, fixed; doctor --rate measures", kilobytes(DEFAULT_RATE))
             }
-            (None, false) => "not measured; doctor --rate does".to_string(),
+            (None, false) => "not measured; doctor --rate measures".to_string(),
         }
     }
 
@@ -196,15 +200,16 @@ impl DoctorReport {
     }
 
     fn hints(&self) -> Vec<String> {
-        let Environment { color_term, no_color, ssh, multiplexer, .. } = &self.surroundings;
-        let asked = self.asked();
+        let Environment { color_term, no_color, ssh, multiplexer, .. } = &self.environment;
+        let capabilities = self.capabilities();
         let few_colors = self.level() != Colors::True && !no_color;
         let tmux = *multiplexer == Some(Multiplexer::Tmux);
         let mut hints = Vec::new();
         if ssh.is_some() {
-            hints.push("ssh -C: a quarter of the bytes, on a slow line four times the pictures");
+            hints
+                .push("ssh -C: a quarter of the bytes, on a slow connection four times the frames");
             if multiplexer.is_none() {
-                hints.push("tmux on this machine keeps the session when the line drops");
+                hints.push("tmux on this machine keeps the session when the connection drops");
             }
             if color_term.is_empty() && few_colors {
                 hints.push(
@@ -213,9 +218,9 @@ impl DoctorReport {
                 );
             }
         }
-        if tmux && asked.is_some_and(|terminal| terminal.passthrough.is_none()) {
+        if tmux && capabilities.is_some_and(|terminal| terminal.passthrough.is_none()) {
             hints.push(
-                "set -g allow-passthrough on in ~/.tmux.conf: answers come from the terminal",
+                "set -g allow-passthrough on in ~/.tmux.conf: replies come from the terminal",
             );
         }
         if tmux && few_colors {
@@ -231,9 +236,9 @@ impl DoctorReport {
     }
 }
 
-/// `what` in lines of at most `COLUMNS` after `name` and below.
-fn indented(name: &str, what: &str) -> String {
-    let lines = wrapped(what, (COLUMNS - name.len()) as u16);
+/// Wraps `value` to lines of at most `COLUMNS` behind `name`.
+fn indented(name: &str, value: &str) -> String {
+    let lines = wrapped(value, (COLUMNS - name.len()) as u16);
     name.to_string() + &lines.join(&format!("\n{:1$}", "", name.len()))
 }
 
@@ -241,7 +246,7 @@ fn background(terminal: &Capabilities) -> String {
     match terminal.background {
         None => "unknown".to_string(),
         Some([r, g, b]) => {
-            // Rec. 601 luma, enough to tell night from day.
+            // Rec. 601 luma, sufficient to distinguish dark from light.
             let luma = 0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b);
             let shade = if luma < 128.0 { "dark" } else { "light" };
             format!("#{r:02x}{g:02x}{b:02x}, {shade}")
@@ -255,11 +260,11 @@ fn size([columns, rows]: [u16; 2], pixels: Option<[u16; 2]>) -> String {
 }
 
 fn whole_frames(terminal: &Capabilities) -> String {
-    let how = match terminal.synchronised {
+    let update = match terminal.synchronised {
         true => "shown at once (mode 2026)",
-        false => "shown as they come (no mode 2026)",
+        false => "shown while they arrive (no mode 2026)",
     };
-    how.to_string()
+    update.to_string()
 }
 
 fn stills(terminal: &Capabilities) -> String {
@@ -273,22 +278,22 @@ fn stills(terminal: &Capabilities) -> String {
     format!("in half blocks: {missing}")
 }
 
-fn arrival(mode: PacingMode) -> String {
-    let how = match mode {
-        PacingMode::Unlimited => "being written: whoever reads is here",
-        PacingMode::AckClocked(None) => "answers of the terminal",
-        PacingMode::AckClocked(Some(_)) => "answers of the terminal, through what is between",
-        PacingMode::SendQueue => "what the kernel has not sent yet (/proc/net/tcp)",
-        PacingMode::FixedRate => "nothing: a fixed rate is sent; --bandwidth sets it",
+fn acknowledgement(mode: PacingMode) -> String {
+    let source = match mode {
+        PacingMode::Unlimited => "none needed (local terminal)",
+        PacingMode::AckClocked(None) => "replies of the terminal",
+        PacingMode::AckClocked(Some(_)) => "replies of the terminal, through the multiplexer",
+        PacingMode::SendQueue => "length of the TCP send queue (/proc/net/tcp)",
+        PacingMode::FixedRate => "none: frames are sent at a fixed rate; --bandwidth sets it",
     };
-    how.to_string()
+    source.to_string()
 }
 
 fn round_trip(terminal: &Capabilities) -> String {
     let ms = |time: Duration| format!("{:.1} ms", 1e3 * time.as_secs_f64());
     match (terminal.round_trip, terminal.passthrough) {
-        (None, _) => "nobody answers".to_string(),
-        (Some(near), Some(far)) => format!("{}; to what is between {}", ms(far), ms(near)),
+        (None, _) => "no reply".to_string(),
+        (Some(near), Some(far)) => format!("{}; to the multiplexer {}", ms(far), ms(near)),
         (Some(near), None) => ms(near),
     }
 }
@@ -301,13 +306,13 @@ fn shown(path: &Path) -> String {
 mod tests {
     use super::*;
 
-    fn found(variables: &[(&str, &str)], asked: bool) -> DoctorReport {
-        let surroundings = Environment::of(|name| {
-            let found = variables.iter().find(|(known, _)| *known == name);
-            found.map(|(_, value)| value.to_string())
+    fn report(variables: &[(&str, &str)], queried: bool) -> DoctorReport {
+        let environment = Environment::of(|name| {
+            let variable = variables.iter().find(|(known, _)| *known == name);
+            variable.map(|(_, value)| value.to_string())
         });
-        let terminal = Capabilities::from_environment(surroundings.clone());
-        let examined = TerminalReport {
+        let terminal = Capabilities::from_environment(environment.clone());
+        let diagnosis = TerminalReport {
             terminal,
             mode: PacingMode::Unlimited,
             cells: [120, 36],
@@ -315,36 +320,36 @@ mod tests {
             rate: None,
         };
         DoctorReport {
-            surroundings,
-            examined: if asked { Ok(examined) } else { Err("stdin or stdout is no terminal") },
-            asked_for_rate: false,
+            environment,
+            diagnosis: if queried { Ok(diagnosis) } else { Err("stdin or stdout is no terminal") },
+            rate_requested: false,
             locale: Some(("LANG", "en_US.UTF-8".into())),
             state: Some("/home/ada/.local/state/zerkalo".into()),
-            kept: Vec::new(),
+            unsaved_files: Vec::new(),
         }
     }
 
-    fn examined(found: &mut DoctorReport) -> &mut TerminalReport {
-        found.examined.as_mut().unwrap_or_else(|why| panic!("{why}"))
+    fn diagnosis(report: &mut DoctorReport) -> &mut TerminalReport {
+        report.diagnosis.as_mut().unwrap_or_else(|reason| panic!("{reason}"))
     }
 
-    fn check(found: &DoctorReport, present: &[&str], absent: &[&str]) {
-        let report = found.report();
+    fn check(report: &DoctorReport, present: &[&str], absent: &[&str]) {
+        let text = report.report();
         for part in present {
-            assert!(report.contains(part), "no {part:?} in\n{report}");
+            assert!(text.contains(part), "no {part:?} in\n{text}");
         }
         for part in absent {
-            assert!(!report.contains(part), "{part:?} in\n{report}");
+            assert!(!text.contains(part), "{part:?} in\n{text}");
         }
     }
 
     #[test]
-    fn a_terminal_here_that_has_everything_needs_no_hints() {
-        let mut found = found(&[("TERM", "xterm-kitty"), ("COLORTERM", "truecolor")], true);
-        let examined = examined(&mut found);
-        examined.pixels = Some([960, 720]);
-        examined.rate = Some(2.5e6);
-        let terminal = &mut examined.terminal;
+    fn full_featured_local_terminal_gets_no_hints() {
+        let mut report = report(&[("TERM", "xterm-kitty"), ("COLORTERM", "truecolor")], true);
+        let diagnosis = diagnosis(&mut report);
+        diagnosis.pixels = Some([960, 720]);
+        diagnosis.rate = Some(2.5e6);
+        let terminal = &mut diagnosis.terminal;
         terminal.version = Some("kitty(0.40.1)".into());
         terminal.kitty_graphics = true;
         terminal.synchronised = true;
@@ -362,24 +367,24 @@ mod tests {
             "2500 KB/s, measured",
             "/home/ada/.local/state/zerkalo",
         ];
-        check(&found, &present, &["hints", "ssh -C", "unknown"]);
+        check(&report, &present, &["hints", "ssh -C", "unknown"]);
     }
 
     #[test]
-    fn a_far_terminal_in_tmux_gets_advice() {
+    fn remote_terminal_in_tmux_gets_hints() {
         let variables = [
             ("TERM", "screen-256color"),
             ("TMUX", "/tmp/tmux,1,0"),
             ("SSH_CONNECTION", "192.0.2.7 5000 192.0.2.1 22"),
         ];
-        let mut found = found(&variables, true);
-        found.locale = Some(("LC_ALL", "C".into()));
-        let examined = examined(&mut found);
-        examined.mode = PacingMode::FixedRate;
-        examined.terminal.round_trip = Some(Duration::from_micros(900));
+        let mut report = report(&variables, true);
+        report.locale = Some(("LC_ALL", "C".into()));
+        let diagnosis = diagnosis(&mut report);
+        diagnosis.mode = PacingMode::FixedRate;
+        diagnosis.terminal.round_trip = Some(Duration::from_micros(900));
         let present = [
             "SSH from 192.0.2.7",
-            "tmux, which lets no questions through",
+            "tmux, which passes no queries through",
             "30 KB/s, fixed",
             "ssh -C",
             "SendEnv COLORTERM",
@@ -388,34 +393,34 @@ mod tests {
             "terminal-features",
             "not UTF-8: LC_ALL=C",
         ];
-        check(&found, &present, &["keeps the session", "truecolor on"]);
-        let examined = self::examined(&mut found);
-        examined.terminal.colors = Colors::True;
-        examined.terminal.passthrough = Some(Duration::from_millis(110));
-        examined.mode = PacingMode::AckClocked(Some(Multiplexer::Tmux));
-        let present = ["took a 24-bit colour", "110.0 ms; to what is between 0.9 ms"];
-        check(&found, &present, &["allow-passthrough", "terminal-features", "SendEnv"]);
+        check(&report, &present, &["keeps the session", "truecolor on"]);
+        let diagnosis = self::diagnosis(&mut report);
+        diagnosis.terminal.colors = Colors::True;
+        diagnosis.terminal.passthrough = Some(Duration::from_millis(110));
+        diagnosis.mode = PacingMode::AckClocked(Some(Multiplexer::Tmux));
+        let present = ["confirmed a 24-bit colour", "110.0 ms; to the multiplexer 0.9 ms"];
+        check(&report, &present, &["allow-passthrough", "terminal-features", "SendEnv"]);
     }
 
     #[test]
-    fn without_a_terminal_the_environment_tells() {
-        let found = found(&[("TERM", "linux"), ("NO_COLOR", "1")], false);
-        check(&found, &["not asked: stdin", "no colour: NO_COLOR is set"], &["round trip"]);
+    fn report_without_a_terminal_uses_the_environment() {
+        let report = report(&[("TERM", "linux"), ("NO_COLOR", "1")], false);
+        check(&report, &["not queried: stdin", "no colour: NO_COLOR is set"], &["round trip"]);
     }
 
     #[test]
-    fn nothing_in_it_steers_a_terminal() {
+    fn report_contains_no_control_characters() {
         let evil = "x\x1b]52;c;aGk=\x07\u{9b}31m\u{202e}";
         let variables =
             [("TERM", evil), ("COLORTERM", evil), ("SSH_CONNECTION", evil), ("STY", evil)];
-        let mut found = found(&variables, true);
-        found.locale = Some(("LANG", evil.into()));
-        found.state = Some(evil.into());
-        found.kept = vec![evil.into()];
-        examined(&mut found).terminal.version = Some(evil.into());
-        let report = found.report();
-        let steers = |line: &str| sanitized(line) != line;
-        assert!(!report.lines().any(steers), "{report:?}");
-        assert!(report.matches("u{1b}]52").count() >= 5, "{report}");
+        let mut report = report(&variables, true);
+        report.locale = Some(("LANG", evil.into()));
+        report.state = Some(evil.into());
+        report.unsaved_files = vec![evil.into()];
+        diagnosis(&mut report).terminal.version = Some(evil.into());
+        let text = report.report();
+        let has_control_characters = |line: &str| sanitized(line) != line;
+        assert!(!text.lines().any(has_control_characters), "{text:?}");
+        assert!(text.matches("u{1b}]52").count() >= 5, "{text}");
     }
 }

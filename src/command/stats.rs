@@ -47,7 +47,7 @@ pub struct Stats {
     /// 95th percentile of the tiles' RMSE, in 8-bit levels.
     pub noise_codes_p95: Option<f64>,
     pub rmse_linear: Option<f64>,
-    /// Samples left out because they were NaN, infinite or negative.
+    /// Samples left out because they were NaN or negative.
     pub bad_samples: u64,
     /// Samples brighter than the film can hold; stored with its largest value.
     pub saturated_samples: u64,

@@ -1,7 +1,8 @@
-//! The film as bytes: the same bytes for the same samples, however they came together.
+//! Canonical serialisation of the film: equal samples give equal bytes, in any order of addition. Unit
+//! and integration tests compare films by it.
 //!
 //! Little-endian. Header: width, height, number of groups (u32 each), a scale per group (f64), seed
-//! (u64), the length of the precision's name (u32) and the name. Bad samples: their count (u64), the
+//! (u64), the length of the precision's name (u32) and the name. Invalid samples: their count (u64), the
 //! number of those remembered (u32), and of each index, x, y (u32) and replicate (u8). Then the tiles
 //! in order: counts of A and B (u32), lattice (u8), and if there is any sample the sums of the pixels
 //! inside the picture, `[replicate][row][column][group][channel]` (i64). At the end, if there are saturated
@@ -13,27 +14,30 @@ use crate::film::tile::Tile;
 use std::io::{self, Write};
 
 impl Film {
-    /// The film as bytes; equal for equal samples.
+    /// Returns the film as bytes; equal for equal samples.
     pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         self.write_bytes(&mut bytes).expect("writing to memory does not fail");
         bytes
     }
 
-    /// Writes what [`Film::bytes`] gives, piece by piece.
+    /// Writes the bytes of [`Film::bytes`] piece by piece.
+    ///
+    /// # Errors
+    /// Returns the error of `out`.
     pub fn write_bytes(&self, out: &mut impl Write) -> io::Result<()> {
-        let u32_of = |n: usize| u32::try_from(n).map_err(io::Error::other).map(u32::to_le_bytes);
+        let u32_bytes = |n: usize| u32::try_from(n).map_err(io::Error::other).map(u32::to_le_bytes);
         let header = self.header();
         for n in [header.width, header.height, header.scales.len()] {
-            out.write_all(&u32_of(n)?)?;
+            out.write_all(&u32_bytes(n)?)?;
         }
         header.scales.iter().try_for_each(|scale| out.write_all(&scale.to_le_bytes()))?;
         out.write_all(&header.seed.to_le_bytes())?;
-        out.write_all(&u32_of(header.precision.len())?)?;
+        out.write_all(&u32_bytes(header.precision.len())?)?;
         out.write_all(header.precision.as_bytes())?;
         let bad = self.bad_samples();
         out.write_all(&bad.count.to_le_bytes())?;
-        out.write_all(&u32_of(bad.first.len())?)?;
+        out.write_all(&u32_bytes(bad.first.len())?)?;
         for sample in &bad.first {
             for n in [sample.index, sample.x, sample.y] {
                 out.write_all(&n.to_le_bytes())?;

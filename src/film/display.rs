@@ -1,18 +1,18 @@
-//! From radiance to the numbers of a picture file: exposure, tone curve, sRGB.
+//! Display transform: exposure, tone curve, sRGB.
 
 use crate::film::srgb_table::SrgbTable;
 use crate::value::srgb_from_linear;
 use std::fmt;
 use std::str::FromStr;
 
-/// What is done with light that is brighter than the display's white.
+/// Tone curve: treatment of light brighter than the display's white.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tone {
-    /// Each channel stops at 1.
+    /// Clips each channel at 1.
     #[default]
     Clip,
-    /// The Khronos PBR Neutral tone mapper (KHR specification of 2024): keeps hues and all but the
-    /// brightest fifth of the range, up to a small constant in the dark, and compresses the rest.
+    /// The Khronos PBR Neutral tone mapper (KHR specification of 2024): keeps hues, compresses the
+    /// brightest fifth of the range and keeps the others up to a small constant in the dark.
     Neutral,
 }
 
@@ -40,39 +40,38 @@ impl FromStr for Tone {
     }
 }
 
-/// How radiance becomes a picture.
+/// Display transform.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Display {
     /// Radiance is multiplied by 2 to the power of this.
     pub exposure_ev: f64,
-    /// What follows the exposure.
+    /// Tone curve, applied after the exposure.
     pub tone: Tone,
 }
 
 impl Display {
-    /// Radiance to sRGB codes, 0..=255, not rounded.
+    /// Converts radiance to unrounded sRGB values, 0..=255.
     pub fn codes(&self, radiance: [f64; 3]) -> [f64; 3] {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Radiance to sRGB codes, rounded to 8 bits: the same as rounding [`Display::codes`], but several
-    /// times as fast.
+    /// Converts radiance to 8-bit sRGB: equal to rounding [`Display::codes`], but several times as fast.
     pub fn codes_8(&self, radiance: [f64; 3]) -> [u8; 3] {
         self.to_8()(radiance)
     }
 
-    /// [`Display::codes_8`] for many pixels.
+    /// Returns [`Display::codes_8`] as a function, for many pixels.
     pub fn to_8(&self) -> impl Fn([f64; 3]) -> [u8; 3] + use<> {
         let (tone, factor, curve) = (self.tone, self.exposure_factor(), SrgbTable::shared());
         move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.code_8(c))
     }
 
-    /// Radiance to linear light of the display, 0..=1.
+    /// Converts radiance to linear light of the display, 0..=1.
     pub fn shown(&self, radiance: [f64; 3]) -> [f64; 3] {
         toned(self.tone, radiance.map(|c| c * self.exposure_factor()))
     }
 
-    /// What the exposure multiplies radiance with.
+    /// Factor by which the exposure multiplies radiance.
     pub fn exposure_factor(&self) -> f64 {
         self.exposure_ev.exp2()
     }
@@ -106,7 +105,7 @@ fn neutral(color: [f64; 3]) -> [f64; 3] {
     color.map(|c| c * (new_peak / peak)).map(|c| c + (new_peak - c) * to_white)
 }
 
-/// A code 0..=255 to the nearest of 16 bits, 65535 for 255.
+/// Rounds a value 0..=255 to 16 bits, 65535 for 255.
 pub fn quantised_16(code: f64) -> u16 {
     (code * (65535.0 / 255.0)).round() as u16
 }
@@ -118,8 +117,8 @@ mod tests {
     use crate::value::linear_from_srgb;
 
     #[test]
-    fn the_curve_is_that_of_the_standard() {
-        // The two pieces meet, and every 8-bit code decodes to what encodes to it.
+    fn srgb_encoding_follows_the_standard() {
+        // The two pieces are continuous, and every 8-bit value round-trips.
         let [below, above] = [0.003_130_79, 0.003_130_81].map(srgb_from_linear);
         assert!((above - below).abs() < 1e-6 && above > below);
         for code in 0..=255u8 {

@@ -1,9 +1,9 @@
 //! OpenEXR: linear radiance in 32-bit floats, with the replicates, the light groups and the sample
 //! count beside the picture.
 //!
-//! Channels of one part, layers by name prefix: `R G B` the picture; `A.R ..` and `B.R ..` the two
-//! replicates, whose half difference is the picture's error; `light_NAME.R ..` what each light group
-//! contributes, summing up to the picture; `count` the samples of a pixel.
+//! Channels of one part, layers by name prefix: `R G B` is the picture; `A.R ..` and `B.R ..` are the two
+//! replicates, whose half difference estimates the picture's error; `light_NAME.R ..` are the contributions
+//! of the light groups, which sum up to the picture; `count` is the number of samples of a pixel.
 
 use crate::film::exr_header::Ordered;
 use crate::film::image_data::{ImageData, WriteSeek};
@@ -27,14 +27,14 @@ pub(super) fn encode(picture: &ImageData, sink: &mut dyn WriteSeek) -> io::Resul
     })
 }
 
-/// What a channel holds.
+/// Contents of a channel.
 #[derive(Clone, Copy)]
 enum Source {
-    /// Radiance of colour channel `.1` in the samples `.0`, all groups together.
+    /// Radiance of colour channel `.1` in the replicates `.0`, all groups together.
     Mixed(Replicates, usize),
-    /// What group `.0` contributes to colour channel `.1`.
+    /// Contribution of group `.0` to colour channel `.1`.
     Group(usize, usize),
-    /// Samples of both replicates.
+    /// Number of samples of both replicates.
     Count,
 }
 
@@ -72,9 +72,9 @@ fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), Error>
         for (index, block) in exr::block::enumerate_ordered_header_block_indices(&meta.headers) {
             let channels = &meta.headers[0].channels;
             let block = UncompressedBlock::from_lines(channels, block, |line| {
-                let at = line.location;
-                let row = rows.load(at.position.y());
-                line.value.copy_from_slice(&row[at.channel]);
+                let location = line.location;
+                let row = rows.load(location.position.y());
+                line.value.copy_from_slice(&row[location.channel]);
             });
             compressor.compress_block(index, block)?;
         }
@@ -86,7 +86,7 @@ fn text(text: &str) -> Text {
     Text::new_or_none(text).unwrap_or_else(|| Text::from_bytes_unchecked(text.bytes().collect()))
 }
 
-/// All channels in the order that the format demands, by name.
+/// Returns all channels, sorted by name as the format demands.
 fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
     let mut channels = vec![("count".to_string(), Source::Count)];
     for (c, color) in ["R", "G", "B"].into_iter().enumerate() {
@@ -101,7 +101,7 @@ fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
     channels
 }
 
-/// A layer name for each group: ASCII letters, digits, `_` and `-`, no two alike.
+/// Returns a unique layer name for each group: ASCII letters, digits, `_` and `-`.
 fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
     let mut layers: Vec<String> = Vec::new();
@@ -112,13 +112,13 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
         };
         let candidates = std::iter::once(format!("light_{name}"))
             .chain((2..).map(|n| format!("light_{name}_{n}")));
-        let free = candidates.into_iter().find(|candidate| !layers.contains(candidate));
-        layers.extend(free);
+        let unique = candidates.into_iter().find(|candidate| !layers.contains(candidate));
+        layers.extend(unique);
     }
     layers
 }
 
-/// One row of the film at a time, as the bytes of each channel.
+/// Reader of single film rows as the bytes of each channel.
 struct Rows<'a> {
     picture: &'a ImageData<'a>,
     sources: Vec<Source>,
@@ -149,13 +149,13 @@ impl<'a> Rows<'a> {
             bytes.resize(picture.film.width() * 4, 0);
         }
         picture.film.visit_row(y, |x, sums| {
-            let parts =
-                [Replicates::Both, Replicates::A, Replicates::B].map(|part| sums.mean(part, mixed));
+            let means = [Replicates::Both, Replicates::A, Replicates::B]
+                .map(|replicates| sums.mean(replicates, mixed));
             for (source, bytes) in sources.iter().zip(bytes.iter_mut()) {
                 let value = match *source {
-                    Source::Mixed(Replicates::Both, c) => (parts[0][c] as f32).to_ne_bytes(),
-                    Source::Mixed(Replicates::A, c) => (parts[1][c] as f32).to_ne_bytes(),
-                    Source::Mixed(Replicates::B, c) => (parts[2][c] as f32).to_ne_bytes(),
+                    Source::Mixed(Replicates::Both, c) => (means[0][c] as f32).to_ne_bytes(),
+                    Source::Mixed(Replicates::A, c) => (means[1][c] as f32).to_ne_bytes(),
+                    Source::Mixed(Replicates::B, c) => (means[2][c] as f32).to_ne_bytes(),
                     Source::Group(group, c) => {
                         group_mean(&sums, mixed, 3 * group + c).to_ne_bytes()
                     }
@@ -168,7 +168,7 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// What one group contributes to one colour channel; `i` counts `[group][channel]`.
+/// Contribution of one group to one colour channel; `i` counts `[group][channel]`.
 fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
     match sums.count(Replicates::Both) {
         0 => 0.0,

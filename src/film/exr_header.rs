@@ -1,58 +1,58 @@
-//! Puts the attributes of an OpenEXR header in order, so that equal pictures are equal files.
+//! Sorts the attributes of an OpenEXR header, so that equal pictures are equal files.
 //!
-//! The format leaves the order of attributes free, and the library that writes them takes that of a
-//! hash map, which is another in every run. OpenEXR File Layout: a header is a list of attributes,
-//! each a name and a type (both end in a zero byte), a size (i32, little-endian) and so many bytes,
-//! and ends in a zero byte.
+//! The format leaves the order of attributes free, and the library writes them in the order of a hash map,
+//! which differs between runs. OpenEXR File Layout: a header is a list of attributes and ends in a zero
+//! byte; an attribute has a name and a type (both end in a zero byte), a size (i32, little-endian) and as
+//! many bytes.
 
 use std::io::{self, Seek, SeekFrom, Write};
 
 /// Bytes before the first attribute: magic number and version.
 const PREAMBLE: usize = 8;
 
-/// Holds back what is written until the header is complete, and then passes it on with the attributes
-/// in the order of their names.
+/// Writer that buffers the header until it is complete, and passes it on with the attributes sorted by
+/// name.
 pub(super) struct Ordered<W: Write + Seek> {
     sink: W,
-    /// The bytes held back; `None` once they are passed on.
-    held: Option<Vec<u8>>,
+    /// The buffered bytes; `None` after the header.
+    buffer: Option<Vec<u8>>,
 }
 
 impl<W: Write + Seek> Ordered<W> {
-    /// A file's beginning is to be written to `sink`.
+    /// Creates a writer for a file that starts at the current position of `sink`.
     pub fn new(sink: W) -> Self {
-        Self { sink, held: Some(Vec::new()) }
+        Self { sink, buffer: Some(Vec::new()) }
     }
 }
 
 impl<W: Write + Seek> Write for Ordered<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let Some(held) = &mut self.held else { return self.sink.write(bytes) };
-        held.extend_from_slice(bytes);
-        if let Some((mut attributes, rest)) = held.get(PREAMBLE..).and_then(attributes) {
+        let Some(buffer) = &mut self.buffer else { return self.sink.write(bytes) };
+        buffer.extend_from_slice(bytes);
+        if let Some((mut attributes, rest)) = buffer.get(PREAMBLE..).and_then(attributes) {
             attributes.sort_unstable();
-            self.sink.write_all(&[&held[..PREAMBLE], &attributes.concat(), rest].concat())?;
-            self.held = None;
+            self.sink.write_all(&[&buffer[..PREAMBLE], &attributes.concat(), rest].concat())?;
+            self.buffer = None;
         }
         Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        // The header is only passed on as a whole.
-        if self.held.is_none() { self.sink.flush() } else { Ok(()) }
+        // The header is passed on as a whole.
+        if self.buffer.is_none() { self.sink.flush() } else { Ok(()) }
     }
 }
 
 impl<W: Write + Seek> Seek for Ordered<W> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        if self.held.is_some() {
+        if self.buffer.is_some() {
             return Err(io::Error::other("a seek before the end of an OpenEXR header"));
         }
         self.sink.seek(to)
     }
 }
 
-/// Splits a header into its attributes and what follows them.
+/// Splits a header into its attributes and the bytes behind them; `None` while it is incomplete.
 fn attributes(mut bytes: &[u8]) -> Option<(Vec<&[u8]>, &[u8])> {
     let mut found = Vec::new();
     while *bytes.first()? != 0 {
@@ -81,7 +81,7 @@ mod tests {
         \0rest";
 
     #[test]
-    fn attributes_are_put_in_order_and_the_rest_follows() {
+    fn attributes_are_sorted_and_other_bytes_follow() {
         for piece in 1..HEAD.len() {
             let mut file = Ordered::new(Cursor::new(Vec::new()));
             for bytes in HEAD.chunks(piece) {
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_header_is_held_back() {
+    fn only_the_header_is_buffered() {
         let mut file = Ordered::new(Cursor::new(Vec::new()));
         let (header, rest) = HEAD.split_at(HEAD.len() - 5);
         file.write_all(header).unwrap();

@@ -1,25 +1,25 @@
-//! OpenEXR files as pictures to compare with.
+//! OpenEXR reader for reference pictures.
 
 use exr::prelude::*;
 use std::path::Path;
 
-/// A picture out of a file, linear radiance.
+/// Picture read from a file, in linear radiance.
 pub struct ReadPicture {
     /// Width and height in pixels.
     pub size: [usize; 2],
-    /// Row by row.
+    /// `[row][column]`.
     pub pixels: Vec<[f64; 3]>,
-    /// The two replicates of a picture of this program, row by row.
+    /// Replicates A and B of a picture of this program, `[row][column]`.
     pub replicates: Option<[Vec<[f64; 3]>; 2]>,
 }
 
-/// The most pixels that are read: as many as a scene may have.
+/// Largest number of pixels that is read: the limit of scenes.
 const MAX_PIXELS: usize = 1 << 26;
 
-/// Reads the channels `R G B` of an OpenEXR file, and `A.R ..` and `B.R ..` if there are such.
+/// Reads the channels `R G B` of an OpenEXR file, and `A.R ..` and `B.R ..` if they exist.
 ///
 /// # Errors
-/// It cannot be read, is too large, or lacks the channels.
+/// Fails if the file cannot be read, is too large, or lacks the channels.
 pub fn read_exr(path: &Path) -> std::result::Result<ReadPicture, String> {
     let meta = MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
     let largest = meta.headers.iter().map(|h| h.layer_size.area()).max().unwrap_or(0);

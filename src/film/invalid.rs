@@ -1,9 +1,9 @@
-//! Samples that are no light: NaN or negative.
+//! Invalid samples: NaN or negative.
 
-/// How many bad samples are remembered one by one; the rest are only counted.
+/// Number of invalid samples that are remembered one by one; further ones are counted.
 pub const INVALID_REMEMBERED: usize = 16;
 
-/// Where a sample arose; enough to trace it again.
+/// Position of a sample, sufficient to trace it again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct InvalidSample {
     /// Index in the replicate's sequence.
@@ -16,11 +16,11 @@ pub struct InvalidSample {
     pub x: u32,
 }
 
-/// A count of bad samples, and the first of them in the order of [`InvalidSample`]'s fields: an order in
-/// which it does not matter who met them when.
+/// Number of invalid samples, and the first of them in the order of [`InvalidSample`]'s fields, which does
+/// not depend on threads.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InvalidSamples {
-    /// How many there were.
+    /// Number of invalid samples.
     pub count: u64,
     /// The first [`INVALID_REMEMBERED`], ascending.
     pub first: Vec<InvalidSample>,
@@ -38,10 +38,10 @@ impl InvalidSamples {
     }
 
     fn remember(&mut self, sample: InvalidSample) {
-        let place = self.first.partition_point(|known| *known <= sample);
-        if place < INVALID_REMEMBERED {
+        let index = self.first.partition_point(|known| *known <= sample);
+        if index < INVALID_REMEMBERED {
             self.first.truncate(INVALID_REMEMBERED - 1);
-            self.first.insert(place, sample);
+            self.first.insert(index, sample);
         }
     }
 }
@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_do_not_depend_on_the_order() {
+    fn remembered_samples_do_not_depend_on_the_order() {
         let all: Vec<_> = (0..40)
             .map(|i| InvalidSample { index: i * 7 % 40, replicate: (i % 2) as u8, y: i, x: 3 })
             .collect();

@@ -1,78 +1,78 @@
-//! From sums to radiance: the colour and strength of each light are put in here.
+//! Light group weights: conversion of the film's sums to radiance.
 
 use crate::film::tile::Tile;
 
-/// Colour times intensity of the lights whose unit-light sums the film holds.
+/// Colour times intensity of each light group; the film holds sums for unit light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightWeights {
-    /// For each light group: red, green, blue, at least 0.
+    /// Red, green, blue of each light group, at least 0.
     pub weights: Vec<[f64; 3]>,
 }
 
 impl LightWeights {
-    /// One group of a film of `groups` groups, in unit light.
+    /// Weights that select one group of a film of `groups` groups, in unit light.
     pub fn only(group: usize, groups: usize) -> Self {
         Self { weights: (0..groups).map(|g| [f64::from(u8::from(g == group)); 3]).collect() }
     }
 
-    /// The factors that turn sums into radiance times count.
+    /// Factors from sums to radiance times count, `[group][channel]`; `scales` are those of the film.
     pub(super) fn radiance_per_step(&self, scales: &[f64]) -> Vec<f64> {
         assert_eq!(self.weights.len(), scales.len(), "weights for the groups of the film");
         self.weights.iter().zip(scales).flat_map(|(w, scale)| w.map(|w| w / scale)).collect()
     }
 }
 
-/// Which samples are looked at.
+/// Choice of replicates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Replicates {
-    /// All of them: the picture.
+    /// Both replicates: the picture.
     Both,
-    /// Replicate A.
+    /// Replicate A alone.
     A,
-    /// Replicate B.
+    /// Replicate B alone.
     B,
 }
 
-/// The sums and counts of one pixel.
+/// Sums and counts of one pixel.
 #[derive(Clone, Copy)]
 pub(super) struct Sums<'a> {
     /// `[group][channel]`, replicates A and B.
     pub values: [&'a [i64]; 2],
-    /// Samples of A and B.
+    /// Number of samples of A and B.
     pub counts: [u32; 2],
 }
 
 impl Sums<'_> {
-    /// Samples that count in `part`.
-    pub fn count(&self, part: Replicates) -> u32 {
-        match part {
+    /// Number of samples of `replicates`.
+    pub fn count(&self, replicates: Replicates) -> u32 {
+        match replicates {
             Replicates::Both => self.counts[0].saturating_add(self.counts[1]),
             Replicates::A => self.counts[0],
             Replicates::B => self.counts[1],
         }
     }
 
-    /// Sum `i` of `[group][channel]`, as far as it counts in `part`.
+    /// Sum `i` of `[group][channel]` over `replicates`.
     #[inline(always)]
-    pub fn value(&self, part: Replicates, i: usize) -> f64 {
-        match part {
+    pub fn value(&self, replicates: Replicates, i: usize) -> f64 {
+        match replicates {
             Replicates::Both => self.values[0][i] as f64 + self.values[1][i] as f64,
             Replicates::A => self.values[0][i] as f64,
             Replicates::B => self.values[1][i] as f64,
         }
     }
 
-    /// Radiance, or black without samples; `per_unit` from [`LightWeights::per_unit`].
+    /// Radiance, or black without samples; `per_unit` is from [`LightWeights::radiance_per_step`].
     #[inline(always)]
-    pub fn mean(&self, part: Replicates, per_unit: &[f64]) -> [f64; 3] {
-        let count = self.count(part);
+    pub fn mean(&self, replicates: Replicates, per_unit: &[f64]) -> [f64; 3] {
+        let count = self.count(replicates);
         if count == 0 {
             return [0.0; 3];
         }
         let mut sum = [0.0; 3];
         for (group, factors) in per_unit.chunks_exact(3).enumerate() {
             for c in 0..3 {
-                sum[c] += self.value(part, 3 * group + c) * factors[c];
+                sum[c] += self.value(replicates, 3 * group + c) * factors[c];
             }
         }
         sum.map(|s| s / f64::from(count))
@@ -93,7 +93,7 @@ mod tests {
     use crate::film::testing::{each_tile, fill, film, white};
 
     #[test]
-    fn a_pixel_is_the_mixed_mean_of_both_replicates() {
+    fn pixel_is_the_weighted_mean_of_both_replicates() {
         let mut film = film(20, 18, &[2f64.powi(20), 2f64.powi(-3)]);
         fill(&mut film, 4, |x, y, r| {
             let (x, y, r) = (x as f64, y as f64, r as f64);
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn unequal_counts_weigh_the_replicates() {
+    fn replicates_are_weighted_by_their_counts() {
         let mut film = film(1, 1, &[1.0]);
         each_tile(&mut film, |tile, _| {
             tile.add(0, 0, &[30, 30, 30]);
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn without_samples_all_is_black() {
+    fn film_without_samples_is_black() {
         let mut film = film(3, 3, &[1.0]);
         assert_eq!(film.pixel(2, 2, &white(1)), [0.0; 3]);
         fill(&mut film, 1, |_, _, _| vec![1.0; 3]);

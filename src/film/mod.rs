@@ -26,7 +26,7 @@ mod probe;
 mod srgb_table;
 mod store;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 mod tile;
 
 pub use box_filter::box_means;

@@ -1,27 +1,27 @@
-//! How much error is left: estimated from the difference of the two replicates.
+//! Noise estimates from the difference of the two replicates.
 //!
 //! A and B are independent and equally distributed when their counts are equal. So their half
 //! difference d = (A - B) / 2 has the variance of the picture M = (A + B) / 2, and in linear light the
 //! mean of d^2 is the picture's mean square error, unbiased for any sampler. As displayed, the error
-//! is code(M) - code(truth); its estimate is code(M) - code(M + d) and code(M) - code(M - d), that
-//! is, the distance from the picture's codes to those of A and B, squared, averaged. M + d and M - d
-//! are A and B. This displaces the picture by as much as it is wrong itself, so a curved or clipped
-//! tone curve acts on both alike. Where it is hardest, dark pixels that few of 16 + 16 samples find
-//! lit, true over estimated RMSE is 1.13; it is 1.20 with half the difference of the codes of A and B,
+//! is code(M) - code(truth), where code is the display transform. Its estimates are
+//! code(M) - code(M + d) and code(M) - code(M - d): the distances of the picture from A and B (which are
+//! M + d and M - d) as displayed, squared and averaged. They displace the picture by its own error, so a
+//! curved or clipped tone curve acts on both alike. In the hardest case, dark pixels that few of 16 + 16
+//! samples find lit, true over estimated RMSE is 1.13; it is 1.20 with half the displayed difference of A and B,
 //! and 1.52 with d times the slope at M (a test compares the three).
 //!
 //! One pixel has a single degree of freedom and no meaningful estimate; a tile's is good to some 7 %
 //! if its pixels are alike, and a whole picture's to well under that.
 //!
-//! A sampler that prefers the tiles with the largest estimates leaves behind those whose estimates are low
-//! by chance, and an estimate of the picture made of the same numbers is too low: by 2 % of the RMSE after
-//! 32 samples per pixel, by 5 % after 8. So a tile is estimated twice, each time from every other pixel,
-//! like a chessboard: the black ones guide the samples, the white ones give the reported error. Their samples are
-//! independent. But they are half as many, and of a small picture the estimate from all pixels may be the
-//! better one: the larger of the two is reported.
+//! Adaptive sampling prefers the tiles with the largest estimates and neglects those whose estimates are low
+//! by chance. An estimate of the picture from the same numbers is too low: by 2 % of the RMSE after 32
+//! samples per pixel, by 5 % after 8. Therefore a tile is estimated twice, from the two colours of a
+//! chessboard of pixels: black ones decide the allocation, white ones give the reported error. Their samples
+//! are independent. They are half as many, and for a small picture the estimate from all pixels may be
+//! better: the larger of the two is reported.
 //!
-//! The error of a sparse picture (stars, hairlines) sits in few pixels. Its estimate is as uncertain as those are few,
-//! by 1 / sqrt(2 k) of the RMSE for k effective pixels, and so is the true error itself.
+//! The error of a sparse picture (stars, hairlines) is concentrated in few pixels. With k effective pixels the
+//! relative uncertainty of the estimated RMSE is 1 / sqrt(2 k), and so is that of the true error.
 
 use crate::film::TILE;
 use crate::film::display::{Display, Tone, toned};
@@ -32,14 +32,14 @@ use crate::film::tile::Tile;
 /// Mean square error over pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mse {
-    /// In linear radiance.
+    /// Error in linear radiance, squared.
     pub linear: f64,
-    /// As displayed, in codes of 0..=255.
+    /// Displayed error, in squared 8-bit levels.
     pub codes: f64,
 }
 
 impl Mse {
-    /// Squares ([`TileNoise::squares`]) of an error that sits in more pixels than there are.
+    /// Squares ([`TileNoise::squares`]) of an error that is spread over any number of pixels.
     #[cfg(test)]
     pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
 
@@ -52,18 +52,18 @@ impl Mse {
 /// Estimated error of one tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileNoise {
-    /// To be told: nothing was decided by it.
+    /// Validation estimate, reported to the user; no decision depends on it.
     pub reported: Mse,
-    /// To decide by, from other pixels.
+    /// Allocation estimate from other pixels, used for decisions.
     pub allocation: Mse,
-    /// Sum over the pixels of the square of each one's squared error, which is summed over its channels. Shows in how
-    /// many pixels the error sits.
+    /// Sum over the pixels of the squares of their squared errors (summed over channels). It determines the number
+    /// of effective pixels.
     pub squares: Mse,
-    /// Pixels of the tile inside the picture.
+    /// Number of pixels of the tile inside the picture.
     pub pixels: u32,
 }
 
-/// Estimates the error of tiles under one mix of lights and one display transform.
+/// Estimator of tile errors under given light weights and display transform.
 pub struct Estimator {
     /// `[group][channel]`.
     per_unit: Vec<f64>,
@@ -73,7 +73,7 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// For tiles of films with these `scales` (see [`Film::scales`](crate::film::Film::scales)).
+    /// Creates an estimator for tiles of films with these `scales` (see [`Film::scales`](crate::film::Film::scales)).
     pub fn new(scales: &[f64], mix: &LightWeights, display: &Display) -> Self {
         Self {
             per_unit: mix.radiance_per_step(scales),
@@ -83,18 +83,18 @@ impl Estimator {
         }
     }
 
-    /// The error of a tile; `None` while A and B have different numbers of samples, or none.
+    /// Estimates the error of a tile; `None` while A and B have different numbers of samples, or none.
     pub fn tile(&self, tile: &Tile) -> Option<TileNoise> {
         let [count, count_b] = tile.counts();
         if count == count_b { self.tile_so_far(tile) } else { None }
     }
 
-    /// The error of a tile, also while B has fewer samples than A; `None` while either has none.
+    /// Estimates the error of a tile, also while B has fewer samples than A; `None` while either has none.
     ///
     /// With n and m samples of variance v each, (A - B)^2 has the mean v (n + m) / nm and the picture,
-    /// (nA + mB) / (n + m), the variance v / (n + m): so d = (A - B) sqrt(nm) / (n + m) takes the place
-    /// of the half difference. That holds for independent samples; where errors fall faster the
-    /// estimate is too high, by a quarter at most while B has at least half of the samples of A.
+    /// (nA + mB) / (n + m), has the variance v / (n + m). Hence d = (A - B) sqrt(nm) / (n + m) replaces
+    /// the half difference. This holds for independent samples; where errors fall faster the estimate is
+    /// too high, by at most a quarter while B has at least half of the samples of A.
     pub fn tile_so_far(&self, tile: &Tile) -> Option<TileNoise> {
         let counts = tile.counts();
         if counts.contains(&0) || tile.lattice_px() != 0 {
@@ -123,8 +123,8 @@ impl Estimator {
                 let (a, b) = if n == m {
                     (a, b)
                 } else {
-                    let beside = |sign: f64| [0, 1, 2].map(|c| (mean[c] + sign * d[c]).max(0.0));
-                    (beside(1.0), beside(-1.0))
+                    let displaced = |sign: f64| [0, 1, 2].map(|c| (mean[c] + sign * d[c]).max(0.0));
+                    (displaced(1.0), displaced(-1.0))
                 };
                 let (mean, a, b) = (self.codes(mean), self.codes(a), self.codes(b));
                 let mut codes = 0.0;
@@ -137,13 +137,13 @@ impl Estimator {
             }
         }
         let pixels = width * height;
-        let over = |sums: Mse, pixels: usize| {
+        let mean_over = |sums: Mse, pixels: usize| {
             let values = (3 * pixels) as f64;
             Mse { linear: sums.linear / values, codes: sums.codes / values }
         };
-        // A single pixel does both.
-        let black = over(halves[0], pixels.div_ceil(2));
-        let white = if pixels > 1 { over(halves[1], pixels / 2) } else { black };
+        // A single pixel serves both estimates.
+        let black = mean_over(halves[0], pixels.div_ceil(2));
+        let white = if pixels > 1 { mean_over(halves[1], pixels / 2) } else { black };
         Some(TileNoise { reported: white, allocation: black, squares, pixels: pixels as u32 })
     }
 
@@ -165,7 +165,7 @@ fn weighted(sums: &[i64], per_sum: &[f64]) -> [f64; 3] {
 }
 
 impl TileNoise {
-    /// From all pixels.
+    /// Estimate from all pixels.
     pub fn of_all(&self) -> Mse {
         let [black, white] = [self.pixels.div_ceil(2), self.pixels / 2].map(f64::from);
         let mean = |black_mse: f64, white_mse: f64| {
@@ -183,38 +183,38 @@ impl TileNoise {
 pub struct Noise {
     /// Root mean square error in linear radiance.
     pub rmse_linear: f64,
-    /// Root mean square error as displayed, in codes of 0..=255.
+    /// Root mean square error as displayed, in 8-bit levels.
     pub rmse_codes: f64,
-    /// 95 of 100 tiles have at most this, in codes.
+    /// 95th percentile of the tiles' RMSE, in 8-bit levels.
     pub p95_codes: f64,
-    /// The largest of a tile, in codes.
+    /// Largest RMSE of a tile, in 8-bit levels.
     pub worst_codes: f64,
-    /// Pixels that an evenly spread error of the same size and spread would sit in: the square of the sum over the
-    /// sum of squares of the pixels' squared errors (Kish's effective sample size). 0 without any error.
+    /// Number of effective pixels (Kish's effective sample size): the squared sum of the pixels' squared errors over the
+    /// sum of their squares. 0 without any error.
     pub effective_pixels: Mse,
 }
 
 impl Noise {
-    /// From the estimates of all tiles; `None` if there are none or one is missing.
+    /// Combines the estimates of all tiles; `None` without tiles or if one is missing.
     pub fn of_tiles(tiles: impl IntoIterator<Item = Option<TileNoise>>) -> Option<Self> {
-        let (mut told, mut all, mut pixels) = (Mse::default(), Mse::default(), 0.0);
+        let (mut reported, mut all, mut pixels) = (Mse::default(), Mse::default(), 0.0);
         let mut squares = Mse::default();
-        let mut of_tiles = Vec::new();
+        let mut tile_errors = Vec::new();
         for tile in tiles {
             let tile = tile?;
             let weight = f64::from(tile.pixels);
-            told.add(weight, tile.reported);
+            reported.add(weight, tile.reported);
             all.add(weight, tile.of_all());
             squares.add(1.0, tile.squares);
             pixels += weight;
-            of_tiles.push(tile.of_all().codes);
+            tile_errors.push(tile.of_all().codes);
         }
         // The smallest value that at least 95 % of the tiles do not exceed.
-        let rank = (of_tiles.len() * 19).div_ceil(20).checked_sub(1)?;
-        let (_, p95, _) = of_tiles.select_nth_unstable_by(rank, f64::total_cmp);
+        let rank = (tile_errors.len() * 19).div_ceil(20).checked_sub(1)?;
+        let (_, p95, _) = tile_errors.select_nth_unstable_by(rank, f64::total_cmp);
         let p95_codes = p95.sqrt();
-        let worst = of_tiles.iter().copied().fold(0.0, f64::max);
-        // The sums over the picture are means over the three channels, the squares are of sums over them.
+        let worst = tile_errors.iter().copied().fold(0.0, f64::max);
+        // The sums hold means over the three channels, the squares hold sums over them.
         let effective = |sum: f64, squares: f64| {
             let sum = 3.0 * sum;
             if squares > 0.0 { sum * sum / squares } else { 0.0 }
@@ -224,8 +224,8 @@ impl Noise {
             codes: effective(all.codes, squares.codes),
         };
         Some(Self {
-            rmse_linear: (told.linear.max(all.linear) / pixels).sqrt(),
-            rmse_codes: (told.codes.max(all.codes) / pixels).sqrt(),
+            rmse_linear: (reported.linear.max(all.linear) / pixels).sqrt(),
+            rmse_codes: (reported.codes.max(all.codes) / pixels).sqrt(),
             p95_codes,
             worst_codes: worst.sqrt(),
             effective_pixels,

@@ -1,12 +1,12 @@
-//! Estimates against errors that are known.
+//! Noise estimates against known errors.
 
 use crate::film::noise::*;
 use crate::film::testing::{Rng, each_tile, fill, film, white};
 use crate::film::*;
 use crate::film::{Replicates, quantised_8};
 
-/// A pixel whose samples have a known mean: each is `dark + LIGHT` with probability `chance` and
-/// else `dark`, or normal around the mean.
+/// Pixel of known mean. Its samples are `dark + LIGHT` with probability `chance` and `dark` otherwise, or
+/// normally distributed around the mean.
 #[derive(Clone, Copy)]
 struct Pixel {
     chance: f64,
@@ -22,7 +22,7 @@ impl Pixel {
         [0, 1, 2].map(|c| self.dark[c] + self.chance * LIGHT[c])
     }
 
-    /// The sum of `n` samples. Stratified: one in each n-th of the unit interval.
+    /// Sum of `n` samples; stratified ones use one number in each n-th of the unit interval.
     fn sum(self, n: u32, stratified: bool, rng: &mut Rng) -> [f64; 3] {
         let count = f64::from(n);
         let hits = if self.normal {
@@ -38,7 +38,7 @@ impl Pixel {
     }
 }
 
-/// Pixels of a scene of 64x48, with a few that see the light hardly ever or nearly always.
+/// Pixels of a picture of 64x48; the light is visible from them with probabilities from 0 to 1.
 fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
     (0..64 * 48).map(|_| Pixel { chance: rng.unit(), normal, dark }).collect()
 }
@@ -46,11 +46,11 @@ fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
 struct Outcome {
     linear: Vec<f64>,
     codes: Vec<f64>,
-    /// Estimated RMSE of each tile, in codes, over the true one (in the mean over the seeds).
+    /// Relative standard deviation of a tile's estimated RMSE over the seeds, in the mean over tiles.
     tile_spread: f64,
 }
 
-/// True RMSE over the estimate, for each of 20 seeds.
+/// Ratio of true to estimated RMSE for each of 20 seeds.
 fn ratios(n: u32, normal: bool, stratified: bool, dark: [f64; 3]) -> Outcome {
     let pixels = scene(normal, dark, &mut Rng(11));
     let (mix, display) = (white(1), Display::default());
@@ -93,7 +93,7 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 #[test]
-fn estimates_are_honest() {
+fn estimates_equal_true_errors_in_the_mean() {
     for n in [16, 64, 512] {
         for (normal, stratified, dark) in [
             (true, false, GLOOM),
@@ -117,8 +117,8 @@ fn estimates_are_honest() {
     }
 }
 
-/// Dark pixels that few samples find lit, where the tone curve is steep and bent: the estimate
-/// against the two simpler ones.
+/// Comparison with the two simpler estimates for dark pixels that few samples find lit, where the tone
+/// curve is steep and bent.
 #[test]
 fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
     let (n, mut rng) = (16u32, Rng(5));
@@ -145,7 +145,7 @@ fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
 }
 
 #[test]
-fn one_pixel_by_hand() {
+fn estimate_of_one_pixel_matches_the_formula() {
     let mut film = film(1, 1, &[1024.0, 2.0]);
     fill(&mut film, 2, |_, _, r| vec![[0.25, 0.5][r], 1.0, 0.5, 0.0, 0.0, [2.0, 0.0][r]]);
     let mix = LightWeights { weights: vec![[1.0; 3], [0.0, 0.0, 0.25]] };
@@ -162,7 +162,7 @@ fn one_pixel_by_hand() {
     let expected = (apart(0.125, 0.25) + apart(0.5, 0.25)) / 3.0;
     assert!((tile.reported.codes / expected - 1.0).abs() < 1e-4, "{tile:?} {expected}");
     assert_eq!((tile.pixels, tile.allocation), (1, tile.reported));
-    // Far over white nothing is seen of the difference.
+    // Far above white the displayed difference is 0.
     let bright = Display { exposure_ev: 9.0, tone: Tone::Clip };
     let noise = film.noise(&LightWeights::only(0, 2), &bright).unwrap();
     assert_eq!((noise.rmse_codes, quantised_8(bright.codes([0.125; 3])[0])), (0.0, 255));
@@ -175,12 +175,12 @@ fn both_tone_curves_are_estimated_as_displayed() {
         let display = Display { exposure_ev: -0.5, tone };
         let (mut film, mut rng) = (film(16, 16, &[2f64.powi(20)]), Rng(3));
         fill(&mut film, 1, |_, _, _| (0..3).map(|_| 2.0 * rng.unit()).collect());
-        // The white squares of the chessboard tell the error.
+        // The white squares of the chessboard give the reported error.
         let mut mse = 0.0;
         for y in 0..16 {
-            let [m, a, b] = [Replicates::Both, Replicates::A, Replicates::B].map(|part| {
+            let [m, a, b] = [Replicates::Both, Replicates::A, Replicates::B].map(|replicates| {
                 let mut row = vec![];
-                film.row(y, part, &white(1), &mut row);
+                film.row(y, replicates, &white(1), &mut row);
                 row
             });
             for ((m, a), b) in m.iter().zip(&a).zip(&b).skip((y + 1) % 2).step_by(2) {
@@ -218,10 +218,9 @@ fn unequal_counts_have_no_noise() {
     assert_eq!(noise(&film), None);
 }
 
-/// The estimate between two waves, in the mean over many tiles, against the variance that the
-/// picture has.
+/// The mean estimate between two waves, over many tiles, equals the variance of the picture.
 #[test]
-fn a_lagging_replicate_still_has_an_estimate() {
+fn replicate_with_fewer_samples_still_has_an_estimate() {
     let display = Display { exposure_ev: -2.0, tone: Tone::Clip };
     let (n, m) = (12u32, 8u32);
     let (mut rng, mut estimates, mut codes, mut errors) = (Rng(9), 0.0, 0.0, [0.0; 2]);
@@ -254,28 +253,28 @@ fn a_lagging_replicate_still_has_an_estimate() {
 }
 
 #[test]
-fn the_picture_sums_up_its_tiles() {
+fn noise_combines_the_tiles() {
     let tile = |codes: f64, pixels| {
-        let told = Mse { linear: 0.01, codes: codes * codes };
-        Some(TileNoise { reported: told, allocation: told, squares: Mse::SPREAD, pixels })
+        let mse = Mse { linear: 0.01, codes: codes * codes };
+        Some(TileNoise { reported: mse, allocation: mse, squares: Mse::SPREAD, pixels })
     };
     let tiles = (1..=20).map(|i| tile(f64::from(i), 256)).chain([tile(7.0, 0)]);
     let noise = Noise::of_tiles(tiles).unwrap();
     assert!((noise.rmse_linear - 0.1).abs() < 1e-15);
     assert!((noise.rmse_codes - 143.5f64.sqrt()).abs() < 1e-12);
     assert_eq!((noise.p95_codes, noise.worst_codes), (19.0, 20.0));
-    // Of the estimates from half the pixels and from all the larger one counts.
-    let of = |told: f64, guide: f64| {
+    // The larger of the estimates from half the pixels and from all pixels counts.
+    let rmse = |reported: f64, allocation: f64| {
         let mse = |x: f64| Mse { linear: x, codes: x };
         let tile = TileNoise {
-            reported: mse(told),
-            allocation: mse(guide),
+            reported: mse(reported),
+            allocation: mse(allocation),
             squares: Mse::SPREAD,
             pixels: 256,
         };
         Noise::of_tiles([Some(tile)]).unwrap().rmse_codes
     };
-    assert_eq!((of(4.0, 2.0), of(2.0, 6.0)), (2.0, 2.0));
+    assert_eq!((rmse(4.0, 2.0), rmse(2.0, 6.0)), (2.0, 2.0));
     assert_eq!(Noise::of_tiles([tile(1.0, 256), None]), None);
     assert_eq!(Noise::of_tiles([]), None);
 }

@@ -1,4 +1,4 @@
-//! Picture files: which format a path asks for, and writing so that a failure leaves the old file.
+//! Picture files: format by extension, and atomic replacement that keeps the old file on failure.
 
 use crate::film::image_data::{ImageData, WriteSeek};
 use crate::film::{exr, png};
@@ -15,7 +15,7 @@ struct Format {
     encode: fn(&ImageData, &mut dyn WriteSeek) -> io::Result<()>,
 }
 
-/// Every format that can be written.
+/// Formats that can be written.
 static FORMATS: [Format; 2] = [
     Format { extension: "png", encode: png::encode },
     Format { extension: "exr", encode: exr::encode },
@@ -26,18 +26,18 @@ static FORMATS: [Format; 2] = [
 pub struct ImageOutput {
     path: PathBuf,
     format: usize,
-    /// There must be no file yet.
+    /// Fails if the file exists.
     create_new: bool,
 }
 
-/// Why a picture cannot be written: the path, what is wrong, what would help.
+/// Reason why a picture cannot be written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WriteError {
-    /// The file that was asked for.
+    /// The requested file.
     pub path: PathBuf,
-    /// What is wrong, as a clause.
+    /// The problem, as a clause.
     pub what: String,
-    /// What would help, as a clause.
+    /// The remedy, as a clause.
     pub remedy: String,
 }
 
@@ -50,7 +50,10 @@ impl fmt::Display for WriteError {
 impl std::error::Error for WriteError {}
 
 impl ImageOutput {
-    /// Finds the format by the path's extension, in upper or lower case. Touches no file.
+    /// Chooses the format by the path's extension, in upper or lower case. Touches no file.
+    ///
+    /// # Errors
+    /// Fails if the extension is missing or unknown.
     pub fn from_path(path: impl Into<PathBuf>) -> Result<Self, WriteError> {
         let path = path.into();
         let extension = path.extension().map(OsStr::to_string_lossy);
@@ -64,7 +67,9 @@ impl ImageOutput {
                 Err(WriteError {
                     what: match extension {
                         Some(e) => format!("no picture format has the extension .{e}"),
-                        None => "its name has no extension to tell the picture format".to_string(),
+                        None => {
+                            "its name has no extension that names the picture format".to_string()
+                        }
                     },
                     remedy: format!("known extensions: {}", known.join(", ")),
                     path,
@@ -73,25 +78,29 @@ impl ImageOutput {
         }
     }
 
-    /// The same, but a file that is there, or comes into being before this one is complete, is not
-    /// overwritten: writing fails.
+    /// Output that fails to write if the file exists, or is created before this one is complete.
     pub fn create_new(self) -> Self {
         Self { create_new: true, ..self }
     }
 
-    /// The file that is to be written.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Finds out whether the file could be written now, without changing it: for use before work
-    /// whose result would be lost.
+    /// Checks before the work that the file can be written, without changing it.
+    ///
+    /// # Errors
+    /// Returns the error that writing would give now.
     pub fn check_writable(&self) -> Result<(), WriteError> {
         self.prepare().map(drop)
     }
 
-    /// Writes the picture to a temporary file beside its place, and puts it there when it is complete
-    /// and on the disk. On failure a file that was there before is untouched.
+    /// Writes the picture to a temporary file in the same directory and renames it when it is complete
+    /// and on the disk.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be written; an existing file is then unchanged.
     pub fn write(&self, picture: &ImageData) -> Result<(), WriteError> {
         self.replace(|sink| (FORMATS[self.format].encode)(picture, sink))
     }
@@ -101,16 +110,16 @@ impl ImageOutput {
         encode: impl FnOnce(&mut dyn WriteSeek) -> io::Result<()>,
     ) -> Result<(), WriteError> {
         let PendingFile { file, directory, temporary } = self.prepare()?;
-        let explain = |error| self.explained(&error, &directory);
+        let explain = |error| self.explain(&error, &directory);
         let mut out = BufWriter::with_capacity(1 << 16, temporary);
         encode(&mut out).and_then(|()| out.flush()).map_err(explain)?;
         let temporary = out.into_inner().map_err(|e| explain(e.into_error()))?;
         temporary.as_file().sync_all().map_err(explain)?;
-        let put = match self.create_new {
+        let renamed = match self.create_new {
             true => temporary.persist_noclobber(&file),
             false => temporary.persist(&file),
         };
-        put.map_err(|e| explain(e.error))?;
+        renamed.map_err(|e| explain(e.error))?;
         // Makes the new name durable. Not every system lets a directory be opened or synced; the
         // picture is complete either way.
         if let Ok(directory) = File::open(&directory) {
@@ -120,7 +129,7 @@ impl ImageOutput {
     }
 
     fn prepare(&self) -> Result<PendingFile, WriteError> {
-        // A link stays a link: what it points to is replaced.
+        // A symbolic link stays; its destination is replaced.
         let is_link = self.path.symlink_metadata().is_ok_and(|m| m.file_type().is_symlink());
         let file = match is_link.then(|| fs::canonicalize(&self.path)) {
             Some(Ok(real)) => real,
@@ -150,15 +159,15 @@ impl ImageOutput {
             use std::os::unix::fs::PermissionsExt;
             builder.permissions(fs::Permissions::from_mode(0o666));
         }
-        let made = builder.tempfile_in(&directory).and_then(|temporary| {
-            // The sign that it is not a left-over; where files cannot be locked nobody removes those.
+        let created = builder.tempfile_in(&directory).and_then(|temporary| {
+            // The lock marks a file in use; where files cannot be locked, leftovers are not removed.
             let _ = temporary.as_file().try_lock();
             if let Some(existing) = &existing {
                 temporary.as_file().set_permissions(existing.permissions())?;
             }
             Ok(temporary)
         });
-        let temporary = made.map_err(|error| self.explained(&error, &directory))?;
+        let temporary = created.map_err(|error| self.explain(&error, &directory))?;
         Ok(PendingFile { file, directory, temporary })
     }
 
@@ -166,7 +175,7 @@ impl ImageOutput {
         WriteError { path: self.path.clone(), what: what.into(), remedy: remedy.into() }
     }
 
-    fn explained(&self, error: &io::Error, directory: &Path) -> WriteError {
+    fn explain(&self, error: &io::Error, directory: &Path) -> WriteError {
         let shown = directory.display();
         match error.kind() {
             ErrorKind::AlreadyExists => {
@@ -196,7 +205,7 @@ impl ImageOutput {
     }
 }
 
-/// A temporary file ready to be filled, and where it goes.
+/// Temporary file and its destination.
 struct PendingFile {
     file: PathBuf,
     directory: PathBuf,
@@ -213,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn the_extension_tells_the_format() {
+    fn extension_chooses_the_format() {
         for good in ["a.png", "A.PNG", "dir.x/b.Exr"] {
             assert_eq!(ImageOutput::from_path(good).unwrap().path(), Path::new(good));
         }
@@ -228,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_said_before() {
+    fn unwritable_output_is_reported_before_the_work() {
         let dir = tempfile::tempdir().unwrap();
         let missing = message(&dir.path().join("no/such/a.png"));
         assert!(missing.contains("no/such does not exist; create it first"), "{missing}");
@@ -248,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_check_leaves_nothing_behind() {
+    fn check_writable_leaves_no_file() {
         let dir = tempfile::tempdir().unwrap();
         let old = dir.path().join("old.png");
         fs::write(&old, "old").unwrap();
@@ -260,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failure_leaves_the_old_file_and_says_why() {
+    fn failed_write_keeps_the_old_file_and_names_the_reason() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
         fs::write(&path, "old").unwrap();
@@ -283,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_to_be_fresh_overwrites_nothing() {
+    fn create_new_overwrites_no_file() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
         let target = ImageOutput::from_path(&path).unwrap().create_new();
@@ -296,7 +305,7 @@ mod tests {
 
     #[test]
     #[cfg(unix)]
-    fn links_and_permissions_are_kept() {
+    fn symbolic_links_and_permissions_are_kept() {
         use std::os::unix::fs::PermissionsExt;
         let dir = tempfile::tempdir().unwrap();
         let (real, link) = (dir.path().join("real.png"), dir.path().join("link.png"));

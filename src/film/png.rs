@@ -1,4 +1,4 @@
-//! PNG: what the display shows, in 8 or 16 bits per channel, sRGB, with text metadata.
+//! PNG writer: displayed pictures in 8 or 16 bits per channel, sRGB, with text metadata.
 
 use crate::film::display::quantised_16;
 use crate::film::image_data::{Depth, ImageData, WriteSeek};
@@ -51,10 +51,10 @@ fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), Encodi
     writer.finish()
 }
 
-/// A PNG of rows of red, green, blue, 8 bits each, sRGB.
+/// Encodes rows of red, green, blue, 8 bits each, sRGB, as PNG.
 ///
 /// # Errors
-/// The bytes are not as many as the size says.
+/// Fails if the number of bytes differs from the size.
 pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, width, height);
@@ -67,7 +67,7 @@ pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> 
     Ok(bytes)
 }
 
-/// The picture's bytes: rows of red, green, blue; 16-bit values big end first, as PNG has them.
+/// Bytes of the picture: rows of red, green, blue; 16-bit values are big-endian, as in PNG.
 fn pixels(picture: &ImageData) -> Vec<u8> {
     let (film, mut row) = (picture.film, Vec::new());
     let bytes_per_channel = match picture.depth {
@@ -83,7 +83,7 @@ fn pixels(picture: &ImageData) -> Vec<u8> {
             Depth::Sixteen => bytes.extend(
                 row.iter()
                     .flat_map(|rgb| picture.display.codes(*rgb))
-                    .flat_map(|code| quantised_16(code).to_be_bytes()),
+                    .flat_map(|value| quantised_16(value).to_be_bytes()),
             ),
         }
     }

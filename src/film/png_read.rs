@@ -1,17 +1,17 @@
-//! PNG files as codes to be shown.
+//! PNG reader for the image viewer.
 
 use png::{ColorType, Decoder, Transformations};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-/// The most pixels that are read: as many as a scene may have.
+/// Largest number of pixels that is read: the limit of scenes.
 const MAX_PIXELS: u64 = 1 << 26;
 
-/// Width and height of a PNG and its sRGB codes row by row, without what it may say about transparency.
+/// Returns width and height of a PNG and its 8-bit sRGB pixels, `[row][column]`, without transparency.
 ///
 /// # Errors
-/// It cannot be read or is too large.
+/// Fails if the file cannot be read or is too large.
 pub fn read_png(path: &Path) -> Result<([usize; 2], Vec<[u8; 3]>), String> {
     let file = File::open(path).map_err(|error| error.to_string())?;
     let mut decoder = Decoder::new(BufReader::new(file));
@@ -45,14 +45,14 @@ mod tests {
     use crate::film::png_of_rgb;
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_png_is_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         let codes: Vec<u8> = (0..5 * 3 * 3).map(|i| (i * 37 % 256) as u8).collect();
         std::fs::write(&path, png_of_rgb([5, 3], &codes).unwrap()).unwrap();
         let (size, pixels) = read_png(&path).unwrap();
         assert_eq!((size, pixels.as_flattened()), ([5, 3], &codes[..]));
-        // However it is cut off, it is an error or the picture.
+        // Truncated at any length, it gives an error or the picture.
         let whole = std::fs::read(&path).unwrap();
         for length in 0..whole.len() {
             std::fs::write(&path, &whole[..length]).unwrap();

@@ -1,4 +1,4 @@
-//! One pixel, looked at closely.
+//! Probe of one pixel.
 
 use crate::film::TILE;
 use crate::film::display::Display;
@@ -6,23 +6,23 @@ use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::noise::Estimator;
 use crate::film::store::Film;
 
-/// What the film knows about one pixel under one mix of lights and one display transform.
+/// Samples, value and error of one pixel under given light weights and display transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probe {
     /// Column and row of the film.
     pub pixel: [usize; 2],
-    /// Samples of replicates A and B.
+    /// Number of samples of replicates A and B.
     pub samples: [u32; 2],
     /// Linear radiance; black without samples.
     pub radiance: [f64; 3],
-    /// The same as displayed, in codes of 0..=255, not rounded.
+    /// Displayed value in 8-bit levels, 0..=255, unrounded.
     pub codes: [f64; 3],
-    /// Half the difference of A and B, in radiance: the size of this pixel's error, but with one
-    /// degree of freedom, that is, within a factor of two or three. `None` without samples of both.
+    /// Half the difference of A and B, in radiance: an estimate of the pixel's error with one degree of
+    /// freedom, good to a factor of two or three. `None` without samples of both.
     pub difference: Option<[f64; 3]>,
     /// Estimated RMSE of the pixels of its tile in linear radiance; `None` without samples of both.
     pub tile_rmse_linear: Option<f64>,
-    /// The same as displayed, in codes.
+    /// Estimated RMSE of the pixels of its tile as displayed, in 8-bit levels.
     pub tile_rmse_codes: Option<f64>,
 }
 
@@ -74,7 +74,7 @@ mod tests {
     use crate::film::testing::{each_tile, fill, film};
 
     #[test]
-    fn a_pixel_and_its_error() {
+    fn probe_reports_samples_value_and_error() {
         let mut film = film(20, 18, &[8.0, 4.0]);
         let mix = LightWeights { weights: vec![[1.0, 2.0, 0.0], [0.0, 0.0, 3.0]] };
         let display = Display { exposure_ev: -3.0, ..Display::default() };

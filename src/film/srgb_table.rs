@@ -1,23 +1,23 @@
-//! The sRGB curve by table, many times cheaper than the power function.
+//! Lookup table of the sRGB encoding, many times faster than the power function.
 
 use crate::value::srgb_from_linear;
 use std::sync::LazyLock;
 
 /// Segments per octave (power of two).
 const SEGMENTS_LOG2: u32 = 7;
-/// Below two to the power of this the curve is its straight part (which ends at 0.0031308).
+/// Exponent of the power of two below which the encoding is linear (it is up to 0.0031308).
 const FIRST_OCTAVE: i32 = -9;
 const SHIFT: u32 = 52 - SEGMENTS_LOG2;
-/// The upper bits of 2^FIRST_OCTAVE, less one: entry 0 is the straight part.
+/// Upper bits of 2^FIRST_OCTAVE, less one: entry 0 is the linear part.
 const BASE: u64 = (((1023 + FIRST_OCTAVE) as u64) << SEGMENTS_LOG2) - 1;
 const ENTRIES: usize = ((-FIRST_OCTAVE as usize) << SEGMENTS_LOG2) + 2;
 
-/// Largest difference from the exact curve, in codes of 0..=255.
+/// Largest difference from the exact encoding, in 8-bit levels.
 const MAX_ERROR_CODES: f64 = 5.5e-4;
 
-/// sRGB codes by chords between exact points, 128 to an octave of linear light.
+/// Piecewise linear sRGB encoding through exact points, 128 to an octave of linear light.
 pub(super) struct SrgbTable {
-    /// `[at 0, slope]` of each chord, in codes.
+    /// `[value at 0, slope]` of each chord, in 8-bit levels.
     chords: [[f64; 2]; ENTRIES],
 }
 
@@ -41,7 +41,7 @@ impl SrgbTable {
         Self { chords }
     }
 
-    /// The code, 0..=255 unrounded, of linear light 0..=1; within 5.5e-4 of the exact one.
+    /// Unrounded sRGB value, 0..=255, of linear light 0..=1; within 5.5e-4 of the exact one.
     #[inline(always)]
     pub fn code(&self, linear: f64) -> f64 {
         let entry = (linear.to_bits() >> SHIFT).saturating_sub(BASE) as usize;
@@ -49,7 +49,7 @@ impl SrgbTable {
         at_zero + slope * linear
     }
 
-    /// The exact code, rounded to 8 bits, of linear light 0..=1.
+    /// 8-bit sRGB value of linear light 0..=1, as rounded from the exact encoding.
     #[inline]
     pub fn code_8(&self, linear: f64) -> u8 {
         let above = self.code(linear) + 0.5;
@@ -61,7 +61,7 @@ impl SrgbTable {
     }
 }
 
-/// Rounds a code 0..=255 to 8 bits.
+/// Rounds a value 0..=255 to 8 bits.
 pub fn quantised_8(code: f64) -> u8 {
     code.round() as u8
 }
@@ -72,7 +72,7 @@ mod tests {
     use crate::value::linear_from_srgb;
 
     #[test]
-    fn the_table_keeps_its_bound() {
+    fn table_error_is_within_its_bound() {
         let mut worst = 0.0f64;
         for i in 0..=1_000_000 {
             let even = f64::from(i) * 1e-6;
@@ -86,13 +86,13 @@ mod tests {
     }
 
     #[test]
-    fn eight_bits_are_those_of_the_exact_curve() {
+    fn eight_bit_values_equal_the_exact_encoding() {
         let exact = |linear| quantised_8(255.0 * srgb_from_linear(linear));
         for i in 0..=200_000 {
             let linear = f64::from(i) * 5e-6;
             assert_eq!(SrgbTable::shared().code_8(linear), exact(linear), "{linear}");
         }
-        // Around every border between two codes.
+        // Around every border between two 8-bit values.
         for border in (0..255).map(|code| (f64::from(code) + 0.5) / 255.0) {
             let linear = linear_from_srgb(border);
             for step in -2000..=2000 {
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_are_exact() {
+    fn table_is_exact_at_both_ends() {
         assert_eq!(SrgbTable::shared().code(0.0), 0.0);
         assert!((SrgbTable::shared().code(1.0) - 255.0).abs() < 1e-12);
         assert_eq!(SrgbTable::shared().code(f64::MIN_POSITIVE), 255.0 * 12.92 * f64::MIN_POSITIVE);

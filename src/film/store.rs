@@ -1,4 +1,4 @@
-//! The film: tiles of integer sums, restarted lazily, added exactly.
+//! The film: tiles of integer sums, cleared lazily, added exactly.
 
 use crate::film::TILE;
 use crate::film::display::Display;
@@ -8,24 +8,24 @@ use crate::film::noise::{Estimator, Noise};
 use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::fmt;
 
-/// What two films must share to be added.
+/// Properties that films must share to be added.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
     /// Columns, in pixels, at least 1.
     pub width: usize,
     /// Rows, in pixels, at least 1.
     pub height: usize,
-    /// For each light group, what a sample is multiplied with before it is rounded to an integer; a
+    /// Factor of each light group by which a sample is multiplied before it is rounded to an integer; a
     /// power of two, so that the product is exact.
     pub scales: Vec<f64>,
-    /// The seed of all samples.
+    /// Random seed of all samples.
     pub seed: u64,
-    /// What they were traced in, `single` or `double`: how many lanes side by side changes no bit.
+    /// Precision of the samples, `single` or `double`. The number of lanes changes no bit.
     pub precision: String,
 }
 
-/// Sums of samples for every pixel, light group, channel and replicate, in integers: the same bits in
-/// whatever order they were added. Sample sums of a pixel divided by `scale * count` are radiance.
+/// Integer sums of samples for every pixel, light group, channel and replicate: the order of addition
+/// changes no bit. The sums of a pixel divided by `scale * count` are radiance.
 #[derive(Debug)]
 pub struct Film {
     header: Header,
@@ -33,7 +33,7 @@ pub struct Film {
     tiles: Vec<Tile>,
 }
 
-/// A tile handed to a worker, which makes it ready (allocates or clears it) by [`TileHandle::prepare`].
+/// Exclusive access to a tile for one worker, which allocates or clears it by [`TileHandle::prepare`].
 #[derive(Debug)]
 pub struct TileHandle<'a> {
     /// Number of the tile.
@@ -45,17 +45,17 @@ pub struct TileHandle<'a> {
 }
 
 impl<'a> TileHandle<'a> {
-    /// The tile, ready to be added to.
+    /// Allocates or clears the tile if necessary and returns it.
     pub fn prepare(self) -> &'a mut Tile {
         self.tile.clear_if_stale(self.epoch);
         self.tile
     }
 }
 
-/// Why two films cannot be added.
+/// Reason why two films cannot be added.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mismatch {
-    /// They differ in what is named; what each has.
+    /// Name of the property in which they differ, and the value of each.
     Header(&'static str, String, String),
     /// Both hold parts of the first sample of the tile with this number.
     Overlap(usize),
@@ -64,9 +64,9 @@ pub enum Mismatch {
 impl fmt::Display for Mismatch {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::Header(what, ours, theirs) => write!(
+            Self::Header(property, ours, theirs) => write!(
                 f,
-                "these films cannot be added: {what} {ours} here, {theirs} there; \
+                "these films cannot be added: {property} {ours} here, {theirs} there; \
                  only films of the same scene, size, seed and precision can"
             ),
             Self::Overlap(tile) => write!(
@@ -81,7 +81,7 @@ impl fmt::Display for Mismatch {
 impl std::error::Error for Mismatch {}
 
 impl Film {
-    /// A film without samples.
+    /// Creates a film without samples.
     ///
     /// # Panics
     /// If width, height or the number of groups is 0, there are more than [`MAX_FILM_GROUPS`], or a
@@ -104,17 +104,17 @@ impl Film {
         Self { epoch: 1, tiles, header }
     }
 
-    /// A film without samples in the memory of this one, which may be of another kind.
+    /// Creates a film without samples in the memory of this one, which may have another header.
     ///
     /// # Panics
-    /// As [`Film::new`].
+    /// Panics in the same cases as [`Film::new`].
     pub fn reuse_for(mut self, header: Header) -> Self {
         if header == self.header {
             self.restart();
             return self;
         }
         let mut film = Self::new(header);
-        // Beyond every epoch of the old tiles.
+        // Later than every epoch of the old tiles.
         film.epoch = self.epoch + 1;
         let memory = self.tiles.into_iter().map(Tile::into_memory);
         film.tiles = film
@@ -141,7 +141,7 @@ impl Film {
         self.header.scales.len()
     }
 
-    /// What a sample of each group is multiplied with before rounding; powers of two.
+    /// Factors of the light groups by which samples are multiplied before rounding; powers of two.
     pub fn scales(&self) -> &[f64] {
         &self.header.scales
     }
@@ -151,13 +151,12 @@ impl Film {
         &self.header
     }
 
-    /// Changes whenever samples are forgotten. Within one epoch, equal counts of a tile mean equal
-    /// contents.
+    /// Number of restarts. Within one epoch, equal counts of a tile mean equal contents.
     pub(super) fn epoch(&self) -> u64 {
         self.epoch
     }
 
-    /// Forgets all samples. Tiles are cleared when they are next touched, pixel by pixel.
+    /// Discards all samples. Pixels are cleared when they are next written.
     pub fn restart(&mut self) {
         self.epoch += 1;
     }
@@ -178,42 +177,42 @@ impl Film {
         [index % columns * TILE, index / columns * TILE]
     }
 
-    /// A tile, if it has been touched since the last restart.
+    /// Returns a tile if it has been touched since the last restart.
     pub fn tile(&self, index: usize) -> Option<&Tile> {
         Some(&self.tiles[index]).filter(|tile| tile.is_of(self.epoch))
     }
 
-    /// The touched tiles and their numbers.
+    /// Touched tiles with their numbers.
     pub fn touched(&self) -> impl Iterator<Item = (usize, &Tile)> {
         self.tiles.iter().enumerate().filter(|(_, tile)| tile.is_of(self.epoch))
     }
 
-    /// Tiles to be written to, in the order of `indices`, each to be opened by the thread that works
-    /// on it.
+    /// Handles of tiles, in the order of `indices`, each to be prepared by the thread that works on it.
     ///
     /// # Panics
-    /// If an index is named twice or is not below [`Film::tile_count`].
+    /// If an index occurs twice or is not below [`Film::tile_count`].
     pub fn slots(&mut self, indices: &[usize]) -> Vec<TileHandle<'_>> {
         let mut order: Vec<usize> = (0..indices.len()).collect();
         order.sort_unstable_by_key(|i| indices[*i]);
         let (columns, epoch) = (self.tile_columns(), self.epoch);
-        let mut found: Vec<Option<TileHandle>> = indices.iter().map(|_| None).collect();
-        let mut rest = self.tiles.as_mut_slice();
-        let mut passed = 0;
+        let mut handles: Vec<Option<TileHandle>> = indices.iter().map(|_| None).collect();
+        let mut remaining = self.tiles.as_mut_slice();
+        let mut first = 0;
         for i in order {
             let index = indices[i];
-            assert!(index >= passed, "tile {index} is named twice");
-            let (tile, after) = rest[index - passed..].split_first_mut().expect("tile in range");
+            assert!(index >= first, "tile {index} is named twice");
+            let (tile, after) =
+                remaining[index - first..].split_first_mut().expect("tile in range");
             let origin = [index % columns * TILE, index / columns * TILE];
-            found[i] = Some(TileHandle { index, origin, tile, epoch });
-            (rest, passed) = (after, index + 1);
+            handles[i] = Some(TileHandle { index, origin, tile, epoch });
+            (remaining, first) = (after, index + 1);
         }
-        found.into_iter().flatten().collect()
+        handles.into_iter().flatten().collect()
     }
 
-    /// Samples of all pixels and both replicates.
+    /// Number of samples of all pixels and both replicates.
     pub fn samples(&self) -> u64 {
-        let of_tile = |tile: &Tile| {
+        let samples_of_tile = |tile: &Tile| {
             let [width, height] = tile.extent();
             let counts = tile.counts().map(u64::from);
             let lattice = match tile.lattice_px() {
@@ -222,7 +221,7 @@ impl Film {
             };
             (counts[0] + counts[1]) * (width * height) as u64 + lattice as u64
         };
-        self.touched().map(|(_, tile)| of_tile(tile)).sum()
+        self.touched().map(|(_, tile)| samples_of_tile(tile)).sum()
     }
 
     /// Radiance of the pixel in column `x`, row `y`: the mean over all its samples of both
@@ -270,30 +269,33 @@ impl Film {
         Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }
 
-    /// Bad samples since the last restart.
+    /// Invalid samples since the last restart.
     pub fn bad_samples(&self) -> InvalidSamples {
         let mut all = InvalidSamples::default();
         self.touched().for_each(|(_, tile)| all.merge(tile.bad()));
         all
     }
 
-    /// Samples since the last restart that were brighter than the film holds.
+    /// Number of samples since the last restart that were brighter than the film can hold.
     pub fn saturated_samples(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_samples()).sum()
     }
 
-    /// Number of channel sums that have reached the largest value a sum can have.
+    /// Number of channel sums that have reached their limit.
     pub fn saturated(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated()).sum()
     }
 
-    /// Number of pixels with such a sum: more samples make them darker than they are.
+    /// Number of pixels with such a sum: further samples make them too dark.
     pub fn saturated_pixels(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
     }
 
-    /// Adds the samples of another film. Films of disjoint sample ranges, added in any order, equal
-    /// the film of the whole. Nothing is changed on error.
+    /// Adds the samples of another film. Films of disjoint sample ranges, added in any order, equal the film
+    /// of the whole range.
+    ///
+    /// # Errors
+    /// Fails, without a change, if the headers differ or both films hold parts of the same first sample.
     pub fn add(&mut self, other: &Self) -> Result<(), Mismatch> {
         self.check_addable(other)?;
         for (index, theirs) in other.touched() {
@@ -306,7 +308,7 @@ impl Film {
 
     fn check_addable(&self, other: &Self) -> Result<(), Mismatch> {
         let (ours, theirs) = (&self.header, &other.header);
-        let show = |h: &Header| -> [(&'static str, String); 4] {
+        let properties = |h: &Header| -> [(&'static str, String); 4] {
             [
                 ("size", format!("{}x{}", h.width, h.height)),
                 ("light group scales", format!("{:?}", h.scales)),
@@ -314,15 +316,16 @@ impl Film {
                 ("precision", h.precision.clone()),
             ]
         };
-        for ((what, ours), (_, theirs)) in show(ours).into_iter().zip(show(theirs)) {
+        for ((property, ours), (_, theirs)) in properties(ours).into_iter().zip(properties(theirs))
+        {
             if ours != theirs {
-                return Err(Mismatch::Header(what, ours, theirs));
+                return Err(Mismatch::Header(property, ours, theirs));
             }
         }
-        let clash = other.touched().find(|(index, theirs)| {
+        let overlap = other.touched().find(|(index, theirs)| {
             theirs.lattice_px() != 0 && self.tile(*index).is_some_and(|t| t.lattice_px() != 0)
         });
-        clash.map_or(Ok(()), |(index, _)| Err(Mismatch::Overlap(index)))
+        overlap.map_or(Ok(()), |(index, _)| Err(Mismatch::Overlap(index)))
     }
 }
 
@@ -341,12 +344,12 @@ mod tests {
     }
 
     #[test]
-    fn slots_come_in_the_order_asked_for() {
+    fn slots_have_the_order_of_the_indices() {
         let mut film = film(48, 32, &[1.0]);
         let slots = film.slots(&[4, 0, 5, 2]);
         let order: Vec<_> = slots.iter().map(|slot| (slot.index, slot.origin)).collect();
         assert_eq!(order, [(4, [16, 16]), (0, [0, 0]), (5, [32, 16]), (2, [32, 0])]);
-        // Only opened tiles are touched.
+        // Only prepared tiles are touched.
         slots.into_iter().nth(2).unwrap().prepare().advance(0, 3);
         let touched: Vec<_> = film.touched().map(|(i, tile)| (i, tile.counts())).collect();
         assert_eq!(touched, [(5, [3, 0])]);
@@ -360,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn a_restart_forgets() {
+    fn restart_discards_all_samples() {
         let (mut film, empty) = (film(20, 20, &[1.0]), film(20, 20, &[1.0]).bytes());
         fill(&mut film, 2, |x, _, _| vec![x as f64; 3]);
         let full = film.bytes();
@@ -371,11 +374,11 @@ mod tests {
     }
 
     #[test]
-    fn memory_used_again_holds_nothing() {
+    fn reused_memory_holds_no_samples() {
         let value = |x: usize| vec![x as f64 + 1.0; 3];
         let mut old = film(40, 40, &[1.0]);
         fill(&mut old, 2, |x, _, _| value(x));
-        let wanted = |width, height, groups: usize| {
+        let expected = |width, height, groups: usize| {
             let header = film(width, height, &vec![4.0; groups]).header().clone();
             let mut fresh = Film::new(header.clone());
             fill(&mut fresh, 1, |x, _, _| value(x).repeat(groups));
@@ -383,7 +386,7 @@ mod tests {
         };
         // Fewer, more and equally many tiles; more and fewer groups.
         for (width, height, groups) in [(20, 20, 1), (70, 30, 3), (70, 30, 2), (40, 40, 1)] {
-            let (header, bytes) = wanted(width, height, groups);
+            let (header, bytes) = expected(width, height, groups);
             old = old.reuse_for(header);
             assert_eq!((old.samples(), old.touched().count()), (0, 0));
             fill(&mut old, 1, |x, _, _| value(x).repeat(groups));
@@ -392,25 +395,25 @@ mod tests {
     }
 
     #[test]
-    fn only_alike_films_add_up() {
+    fn films_with_different_headers_cannot_be_added() {
         let mut ours = film(20, 20, &[1.0]);
         fill(&mut ours, 2, |x, _, _| vec![x as f64; 3]);
         let before = ours.bytes();
-        let alter = |change: fn(&mut Header)| {
+        let altered = |change: fn(&mut Header)| {
             let mut header = ours.header().clone();
             change(&mut header);
             Film::new(header)
         };
         let others = [
-            (alter(|h| h.width = 19), "size 20x20 here, 19x20 there"),
-            (alter(|h| h.scales = vec![2.0]), "scales [1.0] here, [2.0] there"),
-            (alter(|h| h.scales = vec![1.0, 1.0]), "[1.0] here, [1.0, 1.0] there"),
-            (alter(|h| h.seed = 2), "seed 1 here, 2 there"),
-            (alter(|h| h.precision = "double".into()), "precision single here, double there"),
+            (altered(|h| h.width = 19), "size 20x20 here, 19x20 there"),
+            (altered(|h| h.scales = vec![2.0]), "scales [1.0] here, [2.0] there"),
+            (altered(|h| h.scales = vec![1.0, 1.0]), "[1.0] here, [1.0, 1.0] there"),
+            (altered(|h| h.seed = 2), "seed 1 here, 2 there"),
+            (altered(|h| h.precision = "double".into()), "precision single here, double there"),
         ];
-        for (other, words) in others {
+        for (other, difference) in others {
             let message = ours.add(&other).unwrap_err().to_string();
-            assert!(message.contains(words), "{message}");
+            assert!(message.contains(difference), "{message}");
         }
         assert_eq!(ours.bytes(), before);
         ours.add(&film(20, 20, &[1.0])).unwrap();
@@ -418,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_sample_is_not_added_twice() {
+    fn first_sample_cannot_be_added_twice() {
         let lattice = || {
             let mut film = film(16, 16, &[1.0]);
             film.slots(&[0]).remove(0).prepare().set_lattice(8);
@@ -426,12 +429,12 @@ mod tests {
         };
         let mut ours = lattice();
         assert_eq!(ours.add(&lattice()), Err(Mismatch::Overlap(0)));
-        let mut rest = film(16, 16, &[1.0]);
-        fill(&mut rest, 4, |_, _, _| vec![4.0; 3]);
-        rest.add(&ours).unwrap();
-        assert_eq!(rest.samples(), 2 * 4 * 256 + 4);
-        assert_eq!(rest.pixel(8, 8, &white(1)), [8.0 / 9.0; 3]);
-        assert_eq!(rest.pixel(9, 8, &white(1)), [1.0; 3]);
+        let mut others = film(16, 16, &[1.0]);
+        fill(&mut others, 4, |_, _, _| vec![4.0; 3]);
+        others.add(&ours).unwrap();
+        assert_eq!(others.samples(), 2 * 4 * 256 + 4);
+        assert_eq!(others.pixel(8, 8, &white(1)), [8.0 / 9.0; 3]);
+        assert_eq!(others.pixel(9, 8, &white(1)), [1.0; 3]);
     }
 
     #[test]

@@ -1,10 +1,10 @@
-//! Films with known contents, for the tests of this room.
+//! Films with known contents, for unit tests.
 
 use crate::film::store::{Film, Header};
 use crate::film::tile::Tile;
 use crate::film::{LightWeights, TILE};
 
-/// Numbers for tests (SplitMix64).
+/// Random numbers for tests (SplitMix64).
 pub struct Rng(pub u64);
 
 impl Rng {
@@ -15,12 +15,12 @@ impl Rng {
         z ^ (z >> 31)
     }
 
-    /// Uniform in [0, 1).
+    /// Uniform number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Standard normal.
+    /// Standard normal number.
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.unit()).cos()
@@ -37,7 +37,7 @@ pub fn white(groups: usize) -> LightWeights {
     LightWeights { weights: vec![[1.0; 3]; groups] }
 }
 
-/// Opens every tile and calls `f` with it and the column and row of its upper left pixel.
+/// Calls `f` with every tile and the column and row of its upper left pixel.
 pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
     let all: Vec<_> = (0..film.tile_count()).collect();
     for slot in film.slots(&all) {
@@ -46,7 +46,7 @@ pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
     }
 }
 
-/// Gives both replicates `count` samples in every pixel, whose sums in `[group][channel]` are
+/// Adds `count` samples per pixel to both replicates. Their sums, `[group][channel]`, are
 /// `sums(x, y, replicate)` times the group's scale, rounded.
 pub fn fill(film: &mut Film, count: u32, mut sums: impl FnMut(usize, usize, usize) -> Vec<f64>) {
     let scales = film.scales().to_vec();

@@ -1,4 +1,4 @@
-//! One 16x16 square of the film: integer sums for both replicates.
+//! Tile of 16x16 pixels: integer sums for both replicates.
 
 use crate::film::invalid::InvalidSamples;
 use crate::film::{InvalidSample, TILE};
@@ -7,40 +7,38 @@ use crate::lanes::prefetch;
 /// Number of pixels in a tile.
 pub const TILE_PIXELS: usize = TILE * TILE;
 
-/// The most light groups of a film.
+/// Largest number of light groups of a film.
 pub const MAX_FILM_GROUPS: usize = 16;
 
-/// Sums in a cache line.
+/// Number of sums in a cache line.
 const CACHE_LINE: usize = 8;
 
-/// The sums of a pixel that has none.
-static NOTHING: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
+/// Sums of a pixel without samples.
+static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 
-/// The sums of one 16x16 square of pixels. Pixels are numbered `y * 16 + x` inside the tile; the
-/// tiles at the right and lower edge have pixels that lie outside the picture (see
-/// [`Tile::extent`]) and stay zero.
+/// Sums of 16x16 pixels. Pixels are numbered `y * 16 + x` inside the tile. The tiles at the right and lower
+/// edge have pixels outside the picture (see [`Tile::extent`]), which stay zero.
 ///
-/// Every pixel has the same number of samples, one number per replicate, except while the very first
-/// sample of replicate A is taken in interleaved order: then [`Tile::lattice_px`] tells which pixels
-/// have it already.
+/// Every pixel has the same number of samples, one number per replicate. The exception is the first sample
+/// of replicate A, taken in interleaved order: [`Tile::lattice_px`] determines the pixels that have it.
 #[derive(Debug)]
 pub struct Tile {
-    /// The film's epoch in which the contents were made; 0: never.
+    /// Epoch of the film to which the contents belong; 0 before the first.
     epoch: u64,
     /// `groups * 3`.
     stride: usize,
     extent: [usize; 2],
     counts: [u32; 2],
     lattice_px: u8,
-    /// Some sum has reached the largest value.
+    /// A sum has reached its limit.
     full: bool,
     saturated_samples: u64,
     bad: InvalidSamples,
     /// `[replicate][pixel][group][channel]`; empty until the first touch.
     sums: Vec<i64>,
-    /// Bit `p % 64` of `[replicate][p / 64]`: the sums of pixel p are of this epoch. Those of other
-    /// pixels are zero, whatever is stored: so a restart costs nothing per pixel, and the first few
-    /// samples of a large film touch only a few of its pages of memory.
+    /// Bit `p % 64` of `[replicate][p / 64]` is set if the sums of pixel p belong to this epoch. Those of
+    /// other pixels count as zero, whatever is stored: a restart costs nothing per pixel, and the first
+    /// samples of a large film touch few of its memory pages.
     written: [[u64; TILE_PIXELS / 64]; 2],
 }
 
@@ -60,17 +58,17 @@ impl Tile {
         }
     }
 
-    /// The tile's memory for another film; its contents mean nothing there.
+    /// Releases the tile's memory for another film.
     pub(super) fn into_memory(self) -> Vec<i64> {
         self.sums
     }
 
-    /// Gives an untouched tile memory to use again.
+    /// Gives an untouched tile memory for reuse.
     pub(super) fn with_memory(self, sums: Vec<i64>) -> Self {
         Self { sums, ..self }
     }
 
-    /// Makes the tile one of `epoch`: allocates or clears it if it is not one yet.
+    /// Moves the tile to `epoch`: allocates or clears it if it belongs to another one.
     pub(super) fn clear_if_stale(&mut self, epoch: u64) {
         if self.epoch == epoch {
             return;
@@ -79,7 +77,7 @@ impl Tile {
         if self.sums.capacity() >= len {
             self.sums.resize(len, 0);
         } else {
-            // Not by growing, which would copy what means nothing any more.
+            // A new allocation: growth would copy stale contents.
             self.sums = vec![0; len];
         }
         self.written = Default::default();
@@ -95,49 +93,49 @@ impl Tile {
         self.epoch == epoch
     }
 
-    /// Width and height of the part that lies inside the picture, in pixels, 1..=16 each.
+    /// Width and height of the part inside the picture, in pixels, 1..=16 each.
     pub fn extent(&self) -> [usize; 2] {
         self.extent
     }
 
-    /// Samples that every pixel has, of replicates A and B.
+    /// Number of samples of every pixel, for replicates A and B.
     pub fn counts(&self) -> [u32; 2] {
         self.counts
     }
 
-    /// While the first sample of replicate A is taken in interleaved order: the pixels whose x and y
-    /// are both multiples of this have it, in addition to [`Tile::counts`]. 0: no such pixel.
+    /// Step of the lattice during the interleaved first pass: pixels whose x and y are both multiples of it
+    /// have the first sample of replicate A, in addition to [`Tile::counts`]. 0 outside of that pass.
     pub fn lattice_px(&self) -> usize {
         usize::from(self.lattice_px)
     }
 
-    /// Samples that one pixel has, of replicates A and B.
+    /// Number of samples of one pixel, for replicates A and B.
     #[inline]
     pub fn counts_of(&self, pixel: usize) -> [u32; 2] {
         let extra = self.lattice_px != 0 && on_lattice(pixel, usize::from(self.lattice_px));
         [self.counts[0] + u32::from(extra), self.counts[1]]
     }
 
-    /// Whether a pixel has any sample.
+    /// Returns `true` if the pixel has a sample.
     pub fn sampled(&self, pixel: usize) -> bool {
         self.counts_of(pixel) != [0; 2]
     }
 
-    /// Whether any pixel has a sample.
+    /// Returns `true` if any pixel has a sample.
     pub fn any_sampled(&self) -> bool {
         self.counts != [0; 2] || self.lattice_px != 0
     }
 
-    /// Records that every pixel got `samples` more of `replicate` (0: A, 1: B).
+    /// Records `samples` further samples of `replicate` (0: A, 1: B) in every pixel.
     pub fn advance(&mut self, replicate: usize, samples: u32) {
         self.counts[replicate] = self.counts[replicate].saturating_add(samples);
     }
 
-    /// Records that the pixels whose x and y are multiples of `step_px` (1, 2, 4, 8 or 16) all have
-    /// their first sample of replicate A; with 1 that is every pixel, and the count grows by one.
+    /// Records the first sample of replicate A in the pixels whose x and y are multiples of `step_px` (1, 2,
+    /// 4, 8 or 16). With 1 that is every pixel, and the count grows by one.
     ///
     /// # Panics
-    /// If `step_px` is none of these, or coarser than what is there already.
+    /// If `step_px` is none of these, or coarser than the current lattice.
     pub fn set_lattice(&mut self, step_px: usize) {
         assert!(
             matches!(step_px, 1 | 2 | 4 | 8 | 16)
@@ -153,7 +151,7 @@ impl Tile {
         }
     }
 
-    /// The sums of one pixel and replicate (0: A, 1: B): `[group][channel]`, length `groups * 3`.
+    /// Sums of one pixel and replicate (0: A, 1: B): `[group][channel]`, length `groups * 3`.
     /// Adding to them directly is for sums that cannot overflow; else use [`Tile::add`].
     #[inline(always)]
     pub fn pixel_mut(&mut self, replicate: usize, pixel: usize) -> &mut [i64] {
@@ -171,32 +169,32 @@ impl Tile {
         sums
     }
 
-    /// The sums of one pixel and replicate: `[group][channel]`.
+    /// Sums of one pixel and replicate: `[group][channel]`.
     #[inline(always)]
     pub fn pixel(&self, replicate: usize, pixel: usize) -> &[i64] {
         if self.written[replicate][pixel / 64] >> (pixel % 64) & 1 == 0 {
-            return &NOTHING[..self.stride];
+            return &ZERO_SUMS[..self.stride];
         }
         let start = (replicate * TILE_PIXELS + pixel) * self.stride;
         &self.sums[start..start + self.stride]
     }
 
-    /// Begins to bring the sums of a replicate from memory; nothing waits for it.
+    /// Prefetches the sums of a replicate into the cache.
     pub fn prefetch(&self, replicate: usize) {
         let start = replicate * TILE_PIXELS * self.stride;
         let sums = &self.sums[start..start + TILE_PIXELS * self.stride];
         sums.chunks(CACHE_LINE).for_each(|line| prefetch(&line[0]));
     }
 
-    /// Every replicate and pixel whose sums can be other than zero.
+    /// Replicates and pixels whose sums belong to this epoch.
     fn written(&self) -> impl Iterator<Item = (usize, usize)> {
         let all = (0..2).flat_map(|r| (0..TILE_PIXELS).map(move |p| (r, p)));
         all.filter(|(r, p)| self.written[*r][p / 64] >> (p % 64) & 1 != 0)
     }
 
-    /// Adds non-negative `values` (`[group][channel]`, length `groups * 3`) to a pixel. A sum that
-    /// would pass `i64::MAX` stays there and counts as saturated: being non-negative, the values give
-    /// the same sums in any order even then.
+    /// Adds non-negative `values` (`[group][channel]`, length `groups * 3`) to a pixel. A sum that would
+    /// exceed `i64::MAX` stays there and counts as saturated. The values are not negative, so the order of
+    /// addition does not matter even then.
     #[inline(always)]
     pub fn add(&mut self, replicate: usize, pixel: usize, values: &[i64]) {
         for (group, values) in values.chunks_exact(3).enumerate() {
@@ -204,18 +202,18 @@ impl Tile {
         }
     }
 
-    /// The same for one group.
+    /// Adds the non-negative `values` of one group to a pixel; see [`Tile::add`].
     #[inline(always)]
     pub fn add_group(&mut self, replicate: usize, pixel: usize, group: usize, values: [i64; 3]) {
         let sums = &mut self.pixel_mut(replicate, pixel)[3 * group..][..3];
-        // Of numbers that are not negative, a sum that does not fit is.
+        // A sum of non-negative numbers that overflows is negative.
         let new = [0, 1, 2].map(|c| sums[c].wrapping_add(values[c]));
         let fit = new[0] | new[1] | new[2] >= 0;
-        sums.copy_from_slice(&if fit { new } else { new.map(at_most_the_largest) });
+        sums.copy_from_slice(&if fit { new } else { new.map(saturated_sum) });
         self.full |= !fit;
     }
 
-    /// Number of channel sums that have reached the largest value a sum can have.
+    /// Number of channel sums that have reached their limit.
     pub fn saturated(&self) -> u64 {
         if !self.full {
             return 0;
@@ -233,18 +231,18 @@ impl Tile {
         (0..TILE_PIXELS).filter(full).count() as u64
     }
 
-    /// Records samples that were brighter than the film holds: they have the largest value that it does.
+    /// Records samples that were brighter than the film can hold and have its largest value.
     #[cold]
     pub fn record_saturated(&mut self, samples: u64) {
         self.saturated_samples += samples;
     }
 
-    /// Number of such samples.
+    /// Number of samples that were brighter than the film can hold.
     pub fn saturated_samples(&self) -> u64 {
         self.saturated_samples
     }
 
-    /// Records a sample that was NaN or negative. It counts as a sample of value 0.
+    /// Records an invalid sample. It counts as a sample of value 0.
     #[cold]
     pub fn record_bad(&mut self, sample: InvalidSample) {
         self.bad.record(sample);
@@ -254,7 +252,10 @@ impl Tile {
         &self.bad
     }
 
-    /// Adds another tile of the same place. `Err`: both hold parts of the same first sample.
+    /// Adds the same tile of another film.
+    ///
+    /// # Errors
+    /// Fails if both hold parts of the same first sample.
     pub(super) fn add_tile(&mut self, other: &Self) -> Result<(), ()> {
         if self.lattice_px != 0 && other.lattice_px != 0 {
             return Err(());
@@ -273,20 +274,20 @@ impl Tile {
     }
 }
 
-/// A sum that has wrapped around stays at the limit.
+/// Replaces a sum that has wrapped around by the limit.
 #[cold]
-fn at_most_the_largest(sum: i64) -> i64 {
+fn saturated_sum(sum: i64) -> i64 {
     if sum < 0 { i64::MAX } else { sum }
 }
 
 #[inline(always)]
 fn on_lattice(pixel: usize, step_px: usize) -> bool {
-    // Steps are powers of two: x and y have no bit below the step.
+    // Steps are powers of two: x and y of lattice pixels have no bit below the step.
     ((pixel % TILE) | (pixel / TILE)) & (step_px - 1) == 0
 }
 
-/// The pixels of a tile that a lattice of `step_px` has and one of `before_px` has not (0: no lattice
-/// before), in row order. `step_px` divides 16.
+/// Pixels of the lattice of `step_px` that are missing in the lattice of `before_px` (0: none), in row order.
+/// `step_px` divides 16.
 pub fn lattice_pixels(before_px: usize, step_px: usize) -> impl Iterator<Item = usize> {
     let lines = move || (0..TILE).step_by(step_px);
     lines()
@@ -316,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lattice_tells_which_pixels_have_the_first_sample() {
+    fn lattice_determines_the_pixels_with_a_first_sample() {
         let mut tile = tile();
         assert!(!tile.any_sampled());
         tile.set_lattice(8);
@@ -329,14 +330,14 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "a lattice of 8 pixels after one of 4")]
-    fn a_lattice_only_becomes_finer() {
+    fn coarser_lattice_panics() {
         let mut tile = tile();
         tile.set_lattice(4);
         tile.set_lattice(8);
     }
 
     #[test]
-    fn saturation_stays_and_is_counted() {
+    fn saturated_sums_stay_and_are_counted() {
         let mut tile = tile();
         tile.add(1, 3, &[i64::MAX - 1, 1, 2, 3, 4, 5]);
         assert_eq!(tile.saturated(), 0);
@@ -352,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_epoch_clears() {
+    fn new_epoch_clears_the_tile() {
         let mut tile = tile();
         tile.add(0, 0, &[1; 6]);
         tile.advance(0, 1);
@@ -363,7 +364,7 @@ mod tests {
         tile.clear_if_stale(2);
         assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (0, [0, 0]));
         assert_eq!(tile.saturated_samples(), 0);
-        // Also where the first thing that happens is a write, and in memory of another stride.
+        // A write is the first access, in memory of the same and of another stride.
         tile.add(0, 0, &[2; 6]);
         assert_eq!((tile.pixel(0, 0), tile.pixel(1, 0)), (&[2; 6][..], &[0; 6][..]));
         for groups in [1, 3] {

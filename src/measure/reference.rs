@@ -229,33 +229,22 @@ fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::testing::Rng;
 
-    /// Approximately normal numbers: sums of twelve uniform ones.
-    struct Noise(u64);
-
-    impl Noise {
-        fn next(&mut self) -> f64 {
-            (0..12).fold(-6.0, |sum, _| {
-                self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                sum + (self.0 >> 11) as f64 / (1u64 << 53) as f64
-            })
-        }
-
-        /// Grey pixels of standard deviation `s` about 0.5, plus a third of that in each channel.
-        fn pixels(&mut self, count: usize, s: f64) -> Vec<[f64; 3]> {
-            let pixel = |_| {
-                let common = self.next();
-                [0; 3].map(|_| 0.5 + s * (common + self.next() / 3.0))
-            };
-            (0..count).map(pixel).collect()
-        }
+    /// Grey pixels of standard deviation `s` about 0.5, plus a third of that in each channel.
+    fn noisy_pixels(rng: &mut Rng, count: usize, s: f64) -> Vec<[f64; 3]> {
+        let pixel = |_| {
+            let common = rng.normal();
+            [0; 3].map(|_| 0.5 + s * (common + rng.normal() / 3.0))
+        };
+        (0..count).map(pixel).collect()
     }
 
     /// Replicates with noise of standard deviation s have a mean whose error is s / sqrt 2.
     #[test]
     fn own_error_is_that_of_the_mean() {
-        let mut noise = Noise(1);
-        let [a, b] = [0; 2].map(|_| noise.pixels(10_000, 0.01));
+        let mut rng = Rng(1);
+        let [a, b] = [0; 2].map(|_| noisy_pixels(&mut rng, 10_000, 0.01));
         let reference = Reference::of_replicates([100, 100], &a, &b, &Display::default());
         let expected = 0.01 * (1.0f64 + 1.0 / 9.0).sqrt() / 2f64.sqrt();
         assert!((reference.noise_linear() / expected - 1.0).abs() < 0.02);
@@ -267,13 +256,13 @@ mod tests {
     /// Errors of one picture against many references of the same noise differ by the predicted spread.
     #[test]
     fn spread_is_that_between_references() {
-        let mut noise = Noise(2);
+        let mut rng = Rng(2);
         let size = [40, 30];
         for (own, theirs) in [(0.01, 0.003), (0.01, 0.01), (0.004, 0.01)] {
-            let picture = noise.pixels(1200, own);
+            let picture = noisy_pixels(&mut rng, 1200, own);
             let errors: Vec<Errors> = (0..200)
                 .map(|_| {
-                    let [a, b] = [0; 2].map(|_| noise.pixels(1200, theirs * 2f64.sqrt()));
+                    let [a, b] = [0; 2].map(|_| noisy_pixels(&mut rng, 1200, theirs * 2f64.sqrt()));
                     let reference = Reference::of_replicates(size, &a, &b, &Display::default());
                     reference.errors_of(&mut |y, row| {
                         row.clear();
@@ -295,8 +284,8 @@ mod tests {
 
     #[test]
     fn exact_reference_has_no_spread_and_equal_pictures_no_error() {
-        let mut noise = Noise(3);
-        let pixels = noise.pixels(1200, 0.01);
+        let mut rng = Rng(3);
+        let pixels = noisy_pixels(&mut rng, 1200, 0.01);
         let same = |row: &mut Vec<[f64; 3]>, y: usize| {
             row.clear();
             row.extend_from_slice(&pixels[y * 40..(y + 1) * 40]);

@@ -258,6 +258,7 @@ impl Measurement {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::testing::Rng;
     use crate::measure::reference::Errors;
 
     fn measured(points: &[(f64, f64)]) -> Measured {
@@ -316,14 +317,8 @@ mod tests {
     /// in about four of five cases.
     #[test]
     fn spread_predicts_the_median_of_another_measurement() {
-        let mut state = 5u64;
-        let mut time = || {
-            1.0 + 0.03
-                * (0..12).fold(-6.0, |sum, _| {
-                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                    sum + (state >> 11) as f64 / (1u64 << 53) as f64
-                })
-        };
+        let mut rng = Rng(5);
+        let mut time = || 1.0 + 0.03 * rng.normal();
         for n in [3, 4, 5, 6, 8, 9, 15, 31] {
             let mut times = || (0..n).map(|_| time()).collect::<Vec<f64>>();
             let near = |(a, b): &(Vec<f64>, Vec<f64>)| {

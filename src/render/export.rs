@@ -1,5 +1,5 @@
-//! Picture files of a rendering, and what they say about how it was made. Equal pictures say the
-//! same: no dates, no times, no threads.
+//! Export of pictures with provenance metadata. Equal pictures have equal metadata: no dates, times or
+//! numbers of threads.
 
 use crate::film::{Depth, Display, ImageData, ImageOutput, Tone, WriteError};
 use crate::render::render_state::RenderState;
@@ -7,50 +7,53 @@ use crate::render::session::Report;
 use crate::sampling::SamplerKind;
 use crate::value::fnv1a64;
 
-/// How a picture came to be, as far as its rendering does not know.
+/// Provenance of a picture beyond its render state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Provenance {
-    /// The scene file, as the user named it.
+    /// Path of the scene file, as given by the user.
     pub source: String,
-    /// [`scene_hash`] of its text.
+    /// [`scene_hash`] of the scene file's text.
     pub scene_hash: String,
-    /// Where samples lie.
+    /// Sampler.
     pub sampler: SamplerKind,
-    /// Whether noisy tiles got more samples than others.
+    /// Adaptive sampling.
     pub adaptive: bool,
 }
 
 impl RenderState {
-    /// Writes the picture as it stands, with its metadata. `report`: about this very film.
+    /// Writes the current picture with its metadata. `report` is the report on this film.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be written.
     pub fn write(
         &self,
         report: &Report,
-        origin: &Provenance,
+        provenance: &Provenance,
         display: Display,
         depth: Depth,
-        target: &ImageOutput,
+        output: &ImageOutput,
     ) -> Result<(), WriteError> {
-        target.write(&ImageData {
+        output.write(&ImageData {
             film: &self.film,
             mix: &self.mix,
             group_names: &self.group_names(),
             display,
             depth,
-            metadata: &metadata(self, report, origin, &display),
+            metadata: &metadata(self, report, provenance, &display),
         })
     }
 }
 
-/// A hash of a scene's text, which tells whether a picture was made from it.
+/// Hash of a scene's text, which identifies the scene of a picture.
 pub fn scene_hash(text: &str) -> String {
     format!("fnv1a64:{:016x}", fnv1a64(text.as_bytes()))
 }
 
-/// Keys and values for the file.
+/// Metadata keys and values.
 fn metadata(
     rendering: &RenderState,
     report: &Report,
-    origin: &Provenance,
+    provenance: &Provenance,
     display: &Display,
 ) -> Vec<(String, String)> {
     let spp = &report.spp;
@@ -67,8 +70,8 @@ fn metadata(
     let header = rendering.film.header();
     let entries = [
         ("Software", format!("zerkalo {}", env!("CARGO_PKG_VERSION"))),
-        ("Source", origin.source.clone()),
-        ("Scene hash", origin.scene_hash.clone()),
+        ("Source", provenance.source.clone()),
+        ("Scene hash", provenance.scene_hash.clone()),
         ("Seed", header.seed.to_string()),
         ("Samples per pixel", format!("{:.2} ({}-{})", spp.mean, spp.min, spp.max)),
         ("Noise", noise),
@@ -80,9 +83,9 @@ fn metadata(
             "Settings",
             format!(
                 "sampler {}, {} precision, {}, exposure {} EV, tone {}",
-                origin.sampler.name(),
+                provenance.sampler.name(),
                 header.precision,
-                if origin.adaptive { "adaptive" } else { "uniform" },
+                if provenance.adaptive { "adaptive" } else { "uniform" },
                 display.exposure_ev,
                 tone,
             ),

@@ -1,12 +1,12 @@
-//! What can be seen in each cell of the guest's raster, besides colours.
+//! Feature buffer: the first hit in each cell of a display raster.
 
 use crate::world::FirstHit;
 use rayon::prelude::*;
 
-/// Rays traced by one thread at a time.
+/// Number of rays that a thread traces at a time.
 const CHUNK: usize = 512;
 
-/// One camera ray through the centre of each cell of a raster that covers the picture.
+/// First hits of the camera rays through the centres of a raster that covers the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureBuffer {
     /// Cells in a row.
@@ -18,12 +18,13 @@ pub struct FeatureBuffer {
 }
 
 impl FeatureBuffer {
-    /// For a film of `size` pixels; `look` tells what is seen through points of the film, in pixels
-    /// (see [`AnyWorld::look`](crate::world::AnyWorld::look)).
+    /// Traces a raster of `columns` x `rows` cells over a film of `width` x `height` pixels. `first_hits`
+    /// writes the first hits of the camera rays through points of the film, in pixels (see
+    /// [`AnyWorld::first_hit`](crate::world::AnyWorld::first_hit)).
     pub fn new(
         [width, height]: [usize; 2],
         [columns, rows]: [usize; 2],
-        look: impl Fn(&[[f64; 2]], &mut [FirstHit]) + Sync,
+        first_hits: impl Fn(&[[f64; 2]], &mut [FirstHit]) + Sync,
         pool: &rayon::ThreadPool,
     ) -> Self {
         let mut texels = vec![FirstHit::MISS; columns * rows];
@@ -36,13 +37,13 @@ impl FeatureBuffer {
                 let point = |i: usize| {
                     [center(i % columns, columns, width), center(i / columns, rows, height)]
                 };
-                look(&cells.map(point).collect::<Vec<_>>(), texels);
+                first_hits(&cells.map(point).collect::<Vec<_>>(), texels);
             });
         });
         Self { columns, rows, texels }
     }
 
-    /// What is seen in a cell; `None`: there is no such cell.
+    /// First hit of a cell; `None` outside of the raster.
     pub fn at(&self, column: usize, row: usize) -> Option<&FirstHit> {
         if column >= self.columns {
             return None;
@@ -50,7 +51,7 @@ impl FeatureBuffer {
         self.texels.get(row * self.columns + column)
     }
 
-    /// All cells, `[row][column]`.
+    /// First hits of all cells, `[row][column]`.
     pub fn texels(&self) -> &[FirstHit] {
         &self.texels
     }

@@ -1,4 +1,4 @@
-//! From a scene to a growing film: what to trace next, and the threads that do it.
+//! Progressive rendering: schedule, passes, and the session that runs them on its threads.
 
 pub mod export;
 mod feature_buffer;

@@ -1,5 +1,5 @@
-//! A render in the caller's thread, one decision of the schedule after the other: for measurements,
-//! where nothing may depend on when somebody looks.
+//! Synchronous progressive render in the caller's thread, for measurements that must not depend on the
+//! times of snapshots.
 
 use crate::render::schedule::{Schedule, Settings, Spp, Step, StoppedBy};
 
@@ -9,7 +9,7 @@ use std::io;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// A render that is taken step by step.
+/// Synchronous progressive render.
 pub struct SyncRender {
     rendering: RenderState,
     schedule: Schedule,
@@ -18,8 +18,10 @@ pub struct SyncRender {
 }
 
 impl SyncRender {
-    /// Compiles `scene`, which has no faults, to be traced by `threads` threads. `Err`: they are not
-    /// to be had.
+    /// Compiles `scene`, which has no faults, for `threads` threads.
+    ///
+    /// # Errors
+    /// Returns the error of the system that refuses to start a thread.
     pub fn new(
         scene: &Scene,
         options: &Options,
@@ -36,8 +38,8 @@ impl SyncRender {
         Ok(Self { rendering, schedule, pool, seconds: 0.0 })
     }
 
-    /// Traces what the schedule decides next, in both replicates, so that the picture's error is
-    /// known afterwards. `Some`: there was nothing left to do, and why.
+    /// Traces the next decision of the schedule in both replicates, so that the picture's error is known
+    /// afterwards. Returns the reason if nothing is left to do.
     pub fn step(&mut self) -> Option<StoppedBy> {
         loop {
             let wave = match self.schedule.next(self.seconds) {
@@ -59,7 +61,7 @@ impl SyncRender {
         self.seconds
     }
 
-    /// Samples so far, over all pixels.
+    /// Number of samples so far, over all pixels.
     pub fn samples(&self) -> u64 {
         self.schedule.samples()
     }
@@ -69,13 +71,13 @@ impl SyncRender {
         self.schedule.spp()
     }
 
-    /// The RMSE as displayed that the program itself would tell in codes.
+    /// Estimated RMSE as displayed, in 8-bit levels.
     pub fn noise_codes(&self) -> Option<f64> {
         self.schedule.noise().map(|noise| noise.rmse_codes)
     }
 
-    /// A lower and an upper guess of the seconds of tracing, in all, at which that error will have fallen
-    /// to `codes`; `None` before an error is known.
+    /// Lower and upper estimate of the total seconds of tracing at which that error falls to `codes` 8-bit
+    /// levels; `None` before an error is known.
     pub fn seconds_to_noise(&self, codes: f64) -> Option<(f64, f64)> {
         let (low, high) = self.schedule.seconds_to_noise(codes, self.seconds)?;
         Some((self.seconds + low, self.seconds + high))

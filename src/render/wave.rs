@@ -1,4 +1,4 @@
-//! What the schedule decides and the pass carries out, as plain data.
+//! Waves of jobs: the schedule's decisions, carried out by a pass.
 
 use crate::film::{TILE_PIXELS, TileNoise};
 
@@ -20,14 +20,14 @@ pub struct Wave {
     pub replicate: usize,
     /// The jobs, in any order.
     pub jobs: Vec<Job>,
-    /// Whether each job ends with an estimate of its tile's error. Only set where that makes sense:
-    /// in waves of B, after which both replicates of the tile hold equally many samples.
+    /// Each job ends with an estimate of its tile's error. Only set in waves of B, after which both
+    /// replicates of the tile hold equally many samples.
     pub estimate: bool,
 }
 
 impl Wave {
-    /// The first of its jobs, about `pixel_samples` samples of pixels together (but at least one
-    /// job), none of them longer than `longest` samples per pixel: a piece that takes a short time.
+    /// Cuts the wave to its first jobs, of about `pixel_samples` pixel samples together (at least one job),
+    /// and each job to at most `longest` samples per pixel.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;
@@ -41,23 +41,23 @@ impl Wave {
     }
 }
 
-/// What a finished job says about its tile.
+/// Result of a finished job.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JobReport {
-    /// Rays of every kind (camera, shadow, reflected): the cost of the job, the same on every
+    /// Number of rays of every kind (camera, shadow, reflected): the cost of the job, equal on every
     /// machine.
     pub rays: u64,
-    /// Whether a path met a glossy lobe.
+    /// A path hit a glossy lobe.
     pub glossy: bool,
-    /// The error of the tile's pixels now, if the wave asked for it.
+    /// Error of the tile's pixels, if [`Wave::estimate`] is set.
     pub error: Option<TileNoise>,
 }
 
-/// What became of a wave.
+/// Result of a wave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaveReport {
-    /// One entry per job, in the order of the wave; `None`: cancelled before it began, nothing of it
-    /// is in the film.
+    /// One entry per job, in the order of the wave; `None` if it was cancelled before its start and left no
+    /// sample in the film.
     pub reports: Vec<Option<JobReport>>,
 }
 
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wave_is_cut_to_short_jobs() {
+    fn wave_is_cut_to_short_jobs() {
         let jobs: Vec<Job> = (0..4).map(|tile| Job { tile, first: 8, count: 24 }).collect();
         let wave = Wave { replicate: 1, jobs, estimate: true };
         assert_eq!(wave.clone().cut(u64::MAX, 24), wave);

@@ -1,5 +1,4 @@
-//! Names and texts from elsewhere that would like to steer a terminal, and scenes that would like to
-//! read what is none of their business.
+//! Hostile input: control characters in names and texts, and scenes that name files outside of their folder.
 
 use super::*;
 
@@ -7,8 +6,8 @@ use super::*;
 const EVIL: &str =
     "\u{1b}]52;c;cm0gLXJm\u{7}\u{1b}[31m\u{9b}32m\u{9d}52;c;AA\u{9c}\u{202e}\r\u{8}\u{200b}";
 
-/// Whether anything in `text` is more than letters and line ends.
-fn steers(text: &str) -> bool {
+/// Returns `true` if `text` contains control or formatting characters other than line ends.
+fn has_control_characters(text: &str) -> bool {
     text.chars().any(|c| {
         (c.is_control() && c != '\n')
             || ('\u{200b}'..='\u{200f}').contains(&c)
@@ -17,8 +16,8 @@ fn steers(text: &str) -> bool {
 }
 
 fn check(what: &str, run: &Run) {
-    assert!(!steers(&run.out), "{what}: {:?}", run.out);
-    assert!(!steers(&run.err), "{what}: {:?}", run.err);
+    assert!(!has_control_characters(&run.out), "{what}: {:?}", run.out);
+    assert!(!has_control_characters(&run.err), "{what}: {:?}", run.err);
     assert!(!run.err.contains("panicked"), "{what}: {:?}", run.err);
 }
 
@@ -30,7 +29,7 @@ fn toml(text: &str) -> String {
 
 #[test]
 #[cfg(unix)]
-fn names_of_files_steer_no_terminal() {
+fn file_names_are_printed_without_control_characters() {
     let desk = Desk::new();
     let scene = format!("{EVIL}.toml");
     let (picture, other) = (format!("{EVIL}.png"), format!("{EVIL}.exr"));
@@ -73,7 +72,7 @@ fn names_of_files_steer_no_terminal() {
 }
 
 #[test]
-fn what_a_scene_says_steers_no_terminal() {
+fn scene_texts_are_printed_without_control_characters() {
     let desk = Desk::new();
     let evil = toml(EVIL);
     for (what, text) in [
@@ -110,7 +109,7 @@ fn what_a_scene_says_steers_no_terminal() {
 }
 
 #[test]
-fn what_mesh_files_say_steers_no_terminal() {
+fn mesh_texts_are_printed_without_control_characters() {
     let desk = Desk::new();
     for (name, text) in [
         ("m.obj", format!("mtllib {EVIL}\no {EVIL}\nv 0 0 0\nf 1 2 {EVIL}\n")),
@@ -136,7 +135,7 @@ fn what_mesh_files_say_steers_no_terminal() {
 }
 
 #[test]
-fn the_environment_steers_no_terminal() {
+fn environment_is_printed_without_control_characters() {
     let desk = Desk::new();
     let mut command = desk.command(&["doctor"]);
     for name in ["TERM", "COLORTERM", "SSH_CONNECTION", "LC_ALL", "XDG_STATE_HOME", "TMUX"] {
@@ -146,13 +145,13 @@ fn the_environment_steers_no_terminal() {
     let run = Run::from(command.output().unwrap());
     assert_eq!(run.status, 0, "{}", run.err);
     check("doctor", &run);
-    assert!(run.out.contains("not asked"), "{}", run.out);
+    assert!(run.out.contains("not queried"), "{}", run.out);
 }
 
-/// Devices, pipes and folders are no meshes, whatever they are called, and are not waited for.
+/// Devices, pipes and folders are refused as meshes without blocking, whatever their names are.
 #[test]
 #[cfg(unix)]
-fn a_scene_reads_regular_files_only() {
+fn scenes_read_regular_files_only() {
     use std::os::unix::fs::symlink;
     let desk = Desk::new();
     symlink("/dev/zero", desk.path("zero.obj")).unwrap();
@@ -170,9 +169,9 @@ fn a_scene_reads_regular_files_only() {
     }
 }
 
-/// Files that a scene's file names in turn are looked for in its own folder and below.
+/// Files that a mesh file names must be in its own folder or below.
 #[test]
-fn files_of_files_stay_in_their_folder() {
+fn files_named_by_meshes_stay_in_their_folder() {
     let desk = Desk::new();
     fs::create_dir(desk.path("meshes")).unwrap();
     fs::write(desk.path("secret.bin"), [0; 36]).unwrap();
@@ -201,9 +200,9 @@ fn files_of_files_stay_in_their_folder() {
     }
 }
 
-/// What a scene wants to be large is refused before memory is taken for it.
+/// Excessive sizes are refused before memory is allocated.
 #[test]
-fn sizes_are_checked_before_anything_is_allocated() {
+fn sizes_are_checked_before_allocation() {
     let desk = Desk::new();
     let header = "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\n\
                   property float x\nproperty float y\nproperty float z\nelement face 4000000000\n\
@@ -217,7 +216,7 @@ fn sizes_are_checked_before_anything_is_allocated() {
             "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
         );
         fs::write(desk.path("mesh.toml"), scene).unwrap();
-        // With so little memory only what refuses in time can still tell why.
+        // With this little memory only an early refusal can print its reason.
         let program = env!("CARGO_BIN_EXE_zerkalo");
         let mut command = Command::new("sh");
         command.arg("-c").arg(format!("ulimit -v 2000000; exec '{program}' check mesh.toml"));

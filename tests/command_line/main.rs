@@ -1,4 +1,4 @@
-//! The program itself, as users and scripts meet it.
+//! The command line as users and scripts use it.
 
 mod hostile;
 mod refusals;
@@ -38,7 +38,7 @@ material = "mirror"
 shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0, 0.0, 1.0] }
 "#;
 
-/// A folder with `scene.toml` in it.
+/// Folder that contains `scene.toml`.
 struct Desk(TempDir);
 
 impl Desk {
@@ -68,7 +68,7 @@ impl Desk {
         assert_eq!(run.status, 0, "{}", run.err);
         serde_json::from_slice(&fs::read(self.path("stats.json")).unwrap()).unwrap()
     }
-    /// Names of the files there are, sorted.
+    /// Names of the files in the folder, sorted.
     fn files(&self) -> Vec<String> {
         let entries = fs::read_dir(self.0.path()).unwrap();
         let mut names: Vec<_> =
@@ -99,7 +99,7 @@ fn is_png(path: &Path) -> bool {
 }
 
 #[test]
-fn a_scene_becomes_a_picture() {
+fn render_writes_a_picture() {
     let desk = Desk::new();
     let run = desk.render("a.png", &["--spp", "8"]);
     assert_eq!(run.status, 0, "{}", run.err);
@@ -115,7 +115,7 @@ fn a_scene_becomes_a_picture() {
 }
 
 #[test]
-fn pictures_do_not_depend_on_threads_and_do_on_the_seed() {
+fn pictures_depend_on_the_seed_and_not_on_threads() {
     let desk = Desk::new();
     let picture = |name: &str, more: &[&str]| {
         let run = desk.render(name, &[&["--noise", "1.5"], more].concat());
@@ -129,7 +129,7 @@ fn pictures_do_not_depend_on_threads_and_do_on_the_seed() {
 }
 
 #[test]
-fn files_tell_how_they_were_made() {
+fn files_hold_provenance_metadata() {
     let desk = Desk::new();
     desk.render("a.png", &["--spp", "8", "--seed", "42", "--exposure", "-0.5"]);
     let bytes = fs::read(desk.path("a.png")).unwrap();
@@ -157,9 +157,9 @@ fn files_tell_how_they_were_made() {
     assert!(text.contains("exposure -0.5 EV"));
 }
 
-/// Mirrors that make light stronger at every bounce, until the film does not hold it.
+/// Mirrors that amplify light at every bounce until it exceeds the film's range.
 #[test]
-fn samples_that_were_changed_are_told_everywhere() {
+fn saturated_samples_are_reported_everywhere() {
     let desk = Desk::new();
     let wall = |z: f64| {
         format!(
@@ -177,9 +177,9 @@ fn samples_that_were_changed_are_told_everywhere() {
     let stats: serde_json::Value = serde_json::from_str(&stats).unwrap();
     let count = stats["saturated_samples"].as_u64().unwrap();
     assert!(count > 0 && stats["bad_samples"] == 0, "{stats}");
-    let words = format!("{count} saturated samples");
+    let warning = format!("{count} saturated samples");
     assert!(
-        [&run.out, &run.err].iter().any(|text| text.contains(&words)),
+        [&run.out, &run.err].iter().any(|text| text.contains(&warning)),
         "{} {}",
         run.out,
         run.err
@@ -195,7 +195,7 @@ fn samples_that_were_changed_are_told_everywhere() {
 }
 
 #[test]
-fn statistics_have_every_key() {
+fn stats_file_has_every_key() {
     let desk = Desk::new();
     let stats = desk.stats(&["--spp", "31", "--threads", "2", "--seed", "5", "--uniform"]);
     for key in [
@@ -241,7 +241,7 @@ fn statistics_have_every_key() {
 }
 
 #[test]
-fn each_limit_stops_the_render() {
+fn each_stop_criterion_ends_the_render() {
     let desk = Desk::new();
     let noise = desk.stats(&["--noise", "2"]);
     assert_eq!(noise["stopped_by"], "noise");
@@ -262,7 +262,7 @@ fn each_limit_stops_the_render() {
 }
 
 #[test]
-fn precision_can_be_chosen() {
+fn precision_option_is_used() {
     let desk = Desk::new();
     for precision in ["single", "double"] {
         let stats = desk.stats(&["--spp", "2", "--precision", precision]);
@@ -271,7 +271,7 @@ fn precision_can_be_chosen() {
 }
 
 #[test]
-fn a_starter_scene_is_valid_and_says_so() {
+fn starter_scene_is_valid() {
     let desk = Desk::new();
     let run = desk.run(&["new", "mine.toml"]);
     assert_eq!((run.status, run.err.as_str()), (0, ""));
@@ -284,7 +284,7 @@ fn a_starter_scene_is_valid_and_says_so() {
 }
 
 #[test]
-fn doubts_are_told_on_stderr_and_are_no_failure() {
+fn warnings_are_printed_on_stderr_and_are_no_failure() {
     let desk = Desk::new();
     let bright = SCENE.replace("reflection = 0.9", "reflection = 1.9");
     fs::write(desk.path("scene.toml"), bright).unwrap();

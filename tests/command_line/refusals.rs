@@ -1,4 +1,4 @@
-//! What the program refuses, with which status and words, and that it leaves everything as it was.
+//! Usage errors and failures: exit status, message, unchanged files.
 
 use super::*;
 
@@ -79,11 +79,11 @@ fn every_bad_scene_has_status_1_and_names_its_file() {
     assert_eq!(fs::read_to_string(desk.path("old.png")).unwrap(), "precious");
 }
 
-/// What happens on a processor that lacks what the program was built for, under an emulator.
+/// Start on an emulated processor that lacks features of the build.
 #[cfg(target_arch = "x86_64")]
 #[test]
 #[ignore = "needs qemu-x86_64 (Debian: qemu-user); promised only with RUSTFLAGS=\"-C target-cpu=x86-64-v3\""]
-fn an_old_processor_gets_a_message() {
+fn old_processor_gets_a_message() {
     for (model, lacking) in [("Westmere", "avx"), ("SandyBridge", "avx2")] {
         let mut command = Command::new("qemu-x86_64");
         command.args(["-cpu", model, env!("CARGO_BIN_EXE_zerkalo"), "--help"]);

@@ -1,4 +1,4 @@
-//! Signals, sent by the program that every Unix has for that.
+//! SIGINT and SIGTERM, sent by `kill`.
 
 use super::*;
 use std::time::{Duration, Instant};
@@ -9,7 +9,7 @@ fn signal(name: &str, id: u32) {
 }
 
 #[test]
-fn a_signal_saves_the_picture_so_far() {
+fn signal_saves_the_picture_so_far() {
     for (name, status) in [("INT", 130), ("TERM", 143)] {
         let desk = Desk::new();
         let args = ["render", "scene.toml", "-o", "a.png", "--noise", "1e-6", "--stats", "s.json"];
@@ -27,7 +27,7 @@ fn a_signal_saves_the_picture_so_far() {
 }
 
 #[test]
-fn signals_are_answered_at_once_during_a_long_wave() {
+fn second_signal_ends_a_long_wave_at_once() {
     let desk = Desk::new();
     let args = [
         "render",

@@ -31,12 +31,24 @@ impl Numbers {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform integer in 0..n.
+    /// Log-uniform number between `low` and `high`.
+    pub fn log_uniform(&mut self, low: f64, high: f64) -> f64 {
+        self.between(low.ln(), high.ln()).exp()
+    }
+
+    /// Uniform integer below `n`.
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }
 
-    /// Unit vector, uniform over the sphere.
+    /// Shuffles `items` (Fisher-Yates).
+    pub fn shuffle<T>(&mut self, items: &mut [T]) {
+        for i in (1..items.len()).rev() {
+            items.swap(i, self.below(i + 1));
+        }
+    }
+
+    /// Direction, uniform over the unit sphere.
     pub fn direction(&mut self) -> DVec3 {
         let z = self.between(-1.0, 1.0);
         let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
@@ -44,7 +56,7 @@ impl Numbers {
         DVec3::new(r * cos, r * sin, z).normalize()
     }
 
-    /// Point, uniform in the cube from -`half` to `half`.
+    /// Point, uniform in the cube from -half to half.
     pub fn in_cube(&mut self, half: f64) -> DVec3 {
         DVec3::new(self.between(-half, half), self.between(-half, half), self.between(-half, half))
     }

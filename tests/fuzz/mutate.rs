@@ -1,7 +1,9 @@
 //! Mutations of files, as faulty writers, transfers and editors cause them.
 
-/// Random number generator (SplitMix64: Steele et al. 2014).
-pub struct Random(u64);
+use crate::common::Numbers;
+
+/// Random mutations.
+pub struct Random(Numbers);
 
 /// Replacements of numbers in a text.
 const NUMBERS: &[&str] = &[
@@ -29,20 +31,12 @@ const NUMBERS: &[&str] = &[
 impl Random {
     /// Creates the generator with the given seed.
     pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15))
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ z >> 31
+        Self(Numbers::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
     }
 
     /// Returns a number below `n`, which is greater than 0.
     pub fn below(&mut self, n: usize) -> usize {
-        (self.next() % n as u64) as usize
+        self.0.below(n)
     }
 
     /// Returns `bytes` after one to four mutations, sometimes with pieces of `other`.
@@ -62,7 +56,7 @@ impl Random {
         match self.below(10) {
             0 => out[at] ^= 1 << self.below(8),
             1 => out[at] = [0, 1, 0x7f, 0x80, 0xff, b'\n', b' ', b'"'][self.below(8)],
-            2 => out[at] = self.next() as u8,
+            2 => out[at] = self.0.bits() as u8,
             3 => out.truncate(at),
             4 => {
                 let end = (at + 1 + self.below(16)).min(out.len());

@@ -1,6 +1,8 @@
-//! The error that the program tells is the error that is left, and the picture is not biased: shown
-//! on a scene whose every pixel is known in closed form, and on the mirror room.
+//! Estimated errors against true errors, and unbiasedness of the picture, on a scene with a closed form for
+//! every pixel and on the mirror room.
 
+#[path = "../common/mod.rs"]
+mod common;
 #[path = "../common/report.rs"]
 mod report;
 mod scenes;
@@ -18,23 +20,23 @@ use zerkalo::world::Precision;
 
 const SIZE: [usize; 2] = [64, 48];
 const SEEDS: u64 = 20;
-/// A cone of radius 0.35 at distance 1.
+/// Radius of the cone lobe at distance 1.
 const ROUGHNESS: f64 = 0.35;
-/// The bright sheet's plane is at this distance from the mirror, behind the eye.
+/// Distance of the bright sheet's plane from the mirror; it is behind the eye.
 const SHEET_Z: f64 = 2.0;
-/// The direction of the sheet's edge, in degrees from upright: no row or column of pixels is alike.
+/// Angle between the sheet's edge and the vertical, in degrees: no two rows or columns of pixels are equal.
 const TILT: f64 = 20.0;
-/// Where the edge meets the axis of the picture.
+/// Position at which the edge intersects the axis of the picture.
 const EDGE_X: f64 = 0.15;
 const SHEET: [f64; 3] = [0.9, 0.55, 0.2];
 const SKY: [f64; 3] = [0.08, 0.2, 0.45];
 
-/// A glossy mirror in z = 0 that fills the picture and shows, blurred, the edge of a bright sheet
-/// behind the eye before a sky.
+/// Scene of a glossy mirror in z = 0 that fills the picture and reflects, blurred, the edge of a bright sheet
+/// behind the eye against a sky.
 fn closed_form(filter: Filter) -> Scene {
     let [width, height] = SIZE;
     let (s, c) = TILT.to_radians().sin_cos();
-    // The middle of a sheet of 40 x 40 whose left edge goes through (EDGE_X, 0) upwards.
+    // Centre of a sheet of 40 x 40 whose left edge passes through (EDGE_X, 0).
     let [x, y] = [EDGE_X + 20.0 * c, 20.0 * s];
     let text = format!(
         r#"
@@ -97,7 +99,7 @@ fn cone_share(theta: f64, delta: f64) -> f64 {
     }
 }
 
-/// How much of the sheet the mirror shows at the point (x, y) of the raster, in pixels.
+/// Share of the lobe that hits the sheet, at the point (x, y) of the raster, in pixels.
 fn sheet_share(x: f64, y: f64) -> f64 {
     let eye = [0.1, 0.05, 1.5];
     let w = unit([-0.1, -0.05, -1.5]);
@@ -119,8 +121,8 @@ fn sheet_share(x: f64, y: f64) -> f64 {
     cone_share(ROUGHNESS.atan(), dot(normal, axis).asin())
 }
 
-/// The true radiance of every pixel. For the box filter the mean over the pixel, by Gauss's rule with
-/// 4 points in each of 4 x 4 parts.
+/// True radiance of every pixel. For the box filter it is the mean over the pixel, by Gaussian quadrature
+/// with 4 points in each of 4 x 4 parts.
 fn truth(filter: Filter) -> Vec<[f64; 3]> {
     const PARTS: usize = 4;
     const GAUSS: [(f64, f64); 4] = [
@@ -152,10 +154,9 @@ fn truth(filter: Filter) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// The closed form is right and the scene is the one that it describes: the mean over many pixels of
-/// many samples agrees, and the picture has all shares from none to all.
+/// A render of many samples agrees with the closed form, and the picture has all shares from none to all.
 #[test]
-fn the_closed_form_describes_the_scene() {
+fn closed_form_describes_the_scene() {
     for filter in [Filter::Point, Filter::Box] {
         let truth = truth(filter);
         let rendering = rendered(&closed_form(filter), 7, Precision::Double, 1024);
@@ -172,8 +173,8 @@ fn the_closed_form_describes_the_scene() {
     }
 }
 
-/// How many pixels of each tile show the sheet's edge blurred; a lobe that the edge cuts off less than
-/// one part in a thousand of is hardly ever told from one that it does not cut.
+/// Number of pixels of each tile whose lobe contains the sheet's edge. A lobe of which the edge cuts off less
+/// than one part in a thousand is hardly distinguishable from an uncut one.
 fn blurred_pixels(truth: &[[f64; 3]]) -> Vec<usize> {
     let columns = SIZE[0] / TILE;
     let mut tiles = vec![0; columns * SIZE[1] / TILE];
@@ -185,20 +186,21 @@ fn blurred_pixels(truth: &[[f64; 3]]) -> Vec<usize> {
     tiles
 }
 
-/// What one rendering's error is and what it says about it.
+/// True and estimated error of one render.
 struct Outcome {
-    /// True over estimated RMSE of the picture, in codes and linear.
+    /// True over estimated RMSE of the picture as displayed.
     codes_ratio: f64,
+    /// True over estimated RMSE of the picture in linear radiance.
     linear_ratio: f64,
-    /// True RMSE in codes.
+    /// True RMSE in 8-bit levels.
     codes: f64,
-    /// Estimated and true mean squared error of each tile, in codes.
+    /// Estimated and true mean squared error of each tile, in squared 8-bit levels.
     tiles: Vec<(f64, f64)>,
     /// Mean signed error of the linear picture, per channel.
     mean_error: [f64; 3],
 }
 
-fn judge(rendering: &RenderState, truth: &[[f64; 3]]) -> Outcome {
+fn outcome(rendering: &RenderState, truth: &[[f64; 3]]) -> Outcome {
     let (film, display) = (&rendering.film, Display::default());
     assert_eq!(film.bad_samples().count, 0);
     let got = picture(rendering, Replicates::Both);
@@ -250,27 +252,27 @@ fn outcomes(filter: Filter, adaptive: bool, stop: Stop, expected: StoppedBy) -> 
             let mut rendering = begin(&scene, 100 + seed, Precision::Auto);
             let reason = follow(&mut rendering, settings(adaptive, 0, stop), &pool);
             assert_eq!(reason, expected);
-            judge(&rendering, &truth)
+            outcome(&rendering, &truth)
         })
         .collect()
 }
 
-/// The claims, for one way of rendering; true over estimated RMSE in codes.
+/// Checks the estimates for one kind of render. Returns true over estimated RMSE as displayed.
 fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let outcomes = outcomes(filter, adaptive, stop, StoppedBy::Spp);
-    let what = format!("{filter:?}, {spp} spp, adaptive {adaptive}");
+    let case = format!("{filter:?}, {spp} spp, adaptive {adaptive}");
 
     for (name, ratio) in [
         ("codes", mean(outcomes.iter().map(|o| o.codes_ratio))),
         ("linear", mean(outcomes.iter().map(|o| o.linear_ratio))),
     ] {
-        assert!((0.9..=1.1).contains(&ratio), "{what}: true/estimated {name} {ratio}");
+        assert!((0.9..=1.1).contains(&ratio), "{case}: true/estimated {name} {ratio}");
     }
 
-    // Each tile's estimates against its true error, in the mean over the seeds. A tile whose error sits
-    // in a few pixels (whose lobe the edge only just touches) has a few degrees of freedom, and its
-    // estimate is as uncertain as they are few: only tiles with enough of them can be held to 20 %.
+    // Each tile's estimates against its true error, in the mean over the seeds. A tile whose error is
+    // concentrated in a few pixels has few degrees of freedom and an uncertain estimate: the limit of 20 %
+    // applies to tiles with enough blurred pixels.
     let blurred = blurred_pixels(&truth(filter));
     let mut tested = 0;
     for (tile, blurred) in blurred.into_iter().enumerate() {
@@ -279,30 +281,30 @@ fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
         }
         let true_mse = mean(outcomes.iter().map(|o| o.tiles[tile].1));
         let (mean, sd) = spread(outcomes.iter().map(|o| (o.tiles[tile].0 / true_mse).sqrt()));
-        assert!(sd <= 0.2, "{what}: spread of the estimates of tile {tile} {sd}, mean {mean}");
+        assert!(sd <= 0.2, "{case}: spread of the estimates of tile {tile} {sd}, mean {mean}");
         tested += 1;
     }
-    assert!(tested >= 6, "{what}: only {tested} tiles are blurred");
+    assert!(tested >= 6, "{case}: only {tested} tiles are blurred");
 
     for c in 0..3 {
         let (bias, sd) = spread(outcomes.iter().map(|o| o.mean_error[c]));
         let sigma = sd / (SEEDS as f64).sqrt();
         assert!(
             bias.abs() < 3.0 * sigma,
-            "{what}: bias {bias:e} of sigma {sigma:e} in channel {c}"
+            "{case}: bias {bias:e} of sigma {sigma:e} in channel {c}"
         );
     }
     mean(outcomes.iter().map(|o| o.codes_ratio))
 }
 
-/// The claims, for both filters and few and many samples.
+/// Checks the estimates for both filters and few and many samples.
 fn assert_always_honest(adaptive: bool) {
-    let ways = [Filter::Point, Filter::Box].into_iter();
-    let ways = ways.flat_map(|filter| [32, 128, 1024].map(|spp| (filter, spp)));
-    let ratios: Vec<f64> = ways.map(|(f, spp)| assert_honest(f, adaptive, spp)).collect();
+    let filters = [Filter::Point, Filter::Box].into_iter();
+    let cases = filters.flat_map(|filter| [32, 128, 1024].map(|spp| (filter, spp)));
+    let ratios: Vec<f64> = cases.map(|(f, spp)| assert_honest(f, adaptive, spp)).collect();
     let (low, high) = ratios.iter().fold((f64::INFINITY, 0f64), |(l, h), r| (l.min(*r), h.max(*r)));
-    let way = if adaptive { "adaptive" } else { "uniform" };
-    report::report(30, "both", &format!("{way}: true / told {low:.3} to {high:.3}"));
+    let sampling = if adaptive { "adaptive" } else { "uniform" };
+    report::report(30, "both", &format!("{sampling}: true / estimated {low:.3} to {high:.3}"));
 }
 
 #[test]
@@ -316,21 +318,21 @@ fn extreme_30_adaptive_estimates_are_honest() {
 }
 
 #[test]
-fn extreme_30_a_noise_target_is_reached() {
+fn extreme_30_noise_target_is_reached() {
     for (filter, target) in [(Filter::Box, 2.0), (Filter::Point, 0.5)] {
         let stop = Stop { noise_codes: Some(target), ..Stop::default() };
         let outcomes = outcomes(filter, true, stop, StoppedBy::Noise);
         let achieved = mean(outcomes.iter().map(|o| o.codes * o.codes)).sqrt();
-        assert!(achieved <= 1.1 * target, "{filter:?}: asked for {target}, achieved {achieved}");
-        report::report(30, "both", &format!("asked for {target} codes: {achieved:.2}"));
+        assert!(achieved <= 1.1 * target, "{filter:?}: target {target}, achieved {achieved}");
+        report::report(30, "both", &format!("target {target} 8-bit levels: {achieved:.2}"));
     }
 }
 
-/// The promise of the command line, on the scene that it is made for: noise 0.5 is an RMSE of at most
-/// 0.55 codes, not rounded, against a reference of another seed. A picture of a few dozen tiles knows its
-/// error by some 6 % only (96 x 72, 24 seeds: 0.40 to 0.56 codes); this one has 300.
+/// `--noise 0.5` gives an RMSE of at most 0.55 8-bit levels, unrounded, against a reference of another seed.
+/// The estimate of a picture of a few dozen tiles is uncertain by some 6 % (96 x 72, 24 seeds: 0.40 to 0.56
+/// levels); this one has 300.
 #[test]
-fn noise_half_a_code_is_half_a_code_in_the_mirror_room() {
+fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
     let scene = sized(shipped("mirror-room.toml"), [320, 240]);
     let display = Display::default();
     let pool = pool(2);
@@ -342,7 +344,7 @@ fn noise_half_a_code_is_half_a_code_in_the_mirror_room() {
     let stop = Stop { spp: Some(reference_spp), ..Stop::default() };
     assert_eq!(follow(&mut reference, settings(true, 0, stop), &pool), StoppedBy::Spp);
     let own = reference.film.noise(&reference.mix, &display).unwrap().rmse_codes;
-    assert!(own < 0.1, "the reference has an error of {own} codes itself");
+    assert!(own < 0.1, "the reference has an error of {own} levels itself");
     let reference = codes(&reference);
 
     for seed in 0..8 {
@@ -354,14 +356,14 @@ fn noise_half_a_code_is_half_a_code_in_the_mirror_room() {
         let got = codes(&rendering);
         let sum: f64 = got.iter().zip(&reference).map(|(g, r)| (g - r).powi(2)).sum();
         let achieved = (sum / got.len() as f64 - own * own).max(0.0).sqrt();
-        println!("seed {seed}: {achieved:.3} codes at {spp} samples per pixel");
-        assert!(achieved <= 0.55, "seed {seed}: achieved {achieved} codes");
+        println!("seed {seed}: {achieved:.3} levels at {spp} samples per pixel");
+        assert!(achieved <= 0.55, "seed {seed}: achieved {achieved} levels");
     }
 }
 
-/// A linear target on the physical mirror room, adaptive by linear error: the true RMSE is the target,
+/// Checks that a linear target on the physical mirror room, adaptive by linear error, gives that true RMSE
 /// against a reference of another seed.
-fn linear_target_is_met(size: [u32; 2], seeds: u64) {
+fn assert_linear_target_is_met(size: [u32; 2], seeds: u64) {
     let scene = sized(shipped("mirror-room-physical.toml"), size);
     let pool = pool(2);
     let values = |rendering: &RenderState| picture(rendering, Replicates::Both).concat();
@@ -390,13 +392,13 @@ fn linear_target_is_met(size: [u32; 2], seeds: u64) {
 }
 
 #[test]
-fn a_linear_target_is_met() {
-    linear_target_is_met([96, 72], 4);
+fn linear_target_is_met() {
+    assert_linear_target_is_met([96, 72], 4);
 }
 
-/// The picture that the speed figures are about.
+/// The picture of the speed figures.
 #[test]
 #[ignore = "half a minute: cargo test --test honesty -- --ignored --nocapture"]
-fn a_linear_target_is_met_at_full_size() {
-    linear_target_is_met([640, 480], 3);
+fn linear_target_is_met_at_full_size() {
+    assert_linear_target_is_met([640, 480], 3);
 }

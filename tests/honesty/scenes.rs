@@ -1,6 +1,7 @@
-//! Random scenes for the honesty survey: sparse pictures, whose noise sits in a few pixels, and dense ones.
+//! Random scenes for the honesty survey: sparse pictures, whose noise is concentrated in few pixels, and dense ones.
 
-use crate::support::{Rng, parsed, shipped, sized};
+use crate::common::Numbers;
+use crate::support::{parsed, shipped, sized};
 use std::fmt::Write;
 use zerkalo::scene::Scene;
 
@@ -24,48 +25,31 @@ pub struct Sample {
     pub scene: Scene,
 }
 
-/// Uniform random numbers in intervals.
-struct Numbers(Rng);
-
-impl Numbers {
-    fn unit(&mut self) -> f64 {
-        (self.0.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    /// Log-uniform.
-    fn scale(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
-    }
-
-    fn whole(&mut self, low: u32, high: u32) -> u32 {
-        low + (self.0.bits() % u64::from(high - low + 1)) as u32
-    }
-
-    fn color(&mut self) -> String {
-        format!("{:.3?}", [0; 3].map(|_| self.between(0.05, 0.95)))
-    }
+/// Uniform integer from `low` to `high`.
+fn whole(n: &mut Numbers, low: u32, high: u32) -> u32 {
+    low + n.below((high - low + 1) as usize) as u32
 }
 
-/// Half the height of what the camera at (0, 0, 10) sees of z = 0, with 40 degrees from top to bottom.
+fn random_color(n: &mut Numbers) -> String {
+    format!("{:.3?}", [0; 3].map(|_| n.between(0.05, 0.95)))
+}
+
+/// Half of the visible height at z = 0 for the camera at (0, 0, 10) with a vertical view angle of 40 degrees.
 const HALF_HEIGHT: f64 = 3.64;
 
-/// The scene number `seed`; kinds take turns.
+/// Scene number `seed`; kinds take turns.
 pub fn scene(seed: u64) -> Sample {
     let kind = (seed % KINDS.len() as u64) as usize;
-    let mut n = Numbers(Rng(seed.wrapping_mul(0x9e37_79b9) ^ 0x5eed));
-    let size = [[160, 120], [160, 128], [200, 100], [240, 180]][n.whole(0, 3) as usize];
+    let mut n = Numbers::new(seed.wrapping_mul(0x9e37_79b9) ^ 0x5eed);
+    let size = [[160, 120], [160, 128], [200, 100], [240, 180]][whole(&mut n, 0, 3) as usize];
     let scene = match kind {
         0 => balls(&mut n, size, 1, 1.0),
         1 => {
-            let count = n.whole(20, 100);
+            let count = whole(&mut n, 20, 100);
             balls(&mut n, size, count, 1.0)
         }
         2 => {
-            let (count, bright) = (n.whole(100, 500), n.scale(3.0, 100.0));
+            let (count, bright) = (whole(&mut n, 100, 500), n.log_uniform(3.0, 100.0));
             balls(&mut n, size, count, bright)
         }
         3 => hairlines(&mut n, size),
@@ -76,13 +60,13 @@ pub fn scene(seed: u64) -> Sample {
         8 => {
             let mut scene = sized(shipped("mirror-room.toml"), size);
             let mirror = scene.materials.get_mut("mirror").unwrap();
-            mirror.roughness = n.scale(0.003, 0.5);
+            mirror.roughness = n.log_uniform(0.003, 0.5);
             scene.camera.eye[0] += n.between(-1.0, 1.0);
             scene
         }
         _ => {
             let name = ["gallery-glass.toml", "glass.toml", "water-glass.toml"];
-            let mut scene = sized(shipped(name[n.whole(0, 2) as usize]), size);
+            let mut scene = sized(shipped(name[whole(&mut n, 0, 2) as usize]), size);
             scene.camera.eye[1] += n.between(0.0, 0.3);
             scene
         }
@@ -107,7 +91,7 @@ fn balls(n: &mut Numbers, size: [u32; 2], count: u32, brightness: f64) -> Scene 
     for _ in 0..count {
         let (x, y) = (n.between(-across, across), n.between(-HALF_HEIGHT, HALF_HEIGHT));
         let radius =
-            pixel * if brightness > 1.0 { n.scale(0.05, 0.5) } else { n.between(0.3, 1.5) };
+            pixel * if brightness > 1.0 { n.log_uniform(0.05, 0.5) } else { n.between(0.3, 1.5) };
         write!(
             text,
             "[[object]]\nmaterial = \"m\"\nshape.sphere = {{ center = [{x}, {y}, 0.0], radius = {radius} }}\n"
@@ -122,8 +106,8 @@ fn hairlines(n: &mut Numbers, size: [u32; 2]) -> Scene {
     let pixel = 2.0 * HALF_HEIGHT / f64::from(size[1]);
     let mut text = head(size, "[0.02, 0.03, 0.05]", 1.0);
     text += "[materials.m]\ncolor = [1.0, 0.9, 0.8]\ndiffuse = 0.0\n";
-    for _ in 0..n.whole(3, 40) {
-        let (length, width) = (n.between(0.5, 5.0), pixel * n.scale(0.02, 0.8));
+    for _ in 0..whole(n, 3, 40) {
+        let (length, width) = (n.between(0.5, 5.0), pixel * n.log_uniform(0.02, 0.8));
         let (turn, x, y) = (n.between(0.0, 180.0), n.between(-4.0, 4.0), n.between(-3.0, 3.0));
         write!(
             text,
@@ -138,7 +122,7 @@ fn hairlines(n: &mut Numbers, size: [u32; 2]) -> Scene {
 
 /// A checkered plane up to its horizon.
 fn checkerboard(n: &mut Numbers, size: [u32; 2]) -> Scene {
-    let (height, scale) = (n.between(0.3, 3.0), n.scale(0.2, 3.0));
+    let (height, scale) = (n.between(0.3, 3.0), n.log_uniform(0.2, 3.0));
     let mut text = head(size, "[0.2, 0.3, 0.5]", 1.0);
     write!(
         text,
@@ -150,13 +134,13 @@ fn checkerboard(n: &mut Numbers, size: [u32; 2]) -> Scene {
     parsed(&text)
 }
 
-/// Lit balls, small beside the picture or all over it.
+/// Lit balls, in a small part of the picture or all over it.
 fn crowd(n: &mut Numbers, size: [u32; 2], mirrors: bool) -> Scene {
     let mut text = head(size, "[0.0, 0.0, 0.0]", 0.05);
     text += "[[light]]\npoint = { position = [3.0, 5.0, 8.0] }\nintensity = 1.0\n";
     let kinds = 4;
     for kind in 0..kinds {
-        let color = n.color();
+        let color = random_color(n);
         write!(text, "[materials.m{kind}]\ncolor = {color}\nspecular = 0.3\nexponent = 40.0\n")
             .unwrap();
         if mirrors && kind == 0 {
@@ -164,13 +148,13 @@ fn crowd(n: &mut Numbers, size: [u32; 2], mirrors: bool) -> Scene {
         }
     }
     let spread = if mirrors { 3.0 } else { n.between(0.5, 2.5) };
-    let (count, radius) = (n.whole(200, 1500), spread * n.scale(0.01, 0.06));
+    let (count, radius) = (whole(n, 200, 1500), spread * n.log_uniform(0.01, 0.06));
     for _ in 0..count {
-        let at = [0; 3].map(|_| spread * (n.unit() + n.unit() + n.unit() - 1.5) / 0.9);
-        let kind = n.whole(0, kinds - 1);
+        let center = [0; 3].map(|_| spread * (n.unit() + n.unit() + n.unit() - 1.5) / 0.9);
+        let kind = whole(n, 0, kinds - 1);
         write!(
             text,
-            "[[object]]\nmaterial = \"m{kind}\"\nshape.sphere = {{ center = {at:?}, radius = {radius} }}\n"
+            "[[object]]\nmaterial = \"m{kind}\"\nshape.sphere = {{ center = {center:?}, radius = {radius} }}\n"
         )
         .unwrap();
     }
@@ -182,7 +166,8 @@ fn room(n: &mut Numbers, size: [u32; 2]) -> Scene {
     let mut text = head(size, "[0.0, 0.0, 0.0]", 0.03).replace("10.0]\ntarget", "2.5]\ntarget");
     text += "[[light]]\npoint = { position = [0.5, 2.0, 1.0] }\nintensity = 6.0\nfalloff = \"inverse-square\"\n";
     for name in ["wall", "ball"] {
-        let (color, reflection, roughness) = (n.color(), n.between(0.3, 0.8), n.scale(0.02, 0.6));
+        let (color, reflection, roughness) =
+            (random_color(n), n.between(0.3, 0.8), n.log_uniform(0.02, 0.6));
         write!(
             text,
             "[materials.{name}]\ncolor = {color}\ndiffuse = 0.5\nreflection = {reflection}\nroughness = {roughness}\n"
@@ -190,7 +175,7 @@ fn room(n: &mut Numbers, size: [u32; 2]) -> Scene {
         .unwrap();
     }
     text += "[[object]]\nmaterial = \"wall\"\nshape.box = { center = [0.0, 0.0, 0.0], size = [6.0, 5.0, 6.0] }\n";
-    for _ in 0..n.whole(1, 6) {
+    for _ in 0..whole(n, 1, 6) {
         let (x, y, z) = (n.between(-2.0, 2.0), n.between(-2.0, 1.0), n.between(-2.0, 0.5));
         let radius = n.between(0.2, 0.7);
         write!(

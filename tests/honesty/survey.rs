@@ -1,5 +1,5 @@
-//! The error that is reported against the error that is left, over random sparse and dense scenes, and the rays that
-//! an adaptive picture takes against those of a uniform one with the same true error.
+//! Reported against true errors over random sparse and dense scenes, and rays of adaptive pictures against those of
+//! uniform ones with the same true error.
 //!
 //! The short form runs with all tests. The long form prints a table of 200 scenes:
 //! `cargo test --test honesty survey -- --ignored --nocapture`.
@@ -43,7 +43,7 @@ impl Reference {
     }
 }
 
-/// Follows a schedule; `each` sees every state between two decisions and returns whether to end.
+/// Follows a schedule. `each` receives the state after every decision and returns `true` to end.
 fn run(
     sample: &Sample,
     seed: u64,
@@ -81,18 +81,18 @@ struct Outcome {
     rays: f64,
 }
 
-/// Rays at which a uniform picture has the error `wanted`, interpolated between its waves; those of the last wave
-/// where it does not come so far.
-fn uniform_rays(sample: &Sample, seed: u64, reference: &Reference, wanted: f64) -> f64 {
+/// Number of rays at which a uniform picture has the error `target`, interpolated between its waves; that of the last
+/// wave if it does not reach `target`.
+fn uniform_rays(sample: &Sample, seed: u64, reference: &Reference, target: f64) -> f64 {
     let stop = Stop { spp: Some(2 * LIMIT_SPP), noise_codes: Some(1e-9), ..Stop::default() };
     let mut curve: Vec<(f64, f64)> = Vec::new();
     run(sample, seed, false, stop, |rendering, schedule| {
         curve.push((schedule.rays() as f64, reference.square(rendering).max(0.0).sqrt()));
-        curve.last().is_some_and(|(_, error)| *error <= wanted)
+        curve.last().is_some_and(|(_, error)| *error <= target)
     });
     match curve.as_slice() {
-        [.., (r0, e0), (r1, e1)] if e1 <= &wanted && e0 > e1 => {
-            let share = (e0 / wanted).ln() / (e0 / e1.max(1e-9)).ln();
+        [.., (r0, e0), (r1, e1)] if e1 <= &target && e0 > e1 => {
+            let share = (e0 / target).ln() / (e0 / e1.max(1e-9)).ln();
             r0 * (r1 / r0).powf(share)
         }
         [.., (rays, _)] => *rays,
@@ -140,8 +140,8 @@ fn examine(number: u64, reference_count: u32, seeds: u64) -> Outcome {
     Outcome { name: sample.name, ratio, pixels: pixels[0], of_seeds, rays }
 }
 
-/// The true error agrees with the reported one within what few pixels leave uncertain (both are means of as many squares,
-/// each uncertain by 1 / sqrt(2 k)), and adaptivity costs at most half as many rays again as uniform sampling.
+/// Checks that the true error agrees with the reported one within their uncertainty (both are means of k squares, uncertain
+/// by 1 / sqrt(2 k)), and that adaptivity costs at most 1.5 times the rays of uniform sampling.
 fn assert_honest(outcomes: &[Outcome]) {
     let mut scores = Vec::new();
     for Outcome { name, ratio, pixels, rays, .. } in outcomes.iter().filter(|o| o.pixels >= 16.0) {
@@ -175,18 +175,18 @@ fn survey_of_200_scenes() {
     let first: u64 = variable("ZERKALO_FIRST", 0);
     let numbers = first..first + variable("ZERKALO_SCENES", 200);
     let outcomes: Vec<Outcome> = numbers.map(|number| examine(number, 4096, 64)).collect();
-    let many = || outcomes.iter().filter(|o| o.of_seeds.is_finite());
-    let inside = many().filter(|o| (0.9..=1.15).contains(&o.of_seeds)).count();
-    let extreme = many().map(|o| o.of_seeds).fold(0.0, f64::max);
-    let dearest = many().map(|o| o.rays).fold(0.0, f64::max);
+    let finite = || outcomes.iter().filter(|o| o.of_seeds.is_finite());
+    let inside = finite().filter(|o| (0.9..=1.15).contains(&o.of_seeds)).count();
+    let extreme = finite().map(|o| o.of_seeds).fold(0.0, f64::max);
+    let highest = finite().map(|o| o.rays).fold(0.0, f64::max);
     println!(
-        "{inside} of {} within 0.9 to 1.15, at most {extreme:.2}; at most {dearest:.2} times the uniform rays",
-        many().count()
+        "{inside} of {} within 0.9 to 1.15, at most {extreme:.2}; at most {highest:.2} times the uniform rays",
+        finite().count()
     );
     assert_honest(&outcomes);
 }
 
-/// One white ball of about a pixel on a dark ground: its tile is noisy in validation pixels only.
+/// White ball of about a pixel on a dark background: its tile is noisy in validation pixels only.
 #[test]
 fn single_ball_ends_with_few_samples() {
     let text = "
@@ -212,8 +212,8 @@ fn single_ball_ends_with_few_samples() {
     }
 }
 
-/// The mean of a closed glossy room is the same with and without adaptivity: skewed noise in the estimates that decide
-/// biases no tile by more than its own chance.
+/// The mean of a closed glossy room is the same with and without adaptivity: skewed noise in the allocation estimates
+/// biases no tile by more than its own noise.
 #[test]
 fn adaptive_mean_of_a_closed_room_is_unbiased() {
     let mut sample = scene(7);

@@ -41,7 +41,7 @@ pub fn parsed(text: &str) -> Scene {
     Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// A rendering without samples.
+/// Render state without samples.
 pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> RenderState {
     begin_with(scene, SampleSettings { seed, kind: SamplerKind::Sobol }, precision)
 }
@@ -133,32 +133,13 @@ pub fn settings(adaptive: bool, rays_per_pixel: u32, stop: Stop) -> Settings {
     Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel, stop }
 }
 
-/// Radiance of every pixel, row by row.
-pub fn picture(rendering: &RenderState, part: Replicates) -> Vec<[f64; 3]> {
+/// Radiance of every pixel, `[row][column]`.
+pub fn picture(rendering: &RenderState, replicates: Replicates) -> Vec<[f64; 3]> {
     let mut row = Vec::new();
     let mut all = Vec::new();
     for y in 0..rendering.film.height() {
-        rendering.film.row(y, part, &rendering.mix, &mut row);
+        rendering.film.row(y, replicates, &rendering.mix, &mut row);
         all.extend_from_slice(&row);
     }
     all
-}
-
-/// Random number generator of tests (SplitMix64).
-pub struct Rng(pub u64);
-
-impl Rng {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Shuffles `items` (Fisher-Yates).
-    pub fn shuffle<T>(&mut self, items: &mut [T]) {
-        for i in (1..items.len()).rev() {
-            items.swap(i, (self.bits() % (i as u64 + 1)) as usize);
-        }
-    }
 }

@@ -1,8 +1,9 @@
 //! Things with textures, as the scene file and as the direct evaluation have them; when their pictures
 //! agree; and the neighbours of each, which must be told from it.
 
+use crate::common::Numbers;
 use crate::direct::{self, Colors, Lay, SIZE, Solid, TO_LIGHT, Thing};
-use crate::support::{Rng, picture, rendered};
+use crate::support::{picture, rendered};
 use glam::{DAffine3, DVec3};
 use image::RgbImage;
 use std::f64::consts::PI;
@@ -22,7 +23,7 @@ pub struct Desk {
 impl Desk {
     pub fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let mut rng = Rng(7);
+        let mut rng = Numbers::new(7);
         let mut random = |w, h, grey| {
             RgbImage::from_fn(w, h, |_, _| {
                 let [r, g, b, _] = (rng.bits() as u32).to_le_bytes();

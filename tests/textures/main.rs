@@ -2,6 +2,8 @@
 //! refused.
 
 mod cases;
+#[path = "../common/mod.rs"]
+mod common;
 mod direct;
 mod files;
 mod limits;

@@ -1,10 +1,10 @@
 //! Adaptive sampling: allocates the next samples where they lower the picture's error most per ray.
 //!
-//! A tile's expected error is calibrated by tiles like it. Tiles whose allocation estimates and sample counts are
-//! alike form a class; the class has the mean of its validation estimates, which come from other pixels and have taken
-//! part in no decision (cross-fitting, Chernozhukov et al. 2018). So an estimate that is low by chance starves no tile:
-//! a feature that only validation pixels show raises the error of all tiles that look as empty as its own. An
-//! estimate that is high by chance draws few samples that others should have.
+//! A tile's expected error is calibrated by similar tiles. Tiles with similar allocation estimates and sample counts
+//! form a class. The error of a class is the mean of its validation estimates, which come from other pixels and take
+//! part in no decision (cross-fitting, Chernozhukov et al. 2018). An estimate that is low by chance therefore starves
+//! no tile: a feature in validation pixels alone raises the error of all tiles that look as empty as its own. An
+//! estimate that is high by chance draws few samples from other tiles.
 
 use crate::render::schedule::tile::Tile;
 use crate::render::schedule::{Criterion, MAX_SAMPLES, SAMPLE_ALIGNMENT, Schedule, to_packet};
@@ -12,24 +12,23 @@ use crate::render::wave::Job;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Rays of one decision, as a share of the rays spent so far: small enough to correct itself, large enough for few
-/// barriers.
-const SHARE: f64 = 0.1;
-/// Share of a decision's rays that goes to the tiles with the fewest samples, whatever their estimates are. A feature
-/// that no sample has met leaves no trace in any estimate; this share finds it. Measured on 30 sparse pictures (stars and
-/// balls of a pixel, `tests/honesty`): in the mean the true error is 18 % above the reported one with a sixteenth, 16 %
-/// with an eighth, 13 % with a quarter. The physical mirror room takes 60.7 million rays to an RMSE of 0.00068 with a
-/// 32nd, 61.7 with a sixteenth, 64.8 with an eighth.
+/// Rays of one decision, as a share of the rays so far: small enough for corrections, large enough for few barriers.
+const DECISION_SHARE: f64 = 0.1;
+/// Share of a decision's rays for the tiles with the fewest samples, whatever their estimates are. A feature that no
+/// sample has hit is missing in every estimate; this share finds it. Measured on 30 sparse pictures (stars and balls of a
+/// pixel, `tests/honesty`): the true error is 18 % above the reported one in the mean with a sixteenth, 16 % with an
+/// eighth, 13 % with a quarter. The physical mirror room takes 60.7 million rays to an RMSE of 0.00068 with a 32nd, 61.7
+/// with a sixteenth, 64.8 with an eighth.
 pub(super) const EXPLORATION: f64 = 0.0625;
-/// The fewest blocks of a decision; all tiles in a picture that has fewer. Every thread has work between two barriers.
+/// Least number of blocks of a decision (or all tiles, if there are fewer): every thread has work between two barriers.
 const MIN_BLOCKS: usize = 64;
-/// Once the best tiles have doubled their count (an estimate reaches no further), the others go on only as long as
-/// their gain is at least this share of what those would still give.
+/// Least gain of further tiles, as a share of the gain of those that have doubled their count and are set aside: an
+/// estimate holds for one doubling.
 const WORTHWHILE: f64 = 0.25;
 /// Weight of a tile's own estimate against one validation estimate of its class.
 const OWN_WEIGHT: f64 = 0.25;
 
-/// A block of samples that a tile could get next.
+/// Candidate block of samples for a tile.
 struct Candidate {
     /// Expected fall of the summed squared error per ray.
     gain: f64,
@@ -50,7 +49,7 @@ impl PartialOrd for Candidate {
     }
 }
 impl Ord for Candidate {
-    /// By gain; among equals the tile with fewer samples, then the lower tile number, comes first.
+    /// Orders by gain; among equals the tile with fewer samples, then the lower tile number, comes first.
     fn cmp(&self, other: &Self) -> Ordering {
         let fewer = other.count.cmp(&self.count).then(other.tile.cmp(&self.tile));
         self.gain.total_cmp(&other.gain).then(fewer)
@@ -69,7 +68,7 @@ impl ErrorModel {
         self.scale * f64::from(count).powf(-2.0 * self.slope)
     }
 
-    /// The same slope through `mse` at `count`.
+    /// Model of the same slope through `mse` at `count`.
     fn through(&self, count: u32, mse: f64) -> Self {
         Self { scale: mse * f64::from(count).powf(2.0 * self.slope), ..*self }
     }
@@ -81,35 +80,35 @@ struct TileModels {
     validation: ErrorModel,
 }
 
-/// Tiles that are expected to be alike: octave of the sample count, half octave of the allocation estimate per sample
+/// Class of similar tiles: octave of the sample count, half octave of the allocation estimate per sample
 /// (`None`: the estimate is 0).
 type Class = (u32, Option<i32>);
 
-/// Size of the block that a tile with `count` samples per replicate gets next: about a quarter of them, a power
-/// of two and at least a packet, so that blocks stay aligned to what makes the sequence even; or what is missing
-/// to such a block; before the first packet is full, as many again.
+/// Size of the next block of a tile with `count` samples per replicate. Below one packet it is the difference to the
+/// next power of two; at an unaligned count the difference to the next packet; otherwise about a quarter of `count`, a
+/// power of two and at least a packet, so that blocks stay aligned to the evenly spread blocks of the sequence.
 fn block(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT {
         return (count + 1).next_power_of_two() - count;
     }
     match to_packet(count) {
         0 => 1 << (count / 4).max(SAMPLE_ALIGNMENT).ilog2(),
-        rest => rest,
+        missing => missing,
     }
 }
 
-/// The sample counts of a decision while it is made.
+/// Sample counts of a decision in progress.
 struct Allocation<'a> {
     schedule: &'a Schedule,
     counts: Vec<u32>,
-    /// Expected rays of the blocks given out.
+    /// Expected rays of the allocated blocks.
     spent: f64,
     blocks: usize,
     samples_left: u64,
 }
 
 impl Allocation<'_> {
-    /// Samples of the block that `tile` could get next; 0 where a cap or the mean count leaves none.
+    /// Number of samples of the next block of `tile`; 0 if a cap or the mean count leaves none.
     fn next_block(&self, tile: usize) -> u32 {
         let (t, count) = (&self.schedule.tiles[tile], self.counts[tile]);
         let affordable =
@@ -122,14 +121,14 @@ impl Allocation<'_> {
         2.0 * f64::from(samples) * f64::from(t.pixels) * t.rays_per_sample()
     }
 
-    fn give(&mut self, tile: usize, samples: u32) {
+    fn allocate(&mut self, tile: usize, samples: u32) {
         self.spent += self.rays(tile, samples);
         self.samples_left -= u64::from(samples) * u64::from(self.schedule.tiles[tile].pixels);
         self.blocks += 1;
         self.counts[tile] += samples;
     }
 
-    /// Gives one block each to the tiles with the fewest samples, for about `rays` rays.
+    /// Allocates one block each to the tiles with the fewest samples, for about `rays` rays.
     fn explore(&mut self, rays: f64) {
         let mut order: Vec<usize> = (0..self.counts.len()).collect();
         order.sort_by_key(|tile| self.counts[*tile]);
@@ -139,7 +138,7 @@ impl Allocation<'_> {
             }
             let samples = self.next_block(tile);
             if samples > 0 {
-                self.give(tile, samples);
+                self.allocate(tile, samples);
             }
         }
     }
@@ -161,7 +160,7 @@ impl Allocation<'_> {
 }
 
 impl Schedule {
-    /// The jobs for the next decision once the floors are reached.
+    /// Jobs of the next decision after [`Schedule::min_samples`].
     pub(super) fn highest_gain(&self) -> Vec<Job> {
         let criterion = self.settings.criterion;
         let pooled = [self.pooled_slope(false), self.pooled_slope(true)];
@@ -176,7 +175,7 @@ impl Schedule {
             blocks: 0,
             samples_left: self.samples_left(),
         };
-        let budget = SHARE * self.rays as f64;
+        let budget = DECISION_SHARE * self.rays as f64;
         allocation.explore(EXPLORATION * budget);
 
         let over_picture = |rmse: f64| rmse * rmse * self.pixels() as f64;
@@ -201,24 +200,24 @@ impl Schedule {
                 set_aside = set_aside.max(gain);
                 continue;
             }
-            let own = &models[tile].allocation;
-            error -=
-                (own.mse(count) - own.mse(count + samples)) * f64::from(self.tiles[tile].pixels);
-            allocation.give(tile, samples);
+            let model = &models[tile].allocation;
+            error -= (model.mse(count) - model.mse(count + samples))
+                * f64::from(self.tiles[tile].pixels);
+            allocation.allocate(tile, samples);
             heap.extend(allocation.candidate(tile, &expected[tile]));
         }
         allocation.into_jobs()
     }
 
-    /// The expected error of each tile: the mean of its class's validation estimates, and of its own allocation
-    /// estimate with a small weight, which alone counts where a class has one tile and that looks empty otherwise.
+    /// Expected error of each tile: the mean of its class's validation estimates, and of its own allocation estimate
+    /// with a small weight. That estimate decides for a class of one tile whose validation estimate is 0.
     fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
         let variance =
             |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);
         let mut classes: BTreeMap<Class, (f64, f64)> = BTreeMap::new();
         let class_of = |tile: &Tile, models: &TileModels| -> Class {
-            let own = variance(&models.allocation, tile);
-            (tile.done.ilog2(), (own > 0.0).then(|| (2.0 * own.log2()).floor() as i32))
+            let estimate = variance(&models.allocation, tile);
+            (tile.done.ilog2(), (estimate > 0.0).then(|| (2.0 * estimate.log2()).floor() as i32))
         };
         for (tile, models) in self.tiles.iter().zip(models) {
             let (sum, weight) = classes.entry(class_of(tile, models)).or_default();
@@ -228,16 +227,16 @@ impl Schedule {
         let calibrate = |(tile, models): (&Tile, &TileModels)| {
             let (sum, weight) = classes[&class_of(tile, models)];
             let own_weight = OWN_WEIGHT * f64::from(tile.pixels);
-            let own = own_weight * variance(&models.allocation, tile);
-            let mse = (own + sum) / (own_weight + weight) / f64::from(tile.done);
+            let own_sum = own_weight * variance(&models.allocation, tile);
+            let mse = (own_sum + sum) / (own_weight + weight) / f64::from(tile.done);
             models.allocation.through(tile.done, mse)
         };
         self.tiles.iter().zip(models).map(calibrate).collect()
     }
 }
 
-/// Models through a tile's estimates, weighted by their counts. Estimates at lower counts take part so that chance in
-/// the latest one weighs less.
+/// Fits models through a tile's estimates, weighted by their counts. Estimates at lower counts reduce the influence of
+/// chance in the latest one.
 fn tile_models(tile: &Tile, criterion: Criterion, pooled: [f64; 2]) -> TileModels {
     let slope = tile.slope(criterion, pooled[usize::from(tile.glossy)]);
     let (mut sums, mut weights) = ([0.0; 2], 0.0);

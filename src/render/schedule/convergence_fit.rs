@@ -1,16 +1,16 @@
-//! How the noise of the whole picture falls with the rays spent, and when it will reach a target.
+//! Convergence fit: noise of the whole picture against rays, and its extrapolation to a target.
 
 use crate::render::schedule::tile::{FLATTEST, STEEPEST, clamp_slope};
 
-/// Points are kept at every half doubling of the rays; this many span three doublings.
+/// Number of points: one at every half doubling of the rays, over three doublings.
 const POINTS: usize = 7;
 
-/// Relative uncertainty of an extrapolated time with a well fitted slope. The slope falls a little while the work goes on:
-/// the rays of exploration are a smaller share of the rays at the beginning than at the end. At slope 0.75 that
+/// Relative uncertainty of an extrapolated time with a well fitted slope. The slope falls a little during the work:
+/// the rays of exploration are a smaller share of all rays at the start than at the end. At slope 0.75 that
 /// lengthens an extrapolation over two doublings by 4 to 10 %.
 const SPREAD: f64 = 0.15;
 
-/// Noise against work, the last three doublings of the work.
+/// Noise against rays, over the latest three doublings of the rays.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConvergenceFit {
     /// Rays and RMSE, oldest first.
@@ -18,8 +18,8 @@ pub(super) struct ConvergenceFit {
 }
 
 impl ConvergenceFit {
-    /// Notes that `rays` rays brought the picture's RMSE to `noise`.
-    pub fn note(&mut self, rays: f64, noise: f64) {
+    /// Records that the picture's RMSE was `noise` after `rays` rays.
+    pub fn record(&mut self, rays: f64, noise: f64) {
         if !(rays > 0.0 && noise > 0.0) {
             return;
         }
@@ -35,9 +35,9 @@ impl ConvergenceFit {
         }
     }
 
-    /// How many rays will have been traced, in all, when the noise has fallen to `target`: a lower and an upper
-    /// guess, from the steepest and the flattest of the slopes over the last one, two and three
-    /// doublings; before there is one, from the limits of all slopes. `None` without any noise.
+    /// Lower and upper estimate of the total number of rays at which the noise falls to `target`, from the steepest
+    /// and the flattest of the slopes over the latest one, two and three doublings; before the first doubling from the
+    /// limits of all slopes. `None` without any noise.
     pub fn rays_needed(&self, target: f64) -> Option<(f64, f64)> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {
@@ -51,12 +51,11 @@ impl ConvergenceFit {
             .map(|p| (p, p))
             .reduce(|(low, high), (p, _)| (low.min(p), high.max(p)))
             .unwrap_or((FLATTEST, STEEPEST));
-        let more = |p: f64| rays * ((noise / target).powf(1.0 / p) - 1.0);
-        Some((rays + more(steep) * (1.0 - SPREAD), rays + more(flat) * (1.0 + SPREAD)))
+        let additional = |p: f64| rays * ((noise / target).powf(1.0 / p) - 1.0);
+        Some((rays + additional(steep) * (1.0 - SPREAD), rays + additional(flat) * (1.0 + SPREAD)))
     }
 
-    /// The slope over the last three doublings (or what there is of them), 0.5 before there are two
-    /// points.
+    /// Slope over the latest doublings, at most three; 0.5 before there are two points.
     pub fn slope(&self) -> f64 {
         match (self.points.first(), self.points.last()) {
             (Some((r0, n0)), Some((r1, n1))) if r1 > r0 => {

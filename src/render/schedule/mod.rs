@@ -1,10 +1,9 @@
-//! Which tiles get how many samples next, and when to stop. Decides, does nothing: the clock is an
-//! argument, the film is known only through the reports of finished jobs.
+//! Sample allocation: the next tiles, their numbers of samples, and the end of the work. The schedule is
+//! pure logic: the clock is an argument, and the film is known through the reports of finished jobs.
 //!
-//! A decision gives each chosen tile the same sample indices in replicate A and then in replicate B,
-//! so that whenever something is decided every tile holds equally many of both and its error is
-//! known. Decisions depend on estimated errors and rays counted, never on time or threads; time only
-//! ends the work.
+//! A decision gives each chosen tile the same sample indices in replicate A and then in replicate B. At
+//! every decision a tile holds equally many samples of both, and its error is known. Decisions depend on
+//! estimated errors and ray counts, never on time or threads; time only ends the work.
 
 mod allocation;
 mod convergence_fit;
@@ -21,33 +20,33 @@ use convergence_fit::ConvergenceFit;
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
 
-/// Samples per replicate that every tile gets before samples go where the noise is. Estimates begin here:
-/// below, they say little and cost as much as the samples. Sixteen would spend a third of the mirror
-/// room's samples, and two thirds of the reflecting tracks', on tiles without any noise.
+/// Samples per replicate that every tile gets before adaptive sampling and estimates begin. Estimates from
+/// fewer samples are unreliable and cost as much as the samples. A value of 16 would spend a third of the
+/// mirror room's samples, and two thirds of the reflecting tracks', on tiles without noise.
 const MIN_SAMPLES: u32 = 4;
-/// The same while the estimate of the picture's error rests on fewer than [`FEW_PIXELS`] effective pixels: such a picture
-/// is sparse or clean, and its features are found by samples, not by estimates.
-const SPARSE_FLOOR: u32 = SAMPLE_ALIGNMENT;
-/// Effective pixels below which an estimate says little: with 16 its RMSE is uncertain by 18 % (1 / sqrt(2 k)).
+/// [`MIN_SAMPLES`] of a picture whose estimated error has fewer than [`FEW_PIXELS`] effective pixels: it is sparse or
+/// clean, and its features are found by samples, not by estimates.
+const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
+/// Number of effective pixels below which an estimate is unreliable: with 16 its RMSE is uncertain by 18 % (1 / sqrt(2 k)).
 const FEW_PIXELS: f64 = 16.0;
-/// From so many on, samples are given in multiples of this, the width of the widest packets; only a tile's last block
-/// may be shorter. The same where packets are narrower: which samples a picture has must not depend on the processor.
+/// Alignment of sample counts from this count on: the width of the widest packets. A tile's last block may be shorter.
+/// Narrower packets use the same alignment, because the samples of a picture must not depend on the processor.
 pub const SAMPLE_ALIGNMENT: u32 = 16;
-/// Samples per replicate at which a tile is full: the most whose double, the count of both replicates, fits 32 bits.
+/// Samples per replicate at which a tile is full: the largest aligned count whose double, for both replicates, fits 32 bits.
 const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
 
-/// Samples that make `count` a multiple of a packet, if it is more than one: a picture that was to
-/// have fewer samples may have stopped inside one.
+/// Number of samples that aligns `count`, if it is at least one packet: an earlier stop criterion may have ended
+/// inside a packet.
 fn to_packet(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT { 0 } else { count.next_multiple_of(SAMPLE_ALIGNMENT) - count }
 }
 
-/// What comes next.
+/// Next step of the work.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
-    /// Trace this.
+    /// Trace this wave.
     Trace(Wave),
-    /// Nothing: the work is done.
+    /// The work is done.
     Finished(StoppedBy),
 }
 
@@ -62,19 +61,19 @@ pub struct Spp {
     pub max: u32,
 }
 
-/// The scheduler.
+/// Schedule of one render.
 #[derive(Clone, Debug)]
 pub struct Schedule {
     settings: Settings,
     tiles: Vec<Tile>,
-    /// The jobs decided last; both replicates get them.
+    /// Jobs of the latest decision, for both replicates.
     decided: Vec<Job>,
     estimate: bool,
     replicate: usize,
-    /// What is left of `decided` in the current replicate.
-    left: Vec<Job>,
-    trend: ConvergenceFit,
-    /// Samples traced, all pixels and both replicates.
+    /// Jobs of `decided` that the current replicate still needs.
+    remaining: Vec<Job>,
+    convergence: ConvergenceFit,
+    /// Number of samples traced, all pixels and both replicates.
     samples: u64,
     rays: u64,
     noise: Option<Noise>,
@@ -83,7 +82,7 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// For a picture whose tiles, row by row, have these numbers of pixels.
+    /// Creates a schedule. `pixels` holds the number of pixels of each tile, row by row.
     pub fn new(pixels: &[u32], settings: Settings) -> Self {
         Self {
             settings,
@@ -91,8 +90,8 @@ impl Schedule {
             decided: Vec::new(),
             estimate: false,
             replicate: 1,
-            left: Vec::new(),
-            trend: ConvergenceFit::default(),
+            remaining: Vec::new(),
+            convergence: ConvergenceFit::default(),
             samples: 0,
             rays: 0,
             noise: None,
@@ -100,10 +99,10 @@ impl Schedule {
         }
     }
 
-    /// What to do next, `seconds` after the work began. Call [`Schedule::complete`] with the wave's
-    /// report before calling this again.
+    /// Returns the next step, `seconds` after the start of the work. [`Schedule::complete`] takes the wave's
+    /// report before the next call.
     pub fn next(&mut self, seconds: f64) -> Step {
-        if self.left.is_empty() {
+        if self.remaining.is_empty() {
             if self.replicate == 0 {
                 self.replicate = 1;
             } else {
@@ -116,76 +115,76 @@ impl Schedule {
                 }
                 self.replicate = 0;
             }
-            self.left.clone_from(&self.decided);
+            self.remaining.clone_from(&self.decided);
         }
         Step::Trace(Wave {
             replicate: self.replicate,
-            jobs: self.left.clone(),
+            jobs: self.remaining.clone(),
             estimate: self.estimate && self.replicate == 1,
         })
     }
 
-    /// Takes in what became of the wave that [`Schedule::next`] gave out, or of the part of it that
-    /// [`Wave::cut`] left. What was cut off or cancelled will be given out again.
+    /// Records the result of the wave of [`Schedule::next`], or of the part that [`Wave::cut`] left of it.
+    /// Jobs that were cut off or cancelled are returned again.
     pub fn complete(&mut self, wave: &Wave, report: &WaveReport) {
         let mut reports = wave.jobs.iter().zip(&report.reports).peekable();
-        let mut begun = Vec::new();
-        let left = std::mem::take(&mut self.left);
-        for whole in left {
+        let mut partial = Vec::new();
+        let remaining = std::mem::take(&mut self.remaining);
+        for whole in remaining {
             let traced = reports.next_if(|(job, _)| job.tile == whole.tile);
             let Some((job, Some(report))) = traced else {
-                self.left.push(whole);
+                self.remaining.push(whole);
                 continue;
             };
             let tile = &mut self.tiles[job.tile as usize];
             self.samples += u64::from(job.count) * u64::from(tile.pixels);
             self.rays += report.rays;
             let count = job.first + job.count;
-            tile.note(report, count);
+            tile.record(report, count);
             if wave.replicate == 1 {
                 tile.done = count;
             }
             if job.count < whole.count {
-                begun.push(Job { first: count, count: whole.count - job.count, ..whole });
+                partial.push(Job { first: count, count: whole.count - job.count, ..whole });
             }
         }
-        // What has had its turn comes last.
-        self.left.append(&mut begun);
-        if self.left.is_empty() && wave.estimate {
-            self.judge();
+        // Partially traced jobs come last.
+        self.remaining.append(&mut partial);
+        if self.remaining.is_empty() && wave.estimate {
+            self.update_noise();
         }
     }
 
-    /// The picture's noise from that of its tiles.
-    fn judge(&mut self) {
+    /// Computes the picture's noise from that of its tiles.
+    fn update_noise(&mut self) {
         self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error.map(|(_, e)| e)));
         if let Some(noise) = self.noise {
-            self.trend.note(self.rays as f64, self.settings.criterion.of_picture(noise));
+            self.convergence.record(self.rays as f64, self.settings.criterion.of_picture(noise));
         }
     }
 
-    /// The latest estimate of the whole picture's error.
+    /// Latest estimate of the whole picture's error.
     pub fn noise(&self) -> Option<Noise> {
         self.noise
     }
 
-    /// The latest estimate of each tile's RMSE in codes, row by row; 0 before the first.
+    /// Latest estimate of each tile's RMSE in 8-bit levels, row by row; 0 before the first.
     pub fn tile_noise_codes(&self) -> Vec<f32> {
         let codes = |t: &Tile| t.error.map_or(0.0, |(_, e)| e.of_all().codes.sqrt() as f32);
         self.tiles.iter().map(codes).collect()
     }
 
-    /// Samples traced so far, over all pixels.
+    /// Number of samples traced so far, over all pixels.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Rays traced so far.
+    /// Number of rays traced so far.
     pub fn rays(&self) -> u64 {
         self.rays
     }
 
-    /// Samples per pixel, counting what both replicates hold.
+    /// Samples per pixel that both replicates hold.
     pub fn spp(&self) -> Spp {
         let counts = || self.tiles.iter().map(|t| 2 * t.done);
         let (pixels, samples) = self.tiles.iter().fold((0u64, 0u64), |(pixels, samples), t| {
@@ -202,7 +201,7 @@ impl Schedule {
         self.tiles.iter().map(|t| u64::from(t.pixels)).sum()
     }
 
-    /// The most samples per replicate that `tile` may get.
+    /// Largest number of samples per replicate of `tile`.
     fn cap(&self, tile: &Tile) -> u32 {
         match self.settings.rays_per_pixel {
             0 => MAX_SAMPLES,
@@ -211,50 +210,49 @@ impl Schedule {
         }
     }
 
-    /// Root of the mean squared error over the pixels of the tiles that `counts` selects.
-    fn pooled(&self, criterion: Criterion, counts: impl Fn(&Tile) -> bool) -> f64 {
+    /// Root of the mean squared error over the pixels of the tiles that `selects` selects.
+    fn pooled(&self, criterion: Criterion, selects: impl Fn(&Tile) -> bool) -> f64 {
         let (sum, pixels) =
-            self.tiles.iter().filter(|t| counts(t)).fold((0.0, 0u64), |(s, n), t| {
+            self.tiles.iter().filter(|t| selects(t)).fold((0.0, 0u64), |(s, n), t| {
                 (s + t.mse(criterion) * f64::from(t.pixels), n + u64::from(t.pixels))
             });
         (sum / pixels.max(1) as f64).sqrt()
     }
 
-    /// Samples per replicate, over all pixels, until the mean count is reached.
+    /// Number of samples per replicate, over all pixels, until the mean count is reached.
     fn samples_left(&self) -> u64 {
         let Some(spp) = self.settings.stop.spp else { return u64::MAX };
         let done: u64 = self.tiles.iter().map(|t| u64::from(t.done) * u64::from(t.pixels)).sum();
         (u64::from(spp.div_ceil(2)) * self.pixels()).saturating_sub(done)
     }
 
-    /// The next jobs; none if there is nothing to do. Sets whether they end with an estimate.
+    /// Decides the next jobs, none if nothing is left to do, and sets `estimate`.
     fn decide(&mut self) -> Vec<Job> {
         self.estimate = true;
         let common = self.common_count();
-        if common < self.floor() || !self.settings.adaptive {
+        if common < self.min_samples() || !self.settings.adaptive {
             self.uniform(common)
         } else {
             self.highest_gain()
         }
     }
 
-    /// Samples per replicate that every tile gets before an estimate is believed.
-    fn floor(&self) -> u32 {
+    /// Samples per replicate that every tile gets before estimates count.
+    fn min_samples(&self) -> u32 {
         let sparse = |noise: Noise| self.settings.criterion.effective_pixels(noise) < FEW_PIXELS;
-        if self.noise.is_some_and(sparse) { SPARSE_FLOOR } else { MIN_SAMPLES }
+        if self.noise.is_some_and(sparse) { SPARSE_MIN_SAMPLES } else { MIN_SAMPLES }
     }
 
-    /// Samples per replicate of the tiles that no cap holds back (of all if every one is capped).
+    /// Least number of samples per replicate among the tiles below their cap; [`MAX_SAMPLES`] if there is none.
     fn common_count(&self) -> u32 {
         let open = self.tiles.iter().filter(|t| t.done < self.cap(t));
         open.map(|t| t.done).min().unwrap_or(MAX_SAMPLES)
     }
 
-    /// The same indices for every tile that is not capped.
+    /// Jobs with the same sample indices for every tile below its cap.
     fn uniform(&mut self, common: u32) -> Vec<Job> {
         let grown = match common {
-            // To the next power of two; a picture that was to have fewer samples may have stopped
-            // between two of them.
+            // To the next power of two; an earlier stop criterion may have ended between two of them.
             n if n < SAMPLE_ALIGNMENT => (n + 1).next_power_of_two() - n,
             n => {
                 (self.uniform_growth(n) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT).max(SAMPLE_ALIGNMENT)
@@ -266,24 +264,25 @@ impl Schedule {
         let count = grown.min(limit.saturating_sub(common));
         let after = common + count;
         let last = after == limit;
-        let aims = self.target().is_some() || self.settings.stop.seconds.is_some();
-        let due = if aims { after >= MIN_SAMPLES } else { after / 2 >= self.estimated_at.max(2) };
+        let has_target = self.target().is_some() || self.settings.stop.seconds.is_some();
+        let due =
+            if has_target { after >= MIN_SAMPLES } else { after / 2 >= self.estimated_at.max(2) };
         self.estimate = due || last;
         if self.estimate {
             self.estimated_at = after;
         }
-        let cut = |t: &Tile| after.min(self.cap(t)).saturating_sub(t.done);
-        self.jobs(cut)
+        let samples = |t: &Tile| after.min(self.cap(t)).saturating_sub(t.done);
+        self.jobs(samples)
     }
 
-    /// By how many samples to grow a uniform picture that holds `done` of each replicate: half of the
-    /// way to the target on the error, at most as many as there are; or an eighth, when there is no
-    /// such target or a time limit that a larger wave would overshoot.
+    /// Number of samples by which a uniform picture with `done` samples per replicate grows: half of the way to
+    /// the error target, at most `done`; an eighth of `done` without such a target, and at most an eighth with a
+    /// time limit, which a larger wave would overshoot.
     fn uniform_growth(&self, done: u32) -> u32 {
         let eighth = done / 8;
         let Some((criterion, target)) = self.target() else { return eighth };
         let noise = self.pooled(criterion, |_| true);
-        let factor = (noise / target).powf(1.0 / self.trend.slope());
+        let factor = (noise / target).powf(1.0 / self.convergence.slope());
         let half_way = (0.5 * f64::from(done) * (factor - 1.0).clamp(0.0, 2.0)) as u32;
         if self.settings.stop.seconds.is_some() { half_way.min(eighth) } else { half_way }
     }
@@ -296,12 +295,12 @@ impl Schedule {
             .collect()
     }
 
-    /// The slope of the error over all tiles alike (glossy or not), from their latest doublings.
+    /// Slope of the error over all glossy (or all other) tiles, from their latest doublings.
     fn pooled_slope(&self, glossy: bool) -> f64 {
         let criterion = self.settings.criterion;
-        let alike = self.tiles.iter().filter(|t| t.glossy == glossy);
+        let selected = self.tiles.iter().filter(|t| t.glossy == glossy);
         let doublings =
-            alike.filter_map(|t| Some((f64::from(t.pixels), t.last_doubling(criterion)?)));
+            selected.filter_map(|t| Some((f64::from(t.pixels), t.last_doubling(criterion)?)));
         let [mut before, mut after, mut growth] = [0.0; 3];
         for (pixels, [(n0, e0), (n1, e1)]) in doublings {
             before += pixels * e0;

@@ -1,13 +1,13 @@
-//! What the scheduler is asked for, and why it ended.
+//! Settings of the schedule, stop criteria, and reasons for its end.
 
 use crate::film::{Mse, Noise};
 
-/// What "noise" means when tiles compete for samples.
+/// Error that adaptive sampling minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Criterion {
-    /// The error as displayed, in 8-bit codes.
+    /// The error as displayed, in 8-bit levels.
     Codes,
-    /// The error of the linear mix.
+    /// The error in linear radiance.
     Linear,
 }
 
@@ -34,20 +34,20 @@ impl Criterion {
     }
 }
 
-/// When to stop; whichever comes first. Nothing set: never.
+/// Stop criteria; the first one that is reached ends the work. Without any it does not end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stop {
     /// Mean samples per pixel, A and B together; rounds up to even.
     pub spp: Option<u32>,
-    /// Estimated RMSE of the whole picture as displayed, in 8-bit codes.
+    /// Estimated RMSE of the whole picture as displayed, in 8-bit levels.
     pub noise_codes: Option<f64>,
     /// Estimated linear RMSE of the whole picture.
     pub rmse_linear: Option<f64>,
-    /// Seconds of rendering; tested between waves.
+    /// Seconds of rendering, tested between waves.
     pub seconds: Option<f64>,
 }
 
-/// Why the work ended.
+/// Reason for the end of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoppedBy {
     /// The sample count was reached.
@@ -58,9 +58,9 @@ pub enum StoppedBy {
     Rmse,
     /// The time was over.
     Time,
-    /// Every glossy tile has its cap of rays per pixel, and the others meet the target.
+    /// Every glossy tile has reached its cap of samples per pixel, and the others have reached the target.
     RaysPerPixel,
-    /// Every tile holds as many samples as can be counted.
+    /// Every tile holds the largest number of samples.
     Full,
 }
 
@@ -78,16 +78,16 @@ impl StoppedBy {
     }
 }
 
-/// How to schedule.
+/// Settings of the schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Whether tiles may get different counts (else only the cap makes a difference).
+    /// Adaptive sampling: tiles may get different counts. Otherwise counts differ only by the cap.
     pub adaptive: bool,
-    /// The error that the tiles' order minimises.
+    /// The error that adaptive sampling minimises.
     pub criterion: Criterion,
-    /// The most samples per pixel, A and B together, of tiles that met a glossy lobe (rounds down to
-    /// even, at least 2); 0: no cap.
+    /// Largest number of samples per pixel, A and B together, of tiles with a glossy lobe (rounds down to even,
+    /// at least 2); 0 for no cap.
     pub rays_per_pixel: u32,
-    /// When to stop.
+    /// Stop criteria.
     pub stop: Stop,
 }

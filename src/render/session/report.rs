@@ -52,7 +52,7 @@ pub struct Report {
     pub quality_seconds: [Option<(f64, f64)>; QUALITIES.len()],
     /// Share of the work that is done, 0..=1.
     pub progress: Option<f64>,
-    /// Samples left out because they were NaN, infinite or negative.
+    /// Samples left out because they were NaN or negative.
     pub bad_samples: u64,
     /// Samples brighter than the film can hold; they are stored with its largest value.
     pub saturated_samples: u64,

@@ -1,21 +1,25 @@
-//! Where samples go.
+//! Adaptive allocation of samples.
 
 use crate::render::schedule::allocation::EXPLORATION;
 use crate::render::schedule::tests::*;
 
 #[test]
-fn adaptive_spp_is_the_mean_and_goes_where_the_noise_is() {
+fn adaptive_spp_is_the_mean_and_noisy_tiles_get_most() {
     let mut model = Model::exact(clustered(400, 0.3));
     let (schedule, reason) = model.finish(until(spp(200), true));
     assert_eq!(reason, StoppedBy::Spp);
     let spp = schedule.spp();
     assert!(spp.mean <= 200.0 && spp.mean > 199.9, "{spp:?}");
-    // The calm tiles share what exploration gives: 200 * EXPLORATION / 0.7 samples each, in whole blocks.
+    // The calm tiles share the exploration: 200 * EXPLORATION / 0.7 samples each, in whole blocks.
     assert!((2 * MIN_SAMPLES..=40).contains(&spp.min), "{spp:?}");
     assert!(spp.max > 500, "{spp:?}");
 }
 
-/// Samples that adaptive sampling saves at equal error, against the uniform count.
+/// Ratio of uniform to adaptive samples at equal error.
+///
+/// An exact model of the best order gives 8.4, 2.6 and 1.1 for shares of 0.05, 0.3 and 0.9 with tiles that
+/// differ among themselves. Equal noisy tiles, and others without noise, would give at most
+/// 1 / (share + (1 - share) 32 / 1024): 12.4, 3.1 and 1.11.
 fn gain(share: f64) -> f64 {
     let tiles = 2000;
     let mut uniform = Model::exact(clustered(tiles, share));
@@ -30,18 +34,18 @@ fn gain(share: f64) -> f64 {
 }
 
 #[test]
-fn adaptive_order_pays() {
+fn adaptive_sampling_saves_samples() {
     // Where noise is nearly everywhere at most 1 / 0.9, less 2 % for an RMSE that ends 1 % below the target and 0.5 %
     // for counts in whole blocks of a quarter.
     for (share, least) in [(0.05, 8.4), (0.3, 2.6), (0.9, 1.08)] {
-        // The share of exploration does not go where the noise is known to be.
+        // Exploration takes its share from the noisy tiles.
         let (gain, least) = (gain(share), (1.0 - EXPLORATION) * least);
         assert!(gain >= least, "{share}: {gain}");
     }
 }
 
 #[test]
-fn a_target_is_reached_without_overshoot() {
+fn noise_target_is_reached_without_overshoot() {
     for adaptive in [false, true] {
         for (seed, target) in [(1, 0.3), (2, 0.5), (3, 1.0), (4, 1.7)] {
             let mut model = Model::random(clustered(600, 0.3), 64, seed);
@@ -59,7 +63,7 @@ fn a_target_is_reached_without_overshoot() {
 }
 
 #[test]
-fn the_estimate_stays_honest_when_it_decides() {
+fn estimate_stays_unbiased_when_it_decides() {
     for effective in [16, 64, 256] {
         let (mut ratio, runs) = (0.0, 8);
         for seed in 0..runs {
@@ -74,7 +78,7 @@ fn the_estimate_stays_honest_when_it_decides() {
 }
 
 #[test]
-fn decisions_repeat_and_do_not_look_at_the_clock() {
+fn decisions_are_deterministic_and_independent_of_time() {
     let waves = |speed: f64| {
         let mut model = Model::random(clustered(300, 0.2), 64, 7);
         let mut schedule = model.schedule(until(noise(0.7), true));
@@ -89,7 +93,7 @@ fn decisions_repeat_and_do_not_look_at_the_clock() {
     assert_eq!(waves(0.0), waves(1000.0));
 }
 
-/// Noise that only validation pixels show draws samples as well, and not many more than a uniform picture takes.
+/// Noise in validation pixels alone draws samples, and few more than a uniform picture takes.
 #[test]
 fn noise_in_validation_pixels_is_sampled_away() {
     for hidden in [vec![7], (0..100).step_by(3).collect::<Vec<_>>()] {
@@ -109,7 +113,7 @@ fn noise_in_validation_pixels_is_sampled_away() {
     }
 }
 
-/// Tiles without any estimated error go on in turns, the least sampled first.
+/// Tiles without any estimated error take turns, the least sampled first.
 #[test]
 fn clean_tiles_are_explored_evenly() {
     let mut model = Model::exact(clustered(400, 0.1));
@@ -119,7 +123,7 @@ fn clean_tiles_are_explored_evenly() {
     assert!(*least > 64 && *most <= 2 * least, "{least} to {most}");
 }
 
-/// Where all tiles are alike, chance in their estimates draws no samples: all have about the same count.
+/// Tiles of equal noise get about equal counts in spite of chance in their estimates.
 #[test]
 fn chance_in_estimates_of_equal_tiles_draws_no_samples() {
     let mut model = Model::random(vec![NOISY; 400], 64, 5);
@@ -131,9 +135,9 @@ fn chance_in_estimates_of_equal_tiles_draws_no_samples() {
     );
 }
 
-/// Counts of tiles that cost nothing stop where their double still fits 32 bits.
+/// Counts end where their double still fits 32 bits.
 #[test]
-fn full_tiles_have_a_count_that_can_be_reported() {
+fn full_tiles_have_a_count_that_fits_32_bits() {
     let mut model = Model::exact(vec![CALM; 2]);
     let mut schedule = model.schedule(until(Stop::default(), false));
     schedule.tiles.iter_mut().for_each(|t| t.done = MAX_SAMPLES - SAMPLE_ALIGNMENT);
@@ -153,7 +157,7 @@ fn full_tiles_have_a_count_that_can_be_reported() {
 }
 
 #[test]
-fn dear_tiles_get_fewer_samples() {
+fn expensive_tiles_get_fewer_samples() {
     let truth = (0..64).map(|i| Truth { rays_per_sample: if i < 32 { 2 } else { 18 }, ..NOISY });
     let mut model = Model::exact(truth.collect());
     let (schedule, _) = model.finish(until(spp(2000), true));

@@ -1,9 +1,14 @@
-//! What changes while the work goes on: aims, estimates, the length of pieces.
+//! Changes during the work: stop criteria, estimates, length of pieces.
 
 use crate::render::schedule::tests::*;
 
-/// Traces until it rests; every wave in pieces of `tiles` jobs at most, of `longest` samples.
-fn in_pieces(model: &mut Model, schedule: &mut Schedule, tiles: u64, longest: u32) -> StoppedBy {
+/// Traces to the end, every wave in pieces of at most `tiles` jobs of at most `longest` samples.
+fn finish_in_pieces(
+    model: &mut Model,
+    schedule: &mut Schedule,
+    tiles: u64,
+    longest: u32,
+) -> StoppedBy {
     loop {
         match schedule.next(0.0) {
             Step::Finished(reason) => return reason,
@@ -22,7 +27,7 @@ fn mixed() -> Vec<Truth> {
 }
 
 #[test]
-fn pieces_decide_nothing() {
+fn pieces_do_not_change_decisions() {
     for adaptive in [false, true] {
         let settings = until(noise(0.6), adaptive);
         let (whole, reason) = Model::exact(mixed()).finish(settings);
@@ -31,7 +36,7 @@ fn pieces_decide_nothing() {
         {
             let mut model = Model::exact(mixed());
             let mut schedule = model.schedule(settings);
-            assert_eq!(in_pieces(&mut model, &mut schedule, tiles, longest), reason);
+            assert_eq!(finish_in_pieces(&mut model, &mut schedule, tiles, longest), reason);
             let done = |s: &Schedule| s.tiles.iter().map(|t| t.done).collect::<Vec<_>>();
             assert_eq!(done(&schedule), done(&whole), "{tiles} x {longest}, adaptive {adaptive}");
             assert_eq!((schedule.samples(), schedule.rays()), (whole.samples(), whole.rays()));
@@ -41,15 +46,18 @@ fn pieces_decide_nothing() {
 }
 
 #[test]
-fn a_higher_aim_goes_on_where_the_lower_one_ended() {
+fn higher_target_resumes_after_the_lower_one() {
     for adaptive in [false, true] {
         for low in [2, 6, 22, 50, 150] {
             let mut model = Model::exact(mixed());
             let mut schedule = model.schedule(until(spp(low), adaptive));
-            assert_eq!(in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
+            assert_eq!(
+                finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES),
+                StoppedBy::Spp
+            );
             assert_eq!(schedule.spp().mean, f64::from(low));
             schedule.set_stop(spp(2000));
-            // The model refuses samples twice or out of order.
+            // The model panics on repeated samples and on samples out of order.
             model.aligned = false;
             let mut ends = Vec::new();
             while let Step::Trace(wave) = schedule.next(0.0) {
@@ -62,10 +70,10 @@ fn a_higher_aim_goes_on_where_the_lower_one_ended() {
                 let report = model.run(&wave);
                 schedule.complete(&wave, &report);
             }
-            // All but the last decision, which gives A and B what is left.
+            // All but the last decision, which gives A and B the remaining samples.
             assert!(ends[..ends.len() - 2].iter().all(|even| *even), "after {low} {adaptive}");
             assert_eq!(schedule.spp().mean, 2000.0);
-            // And back: it rests at once.
+            // The lower target is reached at once.
             schedule.set_stop(spp(low));
             assert_eq!(schedule.next(0.0), Step::Finished(StoppedBy::Spp));
             schedule.set_stop(noise(1e6));
@@ -75,14 +83,14 @@ fn a_higher_aim_goes_on_where_the_lower_one_ended() {
 }
 
 #[test]
-fn estimates_made_anew_replace_the_old_ones() {
+fn new_estimates_replace_the_old_ones() {
     let mut model = Model::exact(mixed());
     let mut schedule = model.schedule(until(noise(0.6), true));
-    in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES);
+    finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES);
     let (before, samples) = (schedule.noise().unwrap(), schedule.samples());
     schedule.forget_estimates();
     assert_eq!((schedule.noise(), schedule.eta_seconds(1.0)), (None, None));
-    // The picture is displayed three times as bright: so is its error.
+    // The picture is displayed three times as bright, and so is its error.
     model.truth.iter_mut().for_each(|t| t.sigma *= 3.0);
     let estimates: Vec<_> =
         (0..36).map(|tile| Some((schedule.tiles[tile].done, model.estimate(tile)))).collect();
@@ -90,26 +98,26 @@ fn estimates_made_anew_replace_the_old_ones() {
     let after = schedule.noise().unwrap();
     assert!((after.rmse_codes / before.rmse_codes - 3.0).abs() < 1e-9);
     assert_eq!(schedule.samples(), samples);
-    // Nobody knows how fast this picture's noise falls: the range is wide, and holds.
+    // The convergence of this picture is unknown: the range is wide, and holds.
     let (low, high) = schedule.eta_seconds(1.0).unwrap();
     assert!(high > 2.0 * low, "{low}..{high}");
     let rays = schedule.rays() as f64;
-    assert_eq!(in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Noise);
+    assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Noise);
     assert!((model.rmse() / 0.6 - 1.0).abs() < 0.1);
     let needed = schedule.rays() as f64 / rays - 1.0;
     assert!((low..high).contains(&needed), "{needed} not in {low}..{high}");
 }
 
 #[test]
-fn a_cap_may_rise_and_fall() {
+fn cap_may_rise_and_fall() {
     let mut model = Model::exact(mixed());
     let mut schedule = model.schedule(until(spp(100), false));
     schedule.set_rays_per_pixel(40);
-    assert_eq!(in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
+    assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
     assert_eq!((schedule.spp().min, schedule.spp().max), (40, 100));
     schedule.set_rays_per_pixel(0);
     // The cap of 20 per replicate ended inside a packet.
     model.aligned = false;
-    assert_eq!(in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
+    assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
     assert_eq!((schedule.spp().min, schedule.spp().max), (100, 100));
 }

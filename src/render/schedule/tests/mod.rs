@@ -1,32 +1,18 @@
-//! The schedule against pictures that are nothing but numbers.
+//! Tests of the schedule with simulated pictures.
 
 mod adaptive;
 mod changes;
 mod stops;
 
+use crate::film::testing::Rng;
 use crate::film::{Mse, TileNoise};
 use crate::render::schedule::*;
 use crate::render::wave::JobReport;
 
-/// Pixels of a whole tile.
+/// Number of pixels of a whole tile.
 const PIXELS: u32 = 256;
 
-/// Uniform in (0, 1) and standard normal numbers (SplitMix64, Box-Muller).
-struct Chance(u64);
-
-impl Chance {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 + f64::MIN_POSITIVE
-    }
-    fn normal(&mut self) -> f64 {
-        (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
-    }
-}
-
-/// A tile whose error is known: the RMSE of one replicate after n samples is `sigma * n^-slope`.
+/// Simulated tile: the RMSE of one replicate after n samples is `sigma * n^-slope`.
 #[derive(Clone, Copy)]
 struct Truth {
     sigma: f64,
@@ -38,19 +24,19 @@ struct Truth {
 const CALM: Truth = Truth { sigma: 0.0, slope: 0.5, glossy: false, rays_per_sample: 2 };
 const NOISY: Truth = Truth { sigma: 40.0, slope: 0.5, glossy: true, rays_per_sample: 3 };
 
-/// A picture that answers waves.
+/// Simulated picture that reports on waves.
 struct Model {
     truth: Vec<Truth>,
     pixels: Vec<u32>,
     /// Samples per replicate of each tile.
     counts: [Vec<u32>; 2],
-    /// Sums of the errors of `[replicate][tile][effective pixel]`, as random walks; empty: exact.
+    /// Sums of the errors of `[replicate][tile][effective pixel]`, as random walks; empty for exact errors.
     walks: [Vec<Vec<f64>>; 2],
-    chance: Chance,
+    rng: Rng,
     waves: usize,
-    /// Blocks of samples are to begin where packets do.
+    /// Blocks of samples must start at packet boundaries.
     aligned: bool,
-    /// Tiles whose error shows in validation pixels only.
+    /// Tiles with an error in validation pixels only.
     hidden: Vec<usize>,
 }
 
@@ -62,26 +48,26 @@ impl Model {
             pixels: vec![PIXELS; tiles],
             counts: [vec![0; tiles], vec![0; tiles]],
             walks: [vec![vec![]; tiles], vec![vec![]; tiles]],
-            chance: Chance(1),
+            rng: Rng(1),
             waves: 0,
             aligned: true,
             hidden: Vec::new(),
         }
     }
 
-    /// Errors by chance, for slope 0.5: each tile's error sits in `effective` independent values.
+    /// Random errors of slope 0.5: each tile's error consists of `effective` independent values.
     fn random(truth: Vec<Truth>, effective: usize, seed: u64) -> Self {
         let tiles = truth.len();
         let walks = vec![vec![0.0; effective]; tiles];
-        Self { walks: [walks.clone(), walks], chance: Chance(seed), ..Self::exact(truth) }
+        Self { walks: [walks.clone(), walks], rng: Rng(seed), ..Self::exact(truth) }
     }
 
-    /// The estimate from A - B, if the film holds equally many of both.
+    /// Estimate from A - B, if the film holds equally many samples of both.
     fn estimate(&self, tile: usize) -> TileNoise {
         let n = f64::from(self.counts[0][tile]);
         let [a, b] = [&self.walks[0][tile], &self.walks[1][tile]];
         let mse = |codes: f64| Mse { codes, linear: codes * 1e-6 };
-        let [mut guide, mut told] = [0, 1].map(|half| {
+        let [mut allocation, mut reported] = [0, 1].map(|half| {
             if a.is_empty() {
                 return mse(self.true_mse(tile));
             }
@@ -90,12 +76,12 @@ impl Model {
             mse(squares / 2.0 / a.len() as f64)
         });
         if self.hidden.contains(&tile) {
-            (guide, told) = (mse(0.0), mse(2.0 * told.codes));
+            (allocation, reported) = (mse(0.0), mse(2.0 * reported.codes));
         }
-        TileNoise { reported: told, allocation: guide, squares: Mse::SPREAD, pixels: PIXELS }
+        TileNoise { reported, allocation, squares: Mse::SPREAD, pixels: PIXELS }
     }
 
-    /// The squared error that the picture (A + B) / 2 really has.
+    /// True squared error of the picture (A + B) / 2.
     fn true_mse(&self, tile: usize) -> f64 {
         let t = self.truth[tile];
         let n = f64::from(self.counts[0][tile]);
@@ -129,11 +115,11 @@ impl Model {
         let truth = self.truth[tile];
         let step = truth.sigma * f64::from(job.count).sqrt();
         for sum in &mut self.walks[wave.replicate][tile] {
-            *sum += step * self.chance.normal();
+            *sum += step * self.rng.normal();
         }
-        // As the film does: no estimate while B lags.
-        let level = self.counts[0][tile] == self.counts[1][tile];
-        let error = (wave.estimate && level).then(|| self.estimate(tile));
+        // No estimate while B has fewer samples, as in the film.
+        let equal = self.counts[0][tile] == self.counts[1][tile];
+        let error = (wave.estimate && equal).then(|| self.estimate(tile));
         let rays = u64::from(job.count) * u64::from(self.pixels[tile]) * truth.rays_per_sample;
         JobReport { rays, glossy: truth.glossy, error }
     }
@@ -142,7 +128,7 @@ impl Model {
         Schedule::new(&self.pixels, settings)
     }
 
-    /// Runs to the end (a nanosecond per ray); panics if it does not end.
+    /// Runs to the end at a nanosecond per ray; panics if it does not end.
     fn finish(&mut self, settings: Settings) -> (Schedule, StoppedBy) {
         let mut schedule = self.schedule(settings);
         for _ in 0..100_000 {
@@ -170,8 +156,8 @@ fn spp(spp: u32) -> Stop {
     Stop { spp: Some(spp), ..Stop::default() }
 }
 
-/// `tiles` tiles in a square, of which the first `share` (in rows, as things in pictures cluster)
-/// are noisy.
+/// Returns `tiles` tiles in a square, of which the first `share`, in rows, are noisy: noise in pictures is
+/// clustered.
 fn clustered(tiles: usize, share: f64) -> Vec<Truth> {
     (0..tiles).map(|i| if (i as f64) < share * tiles as f64 { NOISY } else { CALM }).collect()
 }

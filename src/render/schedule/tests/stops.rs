@@ -1,9 +1,9 @@
-//! How waves count, when they end, and how long that takes.
+//! Sizes of waves, stop criteria and estimated times.
 
 use crate::render::schedule::tests::*;
 
 #[test]
-fn waves_count_as_the_sequence_likes_it() {
+fn waves_are_aligned_to_the_sequence() {
     let mut model = Model::exact(vec![NOISY; 4]);
     let mut schedule = model.schedule(until(spp(100), false));
     let mut seen = Vec::new();
@@ -23,23 +23,18 @@ fn waves_count_as_the_sequence_likes_it() {
 }
 
 #[test]
-fn spp_rounds_up_to_even_and_even_two_samples_have_a_noise() {
-    for (asked, given) in [(1, 2), (2, 2), (7, 8), (33, 34)] {
+fn spp_rounds_up_to_even_and_two_samples_have_a_noise() {
+    for (requested, traced) in [(1, 2), (2, 2), (7, 8), (33, 34)] {
         for adaptive in [false, true] {
             let mut model = Model::exact(vec![CALM; 9]);
-            let (schedule, reason) = model.finish(until(spp(asked), adaptive));
+            let (schedule, reason) = model.finish(until(spp(requested), adaptive));
             assert_eq!(reason, StoppedBy::Spp);
-            assert_eq!(schedule.spp().mean, f64::from(given), "{asked} adaptive {adaptive}");
+            assert_eq!(schedule.spp().mean, f64::from(traced), "{requested} adaptive {adaptive}");
             assert!(schedule.noise().is_some());
         }
     }
 }
 
-/// An exact model of the best order gives 8.4, 2.6 and 1.1 for tiles that differ among themselves;
-/// tiles that are all alike or free of noise would give at most
-/// 1 / (share + (1 - share) 32 / 1024): 12.4, 3.1 and 1.11.
-/// Choosing tiles by the estimates that also tell the error makes the estimate too low; how much
-/// must stay small, even when a tile's error sits in a few pixels.
 #[test]
 fn caps_hold_for_glossy_tiles_only() {
     for adaptive in [false, true] {
@@ -55,7 +50,7 @@ fn caps_hold_for_glossy_tiles_only() {
             "the noise is that of the whole picture"
         );
 
-        // All are glossy: nothing is left to do.
+        // All tiles are glossy: no work is left.
         let mut model = Model::exact(vec![NOISY; 25]);
         let (schedule, reason) = model.finish(settings);
         assert_eq!((reason, schedule.spp().max), (StoppedBy::RaysPerPixel, 40));
@@ -66,14 +61,14 @@ fn caps_hold_for_glossy_tiles_only() {
 }
 
 #[test]
-fn time_ends_the_work_with_both_replicates_alike() {
+fn time_ends_the_work_with_equal_replicates() {
     let mut model = model_of(NOISY);
     let stop = Stop { seconds: Some(1e-3), ..Stop::default() };
     let (schedule, reason) = model.finish(until(stop, true));
     assert_eq!(reason, StoppedBy::Time);
     assert_eq!(model.counts[0], model.counts[1]);
     assert!(schedule.spp().min >= 2);
-    // Even no time at all gives a picture.
+    // A time of 0 gives a picture.
     let stop = Stop { seconds: Some(0.0), ..Stop::default() };
     let (schedule, _) = model_of(NOISY).finish(until(stop, true));
     assert_eq!(schedule.spp().min, 2);
@@ -94,7 +89,7 @@ fn time_is_overshot_by_little() {
 }
 
 #[test]
-fn whichever_comes_first() {
+fn first_reached_criterion_ends_the_work() {
     let stop = Stop { spp: Some(64), noise_codes: Some(1e-3), ..Stop::default() };
     assert_eq!(model_of(NOISY).finish(until(stop, true)).1, StoppedBy::Spp);
     let stop = Stop { spp: Some(1 << 20), rmse_linear: Some(1e-3), ..Stop::default() };
@@ -102,14 +97,17 @@ fn whichever_comes_first() {
 }
 
 #[test]
-fn clean_picture_ends_at_the_floor_of_sparse_ones() {
+fn clean_picture_ends_at_the_minimum_of_sparse_ones() {
     let (schedule, reason) = model_of(CALM).finish(until(noise(0.5), true));
     let spp = schedule.spp();
-    assert_eq!((reason, spp.min, spp.max), (StoppedBy::Noise, 2 * SPARSE_FLOOR, 2 * SPARSE_FLOOR));
+    assert_eq!(
+        (reason, spp.min, spp.max),
+        (StoppedBy::Noise, 2 * SPARSE_MIN_SAMPLES, 2 * SPARSE_MIN_SAMPLES)
+    );
 }
 
 #[test]
-fn cancelled_jobs_come_again() {
+fn cancelled_jobs_are_traced_later() {
     let mut model = Model::random(clustered(100, 0.5), 16, 3);
     let mut whole = Model::random(clustered(100, 0.5), 16, 3);
     let settings = until(spp(100), false);
@@ -131,28 +129,28 @@ fn cancelled_jobs_come_again() {
 }
 
 #[test]
-fn the_time_left_is_told_as_a_range_that_holds() {
+fn estimated_time_left_is_a_range_that_holds() {
     for slope in [0.5, 0.75, 0.95] {
         for adaptive in [false, true] {
             let mut model = model_of(Truth { slope, ..NOISY });
             let settings = until(noise(0.05), adaptive);
             let mut schedule = model.schedule(settings);
-            let mut told = Vec::new();
+            let mut estimates = Vec::new();
             let seconds = |s: &Schedule| s.rays() as f64 * 1e-9;
             while let Step::Trace(wave) = schedule.next(seconds(&schedule)) {
                 let report = model.run(&wave);
                 schedule.complete(&wave, &report);
                 let now = seconds(&schedule);
-                told.extend(schedule.eta_seconds(now).map(|range| (now, range)));
+                estimates.extend(schedule.eta_seconds(now).map(|range| (now, range)));
             }
             let end = seconds(&schedule);
-            let late = told.iter().filter(|(now, _)| *now > 0.05 * end && *now < 0.8 * end);
+            let late = estimates.iter().filter(|(now, _)| *now > 0.05 * end && *now < 0.8 * end);
             let mut checked = 0;
             for (now, (low, high)) in late {
-                let left = end - now;
+                let seconds_left = end - now;
                 assert!(
-                    low <= high && *low < left * 1.02 && *high > left * 0.98,
-                    "slope {slope} adaptive {adaptive}: {left} not in {low}..{high}"
+                    low <= high && *low < seconds_left * 1.02 && *high > seconds_left * 0.98,
+                    "slope {slope} adaptive {adaptive}: {seconds_left} not in {low}..{high}"
                 );
                 assert!(high / low < 1.6, "{low}..{high}");
                 checked += 1;
@@ -175,7 +173,7 @@ fn the_time_left_is_told_as_a_range_that_holds() {
 }
 
 #[test]
-fn the_95th_percentile_is_that_of_tiles() {
+fn p95_is_the_percentile_of_tiles() {
     let truth = (0..100).map(|i| Truth { sigma: f64::from(i), ..NOISY }).collect();
     let mut model = Model::exact(truth);
     let (schedule, _) = model.finish(until(spp(32), false));
