@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Measures what docs/accuracy.md names and puts the tables and drawings there anew. For a quiet machine.
+# Repeats the measurements of docs/accuracy.md and replaces its tables and plots. Needs a quiet machine.
 #
 #     cargo build --release
 #     benches/accuracy.sh [KEY...]      only the blocks with these keys
 #
 # In docs/accuracy.md a block between `<!-- measured: KEY SCENE OPTIONS -->` and `<!-- end -->` is replaced by what
-# `zerkalo measure scenes/SCENE.toml OPTIONS` prints; the drawing goes to docs/images/accuracy-KEY.svg, the numbers to
-# benches/runs/DATE-accuracy-KEY.csv. The block `<!-- extremes -->` (its key is `extremes`) is replaced by what the
-# tests of extremes tell; that takes no quiet machine.
+# `zerkalo measure scenes/SCENE.toml OPTIONS` prints; the plot goes to docs/images/accuracy-KEY.svg, the numbers to
+# benches/runs/DATE-accuracy-KEY.csv. The block `<!-- extremes -->` (its key is `extremes`) is replaced by a table of
+# the output of the tests of extremes; this needs no quiet machine.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -17,7 +17,7 @@ zerkalo="${ZERKALO:-target/release/zerkalo}"
 scratch="$(mktemp -d)"
 trap 'rm -rf "$scratch"' EXIT
 
-# Puts the text of the second file after the line of the page that the first one holds, up to the block's end.
+# Replaces a block of the page. The first file contains the line that begins the block, the second its new text.
 replace() {
     awk -v begin="$(cat "$1")" -v text="$2" '
         $0 == begin {
@@ -59,7 +59,7 @@ if wanted extremes "$@"; then
     echo "extremes: the tests" >&2
     cargo test --lib --test extremes --test lobes --test film --test determinism --test honesty \
         -- --nocapture extreme all_thirty < /dev/null > "$scratch/tests.txt"
-    grep -o 'extreme [0-9][0-9] | .*' "$scratch/tests.txt" | LC_ALL=C sort -u > "$scratch/told.txt"
+    grep -o 'extreme [0-9][0-9] | .*' "$scratch/tests.txt" | LC_ALL=C sort -u > "$scratch/cells.txt"
     awk -F ' [|] ' '
         function add(column, words) {
             cell[n, column] = cell[n, column] (cell[n, column] == "" ? "" : "; ") words
@@ -69,14 +69,14 @@ if wanted extremes "$@"; then
             if ($2 == "both") { add("single", $3); add("double", $3) } else add($2, $3)
         }
         END {
-            print "\n| # | what | asked | single | double | `auto` takes |"
+            print "\n| # | case | criterion | single | double | `auto` chooses |"
             print "|---|---|---|---|---|---|"
             for (n = 1; n <= 30; n++)
                 printf "| %d | %s | %s | %s | %s | %s |\n", n, cell[n, "about"], cell[n, "criterion"], \
                     cell[n, "single"], cell[n, "double"], cell[n, "auto"]
             print ""
         }
-    ' "$scratch/told.txt" > "$scratch/extremes.md"
+    ' "$scratch/cells.txt" > "$scratch/extremes.md"
     echo "<!-- extremes -->" > "$scratch/begin"
     replace "$scratch/begin" "$scratch/extremes.md"
 fi

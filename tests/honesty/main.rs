@@ -302,7 +302,7 @@ fn assert_always_honest(adaptive: bool) {
     let ratios: Vec<f64> = ways.map(|(f, spp)| assert_honest(f, adaptive, spp)).collect();
     let (low, high) = ratios.iter().fold((f64::INFINITY, 0f64), |(l, h), r| (l.min(*r), h.max(*r)));
     let way = if adaptive { "adaptive" } else { "uniform" };
-    report::report(30, "both", &format!("{way}: true / told {low:.3} to {high:.3}"));
+    report::report(30, "both", &format!("{way}: true / estimated {low:.3} to {high:.3}"));
 }
 
 #[test]
@@ -322,7 +322,7 @@ fn extreme_30_a_noise_target_is_reached() {
         let outcomes = outcomes(filter, true, stop, StoppedBy::Noise);
         let achieved = mean(outcomes.iter().map(|o| o.codes * o.codes)).sqrt();
         assert!(achieved <= 1.1 * target, "{filter:?}: asked for {target}, achieved {achieved}");
-        report::report(30, "both", &format!("asked for {target} codes: {achieved:.2}"));
+        report::report(30, "both", &format!("target {target} levels: {achieved:.2}"));
     }
 }
 
