@@ -59,7 +59,7 @@ if wanted extremes "$@"; then
     echo "extremes: the tests" >&2
     cargo test --lib --test extremes --test lobes --test film --test determinism --test honesty \
         -- --nocapture extreme all_thirty < /dev/null > "$scratch/tests.txt"
-    grep -o 'extreme [0-9][0-9] | .*' "$scratch/tests.txt" | LC_ALL=C sort -u > "$scratch/told.txt"
+    grep -o 'extreme [0-9][0-9] | .*' "$scratch/tests.txt" | LC_ALL=C sort -u > "$scratch/cells.txt"
     awk -F ' [|] ' '
         function add(column, words) {
             cell[n, column] = cell[n, column] (cell[n, column] == "" ? "" : "; ") words
@@ -69,14 +69,14 @@ if wanted extremes "$@"; then
             if ($2 == "both") { add("single", $3); add("double", $3) } else add($2, $3)
         }
         END {
-            print "\n| # | what | asked | single | double | `auto` takes |"
+            print "\n| # | case | criterion | single | double | `auto` chooses |"
             print "|---|---|---|---|---|---|"
             for (n = 1; n <= 30; n++)
                 printf "| %d | %s | %s | %s | %s | %s |\n", n, cell[n, "about"], cell[n, "criterion"], \
                     cell[n, "single"], cell[n, "double"], cell[n, "auto"]
             print ""
         }
-    ' "$scratch/told.txt" > "$scratch/extremes.md"
+    ' "$scratch/cells.txt" > "$scratch/extremes.md"
     echo "<!-- extremes -->" > "$scratch/begin"
     replace "$scratch/begin" "$scratch/extremes.md"
 fi

@@ -182,8 +182,8 @@ const EXTREMES: [(&str, &str, &str, &str); 30] = [
         "tests/determinism.rs",
     ),
     (
-        "the error told is the error left",
-        "true / told 0.9 .. 1.1; at most 1.1 times the target",
+        "the estimated error is the true error",
+        "true / estimated 0.9 .. 1.1; at most 1.1 times the target",
         "estimator_honesty",
         "tests/honesty/main.rs",
     ),

@@ -1,7 +1,7 @@
-//! The camera: its frame, and how it is moved and turned.
+//! The camera's frame and navigation.
 
+use crate::first_hits::hits_agree;
 use crate::row::{Verdict, ensure, row};
-use crate::sight::sees;
 use crate::support::shipped;
 use glam::DVec3;
 use zerkalo::camera::{Camera, ViewAngle};
@@ -11,20 +11,20 @@ fn target(camera: &Camera) -> DVec3 {
     DVec3::from(camera.target.expect("the camera has a target"))
 }
 
-/// The length of a chord that spans `degrees` of a circle.
+/// Length of the chord that spans `degrees` of a circle.
 fn chord(radius: f64, degrees: f64) -> f64 {
     2.0 * radius * (degrees.to_radians() / 2.0).sin()
 }
 
-/// A camera after the motion of a name.
-type Moved<'a> = &'a dyn Fn(&Camera, &str) -> Camera;
+/// The camera after the named motion.
+type Motion<'a> = &'a dyn Fn(&Camera, &str) -> Camera;
 
-/// Moves and turns go as far as they should, keep what they should keep, and the picture shows the room
-/// from there. `moved` is the program's camera by the name of the motion.
-fn goes_where_it_should(room: &Scene, moved: Moved) -> Verdict {
-    // Numbers of cameras are rounded to about a millionth of the distance to the target.
-    let near = |what: &str, a: f64, b: f64| {
-        ensure((a - b).abs() < 2e-5, || format!("{what}: {a} instead of {b}"))
+/// Each motion has the right length and direction and keeps its invariants, and the picture shows the
+/// room from the new viewpoint. `moved` returns the camera after a named motion.
+fn moves_correctly(room: &Scene, moved: Motion) -> Verdict {
+    // Camera coordinates are rounded new_eye about a millionth of the distance new_eye the target.
+    let near = |quantity: &str, a: f64, b: f64| {
+        ensure((a - b).abs() < 2e-5, || format!("{quantity}: {a} instead of {b}"))
     };
     let old = &room.camera;
     let (eye, aim) = (DVec3::from(old.eye), target(old));
@@ -33,41 +33,41 @@ fn goes_where_it_should(room: &Scene, moved: Moved) -> Verdict {
     let right = ahead.cross(DVec3::Y).normalize();
     for motion in ["orbit", "fly", "dolly", "look"] {
         let new = moved(old, motion);
-        let (to, aims) = (DVec3::from(new.eye), target(&new));
+        let (new_eye, new_aim) = (DVec3::from(new.eye), target(&new));
         match motion {
             "orbit" => {
-                near("the target moves by", aims.distance(aim), 0.0)?;
-                near("orbit keeps the distance", to.distance(aim), distance)?;
-                near("orbit keeps the height", to.y, eye.y)?;
+                near("the target moves by", new_aim.distance(aim), 0.0)?;
+                near("orbit keeps the distance", new_eye.distance(aim), distance)?;
+                near("orbit keeps the height", new_eye.y, eye.y)?;
                 let across = (eye - aim).with_y(0.0).length();
-                near("orbit's way", to.distance(eye), chord(across, 20.0))?;
-                ensure((to - eye).dot(right) > 0.0, || "orbit goes to the left".into())?;
+                near("length of orbit's move", new_eye.distance(eye), chord(across, 20.0))?;
+                ensure((new_eye - eye).dot(right) > 0.0, || "orbit goes new_eye the left".into())?;
             }
             "fly" => {
-                let way = right * 0.3 + ahead * 0.5;
-                near("fly misses by", (to - eye).distance(way), 0.0)?;
-                near("the target is left behind by", (aims - aim).distance(way), 0.0)?;
+                let displacement = right * 0.3 + ahead * 0.5;
+                near("fly misses by", (new_eye - eye).distance(displacement), 0.0)?;
+                near("the target is off by", (new_aim - aim).distance(displacement), 0.0)?;
             }
             "dolly" => {
-                near("the target moves by", aims.distance(aim), 0.0)?;
-                near("dolly misses by", to.distance(eye + ahead * (0.25 * distance)), 0.0)?;
+                near("the target moves by", new_aim.distance(aim), 0.0)?;
+                near("dolly misses by", new_eye.distance(eye + ahead * (0.25 * distance)), 0.0)?;
             }
             _ => {
-                near("the eye moves by", to.distance(eye), 0.0)?;
-                let view = (aims - to).normalize();
+                near("the eye moves by", new_eye.distance(eye), 0.0)?;
+                let view = (new_aim - new_eye).normalize();
                 near("look keeps the height", view.y, ahead.y)?;
                 let flat = |v: DVec3| v.with_y(0.0).normalize();
-                near("look's turn", flat(view).dot(flat(ahead)).acos().to_degrees(), 15.0)?;
-                ensure(view.dot(right) > 0.0, || "look turns to the left".into())?;
+                near("look's angle", flat(view).dot(flat(ahead)).acos().to_degrees(), 15.0)?;
+                ensure(view.dot(right) > 0.0, || "look turns new_eye the left".into())?;
             }
         }
-        let there = Scene { camera: new, ..room.clone() };
-        sees(&there, &there).map_err(|found| format!("after {motion}: {found}"))?;
+        let scene = Scene { camera: new, ..room.clone() };
+        hits_agree(&scene, &scene).map_err(|error| format!("after {motion}: {error}"))?;
     }
     Ok(())
 }
 
-fn program(camera: &Camera, motion: &str) -> Camera {
+fn move_camera(camera: &Camera, motion: &str) -> Camera {
     match motion {
         "orbit" => camera.orbit(20.0, 0.0, 1.0),
         "fly" => camera.fly([0.3, 0.0, 0.5]),
@@ -79,35 +79,35 @@ fn program(camera: &Camera, motion: &str) -> Camera {
 #[test]
 fn a9_camera() {
     let room = shipped("mirror-room.toml");
-    goes_where_it_should(&room, &program).unwrap();
-    let neighbours: [(&str, Moved); 4] = [
+    moves_correctly(&room, &move_camera).unwrap();
+    let mutations: [(&str, Motion); 4] = [
         ("standing still", &|camera, _| camera.clone()),
-        ("turning where it should go round", &|camera, motion| match motion {
+        ("look for orbit", &|camera, motion| match motion {
             "orbit" => camera.look(20.0, 0.0),
-            other => program(camera, other),
+            other => move_camera(camera, other),
         }),
-        ("moving across where it should fly ahead", &|camera, motion| match motion {
+        ("sideways for ahead", &|camera, motion| match motion {
             "fly" => camera.fly([0.5, 0.0, 0.3]),
-            other => program(camera, other),
+            other => move_camera(camera, other),
         }),
-        ("zooming where it should come nearer", &|camera, motion| match motion {
+        ("zoom for dolly", &|camera, motion| match motion {
             "dolly" => camera.zoom(0.75),
-            other => program(camera, other),
+            other => move_camera(camera, other),
         }),
     ];
-    for (name, moved) in neighbours {
-        let found = goes_where_it_should(&room, moved).expect_err(name);
-        println!("{name}: {found}");
+    for (name, moved) in mutations {
+        let error = moves_correctly(&room, moved).expect_err(name);
+        println!("{name}: {error}");
     }
 }
 
 #[test]
 fn b3_camera_frame() {
-    let meant = shipped("near.toml");
+    let original = shipped("near.toml");
     let by_width = |s: &mut Scene| s.camera.view_angle = ViewAngle::Horizontal(36.0);
     row(
         "near.toml",
-        |shown| sees(&meant, shown),
+        |tested| hits_agree(&original, tested),
         &[
             ("no near plane", &|s| s.camera.near = 0.0),
             ("a near plane further away", &|s| s.camera.near = 3.6),

@@ -1,13 +1,13 @@
-//! What rays are asked before things are.
+//! Bounding boxes and the other acceleration structures.
 
+use crate::first_hits::hits_agree;
 use crate::row::{Verdict, ensure, row};
-use crate::sight::sees;
 use crate::support::{rendered, shipped, sized};
 use zerkalo::primitive::Acceleration;
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
-/// The bytes of a film.
+/// Bytes of the film of `scene` with the given acceleration structure.
 fn film(scene: &Scene, acceleration: Acceleration, precision: Precision) -> Vec<u8> {
     let mut scene = sized(scene.clone(), [100, 70]);
     scene.trace.acceleration = acceleration;
@@ -16,17 +16,17 @@ fn film(scene: &Scene, acceleration: Acceleration, precision: Precision) -> Vec<
     rendering.film.bytes()
 }
 
-/// The scene has the boxes that it asks for, the things are where their formulas say, and no way to leave
-/// things out changes a bit of the picture.
-fn has_boxes_of_its_own(meant: &Scene, shown: &Scene) -> Verdict {
-    let world = AnyWorld::compile(shown, &Options::default());
+/// The scene is compiled with object boxes, its objects are where their formulas say, and no acceleration
+/// structure changes a bit of the picture.
+fn uses_object_boxes(original: &Scene, tested: &Scene) -> Verdict {
+    let world = AnyWorld::compile(tested, &Options::default());
     let inventory = world.inventory().to_string();
     ensure(inventory.contains("boxes of their own"), || inventory.clone())?;
-    sees(meant, shown)?;
+    hits_agree(original, tested)?;
     for precision in [Precision::Single, Precision::Double] {
-        let bare = film(meant, Acceleration::None, precision);
+        let unaccelerated = film(original, Acceleration::None, precision);
         for acceleration in Acceleration::ALL {
-            let same = film(shown, acceleration, precision) == bare;
+            let same = film(tested, acceleration, precision) == unaccelerated;
             ensure(same, || format!("{} in {precision:?} changes the film", acceleration.name()))?;
         }
     }
@@ -35,17 +35,17 @@ fn has_boxes_of_its_own(meant: &Scene, shown: &Scene) -> Verdict {
 
 #[test]
 fn b9_extents() {
-    let meant = shipped("extents.toml");
-    let by = |acceleration| move |s: &mut Scene| s.trace.acceleration = acceleration;
+    let original = shipped("extents.toml");
+    let with_acceleration = |acceleration| move |s: &mut Scene| s.trace.acceleration = acceleration;
     row(
         "extents.toml",
-        |shown| has_boxes_of_its_own(&meant, shown),
+        |tested| uses_object_boxes(&original, tested),
         &[
-            ("none", &by(Acceleration::None)),
-            ("rectangles on the screen", &by(Acceleration::ScreenBounds)),
-            ("boxes in the scene's space", &by(Acceleration::Aabb)),
-            ("a tree", &by(Acceleration::Bvh)),
-            ("by itself", &by(Acceleration::Auto)),
+            ("none", &with_acceleration(Acceleration::None)),
+            ("screen rectangles", &with_acceleration(Acceleration::ScreenBounds)),
+            ("world-space boxes", &with_acceleration(Acceleration::Aabb)),
+            ("a BVH", &with_acceleration(Acceleration::Bvh)),
+            ("automatic", &with_acceleration(Acceleration::Auto)),
         ],
     );
 }

@@ -1,8 +1,8 @@
-//! Materials, lights, and the formulas that join them.
+//! Materials, lights and shading formulas.
 
-use crate::beside::{agrees, exactly, without_chance};
+use crate::first_hits::{RASTER, centers, first_hits, pixel_ray};
+use crate::plain_tracer::{agrees, agrees_exactly, without_chance};
 use crate::row::{Verdict, ensure, material, object, row};
-use crate::sight::{RASTER, centers, sighting, sights};
 use crate::support::{shipped, sized};
 use glam::DVec3;
 use zerkalo::camera::ViewAngle;
@@ -11,13 +11,13 @@ use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Metal};
 use zerkalo::scene::{RayTypes, Scene};
 use zerkalo::value::Color;
 
-/// `file` is exactly what the plain tracer makes of it.
-fn exact(file: &str, neighbours: &[(&str, crate::row::Change)]) {
-    let meant = shipped(file);
-    row(file, |shown| exactly(&meant, shown), neighbours);
+/// Asserts that `file` agrees exactly with the plain tracer, and none of its `mutations` does.
+fn exact(file: &str, mutations: &[(&str, crate::row::Change)]) {
+    let original = shipped(file);
+    row(file, |tested| agrees_exactly(&original, tested), mutations);
 }
 
-/// The blurred ball fills the picture.
+/// `scene` with a camera for which the blurred ball fills the picture.
 fn close_up(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.camera.target = Some([1.65, 0.5, 0.3]);
@@ -27,12 +27,12 @@ fn close_up(scene: &Scene) -> Scene {
 
 #[test]
 fn a7_material() {
-    let meant = shipped("material.toml");
+    let original = shipped("material.toml");
     row(
         "material.toml",
-        |shown| {
-            agrees(&meant, shown, 96)?;
-            agrees(&close_up(&meant), &close_up(shown), 96)
+        |tested| {
+            agrees(&original, tested, 96)?;
+            agrees(&close_up(&original), &close_up(tested), 96)
         },
         &[
             ("another colour", &|s| material(s, "matt").color = Color([0.7, 0.2, 0.15])),
@@ -45,11 +45,11 @@ fn a7_material() {
     );
 }
 
-/// On the floor, where one lamp reaches it: color x intensity x cosine, with the other lamp or without.
-fn floor_is_lit(meant: &Scene, shown: &Scene) -> Verdict {
-    let meant = sized(meant.clone(), RASTER);
-    let picture = without_chance(shown);
-    let balls: Vec<(DVec3, f64)> = meant
+/// Each visible point of the floor has the sum of colour x intensity x cosine over the lamps that reach it.
+fn floor_is_lit(original: &Scene, tested: &Scene) -> Verdict {
+    let original = sized(original.clone(), RASTER);
+    let pixels = without_chance(tested);
+    let balls: Vec<(DVec3, f64)> = original
         .objects
         .iter()
         .filter_map(|o| match &o.shape {
@@ -57,7 +57,7 @@ fn floor_is_lit(meant: &Scene, shown: &Scene) -> Verdict {
             _ => None,
         })
         .collect();
-    // Whether a ball comes within its radius of the way between two points.
+    // `true` if a ball intersects the segment between two points.
     let blocked = |a: DVec3, b: DVec3| {
         balls.iter().any(|(center, radius)| {
             let t = ((center - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
@@ -65,8 +65,8 @@ fn floor_is_lit(meant: &Scene, shown: &Scene) -> Verdict {
         })
     };
     let (mut lit, mut shadowed) = (0, 0);
-    for (center, shown) in centers(RASTER).iter().zip(&picture) {
-        let ray = sighting(&meant.camera, RASTER, *center);
+    for (center, pixel) in centers(RASTER).iter().zip(&pixels) {
+        let ray = pixel_ray(&original.camera, RASTER, *center);
         let on_floor = ray.origin - ray.direction * (ray.origin.y / ray.direction.y);
         let [x, _, z] = on_floor.to_array();
         if ray.direction.y >= 0.0 || x.abs() > 4.5 || z.abs() > 3.5 {
@@ -76,31 +76,31 @@ fn floor_is_lit(meant: &Scene, shown: &Scene) -> Verdict {
             continue;
         }
         let mut expected = DVec3::ZERO;
-        for light in &meant.lights {
-            let lamp = DVec3::from(light.point.as_ref().unwrap().position);
-            if blocked(on_floor, lamp) {
+        for light in &original.lights {
+            let position = DVec3::from(light.point.as_ref().unwrap().position);
+            if blocked(on_floor, position) {
                 shadowed += 1;
                 continue;
             }
             lit += 1;
-            let cos = (lamp - on_floor).normalize().y;
+            let cos = (position - on_floor).normalize().y;
             expected += DVec3::from(light.color.0) * (0.8 * light.intensity * cos);
         }
-        let apart = (*shown - expected).abs().max_element();
-        ensure(apart < 1e-6, || format!("{shown} instead of {expected} at {on_floor}"))?;
+        let difference = (*pixel - expected).abs().max_element();
+        ensure(difference < 1e-6, || format!("{pixel} instead of {expected} at {on_floor}"))?;
     }
     ensure(lit > 500 && shadowed > 50, || format!("{lit} lit, {shadowed} in shadow"))
 }
 
 #[test]
 fn a8_point_light() {
-    let meant = shipped("point-light.toml");
+    let original = shipped("point-light.toml");
     fn warm(scene: &mut Scene) -> &mut Light {
         &mut scene.lights[0]
     }
     row(
         "point-light.toml",
-        |shown| floor_is_lit(&meant, shown),
+        |tested| floor_is_lit(&original, tested),
         &[
             ("falling off with distance", &|s| warm(s).falloff = Falloff::InverseSquare),
             ("a directional light", &|s| {
@@ -164,49 +164,49 @@ fn b11_cook_torrance() {
 
 #[test]
 fn b12_metals() {
-    // The published numbers stand here once more, in place of the names.
-    let mut meant = shipped("metals.toml");
+    // The published reflectances in place of the names.
+    let mut original = shipped("metals.toml");
     for (name, f0) in [
         ("gold", [0.989, 0.876, 0.349]),
         ("silver", [0.950, 0.930, 0.880]),
         ("copper", [0.755, 0.490, 0.095]),
         ("iron", [0.530, 0.505, 0.480]),
     ] {
-        let own = material(&mut meant, name);
-        (own.metal, own.f0, own.fresnel) = (None, Some(Color(f0)), Some(Fresnel::Exact));
+        let metal = material(&mut original, name);
+        (metal.metal, metal.f0, metal.fresnel) = (None, Some(Color(f0)), Some(Fresnel::Exact));
     }
-    let instead =
+    let replaced =
         |name: &'static str, metal| move |s: &mut Scene| material(s, name).metal = Some(metal);
     row(
         "metals.toml",
-        |shown| agrees(&meant, shown, 96),
+        |tested| agrees(&original, tested, 96),
         &[
-            ("silver for gold", &instead("gold", Metal::Silver)),
-            ("iron for silver", &instead("silver", Metal::Iron)),
-            ("gold for copper", &instead("copper", Metal::Gold)),
-            ("copper for iron", &instead("iron", Metal::Copper)),
+            ("silver for gold", &replaced("gold", Metal::Silver)),
+            ("iron for silver", &replaced("silver", Metal::Iron)),
+            ("gold for copper", &replaced("copper", Metal::Gold)),
+            ("copper for iron", &replaced("iron", Metal::Copper)),
         ],
     );
 }
 
-/// The parts are added: what is shown is the Phong part plus k_r x reflected and k_t x transmitted.
+/// Radiance is the sum of the Phong part, k_r x reflected and k_t x transmitted radiance.
 #[test]
 fn a17_composition() {
     let weighted = |s: &mut Scene| {
         for m in s.materials.values_mut() {
-            let left = (1.0 - m.reflection - m.transmission).max(0.0);
+            let weight = (1.0 - m.reflection - m.transmission).max(0.0);
             (m.ambient, m.diffuse, m.specular) =
-                (m.ambient * left, m.diffuse * left, m.specular * left);
+                (m.ambient * weight, m.diffuse * weight, m.specular * weight);
         }
     };
     let bright = shipped("brighter-than-its-light.toml");
-    let check = |shown: &Scene| {
-        agrees(&bright, shown, 96)?;
-        let brightest = without_chance(shown).iter().map(|p| p.max_element()).fold(0.0, f64::max);
-        ensure(brightest > 1.2, || format!("nothing is brighter than {brightest}"))?;
-        let warnings: Vec<String> = shown.warnings().iter().map(|w| w.to_string()).collect();
-        let words = "more than the light";
-        ensure(warnings.len() == 1 && warnings[0].contains(words), || format!("{warnings:?}"))
+    let check = |tested: &Scene| {
+        agrees(&bright, tested, 96)?;
+        let brightest = without_chance(tested).iter().map(|p| p.max_element()).fold(0.0, f64::max);
+        ensure(brightest > 1.2, || format!("the brightest pixel has {brightest}"))?;
+        let warnings: Vec<String> = tested.warnings().iter().map(|w| w.to_string()).collect();
+        let phrase = "more than the light";
+        ensure(warnings.len() == 1 && warnings[0].contains(phrase), || format!("{warnings:?}"))
     };
     row(
         "brighter-than-its-light.toml",
@@ -219,7 +219,7 @@ fn a17_composition() {
     let transparent = shipped("transmission.toml");
     row(
         "transmission.toml",
-        |shown| agrees(&transparent, shown, 96),
+        |tested| agrees(&transparent, tested, 96),
         &[
             ("the Phong part weighted by 1 - k_r - k_t", &weighted),
             ("k_t of 0.5", &|s| material(s, "clear").transmission = 0.5),
@@ -228,32 +228,34 @@ fn a17_composition() {
     );
 }
 
-/// Where nothing is met there is the background, and k_r times it where a ball mirrors it.
-fn background_is_seen(meant: &Scene, shown: &Scene) -> Verdict {
-    let meant = sized(meant.clone(), RASTER);
-    let color = DVec3::from(meant.background.color.0);
+/// A camera ray that misses shows the background colour; a ball that reflects it shows k_r times that colour.
+fn background_is_seen(original: &Scene, tested: &Scene) -> Verdict {
+    let original = sized(original.clone(), RASTER);
+    let color = DVec3::from(original.background.color.0);
     let mut mirrored = [0; 3];
-    let seen = sights(&meant);
-    for ((center, sight), shown) in centers(RASTER).iter().zip(&seen).zip(&without_chance(shown)) {
-        let share = match sight.object {
+    let hits = first_hits(&original);
+    for ((center, hit), pixel) in centers(RASTER).iter().zip(&hits).zip(&without_chance(tested)) {
+        let share = match hit.object {
             None => 1.0,
             Some(0) => continue,
             Some(ball) => {
-                // A ray that goes up from a ball misses floor and balls: their centres are level.
-                let ray = sighting(&meant.camera, RASTER, *center);
-                let n = DVec3::from(sight.normal.map(f64::from));
-                let away = ray.direction - 2.0 * n * n.dot(ray.direction);
-                if away.y < 0.5 {
+                // A ray reflected upwards misses the floor and the balls, whose centres are level.
+                let ray = pixel_ray(&original.camera, RASTER, *center);
+                let n = DVec3::from(hit.normal.map(f64::from));
+                let reflected = ray.direction - 2.0 * n * n.dot(ray.direction);
+                if reflected.y < 0.5 {
                     continue;
                 }
                 mirrored[ball as usize - 1] += 1;
                 [1.0, 2.0 / 3.0, 1.0 / 3.0][ball as usize - 1]
             }
         };
-        let apart = (*shown - color * share).abs().max_element();
-        ensure(apart < 1e-6, || format!("{shown} instead of {} at {center:?}", color * share))?;
+        let difference = (*pixel - color * share).abs().max_element();
+        ensure(difference < 1e-6, || {
+            format!("{pixel} instead of {} at {center:?}", color * share)
+        })?;
     }
-    let directly = seen.iter().filter(|s| s.object.is_none()).count();
+    let directly = hits.iter().filter(|s| s.object.is_none()).count();
     ensure(directly > 500 && mirrored.iter().all(|n| *n > 5), || {
         format!("{directly} directly, {mirrored:?} in the balls")
     })
@@ -261,10 +263,10 @@ fn background_is_seen(meant: &Scene, shown: &Scene) -> Verdict {
 
 #[test]
 fn a18_background() {
-    let meant = shipped("background.toml");
+    let original = shipped("background.toml");
     row(
         "background.toml",
-        |shown| background_is_seen(&meant, shown),
+        |tested| background_is_seen(&original, tested),
         &[
             ("black", &|s| s.background.color = Color::BLACK),
             ("as ambient light", &|s| {
@@ -275,7 +277,7 @@ fn a18_background() {
     );
 }
 
-/// Ambient and directional light exist, by themselves and where they were missed.
+/// Ambient and directional light, alone and in the scene of the reflecting tracks.
 #[test]
 fn c3_what_the_tracks_lacked() {
     exact(
@@ -283,7 +285,7 @@ fn c3_what_the_tracks_lacked() {
         &[
             ("no ambient light", &|s| s.ambient.color = Color::BLACK),
             ("no directional light", &|s| s.lights[0].on = false),
-            ("a lamp far away, but not infinitely far", &|s| {
+            ("a distant point light", &|s| {
                 s.lights[0].directional = None;
                 s.lights[0].point = Some(Point { position: [-100.0, 100.0, 50.0] });
             }),
@@ -295,7 +297,7 @@ fn c3_what_the_tracks_lacked() {
     let tracks = shipped("reflecting-tracks-lit.toml");
     row(
         "reflecting-tracks-lit.toml",
-        |shown| agrees(&tracks, shown, 16),
+        |tested| agrees(&tracks, tested, 16),
         &[
             ("no ambient light", &|s| s.ambient.color = Color::BLACK),
             ("no directional light", &|s| s.lights[2].on = false),

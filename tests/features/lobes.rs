@@ -1,8 +1,8 @@
-//! Mirrors and the blur of what they show.
+//! Mirrors and blurred reflection.
 
-use crate::beside::{agrees, without_chance};
+use crate::first_hits::{RASTER, centers, first_hits, pixel_ray};
+use crate::plain_tracer::{agrees, without_chance};
 use crate::row::{Verdict, ensure, material, number, object, row, shape};
-use crate::sight::{RASTER, centers, sighting, sights};
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -12,7 +12,7 @@ use zerkalo::scene::{Filter, Scale, Scene, TransformOp};
 use zerkalo::shape::Shape;
 use zerkalo::world::Precision;
 
-/// Only the mirror reflects, and it shows nothing of its own.
+/// `scene` with the mirror as its only reflecting material, without ambient and diffuse parts.
 fn stripped(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     for (name, m) in &mut scene.materials {
@@ -25,8 +25,8 @@ fn stripped(scene: &Scene) -> Scene {
     scene
 }
 
-/// Without the mirror, everything on the other side of the plane z = -2 in which it lies.
-fn behind_the_mirror(scene: &Scene) -> Scene {
+/// `scene` without the mirror and mirrored at its plane, z = -2.
+fn mirrored_scene(scene: &Scene) -> Scene {
     let mut scene = stripped(scene);
     scene.objects.retain(|o| o.material != "mirror");
     for object in &mut scene.objects {
@@ -39,32 +39,35 @@ fn behind_the_mirror(scene: &Scene) -> Scene {
     scene
 }
 
-/// Where the mirror is seen there is 0.92 of what stands mirrored behind it.
-fn shows_the_mirrored_room(meant: &Scene, shown: &Scene) -> Verdict {
-    let mirror = number(meant, "mirror") as u32;
-    let seen = sights(&sized(meant.clone(), RASTER));
-    let beyond = without_chance(&behind_the_mirror(meant));
-    let own = without_chance(&stripped(shown));
-    let (mut compared, mut things) = (0, 0);
-    for ((sight, beyond), own) in seen.iter().zip(&beyond).zip(&own) {
-        if sight.object == Some(mirror) {
+/// The mirror's pixels have 0.92 of the radiance of the mirrored scene.
+fn shows_the_mirrored_room(original: &Scene, tested: &Scene) -> Verdict {
+    let mirror = number(original, "mirror") as u32;
+    let hits = first_hits(&sized(original.clone(), RASTER));
+    let mirrored = without_chance(&mirrored_scene(original));
+    let pixels = without_chance(&stripped(tested));
+    let (mut compared, mut objects) = (0, 0);
+    for ((hit, mirrored), pixel) in hits.iter().zip(&mirrored).zip(&pixels) {
+        if hit.object == Some(mirror) {
             compared += 1;
-            things += usize::from(beyond.distance(DVec3::from(meant.background.color.0)) > 0.01);
-            let apart = (*own - 0.92 * *beyond).abs().max_element();
-            ensure(apart < 1e-6, || format!("{own} in the mirror, {beyond} behind it"))?;
+            objects +=
+                usize::from(mirrored.distance(DVec3::from(original.background.color.0)) > 0.01);
+            let difference = (*pixel - 0.92 * *mirrored).abs().max_element();
+            ensure(difference < 1e-6, || format!("{pixel} in the mirror, {mirrored} behind it"))?;
         }
     }
-    ensure(things > 50, || format!("only {things} of {compared} pixels of the mirror show things"))
+    ensure(objects > 50, || {
+        format!("only {objects} of {compared} pixels of the mirror show objects")
+    })
 }
 
-/// Standard deviation of the mirror's pixels, by their brightness.
+/// Standard deviation of the brightness of the mirror's pixels.
 fn contrast(scene: &Scene) -> f64 {
     let mirror = number(scene, "mirror") as u32;
     let scene = sized(stripped(scene), RASTER);
-    let seen = sights(&scene);
-    let shown = picture(&rendered(&scene, 1, Precision::Double, 128), Replicates::Both);
-    let of_mirror = seen.iter().zip(&shown).filter(|(s, _)| s.object == Some(mirror));
-    let values: Vec<f64> = of_mirror.map(|(_, rgb)| rgb.iter().sum::<f64>() / 3.0).collect();
+    let hits = first_hits(&scene);
+    let pixels = picture(&rendered(&scene, 1, Precision::Double, 128), Replicates::Both);
+    let mirror_pixels = hits.iter().zip(&pixels).filter(|(s, _)| s.object == Some(mirror));
+    let values: Vec<f64> = mirror_pixels.map(|(_, rgb)| rgb.iter().sum::<f64>() / 3.0).collect();
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
 }
@@ -74,7 +77,7 @@ fn a6_flat_mirror() {
     let sharp = shipped("roughness-0.toml");
     row(
         "roughness-0.toml",
-        |shown| shows_the_mirrored_room(&sharp, shown),
+        |tested| shows_the_mirrored_room(&sharp, tested),
         &[
             ("matt", &|s| material(s, "mirror").reflection = 0.0),
             ("rough", &|s| material(s, "mirror").roughness = 0.01),
@@ -91,13 +94,13 @@ fn a6_flat_mirror() {
     let blurred = shipped("roughness-0.3.toml");
     row(
         "roughness-0.3.toml",
-        |shown| agrees(&blurred, shown, 96),
+        |tested| agrees(&blurred, tested, 96),
         &[
             ("perfect", &|s| material(s, "mirror").roughness = 0.0),
             ("half as rough", &|s| material(s, "mirror").roughness = 0.15),
         ],
     );
-    // From perfect to fully blurred, without a limit.
+    // Contrast falls with every increase of roughness.
     let by_roughness = [0.0, 0.1, 0.3, 1.0, 1e3].map(|roughness| {
         let mut scene = sharp.clone();
         material(&mut scene, "mirror").roughness = roughness;
@@ -105,73 +108,82 @@ fn a6_flat_mirror() {
     });
     println!("contrast by roughness: {by_roughness:?}");
     assert!(by_roughness.is_sorted_by(|a, b| a > b), "{by_roughness:?}");
-    // What is left is how much of the floor and of the sky the surroundings of a point have.
+    // The remaining contrast is that between floor and sky around each point.
     assert!(by_roughness[4] < 0.5 * by_roughness[0], "{by_roughness:?}");
 }
 
-/// The raster in which footprints are looked at.
+/// Raster of the footprint scenes.
 const FINE: [u32; 2] = [96, 64];
 
-/// A ball as seen from a point of the mirror: the angle to the mirrored direction, the ball's own
-/// half-angle, and its radiance.
+/// A ball as seen from a point of the mirror.
 struct Spot {
+    /// Angle between its centre and the mirrored direction, in radians.
     angle: f64,
+    /// Angular radius in radians.
     half: f64,
     radiance: DVec3,
 }
 
-/// A pixel of the mirror: the balls that it may show, what it shows, and the error of that.
+/// A pixel of the mirror.
 struct Footprint {
+    /// Balls that it may reflect.
     spots: Vec<Spot>,
-    shown: DVec3,
+    /// Rendered radiance.
+    radiance: DVec3,
+    /// Standard error of `radiance`.
     error: DVec3,
 }
 
-fn footprints(meant: &Scene, shown: &Scene) -> Vec<Footprint> {
-    let meant = sized(meant.clone(), FINE);
-    let mut shown = sized(shown.clone(), FINE);
-    shown.film.filter = Filter::Point;
-    let rendering = rendered(&shown, 1, Precision::Double, 512);
+/// The pixels of the mirror in the rendering of `tested`, with the balls of `original`.
+fn footprints(original: &Scene, tested: &Scene) -> Vec<Footprint> {
+    let original = sized(original.clone(), FINE);
+    let mut tested = sized(tested.clone(), FINE);
+    tested.film.filter = Filter::Point;
+    let rendering = rendered(&tested, 1, Precision::Double, 512);
     let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
-    let seen = sights(&meant);
-    let mirrors = (0..a.len()).filter(|i| seen[*i].object == Some(0));
+    let hits = first_hits(&original);
+    let mirrors = (0..a.len()).filter(|i| hits[*i].object == Some(0));
     let pixel = |i: usize| {
-        let ray = sighting(&meant.camera, FINE, centers(FINE)[i]);
+        let ray = pixel_ray(&original.camera, FINE, centers(FINE)[i]);
         let on_mirror = ray.origin + ray.direction * ((-1.0 - ray.origin.z) / ray.direction.z);
         let mirrored = ray.direction * DVec3::new(1.0, 1.0, -1.0);
         let spot = |o: &zerkalo::scene::Object| match &o.shape {
             Shape::Sphere(s) => {
-                let to = DVec3::from(s.center) - on_mirror;
-                let color = DVec3::from(meant.materials[&o.material].color.0);
-                let radiance = color * DVec3::from(meant.ambient.color.0);
-                let half = (s.radius / to.length()).asin();
-                Some(Spot { angle: mirrored.angle_between(to), half, radiance })
+                let to_center = DVec3::from(s.center) - on_mirror;
+                let color = DVec3::from(original.materials[&o.material].color.0);
+                let radiance = color * DVec3::from(original.ambient.color.0);
+                let half = (s.radius / to_center.length()).asin();
+                Some(Spot { angle: mirrored.angle_between(to_center), half, radiance })
             }
             _ => None,
         };
         let (a, b) = (DVec3::from(a[i]), DVec3::from(b[i]));
-        let spots = meant.objects.iter().filter_map(spot).collect();
-        Footprint { spots, shown: (a + b) / 2.0, error: (a - b) / 2.0 }
+        let spots = original.objects.iter().filter_map(spot).collect();
+        Footprint { spots, radiance: (a + b) / 2.0, error: (a - b) / 2.0 }
     };
     mirrors.map(pixel).collect()
 }
 
-/// Pixels for which `share` tells of every ball which share of the lobe it covers show that share of
-/// its radiance, weighted by k_r = 0.9, and where that is nothing, nothing.
+/// Each pixel has the sum of 0.9 x share x radiance over its balls (k_r = 0.9). `share` returns the share of
+/// the lobe that a ball covers; pixels with a ball for which it returns `None` are left out. Pixels whose
+/// sum is 0 must be exactly black.
 fn shows_shares(pixels: &[Footprint], share: impl Fn(&Spot) -> Option<f64>) -> Verdict {
     let (mut sum, mut variance, mut expected_sum) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
     let (mut bright, mut dark) = (0, 0);
     for pixel in pixels {
         let shares: Option<Vec<f64>> = pixel.spots.iter().map(&share).collect();
         let Some(shares) = shares else { continue };
-        let parts = pixel.spots.iter().zip(&shares);
-        let expected = parts.map(|(spot, share)| spot.radiance * (0.9 * share)).sum::<DVec3>();
+        let weighted_spots = pixel.spots.iter().zip(&shares);
+        let expected =
+            weighted_spots.map(|(spot, share)| spot.radiance * (0.9 * share)).sum::<DVec3>();
         if expected == DVec3::ZERO {
             dark += 1;
-            ensure(pixel.shown == DVec3::ZERO, || format!("{} outside of all lobes", pixel.shown))?;
+            ensure(pixel.radiance == DVec3::ZERO, || {
+                format!("{} outside the lobe", pixel.radiance)
+            })?;
         } else {
             bright += 1;
-            sum += pixel.shown - expected;
+            sum += pixel.radiance - expected;
             variance += pixel.error * pixel.error;
             expected_sum += expected;
         }
@@ -179,26 +191,28 @@ fn shows_shares(pixels: &[Footprint], share: impl Fn(&Spot) -> Option<f64>) -> V
     ensure(bright > 100 && dark > 100, || format!("{bright} pixels inside, {dark} outside"))?;
     let z = (sum / variance.map(f64::sqrt)).abs().max_element();
     let off = (sum / expected_sum).abs().max_element();
-    // Three channels: by chance alone once in five thousand seeds.
-    ensure(z < 4.0, || format!("inside {off:.4} too much or too little, {z:.1} standard errors"))
+    // Three channels: exceeded by chance in one of five thousand seeds.
+    ensure(z < 4.0, || format!("inside off by {off:.4}, {z:.1} standard errors"))
 }
 
-/// Radius of the cone's base at unit distance, and half the side of the square of the same area.
+/// Radius of the cone's base at unit distance.
 const RADIUS: f64 = 0.2;
 
+/// Half the side of the square with the area of the cone's base.
 fn half_side() -> f64 {
     0.5 * PI.sqrt() * RADIUS
 }
 
-/// Where a direction at `angle` to the axis meets the plane at unit distance, if it does.
+/// Distance from the axis at which a direction at `angle` to it reaches the plane at unit distance; infinite
+/// if it does not.
 fn reach(angle: f64) -> f64 {
     if angle < 0.5 * PI { angle.tan() } else { f64::INFINITY }
 }
 
-/// Every direction in the cone is as likely as any other: a ball counts by its solid angle.
-fn spreads_over_a_cone(meant: &Scene, shown: &Scene) -> Verdict {
+/// Directions are uniform in the cone: a ball's share is its solid angle.
+fn spreads_over_a_cone(original: &Scene, tested: &Scene) -> Verdict {
     let edge = RADIUS.atan();
-    shows_shares(&footprints(meant, shown), |spot| {
+    shows_shares(&footprints(original, tested), |spot| {
         if spot.angle - spot.half > edge {
             return Some(0.0);
         }
@@ -207,11 +221,11 @@ fn spreads_over_a_cone(meant: &Scene, shown: &Scene) -> Verdict {
     })
 }
 
-/// Every point of the square is as likely as any other: a ball counts by the ellipse that it covers in
-/// the plane at unit distance. The corners reach further than the cone, the sides less far.
-fn spreads_over_a_square(meant: &Scene, shown: &Scene) -> Verdict {
+/// Points are uniform on the square: a ball's share is the area of its ellipse in the plane at unit
+/// distance. The corners of the square extend beyond the cone, its sides lie within.
+fn spreads_over_a_square(original: &Scene, tested: &Scene) -> Verdict {
     let half = half_side();
-    let pixels = footprints(meant, shown);
+    let pixels = footprints(original, tested);
     shows_shares(&pixels, |spot| {
         if reach(spot.angle - spot.half) > 2f64.sqrt() * half {
             return Some(0.0);
@@ -221,23 +235,24 @@ fn spreads_over_a_square(meant: &Scene, shown: &Scene) -> Verdict {
         let inside = reach(spot.angle + spot.half) < half;
         inside.then_some(ellipse / (4.0 * half * half))
     })?;
-    let beyond = |pixel: &&Footprint, radius: f64| {
+    let all_outside = |pixel: &&Footprint, radius: f64| {
         pixel.spots.iter().all(|spot| reach(spot.angle - spot.half) > radius)
     };
-    let corners = pixels.iter().filter(|p| beyond(p, RADIUS) && p.shown != DVec3::ZERO).count();
+    let corners =
+        pixels.iter().filter(|p| all_outside(p, RADIUS) && p.radiance != DVec3::ZERO).count();
     ensure(corners > 10, || format!("only {corners} pixels are lit by corners"))?;
-    // Some pixels are dark that the cone would reach: those beside the middle of a side.
-    let sides = pixels.iter().filter(|p| beyond(p, half) && p.shown == DVec3::ZERO);
+    // Pixels beside the middle of a side are dark although the cone would reach them.
+    let sides = pixels.iter().filter(|p| all_outside(p, half) && p.radiance == DVec3::ZERO);
     let sides = sides.filter(|p| p.spots.iter().any(|s| reach(s.angle - s.half) < RADIUS)).count();
     ensure(sides > 10, || format!("only {sides} pixels are dark beside the sides"))
 }
 
 #[test]
 fn a11_blurred_reflection() {
-    let meant = shipped("footprint-cone.toml");
+    let original = shipped("footprint-cone.toml");
     row(
         "footprint-cone.toml",
-        |shown| spreads_over_a_cone(&meant, shown),
+        |tested| spreads_over_a_cone(&original, tested),
         &[
             ("the square", &|s| material(s, "mirror").lobe = Lobe::Square),
             ("no spread", &|s| material(s, "mirror").lobe = Lobe::Mirror),
@@ -250,10 +265,10 @@ fn a11_blurred_reflection() {
 
 #[test]
 fn a12_pyramid_lobe() {
-    let meant = shipped("footprint-square.toml");
+    let original = shipped("footprint-square.toml");
     row(
         "footprint-square.toml",
-        |shown| spreads_over_a_square(&meant, shown),
+        |tested| spreads_over_a_square(&original, tested),
         &[
             ("the cone", &|s| material(s, "mirror").lobe = Lobe::Cone),
             ("no spread", &|s| material(s, "mirror").lobe = Lobe::Mirror),

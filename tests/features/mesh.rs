@@ -1,32 +1,33 @@
-//! Meshes from files, triangle by triangle.
+//! Meshes from files, compared with a direct intersection of all triangles.
 
+use crate::analytic_shapes::{AnalyticShape, placement, triangles};
+use crate::first_hits::hits_agree_with;
 use crate::row::{object, row, shape};
-use crate::sight::sees_things;
-use crate::solids::{Thing, placement, triangles};
 use crate::support::{parsed, shipped};
 use glam::DVec3;
 use std::fs;
 use zerkalo::scene::Scene;
 
-/// Triangles from the first corner of a polygon.
+/// Triangles of the fan around the first corner of a polygon.
 fn fan(corners: &[DVec3]) -> impl Iterator<Item = [DVec3; 3]> {
     corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]])
 }
 
-/// The triangles of a text in OBJ.
-fn of_obj(text: &str) -> Vec<[DVec3; 3]> {
-    let words = |key: &str| {
+/// Triangles of an OBJ file.
+fn obj_triangles(text: &str) -> Vec<[DVec3; 3]> {
+    let statements = |key: &str| {
         let lines = text.lines().filter_map(|line| line.split_once(' '));
-        lines.filter(|(k, _)| *k == key).map(|(_, rest)| rest.to_string()).collect::<Vec<_>>()
+        let matching = lines.filter(|(k, _)| *k == key);
+        matching.map(|(_, arguments)| arguments.to_string()).collect::<Vec<_>>()
     };
     let number = |word: &str| word.parse::<f64>().unwrap();
     let point = |line: &String| {
         let x: Vec<f64> = line.split_whitespace().map(number).collect();
         DVec3::new(x[0], x[1], x[2])
     };
-    let points: Vec<DVec3> = words("v").iter().map(point).collect();
+    let points: Vec<DVec3> = statements("v").iter().map(point).collect();
     let corner = |word: &str| points[word.split('/').next().unwrap().parse::<usize>().unwrap() - 1];
-    let faces = words("f");
+    let faces = statements("f");
     faces
         .iter()
         .flat_map(|f| {
@@ -35,9 +36,9 @@ fn of_obj(text: &str) -> Vec<[DVec3; 3]> {
         .collect()
 }
 
-/// The triangles of a binary PLY file whose vertices have three `float` and whose faces are lists of
-/// `int` with a `uchar` before each.
-fn of_ply(bytes: &[u8]) -> Vec<[DVec3; 3]> {
+/// Triangles of a binary PLY file whose vertices are three `float` and whose faces are lists of `int` after
+/// a `uchar` count.
+fn ply_triangles(bytes: &[u8]) -> Vec<[DVec3; 3]> {
     let end = b"end_header\n";
     let data = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
     let header = std::str::from_utf8(&bytes[..data]).unwrap();
@@ -53,10 +54,10 @@ fn of_ply(bytes: &[u8]) -> Vec<[DVec3; 3]> {
         .collect();
     let mut all = Vec::new();
     for _ in 0..count("face") {
-        let (list, rest) = faces[1..].split_at(4 * faces[0] as usize);
+        let (list, following) = faces[1..].split_at(4 * faces[0] as usize);
         let corner = |b: &[u8]| points[u32::from_le_bytes(b.try_into().unwrap()) as usize];
         all.extend(fan(&list.chunks(4).map(corner).collect::<Vec<_>>()));
-        faces = rest;
+        faces = following;
     }
     all
 }
@@ -67,36 +68,34 @@ fn b8_mesh_objects() {
         let path = format!("{}/scenes/meshes/{name}", env!("CARGO_MANIFEST_DIR"));
         fs::read(&path).unwrap_or_else(|e| panic!("{path}: {e}"))
     };
-    let knot = of_ply(&file("knot.ply"));
-    let stone = of_obj(std::str::from_utf8(&file("stone.obj")).unwrap());
+    let knot = ply_triangles(&file("knot.ply"));
+    let stone = obj_triangles(std::str::from_utf8(&file("stone.obj")).unwrap());
     assert_eq!((knot.len(), stone.len() > 20), (2 * 5760, true));
-    // The knot and the stone by themselves on their ground.
-    let only = |scene: &Scene| {
+    // The knot and the stone on their ground, without the other objects.
+    let meshes_only = |scene: &Scene| {
         let mut scene = scene.clone();
         scene.objects.retain(|o| ["ground", "knot", "stone"].contains(&o.name.as_str()));
         scene
     };
-    let meant = only(&shipped("shape-mesh.toml"));
-    let things: Vec<Thing> = meant
+    let original = meshes_only(&shipped("shape-mesh.toml"));
+    let shapes: Vec<AnalyticShape> = original
         .objects
         .iter()
         .map(|o| match o.name.as_str() {
-            "knot" => Thing::Thin(triangles(knot.clone(), placement(&o.transform))),
-            "stone" => Thing::Thin(triangles(stone.clone(), placement(&o.transform))),
-            _ => Thing::new(o),
+            "knot" => AnalyticShape::Thin(triangles(knot.clone(), placement(&o.transform))),
+            "stone" => AnalyticShape::Thin(triangles(stone.clone(), placement(&o.transform))),
+            _ => AnalyticShape::new(o),
         })
         .collect();
     let stand_in = parsed("[[object]]\nshape.mesh = {}").objects.remove(0).shape;
     row(
         "shape-mesh.toml",
-        |shown| sees_things(&meant, &things, &only(shown)),
+        |tested| hits_agree_with(&original, &shapes, &meshes_only(tested)),
         &[
             ("a ball of its size", &|s| {
                 object(s, "stone").shape = shape("sphere = { center = [0, 0, 0], radius = 1.0 }");
             }),
-            ("the mesh that stands in for a file", &|s| {
-                object(s, "stone").shape = stand_in.clone()
-            }),
+            ("the placeholder of a missing file", &|s| object(s, "stone").shape = stand_in.clone()),
             ("the other file", &|s| {
                 object(s, "stone").shape = object(s, "knot").shape.clone();
             }),

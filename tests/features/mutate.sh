@@ -1,5 +1,5 @@
 #!/bin/sh
-# Tries the mutations of this folder. A copy of the source gets all of them at once, each asleep until the
+# Tries the mutations of this folder. A copy of the source gets all of them at once, each disabled until the
 # environment variable ZERKALO_MUTANT has its name, so that it is compiled once. Then every test that must
 # notice a mutation runs with it, and has to fail.
 #
@@ -42,7 +42,7 @@ done
 cp mutated src/lib.rs
 cat >> src/lib.rs <<'RUST'
 
-/// Whether the mutation `name` is awake.
+/// Returns `true` if the mutation `name` is enabled.
 pub fn mutant(name: &str) -> bool {
     static AWAKE: std::sync::OnceLock<String> = std::sync::OnceLock::new();
     AWAKE.get_or_init(|| std::env::var("ZERKALO_MUTANT").unwrap_or_default()) == name
@@ -60,13 +60,13 @@ fi
 status=0
 for name in "$@"; do
     test=$(value "$name" test)
-    # Without the mutation the copy is as the original.
+    # Without the mutation the copy equals the original.
     if ! cargo test --quiet --test features "$test" > before.log 2>&1; then
         outcome="FAILS WITHOUT IT, TOO"
     elif ZERKALO_MUTANT=$name cargo test --quiet --test features "$test" > mutate.log 2>&1; then
         outcome="NOT NOTICED"
     else
-        # The words after the place of the panic.
+        # The message after the location of the panic.
         outcome="noticed: $(sed -n '/panicked at/{n;p;q;}' mutate.log | cut -c 1-110)"
     fi
     printf '%-30s %-28s %s\n' "$name" "$test" "$outcome"

@@ -1,30 +1,30 @@
-//! Changes of the source that a row's test must notice. `mutate.sh` tries them; here they are kept from
-//! rotting.
+//! Mutations: changes of the source that make a row's test fail. `mutate.sh` runs them; the test here checks
+//! that they still apply to the source.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// A change of one expression in the source.
+/// Replacement of one expression in the source.
 pub struct Mutation {
     /// Name of the test that must fail.
     pub test: String,
     /// Source file.
     pub file: String,
-    /// The text around the expression and the expression, which stands in guillemets.
+    /// Source text with the expression in guillemets.
     replace: String,
-    /// An expression of the same type.
+    /// Replacement, an expression of the same type.
     by: String,
 }
 
-/// All mutations by the names of their files. Each file has a line of words for people, beginning with #,
-/// and one line for each of `test`, `file`, `replace`, `by`.
+/// All mutations by file name. Each file begins with a description after `#` and has one line for each of
+/// `test`, `file`, `replace` and `by`.
 pub fn all() -> BTreeMap<String, Mutation> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/features/mutations");
     let read = |path: std::path::PathBuf| {
         let name = path.file_name().unwrap().to_str().unwrap().to_string();
         let text = fs::read_to_string(&path).unwrap();
-        assert!(text.starts_with("# "), "{name} does not say what it is");
+        assert!(text.starts_with("# "), "{name} has no description");
         let value = |key: &str| {
             let mut lines = text.lines().filter_map(|l| l.strip_prefix(key)?.strip_prefix(' '));
             let first = lines.next().unwrap_or_else(|| panic!("{name} has no line `{key}`"));
@@ -48,7 +48,7 @@ fn every_mutation_applies_to_the_source() {
         assert_eq!(parts.len(), 3, "{name}: `{}` needs one pair of guillemets", m.replace);
         let text = parts.concat();
         let found = source.matches(&text).count();
-        assert_eq!(found, 1, "{name}: `{text}` stands {found} times in {}", m.file);
+        assert_eq!(found, 1, "{name}: `{text}` occurs {found} times in {}", m.file);
         assert_ne!(parts[1], m.by, "{name}");
     }
 }

@@ -1,8 +1,8 @@
-//! How far paths are followed, what goes through surfaces, and faults of old that are not inherited.
+//! Path depth, transmission, and faults of earlier ray tracers that this one must not have.
 
-use crate::beside::{agrees, exactly, without_chance};
+use crate::first_hits::{RASTER, centers, hits_agree, pixel_ray};
+use crate::plain_tracer::{agrees, agrees_exactly, without_chance};
 use crate::row::{Verdict, ensure, material, row};
-use crate::sight::{RASTER, centers, sees, sighting};
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
 use zerkalo::film::Replicates;
@@ -23,25 +23,28 @@ fn b1_tracing_depth() {
     for (file, others) in
         [("level-primary.toml", [shadows, full]), ("level-shadows.toml", [primary, full])]
     {
-        let meant = shipped(file);
-        row(file, |shown| agrees(&meant, shown, 48), &others);
-        exactly(&meant, &meant).unwrap();
+        let original = shipped(file);
+        row(file, |tested| agrees(&original, tested, 48), &others);
+        agrees_exactly(&original, &original).unwrap();
     }
-    let meant = shipped("level-full.toml");
-    row("level-full.toml", |shown| agrees(&meant, shown, 96), &[primary, shadows]);
+    let original = shipped("level-full.toml");
+    row("level-full.toml", |tested| agrees(&original, tested, 96), &[primary, shadows]);
 }
 
-/// Upright panes, as the scene of the ray tree has them.
+/// An upright pane of the ray-tree scene.
 struct Pane {
     center: DVec3,
+    /// Half width and half height.
     half: [f64; 2],
+    /// Emitted radiance.
     glow: DVec3,
     reflection: f64,
     transmission: f64,
 }
 
-/// What comes back along a ray that may meet `left` more surfaces: both arms at each.
-fn tree(panes: &[Pane], background: DVec3, origin: DVec3, direction: DVec3, left: u32) -> DVec3 {
+/// Radiance along a ray by the full tree: reflection and transmission at every pane. `depth` is the number of
+/// surfaces that the ray may still scatter at.
+fn tree(panes: &[Pane], background: DVec3, origin: DVec3, direction: DVec3, depth: u32) -> DVec3 {
     let nearest = panes
         .iter()
         .filter_map(|pane| {
@@ -52,20 +55,21 @@ fn tree(panes: &[Pane], background: DVec3, origin: DVec3, direction: DVec3, left
         })
         .min_by(|a, b| a.0.total_cmp(&b.0));
     let Some((t, pane)) = nearest else { return background };
-    if left == 0 {
+    if depth == 0 {
         return pane.glow;
     }
-    let at = origin + direction * t;
-    let onward = |direction: DVec3| tree(panes, background, at, direction, left - 1);
+    let hit_point = origin + direction * t;
+    let incoming = |direction: DVec3| tree(panes, background, hit_point, direction, depth - 1);
     pane.glow
-        + pane.reflection * onward(direction * DVec3::new(1.0, 1.0, -1.0))
-        + pane.transmission * onward(direction)
+        + pane.reflection * incoming(direction * DVec3::new(1.0, 1.0, -1.0))
+        + pane.transmission * incoming(direction)
 }
 
-fn grows_the_whole_tree(meant: &Scene, shown: &Scene) -> Verdict {
+/// The mean over each band of six rows is that of the full ray tree.
+fn traces_the_whole_tree(original: &Scene, tested: &Scene) -> Verdict {
     let pane = |o: &zerkalo::scene::Object| {
         let Shape::Rectangle(r) = &o.shape else { panic!("not a pane") };
-        let m = &meant.materials[&o.material];
+        let m = &original.materials[&o.material];
         Pane {
             center: r.center.into(),
             half: r.size.map(|s| s / 2.0),
@@ -74,26 +78,26 @@ fn grows_the_whole_tree(meant: &Scene, shown: &Scene) -> Verdict {
             transmission: m.transmission,
         }
     };
-    let panes: Vec<Pane> = meant.objects.iter().map(pane).collect();
-    let background = DVec3::from(meant.background.color.0);
-    let mut shown = sized(shown.clone(), RASTER);
-    shown.film.filter = Filter::Point;
-    let rendering = rendered(&shown, 1, Precision::Double, 256);
+    let panes: Vec<Pane> = original.objects.iter().map(pane).collect();
+    let background = DVec3::from(original.background.color.0);
+    let mut tested = sized(tested.clone(), RASTER);
+    tested.film.filter = Filter::Point;
+    let rendering = rendered(&tested, 1, Precision::Double, 256);
     let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
-    // By bands of rows, so that errors of both signs do not cancel.
+    // In bands of rows, so that errors of opposite sign do not cancel.
     for (band, centers) in centers(RASTER).chunks(6 * RASTER[0] as usize).enumerate() {
         let (mut sum, mut variance) = (DVec3::ZERO, DVec3::ZERO);
         let first = band * 6 * RASTER[0] as usize;
         for (i, center) in (first..).zip(centers) {
-            let ray = sighting(&meant.camera, RASTER, *center);
+            let ray = pixel_ray(&original.camera, RASTER, *center);
             let expected =
-                tree(&panes, background, ray.origin, ray.direction, meant.trace.max_depth);
+                tree(&panes, background, ray.origin, ray.direction, original.trace.max_depth);
             let [a, b] = [DVec3::from(a[i]), DVec3::from(b[i])];
             sum += (a + b) / 2.0 - expected;
             variance += ((a - b) / 2.0).powf(2.0) + DVec3::splat(1e-14);
         }
         let z = (sum / variance.map(f64::sqrt)).abs().max_element();
-        // Eighteen numbers are looked at.
+        // The limit allows for eighteen comparisons.
         ensure(z < 4.5, || {
             format!("rows {} to {}: {z:.1} standard errors", 6 * band, 6 * band + 5)
         })?;
@@ -101,72 +105,76 @@ fn grows_the_whole_tree(meant: &Scene, shown: &Scene) -> Verdict {
     Ok(())
 }
 
-/// Between two endless mirrors that glow with radiance 1 every pixel shows a sum, one term for each
-/// surface that a path meets: its weights are those of the reflections before it.
-fn glows_between(shown: &Scene, mirrors: [&str; 2], terms: impl Iterator<Item = f64>) -> Verdict {
-    let mut shown = shown.clone();
-    shown.objects.retain(|o| mirrors.contains(&o.name.as_str()));
+/// Between two mirrors of 1e4 units that emit radiance 1 every pixel has the sum of `terms`. Each term is
+/// the throughput with which a path reaches its next surface.
+fn sums_reflections(
+    tested: &Scene,
+    mirrors: [&str; 2],
+    terms: impl Iterator<Item = f64>,
+) -> Verdict {
+    let mut tested = tested.clone();
+    tested.objects.retain(|o| mirrors.contains(&o.name.as_str()));
     let mut middle = DVec3::ZERO;
-    for object in &mut shown.objects {
+    for object in &mut tested.objects {
         let Shape::Rectangle(r) = &mut object.shape else { panic!("not a mirror") };
         r.size = [1e4; 2];
         middle += DVec3::from(r.center) / 2.0;
     }
-    // From the middle towards the first of the two.
-    let Shape::Rectangle(first) = &shown.objects[0].shape else { unreachable!() };
-    shown.camera.target = Some(first.center);
-    shown.camera.eye = middle.to_array();
-    let own = material(&mut shown, "mirror");
-    (own.color, own.ambient, own.roughness) = (Color::WHITE, 1.0, 0.0);
-    shown.ambient.color = Color::WHITE;
-    shown.lights.clear();
+    // The camera looks from the middle towards the first mirror.
+    let Shape::Rectangle(first) = &tested.objects[0].shape else { unreachable!() };
+    tested.camera.target = Some(first.center);
+    tested.camera.eye = middle.to_array();
+    let mirror = material(&mut tested, "mirror");
+    (mirror.color, mirror.ambient, mirror.roughness) = (Color::WHITE, 1.0, 0.0);
+    tested.ambient.color = Color::WHITE;
+    tested.lights.clear();
     let sum: f64 = terms.sum();
-    for shown in without_chance(&shown) {
-        let apart = (shown - DVec3::splat(sum)).abs().max_element();
-        ensure(apart < 1e-5, || format!("{shown} between the mirrors, not {sum}"))?;
+    for pixel in without_chance(&tested) {
+        let difference = (pixel - DVec3::splat(sum)).abs().max_element();
+        ensure(difference < 1e-5, || format!("{pixel} between the mirrors, not {sum}"))?;
     }
     Ok(())
 }
 
 #[test]
 fn b2_ray_tree() {
-    let meant = shipped("ray-tree.toml");
+    let original = shipped("ray-tree.toml");
     row(
         "ray-tree.toml",
-        |shown| grows_the_whole_tree(&meant, shown),
+        |tested| traces_the_whole_tree(&original, tested),
         &[
             ("one surface less", &|s| s.trace.max_depth -= 1),
             ("one surface more", &|s| s.trace.max_depth += 1),
-            ("no reflected arm", &|s| material(s, "middle").reflection = 0.0),
-            ("no transmitted arm", &|s| material(s, "middle").transmission = 0.0),
+            ("no reflected branch", &|s| material(s, "middle").reflection = 0.0),
+            ("no transmitted branch", &|s| material(s, "middle").transmission = 0.0),
             ("no tree", &|s| s.trace.ray_types = RayTypes::Shadows),
         ],
     );
-    // 0.9^28 is the last power above 0.05; after 40 reflections depth would end it.
+    // 0.9^28 is the last power above 0.05; the depth of the scene is 40.
     let powers = || (0..).map(|n| 0.9f64.powi(n)).take_while(|w| *w >= 0.05);
     assert_eq!(powers().count(), 29);
     row(
         "facing-mirrors.toml",
-        |shown| glows_between(shown, ["front mirror", "back mirror"], powers()),
+        |tested| sums_reflections(tested, ["front mirror", "back mirror"], powers()),
         &[
-            ("no least weight", &|s| s.trace.min_throughput = 0.0),
-            ("a larger least weight", &|s| s.trace.min_throughput = 0.055),
+            ("no smallest weight", &|s| s.trace.min_throughput = 0.0),
+            ("a larger smallest weight", &|s| s.trace.min_throughput = 0.055),
             ("a smaller depth", &|s| s.trace.max_depth = 27),
             ("a smaller coefficient", &|s| material(s, "mirror").reflection = 0.89),
         ],
     );
 }
 
-/// A ball that reflects everything outside and lets a fifth in and a fifth out: before a white background
-/// 1 + 0.2 x 0.2, and not what would ring between its inner walls.
-fn does_not_ring(shown: &Scene) -> Verdict {
-    let mut alone = shown.clone();
+/// The large ball reflects all light outside and transmits a fifth at each surface. Before a white
+/// background it shows 1 + 0.2 x 0.2: nothing is reflected inside.
+fn has_no_inner_reflections(tested: &Scene) -> Verdict {
+    let mut alone = tested.clone();
     alone.objects.truncate(1);
     alone.background.color = Color::WHITE;
     alone.lights.clear();
-    for shown in without_chance(&alone) {
-        let one = |x: f64| (shown - DVec3::splat(x)).abs().max_element() < 1e-6;
-        ensure(one(1.0) || one(1.04), || format!("{shown} on the ball"))?;
+    for pixel in without_chance(&alone) {
+        let equals = |x: f64| (pixel - DVec3::splat(x)).abs().max_element() < 1e-6;
+        ensure(equals(1.0) || equals(1.04), || format!("{pixel} on the ball"))?;
     }
     Ok(())
 }
@@ -176,7 +184,7 @@ fn c2_refraction() {
     let fixed = shipped("transmission.toml");
     row(
         "transmission.toml",
-        |shown| agrees(&fixed, shown, 96),
+        |tested| agrees(&fixed, tested, 96),
         &[
             ("no bending", &|s| material(s, "clear").ior = 1.0),
             ("the ratio the wrong way round", &|s| material(s, "clear").ior = 0.7),
@@ -186,7 +194,7 @@ fn c2_refraction() {
     let glass = shipped("glass.toml");
     row(
         "glass.toml",
-        |shown| agrees(&glass, shown, 96),
+        |tested| agrees(&glass, tested, 96),
         &[
             ("fixed coefficients", &|s| material(s, "glass").fresnel = Some(Fresnel::Constant)),
             ("a bubble of glass", &|s| material(s, "air").ior = 1.5),
@@ -194,23 +202,23 @@ fn c2_refraction() {
         ],
     );
     let two_fifths = |s: &mut Scene| material(s, "mirror").transmission = 0.4;
-    row("reflecting-tracks.toml", does_not_ring, &[("k_t of 0.4", &two_fifths)]);
+    row("reflecting-tracks.toml", has_no_inner_reflections, &[("k_t of 0.4", &two_fifths)]);
 }
 
-/// A round room seen from inside, mirrors that face each other without loss, a lamp with a ball beyond it,
-/// light brighter than 1 in a mirror, glass away from the origin.
+/// Faults of earlier ray tracers: a round room seen from inside, lossless facing mirrors, a light with a ball
+/// beyond it, radiance above 1 in a mirror, glass away from the origin.
 #[test]
 fn c4_old_faults() {
-    let meant = shipped("round-room.toml");
-    let check = |shown: &Scene| {
-        sees(&meant, shown)?;
-        agrees(&meant, shown, 96)?;
-        // Twelve reflections without loss, and then an end.
-        glows_between(shown, ["left mirror", "right mirror"], [1.0; 13].into_iter())?;
-        // The white ball, lit by more than 1, is as bright in the mirrors.
+    let original = shipped("round-room.toml");
+    let check = |tested: &Scene| {
+        hits_agree(&original, tested)?;
+        agrees(&original, tested, 96)?;
+        // Twelve lossless reflections, then the path ends.
+        sums_reflections(tested, ["left mirror", "right mirror"], [1.0; 13].into_iter())?;
+        // The white ball, lit by more than 1, keeps its brightness in the mirrors.
         let brightest = |s: &Scene| without_chance(s).iter().map(|p| p.x).fold(0.0, f64::max);
-        let bright = brightest(shown);
-        ensure(bright > 1.5, || format!("nothing is brighter than {bright}"))
+        let bright = brightest(tested);
+        ensure(bright > 1.5, || format!("the brightest pixel has {bright}"))
     };
     row(
         "round-room.toml",

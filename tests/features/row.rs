@@ -1,60 +1,59 @@
-//! How a row is tested: a check that holds for the real thing and fails for each of its neighbours.
+//! Test of a row: a check that passes for the shipped scene and fails for each mutation of it.
 
 use crate::support::{parsed, shipped};
 use zerkalo::material::Material;
 use zerkalo::scene::{Object, Scene};
 use zerkalo::shape::Shape;
 
-/// What a check finds: nothing wrong, or what.
+/// Result of a check, with a description of the failure.
 pub type Verdict = Result<(), String>;
 
-/// Makes of a feature what stands next to it.
+/// Mutation of a scene: replaces a feature by a similar one.
 pub type Change<'a> = &'a dyn Fn(&mut Scene);
 
-/// Asserts that `check` holds for the shipped scene `file` and fails for each of its `neighbours`, scenes
-/// in which the feature is replaced by what stands next to it. `check` is given the scene to show; what
-/// it should look like, it must know from elsewhere.
-pub fn row(file: &str, check: impl Fn(&Scene) -> Verdict, neighbours: &[(&str, Change)]) {
-    let real = shipped(file);
-    if let Err(found) = check(&real) {
-        panic!("{file}: {found}");
+/// Asserts that `check` passes for the shipped scene `file` and fails for each of `mutations`. `check` renders
+/// the scene it is given and compares with an expectation from an independent source.
+pub fn row(file: &str, check: impl Fn(&Scene) -> Verdict, mutations: &[(&str, Change)]) {
+    let original = shipped(file);
+    if let Err(error) = check(&original) {
+        panic!("{file}: {error}");
     }
-    for (name, change) in neighbours {
-        let mut scene = real.clone();
+    for (name, change) in mutations {
+        let mut scene = original.clone();
         change(&mut scene);
-        assert_ne!(scene, real, "`{name}` changes nothing");
+        assert_ne!(scene, original, "`{name}` changes nothing");
         let faults = scene.faults();
-        assert!(faults.is_empty(), "`{name}` is no scene: {}", faults[0]);
+        assert!(faults.is_empty(), "`{name}` has faults: {}", faults[0]);
         match check(&scene) {
-            Ok(()) => panic!("{file}: {name} passes for the real thing"),
-            Err(found) => println!("{file}, {name}: {found}"),
+            Ok(()) => panic!("{file}: mutation `{name}` passes"),
+            Err(error) => println!("{file}, {name}: {error}"),
         }
     }
 }
 
-/// The object called `name`.
+/// The object `name`.
 pub fn object<'a>(scene: &'a mut Scene, name: &str) -> &'a mut Object {
     let found = scene.objects.iter_mut().find(|o| o.name == name);
     found.unwrap_or_else(|| panic!("no object \"{name}\""))
 }
 
-/// The number of the object called `name`.
+/// Index of the object `name`.
 pub fn number(scene: &Scene, name: &str) -> usize {
     let found = scene.objects.iter().position(|o| o.name == name);
     found.unwrap_or_else(|| panic!("no object \"{name}\""))
 }
 
-/// The material called `name`.
+/// The material `name`.
 pub fn material<'a>(scene: &'a mut Scene, name: &str) -> &'a mut Material {
     scene.materials.get_mut(name).unwrap_or_else(|| panic!("no material \"{name}\""))
 }
 
-/// The shape that a scene file would have behind `shape.`.
+/// The shape with the text `text` after `shape.` in a scene file.
 pub fn shape(text: &str) -> Shape {
     parsed(&format!("[[object]]\nshape.{text}")).objects.remove(0).shape
 }
 
-/// `Err` with the words of `found` unless `holds`.
-pub fn ensure(holds: bool, found: impl FnOnce() -> String) -> Verdict {
-    if holds { Ok(()) } else { Err(found()) }
+/// Returns `Err` with the text of `error` unless `condition` holds.
+pub fn ensure(condition: bool, error: impl FnOnce() -> String) -> Verdict {
+    if condition { Ok(()) } else { Err(error()) }
 }

@@ -1,24 +1,25 @@
-//! Shapes, transforms and compounds: rays end where the formulas of the shapes say.
+//! Shapes, transforms and compounds, compared with the formulas of the shapes.
 
+use crate::first_hits::hits_agree;
 use crate::row::{object, row, shape};
-use crate::sight::sees;
 use crate::support::shipped;
 use zerkalo::scene::Scene;
 use zerkalo::shape::{Difference, Intersection, Shape, Union};
 
-/// What is seen of `file` is what the formulas say, and is not when a shape is replaced.
-fn shapes(file: &str, neighbours: &[(&str, &str, &str)]) {
-    let meant = shipped(file);
-    let changes: Vec<_> = neighbours
+/// Asserts that first hits in `file` agree with the formulas, and not after a mutation: name, object and its
+/// new shape.
+fn shapes(file: &str, mutations: &[(&str, &str, &str)]) {
+    let original = shipped(file);
+    let changes: Vec<_> = mutations
         .iter()
-        .map(|(name, of, text)| {
-            let change = move |scene: &mut Scene| object(scene, of).shape = shape(text);
+        .map(|(name, target, text)| {
+            let change = move |scene: &mut Scene| object(scene, target).shape = shape(text);
             (*name, change)
         })
         .collect();
     let changes: Vec<_> =
         changes.iter().map(|(name, change)| (*name, change as crate::row::Change)).collect();
-    row(file, |shown| sees(&meant, shown), &changes);
+    row(file, |tested| hits_agree(&original, tested), &changes);
 }
 
 #[test]
@@ -130,10 +131,10 @@ fn a5_platform() {
 
 #[test]
 fn b4_canonical_objects() {
-    let meant = shipped("transform.toml");
+    let original = shipped("transform.toml");
     row(
         "transform.toml",
-        |shown| sees(&meant, shown),
+        |tested| hits_agree(&original, tested),
         &[
             ("steps in the other order", &|s| object(s, "sheared cube").transform.reverse()),
             ("a step left out", &|s| object(s, "lens").transform.truncate(1)),
@@ -151,9 +152,9 @@ fn b5_tapered_cylinder() {
     shapes(
         "shape-tapered-cylinder.toml",
         &[
-            ("s of 1", "squeezed", "unit_frustum = { s = 1.0 }"),
-            ("s of 0", "squeezed", "unit_frustum = { s = 0.0 }"),
-            ("widening as it should narrow", "squeezed", "unit_frustum = { s = 1.4 }"),
+            ("s of 1", "squeezed", "unit_cylinder = { s = 1.0 }"),
+            ("s of 0", "squeezed", "unit_cylinder = { s = 0.0 }"),
+            ("widening for narrowing", "squeezed", "unit_cylinder = { s = 1.4 }"),
             ("a sphere", "cylinder", "sphere = { center = [-1.5, 0.5, 0.0], radius = 0.35 }"),
             (
                 "a cylinder for a cone",
@@ -190,29 +191,33 @@ fn b6_plane() {
 }
 
 fn as_union(scene: &mut Scene) {
-    combined_otherwise(scene, |of| Shape::Union(Union { of }));
+    replace_operation(scene, |of| Shape::Union(Union { of }));
 }
 
 fn as_intersection(scene: &mut Scene) {
-    combined_otherwise(scene, |of| Shape::Intersection(Intersection { of }));
+    replace_operation(scene, |of| Shape::Intersection(Intersection { of }));
 }
 
 fn as_difference(scene: &mut Scene) {
-    combined_otherwise(scene, |of| Shape::Difference(Difference { of }));
+    replace_operation(scene, |of| Shape::Difference(Difference { of }));
 }
 
-fn combined_otherwise(scene: &mut Scene, into: impl Fn(Vec<zerkalo::shape::CsgOperand>) -> Shape) {
+/// Replaces the operation of every compound by that of `combine`.
+fn replace_operation(
+    scene: &mut Scene,
+    combine: impl Fn(Vec<zerkalo::shape::CsgOperand>) -> Shape,
+) {
     for object in &mut scene.objects {
-        let of = match &object.shape {
+        let operands = match &object.shape {
             Shape::Union(u) => u.of.clone(),
             Shape::Intersection(i) => i.of.clone(),
             Shape::Difference(d) => d.of.clone(),
             _ => continue,
         };
-        let other = into(of);
-        // Of halves of space only some combinations have an end.
-        if other.faults().is_empty() {
-            object.shape = other;
+        let replacement = combine(operands);
+        // Some combinations of half-spaces are unbounded, which is a fault.
+        if replacement.faults().is_empty() {
+            object.shape = replacement;
         }
     }
 }
@@ -228,8 +233,8 @@ fn b7_compound() {
         ("compound-difference.toml", [("unions", &as_union), ("intersections", &as_intersection)]),
         ("compound-nested.toml", [("unions", &as_union), ("intersections", &as_intersection)]),
     ];
-    for (file, neighbours) in files {
-        let meant = shipped(file);
-        row(file, |shown| sees(&meant, shown), &neighbours);
+    for (file, mutations) in files {
+        let original = shipped(file);
+        row(file, |tested| hits_agree(&original, tested), &mutations);
     }
 }

@@ -1,4 +1,4 @@
-//! The table of docs/features.md: every row is there, and what it names exists.
+//! Guard of the table in docs/features.md: it has every row, and all files and tests that it names exist.
 
 use crate::mutations;
 use std::collections::BTreeSet;
@@ -15,7 +15,7 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// What stands between backticks.
+/// Texts between backticks.
 fn quoted(cell: &str) -> Vec<&str> {
     cell.split('`').skip(1).step_by(2).collect()
 }
@@ -30,7 +30,7 @@ fn tests() -> BTreeSet<String> {
         }
         let text = fs::read_to_string(path).unwrap();
         let after = text.split("#[test]\nfn ").skip(1);
-        names.extend(after.map(|rest| rest[..rest.find('(').unwrap()].to_string()));
+        names.extend(after.map(|text| text[..text.find('(').unwrap()].to_string()));
     }
     names
 }
@@ -44,11 +44,11 @@ fn every_row_has_scene_test_source_and_mutation() {
     let mut named = BTreeSet::new();
     for line in text.lines().filter(|l| l.starts_with("| ") && !l.starts_with("| row")) {
         let cells: Vec<&str> = line.trim_matches('|').split(" | ").map(str::trim).collect();
-        let [row, what, scenes, test, sources, mutation] = cells[..] else {
+        let [row, description, scenes, test, sources, mutation] = cells[..] else {
             panic!("not six cells: {line}");
         };
-        assert!(rows.insert(row.to_string()), "{row} stands there twice");
-        assert!(what.len() > 10, "{row} does not say what it is");
+        assert!(rows.insert(row.to_string()), "{row} appears twice");
+        assert!(description.len() > 10, "{row} has no description");
         assert!(!quoted(scenes).is_empty(), "{row} has no scene");
         for scene in quoted(scenes) {
             assert!(root().join("scenes").join(scene).exists(), "{row}: no scene {scene}");
@@ -64,13 +64,13 @@ fn every_row_has_scene_test_source_and_mutation() {
         assert!(mutation.len() > 10, "{row} has no mutation");
         for file in quoted(mutation) {
             let m = mutations.get(file).unwrap_or_else(|| panic!("{row}: no mutation {file}"));
-            assert_eq!(m.test, test, "{row}: {file} is one of another test");
+            assert_eq!(m.test, test, "{row}: {file} belongs to another test");
             named.insert(file.to_string());
         }
     }
     assert_eq!(rows, expected(), "rows of the table");
     for (file, m) in &mutations {
-        assert!(named.contains(file), "{file} stands in no row");
+        assert!(named.contains(file), "{file} is in no row");
         assert!(tests.contains(&m.test), "{file}: no test {}", m.test);
     }
 }

@@ -1,9 +1,9 @@
-//! Textures and bumps: images looked up by the formulas of two mappings.
+//! Textures and bumps, compared with image lookups by the formulas of the mappings.
 
-use crate::beside::without_chance;
+use crate::first_hits::{RASTER, centers, first_hits, pixel_ray};
 use crate::paint::Pixels;
+use crate::plain_tracer::without_chance;
 use crate::row::{Verdict, ensure, number, row};
-use crate::sight::{RASTER, centers, sighting, sights};
 use crate::support::{shipped, sized};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -12,12 +12,12 @@ use zerkalo::scene::edit::{self, Target};
 use zerkalo::scene::{RayTypes, Scene};
 use zerkalo::shape::Shape;
 
-/// An image of `scenes/textures`.
+/// The image `name` of `scenes/textures`.
 fn image(name: &str) -> Pixels {
     Pixels::open(&format!("textures/{name}")).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Only camera rays, and no highlights.
+/// `scene` with camera rays only and without highlights.
 fn plain(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.trace.ray_types = RayTypes::Primary;
@@ -25,26 +25,26 @@ fn plain(scene: &Scene) -> Scene {
     scene
 }
 
-/// Longitude from +z towards +x and latitude, of a unit vector.
+/// Longitude (from +z towards +x) and latitude of a unit vector.
 fn angles(n: DVec3) -> [f64; 2] {
     [n.x.atan2(n.z), n.y.asin()]
 }
 
-/// Whole turns and from pole to pole become 1.
+/// Texture coordinates of the spherical mapping: a full turn and the distance between the poles become `scale`.
 fn spherical(n: DVec3, scale: [f64; 2]) -> DVec2 {
     let [longitude, latitude] = angles(n);
     DVec2::new(0.5 + longitude / TAU, 0.5 + latitude / PI) * DVec2::from(scale)
 }
 
-/// The pixels that show object `name`, as their number and the point seen.
+/// Index and hit point of each pixel that shows the object `name`.
 fn points(scene: &Scene, name: &str) -> Vec<(usize, DVec3)> {
     let object = number(scene, name) as u32;
     let scene = sized(scene.clone(), RASTER);
-    let seen = sights(&scene).into_iter().zip(centers(RASTER)).enumerate();
-    seen.filter(|(_, (sight, _))| sight.object == Some(object))
-        .map(|(i, (sight, center))| {
-            let ray = sighting(&scene.camera, RASTER, center);
-            (i, ray.origin + ray.direction * f64::from(sight.depth))
+    let hits = first_hits(&scene).into_iter().zip(centers(RASTER)).enumerate();
+    hits.filter(|(_, (hit, _))| hit.object == Some(object))
+        .map(|(i, (hit, center))| {
+            let ray = pixel_ray(&scene.camera, RASTER, center);
+            (i, ray.origin + ray.direction * f64::from(hit.depth))
         })
         .collect()
 }
@@ -56,34 +56,34 @@ fn ball(scene: &Scene, name: &str) -> (DVec3, f64) {
     }
 }
 
-/// The picture at the wall and the ball show their images, multiplied by what they would show without.
-fn wears_images(meant: &Scene, shown: &Scene) -> Verdict {
-    let mut bare = plain(meant);
+/// The pixels of the picture on the wall and of the ball are their images times the untextured radiance.
+fn has_images(original: &Scene, tested: &Scene) -> Verdict {
+    let mut bare = plain(original);
     bare.materials.values_mut().for_each(|m| m.texture = None);
-    let (bare, shown) = (without_chance(&bare), without_chance(&plain(shown)));
+    let (untextured, textured) = (without_chance(&bare), without_chance(&plain(tested)));
     let (sheet, wood) = (image("sheet.png"), image("wood.png"));
-    let color = |of: &Pixels, uv| of.color(uv, Wrap::Repeat, TextureFilter::Bilinear);
-    let (center, radius) = ball(meant, "ball");
+    let color = |image: &Pixels, uv| image.color(uv, Wrap::Repeat, TextureFilter::Bilinear);
+    let (center, radius) = ball(original, "ball");
     let mut pixels: Vec<(usize, DVec3)> = Vec::new();
-    for (i, p) in points(meant, "picture") {
+    for (i, p) in points(original, "picture") {
         // 1.1 wide and 0.8 high around (-0.75, 1.55).
         let uv = DVec2::new((p.x + 0.75) / 1.1 + 0.5, (p.y - 1.55) / 0.8 + 0.5);
         pixels.push((i, color(&sheet, uv)));
     }
     ensure(pixels.len() > 40, || format!("{} pixels of the picture", pixels.len()))?;
-    for (i, p) in points(meant, "ball") {
+    for (i, p) in points(original, "ball") {
         pixels.push((i, color(&wood, spherical((p - center) / radius, [3.0, 2.0]))));
     }
     ensure(pixels.len() > 120, || format!("{} pixels in all", pixels.len()))?;
     for (i, color) in pixels {
-        let expected = color * bare[i];
-        let apart = (shown[i] - expected).abs().max_element();
-        ensure(apart < 2e-3, || format!("pixel {i}: {} instead of {expected}", shown[i]))?;
+        let expected = color * untextured[i];
+        let difference = (textured[i] - expected).abs().max_element();
+        ensure(difference < 2e-3, || format!("pixel {i}: {} instead of {expected}", textured[i]))?;
     }
     Ok(())
 }
 
-/// Writes `text` behind `key` of a material.
+/// Sets `key` of a material to `text`.
 fn set(scene: &mut Scene, material: &str, key: &str, text: &str) {
     let subject = Target::Material(material.into());
     let edit = edit::set(scene, &subject, key, text);
@@ -92,10 +92,10 @@ fn set(scene: &mut Scene, material: &str, key: &str, text: &str) {
 
 #[test]
 fn b13_image_texture() {
-    let meant = shipped("texture-image.toml");
+    let original = shipped("texture-image.toml");
     row(
         "texture-image.toml",
-        |shown| wears_images(&meant, shown),
+        |tested| has_images(&original, tested),
         &[
             ("no image", &|s| s.materials.get_mut("picture").unwrap().texture = None),
             ("one colour", &|s| {
@@ -112,25 +112,25 @@ fn b13_image_texture() {
     );
 }
 
-/// The ball's normals are those of a surface raised by the image's heights; its outline stays.
-fn is_raised(meant: &Scene, shown: &Scene) -> Verdict {
-    let picture = without_chance(&plain(shown));
+/// The ball is shaded with the normals of a surface raised by the image's heights, and keeps its outline.
+fn is_raised(original: &Scene, tested: &Scene) -> Verdict {
+    let picture = without_chance(&plain(tested));
     let heights = image("brick-heights.png");
-    let (center, radius) = ball(meant, "plaster ball");
+    let (center, radius) = ball(original, "plaster ball");
     let (scale, height) = ([3.0, 1.5], 0.02);
-    let own = &meant.materials["plaster"];
-    let color = DVec3::from(own.color.0);
-    let light = &meant.lights[0];
-    let lamp = DVec3::from(light.point.as_ref().unwrap().position);
-    let eye = DVec3::from(meant.camera.eye);
-    let seen = points(shown, "plaster ball");
-    ensure(seen == points(meant, "plaster ball"), || "another outline".into())?;
+    let plaster = &original.materials["plaster"];
+    let color = DVec3::from(plaster.color.0);
+    let light = &original.lights[0];
+    let light_position = DVec3::from(light.point.as_ref().unwrap().position);
+    let eye = DVec3::from(original.camera.eye);
+    let hits = points(tested, "plaster ball");
+    ensure(hits == points(original, "plaster ball"), || "another outline".into())?;
     let step = 1.0 / heights.size;
     let mut bent = 0;
-    for (i, p) in seen {
+    for (i, p) in hits {
         let n = (p - center) / radius;
         let uv = spherical(n, scale);
-        // Heights a pixel to both sides.
+        // Central difference of the heights, one image pixel to each side.
         let [along_u, along_v] = [DVec2::X * step.x, DVec2::Y * step.y].map(|d| {
             let rise = heights.height(uv + d, Wrap::Repeat) - heights.height(uv - d, Wrap::Repeat);
             height * rise / (2.0 * d.element_sum())
@@ -145,22 +145,22 @@ fn is_raised(meant: &Scene, shown: &Scene) -> Verdict {
             continue;
         }
         bent += usize::from(raised.dot(n) < 0.99);
-        let to = (lamp - p).normalize();
-        let cos = if n.dot(to) > 0.0 { raised.dot(to).max(0.0) } else { 0.0 };
-        let expected = color * DVec3::from(meant.ambient.color.0) * own.ambient
-            + color * (own.diffuse * light.intensity * cos);
-        let apart = (picture[i] - expected).abs().max_element();
-        ensure(apart < 3e-3, || format!("pixel {i}: {} instead of {expected}", picture[i]))?;
+        let to_light = (light_position - p).normalize();
+        let cos = if n.dot(to_light) > 0.0 { raised.dot(to_light).max(0.0) } else { 0.0 };
+        let expected = color * DVec3::from(original.ambient.color.0) * plaster.ambient
+            + color * (plaster.diffuse * light.intensity * cos);
+        let difference = (picture[i] - expected).abs().max_element();
+        ensure(difference < 3e-3, || format!("pixel {i}: {} instead of {expected}", picture[i]))?;
     }
     ensure(bent > 20, || format!("only {bent} pixels are bent"))
 }
 
 #[test]
 fn b14_bump_texture() {
-    let meant = shipped("bump.toml");
+    let original = shipped("bump.toml");
     row(
         "bump.toml",
-        |shown| is_raised(&meant, shown),
+        |tested| is_raised(&original, tested),
         &[
             ("flat", &|s| s.materials.get_mut("plaster").unwrap().bump = None),
             ("sunken", &|s| set(s, "plaster", "bump.image.height", "-0.02")),

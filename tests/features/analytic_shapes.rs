@@ -1,60 +1,59 @@
-//! Shapes as functions of points, negative inside: what a ray must not enter before it ends, and on
-//! whose zero it must end. Flat things and triangles are met by formula.
+//! Analytic shapes, independent of the program. Solids are implicit functions, negative inside; rectangles and
+//! triangles are intersected directly.
 
 use crate::surfaces::map;
 use glam::{DAffine3, DVec3};
 use zerkalo::scene::{Object, TransformOp};
 use zerkalo::shape::{CsgOperand, Shape};
 
-/// Below zero inside, zero on the surface, above zero outside.
+/// Implicit function: negative inside, zero on the surface, positive outside.
 pub type Inside = Box<dyn Fn(DVec3) -> f64 + Sync>;
-/// Distances at which the ray from a point in a direction meets it.
+/// Distances of all hits of the ray with the given origin and direction.
 pub type Crossings = Box<dyn Fn(DVec3, DVec3) -> Vec<f64> + Sync>;
 
-/// What an object is to a ray.
-pub enum Thing {
+/// Analytic form of an object.
+pub enum AnalyticShape {
     Solid(Inside),
     Thin(Crossings),
 }
 
-impl Thing {
-    /// Of anything but a mesh.
+impl AnalyticShape {
+    /// Creates the shape of any object but a mesh.
     pub fn new(object: &Object) -> Self {
         let v = |a: [f64; 3]| DVec3::from(a);
         match &object.shape {
             Shape::HorizontalRectangle(p) => {
                 let [x, z] = p.size;
-                Self::Thin(flat(v(p.center), DVec3::X * (0.5 * x), DVec3::NEG_Z * (0.5 * z)))
+                Self::Thin(rectangle(v(p.center), DVec3::X * (0.5 * x), DVec3::NEG_Z * (0.5 * z)))
             }
             Shape::Rectangle(r) => {
                 let right = v(r.up).cross(v(r.normal)).normalize();
                 let up = v(r.normal).cross(right).normalize();
                 let [width, height] = r.size;
-                Self::Thin(flat(v(r.center), right * (0.5 * width), up * (0.5 * height)))
+                Self::Thin(rectangle(v(r.center), right * (0.5 * width), up * (0.5 * height)))
             }
             shape => Self::Solid(placed(inside(shape), &object.transform)),
         }
     }
 }
 
-/// The parallelogram of the points `center` + a `u` + b `v` with |a|, |b| up to 1, for u and v at a right
-/// angle.
-fn flat(center: DVec3, u: DVec3, v: DVec3) -> Crossings {
+/// The rectangle of the points `center` + a `u` + b `v` with |a| <= 1, |b| <= 1; `u` and `v` are perpendicular.
+fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Crossings {
     let normal = u.cross(v);
     Box::new(move |origin, direction| {
         let t = normal.dot(center - origin) / normal.dot(direction);
-        let at = origin + direction * t - center;
-        let within = |axis: DVec3| at.dot(axis).abs() <= axis.length_squared();
+        let offset = origin + direction * t - center;
+        let within = |axis: DVec3| offset.dot(axis).abs() <= axis.length_squared();
         if t > 0.0 && within(u) && within(v) { vec![t] } else { Vec::new() }
     })
 }
 
-/// Triangles, by solving origin + t direction = a + x (b - a) + y (c - a).
+/// Triangles, intersected by solving origin + t direction = a + x (b - a) + y (c - a).
 pub fn triangles(list: Vec<[DVec3; 3]>, scene_from_mesh: DAffine3) -> Crossings {
     let placed = move |t: &[DVec3; 3]| t.map(|corner| scene_from_mesh.transform_point3(corner));
     let list: Vec<[DVec3; 3]> = list.iter().map(placed).collect();
     Box::new(move |origin, direction| {
-        let meet = |[a, b, c]: &[DVec3; 3]| {
+        let intersect = |[a, b, c]: &[DVec3; 3]| {
             let (u, v) = (b - a, c - a);
             let across = direction.cross(v);
             let volume = u.dot(across);
@@ -64,7 +63,7 @@ pub fn triangles(list: Vec<[DVec3; 3]>, scene_from_mesh: DAffine3) -> Crossings 
             let t = v.dot(turned) / volume;
             (x >= 0.0 && y >= 0.0 && x + y <= 1.0 && t > 0.0).then_some(t)
         };
-        list.iter().filter_map(meet).collect()
+        list.iter().filter_map(intersect).collect()
     })
 }
 
@@ -72,11 +71,11 @@ fn placed(inside: Inside, steps: &[TransformOp]) -> Inside {
     if steps.is_empty() {
         return inside;
     }
-    let own_from_scene = placement(steps).inverse();
-    Box::new(move |p| inside(own_from_scene.transform_point3(p)))
+    let object_from_scene = placement(steps).inverse();
+    Box::new(move |p| inside(object_from_scene.transform_point3(p)))
 }
 
-/// The steps, the first one first.
+/// The affine map of transform `steps`, applied in order.
 pub fn placement(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all)
 }
@@ -98,13 +97,13 @@ fn inside(shape: &Shape) -> Inside {
             let height = s.height.min(s.apex_height);
             Box::new(move |p| {
                 let q = unturned(p - foot, s.rotation);
-                // Half the width of the cross section.
+                // Half width of the cross section.
                 let half = s.side / 2.0 * (1.0 - q.y / s.apex_height);
                 (q.x.abs() - half).max(q.z.abs() - half).max(-q.y).max(q.y - height)
             })
         }
         Shape::Prism(s) => {
-            // From the centroid to each of the three sides.
+            // Distance from the centroid to each of the three sides.
             let in_radius = s.side / 12f64.sqrt();
             let foot = v(s.corner) + DVec3::new(s.side / 2.0, 0.0, -in_radius);
             let sides = [90.0, 210.0, 330.0].map(|a: f64| {
@@ -120,7 +119,7 @@ fn inside(shape: &Shape) -> Inside {
         Shape::Cylinder(c) => round(v(c.base), v(c.top), [c.radius; 2]),
         Shape::Cone(c) => round(v(c.base), v(c.apex), [c.radius, 0.0]),
         Shape::TaperedCylinder(c) => round(v(c.base), v(c.top), [c.base_radius, c.top_radius]),
-        // Its canonical form: x^2 + y^2 = (1 + (s - 1) z)^2 between z = 0 and z = 1.
+        // Canonical form: x^2 + y^2 = (1 + (s - 1) z)^2 between z = 0 and z = 1.
         Shape::UnitFrustum(c) => {
             Box::new(move |p| (p.x.hypot(p.y) - (1.0 + (c.s - 1.0) * p.z)).max(-p.z).max(p.z - 1.0))
         }
@@ -140,14 +139,14 @@ fn inside(shape: &Shape) -> Inside {
     }
 }
 
-fn parts(of: &[CsgOperand]) -> Vec<Inside> {
-    of.iter().map(|part| placed(inside(&part.shape), &part.transform)).collect()
+fn parts(operands: &[CsgOperand]) -> Vec<Inside> {
+    operands.iter().map(|part| placed(inside(&part.shape), &part.transform)).collect()
 }
 
-/// Undoes a turn about the vertical, counter-clockwise seen from above.
+/// Inverse of a rotation about the vertical by `degrees`, counter-clockwise seen from above.
 fn unturned(p: DVec3, degrees: f64) -> DVec3 {
     let (sin, cos) = degrees.to_radians().sin_cos();
-    // Seen from above x goes to the right and z down.
+    // Seen from above x points right and z down.
     DVec3::new(p.x * cos - p.z * sin, p.y, p.x * sin + p.z * cos)
 }
 

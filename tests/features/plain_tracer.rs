@@ -1,0 +1,57 @@
+//! Comparison of the program's pictures with those of the plain tracer of tests/agreement.
+
+use crate::common::Numbers;
+use crate::compare::{Picture, reference, small};
+use crate::first_hits::RASTER;
+use crate::row::Verdict;
+use crate::support::{picture, rendered, sized};
+use crate::tracer::{Mutation, Tracer};
+use glam::DVec3;
+use zerkalo::film::Replicates;
+use zerkalo::scene::{Filter, Scene};
+use zerkalo::world::Precision;
+
+/// Samples that the program takes per pixel and replicate.
+const PROGRAM_SAMPLES: u32 = 256;
+
+/// Statistical comparison of the program's picture of `tested` with the plain tracer's picture of `original`.
+/// The plain tracer takes `samples` samples per pixel.
+pub fn agrees(original: &Scene, tested: &Scene, samples: u32) -> Verdict {
+    let reference = reference(&small(original.clone()), samples, Mutation::None);
+    let reference = reference.expect("the plain tracer supports the scene");
+    let verdict = Picture::new(&small(tested.clone()), PROGRAM_SAMPLES).beside(&reference, samples);
+    if verdict.agree() { Ok(()) } else { Err(verdict.to_string()) }
+}
+
+/// Radiance of every pixel, with one ray through each pixel centre.
+pub fn without_chance(scene: &Scene) -> Vec<DVec3> {
+    let mut scene = sized(scene.clone(), RASTER);
+    scene.film.filter = Filter::Point;
+    let rendering = rendered(&scene, 1, Precision::Double, 1);
+    picture(&rendering, Replicates::Both).into_iter().map(DVec3::from).collect()
+}
+
+/// Comparison of the program's picture of `tested` with the plain tracer's picture of `original`, pixel by pixel.
+/// The scenes must not depend on random choices.
+pub fn agrees_exactly(original: &Scene, tested: &Scene) -> Verdict {
+    let mut original = sized(original.clone(), RASTER);
+    original.film.filter = Filter::Point;
+    let tracer =
+        Tracer::new(&original, Mutation::None).expect("the plain tracer supports the scene");
+    let mut numbers = Numbers::new(1);
+    let pixels = without_chance(tested);
+    let mut wrong = Vec::new();
+    for (i, pixel) in pixels.iter().enumerate() {
+        let (x, y) = (i as u32 % RASTER[0], i as u32 / RASTER[0]);
+        let expected = tracer.pixel(x, y, 2, &mut numbers).mean;
+        // Rounding of the film and of two different computations.
+        let difference = (*pixel - expected).abs().max_element();
+        if difference > 1e-6 * (expected.abs().max_element() + 1e-3) {
+            wrong.push(format!("pixel {x}, {y}: {pixel} instead of {expected}"));
+        }
+    }
+    match wrong.first() {
+        None => Ok(()),
+        Some(first) => Err(format!("{} of {} pixels, {first}", wrong.len(), pixels.len())),
+    }
+}
