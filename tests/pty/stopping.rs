@@ -120,7 +120,7 @@ fn edits_outlive_a_kill_and_are_offered_to_the_next() {
     assert_eq!(fs::read_to_string(desk.path("room.toml")).unwrap(), BUILT_IN);
 
     let mut terminal = desk.open(&["room.toml"], [120, 36]);
-    terminal.wait_for_text("broke off a moment ago");
+    terminal.wait_for_text("ended unexpectedly a moment ago");
     terminal.send("r");
     terminal.wait_for_text("recovered");
     terminal.send("\x13");
@@ -158,9 +158,9 @@ fn edits_of_a_scene_without_a_file_and_of_one_that_cannot_be_written_beside() {
     let mode = fs::metadata(state.join("zerkalo")).unwrap().permissions().mode();
     assert_eq!(mode & 0o777, 0o700);
     let mut terminal = open(&[PROGRAM]);
-    terminal.wait_for_text("broke off");
+    terminal.wait_for_text("ended unexpectedly");
     terminal.send("d");
-    terminal.wait_until_gone("broke off");
+    terminal.wait_until_gone("ended unexpectedly");
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
     assert_eq!(fs::read_dir(state.join("zerkalo")).unwrap().count(), 0);
