@@ -75,8 +75,7 @@ pub fn probe(
         found.learn(reply);
         matches!(reply, Reply::Attributes(_))
     })?;
-    if let (Some(_), Some(multiplexer)) = (&found.environment.ssh, found.environment.multiplexer)
-    {
+    if let (Some(_), Some(multiplexer)) = (&found.environment.ssh, found.environment.multiplexer) {
         let sent_at = Instant::now();
         tty.write(cursor_request(Some(multiplexer)).as_bytes())?;
         listen(keyboard, sent_at + PATIENCE, is_ending, |at, reply| {

@@ -73,7 +73,7 @@ fn converge(scene: &Scene) -> Figures {
         let begun = line.now;
         loop {
             line.pass(&work.wanted(), Duration::from_millis(200));
-            let waits = line.pacing.rest().visible || line.pacing.rest().text;
+            let waits = line.pacing.pending().visible || line.pacing.pending().text;
             if !waits {
                 break;
             }

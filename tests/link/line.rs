@@ -93,7 +93,7 @@ impl Line {
                     self.coming.push_back((self.free_at + self.one_way, bytes));
                 }
             }
-            if self.pacing.rest().visible {
+            if self.pacing.pending().visible {
                 self.waited[0] += STEP;
                 self.waited[1] += if self.free_at >= self.now { STEP } else { Duration::ZERO };
             }

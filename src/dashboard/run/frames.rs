@@ -166,7 +166,7 @@ impl FramePipeline {
 
     /// Whether differences of the picture wait that can be seen, and bytes of frames sent so far.
     pub fn load(&self) -> (bool, u64) {
-        (self.pacing.rest().visible, self.sent)
+        (self.pacing.pending().visible, self.sent)
     }
 
     /// What the user is told about the line.
@@ -213,7 +213,7 @@ impl FramePipeline {
     /// When to draw again; `None`: when something happens. `changed`: the model is another one;
     /// `answers`: what is drawn shows what the user has just done.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
-        let rest = self.pacing.rest();
+        let rest = self.pacing.pending();
         let text = changed || rest.text || !self.removal.is_empty();
         let may = || self.link.allowance(now, false).is_some_and(|allowance| allowance.picture);
         if let Some(sending) = &self.sending
@@ -223,7 +223,7 @@ impl FramePipeline {
             return sending.is_unfinished().then(slice);
         }
         if !text && !rest.visible {
-            let hidden = rest.hidden?.max(self.link.flush_at());
+            let hidden = rest.hidden?.max(self.link.refine_at());
             return Some(if may() { hidden } else { hidden.max(self.link.wakes_at(now, false)) });
         }
         match self.link.allowance(now, answers) {
@@ -279,13 +279,13 @@ impl FramePipeline {
         if bytes.len() == empty && self.copied.is_empty() && self.removal.is_empty() {
             bytes.clear();
             self.writer.keep(bytes);
-            let rest = self.pacing.rest();
+            let rest = self.pacing.pending();
             let follows =
                 |sending: &ImageUpload| sending.is_unfinished() && sending.follows(rest.visible);
             if !rest.text && self.sending.as_ref().is_some_and(follows) {
                 return self.slice(now, whole);
             }
-            return if self.pacing.rest().visible {
+            return if self.pacing.pending().visible {
                 DrawOutcome::BranchStack
             } else {
                 DrawOutcome::Same

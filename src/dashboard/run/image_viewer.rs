@@ -23,8 +23,13 @@ impl Dashboard {
         terminal.cell_px = cell_px;
         let most_bytes = self.frames.reading().map(|line| line.rate * LONGEST.as_secs_f64());
         let protocol = Protocol::of(&terminal);
-        let window =
-            ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, most_bytes };
+        let window = ImageViewport {
+            protocol,
+            screen,
+            cell_px,
+            sixel_px: terminal.sixel_px,
+            max_bytes: most_bytes,
+        };
         let (path, results) = (path.to_path_buf(), self.hands.results());
         let failed = results.clone();
         let asked = path.clone();
