@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# How long answers take over a slow line: `cargo bench --bench link` behind an OpenSSH server, plain and
-# inside tmux. Installs what is missing where it may.
+# Latency over a slow connection: `cargo bench --bench link` behind an OpenSSH server, plain and inside
+# tmux. Installs missing programs if it may.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 missing=()
@@ -12,11 +12,11 @@ if [ ${#missing[@]} -gt 0 ]; then
         apt-get install -y --no-install-recommends "${missing[@]}" >/dev/null 2>&1; then
         echo "installed: ${missing[*]}"
     else
-        echo "not here and not to be installed: ${missing[*]}; what needs them is skipped"
+        echo "missing and not installed: ${missing[*]}; rows that need them are skipped"
     fi
 fi
 echo "machine: $(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | xargs), $(nproc) cores; $(date +%F)"
-echo "line: 1 Mbit/s, 50 ms each way; 160x45 cells; from a key to the first change of the picture"
+echo "connection: 1 Mbit/s, 50 ms each way; 160x45 cells; from a key to the first change of the picture"
 cargo bench --quiet --bench link "$@"
-echo "on a simulated line, one wave at a time to 1,024 samples per pixel:"
+echo "on a simulated connection, one wave at a time to 1,024 samples per pixel:"
 cargo test --quiet --test link -- --nocapture --test-threads 1 | grep -E "room|noisy|acting"
