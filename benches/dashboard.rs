@@ -1,6 +1,6 @@
-//! How fast the dashboard answers: the program itself in a terminal of 160x45 cells, with keys pressed
-//! at a fixed rate. Latencies are its own (`--trace`): from the reading of a key to the moment when the
-//! frame that answers it has been written.
+//! Input latency of the dashboard, in a terminal of 160x45 cells with keys pressed at a fixed rate. The
+//! program records the latencies (`--trace`): from the reading of a key until the frame that shows its
+//! effect has been written.
 
 #[path = "../tests/pty/terminal.rs"]
 mod terminal;
@@ -16,17 +16,17 @@ use zerkalo::scene::BUILT_IN;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 const SIZE: [u16; 2] = [160, 45];
 
-/// Arrow keys, in turn, so that the camera stays about where it is.
+/// Arrow keys whose moves cancel each other.
 const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[A", "\x1b[D", "\x1b[B"];
 
-/// An event of the trace.
+/// Event of the trace.
 struct Event {
     picture: bool,
     milliseconds: f64,
 }
 
 fn main() {
-    // `cargo test --benches` only wants to know whether it runs.
+    // `cargo test --benches` runs it without measurement.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }
@@ -34,44 +34,45 @@ fn main() {
     let room = folder.path().join("room.toml");
     fs::write(&room, BUILT_IN).unwrap();
     // Single presses, while the picture converges.
-    let single = pressed(folder.path(), 40, Duration::from_millis(250));
+    let single = press_keys(folder.path(), 40, Duration::from_millis(250));
     report("single keys, 640x480, to picture", &single, true);
     // A key held down for ten seconds.
-    let held = pressed(folder.path(), 300, Duration::from_nanos(1_000_000_000 / 30));
+    let held = press_keys(folder.path(), 300, Duration::from_nanos(1_000_000_000 / 30));
     report("held key, 640x480, to picture", &held, true);
     if let Some(last) = held.iter().rfind(|event| event.picture) {
         println!("{:44} {:6.1} ms", "last key of those to its picture", last.milliseconds);
     }
     println!("{:44} {:6.2} %", "one core when converged", idle_percent(folder.path()));
     fs::write(&room, BUILT_IN.replace("size = [640, 480]", "size = [3840, 2160]")).unwrap();
-    let large = pressed(folder.path(), 40, Duration::from_millis(250));
+    let large = press_keys(folder.path(), 40, Duration::from_millis(250));
     report("single keys, 3840x2160, to screen", &large, false);
     report("single keys, 3840x2160, to picture", &large, true);
 }
 
 /// Starts the program in `folder` and waits for its first picture.
-fn opened(folder: &Path, more: &[&str]) -> Terminal {
-    // What the session before has left behind would be asked about.
+fn open(folder: &Path, more: &[&str]) -> Terminal {
+    // Removes unsaved edits of the session before, which would open a prompt.
     let _ = fs::remove_file(folder.join(".room.toml.unsaved"));
     let command = [&[PROGRAM, "room.toml"], more].concat();
     let terminal =
-        Terminal::start(&Start { command: &command, folder, size: SIZE, env: &[], answers: true });
+        Terminal::start(&Start { command: &command, folder, size: SIZE, env: &[], replies: true });
     terminal.wait_for_text("spp");
     std::thread::sleep(Duration::from_millis(500));
     terminal
 }
 
-/// Presses `count` keys, one each `interval`, every fourth of them one that only moves the focus.
-fn pressed(folder: &Path, count: usize, interval: Duration) -> Vec<Event> {
+/// Presses `count` arrow keys, one each `interval`, with a key in between that toggles the panels if the
+/// interval is longer than 100 ms. Returns the recorded events.
+fn press_keys(folder: &Path, count: usize, interval: Duration) -> Vec<Event> {
     let trace = folder.join("trace.csv");
-    let mut terminal = opened(folder, &["--trace", trace.to_str().unwrap()]);
-    let begun = Instant::now();
+    let mut terminal = open(folder, &["--trace", trace.to_str().unwrap()]);
+    let start = Instant::now();
     for i in 0..count {
-        let due = begun + interval * i as u32;
+        let due = start + interval * i as u32;
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
         terminal.send(ARROWS[i % ARROWS.len()]);
         if interval > Duration::from_millis(100) {
-            // Shows and hides the panels: answered by the next frame.
+            // Shows and hides the panels: the next frame shows it.
             std::thread::sleep(interval / 2);
             terminal.send("z");
         }
@@ -86,9 +87,9 @@ fn pressed(folder: &Path, count: usize, interval: Duration) -> Vec<Event> {
     text.lines().skip(1).map(event).collect()
 }
 
-/// How much of one processor the program takes when it has nothing to do.
+/// Returns the processor time of the converged program, in percent of one processor.
 fn idle_percent(folder: &Path) -> f64 {
-    let mut terminal = opened(folder, &[]);
+    let mut terminal = open(folder, &[]);
     terminal.send("T");
     terminal.wait_for_text("top at");
     terminal.send("\x15spp 16\r");
@@ -103,14 +104,14 @@ fn idle_percent(folder: &Path) -> f64 {
     ticks as f64 / seconds as f64
 }
 
-/// User and system time of a process (fields 14 and 15 of proc_pid_stat(5)).
+/// Returns user and system time of a process in ticks (fields 14 and 15 of proc_pid_stat(5)).
 fn processor_ticks(id: u32) -> u64 {
     let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap();
     let after_name = stat.rsplit_once(')').unwrap().1;
     after_name.split_whitespace().skip(11).take(2).map(|n| n.parse::<u64>().unwrap()).sum()
 }
 
-/// Ends the program without its asking for what is unsaved.
+/// Ends the program without the prompt for unsaved edits.
 fn end(terminal: Terminal) {
     let id = terminal.process_id().to_string();
     assert!(Command::new("kill").args(["-TERM", &id]).status().unwrap().success());

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Latency over a slow connection: `cargo bench --bench link` behind an OpenSSH server, plain and inside tmux.
-# Installs missing packages if it has the right to.
+# Latency over a slow connection: `cargo bench --bench link` behind an OpenSSH server, plain and inside
+# tmux. Installs missing programs if it may.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 missing=()
@@ -12,7 +12,7 @@ if [ ${#missing[@]} -gt 0 ]; then
         apt-get install -y --no-install-recommends "${missing[@]}" >/dev/null 2>&1; then
         echo "installed: ${missing[*]}"
     else
-        echo "missing and not installable: ${missing[*]}; measurements that need them are skipped"
+        echo "missing and not installed: ${missing[*]}; rows that need them are skipped"
     fi
 fi
 echo "machine: $(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | xargs), $(nproc) cores; $(date +%F)"

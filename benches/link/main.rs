@@ -1,7 +1,7 @@
-//! From a key to the first change of the picture over a slow line: the program itself behind a real
-//! OpenSSH server on loopback, with a relay between that limits it to 1 Mbit/s and delays everything by
-//! 50 ms, plain and inside tmux. `benches/link.sh` installs what it needs. Arguments: the name of one of
-//! the rows, and how many keys are pressed.
+//! Latency from a key to the first change of the picture over a slow connection. The program runs behind
+//! an OpenSSH server on loopback, plain and inside tmux; a relay limits the rate to 1 Mbit/s and delays
+//! all bytes by 50 ms. `benches/link.sh` installs the requirements. Arguments: the name of a row, and the
+//! number of keys.
 
 #[path = "../../tests/pty/terminal.rs"]
 mod terminal;
@@ -23,26 +23,26 @@ use zerkalo::terminal::cells::Oklab;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 const SIZE: [u16; 2] = [160, 45];
-/// Bytes a second: 1 Mbit/s.
+/// 1 Mbit/s, in bytes per second.
 const RATE: f64 = 125e3;
 const ONE_WAY: Duration = Duration::from_millis(50);
-/// Keys that are pressed, unless an argument says how many.
+/// Number of keys without argument.
 const KEYS: usize = 40;
-/// What the program says at its end.
-const TOLD: &str = "told.txt";
+/// File of the program's messages.
+const MESSAGES: &str = "messages.txt";
 
-/// Two steps to the right, two to the left: the camera stays about where it is.
+/// Arrow keys whose moves cancel each other.
 const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[C", "\x1b[D", "\x1b[D"];
 
 fn main() {
-    // `cargo test --benches` only wants to know whether it runs.
+    // `cargo test --benches` runs it without measurement.
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
     let keys = arguments.iter().find_map(|a| a.parse().ok()).unwrap_or(KEYS);
     let row = arguments.iter().find(|a| !a.starts_with('-') && a.parse::<usize>().is_err());
-    let wanted = |name: &str| row.is_none_or(|row| row == name);
+    let is_selected = |name: &str| row.is_none_or(|row| row == name);
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("room.toml"), BUILT_IN).unwrap();
     let server = match Server::start(folder.path()) {
@@ -54,25 +54,25 @@ fn main() {
         "", "median", "p95", "max", "keys"
     );
     let room = folder.path().join("room.toml");
-    let [trace, told] = ["trace.csv", TOLD].map(|name| folder.path().join(name));
-    // Without passing through the bench's own terminal, in which tmux would swallow it.
+    let [trace, messages] = ["trace.csv", MESSAGES].map(|name| folder.path().join(name));
+    // Messages go to a file, because tmux would swallow them in the terminal.
     let program = |options: &str| {
-        let [room, trace, told] = [&room, &trace, &told].map(|path| path.display());
-        format!("COLORTERM=truecolor {PROGRAM} {room} --trace {trace} {options} 2>{told}")
+        let [room, trace, messages] = [&room, &trace, &messages].map(|path| path.display());
+        format!("COLORTERM=truecolor {PROGRAM} {room} --trace {trace} {options} 2>{messages}")
     };
     let plain = [
         ("plain", "", true),
         ("plain, answers lost after the start", "", false),
         ("plain, --bandwidth 30", "--bandwidth 30", true),
     ];
-    for (name, options, answering) in plain.into_iter().filter(|(name, ..)| wanted(name)) {
-        measure(name, keys, &server, folder.path(), &program(options), answering);
+    for (name, options, replying) in plain.into_iter().filter(|(name, ..)| is_selected(name)) {
+        measure(name, keys, &server, folder.path(), &program(options), replying);
     }
     if Command::new("tmux").arg("-V").output().is_err() {
         return println!("inside tmux: skipped, there is no tmux");
     }
     let inside = [("tmux, passthrough", "on"), ("tmux, no passthrough", "off")];
-    for (name, passthrough) in inside.into_iter().filter(|(name, _)| wanted(name)) {
+    for (name, passthrough) in inside.into_iter().filter(|(name, _)| is_selected(name)) {
         let settings = folder.path().join("tmux.conf");
         let text = format!(
             "set -g allow-passthrough {passthrough}\nset -g status off\nset -g escape-time 10\n\
@@ -87,41 +87,34 @@ fn main() {
     }
 }
 
-/// Opens the dashboard, lets it converge, presses keys.
-fn measure(
-    name: &str,
-    keys: usize,
-    server: &Server,
-    folder: &Path,
-    program: &str,
-    answering: bool,
-) {
-    let _ = fs::remove_file(folder.join(TOLD));
+/// Measures one row: opens the dashboard, lets it converge, presses keys.
+fn measure(name: &str, keys: usize, server: &Server, folder: &Path, program: &str, replying: bool) {
+    let _ = fs::remove_file(folder.join(MESSAGES));
     let relay = Relay::start(server.address, RATE, ONE_WAY).unwrap();
     let command = server.ssh(relay.address, program);
     let words: Vec<&str> = command.iter().map(String::as_str).collect();
-    let start = Start { command: &words, folder, size: SIZE, env: &[], answers: true };
+    let start = Start { command: &words, folder, size: SIZE, env: &[], replies: true };
     let mut terminal = Terminal::start(&start);
     terminal.wait_for_text("spp");
-    terminal.answer(answering);
-    // Noise that is not reached: it converges all the time.
+    terminal.set_replying(replying);
+    // A noise target out of reach keeps it converging.
     terminal.send("T");
     terminal.wait_for_text("top at");
     terminal.send("\x15noise 0.01\r");
-    std::thread::sleep(Duration::from_secs(if answering { 3 } else { 12 }));
-    let mut seconds: Vec<f64> = (0..keys).map(|i| pressed(&mut terminal, i)).collect();
+    std::thread::sleep(Duration::from_secs(if replying { 3 } else { 12 }));
+    let mut seconds: Vec<f64> = (0..keys).map(|i| press_key(&mut terminal, i)).collect();
     seconds.sort_by(f64::total_cmp);
     let quantile = |share: f64| seconds[((share * keys as f64).ceil() as usize).max(1) - 1];
     let status = status(&terminal);
     terminal.send("q");
     std::thread::sleep(Duration::from_secs(3));
-    // The camera was moved: it is asked whether that is to be saved.
+    // The moved camera is an unsaved edit; the prompt is answered.
     if terminal.screen(|screen| screen.contents().contains("unsaved edits")) {
         terminal.send("d");
         std::thread::sleep(Duration::from_secs(3));
     }
     drop(terminal);
-    let line = [busy(folder).unwrap_or("not told".to_string()), status];
+    let line = [busy(folder).unwrap_or("not reported".to_string()), status];
     println!(
         "{name:38} {:5.3} s {:5.3} s {:5.3} s {keys:5}  {}",
         quantile(0.5),
@@ -131,22 +124,21 @@ fn measure(
     );
 }
 
-/// The share of the line that was used while visible differences waited, by what the program says at
-/// its end.
+/// Returns the share of the rate used while visible differences waited, from the program's messages.
 fn busy(folder: &Path) -> Option<String> {
-    let told = fs::read_to_string(folder.join(TOLD)).ok()?;
-    let line = told.lines().find_map(|line| line.split_once("waited for "))?.1;
+    let messages = fs::read_to_string(folder.join(MESSAGES)).ok()?;
+    let line = messages.lines().find_map(|line| line.split_once("waited for "))?.1;
     let numbers = line.split_whitespace().filter_map(|word| word.parse::<f64>().ok());
     let &[seconds, bytes] = &numbers.collect::<Vec<_>>()[..] else { return None };
     Some(format!("{:.0} % in {seconds:.1} s", 100.0 * bytes / seconds / RATE))
 }
 
-/// Presses a key; seconds until the picture is clearly another one.
-fn pressed(terminal: &mut Terminal, i: usize) -> f64 {
-    // Not in step with anything.
+/// Presses a key. Returns the seconds until the picture has clearly changed.
+fn press_key(terminal: &mut Terminal, i: usize) -> f64 {
+    // Irregular pauses.
     std::thread::sleep(Duration::from_millis(1500 + 37 * (i as u64 % 11)));
     let before = terminal.screen(colors);
-    let begun = Instant::now();
+    let start = Instant::now();
     terminal.send(ARROWS[i % ARROWS.len()]);
     terminal.wait_for("another picture", |screen| {
         let now = colors(screen);
@@ -156,10 +148,10 @@ fn pressed(terminal: &mut Terminal, i: usize) -> f64 {
         });
         (changed.count() >= 25).then_some(())
     });
-    begun.elapsed().as_secs_f64()
+    start.elapsed().as_secs_f64()
 }
 
-/// The colours behind the picture's cells.
+/// Returns the colours of the picture's cells.
 fn colors(screen: &vt100::Screen) -> BTreeMap<(u16, u16), [u8; 3]> {
     let (rows, columns) = screen.size();
     let cells = (0..rows.get()).flat_map(|row| (0..columns.get()).map(move |column| (row, column)));
@@ -178,7 +170,7 @@ fn colors(screen: &vt100::Screen) -> BTreeMap<(u16, u16), [u8; 3]> {
     cells.filter_map(color).collect()
 }
 
-/// What the status line says about the line.
+/// Returns the part of the status line about the connection.
 fn status(terminal: &Terminal) -> String {
     terminal.screen(|screen| {
         let text = screen.contents();

@@ -1,4 +1,4 @@
-//! A slow line in user space: what the server sends is limited to a rate, and everything comes late.
+//! Relay that limits the server's output to a rate and delays both directions.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -7,15 +7,15 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Bytes that a line takes before the sender has to wait: as much as routers hold at this rate.
-const HELD: usize = 64 << 10;
+/// Bytes in the relay beyond which the sender waits, as in a router at this rate.
+const MAX_BUFFERED: usize = 64 << 10;
 
-/// A listening relay. Every connection to it goes on to the server.
+/// Listening relay. It forwards each connection to the server.
 pub struct Relay {
     pub address: SocketAddr,
 }
 
-/// Pieces on their way.
+/// Bytes in transmission with their times of arrival.
 #[derive(Default)]
 struct Pipe {
     pieces: VecDeque<(Instant, Vec<u8>)>,
@@ -24,8 +24,8 @@ struct Pipe {
 }
 
 impl Relay {
-    /// To the server at `target`; what comes from it is limited to `rate` bytes a second, and
-    /// everything takes `one_way` longer.
+    /// Starts a relay to the server at `target`. Its output is limited to `rate` bytes per second; both
+    /// directions are delayed by `one_way`.
     pub fn start(target: SocketAddr, rate: f64, one_way: Duration) -> io::Result<Self> {
         let listener = TcpListener::bind("127.0.0.1:0")?;
         let address = listener.local_addr()?;
@@ -34,16 +34,16 @@ impl Relay {
                 let Ok(server) = TcpStream::connect(target) else { continue };
                 let _ = client.set_nodelay(true).and_then(|()| server.set_nodelay(true));
                 let (Ok(up), Ok(down)) = (client.try_clone(), server.try_clone()) else { continue };
-                carry(up, server, f64::INFINITY, one_way);
-                carry(down, client, rate, one_way);
+                forward(up, server, f64::INFINITY, one_way);
+                forward(down, client, rate, one_way);
             }
         });
         Ok(Self { address })
     }
 }
 
-/// One direction.
-fn carry(mut from: TcpStream, mut to: TcpStream, rate: f64, one_way: Duration) {
+/// Forwards one direction.
+fn forward(mut from: TcpStream, mut to: TcpStream, rate: f64, one_way: Duration) {
     let pipe = Arc::new((Mutex::new(Pipe::default()), Condvar::new()));
     let other = Arc::clone(&pipe);
     thread::spawn(move || {
@@ -54,7 +54,7 @@ fn carry(mut from: TcpStream, mut to: TcpStream, rate: f64, one_way: Duration) {
             let read = from.read(&mut buffer).unwrap_or(0);
             let (pipe, changed) = &*pipe;
             let mut pipe =
-                changed.wait_while(pipe.lock().unwrap(), |pipe| pipe.bytes > HELD).unwrap();
+                changed.wait_while(pipe.lock().unwrap(), |pipe| pipe.bytes > MAX_BUFFERED).unwrap();
             if read == 0 {
                 pipe.closed = true;
                 changed.notify_all();
@@ -67,18 +67,18 @@ fn carry(mut from: TcpStream, mut to: TcpStream, rate: f64, one_way: Duration) {
         }
     });
     thread::spawn(move || {
-        let (pipe, changed) = &*other;
+        let (shared, changed) = &*other;
         loop {
-            let mut held = changed
-                .wait_while(pipe.lock().unwrap(), |p| p.pieces.is_empty() && !p.closed)
+            let mut pipe = changed
+                .wait_while(shared.lock().unwrap(), |p| p.pieces.is_empty() && !p.closed)
                 .unwrap();
-            let Some((at, piece)) = held.pieces.pop_front() else { break };
-            drop(held);
+            let Some((at, piece)) = pipe.pieces.pop_front() else { break };
+            drop(pipe);
             thread::sleep(at.saturating_duration_since(Instant::now()));
             if to.write_all(&piece).is_err() {
                 break;
             }
-            pipe.lock().unwrap().bytes -= piece.len();
+            shared.lock().unwrap().bytes -= piece.len();
             changed.notify_all();
         }
         let _ = to.shutdown(Shutdown::Write);

@@ -1,4 +1,4 @@
-//! An OpenSSH server of our own on loopback.
+//! OpenSSH server on loopback.
 
 use std::fs;
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A server with a key that lets its user in. Dropped, it ends.
+/// OpenSSH server that accepts a generated user key. Dropping it ends it.
 pub struct Server {
     child: Child,
     folder: PathBuf,
@@ -14,7 +14,10 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts `sshd` with keys and settings in `folder`; or says what is missing.
+    /// Starts `sshd` with keys and settings in `folder`.
+    ///
+    /// # Errors
+    /// If a program is missing or the server does not start.
     pub fn start(folder: &Path) -> Result<Self, String> {
         let daemon = ["/usr/sbin/sshd", "/usr/local/sbin/sshd", "/usr/bin/sshd"]
             .into_iter()
@@ -22,12 +25,12 @@ impl Server {
             .ok_or("there is no sshd: install openssh-server")?;
         for key in ["host", "user"] {
             let file = folder.join(key);
-            let made = Command::new("ssh-keygen")
+            let status = Command::new("ssh-keygen")
                 .args(["-q", "-t", "ed25519", "-N", "", "-f"])
                 .arg(&file)
                 .status()
                 .map_err(|_| "there is no ssh-keygen: install openssh-client")?;
-            if !made.success() {
+            if !status.success() {
                 return Err("ssh-keygen makes no key".to_string());
             }
         }
@@ -40,7 +43,7 @@ impl Server {
         );
         let file = folder.join("sshd_config");
         fs::write(&file, settings).map_err(|error| error.to_string())?;
-        // Where it puts itself away from the network; only the system's start makes it.
+        // Folder for privilege separation, which the system creates only at boot.
         let _ = fs::create_dir_all("/run/sshd");
         let log = fs::File::create(folder.join("sshd.log")).map_err(|error| error.to_string())?;
         let child = Command::new(daemon)
@@ -63,7 +66,7 @@ impl Server {
         Ok(server)
     }
 
-    /// The command that runs `command` on the server, with a terminal, by way of `address`.
+    /// Returns the words of an ssh command that runs `command` on the server in a terminal, via `address`.
     pub fn ssh(&self, address: SocketAddr, command: &str) -> Vec<String> {
         let mut words: Vec<String> = ["ssh", "-tt", "-F", "none", "-i"].map(String::from).into();
         words.push(self.folder.join("user").display().to_string());

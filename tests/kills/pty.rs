@@ -1,5 +1,5 @@
-//! A pseudo-terminal that answers as little as it must, can be closed like a dropped line, and runs
-//! beside others.
+//! Pseudo-terminal with a minimum of replies, which can be closed like a lost connection and run
+//! concurrently.
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
 use std::io::{Read, Write};
@@ -11,20 +11,20 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Long enough for any machine; reached only on failure.
+/// Longest wait; reached only on failure.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 const SIZE: [u16; 2] = [60, 18];
 
-/// The question that every terminal answers, and an answer.
-const QUESTION: (&[u8], &[u8]) = (b"\x1b[c", b"\x1b[?62;22c");
+/// Request to which every terminal replies, and a reply.
+const REQUEST: (&[u8], &[u8]) = (b"\x1b[c", b"\x1b[?62;22c");
 
 type Keyboard = Arc<Mutex<Option<Box<dyn Write + Send>>>>;
 
-/// The program in a pseudo-terminal of its own.
+/// Program in its own pseudo-terminal.
 pub struct Pty {
     master: Option<Box<dyn MasterPty + Send>>,
-    /// Kept open, so that the modes can be asked for after the program's end.
+    /// Slave end, kept open so that the modes can be read after the program's end.
     slave: Option<Box<dyn SlavePty + Send>>,
     keyboard: Keyboard,
     child: Box<dyn Child + Send + Sync>,
@@ -35,7 +35,7 @@ pub struct Pty {
 }
 
 impl Pty {
-    /// Starts the dashboard with the scene `scene.toml` in `folder`.
+    /// Starts the dashboard with `scene.toml` in `folder`.
     pub fn open(folder: &Path) -> Self {
         let [cols, rows] = SIZE;
         let size = PtySize { rows, cols, pixel_width: 0, pixel_height: 0 };
@@ -57,7 +57,7 @@ impl Pty {
         let (shared, keys, ends) = (output.clone(), keyboard.clone(), closing.clone());
         let reader = std::thread::spawn(move || {
             let mut buffer = vec![0; 1 << 14];
-            let mut answered = 0;
+            let mut replied = 0;
             loop {
                 let read = from.read(&mut buffer).unwrap_or(0);
                 if read == 0 || ends.load(Ordering::Acquire) {
@@ -66,10 +66,10 @@ impl Pty {
                 let mut bytes = shared.0.lock().unwrap();
                 bytes.extend_from_slice(&buffer[..read]);
                 shared.1.notify_all();
-                while let Some(at) = find(&bytes[answered..], QUESTION.0) {
-                    answered += at + QUESTION.0.len();
+                while let Some(offset) = find(&bytes[replied..], REQUEST.0) {
+                    replied += offset + REQUEST.0.len();
                     if let Some(keyboard) = &mut *keys.lock().unwrap() {
-                        let _ = keyboard.write_all(QUESTION.1);
+                        let _ = keyboard.write_all(REQUEST.1);
                     }
                 }
             }
@@ -95,36 +95,39 @@ impl Pty {
         }
     }
 
-    /// Waits until the output is as `wanted`.
-    pub fn wait_for(&self, what: &str, wanted: impl Fn(&[u8]) -> bool) -> Result<(), String> {
+    /// Waits until `condition` is `true` for the output.
+    ///
+    /// # Errors
+    /// If it is not within [`PATIENCE`]; the message names `what`.
+    pub fn wait_for(&self, what: &str, condition: impl Fn(&[u8]) -> bool) -> Result<(), String> {
         let end = Instant::now() + PATIENCE;
         let mut bytes = self.output.0.lock().unwrap();
-        while !wanted(&bytes) {
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() {
+        while !condition(&bytes) {
+            let time_left = end.saturating_duration_since(Instant::now());
+            if time_left.is_zero() {
                 return Err(format!("no {what}; the screen:\n{}", screen(&bytes).contents()));
             }
-            bytes = self.output.1.wait_timeout(bytes, left.min(PATIENCE / 60)).unwrap().0;
+            bytes = self.output.1.wait_timeout(bytes, time_left.min(PATIENCE / 60)).unwrap().0;
         }
         Ok(())
     }
 
-    /// Waits until `text` is on the screen.
+    /// Waits until the screen contains `text`.
     pub fn wait_for_text(&self, text: &str) -> Result<(), String> {
         self.wait_for(&format!("{text:?}"), |bytes| screen(bytes).contents().contains(text))
     }
 
-    /// Sends a signal by the program that every Unix has for that.
+    /// Sends a signal by `kill`.
     pub fn signal(&self, name: &str) {
         let id = self.child.process_id().expect("a process").to_string();
         let sent = Command::new("kill").args([&format!("-{name}"), &id]).status();
         assert!(sent.is_ok_and(|status| status.success()), "no signal {name}");
     }
 
-    /// Closes the terminal as a line is closed that drops: nobody has its other end any more.
+    /// Closes the terminal like a lost connection: its master end is gone.
     pub fn hang_up(&mut self) {
         self.closing.store(true, Ordering::Release);
-        // Help appears or goes: there is something to read, so that the reader sees that it is to end.
+        // The help makes output, which wakes the reader.
         self.send(b"?");
         if let Some(reader) = self.reader.take() {
             reader.join().expect("the reader ends");
@@ -134,7 +137,7 @@ impl Pty {
         self.master = None;
     }
 
-    /// Waits for the end of the program; its exit status.
+    /// Waits for the end of the program. Returns its exit status.
     pub fn end(&mut self) -> Result<u32, String> {
         let end = Instant::now() + PATIENCE;
         loop {
@@ -149,11 +152,10 @@ impl Pty {
         }
     }
 
-    /// After the end: everything that the program has sent, and whether the modes of the terminal are
-    /// as they were before.
+    /// Returns all output, and `true` if the modes of the terminal are restored.
     pub fn afterwards(mut self) -> (Vec<u8>, bool) {
         let restored = self.master.as_deref().is_some_and(|master| modes(master) == self.modes);
-        // With the last of its ends the terminal itself ends, and with it the output.
+        // Closing the last slave end closes the terminal and the output.
         self.slave = None;
         if let Some(reader) = self.reader.take() {
             reader.join().expect("the reader ends");
@@ -163,19 +165,19 @@ impl Pty {
     }
 }
 
-/// A test that fails leaves no program behind.
+/// Ends the program of a failed test.
 impl Drop for Pty {
     fn drop(&mut self) {
         let _ = self.child.kill();
     }
 }
 
-/// Where `part` begins in `bytes`.
+/// Returns the offset of `part` in `bytes`.
 pub fn find(bytes: &[u8], part: &[u8]) -> Option<usize> {
     bytes.windows(part.len()).position(|window| window == part)
 }
 
-/// What a terminal shows after these bytes.
+/// Returns the screen of a terminal after these bytes.
 pub fn screen(bytes: &[u8]) -> vt100::Screen {
     let [columns, rows] = SIZE.map(|n| NonZeroU16::new(n).expect("a size"));
     let mut parser = vt100::Parser::new(rows, columns, 0);

@@ -1,5 +1,4 @@
-//! What a scene becomes by keys, known without the program: the states that its file and what is kept
-//! may have.
+//! Expected states of a scene after keys, computed without the program.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,7 +9,7 @@ use zerkalo::dashboard::update::{begin, update};
 use zerkalo::render::schedule::Stop;
 use zerkalo::scene::Document;
 
-/// A scene that is soon rendered.
+/// Scene that renders quickly.
 pub const SCENE: &str = r#"# A ball before a mirror.
 [film]
 size = [24, 18]
@@ -42,7 +41,7 @@ material = "mirror"
 shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0, 0.0, 1.0] }
 "#;
 
-/// Keys: names and what a keyboard sends. Edits whose result does not depend on when they come.
+/// Keys and the bytes that a keyboard sends. Their edits do not depend on time.
 pub const KEYS: [(&str, &[u8]); 10] = [
     ("'", b"'"),
     (";", b";"),
@@ -55,10 +54,10 @@ pub const KEYS: [(&str, &[u8]); 10] = [
     ("p", b"p"),
     ("P", b"P"),
 ];
-/// Of those the one that saves.
+/// Index of the key that saves.
 pub const SAVE: usize = 7;
 
-/// The file's text, if it were saved after none of the `keys`, the first, the first two and so on.
+/// Returns the text of the saved file after each prefix of `keys`, from none to all.
 pub fn states(keys: &[usize]) -> Vec<String> {
     let path = PathBuf::from("scene.toml");
     let mut document = Document::parse(SCENE.to_string(), "scene.toml").expect("a scene");

@@ -1,12 +1,12 @@
-//! Bytes and errors of whole convergences.
+//! Bytes and errors of complete convergences.
 
-use crate::line::Line;
+use crate::connection::Connection;
 use crate::picture::{SCREEN, Work};
 use crate::support;
 use std::time::Duration;
 use zerkalo::scene::Scene;
 
-/// Everything is seen in a rough mirror.
+/// Scene seen in a rough mirror, noisy everywhere.
 const NOISY: &str = r#"
 [camera]
 eye = [0.0, 1.0, 0.0]
@@ -42,66 +42,67 @@ shape.sphere = { center = [1.5, 1.4, 1.5], radius = 0.8 }
 "#;
 
 const SPP: u32 = 1024;
-/// 1 Mbit/s, 100 ms.
+/// 1 Mbit/s, in bytes per second.
 const RATE: f64 = 125e3;
 const ROUND_TRIP: Duration = Duration::from_millis(100);
 
-/// What one convergence has cost.
+/// Measurements of one convergence.
 struct Figures {
     frames: usize,
     total: usize,
-    /// Of those, for differences that cannot be seen.
+    /// Bytes for invisible differences.
     flushed: usize,
     first_64: usize,
     largest: usize,
-    /// Mean over the waves, at the end of each.
+    /// Mean over the waves of the OKLab error at the end of each.
     mean_error: f64,
     /// Seconds from the last wave until everything is exact.
     exact_after: f64,
-    /// Seconds in which visible differences waited, and the share of them in which the line was busy.
+    /// Seconds in which visible differences waited.
     waited: f64,
+    /// Share of them in which the connection was busy.
     busy: f64,
 }
 
-/// One wave at a time: the next one is traced when nothing that can be seen waits any more.
+/// Renders wave by wave; the next wave starts when no visible difference waits.
 fn converge(scene: &Scene) -> Figures {
     let mut work = Work::new(scene, SPP);
-    let mut line = Line::new(SCREEN, RATE, ROUND_TRIP);
+    let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
     let (mut errors, mut first_64) = (Vec::new(), 0);
     while !work.done {
         work.wave();
-        let begun = line.now;
+        let start = connection.now;
         loop {
-            line.pass(&work.wanted(), Duration::from_millis(200));
-            let waits = line.pacing.rest().visible || line.pacing.rest().text;
-            if !waits {
+            connection.pass(&work.target(), Duration::from_millis(200));
+            let is_pending = connection.diff.pending().visible || connection.diff.pending().text;
+            if !is_pending {
                 break;
             }
-            assert!(line.now < begun + Duration::from_secs(20), "it never catches up");
+            assert!(connection.now < start + Duration::from_secs(20), "it never catches up");
         }
-        errors.push(work.error(line.parser.screen()));
-        if work.wanted().samples <= 64.0 {
-            first_64 = line.total();
+        errors.push(work.error(connection.parser.screen()));
+        if work.target().samples <= 64.0 {
+            first_64 = connection.total();
         }
     }
-    let begun = line.now;
-    while !work.is_exact(line.parser.screen()) {
-        assert!(line.now < begun + Duration::from_secs(60), "it never becomes exact");
-        line.pass(&work.wanted(), Duration::from_millis(100));
+    let start = connection.now;
+    while !work.is_exact(connection.parser.screen()) {
+        assert!(connection.now < start + Duration::from_secs(60), "it never becomes exact");
+        connection.pass(&work.target(), Duration::from_millis(100));
     }
-    for sent in &line.sent {
+    for sent in &connection.sent {
         assert!(sent.bytes <= sent.budget, "{sent:?}");
     }
     Figures {
-        frames: line.sent.len(),
-        total: line.total(),
-        flushed: line.sent.iter().map(|sent| sent.flushed).sum(),
+        frames: connection.sent.len(),
+        total: connection.total(),
+        flushed: connection.sent.iter().map(|sent| sent.flushed).sum(),
         first_64,
-        largest: line.sent.iter().map(|sent| sent.bytes).max().unwrap(),
+        largest: connection.sent.iter().map(|sent| sent.bytes).max().unwrap(),
         mean_error: errors.iter().sum::<f64>() / errors.len() as f64,
-        exact_after: (line.now - begun).as_secs_f64(),
-        waited: line.waited[0].as_secs_f64(),
-        busy: line.busy(),
+        exact_after: (connection.now - start).as_secs_f64(),
+        waited: connection.waited[0].as_secs_f64(),
+        busy: connection.busy(),
     }
 }
 
@@ -123,7 +124,7 @@ fn report(name: &str, f: &Figures) {
 }
 
 #[test]
-fn the_mirror_room_costs_little_and_stays_near() {
+fn mirror_room_stays_within_bytes_and_error() {
     let figures = converge(&support::shipped("mirror-room.toml"));
     report("mirror room", &figures);
     assert!(figures.total <= 2_500_000, "{} bytes", figures.total);
@@ -133,92 +134,91 @@ fn the_mirror_room_costs_little_and_stays_near() {
 }
 
 #[test]
-fn a_scene_that_is_noisy_everywhere() {
+fn noisy_scene_stays_within_bytes() {
     let figures = converge(&support::parsed(NOISY));
     report("noisy everywhere", &figures);
     assert!(figures.total <= 4_000_000, "{} bytes", figures.total);
     assert!(figures.busy >= 0.6, "{}", figures.busy);
 }
 
-/// What is sent follows what is shown, not the clock: the same bytes each time.
+/// Frames depend on the shown cells and simulated time only.
 #[test]
-fn the_same_picture_costs_the_same() {
+fn frames_are_deterministic() {
     let scene = support::shipped("roughness-0.3.toml");
     let sent = |_| {
         let mut work = Work::new(&scene, 16);
-        let mut line = Line::new(SCREEN, RATE, ROUND_TRIP);
+        let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
         while !work.done {
             work.wave();
-            line.pass(&work.wanted(), Duration::from_millis(300));
+            connection.pass(&work.target(), Duration::from_millis(300));
         }
-        line.sent.iter().map(|sent| sent.bytes).collect::<Vec<_>>()
+        connection.sent.iter().map(|sent| sent.bytes).collect::<Vec<_>>()
     };
     let [first, second] = [0, 1].map(sent);
     assert!(first.len() > 10);
     assert_eq!(first, second);
 }
 
-/// After an edit the first frame shows another picture everywhere, whatever the line carries.
+/// After an edit the first frame shows the new picture everywhere, as a mosaic if need be.
 #[test]
-fn another_picture_shows_in_its_first_frame() {
+fn new_picture_shows_in_its_first_frame() {
     let scene = support::shipped("mirror-room.toml");
     let mut work = Work::new(&scene, 8);
-    let mut line = Line::new(SCREEN, RATE, ROUND_TRIP);
+    let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
     while !work.done {
         work.wave();
-        line.pass(&work.wanted(), Duration::from_secs(3));
+        connection.pass(&work.target(), Duration::from_secs(3));
     }
     let other = support::shipped("viewpoint-left.toml");
     work.edit(&other, 8);
     work.wave();
-    let before = work.error(line.parser.screen());
-    let frames = line.sent.len();
-    while line.sent.len() == frames {
-        line.pass(&work.wanted(), Duration::from_millis(5));
+    let before = work.error(connection.parser.screen());
+    let frames = connection.sent.len();
+    while connection.sent.len() == frames {
+        connection.pass(&work.target(), Duration::from_millis(5));
     }
-    let first = line.sent[frames];
-    line.drain();
-    let after = work.error(line.parser.screen());
+    let first = connection.sent[frames];
+    connection.drain();
+    let after = work.error(connection.parser.screen());
     println!("{} of {} B: error {before:.3} -> {after:.3}", first.bytes, first.budget);
     assert!(first.bytes <= first.budget && after < 0.6 * before, "{before} {after}");
 }
 
-/// Edit after edit, the line is kept at work as long as something is to be seen, and whoever presses
-/// the next key does not wait for more than a frame.
+/// The connection is busy while visible differences wait, and input waits for at most one frame.
 #[test]
-fn the_line_is_busy_while_differences_wait() {
+fn connection_is_busy_while_differences_wait() {
     let scenes = ["mirror-room.toml", "viewpoint-left.toml"].map(support::shipped);
     for acting in [false, true] {
         let mut work = Work::new(&scenes[0], 8);
-        let mut line = Line::new(SCREEN, RATE, ROUND_TRIP);
-        line.acting = acting;
+        let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
+        connection.is_user_active = acting;
         for edit in 1..9 {
             while !work.done {
                 work.wave();
-                line.pass(&work.wanted(), Duration::from_millis(120));
+                connection.pass(&work.target(), Duration::from_millis(120));
             }
             work.edit(&scenes[edit % 2], 8);
         }
-        let [waited, busy] = [line.waited[0].as_secs_f64(), line.busy()];
+        let [waited, busy] = [connection.waited[0].as_secs_f64(), connection.busy()];
         println!("acting: {acting}; busy for {:.0} % of {waited:.1} s", 100.0 * busy);
         assert!(waited > 2.0 && busy >= 0.6, "{acting} {waited} {busy}");
-        let longest = line.sent.iter().map(|sent| sent.bytes).max().unwrap();
+        let longest = connection.sent.iter().map(|sent| sent.bytes).max().unwrap();
         assert!(longest as f64 <= 0.15 * RATE, "{longest} bytes");
     }
 }
 
 #[test]
-fn without_answers_it_goes_on() {
+fn picture_becomes_exact_without_replies() {
     let mut work = Work::new(&support::shipped("mirror-room.toml"), 16);
-    let mut line = Line::new(SCREEN, RATE, ROUND_TRIP);
-    line.answering = false;
+    let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
+    connection.is_replying = false;
     while !work.done {
         work.wave();
-        line.pass(&work.wanted(), Duration::from_secs(2));
+        connection.pass(&work.target(), Duration::from_secs(2));
     }
-    let begun = line.now;
-    while !work.is_exact(line.parser.screen()) {
-        assert!(line.now < begun + Duration::from_secs(120), "it never becomes exact");
-        line.pass(&work.wanted(), Duration::from_millis(500));
+    let start = connection.now;
+    while !work.is_exact(connection.parser.screen()) {
+        assert!(connection.now < start + Duration::from_secs(120), "it never becomes exact");
+        connection.pass(&work.target(), Duration::from_millis(500));
     }
 }

@@ -1,8 +1,8 @@
-//! What a converging picture costs on its way to the terminal, and how near to it the terminal is
-//! meanwhile. The line is simulated: its time passes by counting.
+//! Bytes that a converging picture takes on a simulated connection, and the error of the shown picture.
+//! Time is simulated.
 
+mod connection;
 mod figures;
-mod line;
 mod picture;
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,4 +1,4 @@
-//! A screen of 160 x 45 cells: a picture that converges, and a line of text below.
+//! Screen of 160 x 45 cells: a converging picture and a row of text below.
 
 use crate::support;
 use ratatui::buffer::Buffer;
@@ -13,10 +13,10 @@ use zerkalo::terminal::diff::TargetFrame;
 use zerkalo::world::Precision;
 
 pub const SCREEN: [u16; 2] = [160, 45];
-/// All but the last row show the picture.
+/// Area of the picture: all but the last row.
 const PICTURE: Rect = Rect { x: 0, y: 0, width: SCREEN[0], height: SCREEN[1] - 1 };
 
-/// A picture at work: a sample per half cell at first.
+/// Converging picture with one sample per half cell in the first wave.
 pub struct Work {
     rendering: RenderState,
     schedule: Schedule,
@@ -30,7 +30,7 @@ pub struct Work {
 }
 
 impl Work {
-    /// A scene, until it has so many samples per pixel.
+    /// Renders `scene` up to `spp` samples per pixel.
     pub fn new(scene: &Scene, spp: u32) -> Self {
         let size = [PICTURE.width, 2 * PICTURE.height].map(u32::from);
         let scene = support::sized(scene.clone(), size);
@@ -51,7 +51,7 @@ impl Work {
         }
     }
 
-    /// Traces one wave; afterwards it may be done.
+    /// Traces one wave, or sets `done`.
     pub fn wave(&mut self) {
         match self.schedule.next(0.0) {
             Step::Finished(_) => self.done = true,
@@ -71,7 +71,7 @@ impl Work {
         self.cells.reset();
         let picture = PictureCells::new(&raster, Colors::True, self.done);
         for (cell, at) in picture.cells.iter().zip(PICTURE.positions()) {
-            let [fg, bg] = [cell.fg, cell.bg].map(|ink| match ink {
+            let [fg, bg] = [cell.fg, cell.bg].map(|color| match color {
                 CellColor::Rgb([r, g, b]) => Color::Rgb(r, g, b),
                 _ => Color::Reset,
             });
@@ -81,13 +81,14 @@ impl Work {
         self.cells.set_string(0, PICTURE.height, text, Style::new());
     }
 
-    /// Another picture from here on.
+    /// Replaces the scene.
     pub fn edit(&mut self, scene: &Scene, spp: u32) {
         let Self { subject, version, .. } = *self;
         *self = Self { subject: subject + 1, version, ..Self::new(scene, spp) };
     }
 
-    pub fn wanted(&self) -> TargetFrame<'_> {
+    /// Returns the target frame.
+    pub fn target(&self) -> TargetFrame<'_> {
         TargetFrame {
             cells: &self.cells,
             cursor: None,
@@ -100,20 +101,20 @@ impl Work {
         }
     }
 
-    /// Mean OKLab distance of what is shown from what ought to be, over the halves of all cells.
+    /// Returns the mean OKLab distance between shown and target halves of all cells.
     pub fn error(&self, screen: &vt100::Screen) -> f64 {
         let distances = PICTURE.positions().map(|at| {
-            let wanted = &self.cells[at];
-            let wanted = halves(wanted.symbol(), [wanted.fg, wanted.bg].map(rgb));
+            let target = &self.cells[at];
+            let target = halves(target.symbol(), [target.fg, target.bg].map(rgb));
             let cell = screen.cell(at.y, at.x).unwrap();
             let shown = halves(cell.contents(), [cell.fgcolor(), cell.bgcolor()].map(emulated));
-            let distance = |i: usize| f64::from(Oklab::of(wanted[i]).distance(Oklab::of(shown[i])));
+            let distance = |i: usize| f64::from(Oklab::of(target[i]).distance(Oklab::of(shown[i])));
             distance(0) + distance(1)
         });
         distances.sum::<f64>() / (2.0 * f64::from(PICTURE.area()))
     }
 
-    /// Whether text and picture are shown as they ought to be.
+    /// Returns `true` if text and picture are shown exactly.
     pub fn is_exact(&self, screen: &vt100::Screen) -> bool {
         let row = |y: u16| screen.contents_between(y, 0, y, SCREEN[0]);
         let text: String =
@@ -127,7 +128,7 @@ fn halves(glyph: &str, [fg, bg]: [[u8; 3]; 2]) -> [[u8; 3]; 2] {
         "▀" => [fg, bg],
         "▄" => [bg, fg],
         " " | "" => [bg; 2],
-        other => panic!("{other:?} is no picture"),
+        other => panic!("{other:?} is not a cell of the picture"),
     }
 }
 

@@ -1,12 +1,12 @@
-//! Edits, files, and the end with a question.
+//! Editing, saving, and leaving with unsaved edits.
 
 use super::*;
 use zerkalo::scene::BUILT_IN;
 
 #[test]
-fn keys_change_the_picture_and_undo_brings_it_back() {
-    let desk = Desk::with_room();
-    let mut terminal = desk.open(&["room.toml"], [120, 36]);
+fn edits_change_the_picture_and_undo_reverts_them() {
+    let fixture = Fixture::with_room();
+    let mut terminal = fixture.open(&["room.toml"], [120, 36]);
     wait_for_picture(&terminal);
     assert!(!terminal.screen(|s| s.contents()).contains("room.toml ●"), "nothing is unsaved yet");
     terminal.send("]]");
@@ -21,13 +21,13 @@ fn keys_change_the_picture_and_undo_brings_it_back() {
     terminal.wait_until_gone("nsaved");
     terminal.send("uuq");
     assert_eq!(terminal.end().0, 0);
-    assert_eq!(fs::read_to_string(desk.path("room.toml")).unwrap(), BUILT_IN);
+    assert_eq!(fs::read_to_string(fixture.path("room.toml")).unwrap(), BUILT_IN);
 }
 
 #[test]
-fn saving_keeps_every_other_line() {
-    let desk = Desk::with_room();
-    let mut terminal = desk.open(&["room.toml"], [120, 36]);
+fn saving_changes_one_line_only() {
+    let fixture = Fixture::with_room();
+    let mut terminal = fixture.open(&["room.toml"], [120, 36]);
     wait_for_picture(&terminal);
     terminal.send("]");
     terminal.wait_for_text("room.toml ●");
@@ -35,7 +35,7 @@ fn saving_keeps_every_other_line() {
     terminal.wait_until_gone("room.toml ●");
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
-    let saved = fs::read_to_string(desk.path("room.toml")).unwrap();
+    let saved = fs::read_to_string(fixture.path("room.toml")).unwrap();
     let changed: Vec<_> =
         BUILT_IN.lines().zip(saved.lines()).filter(|(before, after)| before != after).collect();
     assert_eq!(BUILT_IN.lines().count(), saved.lines().count());
@@ -47,21 +47,21 @@ fn saving_keeps_every_other_line() {
 }
 
 #[test]
-fn what_others_write_is_shown_and_a_broken_file_can_be_mended() {
-    let desk = Desk::with_room();
-    fs::write(desk.path("room.toml"), "[camera]\neye = [0.0, 1.0\n").unwrap();
-    let mut terminal = desk.open(&["room.toml"], [120, 36]);
+fn external_changes_are_shown_and_faulty_file_can_be_fixed() {
+    let fixture = Fixture::with_room();
+    fs::write(fixture.path("room.toml"), "[camera]\neye = [0.0, 1.0\n").unwrap();
+    let mut terminal = fixture.open(&["room.toml"], [120, 36]);
     terminal.wait_for_text("cannot be read");
     assert_eq!(terminal.screen(picture_cells), 0);
-    fs::write(desk.path("room.toml"), BUILT_IN).unwrap();
-    let cells = |what: &str, wanted: std::ops::Range<usize>| {
-        terminal.wait_for(what, |s| wanted.contains(&picture_cells(s)).then_some(()));
+    fs::write(fixture.path("room.toml"), BUILT_IN).unwrap();
+    let wait_for_cells = |what: &str, expected: std::ops::Range<usize>| {
+        terminal.wait_for(what, |s| expected.contains(&picture_cells(s)).then_some(()));
     };
-    cells("a picture as wide as its film", 2000..3000);
-    // A film of another shape makes another picture.
+    wait_for_cells("a picture as wide as its film", 2000..3000);
+    // A film of another shape shows another picture.
     let narrow = BUILT_IN.replace("size = [640, 480]", "size = [120, 480]");
-    fs::write(desk.path("room.toml"), narrow).unwrap();
-    cells("a narrower picture", 300..1000);
+    fs::write(fixture.path("room.toml"), narrow).unwrap();
+    wait_for_cells("a narrower picture", 300..1000);
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
 }

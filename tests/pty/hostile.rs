@@ -1,25 +1,25 @@
-//! A scene from somebody else, whose names would like to steer the terminal.
+//! A hostile scene whose names contain control sequences.
 
 use super::*;
 use zerkalo::scene::BUILT_IN;
 
-/// Sets the clipboard (OSC 52), colours (C0 and C1), and reorders what follows.
+/// Sequences that set the clipboard (OSC 52) and colours (C0 and C1), and reverse the text direction.
 const EVIL: &str = "\u{1b}]52;c;cm0=\u{7}\u{9b}32m\u{202e}x";
 
 #[test]
-fn names_in_the_dashboard_steer_nothing() {
-    let desk = Desk::new();
+fn names_with_control_sequences_are_escaped() {
+    let fixture = Fixture::new();
     let escaped: String = EVIL.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
     let scene = BUILT_IN
         .replace("\"ball\"", &format!("\"ball{escaped}\""))
         .replace("name = \"lamp\"", &format!("name = \"{escaped}\""))
         + &format!("\n[cameras.\"{escaped}\"]\neye = [0.0, 1.0, 3.0]\ntarget = [0.0, 0.0, 0.0]\n");
     let name = format!("evil{EVIL}.toml");
-    fs::write(desk.path(&name), scene).unwrap();
-    let mut terminal = desk.open(&[&name], [140, 40]);
+    fs::write(fixture.path(&name), scene).unwrap();
+    let mut terminal = fixture.open(&[&name], [140, 40]);
     wait_for_picture(&terminal);
     terminal.wait_for_text("u{1b}]52");
-    // Through the outline, the inspector, renaming, viewpoints, and a picture whose path is refused.
+    // Outline, inspector, renaming, viewpoints, and a picture whose path is refused.
     for keys in [
         "\t", "\x1b[B", "\x1b[B", "\x1b[B", "\x1b[B", "\x1b[B", "\t", "\x1b", "e", "\x1b", "1",
         "l", "x", "u",
@@ -31,10 +31,10 @@ fn names_in_the_dashboard_steer_nothing() {
     terminal.wait_for_text("-1.png");
     terminal.send("y");
     terminal.wait_for_text("not copied");
-    // Broken on the disk: the messages about it hold what it says.
+    // A faulty file: the messages quote it.
     terminal.send("]");
     terminal.wait_for_text("toml ●");
-    fs::write(desk.path(&name), format!("[camera]\n\"{escaped}\" = 1\n")).unwrap();
+    fs::write(fixture.path(&name), format!("[camera]\n\"{escaped}\" = 1\n")).unwrap();
     terminal.wait_for_text("keep my edits");
     terminal.send("r");
     terminal.wait_for_text("nknown");

@@ -1,4 +1,4 @@
-//! Beginning and end: the terminal is taken, and given back as it was.
+//! Start and end: the terminal is taken and restored.
 
 use super::*;
 use std::io::Write;
@@ -11,9 +11,9 @@ pub fn signal(name: &str, id: u32) {
 }
 
 #[test]
-fn the_built_in_scene_opens_and_quits() {
-    let desk = Desk::new();
-    let mut terminal = desk.open(&[], [120, 36]);
+fn built_in_scene_opens_and_quits() {
+    let fixture = Fixture::new();
+    let mut terminal = fixture.open(&[], [120, 36]);
     wait_for_picture(&terminal);
     terminal.wait_for_text("mirror-room");
     terminal.send("q");
@@ -21,14 +21,14 @@ fn the_built_in_scene_opens_and_quits() {
     assert_eq!(status, 0);
     assert!(bytes.starts_with(ENTER.as_str()), "{:?}", &bytes[..100]);
     assert!(bytes.ends_with(LEAVE.as_str()), "{:?}", &bytes[bytes.len() - 100..]);
-    assert_eq!(fs::read_dir(desk.path(".")).unwrap().count(), 0, "nothing was written");
+    assert_eq!(fs::read_dir(fixture.path(".")).unwrap().count(), 0, "nothing was written");
 }
 
 #[test]
-fn signals_give_the_terminal_back() {
-    let desk = Desk::with_room();
+fn signals_restore_the_terminal() {
+    let fixture = Fixture::with_room();
     for (name, expected) in [("TERM", 143), ("INT", 130), ("HUP", 129)] {
-        let terminal = desk.open(&["room.toml"], [80, 24]);
+        let terminal = fixture.open(&["room.toml"], [80, 24]);
         wait_for_picture(&terminal);
         signal(name, terminal.process_id());
         let (status, bytes) = terminal.end();
@@ -37,10 +37,10 @@ fn signals_give_the_terminal_back() {
     }
 }
 
-/// The program of the next test.
+/// Program of the next test.
 #[test]
 #[ignore = "runs in the terminal of another test"]
-fn a_program_that_panics() {
+fn program_that_panics() {
     let screen = Screen::enter().unwrap();
     std::thread::spawn(|| panic!("as the test wants it")).join().unwrap_err();
     drop(screen);
@@ -48,49 +48,54 @@ fn a_program_that_panics() {
 }
 
 #[test]
-fn a_panic_is_told_on_a_restored_terminal() {
-    let desk = Desk::new();
+fn panic_message_follows_restored_terminal() {
+    let fixture = Fixture::new();
     let this = std::env::current_exe().unwrap();
     let command = [
         this.to_str().unwrap(),
-        "life::a_program_that_panics",
+        "life::program_that_panics",
         "--exact",
         "--ignored",
         "--nocapture",
     ];
-    let start =
-        Start { command: &command, folder: desk.0.path(), size: [80, 24], env: &[], answers: true };
+    let start = Start {
+        command: &command,
+        folder: fixture.0.path(),
+        size: [80, 24],
+        env: &[],
+        replies: true,
+    };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 0, "{bytes}");
-    let [entered, left, told, after] =
+    let [entered, left, message, after] =
         [ENTER.as_str(), LEAVE.as_str(), "as the test wants it", "still alive"]
             .map(|part| bytes.find(part).unwrap_or_else(|| panic!("no {part:?} in {bytes:?}")));
-    assert!(entered < left && left < told && told < after, "{bytes:?}");
+    assert!(entered < left && left < message && message < after, "{bytes:?}");
     assert_eq!(bytes.matches(LEAVE.as_str()).count(), 1);
 }
 
 #[test]
-fn without_a_terminal_one_line_tells_what_to_do() {
-    let desk = Desk::with_room();
+fn without_terminal_one_line_names_the_alternative() {
+    let fixture = Fixture::with_room();
     let run = Command::new(PROGRAM)
         .arg("room.toml")
-        .current_dir(desk.0.path())
+        .current_dir(fixture.0.path())
         .stdin(Stdio::null())
         .output()
         .unwrap();
-    let told = String::from_utf8(run.stderr).unwrap();
-    assert_eq!((run.status.code(), told.lines().count()), (Some(2), 1), "{told}");
-    assert!(told.contains("zerkalo render room.toml"), "{told}");
+    let message = String::from_utf8(run.stderr).unwrap();
+    assert_eq!((run.status.code(), message.lines().count()), (Some(2), 1), "{message}");
+    assert!(message.contains("zerkalo render room.toml"), "{message}");
     assert!(run.stdout.is_empty());
 
     let command = [PROGRAM];
     let env = [("TERM", "dumb")];
     let start = Start {
         command: &command,
-        folder: desk.0.path(),
+        folder: fixture.0.path(),
         size: [80, 24],
         env: &env,
-        answers: true,
+        replies: true,
     };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 2);
@@ -98,41 +103,41 @@ fn without_a_terminal_one_line_tells_what_to_do() {
 }
 
 #[test]
-fn a_missing_file_is_told_outside() {
-    let desk = Desk::new();
-    let (status, bytes) = desk.open(&["nowhere.toml"], [80, 24]).end();
+fn missing_file_is_reported_without_dashboard() {
+    let fixture = Fixture::new();
+    let (status, bytes) = fixture.open(&["nowhere.toml"], [80, 24]).end();
     assert_eq!(status, 1);
     assert!(bytes.contains("nowhere.toml") && !bytes.contains(ENTER.as_str()), "{bytes:?}");
 }
 
 #[test]
-fn the_picture_follows_the_size_of_the_terminal() {
-    let desk = Desk::new();
-    let mut terminal = desk.open(&[], [80, 24]);
-    let cells = |what: &str, wanted: std::ops::Range<usize>| {
-        terminal.wait_for(what, |s| wanted.contains(&picture_cells(s)).then_some(()));
+fn picture_follows_terminal_size() {
+    let fixture = Fixture::new();
+    let mut terminal = fixture.open(&[], [80, 24]);
+    let wait_for_cells = |what: &str, expected: std::ops::Range<usize>| {
+        terminal.wait_for(what, |s| expected.contains(&picture_cells(s)).then_some(()));
     };
-    cells("a small picture", 800..1100);
+    wait_for_cells("a small picture", 800..1100);
     terminal.resize([160, 45]);
-    cells("a larger picture", 3000..5000);
+    wait_for_cells("a larger picture", 3000..5000);
     terminal.resize([30, 8]);
     terminal.wait_for("no picture, but a line", |screen| {
-        let told = screen.contents().contains("at least");
-        (picture_cells(screen) == 0 && told).then_some(())
+        let has_message = screen.contents().contains("at least");
+        (picture_cells(screen) == 0 && has_message).then_some(())
     });
     terminal.resize([80, 24]);
-    cells("the picture again", 800..1100);
+    wait_for_cells("the picture again", 800..1100);
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
 }
 
 #[test]
-fn pasted_text_presses_no_keys() {
-    let desk = Desk::new();
-    let mut terminal = desk.open(&[], [120, 36]);
+fn pasted_text_is_not_keys() {
+    let fixture = Fixture::new();
+    let mut terminal = fixture.open(&[], [120, 36]);
     wait_for_picture(&terminal);
     terminal.send("\x1b[200~qqq]]]x\x1b[201~");
-    // The program goes on, and nothing was edited: it ends without a question.
+    // Nothing was edited, so the program quits without a prompt.
     terminal.send("?");
     terminal.wait_for_text("orbit left");
     terminal.send("\x1b");
@@ -141,14 +146,14 @@ fn pasted_text_presses_no_keys() {
     assert_eq!(terminal.end().0, 0);
 }
 
-/// Over SSH, as far as the program knows.
+/// Environment of an SSH connection.
 const SSH: &[(&str, &str)] = &[("SSH_CONNECTION", "192.0.2.1 50000 192.0.2.2 22")];
 
 #[test]
-fn a_terminal_that_never_answers_is_served_slowly() {
-    let desk = Desk::new();
-    let (folder, size) = (desk.0.path(), [120, 36]);
-    let start = Start { command: &[PROGRAM], folder, size, env: SSH, answers: false };
+fn terminal_without_replies_gets_a_fixed_rate() {
+    let fixture = Fixture::new();
+    let (folder, size) = (fixture.0.path(), [120, 36]);
+    let start = Start { command: &[PROGRAM], folder, size, env: SSH, replies: false };
     let mut terminal = Terminal::start(&start);
     wait_for_picture(&terminal);
     terminal.wait_for_text("KB/s fixed");
@@ -161,14 +166,13 @@ fn a_terminal_that_never_answers_is_served_slowly() {
 }
 
 #[test]
-fn replies_press_no_keys() {
-    let desk = Desk::new();
-    let (folder, size) = (desk.0.path(), [120, 36]);
-    let start = Start { command: &[PROGRAM], folder, size, env: SSH, answers: true };
+fn unrequested_replies_are_not_keys() {
+    let fixture = Fixture::new();
+    let (folder, size) = (fixture.0.path(), [120, 36]);
+    let start = Start { command: &[PROGRAM], folder, size, env: SSH, replies: true };
     let mut terminal = Terminal::start(&start);
     wait_for_picture(&terminal);
     terminal.wait_for_text("KB/s");
-    // Replies that nobody asked for press no keys.
     terminal.send("\x1b[24;80R\x1b]11;rgb:1e1e/1e1e/2e2e\x1b\\\x1b[?2026;2$y\x1b_Gi=31;OK\x1b\\\x1b[>0;276;0c");
     terminal.send("?");
     terminal.wait_for_text("orbit left");
@@ -178,21 +182,21 @@ fn replies_press_no_keys() {
     assert_eq!(terminal.end().0, 0);
 }
 
-/// A terminal that answers nothing is waited for, but not when somebody wants the program to end.
+/// The probe waits for replies until a signal arrives.
 #[test]
-fn a_signal_is_heeded_while_the_terminal_is_asked() {
-    let desk = Desk::with_room();
+fn signal_ends_the_probe() {
+    let fixture = Fixture::with_room();
     let env = [("SSH_CONNECTION", "192.0.2.7 5000 192.0.2.1 22")];
     let command = [PROGRAM, "room.toml"];
     let start = Start {
         command: &command,
-        folder: desk.0.path(),
+        folder: fixture.0.path(),
         size: [80, 24],
         env: &env,
-        answers: false,
+        replies: false,
     };
-    // It waits for two seconds; where the machine lets the signal be later, the screen has been drawn.
-    let heeded = (0..3).any(|_| {
+    // The probe takes two seconds. If the signal comes later, the screen has been drawn.
+    let is_prompt = (0..3).any(|_| {
         let terminal = Terminal::start(&start);
         terminal.wait_for("the screen is taken", |screen| screen.alternate_screen().then_some(()));
         signal("TERM", terminal.process_id());
@@ -201,5 +205,5 @@ fn a_signal_is_heeded_while_the_terminal_is_asked() {
         assert!(bytes.ends_with(LEAVE.as_str()));
         !bytes.contains("room.toml")
     });
-    assert!(heeded, "it goes on asking");
+    assert!(is_prompt, "the probe goes on after the signal");
 }

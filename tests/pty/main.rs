@@ -1,4 +1,4 @@
-//! The dashboard as its users meet it: the program itself in a real terminal.
+//! End-to-end tests of the dashboard: the program itself in a pseudo-terminal.
 #![cfg(unix)]
 
 mod editing;
@@ -17,26 +17,26 @@ use terminal::{Start, Terminal};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 
-/// A folder to work in.
-struct Desk(TempDir);
+/// Temporary folder with scene and exports.
+struct Fixture(TempDir);
 
-impl Desk {
+impl Fixture {
     fn new() -> Self {
         Self(TempDir::new().unwrap())
     }
 
-    /// With the mirror room in it, as `room.toml`.
+    /// Creates a folder with the built-in scene as `room.toml`.
     fn with_room() -> Self {
-        let desk = Self::new();
-        fs::write(desk.path("room.toml"), zerkalo::scene::BUILT_IN).unwrap();
-        desk
+        let fixture = Self::new();
+        fs::write(fixture.path("room.toml"), zerkalo::scene::BUILT_IN).unwrap();
+        fixture
     }
 
     fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
-    /// The dashboard in a terminal of `size` columns and rows.
+    /// Starts the dashboard in a terminal of `size` columns and rows.
     fn open(&self, args: &[&str], size: [u16; 2]) -> Terminal {
         let command = [&[PROGRAM], args].concat();
         Terminal::start(&Start {
@@ -44,11 +44,11 @@ impl Desk {
             folder: self.0.path(),
             size,
             env: &[],
-            answers: true,
+            replies: true,
         })
     }
 
-    /// What `zerkalo render` writes.
+    /// Runs `zerkalo render`. Returns the file that it writes.
     fn rendered(&self, args: &[&str], output: &str) -> Vec<u8> {
         let mut command = Command::new(PROGRAM);
         command.arg("render").args(args).args(["-o", output]).current_dir(self.0.path());
@@ -63,7 +63,7 @@ fn wait_for_picture(terminal: &Terminal) {
     terminal.wait_for("a picture", |screen| (picture_cells(screen) > 100).then_some(()));
 }
 
-/// Cells whose halves have colours of 24 bits.
+/// Returns the number of cells with 24-bit background.
 fn picture_cells(screen: &vt100::Screen) -> usize {
     let (rows, columns) = screen.size();
     let cells = (0..rows.get()).flat_map(|row| (0..columns.get()).map(move |column| (row, column)));

@@ -1,5 +1,5 @@
-//! A written picture is looked at without leaving the program. The emulator passes over protocols for
-//! pictures, so what they show is told from the bytes.
+//! Exported-image viewer. The emulator skips graphics protocols, so their images are decoded from the
+//! bytes.
 
 use super::life::signal;
 use super::picture::Picture;
@@ -8,34 +8,34 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use icy_sixel::SixelImage;
 use std::time::Duration;
-use terminal::Answer;
+use terminal::RequestReply;
 use zerkalo::terminal::LEAVE;
 
 const SIZE: [u16; 2] = [120, 36];
-const CELL: Answer = (b"\x1b[16t", "\x1b[6;20;10t");
-const KITTY: Answer = (b"\x1b_Gi=31,", "\x1b_Gi=31;OK\x1b\\");
-const SIXEL: Answer = (b"\x1b[c", "\x1b[?62;4;22c");
-const COLORS: Answer = (b"\x1b[?1;1;0S", "\x1b[?1;0;256S");
-/// What takes kitty's image away.
+const CELL: RequestReply = (b"\x1b[16t", "\x1b[6;20;10t");
+const KITTY: RequestReply = (b"\x1b_Gi=31,", "\x1b_Gi=31;OK\x1b\\");
+const SIXEL: RequestReply = (b"\x1b[c", "\x1b[?62;4;22c");
+const COLORS: RequestReply = (b"\x1b[?1;1;0S", "\x1b[?1;0;256S");
+/// Bytes that remove kitty's image.
 const REMOVAL: &str = "\x1b_Gm=0,q=2;\x1b\\\x1b_Ga=d,d=I,i=163,q=2\x1b\\";
 
-/// The dashboard of a small room in a terminal that answers so, with a picture written; that picture.
-fn with_picture(desk: &Desk, args: &[&str], also: &[Answer]) -> (Terminal, Picture) {
+/// Starts the dashboard in a terminal with `replies` and exports a picture. Returns both.
+fn with_picture(fixture: &Fixture, args: &[&str], replies: &[RequestReply]) -> (Terminal, Picture) {
     let command = [&[PROGRAM, "room.toml"], args].concat();
     let start =
-        Start { command: &command, folder: desk.0.path(), size: SIZE, env: &[], answers: true };
-    let mut terminal = Terminal::start_with(&start, also);
+        Start { command: &command, folder: fixture.0.path(), size: SIZE, env: &[], replies: true };
+    let mut terminal = Terminal::start_with(&start, replies);
     terminal.wait_for_text(" spp");
     wait_for_picture(&terminal);
     terminal.send("o");
     terminal.wait_for_text("No picture was written yet");
     terminal.send("p");
     terminal.wait_for_text("o shows it");
-    let file = Picture::of_png(&fs::read(desk.path("room-1.png")).unwrap());
+    let file = Picture::of_png(&fs::read(fixture.path("room-1.png")).unwrap());
     (terminal, file)
 }
 
-/// Waits until all that has come contains `text`; everything after its beginning.
+/// Waits until the output contains `text`. Returns the output from there on.
 fn wait_for_bytes(terminal: &Terminal, text: &str) -> String {
     let mut all = String::new();
     terminal.wait_for(text, |_| {
@@ -44,47 +44,47 @@ fn wait_for_bytes(terminal: &Terminal, text: &str) -> String {
     });
     for _ in 0..6000 {
         all = String::from_utf8_lossy(&terminal.bytes()).into_owned();
-        if let Some(at) = all.find(text) {
-            return all[at..].to_string();
+        if let Some(start) = all.find(text) {
+            return all[start..].to_string();
         }
         std::thread::sleep(Duration::from_millis(20));
     }
     panic!("no {text:?} in {} bytes", all.len());
 }
 
-/// The pieces of kitty's pictures: keys and letters.
-fn pieces(bytes: &str) -> Vec<(&str, &str)> {
-    let piece = |text: &'_ str| -> Option<(usize, usize)> {
+/// Returns the chunks of kitty's images: keys and Base64 data.
+fn chunks(bytes: &str) -> Vec<(&str, &str)> {
+    let chunk = |text: &'_ str| -> Option<(usize, usize)> {
         let keys = text.find(';')?;
         Some((keys, text.find('\x1b')?))
     };
     let all = bytes.split("\x1b_G").skip(1);
-    all.filter_map(|text| piece(text).map(|(keys, end)| (&text[..keys], &text[keys + 1..end])))
+    all.filter_map(|text| chunk(text).map(|(keys, end)| (&text[..keys], &text[keys + 1..end])))
         .collect()
 }
 
 #[test]
-fn kittys_protocol_shows_the_file_itself() {
-    let desk = Desk::with_room();
-    let (mut terminal, file) = with_picture(&desk, &[], &[KITTY, CELL]);
+fn kitty_protocol_shows_the_exported_file() {
+    let fixture = Fixture::with_room();
+    let (mut terminal, file) = with_picture(&fixture, &[], &[KITTY, CELL]);
     let before = terminal.bytes().len();
     terminal.send("o");
     terminal.wait_for_text("640×480  ·  any key returns");
     let shown = String::from_utf8_lossy(&terminal.bytes()[before..]).into_owned();
-    let pieces = pieces(&shown);
-    assert!(pieces[0].0.contains("a=T,f=100,i=163,C=1,q=2"), "{}", pieces[0].0);
+    let chunks = chunks(&shown);
+    assert!(chunks[0].0.contains("a=T,f=100,i=163,C=1,q=2"), "{}", chunks[0].0);
     assert!(shown.contains("\x1b[6;29H\x1b_Ga=T"), "64 x 24 of 120 x 35 cells, of 10 x 20 pixels");
-    assert!(pieces.iter().all(|(keys, letters)| keys.contains("q=2") && letters.len() <= 4096));
-    assert!(pieces.last().unwrap().0.ends_with("m=0"));
-    let letters: String = pieces.iter().map(|(_, letters)| *letters).collect();
+    assert!(chunks.iter().all(|(keys, letters)| keys.contains("q=2") && letters.len() <= 4096));
+    assert!(chunks.last().unwrap().0.ends_with("m=0"));
+    let letters: String = chunks.iter().map(|(_, letters)| *letters).collect();
     let sent = Picture::of_png(&STANDARD.decode(letters).unwrap());
     assert_eq!((sent.size, sent.rgb == file.rgb), (file.size, true));
-    // Whatever the key would do elsewhere.
+    // Any key returns.
     terminal.send("x");
     terminal.wait_for_text("outline");
     let after = String::from_utf8_lossy(&terminal.bytes()).into_owned();
     assert_eq!(after.matches(REMOVAL).count(), 1);
-    // With another frame it is certain that the one with the removal has been written.
+    // After another frame the one with the removal has certainly been written.
     terminal.send("?");
     terminal.wait_for_text("orbit left");
     terminal.send("?");
@@ -96,9 +96,9 @@ fn kittys_protocol_shows_the_file_itself() {
 }
 
 #[test]
-fn a_signal_takes_the_picture_away() {
-    let desk = Desk::with_room();
-    let (mut terminal, _) = with_picture(&desk, &[], &[KITTY, CELL]);
+fn signal_removes_the_image() {
+    let fixture = Fixture::with_room();
+    let (mut terminal, _) = with_picture(&fixture, &[], &[KITTY, CELL]);
     terminal.send("o");
     terminal.wait_for_text("640×480  ·  any key returns");
     signal("TERM", terminal.process_id());
@@ -111,41 +111,41 @@ fn a_signal_takes_the_picture_away() {
     );
 }
 
-/// On a line of 30 KB/s the picture takes seconds: a key ends it at once.
+/// At 30 KB/s the transfer takes seconds; a key ends it at once.
 #[test]
-fn a_key_ends_the_sending() {
-    let desk = Desk::with_room();
+fn key_ends_the_transfer() {
+    let fixture = Fixture::with_room();
     let slow = ["--bandwidth", "30"];
-    let (mut terminal, _) = with_picture(&desk, &slow, &[KITTY, CELL]);
+    let (mut terminal, _) = with_picture(&fixture, &slow, &[KITTY, CELL]);
     terminal.send("o");
     wait_for_bytes(&terminal, "\x1b_Ga=T");
     terminal.send("\x1b");
-    let rest = wait_for_bytes(&terminal, "\x1b_Ga=T");
+    let output = wait_for_bytes(&terminal, "\x1b_Ga=T");
     assert!(
-        !pieces(&rest).iter().any(|(keys, letters)| keys.ends_with("m=0") && !letters.is_empty())
+        !chunks(&output).iter().any(|(keys, letters)| keys.ends_with("m=0") && !letters.is_empty())
     );
     terminal.wait_for_text("outline");
-    let rest = wait_for_bytes(&terminal, REMOVAL);
-    assert!(!rest[REMOVAL.len()..].contains("\x1b_G"), "no piece comes after the end");
+    let output = wait_for_bytes(&terminal, REMOVAL);
+    assert!(!output[REMOVAL.len()..].contains("\x1b_G"), "no chunk comes after the end");
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
 }
 
 #[test]
-fn sixel_shows_the_file_in_strips() {
-    let desk = Desk::with_room();
-    for (args, ended) in [(&[][..], false), (&["--bandwidth", "30"], true)] {
-        let (mut terminal, file) = with_picture(&desk, args, &[SIXEL, COLORS, CELL]);
+fn sixel_shows_the_exported_file_in_strips() {
+    let fixture = Fixture::with_room();
+    for (args, is_interrupted) in [(&[][..], false), (&["--bandwidth", "30"], true)] {
+        let (mut terminal, file) = with_picture(&fixture, args, &[SIXEL, COLORS, CELL]);
         let before = terminal.bytes().len();
         terminal.send("o");
-        if ended {
+        if is_interrupted {
             wait_for_bytes(&terminal, "\x1bP");
             terminal.send("y");
         } else {
             terminal.wait_for_text("640×480  ·  any key returns");
             let shown = String::from_utf8_lossy(&terminal.bytes()[before..]).into_owned();
             let strips =
-                shown.split("\x1bP").skip(1).map(|rest| rest.split("\x1b\\").next().unwrap());
+                shown.split("\x1bP").skip(1).map(|strip| strip.split("\x1b\\").next().unwrap());
             let mut rgb = Vec::new();
             let mut count = 0;
             for strip in strips {
@@ -155,31 +155,31 @@ fn sixel_shows_the_file_in_strips() {
                 rgb.extend(drawn.flat_map(|p| [p[0], p[1], p[2]]));
                 count += 1;
             }
-            // xterm remembers 16.
+            // xterm keeps 16 images.
             assert!(count <= 16 && rgb.len() == file.rgb.len(), "{count} strips");
-            let off: u64 = rgb.iter().zip(&file.rgb).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
-            let mean = off as f64 / rgb.len() as f64;
-            assert!(mean < 5.0, "{mean} codes off");
+            let difference: u64 =
+                rgb.iter().zip(&file.rgb).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+            let mean = difference as f64 / rgb.len() as f64;
+            assert!(mean < 5.0, "mean error of {mean} levels");
             terminal.send(" ");
         }
         terminal.wait_for_text("outline");
-        fs::remove_file(desk.path("room-1.png")).unwrap();
+        fs::remove_file(fixture.path("room-1.png")).unwrap();
         terminal.send("q");
         let (status, bytes) = terminal.end();
-        // Whatever was begun has ended, and after it the screen was drawn anew.
+        // The last sequence is complete, and the screen was cleared and drawn after it.
         let (strips, after) = bytes.rsplit_once("\x1bP").unwrap();
-        assert!(strips.contains("\x1bP") || ended);
+        assert!(strips.contains("\x1bP") || is_interrupted);
         let (_, after) = after.split_once("\x1b\\").unwrap();
         assert!(after.contains("\x1b[2J") && after.ends_with(LEAVE.as_str()));
         assert_eq!(status, 0);
     }
 }
 
-/// An answer may come late, or from nobody; and where there is none half blocks show the picture.
 #[test]
-fn late_answers_count_and_without_them_half_blocks_do() {
-    let desk = Desk::with_room();
-    let (mut terminal, _) = with_picture(&desk, &[], &[]);
+fn viewer_uses_half_blocks_until_a_late_reply() {
+    let fixture = Fixture::with_room();
+    let (mut terminal, _) = with_picture(&fixture, &[], &[]);
     terminal.send("o");
     terminal.wait_for_text("640×480 in half blocks  ·  any key returns");
     wait_for_picture(&terminal);
@@ -192,10 +192,10 @@ fn late_answers_count_and_without_them_half_blocks_do() {
     terminal.send("o");
     wait_for_bytes(&terminal, "\x1b_Ga=T");
     terminal.wait_for_text("640×480  ·  any key returns");
-    // The file goes away meanwhile, or is another one.
+    // The file is replaced meanwhile.
     terminal.send("o");
     terminal.wait_for_text("outline");
-    fs::write(desk.path("room-1.png"), b"\x89PNG\r\n\x1a\nnothing").unwrap();
+    fs::write(fixture.path("room-1.png"), b"\x89PNG\r\n\x1a\nnothing").unwrap();
     terminal.send("o");
     terminal.wait_for_text("room-1.png cannot be shown");
     terminal.send("q");

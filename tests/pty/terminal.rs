@@ -1,5 +1,5 @@
-//! A terminal for the program: a real pseudo-terminal, and an emulator that knows what it shows.
-#![allow(dead_code, reason = "each guest uses its part")]
+//! Test terminal: a pseudo-terminal and an emulator of its screen.
+#![allow(dead_code, reason = "each test crate uses a part")]
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
 use std::io::{Read, Write};
@@ -9,69 +9,72 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Long enough for any machine; reached only on failure.
+/// Longest wait; reached only on failure.
 pub const PATIENCE: Duration = Duration::from_secs(120);
 
-/// What has come from the program.
+/// Output of the program.
 struct Output {
     parser: vt100::Parser,
     /// Every byte, in order.
     bytes: Vec<u8>,
-    /// The program has closed the terminal.
+    /// `true` if the program has closed the terminal.
     ended: bool,
 }
 
-/// One program at a time: each wants all processors.
+/// Lock for one program at a time, because each uses all processors.
 static TURN: Mutex<()> = Mutex::new(());
 
-/// What keys and answers are written to.
+/// Writer of keys and replies.
 type Keyboard = Arc<Mutex<Box<dyn Write + Send>>>;
 
-/// A question and its answer.
-pub type Answer = (&'static [u8], &'static str);
+/// Request and its reply.
+pub type RequestReply = (&'static [u8], &'static str);
 
-/// Questions of programs, and the answers of a terminal with synchronised output.
-const ANSWERS: [Answer; 3] =
+/// Requests, and the replies of a terminal with synchronised updates. The empty reply is the cursor
+/// position.
+const REPLIES: [RequestReply; 3] =
     [(b"\x1b[c", "\x1b[?62;22c"), (b"\x1b[?2026$p", "\x1b[?2026;2$y"), (b"\x1b[6n", "")];
 
-/// A program in its terminal.
+/// Program in its terminal.
 pub struct Terminal {
     master: Box<dyn MasterPty + Send>,
-    /// Kept open, so that the state of the terminal can be asked for after the program's end.
+    /// Slave end, kept open so that the modes can be read after the program's end.
     slave: Option<Box<dyn SlavePty + Send>>,
     keyboard: Keyboard,
-    /// Questions are answered.
-    answering: Arc<AtomicBool>,
+    /// `true` if the terminal replies.
+    is_replying: Arc<AtomicBool>,
     child: Box<dyn Child + Send + Sync>,
     output: Arc<(Mutex<Output>, Condvar)>,
     before: String,
     _turn: MutexGuard<'static, ()>,
 }
 
-/// How a program is started.
+/// Parameters of a start.
 pub struct Start<'a> {
     /// The program and its arguments.
     pub command: &'a [&'a str],
-    /// Where.
+    /// Working directory.
     pub folder: &'a Path,
     /// Columns and rows.
     pub size: [u16; 2],
-    /// Environment, beside that of the tests.
+    /// Additional environment variables.
     pub env: &'a [(&'a str, &'a str)],
-    /// The terminal answers questions.
-    pub answers: bool,
+    /// `true` if the terminal replies to requests.
+    pub replies: bool,
 }
 
 impl Terminal {
-    /// Starts a program in a terminal of true colour.
+    /// Starts a program in a terminal with 24-bit colour.
     pub fn start(start: &Start) -> Self {
         Self::start_with(start, &[])
     }
 
-    /// The same for one that has other or more answers.
-    pub fn start_with(start: &Start, also: &[Answer]) -> Self {
-        let known = ANSWERS.iter().filter(|known| also.iter().all(|other| other.0 != known.0));
-        let table: Vec<Answer> = known.chain(also).copied().collect();
+    /// Starts a program in a terminal with `additional` replies, which override the defaults.
+    pub fn start_with(start: &Start, additional: &[RequestReply]) -> Self {
+        let defaults = REPLIES
+            .iter()
+            .filter(|(request, _)| additional.iter().all(|other| other.0 != *request));
+        let table: Vec<RequestReply> = defaults.chain(additional).copied().collect();
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let pair = native_pty_system().openpty(pty_size(start.size)).expect("a pseudo-terminal");
         let mut command = CommandBuilder::new(start.command[0]);
@@ -95,14 +98,14 @@ impl Terminal {
         let mut reader = pair.master.try_clone_reader().unwrap();
         let shared = Arc::clone(&output);
         let keyboard: Keyboard = Arc::new(Mutex::new(pair.master.take_writer().unwrap()));
-        let answering = Arc::new(AtomicBool::new(start.answers));
-        let (answers, willing) = (Arc::clone(&keyboard), Arc::clone(&answering));
+        let is_replying = Arc::new(AtomicBool::new(start.replies));
+        let (replies, enabled) = (Arc::clone(&keyboard), Arc::clone(&is_replying));
         std::thread::spawn(move || {
             let mut buffer = vec![0; 1 << 16];
-            let mut begun = Vec::new();
+            let mut unread = Vec::new();
             loop {
                 let read = reader.read(&mut buffer).unwrap_or(0);
-                let asked = questions(&table, &mut begun, &buffer[..read]);
+                let requested = replies_to(&table, &mut unread, &buffer[..read]);
                 let mut output = shared.0.lock().unwrap();
                 output.ended = read == 0;
                 output.parser.process(&buffer[..read]);
@@ -110,13 +113,13 @@ impl Terminal {
                 let (row, column) = output.parser.screen().cursor_position();
                 shared.1.notify_all();
                 drop(output);
-                if willing.load(Ordering::Relaxed) {
-                    let place = format!("\x1b[{};{}R", row + 1, column + 1);
-                    let answer =
-                        |text: &str| if text.is_empty() { place.clone() } else { text.into() };
-                    let all: String = asked.into_iter().map(answer).collect();
+                if enabled.load(Ordering::Relaxed) {
+                    let position = format!("\x1b[{};{}R", row + 1, column + 1);
+                    let reply =
+                        |text: &str| if text.is_empty() { position.clone() } else { text.into() };
+                    let all: String = requested.into_iter().map(reply).collect();
                     // The program may have ended meanwhile.
-                    let _ = answers.lock().unwrap().write_all(all.as_bytes());
+                    let _ = replies.lock().unwrap().write_all(all.as_bytes());
                 }
                 if read == 0 {
                     break;
@@ -125,7 +128,7 @@ impl Terminal {
         });
         Self {
             keyboard,
-            answering,
+            is_replying,
             master: pair.master,
             slave: Some(pair.slave),
             child,
@@ -135,76 +138,77 @@ impl Terminal {
         }
     }
 
-    /// Sends what the keyboard, the mouse or the clipboard would send.
+    /// Sends input as the keyboard, the mouse or the clipboard do.
     pub fn send(&mut self, keys: &str) {
         let mut keyboard = self.keyboard.lock().unwrap();
         keyboard.write_all(keys.as_bytes()).unwrap();
         keyboard.flush().unwrap();
     }
 
-    /// From now on questions are answered, or not.
-    pub fn answer(&self, answering: bool) {
-        self.answering.store(answering, Ordering::Relaxed);
+    /// Enables or disables replies.
+    pub fn set_replying(&self, is_replying: bool) {
+        self.is_replying.store(is_replying, Ordering::Relaxed);
     }
 
-    /// Waits until the screen is as `wanted`; on failure prints it and `what` was waited for.
-    pub fn wait_for<R>(&self, what: &str, wanted: impl Fn(&vt100::Screen) -> Option<R>) -> R {
+    /// Waits until `condition` returns a value for the screen. Panics with `what` and the screen on
+    /// failure.
+    pub fn wait_for<R>(&self, what: &str, condition: impl Fn(&vt100::Screen) -> Option<R>) -> R {
         let end = Instant::now() + PATIENCE;
         let (output, changed) = &*self.output;
         let mut output = output.lock().unwrap();
         loop {
-            if let Some(found) = wanted(output.parser.screen()) {
-                return found;
+            if let Some(value) = condition(output.parser.screen()) {
+                return value;
             }
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() || output.ended {
+            let time_left = end.saturating_duration_since(Instant::now());
+            if time_left.is_zero() || output.ended {
                 let screen = output.parser.screen().contents();
                 drop(output);
-                let why = if left.is_zero() { "in time" } else { "before the program ended" };
+                let why = if time_left.is_zero() { "in time" } else { "before the program ended" };
                 panic!("{what}: not {why}. The screen:\n{screen}");
             }
-            output = changed.wait_timeout(output, left).unwrap().0;
+            output = changed.wait_timeout(output, time_left).unwrap().0;
         }
     }
 
-    /// Waits until `text` stands somewhere on the screen.
+    /// Waits until the screen contains `text`.
     pub fn wait_for_text(&self, text: &str) {
         self.wait_for(&format!("{text:?}"), |screen| {
             screen.contents().contains(text).then_some(())
         });
     }
 
-    /// Waits until `text` stands nowhere on the screen.
+    /// Waits until the screen does not contain `text`.
     pub fn wait_until_gone(&self, text: &str) {
         self.wait_for(&format!("no {text:?}"), |screen| {
             (!screen.contents().contains(text)).then_some(())
         });
     }
 
-    /// What the screen shows now.
+    /// Returns the result of `look` for the current screen.
     pub fn screen<R>(&self, look: impl FnOnce(&vt100::Screen) -> R) -> R {
         look(self.output.0.lock().unwrap().parser.screen())
     }
 
-    /// Every byte that the program has sent so far.
+    /// Returns all bytes that the program has sent so far.
     pub fn bytes(&self) -> Vec<u8> {
         self.output.0.lock().unwrap().bytes.clone()
     }
 
-    /// Gives the terminal another size.
+    /// Resizes the terminal.
     pub fn resize(&self, size: [u16; 2]) {
         let [columns, rows] = size.map(|n| NonZeroU16::new(n).unwrap());
         self.output.0.lock().unwrap().parser.screen_mut().set_size(rows, columns);
         self.master.resize(pty_size(size)).unwrap();
     }
 
-    /// The program's process.
+    /// Returns the process number of the program.
     pub fn process_id(&self) -> u32 {
         self.child.process_id().expect("a process")
     }
 
-    /// Waits for the end of the program: its exit status, and everything that it has sent. Then the
-    /// terminal has to be as it was before.
+    /// Waits for the end of the program and checks that the terminal is restored. Returns the exit status
+    /// and all output.
     pub fn end(mut self) -> (u32, String) {
         let child = &mut self.child;
         let end = Instant::now() + PATIENCE;
@@ -220,7 +224,7 @@ impl Terminal {
             }
         };
         assert_eq!(state(&*self.master), self.before, "the modes of the terminal");
-        // With the last of its ends the terminal itself ends, and with it the output.
+        // Closing the last slave end closes the terminal and the output.
         let Self { slave, output, .. } = &mut self;
         drop(slave.take());
         let (output, changed) = &**output;
@@ -240,26 +244,26 @@ impl Terminal {
     }
 }
 
-/// The answers that `bytes`, after what has `begun` before, ask for; what may be the beginning of
-/// another question is remembered.
-fn questions(table: &[Answer], begun: &mut Vec<u8>, bytes: &[u8]) -> Vec<&'static str> {
-    begun.extend_from_slice(bytes);
-    let mut answers = Vec::new();
+/// Returns the replies to requests in `unread` and `bytes`. A possible start of a request is kept in
+/// `unread`.
+fn replies_to(table: &[RequestReply], unread: &mut Vec<u8>, bytes: &[u8]) -> Vec<&'static str> {
+    unread.extend_from_slice(bytes);
+    let mut replies = Vec::new();
     let mut read = 0;
-    for at in 0..begun.len() {
-        for (question, answer) in table {
-            if begun[at..].starts_with(question) {
-                answers.push(*answer);
-                read = at + question.len();
+    for start in 0..unread.len() {
+        for (request, reply) in table {
+            if unread[start..].starts_with(request) {
+                replies.push(*reply);
+                read = start + request.len();
             }
         }
     }
-    let longest = table.iter().map(|(question, _)| question.len()).max().unwrap_or(0);
-    begun.drain(..read.max(begun.len().saturating_sub(longest - 1)));
-    answers
+    let longest = table.iter().map(|(request, _)| request.len()).max().unwrap_or(0);
+    unread.drain(..read.max(unread.len().saturating_sub(longest - 1)));
+    replies
 }
 
-/// A test that fails leaves no program behind.
+/// Ends the program of a failed test.
 impl Drop for Terminal {
     fn drop(&mut self) {
         let _ = self.child.kill();
@@ -270,7 +274,7 @@ fn pty_size([cols, rows]: [u16; 2]) -> PtySize {
     PtySize { rows, cols, pixel_width: 0, pixel_height: 0 }
 }
 
-/// The modes of the terminal as text, to be compared.
+/// Returns the modes of the terminal as text, for comparison.
 fn state(master: &dyn MasterPty) -> String {
     format!("{:?}", master.get_termios().expect("the modes of a terminal"))
 }

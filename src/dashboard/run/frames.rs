@@ -167,7 +167,7 @@ impl FramePipeline {
     /// Returns `true` if visible differences of the picture are pending, and the bytes of frames
     /// sent so far.
     pub fn load(&self) -> (bool, u64) {
-        (self.diff.rest().visible, self.sent)
+        (self.diff.pending().visible, self.sent)
     }
 
     /// Status of the connection, for display.
@@ -214,7 +214,7 @@ impl FramePipeline {
     /// Time of the next draw; `None` until an event. `changed` is whether the model differs from
     /// the last frame, `answers` whether the frame responds to user input.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
-        let pending = self.diff.rest();
+        let pending = self.diff.pending();
         let text = changed || pending.text || !self.removal.is_empty();
         let may = || self.flow.allowance(now, false).is_some_and(|budget| budget.picture);
         if let Some(upload) = &self.upload
@@ -224,7 +224,7 @@ impl FramePipeline {
             return upload.is_unfinished().then(slice);
         }
         if !text && !pending.visible {
-            let hidden = pending.hidden?.max(self.flow.flush_at());
+            let hidden = pending.hidden?.max(self.flow.refine_at());
             return Some(if may() { hidden } else { hidden.max(self.flow.wakes_at(now, false)) });
         }
         match self.flow.allowance(now, answers) {
@@ -281,13 +281,13 @@ impl FramePipeline {
         if bytes.len() == empty && self.clipboard.is_empty() && self.removal.is_empty() {
             bytes.clear();
             self.writer.keep(bytes);
-            let pending = self.diff.rest();
+            let pending = self.diff.pending();
             let follows =
                 |upload: &ImageUpload| upload.is_unfinished() && upload.follows(pending.visible);
             if !pending.text && self.upload.as_ref().is_some_and(follows) {
                 return self.slice(now, whole);
             }
-            return if self.diff.rest().visible {
+            return if self.diff.pending().visible {
                 DrawOutcome::Deferred
             } else {
                 DrawOutcome::Same

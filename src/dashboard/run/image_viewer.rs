@@ -26,7 +26,7 @@ pub fn viewport(
     let cell_px = cell_px().or(terminal.cell_px);
     let protocol = Protocol::of(&Capabilities { cell_px, ..terminal.clone() });
     let most_bytes = line_rate.map(|rate| rate * MAX_TRANSFER_TIME.as_secs_f64());
-    ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, most_bytes }
+    ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, max_bytes: most_bytes }
 }
 
 /// Reads the image at `path` and encodes it for `viewport`, in a thread of its own. Sends a

@@ -1,13 +1,12 @@
-//! Cells as bytes, and few of them: a colour is sent only if the pen has another one, of the glyphs
-//! that look alike that one is taken for which the pen has to change least, and the cursor moves by
-//! the shortest way.
+//! Encoding of cells in few bytes: colours are sent only when they change, of equivalent glyphs the one
+//! with the fewest colour changes is chosen, and the cursor moves by the shortest sequence.
 
 use ratatui::buffer::Cell;
 use ratatui::style::{Color, Modifier};
 use std::io::Write;
 use unicode_width::UnicodeWidthStr;
 
-/// Attributes: their bit, the code that sets them, and the one that resets them.
+/// Attributes: flag, SGR parameter that sets it, SGR parameter that resets it.
 const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
     (Modifier::BOLD, 1, 22),
     (Modifier::DIM, 2, 22),
@@ -20,10 +19,10 @@ const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
     (Modifier::CROSSED_OUT, 9, 29),
 ];
 
-/// Attributes with which a space is not only its ground.
+/// Attributes that are visible on a space.
 const LINES: Modifier = Modifier::REVERSED.union(Modifier::UNDERLINED).union(Modifier::CROSSED_OUT);
 
-/// What the terminal writes with.
+/// Colours and attributes of the next character.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Pen {
     fg: Color,
@@ -31,23 +30,23 @@ struct Pen {
     modifier: Modifier,
 }
 
-/// What a terminal of some width has been told about its pen and its cursor.
+/// Encoder with the terminal's current pen and cursor.
 #[derive(Clone, Debug)]
 pub struct Encoder {
     pen: Pen,
-    /// Column and row where the next character appears, if that is certain.
-    at: Option<(u16, u16)>,
+    /// Column and row of the cursor; `None` if unknown.
+    cursor: Option<(u16, u16)>,
     columns: u16,
 }
 
 impl Encoder {
-    /// For a terminal whose pen has been reset.
+    /// Creates an encoder for a terminal with default pen.
     pub fn new(columns: u16) -> Self {
         let pen = Pen { fg: Color::Reset, bg: Color::Reset, modifier: Modifier::empty() };
-        Self { pen, at: None, columns }
+        Self { pen, cursor: None, columns }
     }
 
-    /// Empties the terminal.
+    /// Clears the terminal and resets the pen.
     pub fn clear(&mut self, out: &mut Vec<u8>) {
         *self = Self::new(self.columns);
         out.extend(b"\x1b[m\x1b[2J");
@@ -60,24 +59,24 @@ impl Encoder {
         self.set(out, pen);
         out.extend(symbol.as_bytes());
         let width = symbol.width() as u16;
-        // At the right edge terminals differ, and about unusual widths, too.
-        self.at = (width == 1 && x + 1 < self.columns).then_some((x + 1, y));
+        // Terminals differ at the right edge and in the width of wide characters.
+        self.cursor = (width == 1 && x + 1 < self.columns).then_some((x + 1, y));
     }
 
-    /// Nobody knows where the cursor is.
+    /// Marks the position of the cursor as unknown.
     pub fn moved(&mut self) {
-        self.at = None;
+        self.cursor = None;
     }
 
     /// Moves the cursor.
     pub fn go(&mut self, out: &mut Vec<u8>, x: u16, y: u16) {
-        let before = self.at.replace((x, y));
+        let before = self.cursor.replace((x, y));
         let counted = |n: u16, letter: char| match n {
             1 => format!("\x1b[{letter}"),
             n => format!("\x1b[{n}{letter}"),
         };
         let relative = match before {
-            Some(at) if at == (x, y) => return,
+            Some(position) if position == (x, y) => return,
             Some((from, row)) if row == y && from < x => Some(counted(x - from, 'C')),
             Some((from, row)) if row == y => Some(counted(from - x, 'D')),
             Some((_, row)) if row + 1 == y && x == 0 => Some("\r\n".to_string()),
@@ -89,11 +88,12 @@ impl Encoder {
             (0, y) => format!("\x1b[{}H", y + 1),
             (x, y) => format!("\x1b[{};{}H", y + 1, x + 1),
         };
-        let way = relative.filter(|way| way.len() <= absolute.len()).unwrap_or(absolute);
-        out.extend(way.as_bytes());
+        let shortest =
+            relative.filter(|sequence| sequence.len() <= absolute.len()).unwrap_or(absolute);
+        out.extend(shortest.as_bytes());
     }
 
-    /// Of what looks like `cell` the symbol and the pen that need the fewest changes.
+    /// Returns the symbol and pen that look like `cell` and need the fewest changes.
     fn cheapest<'a>(&self, cell: &'a Cell) -> (&'a str, Pen) {
         let Cell { fg, bg, modifier, .. } = *cell;
         let symbol = cell.symbol();
@@ -108,11 +108,11 @@ impl Encoder {
             _ => return plain,
         };
         let [upper, lower] = halves;
-        let same = upper == lower;
-        // The terminal's own colours are other ones in front than behind.
-        let movable = upper != Color::Reset && lower != Color::Reset;
-        let ways: &[(&str, Pen)] = match (movable, same) {
-            // No full block: those of some fonts leave an edge of the ground uncovered.
+        let is_flat = upper == lower;
+        // Default foreground and background differ.
+        let is_explicit = upper != Color::Reset && lower != Color::Reset;
+        let candidates: &[(&str, Pen)] = match (is_explicit, is_flat) {
+            // No full block: in some fonts it leaves an edge of the background uncovered.
             (true, true) => &[(" ", pen(self.pen.fg, upper))],
             (true, false) => &[("▀", pen(upper, lower)), ("▄", pen(lower, upper))],
             (false, _) if symbol == " " => &[(" ", pen(self.pen.fg, bg))],
@@ -120,10 +120,10 @@ impl Encoder {
         };
         let changes = |(symbol, pen): &(&str, Pen)| {
             let colors = usize::from(pen.fg != self.pen.fg) + usize::from(pen.bg != self.pen.bg);
-            // Much the most of it are the colours; then the glyph.
+            // A colour takes far more bytes than a glyph.
             16 * colors + symbol.len()
         };
-        ways.iter().min_by_key(|way| changes(way)).copied().unwrap_or(plain)
+        candidates.iter().min_by_key(|candidate| changes(candidate)).copied().unwrap_or(plain)
     }
 
     fn set(&mut self, out: &mut Vec<u8>, pen: Pen) {
@@ -133,17 +133,17 @@ impl Encoder {
         let plain = Pen { fg: Color::Reset, bg: Color::Reset, modifier: Modifier::empty() };
         let mut codes = Vec::new();
         if pen != plain {
-            let gone = self.pen.modifier - pen.modifier;
-            let mut lost = Modifier::empty();
+            let removed = self.pen.modifier - pen.modifier;
+            let mut reset_too = Modifier::empty();
             for (attribute, _, reset) in ATTRIBUTES {
-                if gone.contains(attribute) {
+                if removed.contains(attribute) {
                     codes.push(reset.to_string());
-                    // One code takes back all attributes that it belongs to.
-                    let with = ATTRIBUTES.iter().filter(|(_, _, other)| *other == reset);
-                    with.for_each(|(attribute, _, _)| lost |= *attribute);
+                    // One parameter can reset several attributes.
+                    let affected = ATTRIBUTES.iter().filter(|(_, _, other)| *other == reset);
+                    affected.for_each(|(attribute, _, _)| reset_too |= *attribute);
                 }
             }
-            let missing = pen.modifier - (self.pen.modifier - lost);
+            let missing = pen.modifier - (self.pen.modifier - reset_too);
             for (attribute, set, _) in ATTRIBUTES {
                 if missing.contains(attribute) {
                     codes.push(set.to_string());
@@ -161,8 +161,8 @@ impl Encoder {
     }
 }
 
-/// The parameters that choose a colour; `base`: 30 in front, 40 behind (ISO 8613-6 for those with
-/// numbers).
+/// Returns the SGR parameters of a colour. `base` is 30 for foreground and 40 for background. RGB and
+/// indexed colours follow ISO 8613-6.
 fn color_code(color: Color, base: u8) -> String {
     let dark = |n: u8| (base + n).to_string();
     let bright = |n: u8| (base + 60 + n).to_string();
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_changes_is_sent() {
+    fn only_changed_colors_are_sent() {
         let cells = [(0, 0, half("▀", 1, 2)), (1, 0, half("▀", 1, 3)), (2, 0, half("▀", 3, 1))];
         let bytes = encoded(&cells);
         let expected = "\x1b[H\x1b[38;2;1;0;0;48;2;2;0;0m▀\x1b[48;2;3;0;0m▀▄";
@@ -221,18 +221,18 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_of_one_color_is_all_ground() {
+    fn flat_cell_is_a_space() {
         let cells = [(5, 1, half("▀", 1, 2)), (6, 1, half(" ", 7, 2)), (7, 1, half("▀", 1, 1))];
         let expected = "\x1b[2;6H\x1b[38;2;1;0;0;48;2;2;0;0m▀ \x1b[48;2;1;0;0m ";
         assert_eq!(encoded(&cells), expected);
-        // Whatever the pen has in front already.
+        // The pen's foreground does not matter.
         let cells = [(0, 0, half("▀", 1, 2)), (1, 0, half("█", 1, 9))];
         let expected = "\x1b[H\x1b[38;2;1;0;0;48;2;2;0;0m▀\x1b[48;2;1;0;0m ";
         assert_eq!(encoded(&cells), expected);
     }
 
     #[test]
-    fn the_shortest_way() {
+    fn cursor_moves_by_the_shortest_sequence() {
         let x = |x, y| (x, y, Cell::new("x"));
         let bytes = encoded(&[x(3, 2), x(5, 2), x(20, 2), x(2, 2), x(3, 4), x(0, 5), x(0, 7)]);
         let expected = "\x1b[3;4Hx\x1b[Cx\x1b[14Cx\x1b[19Dx\x1b[2Bx\r\nx\x1b[8Hx";
@@ -249,7 +249,7 @@ mod tests {
 
     fn any_cell() -> impl Strategy<Value = Cell> {
         let symbol = prop_oneof![Just("▀"), Just("▄"), Just("█"), Just(" "), Just("a"), Just("é")];
-        // Bold and dim at once look different from terminal to terminal; nothing here is.
+        // Terminals differ on bold and dim together, which the dashboard does not use.
         let weight =
             prop_oneof![Just(Modifier::empty()), Just(Modifier::BOLD), Just(Modifier::DIM)];
         let style = prop_oneof![
@@ -267,7 +267,7 @@ mod tests {
         })
     }
 
-    /// How a cell looks: what does not show does not count.
+    /// Returns the visible colours and attributes of a cell.
     fn look(cell: &vt100::Cell) -> (String, String) {
         let [fg, bg] = [cell.fgcolor(), cell.bgcolor()].map(|color| format!("{color:?}"));
         let attributes =
@@ -284,9 +284,9 @@ mod tests {
     }
 
     proptest! {
-        /// An emulator shows what was encoded, in any order and over anything that was there.
+        /// Cells are sent in any order and over any previous contents.
         #[test]
-        fn what_is_encoded_is_shown(
+        fn emulator_shows_encoded_cells(
             cells in prop::collection::vec((0..SIZE[0], 0..SIZE[1], any_cell()), 1..120),
         ) {
             let [columns, rows] = SIZE;
@@ -303,7 +303,7 @@ mod tests {
             parser.process(&out);
             for y in 0..rows {
                 for x in 0..columns {
-                    // The same cell, sent alone and as it is.
+                    // The same cell, sent alone and without substitution.
                     let cell = &expected[(x, y)];
                     let mut alone = vt100::Parser::new(high, wide, 0);
                     let mut bytes = Vec::new();

@@ -1,10 +1,10 @@
-//! Which of the wanted cells go out now.
+//! Frame difference: the cells that a frame sends.
 //!
-//! Text goes first, row by row. Of the picture a cell goes if the difference can be seen, the largest
-//! difference first, as many as the frame may hold; what is so different at once that it does not fit
-//! appears in coarse blocks before. More samples make differences worth looking for only when they
-//! have become so many more that the picture is another one. What cannot be seen waits until nothing
-//! else happens.
+//! Text is sent first, row by row. Then cells of the picture with a visible difference are sent, the
+//! largest difference first, within the frame's budget. A new picture that does not fit is sent as a
+//! mosaic of coarse blocks first. While samples accumulate, cells are compared again only after the number
+//! of samples has grown by a factor of 2^(1/4), from 64 on 2^(1/2). Invisible differences are sent when
+//! the connection is otherwise idle.
 
 mod encode;
 mod perceptual;
@@ -18,115 +18,115 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::{Position, Rect};
 use std::time::Duration;
 
-/// Bytes of a frame beside its cells: cursor, brackets, question.
-const BESIDE_CELLS: usize = 64;
-/// A picture that has not changed for so long is sent exactly.
+/// Bytes of a frame besides its cells: cursor, synchronised update, acknowledgement request.
+const FRAME_OVERHEAD: usize = 64;
+/// Time without change after which a picture is sent exactly.
 const IDLE: Duration = Duration::from_secs(2);
 
-/// What the terminal ought to show.
+/// Contents that the terminal should show.
 #[derive(Clone, Copy, Debug)]
 pub struct TargetFrame<'a> {
-    /// All of it.
+    /// All cells.
     pub cells: &'a Buffer,
-    /// Where text is being typed.
+    /// Text cursor; `None` hides it.
     pub cursor: Option<Position>,
-    /// Where the picture is; may be empty.
+    /// Area of the picture; may be empty.
     pub picture: Rect,
-    /// Which cells of that area show it, row by row: nothing lies over them.
+    /// For each cell of that area, row by row, `true` if nothing covers the picture.
     pub uncovered: &'a [bool],
-    /// Counts up when the picture is another one than the same with more samples.
+    /// Number that increases when the picture changes other than by more samples.
     pub subject: u64,
-    /// Counts up when the picture may be another one.
+    /// Number that increases when the picture may have changed.
     pub version: u64,
     /// Samples per pixel.
     pub samples: f64,
-    /// The picture will not change by itself.
+    /// `true` if the picture will not change without input.
     pub settled: bool,
 }
 
-/// What a frame was made of.
+/// Summary of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Frame {
-    /// Parts of the picture.
+    /// `true` if it has cells of the picture.
     pub picture: bool,
-    /// Bytes of differences that nobody sees.
+    /// Bytes of invisible differences.
     pub flushed: usize,
 }
 
-/// What is still to be sent.
+/// Differences that remain to be sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pending {
-    /// Text.
+    /// `true` if text remains.
     pub text: bool,
-    /// Differences of the picture that can be seen.
+    /// `true` if visible differences of the picture remain.
     pub visible: bool,
-    /// Differences that cannot be seen, if there are any: when they may be sent.
+    /// Earliest time for invisible differences; `None` if there are none.
     pub hidden: Option<Duration>,
 }
 
-/// What the terminal shows, beside what it ought to show.
+/// Difference between the contents of the terminal and a target frame.
 #[derive(Debug)]
 pub struct FrameDiff {
     shown: Buffer,
-    /// Nothing is known of what the terminal shows: it has to be cleared.
+    /// `true` if the contents of the terminal are unknown, so that it must be cleared.
     unknown: bool,
     cursor: Option<Position>,
     encoder: Encoder,
-    sight: PerceptualDiff,
+    picture_diff: PerceptualDiff,
     subject: Option<u64>,
-    /// The picture as it is now has not been shown in any form.
+    /// `true` until some form of the current picture was sent.
     fresh: bool,
-    /// With so many samples differences are looked for again.
+    /// Samples per pixel at which cells are compared again.
     next_samples: f64,
     version: u64,
-    /// When the version came.
-    since: Duration,
-    rest: Pending,
+    /// Time at which the version changed.
+    version_at: Duration,
+    pending: Pending,
 }
 
 impl FrameDiff {
-    /// For a terminal that shows nothing.
+    /// Creates the state for a terminal with unknown contents.
     pub fn new() -> Self {
         Self {
             shown: Buffer::empty(Rect::ZERO),
             unknown: true,
             cursor: None,
             encoder: Encoder::new(0),
-            sight: PerceptualDiff::default(),
+            picture_diff: PerceptualDiff::default(),
             subject: None,
             fresh: true,
             next_samples: 0.0,
             version: 0,
-            since: Duration::ZERO,
-            rest: Pending::default(),
+            version_at: Duration::ZERO,
+            pending: Pending::default(),
         }
     }
 
-    /// What the last frame has left.
-    pub fn rest(&self) -> Pending {
-        self.rest
+    /// Returns the differences that the last frame has left.
+    pub fn pending(&self) -> Pending {
+        self.pending
     }
 
-    /// Something else than a frame has moved the cursor.
+    /// Records that the cursor was moved by other output.
     pub fn moved(&mut self) {
         self.encoder.moved();
     }
 
-    /// Writes the next frame to `out`, which stays empty if there is nothing to send. Differences of at
-    /// most `threshold`, in OKLab, cannot be seen.
+    /// Appends the next frame to `out`, which stays empty if there is nothing to send. OKLab differences up
+    /// to `threshold` are invisible.
     pub fn frame(
         &mut self,
-        wanted: &TargetFrame,
+        target: &TargetFrame,
         now: Duration,
         allowance: FrameBudget,
         threshold: f32,
         out: &mut Vec<u8>,
     ) -> Frame {
-        if self.unknown || wanted.cells.area != self.shown.area {
-            self.shown = Buffer::empty(wanted.cells.area);
-            self.encoder = Encoder::new(wanted.cells.area.width);
+        if self.unknown || target.cells.area != self.shown.area {
+            self.shown = Buffer::empty(target.cells.area);
+            self.encoder = Encoder::new(target.cells.area.width);
             self.encoder.clear(out);
-            self.sight.forget();
+            self.picture_diff.forget();
             self.unknown = false;
         }
         if self.cursor.is_some() {
@@ -135,60 +135,61 @@ impl FrameDiff {
         let before = out.len();
         let mut frame = Frame { picture: true, flushed: 0 };
         if allowance.bytes == usize::MAX {
-            self.everything(wanted, out);
+            self.send_all(target, out);
         } else {
-            let room = allowance.bytes.saturating_sub(BESIDE_CELLS);
-            self.rest.text = !self.text(wanted, room, out);
+            let room = allowance.bytes.saturating_sub(FRAME_OVERHEAD);
+            self.pending.text = !self.send_text(target, room, out);
             let room = room.saturating_sub(out.len());
-            self.look_for(wanted, now, threshold);
-            frame = self.picture(wanted, now, FrameBudget { bytes: room, ..allowance }, out);
+            self.compare(target, now, threshold);
+            frame = self.send_picture(target, now, FrameBudget { bytes: room, ..allowance }, out);
         }
-        if out.len() == before && wanted.cursor == self.cursor {
-            // The cursor was hidden for nothing.
+        if out.len() == before && target.cursor == self.cursor {
+            // Nothing was sent while the cursor was hidden.
             out.truncate(if self.cursor.is_some() { before - 6 } else { before });
             return frame;
         }
-        if let Some(Position { x, y }) = wanted.cursor {
+        if let Some(Position { x, y }) = target.cursor {
             self.encoder.go(out, x, y);
             out.extend(b"\x1b[?25h");
         }
-        self.cursor = wanted.cursor;
+        self.cursor = target.cursor;
         frame
     }
 
-    /// Every cell that differs.
-    fn everything(&mut self, wanted: &TargetFrame, out: &mut Vec<u8>) {
-        for (x, y, cell) in self.shown.diff_iter(wanted.cells) {
+    /// Sends every cell that differs.
+    fn send_all(&mut self, target: &TargetFrame, out: &mut Vec<u8>) {
+        for (x, y, cell) in self.shown.diff_iter(target.cells) {
             self.encoder.cell(out, x, y, cell);
         }
-        self.shown.clone_from(wanted.cells);
-        self.rest = Pending::default();
+        self.shown.clone_from(target.cells);
+        self.pending = Pending::default();
     }
 
-    /// Rows of text that differ, as many as there is room for, but one; whether that was all.
-    fn text(&mut self, wanted: &TargetFrame, room: usize, out: &mut Vec<u8>) -> bool {
-        let differences = self.shown.diff(wanted.cells);
-        let text = differences.into_iter().filter(|(x, y, _)| !wanted.shows_picture(*x, *y));
+    /// Sends rows of text that differ, at least one and otherwise as many as fit into `room` bytes. Returns
+    /// `true` if all were sent.
+    fn send_text(&mut self, target: &TargetFrame, room: usize, out: &mut Vec<u8>) -> bool {
+        let differences = self.shown.diff(target.cells);
+        let text = differences.into_iter().filter(|(x, y, _)| !target.shows_picture(*x, *y));
         let text: Vec<_> = text.collect();
-        let begun = out.len();
+        let start = out.len();
         for row in text.chunk_by(|a, b| a.1 == b.1) {
             let (mut encoder, length) = (self.encoder.clone(), out.len());
             for (x, y, cell) in row {
                 encoder.cell(out, *x, *y, cell);
             }
-            if out.len() > room && length > begun {
+            if out.len() > room && length > start {
                 out.truncate(length);
                 return false;
             }
             self.encoder = encoder;
             for (x, y, cell) in row {
-                // A wide character takes the cells beside it as well.
+                // A wide character takes the next cell as well.
                 let width = unicode_width::UnicodeWidthStr::width(cell.symbol()).max(1) as u16;
-                for x in (*x..x.saturating_add(width)).take_while(|x| *x < wanted.cells.area.width)
+                for x in (*x..x.saturating_add(width)).take_while(|x| *x < target.cells.area.width)
                 {
-                    self.shown[(x, *y)] = wanted.cells[(x, *y)].clone();
-                    if let Some(at) = wanted.place(x, *y) {
-                        self.sight.covered(at);
+                    self.shown[(x, *y)] = target.cells[(x, *y)].clone();
+                    if let Some(index) = target.index(x, *y) {
+                        self.picture_diff.covered(index);
                     }
                 }
             }
@@ -196,51 +197,51 @@ impl FrameDiff {
         true
     }
 
-    /// Takes note of what the picture ought to look like.
-    fn look_for(&mut self, wanted: &TargetFrame, now: Duration, threshold: f32) {
-        if self.version != wanted.version {
-            (self.version, self.since) = (wanted.version, now);
+    /// Compares the picture with the contents of the terminal.
+    fn compare(&mut self, target: &TargetFrame, now: Duration, threshold: f32) {
+        if self.version != target.version {
+            (self.version, self.version_at) = (target.version, now);
         }
-        self.sight.fit(wanted.picture);
-        if self.subject != Some(wanted.subject) {
-            self.subject = Some(wanted.subject);
+        self.picture_diff.fit(target.picture);
+        if self.subject != Some(target.subject) {
+            self.subject = Some(target.subject);
             self.fresh = true;
             self.next_samples = 0.0;
         }
-        let look_again = wanted.samples >= self.next_samples || wanted.settled;
-        if look_again {
-            let power = if wanted.samples < 64.0 { 0.25 } else { 0.5 };
-            self.next_samples = wanted.samples * 2f64.powf(power);
+        let is_due = target.samples >= self.next_samples || target.settled;
+        if is_due {
+            let power = if target.samples < 64.0 { 0.25 } else { 0.5 };
+            self.next_samples = target.samples * 2f64.powf(power);
         }
-        self.sight.compare(wanted, &self.shown, look_again, threshold);
+        self.picture_diff.compare(target, &self.shown, is_due, threshold);
     }
 
-    /// Cells of the picture, as many as there is room for.
-    fn picture(
+    /// Sends cells of the picture, as many as fit.
+    fn send_picture(
         &mut self,
-        wanted: &TargetFrame,
+        target: &TargetFrame,
         now: Duration,
         allowance: FrameBudget,
         out: &mut Vec<u8>,
     ) -> Frame {
-        let area = wanted.picture;
-        let mut visible = self.sight.visible();
-        let idle_at = if wanted.settled { now } else { self.since + IDLE };
+        let area = target.picture;
+        let mut visible = self.picture_diff.visible();
+        let idle_at = if target.settled { now } else { self.version_at + IDLE };
         let mut frame = Frame::default();
-        self.rest.visible = !visible.is_empty();
-        self.fresh &= self.rest.visible;
+        self.pending.visible = !visible.is_empty();
+        self.fresh &= self.pending.visible;
         if !visible.is_empty() && allowance.picture {
-            let all = visible.len();
-            let exact = |at: usize| &wanted.cells[position(area, at)];
+            let count = visible.len();
+            let exact = |index: usize| &target.cells[position(area, index)];
             let mut part = self.fitting(area, &mut visible, allowance.bytes, exact);
-            if std::mem::take(&mut self.fresh) && part.cells.len() < all {
+            if std::mem::take(&mut self.fresh) && part.cells.len() < count {
                 for side in [2, 4, 8, 16] {
-                    let (cells, mut order) = self.sight.coarse(wanted, side);
-                    let coarse = |at: usize| &cells[at];
-                    let whole = order.len();
+                    let (cells, mut order) = self.picture_diff.coarse(target, side);
+                    let coarse = |index: usize| &cells[index];
+                    let all = order.len();
                     let blocks = self.fitting(area, &mut order, allowance.bytes, coarse);
-                    let fits = blocks.cells.len() == whole;
-                    if whole > 0 && (fits || side == 16) {
+                    let fits = blocks.cells.len() == all;
+                    if all > 0 && (fits || side == 16) {
                         part = blocks;
                     }
                     if fits {
@@ -249,25 +250,25 @@ impl FrameDiff {
                 }
             }
             frame.picture = !part.cells.is_empty();
-            self.send(wanted, part, out);
-            self.rest.visible = self.sight.has_visible();
+            self.send(target, part, out);
+            self.pending.visible = self.picture_diff.has_visible();
         } else if visible.is_empty()
             && allowance.picture
             && idle_at <= now
             && allowance.refinement > 0
         {
-            let mut hidden = self.sight.hidden();
-            let exact = |at: usize| &wanted.cells[position(area, at)];
+            let mut hidden = self.picture_diff.hidden();
+            let exact = |index: usize| &target.cells[position(area, index)];
             let room = allowance.refinement.min(allowance.bytes);
             let part = self.fitting(area, &mut hidden, room, exact);
             frame = Frame { picture: !part.cells.is_empty(), flushed: part.bytes.len() };
-            self.send(wanted, part, out);
+            self.send(target, part, out);
         }
-        self.rest.hidden = self.sight.has_hidden().then_some(idle_at);
+        self.pending.hidden = self.picture_diff.has_hidden().then_some(idle_at);
         frame
     }
 
-    /// The first of `order` that fit into `room` bytes.
+    /// Encodes the cells of `order` with the largest differences that fit into `room` bytes.
     fn fitting<'a>(
         &self,
         area: Rect,
@@ -275,23 +276,23 @@ impl FrameDiff {
         room: usize,
         cell: impl Fn(usize) -> &'a Cell,
     ) -> Part {
-        // Ties by place, so that frames do not depend on how they are sorted.
+        // Ties are sorted by index, so that frames are deterministic.
         order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let encoded = |count: usize| {
-            let mut places: Vec<_> = order[..count].iter().map(|(_, at)| *at).collect();
-            places.sort_unstable();
+            let mut indices: Vec<_> = order[..count].iter().map(|(_, index)| *index).collect();
+            indices.sort_unstable();
             let (mut encoder, mut bytes) = (self.encoder.clone(), Vec::new());
             let mut cells = Vec::with_capacity(count);
-            for at in places {
-                let Position { x, y } = position(area, at);
-                encoder.cell(&mut bytes, x, y, cell(at));
-                cells.push((at, cell(at).clone()));
+            for index in indices {
+                let Position { x, y } = position(area, index);
+                encoder.cell(&mut bytes, x, y, cell(index));
+                cells.push((index, cell(index).clone()));
             }
             Part { bytes, encoder, cells }
         };
         let mut best = Part { bytes: Vec::new(), encoder: self.encoder.clone(), cells: Vec::new() };
         let mut count = order.len();
-        // Half of the cells takes more than half of the bytes: so it is found from above.
+        // Half of the cells takes more than half of the bytes, so the estimate is never too small.
         while count > 0 {
             let part = encoded(count);
             if part.bytes.len() <= room {
@@ -300,10 +301,10 @@ impl FrameDiff {
             }
             count = (count * room / part.bytes.len()).min(count - 1);
         }
-        // And then a little more from below.
+        // A second estimate uses the space that is left.
         if best.cells.len() < order.len() && 10 * best.bytes.len() < 9 * room {
-            let more = best.cells.len() * room / best.bytes.len().max(1);
-            let part = encoded((more - more / 50).clamp(best.cells.len(), order.len()));
+            let estimate = best.cells.len() * room / best.bytes.len().max(1);
+            let part = encoded((estimate - estimate / 50).clamp(best.cells.len(), order.len()));
             if part.bytes.len() <= room {
                 best = part;
             }
@@ -311,43 +312,43 @@ impl FrameDiff {
         best
     }
 
-    fn send(&mut self, wanted: &TargetFrame, part: Part, out: &mut Vec<u8>) {
+    fn send(&mut self, target: &TargetFrame, part: Part, out: &mut Vec<u8>) {
         out.extend(&part.bytes);
         self.encoder = part.encoder;
-        for (at, cell) in part.cells {
-            let place = position(wanted.picture, at);
-            let exact = cell == wanted.cells[place];
-            self.sight.sent(at, &cell, exact);
+        for (index, cell) in part.cells {
+            let place = position(target.picture, index);
+            let is_exact = cell == target.cells[place];
+            self.picture_diff.sent(index, &cell, is_exact);
             self.shown[place] = cell;
         }
     }
 }
 
-/// Cells of a frame.
+/// Encoded cells of the picture.
 struct Part {
     bytes: Vec<u8>,
-    /// What the terminal knows after that.
+    /// State of the encoder after them.
     encoder: Encoder,
     cells: Vec<(usize, Cell)>,
 }
 
 impl TargetFrame<'_> {
-    /// The number of a cell within the picture's area.
-    fn place(&self, x: u16, y: u16) -> Option<usize> {
+    /// Returns the index of a cell within the picture's area; `None` outside.
+    fn index(&self, x: u16, y: u16) -> Option<usize> {
         let area = self.picture;
         let inside = area.contains(Position { x, y });
         inside.then(|| usize::from(y - area.y) * usize::from(area.width) + usize::from(x - area.x))
     }
 
     fn shows_picture(&self, x: u16, y: u16) -> bool {
-        self.place(x, y).is_some_and(|at| self.uncovered.get(at).copied().unwrap_or(false))
+        self.index(x, y).is_some_and(|index| self.uncovered.get(index).copied().unwrap_or(false))
     }
 }
 
-/// Where the cell with that number within `area` is.
-fn position(area: Rect, at: usize) -> Position {
+/// Returns the position of cell `index` of `area`.
+fn position(area: Rect, index: usize) -> Position {
     let width = usize::from(area.width).max(1);
-    Position { x: area.x + (at % width) as u16, y: area.y + (at / width) as u16 }
+    Position { x: area.x + (index % width) as u16, y: area.y + (index / width) as u16 }
 }
 
 impl Default for FrameDiff {

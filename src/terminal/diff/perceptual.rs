@@ -1,4 +1,4 @@
-//! How the cells of the picture look, as they are shown and as they ought to be.
+//! Perceptual difference between the shown and the target cells of the picture.
 
 use crate::terminal::cells::{CellColor, Oklab, PictureCell, blocks};
 use crate::terminal::diff::{TargetFrame, position};
@@ -6,46 +6,48 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 
-/// How different a cell is of which nothing is known: more than black and white.
+/// Difference of a cell with unknown contents; greater than between black and white.
 const UNKNOWN: f32 = 2.0;
 
-/// One cell of the picture.
+/// Colours of one cell of the picture.
 #[derive(Clone, Copy, Debug)]
 struct CellColors {
-    /// What ought to be there; `None`: something that is not the picture.
-    wanted: Option<PictureCell>,
+    /// Target cell; `None` where the picture is covered.
+    target: Option<PictureCell>,
+    /// Colours of the target's halves.
     look: [Oklab; 2],
-    /// How what is there looks; `None`: it is not known.
+    /// Colours of the shown halves; `None` if unknown.
     shown: Option<[Oklab; 2]>,
-    /// A difference in it counts: it was looked for after the samples had become so many.
+    /// `true` if a difference counts, because a comparison was due since it was sent.
     counts: bool,
-    /// How different it is from what ought to be there; 0: not at all.
+    /// Difference from the target; 0 if equal.
     error: f32,
-    /// The difference can be seen.
+    /// `true` if the difference is visible.
     visible: bool,
 }
 
-/// The cells of the picture's area, row by row.
+/// Perceptual difference of the picture's area.
 #[derive(Debug, Default)]
 pub struct PerceptualDiff {
     area: Rect,
+    /// Cells, row by row.
     cells: Vec<CellColors>,
 }
 
 impl PerceptualDiff {
-    /// Nothing is known of what is shown.
+    /// Forgets the contents of the terminal.
     pub fn forget(&mut self) {
         self.area = Rect::ZERO;
         self.cells.clear();
     }
 
-    /// The picture is here now.
+    /// Sets the area of the picture. A new area has unknown contents.
     pub fn fit(&mut self, area: Rect) {
         if self.area != area {
             self.area = area;
             let black = Oklab { l: 0.0, a: 0.0, b: 0.0 };
             let unknown = CellColors {
-                wanted: None,
+                target: None,
                 look: [black; 2],
                 shown: None,
                 counts: true,
@@ -57,127 +59,126 @@ impl PerceptualDiff {
         }
     }
 
-    /// Compares what is shown with what ought to be. `look_again`: every difference counts.
-    pub fn compare(
-        &mut self,
-        wanted: &TargetFrame,
-        shown: &Buffer,
-        look_again: bool,
-        threshold: f32,
-    ) {
-        for (at, seen) in self.cells.iter_mut().enumerate() {
-            let place = position(self.area, at);
-            let cell = &wanted.cells[place];
-            (seen.error, seen.visible) = (0.0, false);
-            seen.counts |= look_again;
-            if !wanted.uncovered.get(at).copied().unwrap_or(false) {
-                seen.wanted = None;
+    /// Compares the shown cells with the target. `is_due` is `true` if every difference counts; otherwise
+    /// only those that counted before.
+    pub fn compare(&mut self, target: &TargetFrame, shown: &Buffer, is_due: bool, threshold: f32) {
+        for (index, cell_colors) in self.cells.iter_mut().enumerate() {
+            let place = position(self.area, index);
+            let cell = &target.cells[place];
+            (cell_colors.error, cell_colors.visible) = (0.0, false);
+            cell_colors.counts |= is_due;
+            if !target.uncovered.get(index).copied().unwrap_or(false) {
+                cell_colors.target = None;
                 continue;
             }
             let picture = picture_cell(cell);
-            if seen.wanted != Some(picture) {
-                seen.wanted = Some(picture);
-                seen.look = picture.halves();
+            if cell_colors.target != Some(picture) {
+                cell_colors.target = Some(picture);
+                cell_colors.look = picture.halves();
             }
             if *cell == shown[place] {
-                (seen.shown, seen.counts) = (Some(seen.look), false);
+                (cell_colors.shown, cell_colors.counts) = (Some(cell_colors.look), false);
                 continue;
             }
-            seen.error = seen.shown.map_or(UNKNOWN, |shown| difference(shown, seen.look));
-            seen.counts &= seen.error > threshold;
-            seen.visible = seen.counts;
-            // Equal looks, other cells: still to be told apart from what need not be sent.
-            seen.error = seen.error.max(f32::MIN_POSITIVE);
+            cell_colors.error =
+                cell_colors.shown.map_or(UNKNOWN, |shown| difference(shown, cell_colors.look));
+            cell_colors.counts &= cell_colors.error > threshold;
+            cell_colors.visible = cell_colors.counts;
+            // Different cells of equal colour have a positive error, so that they are sent at the end.
+            cell_colors.error = cell_colors.error.max(f32::MIN_POSITIVE);
         }
     }
 
-    /// Something else than the picture is shown there now.
-    pub fn covered(&mut self, at: usize) {
-        if let Some(seen) = self.cells.get_mut(at) {
-            (seen.shown, seen.counts) = (None, true);
+    /// Records that text now covers the cell.
+    pub fn covered(&mut self, index: usize) {
+        if let Some(cell_colors) = self.cells.get_mut(index) {
+            (cell_colors.shown, cell_colors.counts) = (None, true);
         }
     }
 
-    /// `cell` is shown there now; `exact`: as it ought to be.
-    pub fn sent(&mut self, at: usize, cell: &Cell, exact: bool) {
-        let seen = &mut self.cells[at];
+    /// Records that `cell` is shown. `exact` is `true` if it equals the target.
+    pub fn sent(&mut self, index: usize, cell: &Cell, exact: bool) {
+        let cell_colors = &mut self.cells[index];
         let shown = picture_cell(cell).halves();
-        seen.shown = Some(shown);
-        (seen.counts, seen.visible) = (!exact, !exact);
-        seen.error = if exact { 0.0 } else { difference(shown, seen.look).max(f32::MIN_POSITIVE) };
+        cell_colors.shown = Some(shown);
+        (cell_colors.counts, cell_colors.visible) = (!exact, !exact);
+        cell_colors.error =
+            if exact { 0.0 } else { difference(shown, cell_colors.look).max(f32::MIN_POSITIVE) };
     }
 
-    /// Errors and numbers of the cells whose differences can be seen.
+    /// Returns errors and indices of cells with visible differences.
     pub fn visible(&self) -> Vec<(f32, usize)> {
-        self.those(|seen| seen.visible)
+        self.select(|cell_colors| cell_colors.visible)
     }
 
-    /// The same for all others that are not exact.
+    /// Returns errors and indices of cells with invisible differences.
     pub fn hidden(&self) -> Vec<(f32, usize)> {
-        self.those(|seen| !seen.visible && seen.error > 0.0)
+        self.select(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
 
-    /// Whether differences can be seen.
+    /// Returns `true` if there are visible differences.
     pub fn has_visible(&self) -> bool {
-        self.cells.iter().any(|seen| seen.visible)
+        self.cells.iter().any(|cell_colors| cell_colors.visible)
     }
 
-    /// Whether there are differences that cannot be seen.
+    /// Returns `true` if there are invisible differences.
     pub fn has_hidden(&self) -> bool {
-        self.cells.iter().any(|seen| !seen.visible && seen.error > 0.0)
+        self.cells.iter().any(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
 
-    /// The picture in blocks of `side` x `side` half cells: its cells, and of those that look more like
-    /// the picture than what is shown, by how much, and the number.
-    pub fn coarse(&self, wanted: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
+    /// Returns the cells of a mosaic with blocks of `side` x `side` half cells, and gain and index of the
+    /// cells at which it is closer to the picture than the shown cell.
+    pub fn coarse(&self, target: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
         let rows = usize::from(self.area.height);
         let mut halves = vec![None; 2 * width * rows];
-        for (at, seen) in self.cells.iter().enumerate() {
-            let Some([upper, lower]) = seen.wanted.and_then(|cell| cell.colors()) else { continue };
-            let (x, y) = (at % width, at / width);
+        for (index, cell_colors) in self.cells.iter().enumerate() {
+            let Some([upper, lower]) = cell_colors.target.and_then(|cell| cell.colors()) else {
+                continue;
+            };
+            let (x, y) = (index % width, index / width);
             halves[2 * y * width + x] = Some(upper);
             halves[(2 * y + 1) * width + x] = Some(lower);
         }
         let blocks = blocks(&halves, width, side);
         let mut cells: Vec<Cell> = Vec::with_capacity(self.cells.len());
-        let mut better = Vec::new();
-        for (at, seen) in self.cells.iter().enumerate() {
-            let (x, y) = (at % width, at / width);
+        let mut improved = Vec::new();
+        for (index, cell_colors) in self.cells.iter().enumerate() {
+            let (x, y) = (index % width, index / width);
             let mean = blocks[2 * y * width + x];
-            let mut cell = wanted.cells[position(self.area, at)].clone();
-            if let (Some([r, g, b]), true) = (mean, seen.visible) {
+            let mut cell = target.cells[position(self.area, index)].clone();
+            if let (Some([r, g, b]), true) = (mean, cell_colors.visible) {
                 let look = [Oklab::of([r, g, b]); 2];
                 cell = Cell::new(" ");
                 cell.set_bg(Color::Rgb(r, g, b));
-                let gain = seen.error - difference(look, seen.look);
+                let gain = cell_colors.error - difference(look, cell_colors.look);
                 if gain > 0.0 {
-                    better.push((gain, at));
+                    improved.push((gain, index));
                 }
             }
             cells.push(cell);
         }
-        (cells, better)
+        (cells, improved)
     }
 
-    fn those(&self, which: impl Fn(&CellColors) -> bool) -> Vec<(f32, usize)> {
-        let cells = self.cells.iter().enumerate().filter(|(_, seen)| which(seen));
-        cells.map(|(at, seen)| (seen.error, at)).collect()
+    fn select(&self, predicate: impl Fn(&CellColors) -> bool) -> Vec<(f32, usize)> {
+        let cells = self.cells.iter().enumerate().filter(|(_, cell_colors)| predicate(cell_colors));
+        cells.map(|(index, cell_colors)| (cell_colors.error, index)).collect()
     }
 }
 
-/// The larger of the differences of the two halves.
+/// Returns the larger difference of the two halves.
 fn difference(a: [Oklab; 2], b: [Oklab; 2]) -> f32 {
     a[0].distance(b[0]).max(a[1].distance(b[1]))
 }
 
-/// A cell that was made from one of the picture.
+/// Converts a cell of the buffer back to a cell of the picture.
 fn picture_cell(cell: &Cell) -> PictureCell {
-    let ink = |color| match color {
+    let cell_color = |color| match color {
         Color::Rgb(r, g, b) => CellColor::Rgb([r, g, b]),
         Color::Indexed(index) => CellColor::Indexed(index),
         _ => CellColor::Plain,
     };
     let glyph = cell.symbol().chars().next().unwrap_or(' ');
-    PictureCell { glyph, fg: ink(cell.fg), bg: ink(cell.bg) }
+    PictureCell { glyph, fg: cell_color(cell.fg), bg: cell_color(cell.bg) }
 }

@@ -17,9 +17,9 @@ fn within(bytes: usize) -> FrameBudget {
     FrameBudget { bytes, picture: true, refinement: bytes / 2 }
 }
 
-/// A screen with a picture, a terminal, and what goes between.
-struct Desk {
-    pacing: FrameDiff,
+/// Target screen with a picture, its frame difference and an emulated terminal.
+struct Fixture {
+    diff: FrameDiff,
     cells: Buffer,
     uncovered: Vec<bool>,
     cursor: Option<Position>,
@@ -30,11 +30,11 @@ struct Desk {
     parser: vt100::Parser,
 }
 
-impl Desk {
+impl Fixture {
     fn new() -> Self {
         let [rows, columns] = [AREA.height, AREA.width].map(|n| NonZeroU16::new(n).unwrap());
-        let mut desk = Self {
-            pacing: FrameDiff::new(),
+        let mut fixture = Self {
+            diff: FrameDiff::new(),
             cells: Buffer::empty(AREA),
             uncovered: vec![true; 240],
             cursor: None,
@@ -44,11 +44,11 @@ impl Desk {
             settled: false,
             parser: vt100::Parser::new(rows, columns, 0),
         };
-        desk.paint(|x, y| [8 * x as u8, 20 * y as u8, 100]);
-        desk
+        fixture.paint(|x, y| [8 * x as u8, 20 * y as u8, 100]);
+        fixture
     }
 
-    /// Both halves of every cell have that colour, but the lower one a little more red.
+    /// Paints both halves of every cell with `color`, the lower one with slightly more red.
     fn paint(&mut self, color: impl Fn(u16, u16) -> [u8; 3]) {
         for at in PICTURE.positions() {
             let [r, g, b] = color(at.x - PICTURE.x, at.y - PICTURE.y);
@@ -64,7 +64,7 @@ impl Desk {
     }
 
     fn frame(&mut self, now: u64, allowance: FrameBudget) -> (Frame, Vec<u8>) {
-        let wanted = TargetFrame {
+        let target = TargetFrame {
             cells: &self.cells,
             cursor: self.cursor,
             picture: PICTURE,
@@ -75,23 +75,23 @@ impl Desk {
             settled: self.settled,
         };
         let mut bytes = Vec::new();
-        let frame = self.pacing.frame(&wanted, ms(now), allowance, THRESHOLD, &mut bytes);
+        let frame = self.diff.frame(&target, ms(now), allowance, THRESHOLD, &mut bytes);
         self.parser.process(&bytes);
         (frame, bytes)
     }
 
-    /// Cells of the picture that the terminal shows as they ought to be.
+    /// Returns the number of cells of the picture that the terminal shows exactly.
     fn exact(&self) -> usize {
         PICTURE.positions().filter(|at| self.is_exact(at.x, at.y)).count()
     }
 
-    /// Sends whatever is left.
+    /// Sends all remaining differences.
     fn finish(&mut self) {
         self.settled = true;
         for i in 0..100 {
             self.frame(100_000 + i, within(20_000));
         }
-        assert_eq!((self.exact(), self.pacing.rest()), (240, Pending::default()));
+        assert_eq!((self.exact(), self.diff.pending()), (240, Pending::default()));
     }
 
     fn is_exact(&self, x: u16, y: u16) -> bool {
@@ -111,198 +111,198 @@ impl Desk {
 }
 
 #[test]
-fn a_terminal_that_is_here_is_shown_everything_at_once() {
-    let mut desk = Desk::new();
-    desk.say(10, "words");
-    let (frame, bytes) = desk.frame(0, EVERYTHING);
+fn unlimited_frame_sends_all_cells() {
+    let mut fixture = Fixture::new();
+    fixture.say(10, "words");
+    let (frame, bytes) = fixture.frame(0, EVERYTHING);
     assert!(frame.picture && bytes.starts_with(b"\x1b[m\x1b[2J"));
-    assert_eq!(desk.exact(), 240);
-    assert!(desk.parser.screen().contents().contains("words"));
-    assert_eq!(desk.pacing.rest(), Pending::default());
-    assert_eq!(desk.frame(1, EVERYTHING).1, b"");
-    // The least change goes out, and only that.
-    desk.cells[(5, 5)].set_bg(Color::Rgb(1, 2, 3));
-    assert!(desk.frame(2, EVERYTHING).1.len() < 50);
-    assert_eq!(desk.exact(), 240);
-    // Another size: everything anew.
-    desk.cells = Buffer::empty(Rect { width: 39, ..AREA });
-    assert!(desk.frame(3, EVERYTHING).1.starts_with(b"\x1b[m\x1b[2J"));
+    assert_eq!(fixture.exact(), 240);
+    assert!(fixture.parser.screen().contents().contains("words"));
+    assert_eq!(fixture.diff.pending(), Pending::default());
+    assert_eq!(fixture.frame(1, EVERYTHING).1, b"");
+    // The smallest change is sent alone.
+    fixture.cells[(5, 5)].set_bg(Color::Rgb(1, 2, 3));
+    assert!(fixture.frame(2, EVERYTHING).1.len() < 50);
+    assert_eq!(fixture.exact(), 240);
+    // A new size clears the terminal.
+    fixture.cells = Buffer::empty(Rect { width: 39, ..AREA });
+    assert!(fixture.frame(3, EVERYTHING).1.starts_with(b"\x1b[m\x1b[2J"));
 }
 
 #[test]
-fn text_goes_before_the_picture_and_frames_stay_within_their_budget() {
-    let mut desk = Desk::new();
-    (9..12).for_each(|row| desk.say(row, "a line of text of some length"));
-    let (frame, bytes) = desk.frame(0, within(400));
+fn text_precedes_picture_within_the_budget() {
+    let mut fixture = Fixture::new();
+    (9..12).for_each(|row| fixture.say(row, "a line of text of some length"));
+    let (frame, bytes) = fixture.frame(0, within(400));
     assert!(bytes.len() <= 400, "{}", bytes.len());
     assert!(frame.picture);
-    let text = desk.parser.screen().contents();
+    let text = fixture.parser.screen().contents();
     assert_eq!(text.matches("a line of text of some length").count(), 3);
-    assert!(desk.pacing.rest().visible && !desk.pacing.rest().text);
+    assert!(fixture.diff.pending().visible && !fixture.diff.pending().text);
     let mut frames = 1;
-    while desk.pacing.rest().visible {
-        assert!(desk.frame(100 * frames, within(400)).1.len() <= 400);
+    while fixture.diff.pending().visible {
+        assert!(fixture.frame(100 * frames, within(400)).1.len() <= 400);
         frames += 1;
         assert!(frames < 100);
     }
     assert!(frames > 5);
-    assert!(desk.exact() > 200);
-    desk.finish();
+    assert!(fixture.exact() > 200);
+    fixture.finish();
 }
 
 #[test]
-fn beside_other_frames_only_text_goes() {
-    let mut desk = Desk::new();
-    desk.say(10, "words");
+fn text_only_budget_sends_no_picture() {
+    let mut fixture = Fixture::new();
+    fixture.say(10, "words");
     let beside = FrameBudget { bytes: 1500, picture: false, refinement: 0 };
-    let (frame, _) = desk.frame(0, beside);
-    assert_eq!((frame, desk.exact()), (Frame::default(), 0));
-    assert!(desk.parser.screen().contents().contains("words"));
-    assert!(desk.pacing.rest().visible);
-    assert_eq!(desk.frame(1, beside).1, b"");
-    // Text that is too much comes row by row.
+    let (frame, _) = fixture.frame(0, beside);
+    assert_eq!((frame, fixture.exact()), (Frame::default(), 0));
+    assert!(fixture.parser.screen().contents().contains("words"));
+    assert!(fixture.diff.pending().visible);
+    assert_eq!(fixture.frame(1, beside).1, b"");
+    // Text beyond the budget comes row by row.
     let long: String = ('a'..='z').chain('0'..='9').collect();
-    (9..12).for_each(|row| desk.say(row, &long));
+    (9..12).for_each(|row| fixture.say(row, &long));
     let narrow = FrameBudget { bytes: 120, ..beside };
     for rows in 1..=3 {
-        let (_, bytes) = desk.frame(2, narrow);
+        let (_, bytes) = fixture.frame(2, narrow);
         assert!(bytes.len() <= 120, "{}", bytes.len());
-        assert_eq!(desk.parser.screen().contents().matches(&long).count(), rows);
-        assert_eq!(desk.pacing.rest().text, rows < 3);
+        assert_eq!(fixture.parser.screen().contents().matches(&long).count(), rows);
+        assert_eq!(fixture.diff.pending().text, rows < 3);
     }
 }
 
 #[test]
-fn the_worst_cells_come_first() {
-    let mut desk = Desk::new();
-    desk.frame(0, EVERYTHING);
-    // Now over a line: first everything is known, then three cells change.
-    desk.samples = 2.0;
-    desk.frame(50, within(20_000));
+fn largest_difference_is_sent_first() {
+    let mut fixture = Fixture::new();
+    fixture.frame(0, EVERYTHING);
+    // With a budget: three cells change.
+    fixture.samples = 2.0;
+    fixture.frame(50, within(20_000));
     for (at, color) in [((3, 3), [24, 90, 90]), ((9, 6), [250, 250, 250]), ((20, 2), [150, 20, 60])]
     {
         let [r, g, b] = color;
-        desk.cells[at].set_bg(Color::Rgb(r, g, b)).set_fg(Color::Rgb(r, g, b));
+        fixture.cells[at].set_bg(Color::Rgb(r, g, b)).set_fg(Color::Rgb(r, g, b));
     }
-    desk.version += 1;
-    desk.samples = 4.0;
-    let differing = |desk: &Desk| 240 - desk.exact();
-    let before = differing(&desk);
+    fixture.version += 1;
+    fixture.samples = 4.0;
+    let differing = |fixture: &Fixture| 240 - fixture.exact();
+    let before = differing(&fixture);
     assert_eq!(before, 3);
-    desk.frame(100, within(BESIDE_CELLS + 45));
-    assert_eq!(differing(&desk), before - 1);
-    let parser = &desk.parser;
+    fixture.frame(100, within(FRAME_OVERHEAD + 45));
+    assert_eq!(differing(&fixture), before - 1);
+    let parser = &fixture.parser;
     let cell = parser.screen().cell(6, 9).unwrap();
     assert!([cell.fgcolor(), cell.bgcolor()].contains(&vt100::Color::Rgb(250, 250, 250)));
 }
 
 #[test]
-fn differences_that_nobody_sees_wait_for_rest() {
-    let mut desk = Desk::new();
-    desk.frame(0, within(20_000));
-    assert_eq!(desk.exact(), 240);
-    desk.paint(|x, y| [8 * x as u8, 20 * y as u8, 101]);
-    desk.samples = 2.0;
-    assert_eq!(desk.frame(100, within(20_000)).1, b"");
-    let Pending { visible, hidden, .. } = desk.pacing.rest();
+fn invisible_differences_wait_for_idle_time() {
+    let mut fixture = Fixture::new();
+    fixture.frame(0, within(20_000));
+    assert_eq!(fixture.exact(), 240);
+    fixture.paint(|x, y| [8 * x as u8, 20 * y as u8, 101]);
+    fixture.samples = 2.0;
+    assert_eq!(fixture.frame(100, within(20_000)).1, b"");
+    let Pending { visible, hidden, .. } = fixture.diff.pending();
     assert_eq!((visible, hidden), (false, Some(ms(100) + IDLE)));
-    // After a while without anything new they go, in slices.
-    let (frame, bytes) = desk.frame(2200, within(4000));
+    // After a time without change they are sent in slices.
+    let (frame, bytes) = fixture.frame(2200, within(4000));
     assert!(frame.flushed > 500 && frame.flushed <= 2000 && bytes.len() <= 2000, "{frame:?}");
-    // When the picture is done they go at once; but not before the line has time for them.
-    desk.settled = true;
-    assert_eq!(desk.frame(2300, FrameBudget { refinement: 0, ..within(4000) }).1, b"");
-    while desk.pacing.rest().hidden.is_some() {
-        assert!(desk.frame(2400, within(4000)).0.flushed > 0);
+    // A settled picture sends them at once, if the budget permits refinement.
+    fixture.settled = true;
+    assert_eq!(fixture.frame(2300, FrameBudget { refinement: 0, ..within(4000) }).1, b"");
+    while fixture.diff.pending().hidden.is_some() {
+        assert!(fixture.frame(2400, within(4000)).0.flushed > 0);
     }
-    assert_eq!(desk.exact(), 240);
+    assert_eq!(fixture.exact(), 240);
 }
 
 #[test]
-fn more_samples_count_when_they_are_many_more() {
-    let mut desk = Desk::new();
-    desk.samples = 16.0;
-    desk.frame(0, within(20_000));
-    // Five percent more samples and clearly another colour: it can wait.
-    desk.samples = 17.0;
-    desk.paint(|x, y| [8 * x as u8, 20 * y as u8, 150]);
-    assert_eq!(desk.frame(50, within(20_000)).1, b"");
-    assert!(!desk.pacing.rest().visible);
-    desk.samples = 20.0;
-    desk.frame(100, within(20_000));
-    assert_eq!(desk.exact(), 240);
-    // Another picture cannot wait.
-    desk.subject += 1;
-    desk.samples = 1.0;
-    desk.paint(|x, y| [8 * x as u8, 20 * y as u8, 250]);
-    desk.frame(150, within(20_000));
-    assert_eq!(desk.exact(), 240);
+fn cells_are_compared_after_enough_new_samples() {
+    let mut fixture = Fixture::new();
+    fixture.samples = 16.0;
+    fixture.frame(0, within(20_000));
+    // Five percent more samples and a clearly different colour: nothing is sent.
+    fixture.samples = 17.0;
+    fixture.paint(|x, y| [8 * x as u8, 20 * y as u8, 150]);
+    assert_eq!(fixture.frame(50, within(20_000)).1, b"");
+    assert!(!fixture.diff.pending().visible);
+    fixture.samples = 20.0;
+    fixture.frame(100, within(20_000));
+    assert_eq!(fixture.exact(), 240);
+    // A new subject is sent at once.
+    fixture.subject += 1;
+    fixture.samples = 1.0;
+    fixture.paint(|x, y| [8 * x as u8, 20 * y as u8, 250]);
+    fixture.frame(150, within(20_000));
+    assert_eq!(fixture.exact(), 240);
 }
 
 #[test]
-fn another_picture_appears_in_one_frame_coarse_at_first() {
-    let mut desk = Desk::new();
-    desk.frame(0, within(20_000));
-    desk.subject += 1;
-    desk.paint(|x, y| [255 - 8 * x as u8, 200 - 20 * y as u8, 20]);
-    let (_, bytes) = desk.frame(50, within(1200));
+fn new_picture_appears_as_mosaic_first() {
+    let mut fixture = Fixture::new();
+    fixture.frame(0, within(20_000));
+    fixture.subject += 1;
+    fixture.paint(|x, y| [255 - 8 * x as u8, 200 - 20 * y as u8, 20]);
+    let (_, bytes) = fixture.frame(50, within(1200));
     assert!(bytes.len() <= 1200, "{}", bytes.len());
-    // Every cell has come much nearer.
+    // Every cell is much closer.
     for at in PICTURE.positions() {
-        let cell = desk.parser.screen().cell(at.y, at.x).unwrap();
+        let cell = fixture.parser.screen().cell(at.y, at.x).unwrap();
         let vt100::Color::Rgb(r, ..) = cell.bgcolor() else { panic!("{at} has no colour") };
         let wanted = 255 - 8 * (at.x - PICTURE.x) as i32;
         assert!((i32::from(r) - wanted).abs() < 90, "{at}: {r} for {wanted}");
     }
-    assert!(desk.pacing.rest().visible);
-    desk.finish();
+    assert!(fixture.diff.pending().visible);
+    fixture.finish();
 }
 
 #[test]
-fn what_lay_over_the_picture_comes_back() {
-    let mut desk = Desk::new();
-    desk.frame(0, within(20_000));
-    let before = desk.cells.clone();
+fn uncovered_picture_is_sent_again() {
+    let mut fixture = Fixture::new();
+    fixture.frame(0, within(20_000));
+    let before = fixture.cells.clone();
     for (row, range) in [(3, 35..50), (4, 65..80)] {
-        desk.say(row, "       overlay      ");
-        range.for_each(|at| desk.uncovered[at] = false);
+        fixture.say(row, "       overlay      ");
+        range.for_each(|at| fixture.uncovered[at] = false);
     }
-    // Those cells of the text that lie beside the picture's are its own as well.
+    // Cells of the text beside those marked as covered belong to the picture.
     let wide: Vec<_> = (0..240).map(|at| !(2..4).contains(&(at / 30)) || at % 30 >= 18).collect();
-    desk.uncovered = wide;
-    desk.frame(50, within(20_000));
-    assert!(desk.parser.screen().contents().contains("overlay"));
-    desk.cells = before;
-    desk.uncovered = vec![true; 240];
-    desk.frame(100, within(20_000));
-    assert!(!desk.parser.screen().contents().contains("overlay"));
-    assert_eq!(desk.exact(), 240);
+    fixture.uncovered = wide;
+    fixture.frame(50, within(20_000));
+    assert!(fixture.parser.screen().contents().contains("overlay"));
+    fixture.cells = before;
+    fixture.uncovered = vec![true; 240];
+    fixture.frame(100, within(20_000));
+    assert!(!fixture.parser.screen().contents().contains("overlay"));
+    assert_eq!(fixture.exact(), 240);
 }
 
 #[test]
-fn the_cursor_is_hidden_while_a_frame_is_written() {
-    let mut desk = Desk::new();
-    desk.cursor = Some(Position { x: 7, y: 10 });
-    let (_, bytes) = desk.frame(0, EVERYTHING);
+fn cursor_is_hidden_during_a_frame() {
+    let mut fixture = Fixture::new();
+    fixture.cursor = Some(Position { x: 7, y: 10 });
+    let (_, bytes) = fixture.frame(0, EVERYTHING);
     assert!(bytes.ends_with(b"\x1b[?25h"));
-    assert_eq!(desk.parser.screen().cursor_position(), (10, 7));
-    assert_eq!(desk.frame(1, EVERYTHING).1, b"", "nothing has changed");
-    desk.say(10, "typed");
-    let (_, bytes) = desk.frame(2, within(500));
+    assert_eq!(fixture.parser.screen().cursor_position(), (10, 7));
+    assert_eq!(fixture.frame(1, EVERYTHING).1, b"", "nothing has changed");
+    fixture.say(10, "typed");
+    let (_, bytes) = fixture.frame(2, within(500));
     assert!(bytes.starts_with(b"\x1b[?25l") && bytes.ends_with(b"\x1b[?25h"));
-    desk.cursor = None;
-    assert_eq!(desk.frame(3, EVERYTHING).1, b"\x1b[?25l");
-    assert_eq!(desk.frame(4, EVERYTHING).1, b"");
+    fixture.cursor = None;
+    assert_eq!(fixture.frame(3, EVERYTHING).1, b"\x1b[?25l");
+    assert_eq!(fixture.frame(4, EVERYTHING).1, b"");
 }
 
 #[test]
-fn wide_characters_are_whole() {
-    let mut desk = Desk::new();
+fn wide_characters_are_sent_whole() {
+    let mut fixture = Fixture::new();
     for (now, text) in ["漢字 and more", "a漢", "漢a", "plain"].into_iter().enumerate() {
-        desk.cells.set_string(0, 10, " ".repeat(40), Style::new());
-        desk.say(10, text);
-        desk.frame(100 * now as u64, within(20_000));
-        let screen = desk.parser.screen();
+        fixture.cells.set_string(0, 10, " ".repeat(40), Style::new());
+        fixture.say(10, text);
+        fixture.frame(100 * now as u64, within(20_000));
+        let screen = fixture.parser.screen();
         assert_eq!(screen.contents_between(10, 0, 10, 40).trim_end(), text);
     }
 }

@@ -1,68 +1,68 @@
-//! Frames whose arrival has not been told yet.
+//! Frames that were sent and are not acknowledged yet.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// A frame on its way.
+/// Frame without acknowledgement.
 #[derive(Clone, Copy, Debug)]
 pub struct InFlight {
     pub sent: Duration,
     pub bytes: usize,
-    /// It has parts of the picture.
+    /// `true` if it has cells of the picture.
     pub picture: bool,
 }
 
-/// A frame that has arrived.
+/// Acknowledged frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Acked {
     pub sent: Duration,
     pub bytes: usize,
-    /// No other frame was on its way when it was sent.
+    /// `true` if no other frame was in flight when it was sent.
     pub alone: bool,
 }
 
-/// Frames on their way, in order.
+/// Queue of frames in flight, oldest first.
 #[derive(Debug, Default)]
 pub struct FramesInFlight {
     queue: VecDeque<(InFlight, bool)>,
-    /// When the last one arrived.
-    arrived: Option<Duration>,
+    /// Time of the last acknowledgement.
+    acked_at: Option<Duration>,
 }
 
 impl FramesInFlight {
-    pub fn add(&mut self, flight: InFlight) {
+    pub fn add(&mut self, frame: InFlight) {
         let alone = self.queue.is_empty();
-        self.queue.push_back((flight, alone));
+        self.queue.push_back((frame, alone));
     }
 
-    /// The oldest has arrived; with when the one before it had.
+    /// Removes the oldest frame. Returns it and the time of the acknowledgement before.
     pub fn on_ack(&mut self, at: Duration) -> Option<(Acked, Option<Duration>)> {
         let (InFlight { sent, bytes, .. }, alone) = self.queue.pop_front()?;
-        Some((Acked { sent, bytes, alone }, self.arrived.replace(at)))
+        Some((Acked { sent, bytes, alone }, self.acked_at.replace(at)))
     }
 
     pub fn is_empty(&self) -> bool {
         self.queue.is_empty()
     }
 
-    /// When the oldest was sent.
+    /// Returns the send time of the oldest frame.
     pub fn oldest(&self) -> Option<Duration> {
-        self.queue.front().map(|(flight, _)| flight.sent)
+        self.queue.front().map(|(frame, _)| frame.sent)
     }
 
-    /// When the newest was sent.
+    /// Returns the send time of the newest frame.
     pub fn newest(&self) -> Option<Duration> {
-        self.queue.back().map(|(flight, _)| flight.sent)
+        self.queue.back().map(|(frame, _)| frame.sent)
     }
 
-    /// How many have parts of the picture.
+    /// Returns the number of frames with cells of the picture.
     pub fn pictures(&self) -> usize {
-        self.queue.iter().filter(|(flight, _)| flight.picture).count()
+        self.queue.iter().filter(|(frame, _)| frame.picture).count()
     }
 
-    /// Bytes of those that are only text.
+    /// Returns the bytes of frames with text only.
     pub fn text_bytes(&self) -> usize {
-        let texts = self.queue.iter().filter(|(flight, _)| !flight.picture);
-        texts.map(|(flight, _)| flight.bytes).sum()
+        let texts = self.queue.iter().filter(|(frame, _)| !frame.picture);
+        texts.map(|(frame, _)| frame.bytes).sum()
     }
 }

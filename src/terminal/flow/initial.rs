@@ -1,39 +1,41 @@
-//! What is known about the line before anything was sent.
+//! State of the connection before the first frame.
 
 use crate::terminal::Capabilities;
 use crate::terminal::flow::{DEFAULT_RATE, PacingMode};
 use std::time::Duration;
 
-/// An answer that comes sooner over SSH was not given by the terminal.
+/// Shortest round trip over SSH. A faster reply does not come from the terminal.
 const TOO_SOON: Duration = Duration::from_millis(3);
 
-/// What is known about the line at the start.
+/// State of the connection at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InitialLink {
-    /// How it is known what has arrived.
+    /// Source of acknowledgements.
     pub mode: PacingMode,
-    /// How long the terminal's answer takes, if it is known.
+    /// Round trip of the terminal, if it was measured.
     pub round_trip: Option<Duration>,
-    /// Whether the kernel can be asked.
+    /// `true` if the kernel reports its send queue.
     pub queue: bool,
-    /// What goes out in a second when nothing can be known, in bytes.
+    /// Rate without any acknowledgement, in bytes per second.
     pub fixed_rate: f64,
 }
 
 impl InitialLink {
-    /// By what the terminal has answered. `queue`: whether the kernel can be asked; `rate`: what the
-    /// user wants to be sent in a second, whatever the line may carry.
+    /// Derives the state from the replies of `terminal`. `queue` is `true` if the kernel reports its send
+    /// queue. `rate` is the user's fixed rate in bytes per second, which overrides measurement.
     pub fn of(terminal: &Capabilities, queue: bool, rate: Option<f64>) -> Self {
-        let otherwise = if queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
+        let fallback = if queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
         let multiplexer = terminal.environment.multiplexer;
         let (mode, round_trip) = match (rate, &terminal.environment.ssh) {
             (Some(_), _) => (PacingMode::FixedRate, None),
             (None, None) => (PacingMode::Unlimited, None),
             (None, Some(_)) => match (multiplexer, terminal.passthrough, terminal.round_trip) {
-                (Some(_), Some(took), _) => (PacingMode::AckClocked(multiplexer), Some(took)),
-                (Some(_), None, _) | (None, _, None) => (otherwise, None),
-                (None, _, Some(took)) if took < TOO_SOON => (otherwise, None),
-                (None, _, took) => (PacingMode::AckClocked(None), took),
+                (Some(_), Some(round_trip), _) => {
+                    (PacingMode::AckClocked(multiplexer), Some(round_trip))
+                }
+                (Some(_), None, _) | (None, _, None) => (fallback, None),
+                (None, _, Some(round_trip)) if round_trip < TOO_SOON => (fallback, None),
+                (None, _, round_trip) => (PacingMode::AckClocked(None), round_trip),
             },
         };
         Self { mode, round_trip, queue, fixed_rate: rate.unwrap_or(DEFAULT_RATE) }

@@ -1,13 +1,12 @@
-//! How much the line to the terminal carries, and so what may be sent now.
+//! Flow control: the rate of the connection to the terminal and the size of the next frame.
 //!
-//! A terminal that is far away takes everything at once, into buffers of a megabyte, and shows it many
-//! seconds later. So after each frame the terminal is asked something: its answer tells that it has
-//! come so far, how long that took and how fast the line is. A frame is at most what the line carries
-//! in a tenth of a second, and only one or two are on their way. Where nobody answers, or somebody
-//! does who is not the terminal, the kernel tells how much it has not got rid of yet; where that
-//! cannot be known either, bytes go out at a fixed rate.
+//! An SSH connection accepts a megabyte at once and shows it many seconds later. After each frame the
+//! program therefore requests the cursor position: the reply acknowledges the frame and yields round trip
+//! and rate. A frame holds at most what the connection carries in 100 ms, and only a few frames are in
+//! flight. If the terminal does not reply, or only a multiplexer does, the kernel's TCP send queue is
+//! measured instead. If the kernel does not report it, bytes are sent at a fixed rate.
 //!
-//! Nothing here reads a clock or writes a byte: times and counts are arguments.
+//! The module does no I/O and reads no clock: times and byte counts are arguments.
 
 mod in_flight;
 mod initial;
@@ -23,130 +22,133 @@ use send_queue_estimate::SendQueueEstimate;
 use std::time::Duration;
 pub use tcp_send_queue::TcpSendQueue;
 
-/// Frames come no faster than this.
+/// Shortest interval between frames.
 pub const FRAME_INTERVAL: Duration = Duration::from_millis(33);
-/// Text that nobody waits for comes no faster than this over a line.
+/// Shortest interval between text updates without user input, over a connection.
 pub const TEXT_INTERVAL: Duration = Duration::from_millis(500);
-/// A frame is at most what the line carries in this time.
+/// Time in which the connection carries the largest frame.
 const FRAME_SPAN: Duration = Duration::from_millis(100);
-/// Fewest, first and most bytes of a frame.
+/// Smallest, initial and largest bytes of a frame.
 const BUDGET: [f64; 3] = [2e3, 8e3, 200e3];
-/// Most frames on their way.
-const MOST_FLIGHTS: usize = 6;
-/// Bytes of text that may be sent beside frames on their way.
-const BESIDE: usize = 1500;
-/// Bytes that are measured too roughly to say that a line has become slower.
+/// Most frames in flight.
+const MAX_IN_FLIGHT: usize = 6;
+/// Most bytes of text in flight beside frames of the picture.
+const MAX_TEXT: usize = 1500;
+/// Bytes of a frame below which its time does not show that the connection has become slower.
 const SMALL: usize = 1000;
-/// How long an answer may take; so many questions without one and no more is asked.
+/// Time after which an acknowledgement counts as lost.
 const LOST_AFTER: Duration = Duration::from_secs(3);
-const MOST_LOSSES: u32 = 3;
-/// The shortest time an answer is known to take is learned anew so often.
-const LEARN_INTERVAL: Duration = Duration::from_secs(30);
-/// The share of a new measurement in the rate.
-const NEWEST: f64 = 0.3;
-/// How long somebody acts after the last key.
-const ACTING: Duration = Duration::from_millis(500);
-/// The least that the kernel may hold back before a frame waits.
-const LEAST_QUEUE: f64 = 16e3;
-/// How often the kernel is asked.
+/// Losses in a row after which no more acknowledgements are requested.
+const MAX_LOSSES: u32 = 3;
+/// Interval at which the shortest round trip is measured again.
+const PROBE_INTERVAL: Duration = Duration::from_secs(30);
+/// Weight of a new measurement in the rate.
+const NEW_WEIGHT: f64 = 0.3;
+/// Time after a key during which the user counts as active.
+const ACTIVE_TIME: Duration = Duration::from_millis(500);
+/// Bytes in the kernel's send queue below which a frame never waits.
+const MIN_QUEUE: f64 = 16e3;
+/// Interval at which the kernel's send queue is measured.
 const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
-/// What a line carries of which nothing is known, bytes a second.
+/// Rate of a connection without measurement, in bytes per second.
 pub const DEFAULT_RATE: f64 = 30e3;
-/// The share of the line that goes to differences which nobody sees.
-const FLUSH_SHARE: f64 = 0.25;
-/// How it is known what has arrived.
+/// Share of the rate for differences below the threshold of visibility.
+const REFINEMENT_SHARE: f64 = 0.25;
+
+/// Source of acknowledgements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PacingMode {
-    /// Whoever reads is here: what was written has arrived.
+    /// Local terminal: no acknowledgement needed.
     Unlimited,
-    /// The terminal answers; through a multiplexer, if there is one.
+    /// The terminal replies, through a multiplexer if there is one.
     AckClocked(Option<Multiplexer>),
-    /// The kernel tells what it has not got rid of yet.
+    /// The kernel reports its TCP send queue.
     SendQueue,
-    /// It is not known.
+    /// None: a fixed rate.
     FixedRate,
 }
 
-/// What a frame may contain.
+/// Limits of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameBudget {
-    /// Bytes of everything; `usize::MAX`: as many as there are.
+    /// Bytes in total; `usize::MAX` without limit.
     pub bytes: usize,
-    /// Whether parts of the picture may be among them.
+    /// `true` if cells of the picture may be sent.
     pub picture: bool,
-    /// Of them, bytes of differences that cannot be seen.
+    /// Bytes for differences below the threshold of visibility.
     pub refinement: usize,
 }
 
-/// What the user is told about the line.
+/// State of the connection, for the user.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkStatus {
-    /// Bytes a second: measured, or fixed.
+    /// Rate in bytes per second, measured or fixed.
     pub rate: f64,
-    /// How it is known what has arrived.
+    /// Source of acknowledgements.
     pub mode: PacingMode,
 }
 
-/// The line to the terminal.
+/// Flow control of the connection to the terminal.
 #[derive(Debug)]
 pub struct FlowControl {
     mode: PacingMode,
-    /// What to go back to when answers come again.
-    silent: Option<PacingMode>,
+    /// Mode to return to when replies come again.
+    suspended_mode: Option<PacingMode>,
     start: InitialLink,
-    /// Bytes a second.
+    /// Bytes per second.
     rate: f64,
     round_trip: Option<Duration>,
-    learned: Duration,
-    flights: FramesInFlight,
+    round_trip_at: Duration,
+    in_flight: FramesInFlight,
     losses: u32,
-    /// When the user began to act.
-    acting_since: Duration,
-    acting_until: Duration,
+    /// Start of the user's activity.
+    active_since: Duration,
+    /// End of the user's activity.
+    active_until: Duration,
     last_frame: Option<Duration>,
-    /// When what was sent at a known rate is through.
+    /// Time at which bytes sent without acknowledgement are through, by the rate.
     free_at: Duration,
-    /// When the line has done with what was sent, by its rate: a frame then finds it empty.
+    /// Time at which acknowledged frames are through, by the rate: the connection is then empty.
     clear_at: Duration,
-    /// When the next slice of invisible differences may go.
-    flush_at: Duration,
-    held_back: SendQueueEstimate,
+    /// Earliest time of the next refinement.
+    refine_at: Duration,
+    send_queue: SendQueueEstimate,
 }
 
 impl FlowControl {
-    /// A line of which `start` is known.
+    /// Creates the flow control of a connection in state `start`.
     pub fn new(start: InitialLink) -> Self {
         let span = FRAME_SPAN.as_secs_f64();
         Self {
             mode: start.mode,
-            silent: None,
+            suspended_mode: None,
             rate: if start.mode == PacingMode::FixedRate {
                 start.fixed_rate
             } else {
                 BUDGET[1] / span
             },
             round_trip: start.round_trip,
-            learned: Duration::ZERO,
+            round_trip_at: Duration::ZERO,
             start,
-            flights: FramesInFlight::default(),
+            in_flight: FramesInFlight::default(),
             losses: 0,
-            acting_since: Duration::ZERO,
-            acting_until: Duration::ZERO,
+            active_since: Duration::ZERO,
+            active_until: Duration::ZERO,
             last_frame: None,
             free_at: Duration::ZERO,
             clear_at: Duration::ZERO,
-            flush_at: Duration::ZERO,
-            held_back: SendQueueEstimate::default(),
+            refine_at: Duration::ZERO,
+            send_queue: SendQueueEstimate::default(),
         }
     }
 
-    /// For the user; nothing about a terminal that is here.
+    /// Returns the state for the user; `None` for a local terminal.
     pub fn reading(&self) -> Option<LinkStatus> {
         (self.mode != PacingMode::Unlimited)
             .then_some(LinkStatus { rate: self.rate, mode: self.mode })
     }
 
-    /// The OKLab distance from which on a difference is worth sending.
+    /// Returns the OKLab distance above which a difference counts as visible.
     pub fn threshold(&self) -> f32 {
         match self.mode {
             PacingMode::Unlimited => 0.0,
@@ -157,46 +159,48 @@ impl FlowControl {
         }
     }
 
-    /// The user has done something.
+    /// Records user input.
     pub fn act(&mut self, now: Duration) {
-        if now >= self.acting_until {
-            self.acting_since = now;
+        if now >= self.active_until {
+            self.active_since = now;
         }
-        self.acting_until = now + ACTING;
+        self.active_until = now + ACTIVE_TIME;
     }
 
-    /// How the question after a frame is asked; `None`: it is not.
+    /// Returns the multiplexer that the request after a frame passes through; `None` without request.
     pub fn ack_request(&self) -> Option<Option<Multiplexer>> {
         match self.mode {
-            PacingMode::AckClocked(through) => Some(through),
+            PacingMode::AckClocked(multiplexer) => Some(multiplexer),
             _ => None,
         }
     }
 
-    /// Whether the kernel is to be asked, with [`FlowControl::held_back`].
+    /// Returns `true` if the kernel's send queue is due for [`FlowControl::held_back`].
     pub fn asks_kernel(&self, now: Duration) -> bool {
-        let asked = self.held_back.asked;
+        let measured_at = self.send_queue.asked;
         self.mode == PacingMode::SendQueue
-            && asked.is_none_or(|asked| asked + QUEUE_INTERVAL <= now)
+            && measured_at.is_none_or(|at| at + QUEUE_INTERVAL <= now)
     }
 
-    /// What may be sent now; `answers`: it shows what the user has just done. `None`: nothing.
+    /// Returns the limits of a frame that may be sent now; `None` if none may. `answers` is `true` if the
+    /// frame shows the effect of user input.
     pub fn allowance(&self, now: Duration, answers: bool) -> Option<FrameBudget> {
-        // A small frame, because its answer is to tell how long the way is.
-        let bytes = if self.is_learning(now) { SMALL } else { self.budget() };
+        // A small frame, because its reply measures the round trip.
+        let bytes = if self.is_probing(now) { SMALL } else { self.budget() };
         let due = |interval| self.last_frame.is_none_or(|last| answers || last + interval <= now);
         if due(FRAME_INTERVAL) && self.has_room(now, answers) {
-            let refinement = if self.flush_at <= now { bytes / 2 } else { 0 };
+            let refinement = if self.refine_at <= now { bytes / 2 } else { 0 };
             return Some(FrameBudget { bytes, picture: true, refinement });
         }
-        let beside = BESIDE.saturating_sub(self.flights.text_bytes());
-        let may_beside = self.mode != PacingMode::FixedRate || self.free_at <= now + 2 * FRAME_SPAN;
-        let due = due(TEXT_INTERVAL) && may_beside && beside >= BESIDE / 4;
-        due.then_some(FrameBudget { bytes: beside, picture: false, refinement: 0 })
+        let text_bytes = MAX_TEXT.saturating_sub(self.in_flight.text_bytes());
+        let may_send_text =
+            self.mode != PacingMode::FixedRate || self.free_at <= now + 2 * FRAME_SPAN;
+        let due = due(TEXT_INTERVAL) && may_send_text && text_bytes >= MAX_TEXT / 4;
+        due.then_some(FrameBudget { bytes: text_bytes, picture: false, refinement: 0 })
     }
 
-    /// When to ask for an [`FlowControl::allowance`] again if it is not given now, by time alone. `text`:
-    /// there may be some to send.
+    /// Returns the time at which [`FlowControl::allowance`] may permit a frame without further events.
+    /// `text` is `true` if text may be pending.
     pub fn wakes_at(&self, now: Duration, text: bool) -> Duration {
         let after = |interval| self.last_frame.map_or(now, |last| last + interval);
         let frame = after(FRAME_INTERVAL);
@@ -204,14 +208,14 @@ impl FlowControl {
             PacingMode::Unlimited => frame,
             PacingMode::AckClocked(_) if self.has_room(now, false) => frame,
             PacingMode::AckClocked(_) if self.free_at > now => frame.max(self.free_at),
-            PacingMode::AckClocked(_) if now < self.acting_until.min(self.clear_at) => {
+            PacingMode::AckClocked(_) if now < self.active_until.min(self.clear_at) => {
                 frame.max(self.clear_at)
             }
-            // Before that an answer comes, or is lost.
+            // By then a reply has come or is lost.
             PacingMode::AckClocked(_) => self.lost_at().unwrap_or(frame),
             PacingMode::SendQueue => {
-                let asked = self.held_back.asked.map_or(now, |asked| asked + QUEUE_INTERVAL);
-                if self.has_room(now, false) { frame } else { frame.max(asked) }
+                let due = self.send_queue.asked.map_or(now, |at| at + QUEUE_INTERVAL);
+                if self.has_room(now, false) { frame } else { frame.max(due) }
             }
             PacingMode::FixedRate => frame.max(self.free_at),
         };
@@ -219,28 +223,28 @@ impl FlowControl {
         if at > now { at } else { now + QUEUE_INTERVAL }
     }
 
-    /// When a slice of differences that nobody sees may go.
-    pub fn flush_at(&self) -> Duration {
-        self.flush_at
+    /// Returns the earliest time of the next refinement.
+    pub fn refine_at(&self) -> Duration {
+        self.refine_at
     }
 
-    /// A frame was sent, `picture`: with parts of the picture, of which `flushed` were bytes of what
-    /// cannot be seen.
+    /// Records a sent frame. `picture` is `true` if it has cells of the picture; `flushed` are its bytes of
+    /// invisible differences.
     pub fn sent(&mut self, now: Duration, bytes: usize, picture: bool, flushed: usize) {
         let seconds = |bytes: usize, rate: f64| Duration::from_secs_f64(bytes as f64 / rate);
         self.last_frame = Some(now);
         if flushed > 0 {
-            self.flush_at = now + seconds(flushed, FLUSH_SHARE * self.rate);
+            self.refine_at = now + seconds(flushed, REFINEMENT_SHARE * self.rate);
         }
         match self.mode {
             PacingMode::Unlimited => {}
             PacingMode::AckClocked(_) => {
                 self.clear_at = self.clear_at.max(now) + seconds(bytes, self.rate);
-                self.flights.add(InFlight { sent: now, bytes, picture });
+                self.in_flight.add(InFlight { sent: now, bytes, picture });
             }
             PacingMode::SendQueue => {
-                self.held_back.sent += bytes as f64;
-                self.held_back.bytes += bytes as f64;
+                self.send_queue.sent += bytes as f64;
+                self.send_queue.bytes += bytes as f64;
             }
             PacingMode::FixedRate => {
                 self.free_at = self.free_at.max(now) + seconds(bytes, self.rate)
@@ -248,115 +252,115 @@ impl FlowControl {
         }
     }
 
-    /// Bytes were sent that end in the midst of a sequence, where nothing can be asked: the line is
-    /// taken to carry what it has carried so far.
+    /// Records bytes that end inside a sequence, where no request is possible. Their time is estimated by
+    /// the rate.
     pub fn sent_unasked(&mut self, now: Duration, bytes: usize) {
         if let PacingMode::AckClocked(_) = self.mode {
             self.last_frame = Some(now);
-            let took = Duration::from_secs_f64(bytes as f64 / self.rate);
-            self.free_at = self.free_at.max(now) + took;
+            let duration = Duration::from_secs_f64(bytes as f64 / self.rate);
+            self.free_at = self.free_at.max(now) + duration;
         } else {
             self.sent(now, bytes, true, 0);
         }
     }
 
-    /// The terminal has answered. Whether something may have become possible by that.
+    /// Records a reply of the terminal. Returns `true` if a frame may have become possible.
     pub fn on_ack(&mut self, at: Duration) -> bool {
-        if let Some(mode) = self.silent.take() {
-            // After a tunnel: the answers have come after all.
+        if let Some(mode) = self.suspended_mode.take() {
+            // Late replies, as after a tunnel.
             self.mode = mode;
             self.rate = self.rate.min(self.start.fixed_rate);
-            self.flights = FramesInFlight::default();
+            self.in_flight = FramesInFlight::default();
             self.losses = 0;
             return true;
         }
-        let Some((flight, arrived)) = self.flights.on_ack(at) else { return false };
+        let Some((frame, previous_ack)) = self.in_flight.on_ack(at) else { return false };
         self.losses = 0;
-        if self.flights.is_empty() {
+        if self.in_flight.is_empty() {
             self.clear_at = self.clear_at.min(at);
         }
-        let took = at.saturating_sub(flight.sent);
-        if flight.alone && flight.bytes <= SMALL && self.is_learning(at) {
-            self.round_trip = Some(took);
-            self.learned = at;
+        let elapsed = at.saturating_sub(frame.sent);
+        if frame.alone && frame.bytes <= SMALL && self.is_probing(at) {
+            self.round_trip = Some(elapsed);
+            self.round_trip_at = at;
         }
-        self.round_trip = self.round_trip.map(|least| least.min(took));
-        // The line begins with a frame when it is there, and has done with the one before.
-        let there = flight.sent + self.round_trip.unwrap_or_default().mul_f64(0.9);
-        let begun = arrived.map_or(there, |before| there.max(before));
-        let span = at.saturating_sub(begun).max(Duration::from_millis(10));
-        let rate = flight.bytes as f64 / span.as_secs_f64();
-        // A small frame says little about a fast line, except that it is not slow.
-        if flight.bytes >= SMALL || rate > self.rate {
-            let full = 2 * flight.bytes >= self.budget() || span > 2 * FRAME_SPAN;
-            if full || rate > self.rate {
-                self.rate = (1.0 - NEWEST) * self.rate + NEWEST * rate;
+        self.round_trip = self.round_trip.map(|least| least.min(elapsed));
+        // Transmission starts when the frame has reached the connection and the one before is through.
+        let earliest = frame.sent + self.round_trip.unwrap_or_default().mul_f64(0.9);
+        let start = previous_ack.map_or(earliest, |previous| earliest.max(previous));
+        let span = at.saturating_sub(start).max(Duration::from_millis(10));
+        let rate = frame.bytes as f64 / span.as_secs_f64();
+        // A small frame measures a fast connection poorly; it only shows that it is not slow.
+        if frame.bytes >= SMALL || rate > self.rate {
+            let is_full = 2 * frame.bytes >= self.budget() || span > 2 * FRAME_SPAN;
+            if is_full || rate > self.rate {
+                self.rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
             }
         }
         true
     }
 
-    /// The kernel has got rid of all but so many bytes; `None`: it does not know (any more).
+    /// Records the bytes in the kernel's send queue; `None` if it no longer reports them.
     pub fn held_back(&mut self, now: Duration, bytes: Option<usize>) {
         let Some(bytes) = bytes else {
-            self.go_without_answers(PacingMode::FixedRate, now);
+            self.stop_requests(PacingMode::FixedRate, now);
             return;
         };
-        let held = &mut self.held_back;
-        let gone = held.sent - bytes as f64;
-        let before = held.asked.replace(now).map(|asked| (asked, held.drained));
-        (held.bytes, held.drained) = (bytes as f64, gone);
-        let (since, at_first) = match (before, held.busy_since) {
-            // The line has nothing to do: it is at least as fast as what it has taken.
+        let queue = &mut self.send_queue;
+        let drained = queue.sent - bytes as f64;
+        let before = queue.asked.replace(now).map(|at| (at, queue.drained));
+        (queue.bytes, queue.drained) = (bytes as f64, drained);
+        let (since, drained_before) = match (before, queue.busy_since) {
+            // The queue is empty: the connection is at least as fast as the bytes sent.
             (Some(before), _) if bytes == 0 => before,
             (_, Some(busy)) => busy,
             _ => {
-                held.busy_since = Some((now, gone));
+                queue.busy_since = Some((now, drained));
                 return;
             }
         };
         let span = now.saturating_sub(since);
-        let rate = (gone - at_first) / span.as_secs_f64().max(1e-3);
+        let rate = (drained - drained_before) / span.as_secs_f64().max(1e-3);
         if bytes == 0 {
-            held.busy_since = None;
+            queue.busy_since = None;
             if rate <= self.rate {
                 return;
             }
         } else if span < FRAME_SPAN {
             return;
         } else {
-            held.busy_since = Some((now, gone));
+            queue.busy_since = Some((now, drained));
         }
-        self.rate = (1.0 - NEWEST) * self.rate + NEWEST * rate.max(BUDGET[0]);
+        self.rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate.max(BUDGET[0]);
     }
 
-    /// Time has passed: answers that have not come by now are not waited for.
+    /// Discards acknowledgements that are overdue at `now`.
     pub fn expire(&mut self, now: Duration) {
         if self.lost_at().is_none_or(|at| at > now) {
             return;
         }
-        self.flights = FramesInFlight::default();
+        self.in_flight = FramesInFlight::default();
         self.rate = (self.rate / 2.0).max(BUDGET[0] / FRAME_SPAN.as_secs_f64());
         self.losses += 1;
-        if self.losses >= MOST_LOSSES {
-            let otherwise =
+        if self.losses >= MAX_LOSSES {
+            let fallback =
                 if self.start.queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
-            self.go_without_answers(otherwise, now);
+            self.stop_requests(fallback, now);
         }
     }
 
-    /// How long to wait for answers that are still to come, at the end; nothing if there are none.
+    /// Returns the longest wait for outstanding replies before the program ends; `None` if there are none.
     pub fn awaits(&self) -> Option<Duration> {
-        let waiting = !self.flights.is_empty() || self.silent.is_some();
-        waiting.then(|| 2 * self.round_trip.unwrap_or_default() + 2 * FRAME_SPAN)
+        let is_waiting = !self.in_flight.is_empty() || self.suspended_mode.is_some();
+        is_waiting.then(|| 2 * self.round_trip.unwrap_or_default() + 2 * FRAME_SPAN)
     }
 
-    /// Whether questions are still to be answered.
+    /// Returns `true` if acknowledgements are outstanding.
     pub fn is_waiting(&self) -> bool {
-        !self.flights.is_empty()
+        !self.in_flight.is_empty()
     }
 
-    /// Bytes of a frame.
+    /// Returns the largest bytes of a frame.
     fn budget(&self) -> usize {
         match self.mode {
             PacingMode::Unlimited => usize::MAX,
@@ -369,54 +373,58 @@ impl FlowControl {
             PacingMode::Unlimited => true,
             PacingMode::AckClocked(_) if self.free_at > now => false,
             PacingMode::AckClocked(_) => {
-                if self.is_learning(now) {
-                    return self.flights.is_empty();
+                if self.is_probing(now) {
+                    return self.in_flight.is_empty();
                 }
-                let acting = now < self.acting_until;
-                // Who acts waits for no more than the frame that the line is at.
-                let most = match acting && self.clear_at > now {
+                let is_active = now < self.active_until;
+                // Input waits for no more than the frame being transmitted.
+                let limit = match is_active && self.clear_at > now {
                     true => 1 + usize::from(answers),
-                    false => self.flights_at_once(),
+                    false => self.target_in_flight(),
                 };
-                // The first answer does not wait for what was sent when nobody did anything.
-                let newest = self.flights.newest();
-                let first = acting && answers && newest.is_some_and(|at| at < self.acting_since);
-                first || self.flights.pictures() < most
+                // The first effect of input does not wait for frames sent before the input.
+                let newest_sent = self.in_flight.newest();
+                let is_first =
+                    is_active && answers && newest_sent.is_some_and(|at| at < self.active_since);
+                is_first || self.in_flight.pictures() < limit
             }
             PacingMode::SendQueue => {
-                let most = LEAST_QUEUE.max(self.rate * FRAME_SPAN.as_secs_f64());
-                self.held_back.bytes < most
+                let limit = MIN_QUEUE.max(self.rate * FRAME_SPAN.as_secs_f64());
+                self.send_queue.bytes < limit
             }
             PacingMode::FixedRate => {
-                let early = if answers { FRAME_SPAN } else { Duration::ZERO };
-                self.free_at <= now + early
+                let lead = if answers { FRAME_SPAN } else { Duration::ZERO };
+                self.free_at <= now + lead
             }
         }
     }
 
-    /// Frames on their way that keep the line busy: one that it carries, and what the way holds.
-    fn flights_at_once(&self) -> usize {
-        let way = self.round_trip.unwrap_or_default().as_secs_f64() / FRAME_SPAN.as_secs_f64();
-        (1 + way.round() as usize).clamp(2, MOST_FLIGHTS)
+    /// Returns the number of frames in flight that keeps the connection busy: one in transmission and those
+    /// within the round trip.
+    fn target_in_flight(&self) -> usize {
+        let round_trips =
+            self.round_trip.unwrap_or_default().as_secs_f64() / FRAME_SPAN.as_secs_f64();
+        (1 + round_trips.round() as usize).clamp(2, MAX_IN_FLIGHT)
     }
 
-    /// Whether the next frame is to tell how long the way is: not while somebody acts.
-    fn is_learning(&self, now: Duration) -> bool {
-        let known = self.round_trip.is_some() && now < self.learned + LEARN_INTERVAL;
-        matches!(self.mode, PacingMode::AckClocked(_)) && !known && now >= self.acting_until
+    /// Returns `true` if the next frame is to measure the round trip, which is not done while the user is
+    /// active.
+    fn is_probing(&self, now: Duration) -> bool {
+        let is_known = self.round_trip.is_some() && now < self.round_trip_at + PROBE_INTERVAL;
+        matches!(self.mode, PacingMode::AckClocked(_)) && !is_known && now >= self.active_until
     }
 
     fn lost_at(&self) -> Option<Duration> {
-        self.flights.oldest().map(|sent| sent + LOST_AFTER)
+        self.in_flight.oldest().map(|sent| sent + LOST_AFTER)
     }
 
-    fn go_without_answers(&mut self, mode: PacingMode, now: Duration) {
+    fn stop_requests(&mut self, mode: PacingMode, now: Duration) {
         if matches!(self.mode, PacingMode::AckClocked(_)) {
-            self.silent = Some(self.mode);
+            self.suspended_mode = Some(self.mode);
         }
         self.mode = mode;
         self.free_at = now;
-        self.held_back = SendQueueEstimate::default();
+        self.send_queue = SendQueueEstimate::default();
         if mode == PacingMode::FixedRate {
             self.rate = self.start.fixed_rate;
         }

@@ -1,18 +1,18 @@
-//! What the kernel of this machine has not got rid of yet.
+//! Bytes still in the kernel's TCP send queue.
 
 use std::time::Duration;
 
-/// What the kernel holds back.
+/// Estimate of the send queue and its drain rate.
 #[derive(Debug, Default)]
 pub struct SendQueueEstimate {
-    /// Bytes.
+    /// Bytes in the queue.
     pub bytes: f64,
-    /// When it was asked last.
+    /// Time of the last measurement.
     pub asked: Option<Duration>,
-    /// Bytes that it had got rid of then.
+    /// Bytes that had left the queue by then.
     pub drained: f64,
-    /// Since when it has always held something back, and what it had got rid of before.
+    /// Start of the period in which the queue was never empty, and the bytes drained before.
     pub busy_since: Option<(Duration, f64)>,
-    /// Bytes that were sent in all.
+    /// Bytes sent in total.
     pub sent: f64,
 }

@@ -1,10 +1,10 @@
-//! What the kernel has sent over the connection of SSH and nobody has confirmed (proc(5),
-//! `/proc/net/tcp`). It sees the way to the next host only.
+//! Unacknowledged bytes of the SSH connection in the kernel's send queue (proc(5), `/proc/net/tcp`). They
+//! describe the path to the next host only.
 
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
-/// The connection of SSH.
+/// SSH connection in the kernel's table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TcpSendQueue {
     local: SocketAddr,
@@ -12,20 +12,20 @@ pub struct TcpSendQueue {
 }
 
 impl TcpSendQueue {
-    /// By `SSH_CONNECTION`, if the kernel knows that connection.
+    /// Finds the connection of `SSH_CONNECTION`; `None` if the kernel does not list it.
     pub fn find(ssh_connection: &str) -> Option<Self> {
-        let queue = Self::named(ssh_connection)?;
+        let queue = Self::parse(ssh_connection)?;
         queue.bytes().is_some().then_some(queue)
     }
 
-    /// Bytes that are not confirmed; `None`: the connection is not known.
+    /// Returns the unacknowledged bytes; `None` if the connection is not listed.
     pub fn bytes(&self) -> Option<usize> {
         let tables = ["/proc/net/tcp", "/proc/net/tcp6"];
-        tables.into_iter().find_map(|path| self.found(&fs::read_to_string(path).ok()?))
+        tables.into_iter().find_map(|path| self.bytes_in(&fs::read_to_string(path).ok()?))
     }
 
-    /// `client-address client-port server-address server-port`.
-    fn named(text: &str) -> Option<Self> {
+    /// Parses `client-address client-port server-address server-port`.
+    fn parse(text: &str) -> Option<Self> {
         let fields: Vec<_> = text.split_whitespace().collect();
         let [client, client_port, server, server_port] = fields[..] else { return None };
         let address = |ip: &str, port: &str| {
@@ -36,24 +36,24 @@ impl TcpSendQueue {
         Some(Self { local: address(server, server_port)?, remote: address(client, client_port)? })
     }
 
-    fn found(&self, table: &str) -> Option<usize> {
+    fn bytes_in(&self, table: &str) -> Option<usize> {
         table.lines().skip(1).find_map(|line| {
             let mut fields = line.split_whitespace().skip(1);
             let [local, remote] = [fields.next()?, fields.next()?].map(address);
             let queues = fields.nth(1)?;
-            let is_it = local? == self.local && remote? == self.remote;
-            is_it.then(|| usize::from_str_radix(queues.split(':').next()?, 16).ok())?
+            let is_match = local? == self.local && remote? == self.remote;
+            is_match.then(|| usize::from_str_radix(queues.split(':').next()?, 16).ok())?
         })
     }
 }
 
-/// An address of the table: the 32-bit words of the IP address in the machine's order, in hexadecimal,
-/// and the port.
+/// Parses an address of the table: the IP address as hexadecimal 32-bit words in native byte order, and
+/// the port.
 fn address(text: &str) -> Option<SocketAddr> {
     let (words, port) = text.split_once(':')?;
     let mut bytes = Vec::with_capacity(16);
-    for at in (0..words.len()).step_by(8) {
-        let word = u32::from_str_radix(words.get(at..at + 8)?, 16).ok()?;
+    for start in (0..words.len()).step_by(8) {
+        let word = u32::from_str_radix(words.get(start..start + 8)?, 16).ok()?;
         bytes.extend(word.to_ne_bytes());
     }
     let ip = match <[u8; 4]>::try_from(&*bytes) {
@@ -63,7 +63,7 @@ fn address(text: &str) -> Option<SocketAddr> {
     Some(SocketAddr::new(unmapped(ip), u16::from_str_radix(port, 16).ok()?))
 }
 
-/// IPv4 over a socket of IPv6 is IPv4.
+/// Converts an IPv4-mapped IPv6 address to IPv4.
 fn unmapped(ip: IpAddr) -> IpAddr {
     match ip {
         IpAddr::V6(v6) => v6.to_ipv4_mapped().map_or(ip, IpAddr::V4),
@@ -79,13 +79,13 @@ mod tests {
 
     #[test]
     #[cfg(target_endian = "little")]
-    fn rows_are_found_by_both_addresses() {
+    fn connection_is_found_by_both_addresses() {
         let head = "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt\n";
         let v4 = "   0: 0200000A:0016 0100000A:1388 01 00003E80:00000000 01:00000014 00000000  0\n";
         let v6 = "   1: 0000000000000000FFFF00000200000A:0016 0000000000000000FFFF00000100000A:1389 \
                   01 00000010:00000000 01:00000014\n";
         let table = format!("{head}{v4}{v6}");
-        let found = |text: &str| TcpSendQueue::named(text).and_then(|queue| queue.found(&table));
+        let found = |text: &str| TcpSendQueue::parse(text).and_then(|queue| queue.bytes_in(&table));
         assert_eq!(found("10.0.0.1 5000 10.0.0.2 22"), Some(16_000));
         assert_eq!(found("10.0.0.1 5001 10.0.0.2 22"), Some(16));
         assert_eq!(found("::ffff:10.0.0.1 5001 ::ffff:10.0.0.2 22"), Some(16));
@@ -94,15 +94,15 @@ mod tests {
             assert_eq!(found(wrong), None, "{wrong}");
         }
         assert_eq!(
-            TcpSendQueue::named("10.0.0.1 5000 10.0.0.2 22").unwrap().found("nonsense\n0:\n"),
+            TcpSendQueue::parse("10.0.0.1 5000 10.0.0.2 22").unwrap().bytes_in("nonsense\n0:\n"),
             None
         );
     }
 
-    /// A connection of this very test: what nobody reads stays.
+    /// Unread bytes of a connection within the test stay in the queue.
     #[test]
     #[cfg(target_os = "linux")]
-    fn the_kernel_tells_what_is_held_back() {
+    fn kernel_reports_unread_bytes() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let mut server = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
         let (_client, from) = listener.accept().unwrap();

@@ -1,21 +1,22 @@
-//! Kitty's graphics protocol (sw.kovidgoyal.net/kitty/graphics-protocol): a PNG in pieces.
+//! Kitty's graphics protocol (sw.kovidgoyal.net/kitty/graphics-protocol): a PNG in chunks.
 
 use crate::terminal::Area;
 use crate::terminal::image::transfer::Transfer;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use crossterm::cursor::MoveTo;
 
-/// Letters of a piece. The protocol allows 4096; fewer, so that a piece fits into every budget. Of all
-/// but the last a multiple of 4.
-const PIECE: usize = 1024;
+/// Base64 characters of a chunk, a multiple of 4. The protocol allows 4096; 1024 fit into every budget.
+const CHUNK: usize = 1024;
 
-/// The image's number: small, so that a colour of the table of 256 can tell it.
+/// Image number; below 256, so that an indexed colour encodes it in placeholders.
 pub const IMAGE: u8 = 163;
 
-/// The character for a part of an image among text.
+/// Unicode placeholder for a cell of an image.
 const PLACEHOLDER: char = '\u{10eeee}';
 
-/// Marks that number the rows of placeholders: first and last of each run of the protocol's table.
+/// Combining marks that number the rows of placeholders: first and last of each run of the protocol's
+/// table.
 const MARKS: [[u32; 2]; 29] = [
     [0x305, 0x305],
     [0x30d, 0x30e],
@@ -48,54 +49,54 @@ const MARKS: [[u32; 2]; 29] = [
     [0x732, 0x733],
 ];
 
-/// The most rows that placeholders can tell.
-pub fn most_rows() -> u16 {
+/// Returns the largest number of rows that placeholders can encode.
+pub fn max_rows() -> u16 {
     MARKS.iter().map(|[first, last]| (last - first + 1) as u16).sum()
 }
 
-/// What stands in each cell of a row of the image: its number, and with it that columns go on from the
-/// left.
+/// Returns the text of each cell in a row of the image. It encodes the row; the terminal counts the
+/// columns from the left.
 pub fn placeholder(row: u16) -> String {
     let mark = MARKS.iter().flat_map(|[first, last]| *first..=*last).nth(usize::from(row));
     [Some(PLACEHOLDER), mark.and_then(char::from_u32)].into_iter().flatten().collect()
 }
 
-/// What shows `png` at `place`, pixel by pixel or stretched to its cells. `through_tmux`: wrapped so that
-/// it reaches the terminal behind, which then shows it where there are placeholders.
+/// Returns the bytes that show `png` at `place`. `stretched` scales it to its cells. `through_tmux` wraps
+/// it for the terminal behind tmux, which shows it at placeholders.
 pub fn transfer(png: &[u8], place: Area, stretched: bool, through_tmux: bool) -> Transfer {
     let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
     let letters = STANDARD.encode(png);
     let remove = format!("\x1b_Ga=d,d=I,i={IMAGE},q=2\x1b\\");
-    // An image whose pieces have not all come is given up: the last one makes it a broken one.
+    // An image with missing chunks is ended by a last chunk, which makes it invalid.
     let give_up = "\x1b_Gm=0,q=2;\x1b\\".to_string();
     let remove = [give_up, remove].map(wrap).concat().into_bytes();
     let mut transfer = Transfer { remove, ..Transfer::default() };
     let Area { x, y, width, height } = place;
-    // It appears where the cursor is when its last piece has come.
-    let go = match through_tmux {
+    // The image appears at the cursor when its last chunk has come.
+    let cursor = match through_tmux {
         true => String::new(),
-        false => format!("\x1b[{};{}H", y + 1, x + 1),
+        false => MoveTo(x, y).to_string(),
     };
-    let mut how = if through_tmux { "U=1" } else { "C=1" }.to_string();
+    let mut placement = if through_tmux { "U=1" } else { "C=1" }.to_string();
     if stretched || through_tmux {
-        how += &format!(",c={width},r={height}");
+        placement += &format!(",c={width},r={height}");
     }
-    let count = letters.len().div_ceil(PIECE);
-    for at in 0..count {
-        let piece = &letters[at * PIECE..letters.len().min((at + 1) * PIECE)];
-        let first = match at {
-            0 => format!("a=T,f=100,i={IMAGE},{how},"),
+    let count = letters.len().div_ceil(CHUNK);
+    for i in 0..count {
+        let chunk = &letters[i * CHUNK..letters.len().min((i + 1) * CHUNK)];
+        let first = match i {
+            0 => format!("a=T,f=100,i={IMAGE},{placement},"),
             _ => String::new(),
         };
-        let more = u8::from(at + 1 < count);
-        let go = if at == 0 || more == 0 { &*go } else { "" };
-        let piece = wrap(format!("\x1b_G{first}q=2,m={more};{piece}\x1b\\"));
-        transfer.add(format!("{go}{piece}").as_bytes());
+        let more = u8::from(i + 1 < count);
+        let cursor = if i == 0 || more == 0 { &*cursor } else { "" };
+        let chunk = wrap(format!("\x1b_G{first}q=2,m={more};{chunk}\x1b\\"));
+        transfer.add(format!("{cursor}{chunk}").as_bytes());
     }
     transfer
 }
 
-/// Through tmux to the terminal behind it.
+/// Wraps a sequence for the terminal behind tmux.
 fn wrapped(sequence: &str) -> String {
     format!("\x1bPtmux;{}\x1b\\", sequence.replace('\x1b', "\x1b\x1b"))
 }
@@ -109,7 +110,7 @@ mod tests {
     const PLACE: Area = Area { x: 3, y: 1, width: 40, height: 12 };
 
     #[test]
-    fn pieces_carry_the_whole_file() {
+    fn chunks_carry_the_whole_file() {
         for length in [1, 767, 768, 769, 5000] {
             let png: Vec<u8> = (0..length).map(|i| (i % 251) as u8).collect();
             for (stretched, tmux) in [(false, false), (true, false), (false, true)] {
@@ -137,18 +138,17 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_placeholders_are_told_apart() {
-        let rows: std::collections::BTreeSet<_> = (0..most_rows()).map(placeholder).collect();
-        assert_eq!(rows.len(), usize::from(most_rows()));
+    fn placeholders_of_rows_are_distinct() {
+        let rows: std::collections::BTreeSet<_> = (0..max_rows()).map(placeholder).collect();
+        assert_eq!(rows.len(), usize::from(max_rows()));
         assert!(rows.iter().all(|row| row.chars().count() == 2));
         assert!(rows.iter().all(|row| unicode_width::UnicodeWidthStr::width(&**row) == 1));
         assert_eq!(placeholder(0), "\u{10eeee}\u{305}");
         assert_eq!(placeholder(11), "\u{10eeee}\u{34c}");
     }
 
-    /// What a terminal answers although it should be quiet does no harm.
     #[test]
-    fn answers_are_no_keys() {
+    fn graphics_replies_are_not_keys() {
         let mut decoder = Decoder::new(Duration::from_millis(10));
         let events = decoder.take(b"\x1b_Gi=163;EINVAL:broken\x1b\\\x1b_Gi=163;OK\x1b\\");
         assert!(events.iter().all(|e| matches!(e, crate::terminal::Event::Reply(_))));

@@ -1,8 +1,8 @@
-//! A picture that was written, to be looked at without leaving the program: crisp where the terminal
-//! has a protocol for pictures, in half blocks elsewhere.
+//! Viewer images: an exported picture, read from its file and encoded for the terminal by kitty's protocol
+//! or sixel, or as half blocks.
 //!
-//! The protocols are spoken here rather than by a widget, because a picture goes out in slices that
-//! the line has room for: it takes seconds where a key must take effect in tenths of one.
+//! An image is sent in slices within the frame budget, because a transfer can take seconds and a key must
+//! take effect in tenths of a second. No widget does that.
 
 mod kitty;
 mod shrink;
@@ -17,69 +17,69 @@ use shrink::shrunk;
 use std::path::Path;
 pub use transfer::Transfer;
 
-/// The most pixels in a row and rows of a sixel picture if the terminal does not tell: xterm's.
+/// Largest width and height of a sixel image if the terminal reports none: xterm's limit.
 const SIXEL_PX: usize = 1000;
-/// The size of a cell in pixels if the terminal does not tell.
+/// Size of a cell in pixels if the terminal reports none.
 const CELL_PX: [u16; 2] = [8, 16];
-/// The bytes that a pixel takes, more or less.
+/// Estimated bytes per pixel.
 const BYTES_PER_PIXEL: f64 = 1.6;
 
-/// How a picture can be shown.
+/// Protocol for images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Protocol {
-    /// Kitty's, straight to the terminal.
+    /// Kitty's protocol, directly.
     Kitty,
-    /// Kitty's, to the terminal behind tmux, with placeholders among the text.
+    /// Kitty's protocol with Unicode placeholders, to the terminal behind tmux.
     KittyThroughTmux,
-    /// Sixel, with so many colours.
+    /// Sixel with this number of colours.
     Sixel(u16),
-    /// None: half blocks.
+    /// Half blocks, without a protocol.
     Blocks,
 }
 
-/// Where a picture is to be shown, and how.
+/// Screen and protocol for which an image is prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageViewport {
-    /// How.
+    /// Protocol.
     pub protocol: Protocol,
-    /// Columns and rows of the screen, the last of which tells what is seen.
+    /// Columns and rows of the screen; the last row holds the caption.
     pub screen: [u16; 2],
     /// Width and height of a cell in pixels.
     pub cell_px: Option<[u16; 2]>,
-    /// The most pixels of sixel in both directions, if the terminal tells.
+    /// Largest width and height of a sixel image, if the terminal reports it.
     pub sixel_px: Option<[u16; 2]>,
-    /// More bytes than about so many take too long.
-    pub most_bytes: Option<f64>,
+    /// Approximate limit of bytes; `None` without limit.
+    pub max_bytes: Option<f64>,
 }
 
-/// A picture that is ready to be shown.
+/// Image that is prepared for the screen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewerImage {
-    /// Columns and rows of the screen that it was made for.
+    /// Columns and rows of the screen that it was prepared for.
     pub screen: [u16; 2],
-    /// Width and height of the picture in the file.
+    /// Width and height in the file.
     pub size: [usize; 2],
-    /// The same as it is shown.
+    /// Width and height as shown.
     pub shown: [usize; 2],
-    /// How.
+    /// Protocol.
     pub protocol: Protocol,
-    /// The cells that it covers.
+    /// Cells that it covers.
     pub place: Area,
-    /// It in half blocks, on those of the cells that the crisp one covers whole.
+    /// Half blocks, on the cells that the protocol's image covers completely.
     pub raster: Raster,
-    /// What shows it crisply; empty: nothing does.
+    /// Bytes that show it by the protocol; empty for half blocks.
     pub transfer: Transfer,
 }
 
 impl Protocol {
-    /// What the terminal has.
+    /// Chooses the best protocol of the terminal.
     pub fn of(terminal: &Capabilities) -> Self {
         match terminal.environment.multiplexer {
             None if terminal.kitty_graphics => Self::Kitty,
             Some(Multiplexer::Tmux) if terminal.kitty_graphics && terminal.placeholders => {
                 Self::KittyThroughTmux
             }
-            // A tmux that says so shows them itself.
+            // A tmux that reports sixel shows sixel itself.
             _ if terminal.sixel && terminal.cell_px.is_some() => {
                 Self::Sixel(terminal.sixel_colors.unwrap_or(256).clamp(2, 256))
             }
@@ -87,7 +87,7 @@ impl Protocol {
         }
     }
 
-    /// For the user.
+    /// Returns the name for users.
     pub fn name(self) -> &'static str {
         match self {
             Self::Kitty => "kitty's protocol",
@@ -99,94 +99,92 @@ impl Protocol {
 }
 
 impl ImageViewport {
-    /// The same in pixels, and how many of them a cell is; what pictures are made of as blocks counts
-    /// as square.
+    /// Returns the largest image and the size of a cell, in pixels. A half block counts as one square pixel.
     fn px(&self) -> ([usize; 2], [usize; 2]) {
         let cell = match self.protocol {
             Protocol::Blocks => [1, 2],
             _ => self.cell_px.unwrap_or(CELL_PX).map(|px| usize::from(px.max(1))),
         };
         let rows = match self.protocol {
-            Protocol::KittyThroughTmux => (self.screen[1] - 1).min(kitty::most_rows()),
+            Protocol::KittyThroughTmux => (self.screen[1] - 1).min(kitty::max_rows()),
             _ => self.screen[1] - 1,
         };
-        let mut most = [usize::from(self.screen[0]) * cell[0], usize::from(rows) * cell[1]];
+        let mut largest = [usize::from(self.screen[0]) * cell[0], usize::from(rows) * cell[1]];
         if let Protocol::Sixel(_) = self.protocol {
             let limit = self.sixel_px.map_or([SIXEL_PX; 2], |px| px.map(usize::from));
-            most = [0, 1].map(|i| most[i].min(limit[i]));
+            largest = [0, 1].map(|i| largest[i].min(limit[i]));
         }
-        (most, cell)
+        (largest, cell)
     }
 
-    /// How large a picture of this `size` is shown: never larger than it is.
+    /// Returns the size at which an image of `size` is shown. It is never enlarged.
     fn fitting(&self, size: [usize; 2]) -> [usize; 2] {
-        let (most, _) = self.px();
+        let (largest, _) = self.px();
         let [width, height] = size.map(|n| n as f64);
-        let mut scale = f64::min(most[0] as f64 / width, most[1] as f64 / height).min(1.0);
-        if let (Some(bytes), true) = (self.most_bytes, self.protocol != Protocol::Blocks) {
+        let mut scale = f64::min(largest[0] as f64 / width, largest[1] as f64 / height).min(1.0);
+        if let (Some(bytes), true) = (self.max_bytes, self.protocol != Protocol::Blocks) {
             scale = scale.min((bytes / (BYTES_PER_PIXEL * width * height)).sqrt());
         }
-        [0, 1].map(|i| ((size[i] as f64 * scale).round() as usize).clamp(1, most[i].max(1)))
+        [0, 1].map(|i| ((size[i] as f64 * scale).round() as usize).clamp(1, largest[i].max(1)))
     }
 }
 
 impl ViewerImage {
-    /// Reads the picture at `path`, shown as `display` says if it is linear light, and makes it ready
-    /// for `window`.
+    /// Reads the image at `path` and prepares it for `viewport`. `display` converts linear light (EXR).
     ///
     /// # Errors
-    /// Why it cannot be read or shown.
-    pub fn read(path: &Path, display: &Display, window: &ImageViewport) -> Result<Self, String> {
+    /// If it cannot be read or the screen is too small.
+    pub fn read(path: &Path, display: &Display, viewport: &ImageViewport) -> Result<Self, String> {
         let (size, pixels) = if path.extension().is_some_and(|e| e == "exr") {
             let picture = read_exr(path)?;
             (picture.size, picture.pixels.iter().copied().map(display.to_8()).collect())
         } else {
             read_png(path)?
         };
-        Self::of(size, &pixels, window)
+        Self::of(size, &pixels, viewport)
     }
 
-    /// The same for a picture of this `size`, row by row.
-    fn of(size: [usize; 2], pixels: &[[u8; 3]], window: &ImageViewport) -> Result<Self, String> {
-        if size.contains(&0) || window.screen[1] < 2 {
-            return Err("there is nothing to see".to_string());
+    /// Prepares an image of `size`, with pixels row by row, for `viewport`.
+    fn of(size: [usize; 2], pixels: &[[u8; 3]], viewport: &ImageViewport) -> Result<Self, String> {
+        if size.contains(&0) || viewport.screen[1] < 2 {
+            return Err("the screen is too small for a picture".to_string());
         }
-        let (_, cell) = window.px();
-        let shown = window.fitting(size);
+        let (_, cell) = viewport.px();
+        let shown = viewport.fitting(size);
         let small = shrunk(pixels, size, shown);
         let [width, height] = [0, 1].map(|i| shown[i].div_ceil(cell[i]) as u16);
-        let x = window.screen[0].saturating_sub(width) / 2;
-        let y = (window.screen[1] - 1).saturating_sub(height) / 2;
+        let x = viewport.screen[0].saturating_sub(width) / 2;
+        let y = (viewport.screen[1] - 1).saturating_sub(height) / 2;
         let place = Area { x, y, width, height };
-        let transfer = match window.protocol {
+        let transfer = match viewport.protocol {
             Protocol::Blocks => Transfer::default(),
             Protocol::Sixel(colors) => sixel::transfer(&small, shown[0], place, cell[1], colors)?,
             Protocol::Kitty | Protocol::KittyThroughTmux => {
                 let size = shown.map(|n| n as u32);
                 let png = png_of_rgb(size, small.as_flattened()).map_err(|e| e.to_string())?;
-                let through_tmux = window.protocol == Protocol::KittyThroughTmux;
-                kitty::transfer(&png, place, window.cell_px.is_none(), through_tmux)
+                let through_tmux = viewport.protocol == Protocol::KittyThroughTmux;
+                kitty::transfer(&png, place, viewport.cell_px.is_none(), through_tmux)
             }
         };
-        let raster = match window.protocol {
+        let raster = match viewport.protocol {
             Protocol::Blocks => Raster { width: shown[0], height: shown[1], pixels: small },
             _ => {
-                // Not on cells that the crisp one covers in part: it would look out from behind.
+                // Cells that the protocol's image covers in part would show the half blocks beside it.
                 let covered = [0, 1].map(|i| (shown[i] / cell[i]).max(1));
                 let halves = [covered[0].min(shown[0]), (2 * covered[1]).min(shown[1])];
                 let pixels = shrunk(&small, shown, halves);
                 Raster { width: halves[0], height: halves[1], pixels }
             }
         };
-        let ImageViewport { protocol, screen, .. } = *window;
+        let ImageViewport { protocol, screen, .. } = *viewport;
         Ok(Self { screen, size, shown, protocol, place, raster, transfer })
     }
 
-    /// What stands in the cells of a row of the place when all of the transfer has come, and the number
-    /// of their colour; `None`: the picture lies over them.
+    /// Returns the text and the indexed colour of the cells in a row of `place` after the transfer; `None`
+    /// if the image is drawn over the cells.
     pub fn placeholder(&self, row: u16) -> Option<(String, u8)> {
-        let among_text = self.protocol == Protocol::KittyThroughTmux;
-        among_text.then(|| (kitty::placeholder(row), kitty::IMAGE))
+        let has_placeholders = self.protocol == Protocol::KittyThroughTmux;
+        has_placeholders.then(|| (kitty::placeholder(row), kitty::IMAGE))
     }
 }
 
@@ -199,15 +197,15 @@ mod tests {
         screen: [100, 31],
         cell_px: Some([10, 20]),
         sixel_px: None,
-        most_bytes: None,
+        max_bytes: None,
     };
 
     #[test]
-    fn pictures_keep_their_shape_and_are_not_enlarged() {
+    fn image_keeps_its_aspect_and_is_not_enlarged() {
         let blocks = ImageViewport { protocol: Protocol::Blocks, ..WINDOW };
         let sixel = ImageViewport { protocol: Protocol::Sixel(256), screen: [200, 31], ..WINDOW };
-        let slow = ImageViewport { most_bytes: Some(1.6e4), ..WINDOW };
-        for (window, size, expected) in [
+        let slow = ImageViewport { max_bytes: Some(1.6e4), ..WINDOW };
+        for (viewport, size, expected) in [
             (WINDOW, [640, 480], [640, 480]),
             (WINDOW, [2000, 1000], [1000, 500]),
             (WINDOW, [100, 1200], [50, 600]),
@@ -217,26 +215,26 @@ mod tests {
             (sixel, [4000, 1000], [1000, 250]),
             (slow, [400, 100], [200, 50]),
         ] {
-            assert_eq!(window.fitting(size), expected, "{window:?} {size:?}");
+            assert_eq!(viewport.fitting(size), expected, "{viewport:?} {size:?}");
         }
     }
 
     #[test]
-    fn it_stands_in_the_middle_above_the_last_row() {
+    fn image_is_centred_above_the_last_row() {
         for protocol in
             [Protocol::Kitty, Protocol::KittyThroughTmux, Protocol::Sixel(16), Protocol::Blocks]
         {
             for size in [[64, 48], [3000, 2000], [1, 700], [999, 2]] {
-                let window = ImageViewport { protocol, ..WINDOW };
+                let viewport = ImageViewport { protocol, ..WINDOW };
                 let pixels = vec![[9, 8, 7]; size[0] * size[1]];
-                let still = ViewerImage::of(size, &pixels, &window).unwrap();
-                let Area { x, y, width, height } = still.place;
-                assert!(x + width <= 100 && y + height <= 30, "{:?}", still.place);
+                let image = ViewerImage::of(size, &pixels, &viewport).unwrap();
+                let Area { x, y, width, height } = image.place;
+                assert!(x + width <= 100 && y + height <= 30, "{:?}", image.place);
                 assert!((100 - width).abs_diff(2 * x) <= 1 && (30 - height).abs_diff(2 * y) <= 1);
-                assert!(still.raster.width <= width.into());
-                assert!(still.raster.height <= 2 * usize::from(height));
-                assert_eq!(still.transfer.bytes.is_empty(), protocol == Protocol::Blocks);
-                assert!(still.raster.pixels.iter().all(|p| *p == [9, 8, 7]));
+                assert!(image.raster.width <= width.into());
+                assert!(image.raster.height <= 2 * usize::from(height));
+                assert_eq!(image.transfer.bytes.is_empty(), protocol == Protocol::Blocks);
+                assert!(image.raster.pixels.iter().all(|p| *p == [9, 8, 7]));
             }
         }
         assert!(ViewerImage::of([0, 5], &[], &WINDOW).is_err());

@@ -1,10 +1,10 @@
-//! Reduction of pictures to fewer pixels.
+//! Downscaling of images in linear light.
 
 use crate::film::box_means;
 use crate::terminal::cells::{code, linear};
 
-/// Reduces `pixels` of `from` (columns, rows) to `to`, which are no more: each pixel is the mean, in
-/// linear light, of those that it covers.
+/// Downscales `pixels` of `from` columns and rows to `to`, which is not larger. Each result is the mean of
+/// the area that it covers, in linear light.
 pub fn shrunk(pixels: &[[u8; 3]], from: [usize; 2], to: [usize; 2]) -> Vec<[u8; 3]> {
     if from == to || pixels.is_empty() {
         return pixels.to_vec();
@@ -18,9 +18,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn means_are_those_of_light() {
+    fn means_are_linear() {
         let checkers = [[0; 3], [255; 3], [255; 3], [0; 3]];
-        // Half of the light has code 188, not 128.
+        // Half of the light is the 8-bit level 188.
         assert_eq!(shrunk(&checkers, [2, 2], [1, 1]), [[188; 3]]);
         assert_eq!(shrunk(&checkers, [2, 2], [2, 2]), checkers);
         assert_eq!(shrunk(&[], [0, 0], [0, 0]), [[0u8; 3]; 0]);

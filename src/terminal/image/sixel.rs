@@ -1,17 +1,18 @@
-//! Sixel: strips of a picture, in few colours each.
+//! Sixel: an image in strips with a palette each.
 
 use crate::terminal::Area;
 use crate::terminal::image::transfer::Transfer;
+use crossterm::cursor::MoveTo;
 use icy_sixel::{EncodeOptions, sixel_encode};
 
-/// A picture comes in at most so many strips: xterm remembers no more pictures than 16 at a time.
-const STRIPS: u16 = 16;
+/// Most strips of an image. xterm keeps at most 16 images.
+const MAX_STRIPS: u16 = 16;
 
-/// What shows `pixels`, `width` of them in a row, on the cells of `place`, which are `cell_height` pixels
-/// high, with at most so many `colors` in each strip. Between strips anything else can be sent.
+/// Returns the bytes that show `pixels`, with rows of `width`, at `place`. `cell_height` is in pixels;
+/// `colors` is the largest palette of a strip. Other output can be sent between strips.
 ///
 /// # Errors
-/// The picture has no size.
+/// If the image is empty.
 pub fn transfer(
     pixels: &[[u8; 3]],
     width: usize,
@@ -20,15 +21,14 @@ pub fn transfer(
     colors: u16,
 ) -> Result<Transfer, String> {
     let mut transfer = Transfer { divisible: true, destroys: true, ..Transfer::default() };
-    let rows = place.height.div_ceil(STRIPS).max(1);
+    let rows = place.height.div_ceil(MAX_STRIPS).max(1);
     let options = EncodeOptions { max_colors: colors.clamp(2, 256), ..EncodeOptions::default() };
     let strips = pixels.chunks(width.max(1) * cell_height * usize::from(rows));
     for (strip, row) in strips.zip((place.y..).step_by(usize::from(rows))) {
         let rgba: Vec<u8> = strip.iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect();
         let strip = sixel_encode(&rgba, width, strip.len() / width, &options)
             .map_err(|error| error.to_string())?;
-        let go = format!("\x1b[{};{}H", row + 1, place.x + 1);
-        transfer.add(format!("{go}{strip}").as_bytes());
+        transfer.add(format!("{}{strip}", MoveTo(place.x, row)).as_bytes());
     }
     Ok(transfer)
 }
@@ -39,7 +39,7 @@ mod tests {
     use icy_sixel::SixelImage;
 
     #[test]
-    fn strips_are_the_picture() {
+    fn strips_decode_to_the_image() {
         let (width, height) = (50, 100);
         let pixel = |i: usize| [(5 * (i % width)) as u8, (2 * (i / width)) as u8, 90];
         let pixels: Vec<_> = (0..width * height).map(pixel).collect();
@@ -54,25 +54,25 @@ mod tests {
             assert!(sixel.starts_with("\x1bP") && sixel.ends_with("\x1b\\"));
             let image = SixelImage::decode(sixel.as_bytes()).unwrap();
             assert_eq!(image.width, width);
-            // Rows come by six: those that are too many are not drawn.
+            // Rows come in sixes; those beyond the strip are transparent.
             let drawn = image.pixels[..].chunks_exact(4).filter(|pixel| pixel[3] > 0);
             shown.extend(drawn.map(|p| [p[0], p[1], p[2]]));
         }
         assert_eq!(shown.len(), pixels.len());
-        let off = |(a, b): (&[u8; 3], &[u8; 3])| {
+        let difference = |(a, b): (&[u8; 3], &[u8; 3])| {
             (0..3).map(|c| f64::from(a[c].abs_diff(b[c]))).sum::<f64>() / 3.0
         };
-        let mean = shown.iter().zip(&pixels).map(off).sum::<f64>() / pixels.len() as f64;
-        assert!(mean < 6.0, "{mean} codes off");
+        let mean = shown.iter().zip(&pixels).map(difference).sum::<f64>() / pixels.len() as f64;
+        assert!(mean < 6.0, "mean error of {mean} levels");
     }
 
     #[test]
-    fn there_are_never_too_many_strips() {
+    fn number_of_strips_is_bounded() {
         for rows in 1..70 {
             let place = Area { x: 0, y: 0, width: 1, height: rows };
             let pixels = vec![[1, 2, 3]; 6 * 6 * usize::from(rows)];
             let transfer = transfer(&pixels, 6, place, 6, 16).unwrap();
-            assert!(transfer.stops.len() <= usize::from(STRIPS), "{rows}");
+            assert!(transfer.stops.len() <= usize::from(MAX_STRIPS), "{rows}");
         }
     }
 }

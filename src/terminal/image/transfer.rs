@@ -1,35 +1,35 @@
-//! What is sent for a still, and where it may be cut.
+//! Bytes of an image and the positions at which they may be divided.
 
 use std::ops::Range;
 
 /// Bytes that make a terminal show a picture.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Transfer {
-    /// All of them.
+    /// All bytes.
     pub bytes: Vec<u8>,
-    /// So many bytes on, in ascending order, no sequence is open: anything else may be sent there. The
-    /// last one is the end.
+    /// Offsets at which no sequence is open, so that other output may be sent, in ascending order. The last
+    /// one is the length.
     pub stops: Vec<usize>,
-    /// Sequences may be cut anywhere, and ended early by ST.
+    /// `true` if sequences may be divided anywhere and ended early by ST.
     pub divisible: bool,
-    /// What takes the picture away again, or what there is of it.
+    /// Bytes that remove the image, also a partial one.
     pub remove: Vec<u8>,
-    /// What is below the picture has to be drawn again when it is gone.
+    /// `true` if the cells below the image must be drawn again after it.
     pub destroys: bool,
 }
 
 impl Transfer {
-    /// The next bytes after the first `sent`: at most `room`, or one piece if that is larger and cannot
-    /// be cut; and whether a sequence is open after them.
+    /// Returns the range of bytes after the first `sent`: at most `room`, or one sequence if that is longer
+    /// and indivisible. The second value is `true` if a sequence is open after them.
     pub fn slice(&self, sent: usize, room: usize) -> (Range<usize>, bool) {
         let room = room.max(usize::from(self.divisible));
-        let later = &self.stops[self.stops.partition_point(|stop| *stop <= sent)..];
-        let fitting = later.partition_point(|stop| *stop <= sent.saturating_add(room));
-        match (fitting, later.first()) {
+        let later_stops = &self.stops[self.stops.partition_point(|stop| *stop <= sent)..];
+        let fitting = later_stops.partition_point(|stop| *stop <= sent.saturating_add(room));
+        match (fitting, later_stops.first()) {
             (_, None) => (sent..sent, false),
             (0, Some(stop)) if !self.divisible => (sent..*stop, false),
             (0, Some(_)) => (sent..sent + room, true),
-            (fitting, _) => (sent..later[fitting - 1], false),
+            (fitting, _) => (sent..later_stops[fitting - 1], false),
         }
     }
 
@@ -44,9 +44,9 @@ impl Transfer {
 mod tests {
     use super::*;
 
-    /// Whatever the room, slices are everything, in order; nothing but divisible sequences is cut.
+    /// Slices of any size are contiguous and complete; only divisible sequences are divided.
     #[test]
-    fn slices_make_up_the_whole() {
+    fn slices_are_contiguous_and_complete() {
         for divisible in [false, true] {
             let mut transfer = Transfer { divisible, ..Transfer::default() };
             for length in [1, 7, 30, 2, 2, 100, 1] {
