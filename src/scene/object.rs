@@ -1,4 +1,4 @@
-//! Objects: a shape, where it stands, what it is made of.
+//! Objects: shape, transform, material.
 
 use crate::primitive::Form;
 use crate::shape::{Shape, TransformOp, compose, ill_conditioned};
@@ -6,15 +6,15 @@ use crate::value::{Description, Field, ValidationError, description};
 use glam::DAffine3;
 
 description! {
-    /// A shape, where it stands, what it is made of.
+    /// An object: shape, transform, material.
     pub struct Object {
         /// Name; no two objects have the same.
         name: String, or "a number";
         /// Name of one of the `[materials.NAME]`.
         material: String, or "a matt light grey, the default of every material key";
-        /// What it looks like: exactly one kind.
+        /// Shape of the object: exactly one kind.
         shape: Shape;
-        /// Steps that move, turn and scale it, the first step first.
+        /// Steps that move, rotate and scale it, in order.
         transform: Vec<TransformOp>, or "it stays as its shape says";
     }
 }

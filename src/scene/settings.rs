@@ -1,4 +1,4 @@
-//! What holds for the whole picture: raster, tracing, background, ambient light.
+//! Settings of the whole picture: raster, integrator, background, ambient light.
 
 use crate::primitive::Acceleration;
 use crate::value::{Color, Description, Field, FieldValue, ValidationError, ValueType};
@@ -9,7 +9,7 @@ description! {
     pub struct FilmSettings: Default {
         /// Width and height of the picture; together at most 67108864 pixels.
         size: [u32; 2] = [640, 480], in closed(1.0, 16384.0) "pixels";
-        /// How samples spread over a pixel.
+        /// Distribution of samples over a pixel.
         filter: Filter = "box";
         /// Largest number of samples per pixel spent on glossy pictures; 0 is no cap.
         rays_per_pixel: u32 = 0, in closed(0.0, 1e9) "samples";
@@ -27,17 +27,17 @@ choices! {
 }
 
 description! {
-    /// How far paths are followed.
+    /// Settings of the path integrator.
     pub struct IntegratorSettings: Default {
-        /// What is traced at all.
+        /// Kinds of rays that are traced.
         ray_types: RayTypes = "full";
-        /// The most surfaces that a path meets after the first; 0: no reflection, no transmission.
+        /// Largest number of surfaces that a path hits after the first; 0: no reflection, no transmission.
         max_depth: u32 = 16, in closed(0.0, 10000.0) "surfaces";
-        /// A path ends when what it could still add is weighted by less than this.
+        /// A path ends when its throughput is less than this.
         min_throughput: f64 = 0.0, in SHARE;
-        /// What becomes of a reflected ray that would dip under the surface.
+        /// Treatment of a reflected ray that would point below the surface.
         below_horizon: BelowHorizon = "fold";
-        /// How rays are kept from things that they cannot meet. It changes the time, never the picture.
+        /// Acceleration structure. Every choice renders the same image; only speed differs.
         acceleration: Acceleration = "auto";
     }
 }
@@ -56,7 +56,7 @@ choices! {
 }
 
 choices! {
-    /// Treatment of a reflected ray that would dip under the surface.
+    /// Treatment of a reflected ray that would point below the surface.
     pub enum BelowHorizon {
         /// it is mirrored at the surface: no light is lost
         Fold = "fold",
@@ -66,17 +66,17 @@ choices! {
 }
 
 description! {
-    /// What a ray sees that meets nothing.
+    /// Radiance of rays that hit no surface.
     pub struct Background: Default {
-        /// What a ray sees that meets nothing.
+        /// Radiance of rays that hit no surface.
         color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
     }
 }
 
 description! {
-    /// Light from everywhere, without shadows.
+    /// Ambient light: from all directions, without shadows.
     pub struct Ambient: Default {
-        /// Light from everywhere, without shadows: i_a of k_a i_a.
+        /// Ambient light from all directions, without shadows: i_a of k_a i_a.
         color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
     }
 }
@@ -95,20 +95,20 @@ impl FieldValue for Acceleration {
     }
 }
 
-/// The most pixels of a picture: 8192 x 8192.
+/// Largest number of pixels of a picture: 8192 x 8192.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// The keys of `[film]`.
+/// Keys of `[film]`.
 pub const FILM_FIELDS: &[Field] = FilmSettings::FIELDS;
-/// The keys of `[trace]`.
+/// Keys of `[trace]`.
 pub const TRACE_FIELDS: &[Field] = IntegratorSettings::FIELDS;
-/// The keys of `[background]`.
+/// Keys of `[background]`.
 pub const BACKGROUND_FIELDS: &[Field] = Background::FIELDS;
-/// The keys of `[ambient]`.
+/// Keys of `[ambient]`.
 pub const AMBIENT_FIELDS: &[Field] = Ambient::FIELDS;
 
 impl FilmSettings {
-    /// What is wrong with it.
+    /// Returns the errors of the settings.
     pub fn faults(&self) -> Vec<ValidationError> {
         let [width, height] = self.size;
         let errors = self.validator().errors();
@@ -126,21 +126,21 @@ impl FilmSettings {
 }
 
 impl IntegratorSettings {
-    /// What is wrong with it.
+    /// Returns the errors of the settings.
     pub fn faults(&self) -> Vec<ValidationError> {
         self.validator().errors()
     }
 }
 
 impl Background {
-    /// What is wrong with it.
+    /// Returns the errors of the settings.
     pub fn faults(&self) -> Vec<ValidationError> {
         self.validator().errors()
     }
 }
 
 impl Ambient {
-    /// What is wrong with it.
+    /// Returns the errors of the settings.
     pub fn faults(&self) -> Vec<ValidationError> {
         self.validator().errors()
     }

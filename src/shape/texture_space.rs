@@ -44,9 +44,7 @@ impl TextureSpace {
             Form::Sphere { .. } | Form::Ellipsoid { .. } => DefaultMapping::Spherical,
             Form::ConicalFrustum { .. } => DefaultMapping::Cylindrical,
             Form::Mesh { mesh, .. } if mesh.mesh().uvs.is_some() => DefaultMapping::Uv,
-            Form::ConvexPolyhedron { .. } | Form::Csg(_) | Form::Mesh { .. } => {
-                DefaultMapping::Box
-            }
+            Form::ConvexPolyhedron { .. } | Form::Csg(_) | Form::Mesh { .. } => DefaultMapping::Box,
         };
         let point = texture_from_shape.transform_point3(shape.position());
         let corners = form.transformed(&texture_from_shape).bounds().unwrap_or((point, point));
@@ -167,7 +165,10 @@ mod tests {
         let spaces = compound.texture_spaces();
         assert_eq!(spaces.len(), compound.form().parts());
         let kinds: Vec<_> = spaces.iter().map(|s| s.default_mapping).collect();
-        assert_eq!(kinds, [DefaultMapping::Spherical, DefaultMapping::Box, DefaultMapping::Cylindrical]);
+        assert_eq!(
+            kinds,
+            [DefaultMapping::Spherical, DefaultMapping::Box, DefaultMapping::Cylindrical]
+        );
         let corner = spaces[1].shape_from_texture.transform_point3(DVec3::ONE);
         assert!((corner - DVec3::new(7.0, 2.0, 2.0)).length() < 1e-12, "{corner}");
     }

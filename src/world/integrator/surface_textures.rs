@@ -41,7 +41,9 @@ fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
         (Mapping::Planar, _) | (Mapping::Uv | Mapping::Auto, DefaultMapping::Planar) => {
             Projection::Planar
         }
-        (Mapping::Spherical, _) | (Mapping::Auto, DefaultMapping::Spherical) => Projection::Spherical,
+        (Mapping::Spherical, _) | (Mapping::Auto, DefaultMapping::Spherical) => {
+            Projection::Spherical
+        }
         (Mapping::Cylindrical, _) | (Mapping::Auto, DefaultMapping::Cylindrical) => {
             Projection::Cylindrical
         }
