@@ -58,7 +58,7 @@ fn transparent_surfaces_keep_what_they_claim() {
                 }
             }
         }
-        let claims = law.claims_of_transmission();
+        let claims = law.transmission_properties();
         assert_eq!(lost < 1e-12, claims.energy == Energy::Conserving, "{law:?}: {lost}");
         assert_eq!(lopsided < 1e-9, claims.reciprocal, "{law:?}: {lopsided}");
     }
@@ -137,7 +137,7 @@ fn closed_form_13_reciprocity_is_as_claimed() {
                 // Its own property, without that of the reflectance.
                 material.f0 = None;
             }
-            check_reciprocity(&name, lobe.claims(), asymmetry(|v, l| lobe_f(&material, v, l)));
+            check_reciprocity(&name, lobe.properties(), asymmetry(|v, l| lobe_f(&material, v, l)));
         }
     }
     for highlight in Highlight::ALL {
@@ -146,14 +146,14 @@ fn closed_form_13_reciprocity_is_as_claimed() {
             material.highlight = highlight;
             let name = format!("{highlight:?} {lobe:?} {masking:?}");
             let asymmetry = asymmetry(|v, l| highlight_f(&material, v, l));
-            check_reciprocity(&name, highlight.claims(), asymmetry);
+            check_reciprocity(&name, highlight.properties(), asymmetry);
         }
     }
 }
 
 /// A mirror has no f; its ray comes back the way it went, with the same weight.
 fn mirror_is_reciprocal(material: &Material) {
-    assert!(material.lobe.claims().reciprocal);
+    assert!(material.lobe.properties().reciprocal);
     let n = tilted_normal();
     for (v, _) in pairs() {
         let reflect = |incident: Vector| {
@@ -225,7 +225,7 @@ fn closed_form_7_energy_is_as_claimed() {
                 material.alpha = Some(alpha);
                 let mean = mean_weight(&material, degrees);
                 let name = format!("{lobe:?} {masking:?} alpha {alpha} at {degrees}: {mean}");
-                match lobe.claims().energy {
+                match lobe.properties().energy {
                     Energy::Conserving => assert!(mean == 1.0, "{name}"),
                     Energy::Losing => assert!(mean <= 1.0 + 1e-3, "{name}"),
                     Energy::Unbounded => unreachable!("no lobe is"),
@@ -263,7 +263,7 @@ fn closed_form_7_energy_of_highlights_is_as_claimed() {
                 largest = largest.max(highlight_albedo(&material, degrees));
             }
         }
-        match highlight.claims().energy {
+        match highlight.properties().energy {
             Energy::Losing => assert!(largest <= 1.0 + 1e-3, "{highlight:?}: {largest}"),
             Energy::Unbounded => assert!(largest > 1.2, "{highlight:?} is bounded: {largest}"),
             Energy::Conserving => unreachable!("no highlight is"),

@@ -20,7 +20,7 @@ fn furnace<L: SimdFloat>() {
         shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
         [materials.m]";
     let mut scene = scene(text);
-    for lobe in Lobe::ALL.into_iter().filter(|l| l.claims().energy == Energy::Conserving) {
+    for lobe in Lobe::ALL.into_iter().filter(|l| l.properties().energy == Energy::Conserving) {
         for roughness in [0.0, 1e-3, 0.3, 3.0, 1e4] {
             let mut material = reflector(lobe, Masking::VCavity, roughness);
             material.reflection = rho;
