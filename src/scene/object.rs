@@ -23,18 +23,18 @@ description! {
 pub const OBJECT_FIELDS: &[Field] = Object::FIELDS;
 
 impl Object {
-    /// The material of each part of its form; a simple object has one part.
+    /// Returns the material of each part of its form; a simple object has one part.
     pub fn materials(&self) -> Vec<&str> {
         self.shape.part_materials(&self.material)
     }
 
-    /// Whether it or a part of it carries the name of this material.
+    /// Returns `true` if the object or a part of it names this material.
     pub fn names_material(&self, name: &str) -> bool {
         self.material == name || self.shape.named_materials().iter().any(|(_, own)| *own == name)
     }
 
-    /// Gives it and its parts the material `new` where they name `old`. An empty name stands for the default finish,
-    /// in a part for the material of the whole.
+    /// Replaces the material `old` by `new` in the object and its parts. An empty name means the default
+    /// material, in a part the material of the whole.
     pub fn rename_material(&mut self, old: &str, new: &str) {
         let names = self.shape.part_names_mut().into_iter().chain([&mut self.material]);
         for name in names.filter(|name| *name == old) {
@@ -42,12 +42,12 @@ impl Object {
         }
     }
 
-    /// The transform's steps in order, as one map.
+    /// Returns the composition of the transform's steps.
     pub fn scene_from_object(&self) -> DAffine3 {
         compose(&self.transform)
     }
 
-    /// Its geometry where it stands, in double precision. Of an object without faults.
+    /// Compiles its transformed geometry in double precision. The object has no faults.
     pub fn form(&self) -> Form {
         match self.transform.is_empty() {
             true => self.shape.form(),
@@ -55,7 +55,7 @@ impl Object {
         }
     }
 
-    /// What is wrong with it (its material's name is the scene's business).
+    /// Returns the errors of the object, except an undefined material, which the scene reports.
     pub fn faults(&self) -> Vec<ValidationError> {
         let checks = self.validator();
         let moved =
