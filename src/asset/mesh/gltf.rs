@@ -25,13 +25,13 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let (document, blob) = description(source)?;
     let buffers = buffers(source, &document, blob.as_deref())?;
     let mut builder = Builder::new(source);
-    let mut met = vec![false; document.nodes().count()];
+    let mut visited = vec![false; document.nodes().count()];
     let mut stack: Vec<(Node, DAffine3)> =
         roots(&document).into_iter().map(|node| (node, DAffine3::IDENTITY)).collect();
     stack.reverse();
     while let Some((node, outer)) = stack.pop() {
         let place = || FileLocation::Part(format!("nodes[{}]", node.index()));
-        if std::mem::replace(&mut met[node.index()], true) {
+        if std::mem::replace(&mut visited[node.index()], true) {
             let found = "the node has two parents";
             return Err(source.error(place(), found, "a tree of nodes"));
         }
