@@ -1,5 +1,4 @@
-//! Rays and triangle meshes: nothing slips through, and neither company nor vector width decides what
-//! is met.
+//! Ray/mesh intersection: meshes are watertight, and hits are independent of packets and vector width.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -12,15 +11,15 @@ use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
 use zerkalo::primitive::triangle_mesh;
 
-/// A closed ball around the origin, written as OBJ and read: with slivers round the poles, a
-/// thousand times as long as wide.
+/// Returns a closed ball around the origin, read from OBJ, with slivers at the poles a thousand times as
+/// long as wide.
 fn ball(rings: usize, sides: usize) -> Arc<Mesh> {
     let mut text = String::new();
     for ring in 0..=rings {
         let polar = std::f64::consts::PI * ring as f64 / rings as f64;
         let around_of = |side: usize| std::f64::consts::TAU * side as f64 / sides as f64;
         for around in (0..sides).map(around_of) {
-            // Both poles are one point each, given as often as there are sides.
+            // Each pole is one point, repeated for every side.
             let across = if ring % rings == 0 { 0.0 } else { polar.sin() };
             let (x, z) = (across * around.cos(), across * around.sin());
             text += &format!("v {x} {} {z}\n", polar.cos());
@@ -50,9 +49,9 @@ fn unit(v: [f64; 3]) -> [f64; 3] {
     v.map(|x| x / length)
 }
 
-/// Rays from inside a closed mesh to its corners, to its edges and into its triangles: none may miss,
-/// together or apart.
-fn nothing_slips_through<L: SimdFloat>(mesh: &Mesh, rays: usize) {
+/// Checks that rays from inside a closed mesh to its corners, edges and triangles all hit, in packets and
+/// singly.
+fn check_watertight<L: SimdFloat>(mesh: &Mesh, rays: usize) {
     let mut random = Numbers::new(0x5EED);
     let triangles = &mesh.mesh().triangles;
     let corner = |i: u32| mesh.mesh().positions[i as usize].map(f64::from);
@@ -97,19 +96,19 @@ fn nothing_slips_through<L: SimdFloat>(mesh: &Mesh, rays: usize) {
 }
 
 #[test]
-fn no_ray_slips_between_triangles() {
+fn closed_mesh_is_watertight() {
     let coarse = ball(8, 12);
-    nothing_slips_through::<Single>(&coarse, 300_000);
-    nothing_slips_through::<Double>(&coarse, 50_000);
-    nothing_slips_through::<f32>(&coarse, 20_000);
+    check_watertight::<Single>(&coarse, 300_000);
+    check_watertight::<Double>(&coarse, 50_000);
+    check_watertight::<f32>(&coarse, 20_000);
     let fine = ball(60, 120);
-    nothing_slips_through::<Single>(&fine, 600_000);
-    nothing_slips_through::<Double>(&fine, 50_000);
-    nothing_slips_through::<Single>(&ball(12, 4_000), 300_000);
+    check_watertight::<Single>(&fine, 600_000);
+    check_watertight::<Double>(&fine, 50_000);
+    check_watertight::<Single>(&ball(12, 4_000), 300_000);
 }
 
 #[test]
-fn a_tree_finds_what_a_list_finds() {
+fn mesh_bvh_finds_same_hits_as_list() {
     let mesh = ball(12, 20);
     let mut random = Numbers::new(77);
     for _ in 0..2_000 {
@@ -117,7 +116,7 @@ fn a_tree_finds_what_a_list_finds() {
         let direction = unit(std::array::from_fn(|_| random.unit() - 0.5));
         let ray = Ray { origin: Vec3::<f64>::of(origin), direction: Vec3::<f64>::of(direction) };
         let found = triangle_mesh::closest(&mesh, &ray, f64::MAX);
-        // Möller and Trumbore's test of every triangle.
+        // Möller-Trumbore intersection with every triangle.
         let mut best = f64::MAX;
         for t in &mesh.mesh().triangles {
             let p = t.map(|i| glam::DVec3::from(mesh.mesh().positions[i as usize].map(f64::from)));

@@ -1,5 +1,5 @@
-//! Meshes in scenes: the files that come with the program, pictures against shapes known by formula,
-//! no holes, normals, colours, and files that are wrong or change.
+//! Meshes in scenes: shipped files, pictures against analytic shapes, watertightness, normals, colours,
+//! and files that are invalid or change.
 
 mod support;
 
@@ -16,7 +16,7 @@ use zerkalo::scene::edit::{Target, add_object, set};
 use zerkalo::scene::{Scene, SceneFile};
 use zerkalo::world::{AnyWorld, FirstHit, Options, Precision};
 
-/// A tube round a trefoil knot, of quadrilaterals, as binary PLY.
+/// Tube around a trefoil knot, of quadrilaterals, as binary PLY.
 fn knot() -> Vec<u8> {
     const ALONG: usize = 240;
     const AROUND: usize = 24;
@@ -41,7 +41,7 @@ fn knot() -> Vec<u8> {
         for k in 0..AROUND {
             let (sin, cos) = (TAU * k as f64 / AROUND as f64).sin_cos();
             for x in (here + (inward * cos + side * sin) * 0.45).to_array() {
-                // Decimals at which the rounding of no machine shows.
+                // Decimals that hide rounding differences between machines.
                 out.extend((((x * 1e5).round() / 1e5) as f32).to_le_bytes());
             }
         }
@@ -58,7 +58,7 @@ fn knot() -> Vec<u8> {
     out
 }
 
-/// A cut stone, as OBJ: a table and a crown of one colour, a pavilion of another.
+/// Cut stone as OBJ: table and crown of one colour, pavilion of another.
 fn stone() -> String {
     let mut out = String::from("# A cut stone.\nmtllib stone.mtl\n");
     let ring = |out: &mut String, radius: f64, y: f64, turn: f64| {
@@ -88,7 +88,7 @@ fn stone() -> String {
 const STONE_COLORS: &str = "newmtl crown\nKd 0.55 0.75 0.85\nnewmtl pavilion\nKd 0.10 0.30 0.60\n";
 
 #[test]
-fn the_files_are_what_makes_them() {
+fn mesh_files_match_generators() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/meshes");
     for (name, made) in [
         ("knot.ply", knot()),
@@ -103,9 +103,9 @@ fn the_files_are_what_makes_them() {
     }
 }
 
-/// The volume inside a closed mesh whose fronts are outside.
+/// The signed volume of a closed mesh is positive if its fronts face outwards.
 #[test]
-fn the_files_have_their_fronts_outside() {
+fn shipped_meshes_face_outwards() {
     for (name, volume) in [("knot.ply", 18.0..18.2), ("stone.obj", 1.0..2.0)] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/meshes").join(name);
         let mesh = Assets::default().mesh(&path).unwrap();
@@ -116,7 +116,7 @@ fn the_files_have_their_fronts_outside() {
     }
 }
 
-/// A ball of radius 1 around the origin as OBJ, its corners on the sphere.
+/// Ball of radius 1 around the origin as OBJ, with corners on the sphere.
 fn ball(rings: usize, sides: usize) -> String {
     let mut text = String::from("v 0 1 0\n");
     for ring in 1..rings {
@@ -141,7 +141,7 @@ fn ball(rings: usize, sides: usize) -> String {
     text
 }
 
-/// A folder with mesh files, and scenes that name them.
+/// Folder with mesh files and scenes that name them.
 struct Desk(tempfile::TempDir);
 
 impl Desk {
@@ -190,7 +190,7 @@ fn sights(scene: &Scene, precision: Precision) -> Vec<FirstHit> {
 }
 
 #[test]
-fn a_mesh_of_a_sphere_is_met_where_the_sphere_is() {
+fn sphere_mesh_hits_converge_to_sphere() {
     let desk = Desk::new();
     desk.put("ball.obj", &ball(200, 400));
     let sphere =
@@ -200,7 +200,7 @@ fn a_mesh_of_a_sphere_is_met_where_the_sphere_is() {
         let (a, b) = (sights(&sphere, precision), sights(&mesh, precision));
         let mut both = 0;
         for (a, b) in a.iter().zip(&b) {
-            // The faces lie at most 1 - cos(pi / 400) inside, which shows most at the rim.
+            // The faces are at most 1 - cos(pi / 400) inside, most visible at the rim.
             let (n, m) =
                 (DVec3::from(a.normal.map(f64::from)), DVec3::from(b.normal.map(f64::from)));
             if a.object.is_some() && b.object.is_some() {
@@ -223,10 +223,10 @@ fn a_mesh_of_a_sphere_is_met_where_the_sphere_is() {
     assert!(apart < 1e-3, "{apart}");
 }
 
-/// The blue background shines in no pixel whose surroundings all show the mesh, and the red mesh is
-/// nowhere lit from inside.
+/// The blue background is visible in no pixel whose neighbours all show the mesh, and the red mesh is never
+/// lit from inside.
 #[test]
-fn a_closed_mesh_has_no_holes() {
+fn closed_mesh_has_no_holes() {
     let desk = Desk::new();
     for (rings, sides) in [(7, 12), (90, 181)] {
         desk.put("ball.obj", &ball(rings, sides));
@@ -255,9 +255,9 @@ fn a_closed_mesh_has_no_holes() {
     }
 }
 
-/// A lamp inside a closed mesh lights nothing outside it; one behind it lights no smooth front.
+/// A light inside a closed mesh lights no surface outside of it; one behind it lights no smooth front.
 #[test]
-fn no_light_leaks_through_a_mesh() {
+fn closed_mesh_leaks_no_light() {
     let desk = Desk::new();
     desk.put("ball.obj", &ball(6, 9));
     for (lamp, normals) in [([0.1, -0.1, 0.2], "smooth"), ([0.1, -0.1, 0.2], "flat")] {
@@ -270,9 +270,9 @@ fn no_light_leaks_through_a_mesh() {
     }
 }
 
-/// A big flat triangle under a grazing lamp has no shadow of its own, near and far from the origin.
+/// A large triangle in grazing light does not shadow itself, near and far from the origin.
 #[test]
-fn triangles_do_not_shade_themselves() {
+fn triangles_do_not_shadow_themselves() {
     let desk = Desk::new();
     for at in [0.0, 100.0] {
         let corners = [[-9.0, 0.0, 9.0], [9.0, 0.0, 9.0], [0.0, 0.0, -20.0]];
@@ -305,7 +305,7 @@ fn flat_normals_show_the_triangles() {
     };
     let pictures = [sphere, mesh("smooth"), mesh("flat")]
         .map(|scene| picture(&rendered(&scene, 7, Precision::Auto, 16), Replicates::Both));
-    // Within the silhouettes of both, where the lamp shines on all.
+    // Inside of both silhouettes, where all surfaces are lit.
     let apart = |which: usize| {
         let inner = (0..96 * 96).filter(|i| {
             let (x, y) = ((i % 96) as f64 - 47.5, (i / 96) as f64 - 47.5);
@@ -340,7 +340,7 @@ fn colours_of_the_file_multiply_the_materials() {
     let pixels = picture(&rendered(&desk.scene(text), 1, Precision::Auto, 2), Replicates::Both);
     for (pixel, expected) in [(24, [0.25, 0.125, 0.0]), (31, [0.0, 0.0, 0.5])] {
         for c in 0..3 {
-            // Ambient light and the lamp, whose white matt surface has the brightness 1.
+            // Ambient light, and the light in which a white matt surface has the brightness 1.
             let value = expected[c] * 1.5;
             assert!((pixels[pixel][c] - value).abs() < 1e-4, "{pixel} {:?}", pixels[pixel]);
         }
@@ -348,7 +348,7 @@ fn colours_of_the_file_multiply_the_materials() {
 }
 
 #[test]
-fn a_wrong_name_is_refused_where_it_is_typed_and_a_right_one_read_once() {
+fn invalid_file_name_is_rejected_and_valid_file_read_once() {
     let desk = Desk::new();
     let ball_file = desk.put("ball.obj", &ball(6, 9));
     desk.put("broken.obj", "v 0 0 0\nf 1 2 3\n");
@@ -373,7 +373,7 @@ fn a_wrong_name_is_refused_where_it_is_typed_and_a_right_one_read_once() {
     };
     let triangles = mesh(&named).mesh().triangles.len();
     assert_eq!(triangles, 2 * 9 * 5);
-    // Once read it stays, whatever is edited and whatever becomes of the file.
+    // The mesh stays after edits of the scene and changes of the file.
     fs::remove_file(ball_file).unwrap();
     let flat = set(&named, &subject, "shape.mesh.normals", "flat").unwrap().scene;
     let turned = set(&flat, &subject, "transform", "rotate_y").unwrap().scene;
@@ -384,7 +384,7 @@ fn a_wrong_name_is_refused_where_it_is_typed_and_a_right_one_read_once() {
 }
 
 #[test]
-fn a_scene_is_not_saved_where_it_would_lose_its_mesh() {
+fn scene_is_not_saved_where_mesh_would_be_missing() {
     let desk = Desk::new();
     desk.put("ball.obj", &ball(6, 9));
     let text = VIEW.to_string() + "shape.mesh = { file = \"ball.obj\" }";
@@ -398,7 +398,7 @@ fn a_scene_is_not_saved_where_it_would_lose_its_mesh() {
     let beside = desk.0.path().join("copy.toml");
     file.save_as(&beside, &scene, false).unwrap();
     assert!(Scene::read(&beside).is_ok());
-    // Where another file has the name, it is another mesh.
+    // In a folder with another file of this name it is another mesh.
     fs::write(elsewhere.path().join("ball.obj"), ball(5, 5)).unwrap();
     assert!(file.save_as(&other, &scene, false).is_err());
 }

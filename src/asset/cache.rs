@@ -1,4 +1,4 @@
-//! Files that were read, shared between compilations of a scene.
+//! Cache of asset files, shared between compilations of scenes.
 
 use crate::asset::error::AssetError;
 use crate::asset::file::{FileContents, MAX_BYTES, read_error};
@@ -11,25 +11,25 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::SystemTime;
 
-/// Memory for what no scene uses any more, so that an undone edit finds it [bytes]: 256 MiB.
+/// Memory for files that no scene uses any more, kept for undone edits [bytes]: 256 MiB.
 const UNUSED_BYTES: usize = 256 << 20;
 
 /// Largest image file [bytes]: 512 MiB.
 const MAX_IMAGE_BYTES: u64 = 512 << 20;
 
-/// What takes time when a file is loaded.
+/// Stages of loading a file that take time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LoadProgress {
-    /// A file is read.
+    /// The file is being read.
     Reading {
-        /// Its path.
+        /// Path of the file.
         file: PathBuf,
-        /// Its length.
+        /// Length of the file.
         bytes: u64,
     },
-    /// The tree over a mesh is built.
+    /// The BVH of a mesh is being built.
     Building {
-        /// The mesh's file.
+        /// Path of the mesh file.
         file: PathBuf,
         /// Number of triangles.
         triangles: usize,
@@ -51,7 +51,7 @@ impl fmt::Display for LoadProgress {
     }
 }
 
-/// A file at a moment: another time or length is another file.
+/// Identity of a file's content: another modification time or length is another content.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Key {
     path: PathBuf,
@@ -59,10 +59,10 @@ struct Key {
     bytes: u64,
 }
 
-/// What became of a file, once somebody has read it.
+/// Slot for the content of a file, or the error of reading it.
 type CacheEntry<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
 
-/// Files of one kind, with the count of askings at which each was last asked for.
+/// LRU cache of files of one type; each entry has the number of its last use.
 struct Cache<T> {
     files: HashMap<Key, (CacheEntry<T>, u64)>,
     last_used: u64,
@@ -75,23 +75,22 @@ impl<T> Default for Cache<T> {
 }
 
 impl<T> Cache<T> {
-    /// The cell of a file; older states of the same file are forgotten.
-    fn cell(&mut self, key: &Key) -> CacheEntry<T> {
+    /// Returns the entry of a file and removes older contents of the same file.
+    fn entry(&mut self, key: &Key) -> CacheEntry<T> {
         self.last_used += 1;
         self.files.retain(|k, _| k.path != key.path || k == key);
-        let entry = self.files.entry(key.clone()).or_default();
-        entry.1 = self.last_used;
-        entry.0.clone()
+        let (entry, last_used) = self.files.entry(key.clone()).or_default();
+        *last_used = self.last_used;
+        entry.clone()
     }
 
-    /// Forgets what nobody holds, the longest unasked first, until at most [`UNUSED_BYTES`] of it
-    /// are left.
+    /// Evicts unused files, least recently used first, until at most [`UNUSED_BYTES`] of them are left.
     fn evict(&mut self, bytes_of: impl Fn(&T) -> usize) {
         let mut unused: Vec<(u64, usize, Key)> = self
             .files
             .iter()
-            .filter_map(|(key, (cell, last_used))| {
-                let bytes = match cell.get()? {
+            .filter_map(|(key, (entry, last_used))| {
+                let bytes = match entry.get()? {
                     Ok(file) if Arc::strong_count(file) == 1 => bytes_of(file),
                     Ok(_) => return None,
                     Err(_) => 0,
@@ -110,9 +109,8 @@ impl<T> Cache<T> {
     }
 }
 
-/// All files that scenes name. Each is read once, however many scenes and threads ask, until it
-/// changes on disk; what is wrong with a file is remembered as well. What no scene holds any more
-/// is forgotten when it takes too much memory.
+/// All files that scenes name. Each file is read once for all scenes and threads until it changes on
+/// disk; errors are cached as well. Unused files are evicted when they take too much memory.
 pub struct Assets {
     meshes: Mutex<Cache<Mesh>>,
     images: Mutex<Cache<Image>>,
@@ -135,16 +133,16 @@ impl fmt::Debug for Assets {
 }
 
 impl Assets {
-    /// With nothing read. `progress` is told at the beginning of each [`LoadProgress`], on the thread that
-    /// asked for the file.
+    /// Creates an empty cache. `progress` is called at the beginning of each [`LoadProgress`], on the thread
+    /// that loads the file.
     pub fn new(progress: impl Fn(&LoadProgress) + Send + Sync + 'static) -> Self {
         Self { meshes: Mutex::default(), images: Mutex::default(), progress: Box::new(progress) }
     }
 
-    /// The mesh in the file at `path`.
+    /// Returns the mesh in the file at `path`.
     ///
     /// # Errors
-    /// Whatever is wrong with the file.
+    /// Any error in the file.
     pub fn mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetError> {
         let read = |key: &Key| {
             let triangles = TriangleMesh::parse(self.read(path, key, MAX_BYTES)?)?;
@@ -155,10 +153,10 @@ impl Assets {
         load(&self.meshes, path, read, Mesh::bytes)
     }
 
-    /// The image in the file at `path`.
+    /// Returns the image in the file at `path`.
     ///
     /// # Errors
-    /// Whatever is wrong with the file.
+    /// Any error in the file.
     pub fn image(&self, path: &Path) -> Result<Arc<Image>, AssetError> {
         let read = |key: &Key| Image::parse(&self.read(path, key, MAX_IMAGE_BYTES)?);
         load(&self.images, path, read, Image::bytes)
@@ -170,14 +168,14 @@ impl Assets {
     }
 }
 
-/// Nothing of a shelf is half done when a thread dies: a poisoned lock is as good as any.
-fn locked<T>(shelf: &Mutex<Cache<T>>) -> MutexGuard<'_, Cache<T>> {
-    shelf.lock().unwrap_or_else(PoisonError::into_inner)
+/// Locks a cache. A poisoned lock is valid, because no method leaves a cache half changed.
+fn locked<T>(cache: &Mutex<Cache<T>>) -> MutexGuard<'_, Cache<T>> {
+    cache.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What `shelf` has for the file at `path`, read if need be, without holding the shelf's lock.
+/// Returns the file at `path` from `cache`, read without holding the cache's lock if it is new.
 fn load<T>(
-    shelf: &Mutex<Cache<T>>,
+    cache: &Mutex<Cache<T>>,
     path: &Path,
     read: impl FnOnce(&Key) -> Result<T, AssetError>,
     bytes_of: impl Fn(&T) -> usize,
@@ -188,9 +186,9 @@ fn load<T>(
         modified: metadata.modified().ok(),
         bytes: metadata.len(),
     };
-    let cell = locked(shelf).cell(&key);
-    let file = cell.get_or_init(|| read(&key).map(Arc::new)).clone();
-    locked(shelf).evict(bytes_of);
+    let entry = locked(cache).entry(&key);
+    let file = entry.get_or_init(|| read(&key).map(Arc::new)).clone();
+    locked(cache).evict(bytes_of);
     file
 }
 
@@ -204,8 +202,8 @@ mod tests {
     fn counted() -> (Assets, Arc<AtomicUsize>) {
         let count = Arc::new(AtomicUsize::new(0));
         let counter = count.clone();
-        let assets = Assets::new(move |stage| {
-            if matches!(stage, LoadProgress::Reading { .. }) {
+        let assets = Assets::new(move |progress| {
+            if matches!(progress, LoadProgress::Reading { .. }) {
                 counter.fetch_add(1, Ordering::SeqCst);
             }
         });
@@ -213,15 +211,15 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_read_once_until_it_changes() {
+    fn file_is_read_once_until_it_changes() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.obj");
         std::fs::write(&path, TRIANGLE).unwrap();
         let (assets, reads) = counted();
         let meshes: Vec<_> = std::thread::scope(|scope| {
-            let last_used: Vec<_> =
+            let threads: Vec<_> =
                 (0..8).map(|_| scope.spawn(|| assets.mesh(&path).unwrap())).collect();
-            last_used.into_iter().map(|thread| thread.join().unwrap()).collect()
+            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
         });
         assert!(meshes.iter().all(|m| Arc::ptr_eq(m, &meshes[0])));
         assert_eq!(reads.load(Ordering::SeqCst), 1);
@@ -234,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_remembered_and_missing_files_are_not() {
+    fn errors_are_cached_except_missing_files() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.obj");
         let (assets, reads) = counted();
@@ -248,25 +246,25 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_holds_is_forgotten_the_oldest_first() {
-        let mut shelf = Cache::<usize>::default();
+    fn unused_files_are_evicted_least_recent_first() {
+        let mut cache = Cache::<usize>::default();
         let key = |name: &str| Key { path: name.into(), modified: None, bytes: 0 };
-        let put = |shelf: &mut Cache<usize>, name| {
+        let put = |cache: &mut Cache<usize>, name| {
             let file = Arc::new(UNUSED_BYTES / 2);
-            shelf.cell(&key(name)).set(Ok(file.clone())).unwrap();
+            cache.entry(&key(name)).set(Ok(file.clone())).unwrap();
             file
         };
-        let held = put(&mut shelf, "held");
+        let held = put(&mut cache, "held");
         for name in ["a", "b", "c"] {
-            drop(put(&mut shelf, name));
+            drop(put(&mut cache, name));
         }
-        shelf.evict(|bytes| *bytes);
-        let known = |shelf: &Cache<usize>, name| shelf.files.contains_key(&key(name));
-        assert!(known(&shelf, "held") && !known(&shelf, "a"));
-        assert!(known(&shelf, "b") && known(&shelf, "c"));
+        cache.evict(|bytes| *bytes);
+        let known = |cache: &Cache<usize>, name| cache.files.contains_key(&key(name));
+        assert!(known(&cache, "held") && !known(&cache, "a"));
+        assert!(known(&cache, "b") && known(&cache, "c"));
         drop(held);
-        shelf.cell(&key("b"));
-        shelf.evict(|bytes| *bytes);
-        assert!(!known(&shelf, "held") && known(&shelf, "b") && known(&shelf, "c"));
+        cache.entry(&key("b"));
+        cache.evict(|bytes| *bytes);
+        assert!(!known(&cache, "held") && known(&cache, "b") && known(&cache, "c"));
     }
 }

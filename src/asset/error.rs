@@ -1,10 +1,10 @@
-//! What is wrong with a file.
+//! Errors in asset files.
 
 use crate::value::sanitized;
 use std::fmt;
 use std::path::PathBuf;
 
-/// Where in a file.
+/// Place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileLocation {
     /// The file as a whole.
@@ -17,21 +17,21 @@ pub enum FileLocation {
     Part(String),
 }
 
-/// Something wrong with a file that a scene names.
+/// Error in a file that a scene names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssetError {
     /// The file.
     pub file: PathBuf,
-    /// Where in it.
+    /// Place in the file.
     pub place: FileLocation,
-    /// What was found, as a phrase.
+    /// Phrase that states the error.
     pub found: String,
-    /// What would be right, as a phrase.
+    /// Phrase that states the valid content.
     pub expected: String,
 }
 
 impl AssetError {
-    /// File, place and what was found: `bunny.obj:12: face names vertex 9, of 8`.
+    /// Returns file, place and error: `bunny.obj:12: face names vertex 9, of 8`.
     pub fn what(&self) -> String {
         let file = self.file.display();
         let place = match &self.place {

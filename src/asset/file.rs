@@ -1,4 +1,4 @@
-//! Reading whole files within a limit, and finding those that a file names.
+//! Reads whole files within a limit and resolves the names of files inside files.
 
 use crate::asset::error::{AssetError, FileLocation};
 use std::fs::File;
@@ -10,9 +10,9 @@ pub const MAX_BYTES: u64 = 2 << 30;
 
 /// A file in memory.
 pub struct FileContents {
-    /// Where it was read from.
+    /// Path of the file.
     pub path: PathBuf,
-    /// All of it.
+    /// Content of the file.
     pub bytes: Vec<u8>,
 }
 
@@ -20,10 +20,10 @@ impl FileContents {
     /// Reads the file at `path`, at most `limit` bytes.
     ///
     /// # Errors
-    /// If it cannot be read, or is no regular file, or is larger.
+    /// If the file cannot be read, is not a regular file, or is larger.
     pub fn read(path: &Path, limit: u64) -> Result<Self, AssetError> {
         let metadata = std::fs::metadata(path).map_err(|e| read_error(path, &e))?;
-        let wrong = |found: String, expected: &str| {
+        let error = |found: String, expected: &str| {
             Err(AssetError {
                 file: path.to_path_buf(),
                 place: FileLocation::Whole,
@@ -32,25 +32,25 @@ impl FileContents {
             })
         };
         if !metadata.is_file() {
-            return wrong("this is no regular file".to_string(), "a file");
+            return error("this is no regular file".to_string(), "a file");
         }
         if metadata.len() > limit {
             let found = format!("the file has {} MiB", metadata.len() >> 20);
-            return wrong(found, &format!("at most {} MiB", limit >> 20));
+            return error(found, &format!("at most {} MiB", limit >> 20));
         }
-        // Only now: to open a pipe is to wait for its writer.
+        // Opened after the check: opening a pipe would block until it has a writer.
         let file = File::open(path).map_err(|e| read_error(path, &e))?;
         let mut bytes = Vec::with_capacity(metadata.len() as usize);
-        // One byte more than the limit tells of a file that grew meanwhile.
+        // One byte more than the limit shows that the file grew meanwhile.
         file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| read_error(path, &e))?;
         if bytes.len() as u64 > limit {
             let found = "the file grew while it was read".to_string();
-            return wrong(found, &format!("at most {} MiB", limit >> 20));
+            return error(found, &format!("at most {} MiB", limit >> 20));
         }
         Ok(Self { path: path.to_path_buf(), bytes })
     }
 
-    /// An error at `place` of this file.
+    /// Creates an error at `place` of this file.
     pub fn error(
         &self,
         place: FileLocation,
@@ -65,8 +65,8 @@ impl FileContents {
         }
     }
 
-    /// The path of a file that this one names as `name`: relative to this one's folder, in it or
-    /// below. `None`: `name` leads elsewhere (an absolute path, `..`, a URL).
+    /// Resolves a file name in this file, relative to this file's folder. `None` if `name` leads out of
+    /// that folder (an absolute path, `..`, a URL).
     pub fn resolve_relative(&self, name: &str) -> Option<PathBuf> {
         let name = name.replace('\\', "/");
         let inside = Path::new(&name)
@@ -79,7 +79,7 @@ impl FileContents {
     }
 }
 
-/// Why a file cannot be read.
+/// Converts an I/O error of reading the file at `path`.
 pub fn read_error(path: &Path, error: &std::io::Error) -> AssetError {
     let (found, expected) = match error.kind() {
         ErrorKind::NotFound => ("there is no such file".to_string(), "the path of a file"),
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_reaches_only_its_own_folder() {
+    fn relative_names_stay_in_folder() {
         let source = FileContents { path: PathBuf::from("meshes/a.obj"), bytes: Vec::new() };
         assert_eq!(source.resolve_relative("a.mtl"), Some(PathBuf::from("meshes/a.mtl")));
         assert_eq!(source.resolve_relative("./x\\b.mtl"), Some(PathBuf::from("meshes/./x/b.mtl")));

@@ -7,25 +7,24 @@ use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
 use std::io::Cursor;
 use std::sync::LazyLock;
 
-/// The most pixels in a row or column.
+/// Largest number of pixels in a row or column.
 pub const MAX_SIDE: u32 = 32_768;
 
-/// The most pixels: 64 Mi, in at most 402 MB when decoded and 940 MB while it is read.
+/// Largest number of pixels: 64 Mi, at most 402 MB when decoded and 940 MB while the file is read.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// The most pixels that a byte of a file can stand for: deflate shrinks 1032 times at most, to at
-/// least an eighth of a byte a pixel; a JPEG spends at least one bit on 64 pixels.
+/// Largest number of pixels per byte of a file: deflate compresses at most 1032 times, from at least an
+/// eighth of a byte per pixel; a JPEG needs at least one bit for 64 pixels.
 const PIXELS_PER_BYTE: u64 = 8 * 1032;
 
-/// Pixels as they are kept: one number for a grey picture, three for a coloured one, of the size that
-/// the file has.
+/// Pixels in the bit depth of the file: one number for grey, three for colour.
 #[derive(Clone, Debug, PartialEq)]
 enum Texels {
     Bytes(Vec<u8>),
     Words(Vec<u16>),
 }
 
-/// An image, kept as it was encoded: 1 to 6 bytes a pixel.
+/// A decoded image in the bit depth of its file: 1 to 6 bytes per pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     size: [u32; 2],
@@ -33,20 +32,23 @@ pub struct Image {
     texels: Texels,
 }
 
-/// Linear light of every code from 0 to `last`.
-fn table(last: u16) -> Vec<f32> {
-    let linear = |code| linear_from_srgb(f64::from(code) / f64::from(last)) as f32;
+/// Returns the linear light of every sRGB level from 0 to `last`.
+fn linear_table(last: u16) -> Vec<f32> {
+    let linear = |level| linear_from_srgb(f64::from(level) / f64::from(last)) as f32;
     (0..=last).map(linear).collect()
 }
 
-static BYTES: LazyLock<Vec<f32>> = LazyLock::new(|| table(255));
-static WORDS: LazyLock<Vec<f32>> = LazyLock::new(|| table(65535));
+static BYTES: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(255));
+static WORDS: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(65535));
 
 impl Image {
-    /// From a file in memory; its first bytes say what it is.
+    /// Decodes a file in memory; its first bytes determine the format.
+    ///
+    /// # Errors
+    /// Any error in the file.
     pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
         let reader = ImageReader::new(Cursor::new(&source.bytes[..])).with_guessed_format();
-        let mut reader = reader.map_err(|e| wrong(source, &ImageError::IoError(e)))?;
+        let mut reader = reader.map_err(|e| decode_error(source, &ImageError::IoError(e)))?;
         if reader.format().is_none() {
             let found = "this is neither a PNG nor a JPEG";
             return Err(source.error(FileLocation::Whole, found, "a PNG or JPEG image"));
@@ -54,7 +56,7 @@ impl Image {
         let mut limits = Limits::default();
         limits.max_alloc = Some(MAX_PIXELS * 8);
         reader.limits(limits);
-        let mut decoder = reader.into_decoder().map_err(|e| wrong(source, &e))?;
+        let mut decoder = reader.into_decoder().map_err(|e| decode_error(source, &e))?;
         let (width, height) = decoder.dimensions();
         let pixels = u64::from(width) * u64::from(height);
         let size = format!("the image has {width} x {height} pixels");
@@ -66,8 +68,9 @@ impl Image {
             let found = format!("{size}, more than its {} bytes can hold", source.bytes.len());
             return Err(source.error(FileLocation::Whole, found, "a whole image"));
         }
-        let orientation = decoder.orientation().map_err(|e| wrong(source, &e))?;
-        let mut image = DynamicImage::from_decoder(decoder).map_err(|e| wrong(source, &e))?;
+        let orientation = decoder.orientation().map_err(|e| decode_error(source, &e))?;
+        let mut image =
+            DynamicImage::from_decoder(decoder).map_err(|e| decode_error(source, &e))?;
         image.apply_orientation(orientation);
         let size = [image.width(), image.height()];
         let (channels, texels) = match image {
@@ -75,7 +78,7 @@ impl Image {
             DynamicImage::ImageLuma16(i) => (1, Texels::Words(i.into_raw())),
             DynamicImage::ImageRgb8(i) => (3, Texels::Bytes(i.into_raw())),
             DynamicImage::ImageRgb16(i) => (3, Texels::Words(i.into_raw())),
-            // Transparency is left out.
+            // Alpha is dropped.
             i @ DynamicImage::ImageLumaA8(_) => (1, Texels::Bytes(i.into_luma8().into_raw())),
             i @ DynamicImage::ImageLumaA16(_) => (1, Texels::Words(i.into_luma16().into_raw())),
             i @ DynamicImage::ImageRgba16(_) => (3, Texels::Words(i.into_rgb16().into_raw())),
@@ -84,12 +87,12 @@ impl Image {
         Ok(Self { size, channels, texels })
     }
 
-    /// Width and height in pixels, each at least 1.
+    /// Returns width and height in pixels, each at least 1.
     pub fn size(&self) -> [u32; 2] {
         self.size
     }
 
-    /// Memory that the pixels take \[bytes\].
+    /// Returns the memory of the pixels \[bytes\].
     pub fn bytes(&self) -> usize {
         match &self.texels {
             Texels::Bytes(t) => t.len(),
@@ -97,33 +100,33 @@ impl Image {
         }
     }
 
-    /// Linear light of the pixel in column `x` and row `y` from the top, from 0 to 1: the file's
-    /// numbers are sRGB codes.
+    /// Returns the linear light of the pixel in column `x` and row `y` from the top, from 0 to 1. The
+    /// file's numbers are sRGB levels.
     ///
     /// # Panics
     /// If the image has no such pixel.
     pub fn color(&self, x: u32, y: u32) -> [f32; 3] {
-        let at = self.index(x, y);
+        let index = self.index(x, y);
         let channel = |c: usize| match &self.texels {
-            Texels::Bytes(t) => BYTES[usize::from(t[at + c])],
-            Texels::Words(t) => WORDS[usize::from(t[at + c])],
+            Texels::Bytes(t) => BYTES[usize::from(t[index + c])],
+            Texels::Words(t) => WORDS[usize::from(t[index + c])],
         };
         if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
     }
 
-    /// The number of the pixel in column `x` and row `y` from the top as a height, from 0 to 1: as it
-    /// stands in the file, of a coloured image the mean of the channels.
+    /// Returns the height at the pixel in column `x` and row `y` from the top, from 0 to 1: the number in
+    /// the file, without sRGB decoding; the mean of the channels for a colour image.
     ///
     /// # Panics
     /// If the image has no such pixel.
     pub fn height(&self, x: u32, y: u32) -> f32 {
-        let at = self.index(x, y);
+        let index = self.index(x, y);
         let sum: f32 = match &self.texels {
             Texels::Bytes(t) => {
-                t[at..at + self.channels].iter().map(|b| f32::from(*b) / 255.0).sum()
+                t[index..index + self.channels].iter().map(|b| f32::from(*b) / 255.0).sum()
             }
             Texels::Words(t) => {
-                t[at..at + self.channels].iter().map(|b| f32::from(*b) / 65535.0).sum()
+                t[index..index + self.channels].iter().map(|b| f32::from(*b) / 65535.0).sum()
             }
         };
         sum / self.channels as f32
@@ -135,7 +138,7 @@ impl Image {
     }
 }
 
-fn wrong(source: &FileContents, error: &ImageError) -> AssetError {
+fn decode_error(source: &FileContents, error: &ImageError) -> AssetError {
     source.error(
         FileLocation::Whole,
         format!("the image cannot be read: {error}"),
@@ -156,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_keep_their_numbers() {
+    fn pixels_keep_values_of_file() {
         let mut rgba = image::RgbaImage::from_pixel(3, 2, Rgba([255, 0, 0, 7]));
         rgba.put_pixel(2, 1, Rgba([128, 255, 0, 255]));
         let image = Image::parse(&file(rgba.into(), ImageFormat::Png)).unwrap();
@@ -172,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn jpeg_is_read() {
+    fn jpeg_is_decoded() {
         let rgb = image::RgbImage::from_pixel(20, 10, image::Rgb([200, 100, 50]));
         let image = Image::parse(&file(rgb.into(), ImageFormat::Jpeg)).unwrap();
         assert_eq!(image.size(), [20, 10]);
@@ -180,8 +183,8 @@ mod tests {
         assert!((r - BYTES[200]).abs() < 0.02 && r > g && g > b);
     }
 
-    /// A PNG header that announces so many pixels, with a right checksum and no pixels.
-    fn announced(side: u32) -> FileContents {
+    /// PNG file whose header declares `side` x `side` pixels, with a valid checksum but no such pixels.
+    fn png_declaring(side: u32) -> FileContents {
         let mut source = file(image::GrayImage::new(1, 1).into(), ImageFormat::Png);
         source.bytes[16..20].copy_from_slice(&side.to_be_bytes());
         source.bytes[20..24].copy_from_slice(&side.to_be_bytes());
@@ -197,11 +200,11 @@ mod tests {
     }
 
     #[test]
-    fn too_large_an_image_is_refused_before_it_is_decoded() {
+    fn oversized_image_is_rejected_before_decoding() {
         for (side, words) in
             [(60_000, "60000 x 60000"), (8_000, "more than its"), (u32::MAX >> 1, "cannot be read")]
         {
-            let error = Image::parse(&announced(side)).unwrap_err();
+            let error = Image::parse(&png_declaring(side)).unwrap_err();
             assert!(error.found.contains(words), "{side}: {error}");
         }
         let text = FileContents { path: PathBuf::from("a.png"), bytes: b"no image".to_vec() };

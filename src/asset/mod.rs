@@ -1,12 +1,12 @@
-//! Files that scenes name, read into plain data: meshes and images.
+//! Asset files of scenes, read into plain data: meshes and images.
 //!
-//! Everything is checked before it is kept: counts against limits and against the length of the
-//! file before anything is allocated for them, indices against the number of vertices, coordinates
-//! against NaN and infinities. Whatever is wrong becomes an [`AssetError`] that names the file and
-//! the place in it.
+//! All content is checked: counts against limits and against the length of the file before memory is
+//! allocated, indices against the number of vertices, coordinates against NaN and infinities. Every error
+//! becomes an [`AssetError`] with the file and the place in it.
 //!
-//! A file may name others (the MTL of an OBJ, the buffers of a glTF): only such that lie in its own
-//! folder or below, by relative paths without `..`. Nothing is ever fetched from elsewhere.
+//! A file may name others (the MTL of an OBJ, the buffers of a glTF) in its own folder or below, by
+//! relative paths without `..`. Other files and URLs are never read.
+
 mod cache;
 mod error;
 mod file;

@@ -1,4 +1,4 @@
-//! The camera: a pinhole.
+//! Pinhole camera: description, navigation, compiled form.
 
 mod navigate;
 mod pinhole;
@@ -15,17 +15,17 @@ use serde::{Deserialize, Serialize};
 description! {
     /// Pinhole camera.
     pub struct Camera {
-        /// Where the picture is taken from.
+        /// Position of the camera.
         eye: [f64; 3] => "eye" "[0.0, 1.0, 5.0]", in COORDINATE "scene units";
         /// The point looked at. Exactly one of `target` and `direction` is given.
         target: Option<[f64; 3]>, or "`direction` is needed", in COORDINATE "scene units";
         /// The direction looked in.
         direction: Option<[f64; 3]>, or "`target` is needed", as Direction;
-        /// What is up in the picture; not parallel to the view direction.
+        /// Up direction of the picture; not parallel to the view direction.
         up: [f64; 3] => "up" "[0.0, 1.0, 0.0]", as Direction;
         /// Opening angle, across the height or across the width of the picture.
         view_angle: ViewAngle => "view_angle" "{ vertical = 40.0 }";
-        /// Nothing nearer than this, measured along the view direction, is seen.
+        /// Near plane: its distance along the view direction; surfaces in front of it are invisible.
         near: f64 = 0.0, in closed(0.0, 1e9) "scene units";
     }
 }
@@ -52,8 +52,8 @@ fn view_angle() -> ViewAngle {
     ViewAngle::Vertical(40.0)
 }
 
-/// The camera of a scene that says nothing about it: it looks at the origin. (A file that has a
-/// `[camera]` has to say where it looks.)
+/// Camera of a scene file without `[camera]`: it looks at the origin. (A `[camera]` needs `target` or
+/// `direction`.)
 impl Default for Camera {
     fn default() -> Self {
         Self {
@@ -95,7 +95,7 @@ impl FieldValue for ViewAngle {
 }
 
 impl ViewAngle {
-    /// Its key and its angle in degrees.
+    /// Returns its key and its angle in degrees.
     pub fn key_degrees(&self) -> (&'static str, f64) {
         match *self {
             Self::Vertical(degrees) => ("vertical", degrees),
@@ -105,8 +105,8 @@ impl ViewAngle {
 }
 
 impl Camera {
-    /// Unit vector of the view direction; `None` if `target` is the eye itself, `direction` is
-    /// zero, or not exactly one of them is given.
+    /// Returns the unit vector of the view direction; `None` if `target` is the eye itself, `direction`
+    /// is zero, or not exactly one of them is given.
     pub fn view(&self) -> Option<DVec3> {
         let look = match (self.target, self.direction) {
             (Some(target), None) => DVec3::from_array(target) - DVec3::from_array(self.eye),
@@ -116,7 +116,7 @@ impl Camera {
         unit(look)
     }
 
-    /// What is wrong with it.
+    /// Returns the errors of the camera.
     pub fn faults(&self) -> Vec<ValidationError> {
         let given = match (&self.target, &self.direction) {
             (None, None) => Some(ValidationError::new(
@@ -132,12 +132,12 @@ impl Camera {
             _ => None,
         };
         let checks = self.validator().and(given);
-        let lost = if checks.is_clean() { self.lost() } else { None };
-        checks.and(lost).errors()
+        let degenerate = if checks.is_clean() { self.orientation_error() } else { None };
+        checks.and(degenerate).errors()
     }
 
-    /// What makes a picture impossible although every number is in its range.
-    fn lost(&self) -> Option<ValidationError> {
+    /// Returns the error that makes a picture impossible although every number is in its range.
+    fn orientation_error(&self) -> Option<ValidationError> {
         let Some(view) = self.view() else {
             return Some(ValidationError::new(
                 "target",
@@ -146,7 +146,7 @@ impl Camera {
             ));
         };
         let up = unit(self.up)?;
-        // Within 1e-6 of parallel the picture's sides are noise.
+        // Within 1e-6 of parallel, rounding errors determine the picture's axes.
         (view.cross(up).length() <= 1e-6).then(|| {
             ValidationError::new(
                 "up",
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn every_number_is_checked() {
+    fn camera_ranges_are_checked() {
         let camera = Camera {
             eye: [f64::INFINITY, 0.0, 0.0],
             target: Some([f64::NAN; 3]),
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_view_needs_a_direction_and_an_up_across_it() {
+    fn camera_needs_direction_and_up_across_it() {
         let camera = Camera::default();
         assert!(keys(&camera).is_empty());
         assert_eq!(keys(&Camera { target: None, ..camera.clone() }), [""]);

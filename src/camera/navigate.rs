@@ -1,22 +1,22 @@
-//! Moving a camera by hand: orbit, pan, dolly, fly, look, roll, zoom, frame.
+//! Interactive camera movements: orbit, pan, dolly, fly, look, roll, zoom, frame.
 //!
-//! Every function gives a new camera in the form of the old one (target or direction), its numbers
-//! rounded to about a millionth of the distance to the pivot. What would be no camera (beyond the
-//! coordinates, no distance left) leaves the old one. Turns are relative to `up`; the view never
-//! comes nearer to it than 0.1 degrees.
+//! Every function returns a camera in the form of the old one (target or direction), with numbers
+//! rounded to about a millionth of the distance to the pivot. A movement that would give an invalid
+//! camera (coordinates out of range, no distance left) returns the old one. Rotations are relative to
+//! `up`; the view direction stays at least 0.1 degrees away from it.
 
 use crate::camera::{Camera, ViewAngle};
 use crate::value::{floor_log10, round_significant, rounded_to, unit};
 use glam::DVec3;
 
-/// The steepest view up or down, in degrees above or below the plane across `up`.
-const STEEPEST: f64 = 89.9;
-/// The narrowest and the widest opening angle that a zoom leads to, in degrees.
-const ANGLES: [f64; 2] = [0.1, 170.0];
+/// Steepest view up or down, in degrees above or below the plane across `up`.
+const MAX_PITCH: f64 = 89.9;
+/// Narrowest and widest opening angle of a zoom, in degrees.
+const ZOOM_ANGLES: [f64; 2] = [0.1, 170.0];
 
 impl Camera {
-    /// Unit vectors to the right, up in the picture, and forward; orthonormal also for a camera that
-    /// has faults.
+    /// Returns orthonormal vectors to the right, up in the picture, and forward, also for a camera with
+    /// faults.
     pub fn frame(&self) -> [DVec3; 3] {
         let forward = self.view().unwrap_or(DVec3::NEG_Z);
         let up = unit(self.up).unwrap_or(DVec3::Y);
@@ -25,8 +25,8 @@ impl Camera {
         [right, right.cross(forward), forward]
     }
 
-    /// Half the width and half the height of the picture at unit distance, for a picture `aspect`
-    /// times as wide as high.
+    /// Returns half the width and half the height of the picture at unit distance. `aspect` is the
+    /// picture's width divided by its height.
     pub fn half_size(&self, aspect: f64) -> [f64; 2] {
         let (_, degrees) = self.view_angle.key_degrees();
         let half = (0.5 * degrees).to_radians().tan();
@@ -36,29 +36,29 @@ impl Camera {
         }
     }
 
-    /// Goes round the pivot, `right` degrees to the right and `up` degrees upwards, looking at it from
-    /// the same distance. The pivot is the target, or `distance` ahead.
+    /// Orbits the pivot at constant distance, `right` degrees to the right and `up` degrees upwards. The
+    /// pivot is the target, or the point `distance` ahead.
     pub fn orbit(&self, right: f64, up: f64, distance: f64) -> Self {
-        let distance = self.reach(distance);
-        // The view turns the other way than the eye goes.
+        let distance = self.pivot_distance(distance);
+        // The view direction rotates against the movement of the eye.
         let Some(forward) = self.turned(-right, -up) else { return self.clone() };
         let pivot = DVec3::from_array(self.eye) + self.frame()[2] * distance;
         let pivot = self.target.map_or(pivot, DVec3::from_array);
         self.placed(pivot - forward * distance, forward, distance)
     }
 
-    /// Moves across the view direction: to the right and up, in shares of the distance to the pivot
-    /// (the target, or `distance` ahead).
+    /// Moves across the view direction by `right` and `up`, as fractions of the distance to the pivot
+    /// (the target, or the point `distance` ahead).
     pub fn pan(&self, right: f64, up: f64, distance: f64) -> Self {
-        let distance = self.reach(distance);
+        let distance = self.pivot_distance(distance);
         let [x, y, _] = self.frame();
         self.shifted((x * right + y * up) * distance, distance)
     }
 
-    /// Changes the distance to the pivot (the target, or `distance` ahead) by the factor `factor`: less
-    /// than 1 is nearer. It never comes through the pivot.
+    /// Multiplies the distance to the pivot (the target, or the point `distance` ahead) by `factor`; less
+    /// than 1 is nearer. The camera stays on its side of the pivot.
     pub fn dolly(&self, factor: f64, distance: f64) -> Self {
-        let old = self.reach(distance);
+        let old = self.pivot_distance(distance);
         if !(factor > 0.0 && factor.is_finite()) {
             return self.clone();
         }
@@ -66,31 +66,31 @@ impl Camera {
         let eye = DVec3::from_array(self.eye);
         let pivot = self.target.map_or(eye + forward * old, DVec3::from_array);
         let new = old * factor;
-        // Nearer than this, coordinates have no digits left for it.
+        // Below this distance coordinates have too little precision.
         if new < 1e-6 * pivot.abs().max_element().max(1e-6) {
             return self.clone();
         }
         self.placed(pivot - forward * new, forward, new)
     }
 
-    /// Moves by so many scene units to the right, up in the picture and forward; the target goes along.
+    /// Moves eye and target to the right, up in the picture and forward, in scene units.
     pub fn fly(&self, [right, up, ahead]: [f64; 3]) -> Self {
         let [x, y, z] = self.frame();
-        let by = x * right + y * up + z * ahead;
-        self.shifted(by, self.reach(by.length().max(1e-3)))
+        let translation = x * right + y * up + z * ahead;
+        self.shifted(translation, self.pivot_distance(translation.length().max(1e-3)))
     }
 
-    /// Turns the view in place, `right` degrees to the right and `up` degrees upwards. A target goes
-    /// round the eye.
+    /// Rotates the view about the eye, `right` degrees to the right and `up` degrees upwards. A target
+    /// moves around the eye.
     pub fn look(&self, right: f64, up: f64) -> Self {
-        let distance = self.reach(1.0);
+        let distance = self.pivot_distance(1.0);
         match self.turned(right, up) {
             Some(forward) => self.placed(DVec3::from_array(self.eye), forward, distance),
             None => self.clone(),
         }
     }
 
-    /// Turns the camera about the view direction, `degrees` clockwise for one who looks through it.
+    /// Rolls the camera about the view direction, `degrees` clockwise as seen by the camera.
     pub fn roll(&self, degrees: f64) -> Self {
         if !degrees.is_finite() {
             return self.clone();
@@ -101,30 +101,30 @@ impl Camera {
         // Rodrigues' rotation about the view direction.
         let rolled = up * cos + forward.cross(up) * sin + forward * (forward.dot(up) * (1.0 - cos));
         let up = rolled.map(|x| rounded_to(x, -6)).to_array();
-        self.sound(Self { up, ..self.clone() })
+        self.valid_or_self(Self { up, ..self.clone() })
     }
 
-    /// Multiplies the width of what is seen by `factor`: less than 1 is narrower.
+    /// Multiplies the width of the field of view at unit distance by `factor`; less than 1 is narrower.
     pub fn zoom(&self, factor: f64) -> Self {
         if !(factor > 0.0 && factor.is_finite()) {
             return self.clone();
         }
         let zoomed = |degrees: f64| {
             let half = (0.5 * degrees).to_radians().tan() * factor;
-            let [narrow, wide] = ANGLES;
+            let [narrow, wide] = ZOOM_ANGLES;
             let new = round_significant(2.0 * half.atan().to_degrees(), 4).clamp(narrow, wide);
-            // An angle beyond the limits does not jump to them against the zoom.
+            // An angle outside of the limits keeps its value instead of moving against the zoom.
             if (new < degrees) == (factor < 1.0) { new } else { degrees }
         };
         let view_angle = match self.view_angle {
             ViewAngle::Vertical(degrees) => ViewAngle::Vertical(zoomed(degrees)),
             ViewAngle::Horizontal(degrees) => ViewAngle::Horizontal(zoomed(degrees)),
         };
-        self.sound(Self { view_angle, ..self.clone() })
+        self.valid_or_self(Self { view_angle, ..self.clone() })
     }
 
-    /// Looks at `center` from the same side, from so far that a ball of `radius` around it fills a
-    /// picture `aspect` times as wide as high, but for a small margin. A target becomes the centre.
+    /// Frames the ball of `radius` around `center`, seen from the same side, with a margin of 10 %. `aspect`
+    /// is the picture's width divided by its height. A target becomes the centre.
     pub fn framed(&self, center: [f64; 3], radius: f64, aspect: f64) -> Self {
         let forward = self.frame()[2];
         let half = self.half_size(aspect).into_iter().fold(f64::INFINITY, f64::min).atan();
@@ -137,40 +137,42 @@ impl Camera {
         if aimed.target.is_some() {
             aimed.target = Some(center.to_array());
         }
-        self.sound(aimed.put(center - forward * distance, forward, distance, false))
+        self.valid_or_self(aimed.moved_to(center - forward * distance, forward, distance, false))
     }
 
-    /// The distance to the pivot: the target's, or `distance`.
-    fn reach(&self, distance: f64) -> f64 {
-        let aimed = self.target.map(|t| DVec3::from_array(t) - DVec3::from_array(self.eye));
-        let reach = aimed.map_or(distance, DVec3::length);
-        if reach > 0.0 && reach.is_finite() { reach } else { 1.0 }
+    /// Returns the distance to the target, or `distance` without a target; 1 if that is invalid.
+    fn pivot_distance(&self, distance: f64) -> f64 {
+        let to_target = self.target.map(|t| DVec3::from_array(t) - DVec3::from_array(self.eye));
+        let distance = to_target.map_or(distance, DVec3::length);
+        if distance > 0.0 && distance.is_finite() { distance } else { 1.0 }
     }
 
-    /// The view direction turned to the right and upwards, in degrees; `None` if that is no angle.
+    /// Returns the view direction rotated to the right and upwards, in degrees; `None` if an angle is not
+    /// finite.
     fn turned(&self, right: f64, up: f64) -> Option<DVec3> {
         if !(right.is_finite() && up.is_finite()) {
             return None;
         }
         let axis = unit(self.up).unwrap_or(DVec3::Y);
         let [side, _, forward] = self.frame();
-        // Forward, but level.
+        // Forward direction in the plane across `up`.
         let ahead = axis.cross(side);
         let pitch = forward.dot(axis).clamp(-1.0, 1.0).asin().to_degrees();
-        let pitch = (pitch + up).clamp(-STEEPEST, STEEPEST).to_radians();
+        let pitch = (pitch + up).clamp(-MAX_PITCH, MAX_PITCH).to_radians();
         let (sin, cos) = right.to_radians().sin_cos();
         let level = ahead * cos + side * sin;
         Some((level * pitch.cos() + axis * pitch.sin()).normalize())
     }
 
-    /// At `eye`, looking `forward`, the target (if it has one) or the pivot `distance` ahead. What
-    /// does not change keeps its digits.
+    /// Returns the camera at `eye` with the view direction `forward` and the target, if it has one,
+    /// `distance` ahead. An unchanged eye keeps its digits; an invalid result gives the old camera.
     fn placed(&self, eye: DVec3, forward: DVec3, distance: f64) -> Self {
-        let stays = DVec3::from_array(self.eye) == eye;
-        self.sound(self.put(eye, forward, distance, stays))
+        let eye_stays = DVec3::from_array(self.eye) == eye;
+        self.valid_or_self(self.moved_to(eye, forward, distance, eye_stays))
     }
 
-    fn put(&self, eye: DVec3, forward: DVec3, distance: f64, eye_stays: bool) -> Self {
+    /// [`Camera::placed`] without validation.
+    fn moved_to(&self, eye: DVec3, forward: DVec3, distance: f64, eye_stays: bool) -> Self {
         let mut next = self.clone();
         let round = |v: DVec3| v.map(|x| rounded(x, distance)).to_array();
         if let Some(direction) = next.direction {
@@ -186,25 +188,25 @@ impl Camera {
         next
     }
 
-    /// The eye, and the target if there is one, moved by the same vector.
-    fn shifted(&self, by: DVec3, distance: f64) -> Self {
-        let moved = |at: [f64; 3]| {
-            let at = DVec3::from_array(at);
-            std::array::from_fn(
-                |i| if by[i] == 0.0 { at[i] } else { rounded(at[i] + by[i], distance) },
-            )
+    /// Returns the camera with eye and target moved by `translation`.
+    fn shifted(&self, translation: DVec3, distance: f64) -> Self {
+        let moved = |point: [f64; 3]| {
+            std::array::from_fn(|i| match translation[i] {
+                0.0 => point[i],
+                by => rounded(point[i] + by, distance),
+            })
         };
         let target = self.target.map(moved);
-        self.sound(Self { eye: moved(self.eye), target, ..self.clone() })
+        self.valid_or_self(Self { eye: moved(self.eye), target, ..self.clone() })
     }
 
-    /// `next` if it is a camera, otherwise this one.
-    fn sound(&self, next: Self) -> Self {
+    /// Returns `next` if it has no faults, otherwise this camera.
+    fn valid_or_self(&self, next: Self) -> Self {
         if next.faults().is_empty() { next } else { self.clone() }
     }
 }
 
-/// Rounded to about a millionth of `scale`.
+/// Rounds `x` to about a millionth of `scale`.
 fn rounded(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 6)
 }

@@ -1,4 +1,4 @@
-//! A light, compiled: of unit strength and white. Colour and intensity are applied to the finished
+//! Compiled lights, white and of unit strength. Colour and intensity are applied to the accumulated
 //! sums, so that changing them needs no new samples.
 
 use crate::lanes::{Float, SimdFloat, Vec3};
@@ -7,40 +7,39 @@ use crate::value::unit;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// A light, compiled.
+/// A compiled delta light.
 #[derive(Clone, Copy, Debug)]
 pub enum DeltaLight<S> {
-    /// A point whose irradiance falls with the square of the distance: 1 / d^2.
+    /// Point light with irradiance 1 / d^2 at the distance d.
     InverseSquare {
-        /// Where it stands.
+        /// Position of the light.
         position: [S; 3],
     },
-    /// A point with the same normal irradiance, pi, everywhere.
+    /// Point light with the normal irradiance pi at every distance.
     Constant {
-        /// Where it stands.
+        /// Position of the light.
         position: [S; 3],
     },
-    /// Light along one direction with normal irradiance pi.
+    /// Directional light with the normal irradiance pi.
     Directional {
         /// Unit vector towards the light.
         wi: [S; 3],
     },
 }
 
-/// Unit light arriving at points.
+/// Light incident at points, of unit strength.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSample<L> {
     /// Unit vector towards the light.
     pub wi: Vec3<L>,
-    /// Distance to the light; the largest number for light from infinity.
+    /// Distance to the light; the largest finite number for a directional light.
     pub distance: L,
-    /// Irradiance of a surface that faces the light.
+    /// Irradiance on a surface that faces the light.
     pub irradiance: L,
 }
 
 impl<S: Float> DeltaLight<S> {
-    /// Compiles `light` for a scene shifted so that `origin` becomes zero. `None`: it has no kind
-    /// or no direction.
+    /// Compiles `light` for a scene translated by -`origin`. `None` if it has no kind or no direction.
     pub fn new(light: &Light, origin: DVec3) -> Option<Self> {
         if let Some(point) = &light.point {
             let position = (DVec3::from(point.position) - origin).to_array().map(S::from_f64);
@@ -49,34 +48,34 @@ impl<S: Float> DeltaLight<S> {
                 Falloff::None => Self::Constant { position },
             });
         }
-        let towards = -unit(light.directional?.direction)?;
-        Some(Self::Directional { wi: towards.to_array().map(S::from_f64) })
+        let wi = -unit(light.directional?.direction)?;
+        Some(Self::Directional { wi: wi.to_array().map(S::from_f64) })
     }
 
-    /// The light that arrives at `point`, if nothing is in the way.
+    /// Returns the light incident at `point` without occluders.
     #[inline(always)]
     pub fn sample_li<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> LightSample<L> {
         match self {
-            Self::Directional { wi: towards } => LightSample {
-                wi: Vec3::splat(*towards),
+            Self::Directional { wi } => LightSample {
+                wi: Vec3::splat(*wi),
                 distance: L::from_f64(L::MAX),
                 irradiance: L::from_f64(PI),
             },
             Self::InverseSquare { position } | Self::Constant { position } => {
-                let to = Vec3::splat(*position) - point;
-                let distance = to.length_squared().sqrt();
+                let to_light = Vec3::splat(*position) - point;
+                let distance = to_light.length_squared().sqrt();
                 let inverse = L::one() / distance;
                 let irradiance = match self {
-                    // Infinity times black would be no number.
+                    // Finite, because infinity times black would be NaN.
                     Self::InverseSquare { .. } => (inverse * inverse).min(L::from_f64(L::MAX)),
                     _ => L::from_f64(PI),
                 };
-                LightSample { wi: to * inverse, distance, irradiance }
+                LightSample { wi: to_light * inverse, distance, irradiance }
             }
         }
     }
 
-    /// Normal irradiance at a typical place: at the origin, but not nearer than `radius`.
+    /// Returns the normal irradiance at a typical point: the origin, at a distance of at least `radius`.
     pub fn typical_irradiance(&self, radius: f64) -> f64 {
         match self {
             Self::InverseSquare { position } => {

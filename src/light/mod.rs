@@ -1,4 +1,4 @@
-//! Lights.
+//! Point and directional lights.
 
 mod delta;
 
@@ -7,7 +7,7 @@ pub use delta::{DeltaLight, LightSample};
 use crate::value::{Color, Description, Field, ValidationError, choices, description};
 
 description! {
-    /// One light: exactly one of `point` and `directional`, a colour, an intensity.
+    /// A light: exactly one of `point` and `directional`, a colour, an intensity.
     pub struct Light: Default {
         /// Name; no two lights have the same.
         name: String, or "a number";
@@ -20,9 +20,9 @@ description! {
         /// With falloff `inverse-square` the radiant intensity [W/sr]. With `none`, and for a
         /// directional light, the brightness of a white matt surface that faces the light.
         intensity: f64 = 1.0, in LIGHT "W/sr, or irradiance / π";
-        /// How a point light weakens with distance.
+        /// Falloff of a point light with the distance.
         falloff: Falloff = "none";
-        /// Whether it shines.
+        /// `false` switches the light off.
         on: bool = true;
     }
 }
@@ -30,7 +30,7 @@ description! {
 description! {
     /// Light from one point.
     pub struct Point: Copy {
-        /// Where it stands.
+        /// Position of the light.
         position: [f64; 3], in COORDINATE "scene units";
     }
 }
@@ -44,7 +44,7 @@ description! {
 }
 
 choices! {
-    /// Dependence of a point light on the distance.
+    /// Falloff of a point light with the distance.
     pub enum Falloff {
         /// not at all
         None = "none",
@@ -57,7 +57,7 @@ choices! {
 pub const FIELDS: &[Field] = Light::FIELDS;
 
 impl Light {
-    /// What is wrong with it.
+    /// Returns the errors of the light.
     pub fn faults(&self) -> Vec<ValidationError> {
         let kinds = match (&self.point, &self.directional) {
             (Some(_), None) => None,
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn exactly_one_kind() {
+    fn light_has_exactly_one_kind() {
         let mut light = Light::default();
         assert_eq!(keys(&light), [""]);
         light.point = Some(Point { position: [0.0; 3] });
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn every_number_is_checked() {
+    fn light_ranges_are_checked() {
         let light = Light {
             point: Some(Point { position: [f64::NAN, 0.0, 0.0] }),
             color: Color([-1.0; 3]),
@@ -117,8 +117,8 @@ mod tests {
             ..Light::default()
         };
         assert_eq!(keys(&light), ["point.position", "color", "intensity"]);
-        let still = Directional { direction: [0.0; 3] };
-        let light = Light { directional: Some(still), ..Light::default() };
+        let no_direction = Directional { direction: [0.0; 3] };
+        let light = Light { directional: Some(no_direction), ..Light::default() };
         assert_eq!(keys(&light), ["directional.direction"]);
     }
 }

@@ -1,33 +1,34 @@
-//! A material, compiled: only numbers that the kernel needs.
+//! Compiled BSDF: the numbers that the kernel needs.
 
 use crate::lanes::Float;
 use crate::material::fresnel::Reflectance;
 use crate::material::{Fresnel, Highlight, Lobe, Masking, Material};
 
-/// Microfacet slopes below this are mirrors (for reflected rays) or this (for highlights of lights).
+/// Smallest microfacet alpha. Below it the reflection lobe is a mirror, and the highlights of lights use
+/// this value.
 pub const SMOOTH_ALPHA: f64 = 1e-3;
 
-/// Phong exponents above this have highlights so small that their cosine, rounded in single precision, tells
-/// too little: the power's relative error is the exponent times some 1.5e-7.
+/// Largest Phong exponent for which a single-precision cosine is accurate enough: the relative error of
+/// the power is the exponent times about 1.5e-7.
 pub const SHARP_EXPONENT: f64 = 1024.0;
 
 /// A distribution of microfacets.
 #[derive(Clone, Copy, Debug)]
 pub struct MicrofacetDistribution<S> {
-    /// GGX instead of Beckmann.
+    /// `true` for GGX, `false` for Beckmann.
     pub ggx: bool,
-    /// Slope, at least [`SMOOTH_ALPHA`].
+    /// Roughness parameter alpha, at least [`SMOOTH_ALPHA`].
     pub alpha: S,
-    /// Its square.
+    /// Square of `alpha`.
     pub alpha2: S,
-    /// One over its square.
+    /// Inverse square of `alpha`.
     pub inverse_alpha2: S,
-    /// How facets hide each other.
+    /// Masking and shadowing between microfacets.
     pub masking: Masking,
 }
 
 impl<S: Float> MicrofacetDistribution<S> {
-    /// Of slope `alpha`.
+    /// Creates a distribution with the parameter `alpha`.
     pub fn new(ggx: bool, alpha: f64, masking: Masking) -> Self {
         let alpha2 = alpha * alpha;
         let [alpha, alpha2, inverse_alpha2] = [alpha, alpha2, 1.0 / alpha2].map(S::from_f64);
@@ -35,7 +36,7 @@ impl<S: Float> MicrofacetDistribution<S> {
     }
 }
 
-/// How a light's highlight is computed.
+/// Formula of a light's highlight.
 #[derive(Clone, Copy, Debug)]
 pub enum SpecularModel<S> {
     /// No highlight.
@@ -58,73 +59,74 @@ pub enum SpecularModel<S> {
     },
 }
 
-/// How a reflected ray is spread.
+/// Distribution of reflected rays.
 #[derive(Clone, Copy, Debug)]
 pub enum ReflectionLobe<S> {
-    /// Not at all.
+    /// All in the mirror direction.
     Mirror,
-    /// Uniformly in a cone.
+    /// Uniform in a cone.
     Cone {
         /// 1 - cos of the half-angle.
         one_minus_cos: S,
     },
-    /// Uniformly on a square at unit distance.
+    /// Uniform on a square at unit distance.
     Square {
-        /// Its side.
+        /// Side of the square.
         side: S,
     },
-    /// As microfacets reflect.
+    /// Reflection by microfacets.
     MicrofacetDistribution(MicrofacetDistribution<S>),
 }
 
-/// How a surface lets light through.
+/// Transmission through a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Transmission<S> {
     /// k_t.
     pub strength: S,
     /// Index of refraction of the inside.
     pub index: S,
-    /// Fresnel's equations share the light between reflection and transmission; otherwise k_r and k_t
-    /// are what they are.
+    /// `true` if Fresnel's equations split the light between reflection and transmission; otherwise k_r
+    /// and k_t are used unchanged.
     pub dielectric: bool,
 }
 
-/// A material, compiled.
+/// A compiled material.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf<S> {
     /// k_a x colour.
     pub ambient: [S; 3],
     /// k_d x colour.
     pub diffuse: [S; 3],
-    /// The lights' highlights.
-    pub shine: SpecularModel<S>,
-    /// k_r and its spread, if it reflects at all.
+    /// Highlights of lights.
+    pub specular: SpecularModel<S>,
+    /// k_r and the reflection lobe; `None` if nothing is reflected.
     pub reflection: Option<(S, ReflectionLobe<S>)>,
-    /// k_t and what bends the light, if it lets any through.
+    /// k_t and the index of refraction; `None` if the material is opaque.
     pub transmission: Option<Transmission<S>>,
-    /// F of the highlight.
+    /// Fresnel reflectance of the highlight.
     pub highlight_fresnel: Reflectance<S>,
-    /// F of the reflection, as far as it does not depend on what lies on the other side.
+    /// Fresnel reflectance of the reflection, except the part that depends on the medium on the other
+    /// side.
     pub reflection_fresnel: Reflectance<S>,
-    /// Whether lights matter to it.
+    /// `true` if lights contribute to its colour.
     pub has_direct: bool,
-    /// Whether its back is like its front.
+    /// `true` if its back is like its front.
     pub two_sided: bool,
 }
 
-/// 1 - cos(atan(r)), without cancellation: r^2 / (1 + r^2 + sqrt(1 + r^2)).
+/// Returns 1 - cos(atan(r)) without cancellation: r^2 / (1 + r^2 + sqrt(1 + r^2)).
 pub fn one_minus_cos_of_tan(r: f64) -> f64 {
     let square = r * r;
     if square.is_infinite() { 1.0 } else { square / (1.0 + square + (1.0 + square).sqrt()) }
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Compiles `material`; `reflects`: the scene traces reflected and transmitted rays at all.
+    /// Compiles `material`. `reflects` is `true` if the scene traces reflected and transmitted rays.
     pub fn new(material: &Material, reflects: bool) -> Self {
-        let slope = material.microfacet_alpha().max(SMOOTH_ALPHA);
-        let facets = |ggx| MicrofacetDistribution::new(ggx, slope, material.masking);
+        let alpha = material.microfacet_alpha().max(SMOOTH_ALPHA);
+        let facets = |ggx| MicrofacetDistribution::new(ggx, alpha, material.masking);
         let strength = S::from_f64(material.specular);
-        let shine = match material.highlight {
+        let specular = match material.highlight {
             _ if material.specular == 0.0 => SpecularModel::None,
             Highlight::Phong => SpecularModel::Phong {
                 strength,
@@ -137,7 +139,7 @@ impl<S: Float> Bsdf<S> {
             },
         };
         let r = material.roughness;
-        let spread = match material.lobe {
+        let lobe = match material.lobe {
             Lobe::Mirror => ReflectionLobe::Mirror,
             Lobe::Cone | Lobe::Square if r == 0.0 => ReflectionLobe::Mirror,
             Lobe::Cone => {
@@ -165,8 +167,8 @@ impl<S: Float> Bsdf<S> {
         Self {
             ambient: material.color.0.map(|c| S::from_f64(c * material.ambient)),
             diffuse: material.color.0.map(|c| S::from_f64(c * material.diffuse)),
-            shine,
-            reflection: (reflects && k_r > 0.0).then(|| (S::from_f64(k_r), spread)),
+            specular,
+            reflection: (reflects && k_r > 0.0).then(|| (S::from_f64(k_r), lobe)),
             transmission,
             highlight_fresnel: reflectance,
             reflection_fresnel: if shared { Reflectance::white() } else { reflectance },

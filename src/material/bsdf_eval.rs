@@ -1,4 +1,4 @@
-//! What a finish does with light, in lanes: highlights of lights and directions of reflected rays.
+//! BSDF evaluation and sampling in SIMD lanes: highlights of lights and reflected rays.
 
 use crate::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
 use crate::material::Masking;
@@ -6,18 +6,20 @@ use crate::material::bsdf::{Bsdf, MicrofacetDistribution, ReflectionLobe, Specul
 use crate::sampling::warp;
 use std::f64::consts::{FRAC_1_PI, PI};
 
-/// A reflected ray's direction and what its radiance counts.
+/// Direction and weight of a reflected ray.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfSample<L> {
     /// Unit direction.
     pub direction: Vec3<L>,
-    /// Factor of the radiance that comes from there; zero: the ray is lost.
+    /// Factor of the radiance from `direction`; zero if the ray is lost.
     pub weight: Vec3<L>,
 }
 
-/// Component along the unit vector `n` of `h`, of any length, and the squared tangent of the angle
-/// between them, from the part of `h` across `n`, so that small angles keep their digits. The tangent
-/// is bounded, so that what is computed from it stays finite.
+/// Returns the component of `h` along the unit vector `n`, and the squared tangent of the angle between
+/// them; `h` has any length.
+///
+/// The tangent is computed from the part of `h` across `n`, so that small angles keep full precision, and
+/// bounded by 1e15, so that terms computed from it are finite.
 #[inline(always)]
 fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     let along = h.dot(n);
@@ -25,23 +27,23 @@ fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     (along, (across.length_squared() / (along * along)).min(L::from_f64(1e15)))
 }
 
-/// `cos`^alpha, of a cosine that was computed from unit vectors; 0 from 90 degrees on.
+/// Returns `cos`^alpha for a cosine computed from unit vectors; 0 from 90 degrees.
 ///
-/// The cosine of two rounded vectors may exceed 1 by a few roundings, and 1.000001^1e6 is 2.7: it is at most 1
-/// here.
+/// The cosine is clamped to 1: that of two rounded vectors may exceed 1 by a few roundings, and
+/// 1.000001^1e6 is 2.7.
 #[inline(always)]
 fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
     let power = (cos.max(L::from_f64(1e-30)).min(L::one()).ln() * alpha).exp();
     power.masked(cos.gt(L::zero()))
 }
 
-/// The same of the angle between `a` and `b`, for alpha above
-/// [`SHARP_EXPONENT`](crate::material::bsdf::SHARP_EXPONENT), whatever the vectors' lengths.
+/// Returns cos^alpha of the angle between `a` and `b`, of any lengths, for alpha above
+/// [`SHARP_EXPONENT`](crate::material::bsdf::SHARP_EXPONENT); 0 from 90 degrees.
 ///
-/// Near 1 the cosine has no digits left, but the tangent t = |a x b| / a.b has: cos^alpha = exp(-alpha / 2
-/// ln(1 + t^2)), and ln(1 + t^2) = 2 artanh(s) with s = t^2 / (2 + t^2). Of its series in s^2 four terms leave
-/// a relative error of s^8 / 9: below 1e-9 while alpha s < 88, beyond which the power is no normal number of
-/// single precision.
+/// Near 1 the cosine loses precision, but the tangent t = |a x b| / a.b keeps it: cos^alpha = exp(-alpha / 2
+/// ln(1 + t^2)), and ln(1 + t^2) = 2 artanh(s) with s = t^2 / (2 + t^2). Four terms of its series in s^2 have
+/// a relative error of s^8 / 9: below 1e-9 while alpha s < 88, above which the power is not a normal
+/// single-precision number.
 #[inline(always)]
 fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
     let (along, across2) = (a.dot(b), a.cross(b).length_squared());
@@ -53,25 +55,26 @@ fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
     (-(alpha * s * series)).exp().masked(along.gt(L::zero()))
 }
 
-/// Microfacet terms in a lane type.
+/// Terms of a microfacet BSDF in SIMD lanes.
 pub trait MicrofacetEval<L: SimdFloat> {
-    /// D [1/sr] for a facet normal at `tan2` from the surface normal.
+    /// Returns D [1/sr]; `tan2` is the squared tangent of the angle between facet normal and surface
+    /// normal.
     fn density(&self, tan2: L) -> L;
-    /// G, the share of facets with normal h that both directions see, as numerator and denominator.
-    /// `nh`, `nv`, `nl`, `vh` are cosines, all positive; `nh` and `vh` may have a factor in common.
+    /// Returns G, the fraction of facets with normal h visible from both directions, as numerator and
+    /// denominator. `nh`, `nv`, `nl`, `vh` are positive cosines; `nh` and `vh` may have a common factor.
     fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L);
-    /// Smith's Lambda at cosine `c` > 0 from the normal.
+    /// Returns Smith's Lambda for a direction with the cosine `c` > 0 to the normal.
     fn lambda(&self, c: L) -> L;
 }
 
-/// Beckmann's Lambda is below 3e-10 from here on.
+/// Value of 1 / (alpha tan) from which Beckmann's Lambda is below 3e-10.
 const STEEP: f64 = 4.0;
 
-/// Beckmann's Lambda (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)) for 0 < a < [`STEEP`]; beyond,
-/// anything. Heitz 2014, eq. 57.
+/// Returns Beckmann's Lambda (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)) for 0 < a < [`STEEP`] (Heitz
+/// 2014, eq. 57); undefined for larger `a`.
 ///
-/// It is exp(-a^2) k(a) / (2 a sqrt(pi) (1 + 2 a^2)) with a smooth k between 0.6 and 1, here the
-/// Chebyshev fit of degree 10 in 2 - 6 / (a + 2). Error below 1e-8 (1 + Lambda).
+/// Computed as exp(-a^2) k(a) / (2 a sqrt(pi) (1 + 2 a^2)) with a smooth k between 0.6 and 1, approximated
+/// by a Chebyshev fit of degree 10 in 2 - 6 / (a + 2). The error is below 1e-8 (1 + Lambda).
 #[inline(always)]
 fn beckmann_lambda<L: SimdFloat>(a: L) -> L {
     const K: [f64; 11] = [
@@ -116,7 +119,7 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         }
     }
 
-    /// With a = 1 / (alpha tan).
+    /// Lambda as a function of a = 1 / (alpha tan).
     #[inline(always)]
     fn lambda(&self, c: L) -> L {
         let alpha2 = L::splat(self.alpha2);
@@ -124,26 +127,26 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         if self.ggx {
             return ((alpha2 * sin2 / cos2 + L::one()).sqrt() - L::one()) * L::from_f64(0.5);
         }
-        // Seen steeply by all lanes, as most surfaces are: nothing is hidden.
-        let flat = cos2.lt(sin2 * alpha2 * L::from_f64(STEEP * STEEP));
-        if flat.none() {
+        // Most packets see the surface steeply in all lanes: nothing is masked.
+        let grazing = cos2.lt(sin2 * alpha2 * L::from_f64(STEEP * STEEP));
+        if grazing.none() {
             return L::zero();
         }
-        beckmann_lambda(c / (alpha2 * sin2).sqrt()).masked(flat)
+        beckmann_lambda(c / (alpha2 * sin2).sqrt()).masked(grazing)
     }
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Whether lights leave highlights on it.
+    /// Returns `true` if lights have highlights on it.
     #[inline(always)]
     pub fn has_highlight(&self) -> bool {
-        !matches!(self.shine, SpecularModel::None)
+        !matches!(self.specular, SpecularModel::None)
     }
 
-    /// The highlight of a light: radiance towards `view` per irradiance of a surface that faces the
-    /// light [1/sr] (so with the cosine of the incident light, where the formula has one).
+    /// Returns the highlight of a light: radiance towards `view` per irradiance of a surface that faces
+    /// the light [1/sr]. It includes the cosine of the incident light where the formula has one.
     ///
-    /// `n`, `view`, `light`: unit vectors away from the surface; `nl`, `nv`: their cosines.
+    /// `n`, `view` and `light` are unit vectors away from the surface, `nl` and `nv` their cosines.
     #[inline(always)]
     pub fn highlight<L: SimdFloat<Scalar = S>>(
         &self,
@@ -153,7 +156,7 @@ impl<S: Float> Bsdf<S> {
         nl: L,
         nv: L,
     ) -> Vec3<L> {
-        match &self.shine {
+        match &self.specular {
             SpecularModel::None => Vec3::zero(),
             SpecularModel::Phong { strength, exponent, sharp } => {
                 let (r, alpha) = (-light.reflect(n), L::splat(*exponent));
@@ -167,29 +170,30 @@ impl<S: Float> Bsdf<S> {
                 Vec3::new(value, value, value)
             }
             SpecularModel::MicrofacetDistribution { strength, facets } => {
-                // The half vector, not of unit length: its square is twice its product with either.
+                // The half vector without normalisation: its squared length is twice its product with
+                // either direction.
                 let h = view + light;
                 let (nh, tan2) = along_tan2(h, n);
                 let h2 = h.length_squared();
-                let (seen, all) = facets.masking(nh, nv, nl, h2 * L::from_f64(0.5));
+                let (visible, total) = facets.masking(nh, nv, nl, h2 * L::from_f64(0.5));
                 // f N.L = D G F / (4 N.V): the light's cosine cancels.
                 let d: L = facets.density(tan2);
                 let k = L::from_f64(0.25 * strength.to_f64());
-                let value = d * seen * k / (nv * all);
+                let value = d * visible * k / (nv * total);
                 let valid = nh.gt(L::zero()) & nv.gt(L::zero());
                 self.highlight_fresnel.times(|| h2.sqrt() * L::from_f64(0.5), value).masked(valid)
             }
         }
     }
 
-    /// A reflected ray for the surface seen along `incident` (unit, towards the surface) with normal
-    /// `n` on the viewer's side; `u`, `v` uniform in [0, 1). `fold`: lobes that dip under the surface
-    /// are mirrored up, otherwise lost there.
+    /// Samples a reflected ray. `incident` is the unit direction towards the surface, `n` the normal on
+    /// the viewer's side, `u` and `v` are uniform in [0, 1). If `fold` is `true`, directions below the
+    /// surface are mirrored up, otherwise they get the weight 0.
     #[inline(always)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
         strength: S,
-        spread: &ReflectionLobe<S>,
+        lobe: &ReflectionLobe<S>,
         incident: Vec3<L>,
         n: Vec3<L>,
         (u, v): (L, L),
@@ -197,7 +201,7 @@ impl<S: Float> Bsdf<S> {
     ) -> BsdfSample<L> {
         let mirror = incident.reflect(n);
         let k = L::splat(strength);
-        let (direction, weight) = match spread {
+        let (direction, weight) = match lobe {
             ReflectionLobe::Mirror => (mirror, k),
             ReflectionLobe::Cone { one_minus_cos } => {
                 let local = warp::cone(u, v, L::splat(*one_minus_cos));
@@ -218,14 +222,15 @@ impl<S: Float> Bsdf<S> {
         } else {
             (direction, L::select(below, L::zero(), weight))
         };
-        // The facet that would send this ray: half-way between view and reflected direction, whose
-        // cosine with either is half the length of their sum (without cancellation at grazing angles).
+        // The normal of the facet that reflects this ray is half-way between view and reflected
+        // direction: its cosine with either is half the length of their sum, without cancellation at
+        // grazing angles.
         let cos =
             || ((direction - incident).length_squared().sqrt() * L::from_f64(0.5)).min(L::one());
         BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }
     }
 
-    /// Reflection at a sampled microfacet. Below the surface G is zero, and so is the weight.
+    /// Samples the reflection at a microfacet. Below the surface G, and with it the weight, is zero.
     #[inline(always)]
     fn sample_microfacet<L: SimdFloat<Scalar = S>>(
         &self,
@@ -245,13 +250,13 @@ impl<S: Float> Bsdf<S> {
         };
         let vh = view.dot(h);
         let light = h * (vh + vh) - view;
-        let (seen, all) = facets.masking(h.z, view.z, light.z, vh);
+        let (visible, total) = facets.masking(h.z, view.z, light.z, vh);
         let weight: L = if facets.ggx {
             // Visible normals: density D G1 V.H / N.V, so that f N.L / density = F G / G1.
-            k * seen * (L::one() + MicrofacetEval::<L>::lambda(facets, view.z)) / all
+            k * visible * (L::one() + MicrofacetEval::<L>::lambda(facets, view.z)) / total
         } else {
-            // Normals by D N.H: f N.L / density = F G V.H / (N.V N.H).
-            k * seen * vh / (all * view.z * h.z)
+            // Normals with density D N.H: f N.L / density = F G V.H / (N.V N.H).
+            k * visible * vh / (total * view.z * h.z)
         };
         let valid = vh.gt(L::zero()) & light.z.gt(L::zero()) & view.z.gt(L::zero());
         BsdfSample {
@@ -260,17 +265,17 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Density [1/sr] with which [`Bsdf::reflect`] draws `direction` before folding, one lane at a
-    /// time, in double precision: what tests integrate. `None` for a mirror.
+    /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction` before folding; `None`
+    /// for a mirror. Scalar, in double precision, for tests.
     pub fn density(
         &self,
-        spread: &ReflectionLobe<S>,
+        lobe: &ReflectionLobe<S>,
         incident: Vec3<f64>,
         n: Vec3<f64>,
         direction: Vec3<f64>,
     ) -> Option<f64> {
         let mirror = incident.reflect(n);
-        match spread {
+        match lobe {
             ReflectionLobe::Mirror => None,
             ReflectionLobe::Cone { one_minus_cos } => {
                 Some(warp::cone_pdf(mirror.dot(direction), one_minus_cos.to_f64()))

@@ -1,9 +1,9 @@
-//! Reflectance against angle, per channel.
+//! Fresnel reflectance against angle, per channel.
 
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::material::{Fresnel, Material};
 
-/// Index of refraction that reflects `f0` of the light at normal incidence: (1 + sqrt F0) /
+/// Returns the index of refraction with the reflectance `f0` at normal incidence: (1 + sqrt F0) /
 /// (1 - sqrt F0); infinite for F0 = 1.
 ///
 /// Cook and Torrance 1982, *A Reflectance Model for Computer Graphics*.
@@ -12,40 +12,40 @@ pub fn index_from_f0(f0: f64) -> f64 {
     (1.0 + root) / (1.0 - root)
 }
 
-/// Share of the light that a dielectric of index `n` reflects at normal incidence: its inverse,
-/// ((n - 1) / (n + 1))^2.
+/// Returns the reflectance of a dielectric of index `n` at normal incidence, ((n - 1) / (n + 1))^2: the
+/// inverse of [`index_from_f0`].
 pub fn f0_from_index(n: f64) -> f64 {
     ((n - 1.0) / (n + 1.0)).powi(2)
 }
 
-/// A reflectance, compiled.
+/// Compiled Fresnel reflectance.
 #[derive(Clone, Copy, Debug)]
 pub struct Reflectance<S> {
-    law: Fresnel,
+    mode: Fresnel,
     f0: [S; 3],
-    /// Squared index of refraction minus 1, for the exact law.
+    /// Squared index of refraction minus 1, for the modes `Exact` and `Dielectric`.
     index2_less_1: [S; 3],
-    /// Channels that reflect everything at every angle (F0 = 1: an infinite index).
+    /// Channels with reflectance 1 at every angle (F0 = 1: an infinite index).
     total: [bool; 3],
 }
 
 impl<S: Float> Reflectance<S> {
-    /// 1 at every angle.
+    /// Creates a reflectance of 1 at every angle.
     pub fn white() -> Self {
         Self::new(&Material::default())
     }
 
-    /// Of a material: its F0 (white if it names none) under its law.
+    /// Compiles the F0 (white if none is given) and the Fresnel mode of a material.
     pub fn new(material: &Material) -> Self {
         let f0 = material.f0().0;
-        let law = material.fresnel_mode();
-        let index2 = match law {
+        let mode = material.fresnel_mode();
+        let index2 = match mode {
             Fresnel::Dielectric => [material.ior.powi(2) - 1.0; 3],
             _ => f0.map(|f| index_from_f0(f).powi(2) - 1.0),
         };
         let total = f0.map(|f| f >= 1.0 - f64::powi(2.0, -24));
         Self {
-            law,
+            mode,
             f0: f0.map(S::from_f64),
             index2_less_1: std::array::from_fn(|i| {
                 S::from_f64(if total[i] { 0.0 } else { index2[i] })
@@ -54,26 +54,27 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// `value` times the share of the light reflected at the cosine that `c` gives, if that matters.
+    /// Returns `value` times the reflectance at the cosine `c()`, which is evaluated only if the mode
+    /// depends on the angle.
     #[inline(always)]
     pub fn times<L: SimdFloat<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> Vec3<L> {
-        match self.law {
+        match self.mode {
             Fresnel::Constant => Vec3::splat(self.f0) * value,
             Fresnel::Schlick | Fresnel::Exact | Fresnel::Dielectric => self.at(c()) * value,
         }
     }
 
-    /// Share of the light reflected at cosine `c` (0..1) between light and facet normal.
+    /// Returns the reflectance at the cosine `c` (0..1) between light and facet normal.
     #[inline(always)]
     pub fn at<L: SimdFloat<Scalar = S>>(&self, c: L) -> Vec3<L> {
         let f0 = Vec3::splat(self.f0);
-        match self.law {
+        match self.mode {
             Fresnel::Constant => f0,
             Fresnel::Schlick => {
                 let k = L::one() - c;
                 let k2 = k * k;
-                let rest = Vec3::new(L::one() - f0.x, L::one() - f0.y, L::one() - f0.z);
-                rest.mul_add(k2 * k2 * k, f0)
+                let one_minus_f0 = Vec3::new(L::one() - f0.x, L::one() - f0.y, L::one() - f0.z);
+                one_minus_f0.mul_add(k2 * k2 * k, f0)
             }
             Fresnel::Exact => Vec3::new(self.exact(c, 0), self.exact(c, 1), self.exact(c, 2)),
             Fresnel::Dielectric => {
@@ -83,6 +84,7 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
+    /// Cook and Torrance's form of Fresnel's equations:
     /// F = 1/2 ((g - c) / (g + c))^2 (1 + ((c (g + c) - 1) / (c (g - c) + 1))^2), g^2 = n^2 + c^2 - 1.
     #[inline(always)]
     fn exact<L: SimdFloat<Scalar = S>>(&self, c: L, channel: usize) -> L {
@@ -91,7 +93,7 @@ impl<S: Float> Reflectance<S> {
         }
         let g = c.mul_add(c, L::splat(self.index2_less_1[channel])).max(L::zero()).sqrt();
         let (plus, minus) = (g + c, g - c);
-        // n = 1 seen edge-on: g = c = 0, no boundary, nothing is reflected.
+        // At n = 1 and grazing incidence g = c = 0: there is no boundary, and the reflectance is 0.
         let ratio = minus / plus.max(L::from_f64(1e-30));
         let other = (c * plus - L::one()) / (c * minus + L::one());
         L::from_f64(0.5) * ratio * ratio * (L::one() + other * other)
@@ -112,15 +114,15 @@ mod tests {
         })
     }
 
-    /// Extreme test 24: in [0, 1], F(1) = F0, no NaN, for every F0 and cosine.
+    /// Extreme test 24: F is in [0, 1], F(1) = F0, without NaN, for every F0 and cosine.
     #[test]
     fn extreme_24_fresnel() {
         let mut worst = 0f64;
         for f0 in [0.0, 1e-9, 0.04, 0.349, 0.989, 1.0 - 2f64.powi(-24), 1.0] {
-            for law in [Fresnel::Constant, Fresnel::Schlick, Fresnel::Exact] {
+            for mode in [Fresnel::Constant, Fresnel::Schlick, Fresnel::Exact] {
                 let material = Material {
                     f0: Some(Color([f0; 3])),
-                    fresnel: Some(law),
+                    fresnel: Some(mode),
                     ..Material::default()
                 };
                 let (double, single) =
@@ -128,11 +130,11 @@ mod tests {
                 for i in 0..=1000 {
                     let c = f64::from(i) / 1000.0;
                     let f = double.at(c).x;
-                    assert!((0.0..=1.0 + 1e-12).contains(&f), "{law:?} F0 {f0} c {c}: {f}");
+                    assert!((0.0..=1.0 + 1e-12).contains(&f), "{mode:?} F0 {f0} c {c}: {f}");
                     let f = single.at(c as f32).x;
-                    assert!((0.0..=1.0 + 1e-6).contains(&f), "{law:?} F0 {f0} c {c}: {f}");
+                    assert!((0.0..=1.0 + 1e-6).contains(&f), "{mode:?} F0 {f0} c {c}: {f}");
                 }
-                assert!((double.at(1.0).x - f0).abs() <= 1e-7, "{law:?} {f0}");
+                assert!((double.at(1.0).x - f0).abs() <= 1e-7, "{mode:?} {f0}");
                 worst = worst.max((double.at(1.0).x - f0).abs());
             }
         }
@@ -140,9 +142,9 @@ mod tests {
         println!("extreme 24 | single | all in [0, 1 + 1e-6]");
     }
 
-    /// Grazing light is reflected whole; a dielectric of n = 1.5 gives the textbook's 4 %.
+    /// F is 1 at grazing incidence and 4 % at normal incidence for n = 1.5.
     #[test]
-    fn known_values() {
+    fn fresnel_has_textbook_values() {
         assert!((index_from_f0(0.04) - 1.5).abs() < 1e-12);
         assert!((exact(0.04).at(0.0).x - 1.0).abs() < 1e-12);
         // Mean of s and p at 60 degrees for n = 1.5: 0.0892 (s 0.1770, p 0.0014).

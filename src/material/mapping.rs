@@ -1,8 +1,7 @@
-//! From points on a surface to the coordinates of a texture, in lanes, and how these grow from place to
-//! place.
+//! Texture coordinates of surface points and their gradients, in SIMD lanes.
 //!
 //! A projection is a function of space, so that one formula serves every shape. Its gradient along the
-//! surface is what Blinn's partial derivatives of the surface come to (Blinn 1978, *Simulation of
+//! surface is equivalent to Blinn's partial derivatives of the surface (Blinn 1978, *Simulation of
 //! Wrinkled Surfaces*; Mikkelsen 2010, *Bump Mapping Unparametrized Surfaces on the GPU*).
 
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -10,35 +9,34 @@ use crate::material::texture::{Axis, Mapping, Placement};
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
-/// A formula for the coordinates of a texture, in the texture's space: x to the right, y up, z to the
-/// front.
+/// Formula of texture coordinates in texture space: x to the right, y up, z to the front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
-    /// (x, y).
+    /// u = x, v = y.
     Planar,
-    /// The angle around y in turns, 1/2 at the front; the angle from the lower pole in half turns.
+    /// u is the angle around y in turns, 1/2 at the front; v the angle from the lower pole in half turns.
     Spherical,
-    /// The angle around y in turns, 1/2 at the front; the height in heights of the shape.
+    /// u is the angle around y in turns, 1/2 at the front; v the height divided by the shape's height.
     Cylindrical,
-    /// Each side as it is seen from outside.
+    /// Each side of a box in planar projection, seen from outside.
     Box,
-    /// What the shape itself says.
+    /// Texture coordinates of the shape.
     Uv,
 }
 
-/// How far from the ends of a cylindrical projection its coordinate stays, in heights: ends show the
-/// colours of their rims, whatever rounding does.
+/// Distance that v keeps from the ends of a cylindrical projection, as a fraction of the height: the ends
+/// show the colours of their rims in spite of rounding errors.
 const RIM: f64 = 1.0 / 16_384.0;
 
-/// Sides between two axes belong to the later one: rounding does not decide.
+/// Factor in favour of the later of two axes, so that rounding errors do not choose between equal ones.
 const TIE: f64 = 1.001;
 
-/// Coordinates of a texture in repeats, and their gradients in the texture's space.
+/// Texture coordinates in repeats, and their gradients in texture space.
 #[derive(Clone, Copy, Debug)]
 pub struct TexCoord<L> {
-    /// To the right.
+    /// Coordinate to the right.
     pub u: L,
-    /// Up.
+    /// Coordinate upwards.
     pub v: L,
     /// Gradient of u.
     pub grad_u: Vec3<L>,
@@ -46,26 +44,27 @@ pub struct TexCoord<L> {
     pub grad_v: Vec3<L>,
 }
 
-/// A projection onto one thing of the scene.
+/// Projection of a texture onto one part of an object.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureMapping<S> {
     projection: Projection,
-    /// Columns of the linear map.
+    /// Columns of the linear map from scene to texture space.
     texture_from_scene: [[S; 3]; 3],
-    /// Columns of its inverse.
+    /// Columns of the inverse map.
     scene_from_texture: [[S; 3]; 3],
-    /// The middle of the thing in the scene, and in the texture's space relative to where the
-    /// projection begins: so the error of a point is that of the thing's size.
-    middle: [S; 3],
-    inner_middle: [S; 3],
-    /// Lengths of the box around the thing in the texture's space.
+    /// Centre of the part in the scene. Points are mapped relative to it, so that rounding errors scale
+    /// with the size of the part.
+    center: [S; 3],
+    /// Centre of the part in texture space, relative to the origin of the projection.
+    texture_center: [S; 3],
+    /// Lengths of the part's bounding box in texture space.
     extent: [S; 3],
     scale: [S; 2],
     offset: [S; 2],
 }
 
-/// The axes of the space in which a mapping along or around `axis` is one along z or around y.
-fn turned(projection: Projection, axis: Option<Axis>) -> DMat3 {
+/// Returns the axes in which a mapping along or around `axis` is one along z or around y.
+fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     let rows = match (projection, axis) {
         (Projection::Planar, Some(Axis::X)) => [-z, y, x],
@@ -78,23 +77,23 @@ fn turned(projection: Projection, axis: Option<Axis>) -> DMat3 {
 }
 
 impl<S: Float> TextureMapping<S> {
-    /// By `placement`, whose mapping comes to `projection` here, onto a thing that `low` and `high` are
-    /// corners of the box around, in the texture's space.
+    /// Compiles `placement` for one part of an object. `projection` is the projection that the mapping
+    /// means for the part; `low` and `high` are corners of its bounding box in texture space.
     pub fn new(
         placement: &Placement,
         projection: Projection,
         scene_from_texture: &DAffine3,
         [low, high]: [DVec3; 2],
     ) -> Self {
-        let turn = turned(projection, placement.axis);
-        let ends = [turn * low, turn * high];
+        let rotation = axes_for(projection, placement.axis);
+        let ends = [rotation * low, rotation * high];
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        let scene_from_texture = *scene_from_texture * DAffine3::from_mat3(turn.transpose());
-        let middle = 0.5 * (low + high);
-        let begin = match projection {
+        let scene_from_texture = *scene_from_texture * DAffine3::from_mat3(rotation.transpose());
+        let center = 0.5 * (low + high);
+        let origin = match projection {
             Projection::Planar | Projection::Box | Projection::Uv => low,
-            Projection::Spherical => middle,
-            Projection::Cylindrical => DVec3::new(middle.x, low.y, middle.z),
+            Projection::Spherical => center,
+            Projection::Cylindrical => DVec3::new(center.x, low.y, center.z),
         };
         let outer = scene_from_texture.matrix3;
         let inner = outer.inverse();
@@ -103,45 +102,45 @@ impl<S: Float> TextureMapping<S> {
         let mut scale = placement.scale;
         let extent = high - low;
         if projection == Projection::Planar && placement.mapping == Mapping::Uv {
-            // Once from edge to edge of what is flat.
+            // One repeat from edge to edge of a flat shape.
             scale = [scale[0] / extent.x, scale[1] / extent.y];
         }
         Self {
             projection,
             texture_from_scene: columns(inner),
             scene_from_texture: columns(outer),
-            middle: scene_from_texture.transform_point3(middle).to_array().map(S::from_f64),
-            inner_middle: (middle - begin).to_array().map(S::from_f64),
+            center: scene_from_texture.transform_point3(center).to_array().map(S::from_f64),
+            texture_center: (center - origin).to_array().map(S::from_f64),
             extent: extent.to_array().map(S::from_f64),
             scale: scale.map(S::from_f64),
             offset: placement.offset.map(S::from_f64),
         }
     }
 
-    /// Whether the shape's own coordinates are asked for.
+    /// Returns `true` if the mapping uses the shape's texture coordinates.
     pub fn wants_uv(&self) -> bool {
         self.projection == Projection::Uv
     }
 
-    /// A normal in one space from one in the other, of any length: by the columns of the map back.
+    /// Maps a normal of any length to the other space. `columns` are those of the map back.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(columns: &[[S; 3]; 3], n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = columns.map(Vec3::splat);
         Vec3::new(x.dot(n), y.dot(n), z.dot(n))
     }
 
-    /// The coordinates at `point` of the scene, where the thing's outer normal is `normal`. With
-    /// [`TextureMapping::wants_uv`] these are zero.
+    /// Returns the coordinates at `point`; `normal` is the outer normal there, both in the scene. Zero if
+    /// [`TextureMapping::wants_uv`] is `true`.
     pub fn coordinates<L: SimdFloat<Scalar = S>>(
         &self,
         point: Vec3<L>,
         normal: Vec3<L>,
     ) -> TexCoord<L> {
         let [x, y, z] = self.texture_from_scene.map(Vec3::splat);
-        let from_middle = point - Vec3::splat(self.middle);
-        let p = x * from_middle.x + y * from_middle.y + z * from_middle.z;
-        let p = p + Vec3::splat(self.inner_middle);
-        let found = match self.projection {
+        let from_center = point - Vec3::splat(self.center);
+        let p = x * from_center.x + y * from_center.y + z * from_center.z;
+        let p = p + Vec3::splat(self.texture_center);
+        let coordinates = match self.projection {
             Projection::Planar => planar(p),
             Projection::Spherical => spherical(p),
             Projection::Cylindrical => cylindrical(p, L::splat(self.extent[1])),
@@ -153,26 +152,24 @@ impl<S: Float> TextureMapping<S> {
                 TexCoord { u: L::zero(), v: L::zero(), grad_u: Vec3::zero(), grad_v: Vec3::zero() }
             }
         };
-        self.placed(found)
+        self.placed(coordinates)
     }
 
-    /// Coordinates of the shape itself, scaled and moved.
-    pub fn placed<L: SimdFloat<Scalar = S>>(&self, found: TexCoord<L>) -> TexCoord<L> {
+    /// Applies scale and offset to coordinates.
+    pub fn placed<L: SimdFloat<Scalar = S>>(&self, unplaced: TexCoord<L>) -> TexCoord<L> {
         let ([su, sv], [ou, ov]) = (self.scale.map(L::splat), self.offset.map(L::splat));
         TexCoord {
-            u: found.u.mul_add(su, ou),
-            v: found.v.mul_add(sv, ov),
-            grad_u: found.grad_u * su,
-            grad_v: found.grad_v * sv,
+            u: unplaced.u.mul_add(su, ou),
+            v: unplaced.v.mul_add(sv, ov),
+            grad_u: unplaced.grad_u * su,
+            grad_v: unplaced.grad_v * sv,
         }
     }
 
-    /// The unit normal of the surface that rises above the one with the unit normal `normal` by a
-    /// height whose gradient in the texture's space is `gradient`. `outward`: 1 where `normal` points
-    /// the way that heights rise, -1 where it points back.
+    /// Returns the unit normal perturbed by a bump map. `gradient` is the gradient of the height in texture
+    /// space; `outward` is 1 where `normal` is the outer normal, along which heights rise, else -1.
     ///
-    /// Heights rise along the normal in the texture's space, so that an object that is transformed
-    /// takes its bumps along.
+    /// Heights rise along the normal in texture space, so that bumps are transformed with their object.
     pub fn bumped<L: SimdFloat<Scalar = S>>(
         &self,
         normal: Vec3<L>,
@@ -186,8 +183,9 @@ impl<S: Float> TextureMapping<S> {
     }
 }
 
+/// Vector of the given length along a coordinate axis.
 #[inline(always)]
-fn unit<L: SimdFloat>(axis: usize, length: L) -> Vec3<L> {
+fn along_axis<L: SimdFloat>(axis: usize, length: L) -> Vec3<L> {
     let zero = L::zero();
     match axis {
         0 => Vec3::new(length, zero, zero),
@@ -197,14 +195,14 @@ fn unit<L: SimdFloat>(axis: usize, length: L) -> Vec3<L> {
 }
 
 fn planar<L: SimdFloat>(p: Vec3<L>) -> TexCoord<L> {
-    TexCoord { u: p.x, v: p.y, grad_u: unit(0, L::one()), grad_v: unit(1, L::one()) }
+    TexCoord { u: p.x, v: p.y, grad_u: along_axis(0, L::one()), grad_v: along_axis(1, L::one()) }
 }
 
-/// The angle around y in turns, its gradient, and the square of the distance from y.
+/// Returns the angle around y in turns, its gradient, and the squared distance from the axis.
 #[inline(always)]
 fn around<L: SimdFloat>(p: Vec3<L>) -> (L, Vec3<L>, L) {
     let across2 = p.x.mul_add(p.x, p.z * p.z);
-    // On the axis there is no angle, and no gradient that were finite.
+    // Bounded, because angle and gradient are undefined on the axis.
     let across2 = across2.max(p.length_squared() * L::from_f64(1e-12)).max(L::from_f64(1e-30));
     let turns = p.x.atan2(p.z).mul_add(L::from_f64(1.0 / TAU), L::from_f64(0.5));
     let per = L::from_f64(1.0 / TAU) / across2;
@@ -226,10 +224,15 @@ fn cylindrical<L: SimdFloat>(p: Vec3<L>, height: L) -> TexCoord<L> {
     let per = (L::one() / L::select(flat, L::one(), height)).masked(!flat);
     let (free, low, high) = (p.y * per, L::from_f64(RIM), L::from_f64(1.0 - RIM));
     let inside = free.ge(low) & free.le(high);
-    TexCoord { u, v: free.max(low).min(high), grad_u: du, grad_v: unit(1, per.masked(inside)) }
+    TexCoord {
+        u,
+        v: free.max(low).min(high),
+        grad_u: du,
+        grad_v: along_axis(1, per.masked(inside)),
+    }
 }
 
-/// Sides of a box from its lower corner on: which one, the normal says.
+/// Planar projection of the side of a box that `normal` selects, from its lower corner.
 fn sides<L: SimdFloat>(p: Vec3<L>, normal: Vec3<L>, extent: Vec3<L>) -> TexCoord<L> {
     let zero = L::zero();
     let [ax, ay, az] = [normal.x, normal.y, normal.z].map(L::abs);
@@ -238,10 +241,10 @@ fn sides<L: SimdFloat>(p: Vec3<L>, normal: Vec3<L>, extent: Vec3<L>) -> TexCoord
     let pick = |x, y, z| L::select(on_z, z, L::select(on_y, y, x));
     let sign = L::one().copysign(pick(normal.x, normal.y, normal.z));
     let front = sign.gt(zero);
-    let from = |front, high: L, at: L| L::select(front, at, high - at);
+    let from_edge = |front, high: L, x: L| L::select(front, x, high - x);
     TexCoord {
-        u: pick(from(!front, extent.z, p.z), p.x, from(front, extent.x, p.x)),
-        v: pick(p.y, from(!front, extent.z, p.z), p.y),
+        u: pick(from_edge(!front, extent.z, p.z), p.x, from_edge(front, extent.x, p.x)),
+        v: pick(p.y, from_edge(!front, extent.z, p.z), p.y),
         grad_u: Vec3::new(pick(zero, L::one(), sign), zero, pick(-sign, zero, zero)),
         grad_v: Vec3::new(zero, pick(L::one(), zero, L::one()), pick(zero, -sign, zero)),
     }
@@ -256,20 +259,25 @@ mod tests {
     }
 
     fn projector(projection: Projection, axis: Option<Axis>) -> TextureMapping<f64> {
-        let there = DAffine3::from_translation(DVec3::new(5.0, -3.0, 2.0))
+        let scene_from_texture = DAffine3::from_translation(DVec3::new(5.0, -3.0, 2.0))
             * DAffine3::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.7)
             * DAffine3::from_scale(DVec3::new(2.0, 0.5, 1.5));
         let corners = [DVec3::new(-1.0, -2.0, -3.0), DVec3::new(2.0, 1.0, 0.5)];
-        TextureMapping::new(&placement(Mapping::Auto, axis), projection, &there, corners)
+        TextureMapping::new(
+            &placement(Mapping::Auto, axis),
+            projection,
+            &scene_from_texture,
+            corners,
+        )
     }
 
-    fn at(p: &TextureMapping<f64>, point: DVec3, normal: DVec3) -> TexCoord<f64> {
+    fn coordinates_at(p: &TextureMapping<f64>, point: DVec3, normal: DVec3) -> TexCoord<f64> {
         p.coordinates(Vec3::of(point.to_array()), Vec3::of(normal.to_array()))
     }
 
-    /// Gradients in the texture's space, carried into the scene, against differences.
+    /// Gradients, mapped to the scene, equal central differences of the coordinates.
     #[test]
-    fn gradients_are_those_of_the_coordinates() {
+    fn gradients_match_finite_differences() {
         let normal = DVec3::new(0.3, 0.8, -0.2).normalize();
         for projection in
             [Projection::Planar, Projection::Spherical, Projection::Cylindrical, Projection::Box]
@@ -277,17 +285,20 @@ mod tests {
             for axis in [None, Some(Axis::X), Some(Axis::Y), Some(Axis::Z)] {
                 let p = projector(projection, axis);
                 let point = DVec3::new(5.9, -3.1, 1.2);
-                let here = at(&p, point, normal);
+                let coordinates = coordinates_at(&p, point, normal);
                 for (axis, way) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
                     let h = 1e-6;
-                    let (a, b) = (at(&p, point - way * h, normal), at(&p, point + way * h, normal));
+                    let a = coordinates_at(&p, point - way * h, normal);
+                    let b = coordinates_at(&p, point + way * h, normal);
                     let column = Vec3::<f64>::splat(p.texture_from_scene[axis]);
-                    for (a, b, gradient) in [(a.u, b.u, here.grad_u), (a.v, b.v, here.grad_v)] {
+                    for (a, b, gradient) in
+                        [(a.u, b.u, coordinates.grad_u), (a.v, b.v, coordinates.grad_v)]
+                    {
                         let slope = (b - a) / (2.0 * h);
-                        let told = gradient.dot(column);
+                        let derivative = gradient.dot(column);
                         assert!(
-                            (slope - told).abs() < 1e-6,
-                            "{projection:?} {axis}: {slope} {told}"
+                            (slope - derivative).abs() < 1e-6,
+                            "{projection:?} {axis}: {slope} {derivative}"
                         );
                     }
                 }
@@ -296,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_infinite_on_axes_and_in_the_middle() {
+    fn coordinates_are_finite_on_axes_and_in_center() {
         for projection in [Projection::Spherical, Projection::Cylindrical] {
             let p = TextureMapping::<f32>::new(
                 &placement(Mapping::Auto, None),
@@ -313,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ramp_tilts_the_normal_by_the_angle_of_its_slope() {
+    fn ramp_tilts_normal_by_its_slope() {
         let p = TextureMapping::<f64>::new(
             &placement(Mapping::Auto, None),
             Projection::Planar,

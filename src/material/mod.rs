@@ -1,4 +1,4 @@
-//! Materials: how a surface answers light.
+//! Materials: description of a surface and its compiled BSDF.
 
 mod bsdf;
 mod bsdf_eval;
@@ -27,7 +27,7 @@ pub use texture_eval::{BumpMap, CompiledTexture};
 use crate::value::{Color, Description, Field, ValidationError, choices, description};
 
 description! {
-    /// A surface's finish. Every key may be left out.
+    /// A surface's material. Every key may be left out.
     pub struct Material: Default {
         /// Body colour: multiplies the ambient and the diffuse part.
         color: Color = [0.8, 0.8, 0.8], in COEFFICIENT;
@@ -51,25 +51,24 @@ description! {
         /// Tangent of the half-angle of the reflection cone, not a microfacet alpha; 0 is a perfect
         /// mirror.
         roughness: f64 = 0.0, in closed(0.0, 1e6);
-        /// How the reflected ray is spread; the same roughness means a comparable blur in each.
+        /// Distribution of reflected rays; the same roughness means a comparable blur in each.
         lobe: Lobe = "cone";
-        /// Slope parameter of the microfacets.
+        /// Roughness parameter alpha of the microfacet distribution.
         alpha: Option<f64>, or "roughness / (2 √2)", in closed(0.0, 1e6);
         /// Masking and shadowing between microfacets.
         masking: Masking = "v-cavity";
-        /// How the reflectance depends on the angle.
+        /// Dependence of the reflectance on the angle.
         fresnel: Option<Fresnel>, or "`exact` for a metal, otherwise `constant`";
         /// Reflectance F0 at normal incidence. Not together with `metal`.
         f0: Option<Color>, or "white", in SHARE;
         /// A metal, for its reflectance. Not together with `f0`.
         metal: Option<Metal>, or "no metal";
-        /// Whether the back of a surface is finished like its front; otherwise the back is black: of its
-        /// finish only `transmission` is left there, and total reflection past the critical angle unless
-        /// `fresnel` is `dielectric`.
+        /// The back of a surface has the same material as its front; otherwise the back is black: only
+        /// `transmission` remains there, and total internal reflection unless `fresnel` is `dielectric`.
         two_sided: bool = true;
-        /// What multiplies `color`, from place to place.
+        /// Texture that multiplies `color`.
         texture: Option<Texture>, or "one colour all over";
-        /// Heights that light sees on the surface; its outline stays as it is.
+        /// Heights that perturb the shading normals; the outline of the surface does not change.
         bump: Option<Bump>, or "as smooth as the shape";
     }
 }
@@ -88,7 +87,7 @@ choices! {
 }
 
 choices! {
-    /// Spread of the reflected ray.
+    /// Distribution of reflected rays.
     pub enum Lobe {
         /// no spread, whatever the roughness
         Mirror = "mirror",
@@ -143,7 +142,7 @@ choices! {
 }
 
 impl Metal {
-    /// Reflectance F0 at normal incidence.
+    /// Returns the reflectance F0 at normal incidence.
     pub fn f0(self) -> Color {
         Color(match self {
             Self::Gold => [0.989, 0.876, 0.349],
@@ -155,38 +154,39 @@ impl Metal {
 }
 
 impl Material {
-    /// Reflectance at normal incidence: the metal's, the given one, that of a dielectric, or white.
+    /// Returns the reflectance at normal incidence: that of `metal`, `f0`, that of the dielectric, or white.
     pub fn f0(&self) -> Color {
-        let own = match self.fresnel_mode() {
+        let default = match self.fresnel_mode() {
             Fresnel::Dielectric => Color([f0_from_index(self.ior); 3]),
             _ => Color::WHITE,
         };
-        self.metal.map(Metal::f0).or(self.f0).unwrap_or(own)
+        self.metal.map(Metal::f0).or(self.f0).unwrap_or(default)
     }
 
-    /// How reflectance depends on the angle.
+    /// Returns the dependence of the reflectance on the angle.
     pub fn fresnel_mode(&self) -> Fresnel {
-        let usual = if self.metal.is_some() { Fresnel::Exact } else { Fresnel::Constant };
-        self.fresnel.unwrap_or(usual)
+        let default = if self.metal.is_some() { Fresnel::Exact } else { Fresnel::Constant };
+        self.fresnel.unwrap_or(default)
     }
 
-    /// Slope alpha of the microfacets: the given one, or that with the second moment of the cone.
+    /// Returns the alpha of the microfacet distribution: `alpha`, or the one with the second moment of the
+    /// cone.
     pub fn microfacet_alpha(&self) -> f64 {
         self.alpha.unwrap_or(self.roughness / 8f64.sqrt())
     }
 
-    /// Whether a microfacet distribution is asked for, by the reflection or by the highlight.
+    /// Returns `true` if the reflection or the highlight uses a microfacet distribution.
     pub fn has_microfacets(&self) -> bool {
         matches!(self.lobe, Lobe::Beckmann | Lobe::Ggx)
             || self.highlight == Highlight::CookTorrance && self.specular > 0.0
     }
 
-    /// What is wrong with it.
+    /// Returns the errors of the material.
     pub fn faults(&self) -> Vec<ValidationError> {
         let both = self.f0.is_some() && self.metal.is_some();
         let dielectric = self.fresnel == Some(Fresnel::Dielectric);
         let other = if self.metal.is_some() { "metal" } else { "f0" };
-        let twice = dielectric && (self.metal.is_some() || self.f0.is_some());
+        let redundant = dielectric && (self.metal.is_some() || self.f0.is_some());
         self.validator()
             .and(both.then(|| {
                 ValidationError::new(
@@ -195,7 +195,7 @@ impl Material {
                     "only one of them: a metal stands for its f0",
                 )
             }))
-            .and(twice.then(|| {
+            .and(redundant.then(|| {
                 ValidationError::new(
                     "fresnel",
                     format!("`dielectric` together with {other}"),
@@ -214,7 +214,7 @@ mod tests {
     use crate::value::Color;
 
     #[test]
-    fn documented_reflectances_are_the_ones_in_use() {
+    fn documented_f0_of_metals_are_used() {
         for metal in Metal::CHOICES {
             let text = format!("metal = \"{}\"", metal.name);
             let metal_read: Metal = toml::from_str::<Material>(&text).unwrap().metal.unwrap();
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn every_number_is_checked() {
+    fn material_ranges_are_checked() {
         let mut bad = Material {
             color: Color([-1.0, 0.0, 0.0]),
             ambient: f64::NAN,
@@ -254,7 +254,7 @@ mod tests {
             "f0",
         ];
         assert_eq!(keys, numbers);
-        assert_eq!(FIELDS.len(), numbers.len() + 8, "a new field? Check its range here");
+        assert_eq!(FIELDS.len(), numbers.len() + 8, "check the range of the new field here");
         bad = Material { metal: Some(Metal::Gold), ..Material::default() };
         assert!(bad.faults().is_empty());
         bad.f0 = Some(Color::WHITE);

@@ -5,16 +5,16 @@
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use crate::material::bsdf::Transmission;
 
-/// Where rays cross from one medium to another.
+/// Refraction of rays at the boundary of two media.
 #[derive(Clone, Copy, Debug)]
 pub struct Interface<L: SimdFloat> {
-    /// Unit direction of the refracted rays; meaningless where all is reflected.
+    /// Unit direction of the refracted rays; undefined in lanes of `tir`.
     pub refracted: Vec3<L>,
-    /// Lanes past the critical angle: nothing gets to the other side.
+    /// Lanes with total internal reflection.
     pub tir: L::Mask,
     /// Cosine of the angle of incidence.
     cos_i: L,
-    /// Cosine of the angle of refraction; 0 past the critical angle.
+    /// Cosine of the angle of refraction; 0 beyond the critical angle.
     cos_t: L,
     /// Index of refraction on the side of the incident rays.
     n_i: L,
@@ -22,23 +22,23 @@ pub struct Interface<L: SimdFloat> {
     n_t: L,
 }
 
-/// What reflected and transmitted rays count.
+/// Weights of reflected and transmitted rays.
 #[derive(Clone, Copy, Debug)]
 pub struct FresnelSplit<L> {
-    /// Factor of the finish's own reflection.
+    /// Factor of the BSDF's reflection lobe.
     pub reflected: L,
-    /// Factor of what is seen through the surface.
+    /// Factor of the transmitted ray.
     pub transmitted: L,
-    /// Factor of a perfect reflection that takes the place of the transmitted ray.
+    /// Factor of a mirror reflection that replaces the transmitted ray.
     pub tir: L,
 }
 
 impl<L: SimdFloat> Interface<L> {
-    /// For rays along `incident` (unit) that meet a boundary with unit normal `n` on their side; the
-    /// media before and behind it have the indices `n_i` and `n_t`.
+    /// Refracts rays with the unit direction `incident` at a boundary with the unit normal `n` on their
+    /// side. `n_i` and `n_t` are the indices of refraction before and behind it.
     ///
-    /// sin t = (n_i / n_t) sin i, from the part of the direction along the boundary, so that grazing
-    /// rays keep their digits. Where the indices are equal the direction stays what it is.
+    /// sin t = (n_i / n_t) sin i is computed from the part of the direction along the boundary, so that
+    /// grazing rays keep full precision. With equal indices the direction is unchanged.
     #[inline(always)]
     pub fn new(incident: Vec3<L>, n: Vec3<L>, n_i: L, n_t: L) -> Self {
         let cos_i = -incident.dot(n);
@@ -46,12 +46,12 @@ impl<L: SimdFloat> Interface<L> {
         let ratio = n_i / n_t;
         let same = n_i.le(n_t) & n_t.le(n_i);
         let sin2_t = ratio * ratio * along.length_squared();
-        let total = sin2_t.ge(L::one()).and_not(same);
+        let tir = sin2_t.ge(L::one()).and_not(same);
         let cos_t = (L::one() - sin2_t).max(L::zero()).sqrt();
         let bent = n.mul_add(-cos_t, along * ratio).renormalize();
         Self {
             refracted: Vec3::select(same, incident, bent),
-            tir: total,
+            tir,
             cos_i: cos_i.max(L::zero()),
             cos_t: L::select(same, cos_i.max(L::zero()), cos_t),
             n_i,
@@ -59,42 +59,44 @@ impl<L: SimdFloat> Interface<L> {
         }
     }
 
-    /// Share of unpolarised light that is reflected there, for both polarisations: F is their mean.
+    /// Returns the reflectances for s and p polarisation.
     #[inline(always)]
     fn polarised(&self) -> (L, L) {
         let Self { cos_i, cos_t, n_i, n_t, .. } = *self;
-        let share = |a: L, b: L| {
-            // Both are zero where nothing bends and the ray grazes: no boundary.
+        let reflectance = |a: L, b: L| {
+            // With equal indices and a grazing ray both are zero: there is no boundary.
             let r = (a - b) / (a + b).max(L::from_f64(1e-30));
             r * r
         };
-        let s = share(n_i * cos_i, n_t * cos_t);
-        let p = share(n_t * cos_i, n_i * cos_t);
+        let s = reflectance(n_i * cos_i, n_t * cos_t);
+        let p = reflectance(n_t * cos_i, n_i * cos_t);
         (L::select(self.tir, L::one(), s), L::select(self.tir, L::one(), p))
     }
 
-    /// Share of unpolarised light that the boundary reflects, F.
+    /// Returns the reflectance F of the boundary for unpolarised light.
     #[inline(always)]
     pub fn reflectance(&self) -> L {
         let (s, p) = self.polarised();
         (s + p) * L::from_f64(0.5)
     }
 
-    /// The same for a thin pane, a slab with this boundary on both sides, with all its inner
-    /// reflections: 2 F / (1 + F) for each polarisation.
+    /// Returns the reflectance for unpolarised light of a thin pane, a slab with this boundary on both
+    /// sides, with all inner reflections: 2 F / (1 + F) for each polarisation.
     #[inline(always)]
     pub fn pane_reflectance(&self) -> L {
         let (s, p) = self.polarised();
         s / (L::one() + s) + p / (L::one() + p)
     }
 
-    /// What the rays count by a boundary of this kind. `outer`: lanes that come from outside of a
-    /// solid. Without Fresnel's equations a solid reflects on its outer side only, so that light cannot
-    /// ring for ever between its inner walls; past the critical angle everything is reflected.
+    /// Returns the weights of reflected and transmitted rays. `outer` selects lanes that come from outside
+    /// of a solid.
+    ///
+    /// Without Fresnel's equations a solid reflects on its outer side only, which prevents endless
+    /// reflections between its inner walls; beyond the critical angle all light is reflected.
     #[inline(always)]
-    pub fn split(&self, by: &Transmission<L::Scalar>, outer: L::Mask) -> FresnelSplit<L> {
-        let k_t = L::splat(by.strength);
-        if by.dielectric {
+    pub fn split(&self, transmission: &Transmission<L::Scalar>, outer: L::Mask) -> FresnelSplit<L> {
+        let k_t = L::splat(transmission.strength);
+        if transmission.dielectric {
             let f = self.reflectance();
             return FresnelSplit {
                 reflected: f,
@@ -109,11 +111,11 @@ impl<L: SimdFloat> Interface<L> {
         }
     }
 
-    /// What the rays count by a thin pane, which they cross without bending.
+    /// Returns the weights of reflected and transmitted rays at a thin pane, which does not refract.
     #[inline(always)]
-    pub fn split_thin(&self, by: &Transmission<L::Scalar>) -> FresnelSplit<L> {
-        let k_t = L::splat(by.strength);
-        if !by.dielectric {
+    pub fn split_thin(&self, transmission: &Transmission<L::Scalar>) -> FresnelSplit<L> {
+        let k_t = L::splat(transmission.strength);
+        if !transmission.dielectric {
             return FresnelSplit { reflected: L::one(), transmitted: k_t, tir: L::zero() };
         }
         let f = self.pane_reflectance();
@@ -127,14 +129,14 @@ mod tests {
     use crate::lanes::{Double, Single};
     use crate::material::f0_from_index;
 
-    /// Rays at `degrees` from the normal +z, downwards.
-    fn at<L: SimdFloat>(degrees: f64, n_i: f64, n_t: f64) -> Interface<L> {
+    /// Refracts downward rays at `degrees` from the normal +z.
+    fn interface<L: SimdFloat>(degrees: f64, n_i: f64, n_t: f64) -> Interface<L> {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let up = Vec3::of([0.0, 0.0, 1.0]);
         Interface::new(Vec3::of([sin, 0.0, -cos]), up, L::from_f64(n_i), L::from_f64(n_t))
     }
 
-    /// Share of the energy that goes on: n_t cos t / (n_i cos i) times the squared amplitudes.
+    /// Returns the transmitted fraction of the energy: n_t cos t / (n_i cos i) times the squared amplitudes.
     fn transmittance(i: &Interface<f64>) -> f64 {
         let Interface { cos_i, cos_t, n_i, n_t, .. } = *i;
         let s = 2.0 * n_i * cos_i / (n_i * cos_i + n_t * cos_t);
@@ -146,23 +148,22 @@ mod tests {
     fn closed_form_11_normal_incidence_brewster_and_critical_angle() {
         for n in [1.0, 1.33, 1.5, 2.4, 1e3] {
             let f = f0_from_index(n);
-            assert!((at::<f64>(0.0, 1.0, n).reflectance() - f).abs() < 1e-14);
-            assert!((at::<f64>(0.0, n, 1.0).reflectance() - f).abs() < 1e-14);
+            assert!((interface::<f64>(0.0, 1.0, n).reflectance() - f).abs() < 1e-14);
+            assert!((interface::<f64>(0.0, n, 1.0).reflectance() - f).abs() < 1e-14);
             // A slab with all orders: R = 2 F / (1 + F), T = (1 - F) / (1 + F).
-            let pane = at::<f64>(0.0, 1.0, n).pane_reflectance();
+            let pane = interface::<f64>(0.0, 1.0, n).pane_reflectance();
             assert!((pane - 2.0 * f / (1.0 + f)).abs() < 1e-14, "{n}");
             assert!((1.0 - pane - (1.0 - f) / (1.0 + f)).abs() < 1e-14, "{n}");
-            // At Brewster's angle only one polarisation is reflected.
-            let (_, p) = at::<f64>(n.atan().to_degrees(), 1.0, n).polarised();
+            // At Brewster's angle p-polarised light is not reflected.
+            let (_, p) = interface::<f64>(n.atan().to_degrees(), 1.0, n).polarised();
             assert!(p < 1e-20, "{n}: {p}");
-            // Grazing light is reflected whole, but where there is no boundary.
-            let grazing = at::<f64>(90.0, 1.0, n).reflectance();
+            // At grazing incidence F is 1, except without a boundary.
+            let grazing = interface::<f64>(90.0, 1.0, n).reflectance();
             assert!((grazing - if n == 1.0 { 0.0 } else { 1.0 }).abs() < 1e-9, "{n}: {grazing}");
         }
     }
 
-    /// Extreme test 25: what is reflected and what goes on are all there is, next to the critical angle
-    /// and far from it, and nothing jumps at it.
+    /// Extreme test 25: R + T = 1 near the critical angle and far from it, and R is continuous there.
     #[test]
     fn extreme_25_total_reflection() {
         let mut worst = 0f64;
@@ -170,7 +171,7 @@ mod tests {
             let critical = (1.0f64 / n).asin().to_degrees();
             for step in -1000..=1000i32 {
                 let degrees = (critical + f64::from(step) * 1e-10 * 57.3).min(90.0);
-                let i = at::<f64>(degrees, n, 1.0);
+                let i = interface::<f64>(degrees, n, 1.0);
                 let f = i.reflectance();
                 assert!((0.0..=1.0).contains(&f), "{n} {degrees} {f}");
                 assert_eq!(i.tir, f == 1.0 && n > 1.0, "{n} {degrees}");
@@ -190,12 +191,12 @@ mod tests {
             for degrees in 0..=900 {
                 let degrees = f64::from(degrees) * 0.1;
                 for (n_i, n_t) in [(1.0, n), (n, 1.0)] {
-                    let i = at::<f64>(degrees, n_i, n_t);
+                    let i = interface::<f64>(degrees, n_i, n_t);
                     let f = i.reflectance();
                     let t = if i.tir || degrees == 90.0 { 1.0 - f } else { transmittance(&i) };
                     assert!((f + t - 1.0).abs() < 1e-12, "{n_i} {n_t} {degrees}: {f} {t}");
                     worst = worst.max((f + t - 1.0).abs());
-                    let single = at::<f32>(degrees, n_i, n_t).reflectance();
+                    let single = interface::<f32>(degrees, n_i, n_t).reflectance();
                     assert!((0.0..=1.000_001).contains(&single), "{n_i} {n_t} {degrees}");
                 }
             }
@@ -204,12 +205,11 @@ mod tests {
         println!("extreme 25 | single | R in [0, 1 + 1e-6]");
     }
 
-    /// Snell's law, and the way back is the way there.
+    /// Refraction obeys Snell's law and is reversible.
     #[test]
-    fn bending_obeys_snell_and_can_be_turned_round() {
+    fn refraction_obeys_snell_and_is_reversible() {
         for degrees in [0.0, 1e-6, 20.0, 45.0, 70.0, 89.0, 89.999] {
-            let there = at::<f64>(degrees, 1.0, 1.5);
-            let t = there.refracted;
+            let t = interface::<f64>(degrees, 1.0, 1.5).refracted;
             assert!((t.x - degrees.to_radians().sin() / 1.5).abs() < 1e-15);
             assert!((t.length_squared() - 1.0).abs() < 1e-14 && t.z < 0.0);
             let up = Vec3::of([0.0, 0.0, -1.0]);
@@ -217,7 +217,7 @@ mod tests {
             let (sin, cos) = degrees.to_radians().sin_cos();
             assert!((back.x + sin).abs() < 1e-12 && (back.z - cos).abs() < 1e-9, "{degrees}");
         }
-        let straight = at::<Single>(50.0, 1.3, 1.3);
+        let straight = interface::<Single>(50.0, 1.3, 1.3);
         let (sin, _) = 50f64.to_radians().sin_cos();
         assert_eq!(SimdFloat::lane(straight.refracted.x, 3), sin as f32);
         assert!(straight.tir.none());
@@ -225,9 +225,10 @@ mod tests {
     }
 
     #[test]
-    fn packets_equal_width_1() {
+    fn wide_refraction_equals_scalar() {
         for degrees in [0.0, 30.0, 41.810_3, 41.810_4, 60.0, 89.9] {
-            let (wide, one) = (at::<Double>(degrees, 1.5, 1.0), at::<f64>(degrees, 1.5, 1.0));
+            let (wide, one) =
+                (interface::<Double>(degrees, 1.5, 1.0), interface::<f64>(degrees, 1.5, 1.0));
             assert_eq!(SimdFloat::lane(wide.refracted.x, 1), one.refracted.x);
             assert_eq!(SimdFloat::lane(wide.reflectance(), 2), one.reflectance());
             assert_eq!(Mask::lane(wide.tir, 0), one.tir);

@@ -1,5 +1,5 @@
-//! Textures: what varies over a surface. A texture's colour multiplies the material's; a bump turns the
-//! normal that light is computed with.
+//! Textures and bump maps. A texture's colour multiplies that of the material; a bump perturbs the shading
+//! normal.
 //!
 //! ```toml
 //! texture.image = { file = "wood.png", mapping = "box", scale = [2.0, 2.0] }
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::sync::Arc;
 
-/// What multiplies a material's colour: one kind with its parameters.
+/// A texture that multiplies a material's colour: one kind with its parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Texture {
@@ -24,7 +24,7 @@ pub enum Texture {
     Checker(Checker),
 }
 
-/// What turns the normals of a surface: one kind with its parameters.
+/// A bump map that perturbs shading normals: one kind with its parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bump {
@@ -37,17 +37,17 @@ description! {
     pub struct ImageTexture: Default {
         /// Name of the file, relative to the folder of the scene file. Empty: white.
         file: String = "";
-        /// Where the coordinates u (to the right) and v (up) come from.
+        /// Source of the coordinates u (to the right) and v (up).
         mapping: Mapping = "auto";
-        /// What those mappings turn around, or look along.
+        /// Axis around or along which those mappings project.
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
         /// Repeats per unit of u and of v: the larger, the smaller the picture.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
         /// Added to the scaled u and v, in repeats: moves the picture to the left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
-        /// What lies beyond the edges of the image.
+        /// Continuation of the image beyond its edges.
         wrap: Wrap = "repeat";
-        /// What lies between the middles of the pixels.
+        /// Interpolation between the centres of the pixels.
         filter: TextureFilter = "bilinear";
         skip content: Loaded;
     }
@@ -60,9 +60,9 @@ description! {
         even: Color = [1.0, 1.0, 1.0], in COEFFICIENT;
         /// Colour of its neighbours.
         odd: Color = [0.1, 0.1, 0.1], in COEFFICIENT;
-        /// Where the coordinates u (to the right) and v (up) come from.
+        /// Source of the coordinates u (to the right) and v (up).
         mapping: Mapping = "auto";
-        /// What those mappings turn around, or look along.
+        /// Axis around or along which those mappings project.
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
         /// Repeats per unit of u and of v: the larger, the smaller the picture.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
@@ -76,17 +76,17 @@ description! {
     pub struct HeightImage: Default {
         /// Name of the file, relative to the folder of the scene file. Empty: flat.
         file: String = "";
-        /// How far white rises above black, before the object's transform; negative: how far it sinks.
+        /// Height of white above black, before the object's transform; negative: depth below black.
         height: f64 = 0.02, in closed(-1e3, 1e3) "scene units";
-        /// Where the coordinates u (to the right) and v (up) come from.
+        /// Source of the coordinates u (to the right) and v (up).
         mapping: Mapping = "auto";
-        /// What those mappings turn around, or look along.
+        /// Axis around or along which those mappings project.
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
         /// Repeats per unit of u and of v: the larger, the smaller the picture.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
         /// Added to the scaled u and v, in repeats: moves the picture to the left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
-        /// What lies beyond the edges of the image.
+        /// Continuation of the image beyond its edges.
         wrap: Wrap = "repeat";
         skip content: Loaded;
     }
@@ -147,12 +147,12 @@ choices! {
     }
 }
 
-/// How a texture lies on shapes.
+/// Placement of a texture on shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Where coordinates come from.
+    /// Source of the coordinates.
     pub mapping: Mapping,
-    /// The axis of the mapping; `None`: the shape's own.
+    /// Axis of the mapping; `None` for the shape's own.
     pub axis: Option<Axis>,
     /// Repeats per unit of u and v.
     pub scale: [f64; 2],
@@ -160,11 +160,11 @@ pub struct Placement {
     pub offset: [f64; 2],
 }
 
-/// What is in a file, once it was looked for.
+/// Content of a file, or the error of reading it; `None` until the file was searched.
 #[derive(Clone, Default)]
 struct Loaded(Option<Result<Arc<Image>, AssetError>>);
 
-/// Pixels are compared only where they do not lie in the same place.
+/// Pixels are compared only if the images differ in address.
 impl PartialEq for Loaded {
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
@@ -174,11 +174,11 @@ impl PartialEq for Loaded {
     }
 }
 
-/// Without the pixels.
+/// Prints the size instead of the pixels.
 impl fmt::Debug for Loaded {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match &self.0 {
-            None => f.write_str("not looked for"),
+            None => f.write_str("not loaded"),
             Some(Ok(image)) => write!(f, "{} x {} pixels", image.size()[0], image.size()[1]),
             Some(Err(error)) => write!(f, "{error}"),
         }
@@ -196,11 +196,11 @@ impl Loaded {
     }
 }
 
-/// The image of a description with a file; how it lies.
-macro_rules! laid {
+/// Implements `placement` for textures with the common placement keys.
+macro_rules! placed {
     ($($kind:ident),+) => {$(
         impl $kind {
-            /// How it lies on shapes.
+            /// Returns its placement on shapes.
             pub fn placement(&self) -> Placement {
                 let Self { mapping, axis, scale, offset, .. } = *self;
                 Placement { mapping, axis, scale, offset }
@@ -209,24 +209,24 @@ macro_rules! laid {
     )+};
 }
 
-laid!(ImageTexture, Checker, HeightImage);
+placed!(ImageTexture, Checker, HeightImage);
 
 impl ImageTexture {
-    /// The pixels; `None`: no file is named.
+    /// Returns the pixels; `None` without a readable file.
     pub fn image(&self) -> Option<&Arc<Image>> {
         self.content.image()
     }
 }
 
 impl HeightImage {
-    /// The pixels; `None`: no file is named.
+    /// Returns the pixels; `None` without a readable file.
     pub fn image(&self) -> Option<&Arc<Image>> {
         self.content.image()
     }
 }
 
 impl Texture {
-    /// The kind with this key, with the defaults; `None`: no kind has it.
+    /// Creates the kind with this key and default parameters; `None` if no kind has it.
     pub fn new(key: &str) -> Option<Self> {
         match key {
             "image" => Some(Self::Image(ImageTexture::default())),
@@ -235,7 +235,7 @@ impl Texture {
         }
     }
 
-    /// The key of its kind.
+    /// Returns the key of its kind.
     pub fn key(&self) -> &'static str {
         match self {
             Self::Image(_) => "image",
@@ -243,7 +243,7 @@ impl Texture {
         }
     }
 
-    /// How it lies on shapes.
+    /// Returns its placement on shapes.
     pub fn placement(&self) -> Placement {
         match self {
             Self::Image(image) => image.placement(),
@@ -251,18 +251,20 @@ impl Texture {
         }
     }
 
-    /// Another kind that lies on shapes in the same way.
+    /// Returns a texture of the kind `key` with the same placement.
     pub fn changed(&self, key: &str) -> Option<Self> {
         let Placement { mapping, axis, scale, offset } = self.placement();
         Some(match Self::new(key)? {
             Self::Image(image) => {
                 Self::Image(ImageTexture { mapping, axis, scale, offset, ..image })
             }
-            Self::Checker(it) => Self::Checker(Checker { mapping, axis, scale, offset, ..it }),
+            Self::Checker(checker) => {
+                Self::Checker(Checker { mapping, axis, scale, offset, ..checker })
+            }
         })
     }
 
-    /// Whether it shows anything: an image without a file does not.
+    /// Returns `false` for an image without a readable file.
     pub fn has_effect(&self) -> bool {
         match self {
             Self::Image(image) => image.image().is_some(),
@@ -272,18 +274,18 @@ impl Texture {
 }
 
 impl Bump {
-    /// The kind with this key, with the defaults; `None`: no kind has it.
+    /// Creates the kind with this key and default parameters; `None` if no kind has it.
     pub fn new(key: &str) -> Option<Self> {
         (key == "image").then(|| Self::Image(HeightImage::default()))
     }
 
-    /// How it lies on shapes.
+    /// Returns its placement on shapes.
     pub fn placement(&self) -> Placement {
         let Self::Image(image) = self;
         image.placement()
     }
 
-    /// Whether it turns any normal: without a file, or with the height 0, it does not.
+    /// Returns `false` if no normal is perturbed: without a readable file, or with the height 0.
     pub fn has_effect(&self) -> bool {
         let Self::Image(image) = self;
         image.height != 0.0 && image.image().is_some()
@@ -333,7 +335,7 @@ impl FieldValue for Bump {
 }
 
 impl crate::material::Material {
-    /// The named files of its texture and its bump, with what was found in them.
+    /// Returns the names of its texture's and bump's files with their content.
     fn files_mut(&mut self) -> impl Iterator<Item = (&String, &mut Loaded)> {
         let texture = match &mut self.texture {
             Some(Texture::Image(image)) => Some((&image.file, &mut image.content)),
@@ -343,7 +345,7 @@ impl crate::material::Material {
         [texture, bump].into_iter().flatten().filter(|(file, _)| !file.is_empty())
     }
 
-    /// The files that it names.
+    /// Returns the files that the material names.
     pub fn files(&self) -> impl Iterator<Item = &str> {
         let texture = match &self.texture {
             Some(Texture::Image(image)) => Some(image.file.as_str()),
@@ -353,14 +355,14 @@ impl crate::material::Material {
         [texture, bump].into_iter().flatten().filter(|file| !file.is_empty())
     }
 
-    /// Takes what `load` finds in the files that it names, those that have not been looked for yet.
+    /// Loads the files that the material names with `load`, unless they have been searched already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Image>, AssetError>) {
         for (file, content) in self.files_mut() {
             content.0.get_or_insert_with(|| load(file));
         }
     }
 
-    /// Takes over what `other` found in the files that both name.
+    /// Takes the content of files from `other` that both materials name.
     pub fn resolve_as(&mut self, other: &Self) {
         let mut known = other.clone();
         let known: Vec<_> = known.files_mut().collect();

@@ -1,42 +1,43 @@
-//! Textures, compiled: colours and slopes at given coordinates.
+//! Compiled textures: colours and height gradients at given coordinates.
 
 use crate::asset::Image;
 use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3};
 use crate::material::texture::{Bump, Texture, TextureFilter, Wrap};
 use std::sync::Arc;
 
-/// What multiplies a colour, by coordinates in repeats.
+/// Compiled texture; its coordinates are in repeats.
 #[derive(Clone, Debug)]
 pub enum CompiledTexture<S> {
-    /// Squares, two by two a repeat: the colour of the first and of its neighbours.
+    /// Squares, two by two per repeat: colour of the first and of its neighbours.
     Checker([[S; 3]; 2]),
     /// An image.
     Image {
-        /// Its pixels.
+        /// Pixels.
         image: Arc<Image>,
-        /// What lies beyond its edges.
+        /// Continuation beyond the edges.
         wrap: Wrap,
-        /// What lies between its pixels.
+        /// Interpolation between pixels.
         filter: TextureFilter,
     },
 }
 
-/// Heights, by coordinates in repeats.
+/// Compiled bump map; its coordinates are in repeats.
 #[derive(Clone, Debug)]
 pub struct BumpMap {
     image: Arc<Image>,
     wrap: Wrap,
-    /// Of white above black.
+    /// Height of white above black.
     height: f64,
 }
 
-/// Two neighbours in a row or column of `size` pixels: numbers that may lie beyond the ends, and how
-/// far between their middles the coordinate `x` in repeats lies, from 0 to 1.
+/// Returns the position of the coordinate `x`, in repeats, among `size` pixels: the index of the pixel
+/// whose centre is at or before it, which may be out of range, and the fraction from there to the next
+/// centre, from 0 to 1.
 #[inline(always)]
-fn between(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
+fn pixel_position(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
     let size = f64::from(size);
     let x = match wrap {
-        // A triangle without area has no coordinates.
+        // A triangle without area has no texture coordinates.
         _ if !x.is_finite() => 0.0,
         Wrap::Repeat => x - x.floor(),
         Wrap::Clamp => x.clamp(-1.0, 2.0),
@@ -45,7 +46,7 @@ fn between(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
     (x.floor() as i32, x - x.floor())
 }
 
-/// The pixel of a row or column of `size` that stands for the number `i`.
+/// Maps the index `i`, which may be out of range, to one of `size` pixels.
 #[inline(always)]
 fn wrapped(i: i32, size: u32, wrap: Wrap) -> u32 {
     match wrap {
@@ -54,11 +55,12 @@ fn wrapped(i: i32, size: u32, wrap: Wrap) -> u32 {
     }
 }
 
-/// Linear light at (u, v): v points up, rows go down.
+/// Returns linear light at (u, v); v points up, rows are stored downwards.
 #[inline(always)]
 fn color_at(image: &Image, wrap: Wrap, filter: TextureFilter, u: f64, v: f64) -> [f64; 3] {
     let [width, height] = image.size();
-    let ((x, fx), (y, fy)) = (between(u, width, wrap), between(1.0 - v, height, wrap));
+    let ((x, fx), (y, fy)) =
+        (pixel_position(u, width, wrap), pixel_position(1.0 - v, height, wrap));
     let pixel = |x, y| image.color(wrapped(x, width, wrap), wrapped(y, height, wrap));
     if filter == TextureFilter::Nearest {
         let up = |f: f64| i32::from(f >= 0.5);
@@ -66,13 +68,13 @@ fn color_at(image: &Image, wrap: Wrap, filter: TextureFilter, u: f64, v: f64) ->
     }
     let [a, b, c, d] = [pixel(x, y), pixel(x + 1, y), pixel(x, y + 1), pixel(x + 1, y + 1)];
     std::array::from_fn(|i| {
-        let mix = |a: f32, b: f32, f: f64| f64::from(a) + f * (f64::from(b) - f64::from(a));
-        let (above, below) = (mix(a[i], b[i], fx), mix(c[i], d[i], fx));
+        let lerp = |a: f32, b: f32, f: f64| f64::from(a) + f * (f64::from(b) - f64::from(a));
+        let (above, below) = (lerp(a[i], b[i], fx), lerp(c[i], d[i], fx));
         above + fy * (below - above)
     })
 }
 
-/// The lanes of `bits`, each with what `f` gives for it; the others are zero.
+/// Gathers `f(lane)` for the lanes of `bits`; other lanes are zero.
 #[inline(always)]
 fn gathered<L: SimdFloat>(bits: u32, mut f: impl FnMut(usize) -> [f64; 3]) -> Vec3<L> {
     let mut all = [[0.0; 3]; MAX_WIDTH];
@@ -86,7 +88,7 @@ fn gathered<L: SimdFloat>(bits: u32, mut f: impl FnMut(usize) -> [f64; 3]) -> Ve
 }
 
 impl<S: Float> CompiledTexture<S> {
-    /// Of a texture; `None`: it shows nothing.
+    /// Compiles a texture; `None` if it has no effect.
     pub fn new(texture: &Texture) -> Option<Self> {
         match texture {
             Texture::Checker(checker) => {
@@ -100,17 +102,17 @@ impl<S: Float> CompiledTexture<S> {
         }
     }
 
-    /// The colours at (u, v) in the lanes of `bits`.
+    /// Returns the colours at (u, v) in the lanes of `bits`.
     pub fn eval<L: SimdFloat<Scalar = S>>(&self, (u, v): (L, L), bits: u32) -> Vec3<L> {
-        let at = |lane| (u.lane(lane).to_f64(), v.lane(lane).to_f64());
+        let coordinates = |lane| (u.lane(lane).to_f64(), v.lane(lane).to_f64());
         match self {
             Self::Checker(colors) => gathered(bits, |lane| {
-                let (u, v) = at(lane);
+                let (u, v) = coordinates(lane);
                 let squares = ((2.0 * u).floor() as i64).wrapping_add((2.0 * v).floor() as i64);
                 colors[(squares & 1) as usize].map(S::to_f64)
             }),
             Self::Image { image, wrap, filter } => gathered(bits, |lane| {
-                let (u, v) = at(lane);
+                let (u, v) = coordinates(lane);
                 color_at(image, *wrap, *filter, u, v)
             }),
         }
@@ -118,17 +120,17 @@ impl<S: Float> CompiledTexture<S> {
 }
 
 impl BumpMap {
-    /// Of a bump; `None`: it turns nothing.
+    /// Compiles a bump map; `None` if it has no effect.
     pub fn new(bump: &Bump) -> Option<Self> {
-        let Bump::Image(of) = bump;
+        let Bump::Image(source) = bump;
         bump.has_effect().then_some(())?;
-        Some(Self { image: of.image()?.clone(), wrap: of.wrap, height: of.height })
+        Some(Self { image: source.image()?.clone(), wrap: source.wrap, height: source.height })
     }
 
-    /// How heights grow with u and with v, in lengths a repeat, in the lanes of `bits`.
+    /// Returns the gradient of the height along u and v, in lengths per repeat, in the lanes of `bits`.
     ///
-    /// The differences of the pixels on both sides of each pixel, bilinear between pixels: so slopes
-    /// change evenly, where those of bilinear heights would jump from pixel to pixel.
+    /// Central differences at the pixels are interpolated bilinearly. The gradient is continuous; that of
+    /// bilinear heights would jump at pixel boundaries.
     pub fn gradient<L: SimdFloat>(&self, (u, v): (L, L), bits: u32) -> (L, L) {
         let slopes: Vec3<L> = gathered(bits, |lane| {
             let [du, dv] = self.slope_at(u.lane(lane).to_f64(), v.lane(lane).to_f64());
@@ -140,17 +142,17 @@ impl BumpMap {
     fn slope_at(&self, u: f64, v: f64) -> [f64; 2] {
         let [width, height] = self.image.size();
         let wrap = self.wrap;
-        let (x, fx) = between(u, width, wrap);
-        let (y, fy) = between(1.0 - v, height, wrap);
+        let (x, fx) = pixel_position(u, width, wrap);
+        let (y, fy) = pixel_position(1.0 - v, height, wrap);
         let columns: [u32; 4] = std::array::from_fn(|i| wrapped(x + i as i32 - 1, width, wrap));
         let rows: [u32; 4] = std::array::from_fn(|i| wrapped(y + i as i32 - 1, height, wrap));
-        let at = |i: usize, j: usize| f64::from(self.image.height(columns[i], rows[j]));
-        let mix = |f: f64, a: f64, b: f64| a + f * (b - a);
-        // Twice the slope a pixel to the right, and a pixel down, at the four pixels around.
-        let right = |i: usize, j: usize| at(i + 1, j) - at(i - 1, j);
-        let down = |i: usize, j: usize| at(i, j + 1) - at(i, j - 1);
-        let du = mix(fy, mix(fx, right(1, 1), right(2, 1)), mix(fx, right(1, 2), right(2, 2)));
-        let dv = mix(fy, mix(fx, down(1, 1), down(2, 1)), mix(fx, down(1, 2), down(2, 2)));
+        let height_at = |i: usize, j: usize| f64::from(self.image.height(columns[i], rows[j]));
+        let lerp = |f: f64, a: f64, b: f64| a + f * (b - a);
+        // Twice the slope per pixel, to the right and down, at the four pixels around.
+        let right = |i: usize, j: usize| height_at(i + 1, j) - height_at(i - 1, j);
+        let down = |i: usize, j: usize| height_at(i, j + 1) - height_at(i, j - 1);
+        let du = lerp(fy, lerp(fx, right(1, 1), right(2, 1)), lerp(fx, right(1, 2), right(2, 2)));
+        let dv = lerp(fy, lerp(fx, down(1, 1), down(2, 1)), lerp(fx, down(1, 2), down(2, 2)));
         let half = 0.5 * self.height;
         [half * f64::from(width) * du, -half * f64::from(height) * dv]
     }

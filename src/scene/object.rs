@@ -12,9 +12,9 @@ description! {
         name: String, or "a number";
         /// Name of one of the `[materials.NAME]`.
         material: String, or "a matt light grey, the default of every material key";
-        /// What it looks like: exactly one kind.
+        /// Shape of the object: exactly one kind.
         shape: Shape;
-        /// Steps that move, turn and scale it, the first step first.
+        /// Steps that move, rotate and scale it, in order.
         transform: Vec<TransformOp>, or "it stays as its shape says";
     }
 }

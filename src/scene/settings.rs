@@ -76,7 +76,7 @@ description! {
 description! {
     /// Ambient light: uniform, without shadows.
     pub struct Ambient: Default {
-        /// Light from everywhere, without shadows: i_a of k_a i_a.
+        /// Ambient light from all directions, without shadows: i_a of k_a i_a.
         color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
     }
 }
@@ -98,13 +98,13 @@ impl FieldValue for Acceleration {
 /// Largest number of pixels: 8192 x 8192.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// The keys of `[film]`.
+/// Keys of `[film]`.
 pub const FILM_FIELDS: &[Field] = FilmSettings::FIELDS;
-/// The keys of `[trace]`.
+/// Keys of `[trace]`.
 pub const TRACE_FIELDS: &[Field] = IntegratorSettings::FIELDS;
-/// The keys of `[background]`.
+/// Keys of `[background]`.
 pub const BACKGROUND_FIELDS: &[Field] = Background::FIELDS;
-/// The keys of `[ambient]`.
+/// Keys of `[ambient]`.
 pub const AMBIENT_FIELDS: &[Field] = Ambient::FIELDS;
 
 impl FilmSettings {

@@ -1,13 +1,13 @@
-//! Solids around an axis from one point to another: what cylinder, cone and tapered cylinder have in
-//! common.
+//! Solids of revolution around an axis between two points: shared code of cylinder, cone and tapered
+//! cylinder.
 
 use crate::primitive::Form;
 use crate::shape::texture_space::around_axis;
 use crate::value::{ValidationError, unit};
 use glam::{DAffine3, DMat3, DVec3};
 
-/// The solid around the axis from `base` to `top`, two different points, with these radii there, both
-/// at least 0 and not both 0.
+/// Conical frustum around the axis from `base` to `top`, two different points. The radii at the ends
+/// are at least 0 and not both 0.
 pub(super) fn frustum_between(
     base: [f64; 3],
     top: [f64; 3],
@@ -15,25 +15,25 @@ pub(super) fn frustum_between(
     top_radius: f64,
 ) -> Form {
     let (base, top) = (DVec3::from_array(base), DVec3::from_array(top));
-    // The wider end first: the canonical base has radius 1.
-    let (from, to, wide, narrow) = if base_radius >= top_radius {
+    // The wider end becomes the canonical base, which has radius 1.
+    let (start, end, wide, narrow) = if base_radius >= top_radius {
         (base, top, base_radius, top_radius)
     } else {
         (top, base, top_radius, base_radius)
     };
-    let axis = to - from;
+    let axis = end - start;
     let (u, v) = unit(axis).unwrap_or(DVec3::Y).any_orthonormal_pair();
     let linear = DMat3::from_cols(u * wide, v * wide, axis);
-    Form::conical_frustum(DAffine3::from_mat3_translation(linear, from), narrow / wide)
+    Form::conical_frustum(DAffine3::from_mat3_translation(linear, start), narrow / wide)
 }
 
-/// The axes in which textures lie on it: y from `base` to `top`.
+/// Returns the texture axes: y points from `base` to `top`.
 pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
     let axis = DVec3::from_array(top) - DVec3::from_array(base);
     around_axis(unit(axis).unwrap_or(DVec3::Y))
 }
 
-/// The fault of an axis of length 0, which ends at the key `name`.
+/// Returns an error if the axis, which ends at the key `name`, has length 0.
 pub(super) fn degenerate_axis(
     base: [f64; 3],
     top: [f64; 3],
@@ -48,12 +48,12 @@ pub(super) fn degenerate_axis(
     })
 }
 
-/// Whether the axis is vertical.
+/// Returns `true` if the axis is vertical.
 pub(super) fn is_upright(base: [f64; 3], top: [f64; 3]) -> bool {
     base[0] == top[0] && base[2] == top[2]
 }
 
-/// Distance of the ends of the axis: a size of the solid.
+/// Returns the length of the axis.
 pub(super) fn height(base: [f64; 3], top: [f64; 3]) -> f64 {
     DVec3::from_array(base).distance(DVec3::from_array(top))
 }
@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn the_wider_end_is_the_base() {
+    fn wider_end_becomes_canonical_base() {
         let (a, b) = ([0.0, 1.0, 0.0], [2.0, 1.0, -3.0]);
         let narrowing = frustum_between(a, b, 2.0, 0.5);
         assert_eq!(ends(&narrowing), (a.into(), b.into(), 0.25));
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn the_canonical_form_may_widen() {
+    fn canonical_frustum_may_widen() {
         let map = DAffine3::from_translation(DVec3::X);
         for s in [0.0, 0.3, 1.0, 4.0] {
             let form = Form::conical_frustum(map, s);
@@ -90,7 +90,7 @@ mod tests {
             let r = s.max(1.0);
             assert!((low - DVec3::new(1.0 - r, -r, 0.0)).length() < 1e-15, "{s}: {low}");
             assert!((high - DVec3::new(1.0 + r, r, 1.0)).length() < 1e-15, "{s}: {high}");
-            // A point of the rim at z = 1, and whether it is at the same distance from the axis.
+            // The image of a rim point at z = 1 is at distance `s` from the axis.
             let Form::ConicalFrustum { scene_from_unit: m, top_radius: top } = form else {
                 panic!("{form:?}")
             };

@@ -2,8 +2,7 @@
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::axial::axes_between;
-use crate::shape::axial::{degenerate_axis, frustum_between, height, is_upright};
+use crate::shape::axial::{axes_between, degenerate_axis, frustum_between, height, is_upright};
 use crate::value::{Description, ValidationError, description};
 use glam::{DMat3, DVec3};
 
@@ -45,7 +44,7 @@ impl ShapeDesc for Cone {
         vec![&mut self.base, &mut self.apex]
     }
 
-    /// Upright it looks the same from all sides.
+    /// An upright cone is symmetric about the vertical.
     fn rotate_y(&mut self, _: f64) -> bool {
         is_upright(self.base, self.apex)
     }

@@ -1,6 +1,6 @@
-//! Compound objects: union, intersection and difference of solids, nested to any depth.
+//! Compound objects: union, intersection and difference of solids, nested up to 64 deep.
 //!
-//! A part is written like an object, with `shape`, and if needed `material` and `transform`, so that
+//! A part is written like an object, with `shape` and optionally `material` and `transform`, so that
 //! objects and parts can be copied into each other.
 
 use crate::primitive::Form;
@@ -12,19 +12,19 @@ use crate::value::{Description, Field, ValidationError, Validator, ValueType};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// The deepest nesting of compounds in compounds.
+/// Largest depth of compounds nested in compounds.
 pub const MAX_DEPTH: usize = 64;
 
-/// A part of a compound.
+/// One part of a compound.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CsgOperand {
-    /// What it looks like: a solid, or a plane for the half-space behind it.
+    /// Shape of the part: a solid, or a plane for the half-space behind it.
     pub shape: Shape,
-    /// Key of the scene's `materials`; empty: that of the whole.
+    /// Key of the scene's `materials`; empty for the material of the whole.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub material: String,
-    /// Steps that move, turn and scale it inside the whole, the first step first.
+    /// Steps that move, rotate and scale the part inside the whole, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub transform: Vec<TransformOp>,
 }
@@ -36,7 +36,7 @@ static PART_FIELDS: [Field; 3] = [
         "shape",
         ValueType::OneOf(&KIND_TABLE),
         "",
-        "What it looks like: a solid, or a plane for the half-space behind it.",
+        "Shape of the part: a solid, or a plane for the half-space behind it.",
     ),
     Field::optional(
         "material",
@@ -50,11 +50,11 @@ static PART_FIELDS: [Field; 3] = [
         ValueType::ListOf(TRANSFORM_OP_FIELDS),
         "",
         "it stays as its shape says",
-        "Steps that move, turn and scale it, the first step first.",
+        "Steps that move, rotate and scale it, in order.",
     ),
 ];
 
-/// The keys of a compound kind.
+/// Keys of a compound kind.
 pub(super) static OF_FIELDS: [Field; 1] = [Field::required(
     "of",
     ValueType::Tables(&PART_FIELDS),
@@ -124,7 +124,7 @@ compounds! {
     { shape.cylinder = { base = [0.0, 0.4, 0.0], top = [0.0, 1.2, 0.0], radius = 0.2 } },
 ]";
     Intersection,
-    "What solids have in common: every point that is in all parts.",
+    "The common part of solids: every point that is in all parts.",
     "shape.intersection.of = [
     { shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0 } },
     { shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.65 } },
@@ -138,7 +138,7 @@ compounds! {
 ]";
 }
 
-/// A block of this size on `base`, and a ball that reaches out of it at its upper right near corner.
+/// Returns a block of this size on `base`, and a ball that protrudes at its upper right near corner.
 fn fitted_to(base: DVec3, size: DVec3) -> [Shape; 2] {
     let block = Cuboid::fitted_to(base, size * 0.9);
     let radius = 0.4 * size.min_element();
@@ -148,13 +148,13 @@ fn fitted_to(base: DVec3, size: DVec3) -> [Shape; 2] {
 }
 
 impl CsgOperand {
-    /// A shape as it is, of the material of the whole.
+    /// Creates a part without a transform, with the material of the whole.
     pub fn new(shape: Shape) -> Self {
         Self { shape, material: String::new(), transform: Vec::new() }
     }
 }
 
-/// The parts of a compound kind; `None`: the shape is a simple one.
+/// Returns the parts of a compound; `None` if the shape is a simple one.
 pub(super) fn parts_of(shape: &Shape) -> Option<&[CsgOperand]> {
     match shape {
         Shape::Union(Union { of })
@@ -164,7 +164,7 @@ pub(super) fn parts_of(shape: &Shape) -> Option<&[CsgOperand]> {
     }
 }
 
-/// [`parts_of`], to be changed.
+/// Mutable [`parts_of`]; empty if the shape is a simple one.
 fn parts_of_mut(shape: &mut Shape) -> &mut [CsgOperand] {
     match shape {
         Shape::Union(Union { of })
@@ -174,6 +174,7 @@ fn parts_of_mut(shape: &mut Shape) -> &mut [CsgOperand] {
     }
 }
 
+/// Compiles parts to one solid: `join` combines their trees.
 fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     let mut parts = Vec::new();
     let mut trees = Vec::new();
@@ -192,8 +193,8 @@ fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     CsgSolid { parts, tree: join(trees) }
 }
 
-/// Why the shape cannot be a part, if it cannot.
-fn unfit(shape: &Shape) -> Option<&'static str> {
+/// Returns the reason why `shape` cannot be a part, if there is one.
+fn unfit_reason(shape: &Shape) -> Option<&'static str> {
     match shape {
         Shape::Rectangle(_) | Shape::HorizontalRectangle(_) => {
             Some("is flat: nothing is inside it")
@@ -203,6 +204,7 @@ fn unfit(shape: &Shape) -> Option<&'static str> {
     }
 }
 
+/// Returns the errors of the parts of a compound that is nested `depth` deep.
 fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     let mut faults = Vec::new();
     if of.len() < 2 {
@@ -225,42 +227,43 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
                 .collect(),
             None => part.shape.faults(),
         };
-        let open = unfit(&part.shape).map(|why| {
-            let found = format!("a {} {why}", part.shape.key());
+        let unfit = unfit_reason(&part.shape).map(|reason| {
+            let found = format!("a {} {reason}", part.shape.key());
             ValidationError::new("shape", found, "a solid")
         });
         let checks = Validator::new(&PART_FIELDS)
             .nested("shape", inner)
-            .and(open)
+            .and(unfit)
             .field("transform", &part.transform);
-        let moved =
+        let ill_placed =
             if checks.is_clean() { ill_conditioned(&part.shape, &part.transform) } else { None };
-        faults
-            .extend(checks.and(moved).errors().into_iter().map(|f| f.prefixed(&format!("of.{i}"))));
+        faults.extend(
+            checks.and(ill_placed).errors().into_iter().map(|f| f.prefixed(&format!("of.{i}"))),
+        );
     }
     faults
 }
 
-/// A material that a shape's parts name: where (dotted keys below the shape's own), and its name.
+/// A reference to a material in a compound: dotted key below the shape's, and material name.
 pub type Named<'a> = (String, &'a str);
 
 impl Shape {
-    /// The material of each part of the shape's form, in the order of [`Compound::parts`]: the part's
-    /// own, else that of what it is a part of, at last `whole`. A simple shape has one part.
+    /// Returns the material of each part of the shape's form, in the order of [`CsgSolid::parts`]: the
+    /// part's own, else that of the enclosing part, else `whole`. A simple shape has one part.
     pub fn part_materials<'a>(&'a self, whole: &'a str) -> Vec<&'a str> {
         match parts_of(self) {
             None => vec![whole],
             Some(of) => of
                 .iter()
                 .flat_map(|part| {
-                    let own = if part.material.is_empty() { whole } else { &part.material };
-                    part.shape.part_materials(own)
+                    let material = if part.material.is_empty() { whole } else { &part.material };
+                    part.shape.part_materials(material)
                 })
                 .collect(),
         }
     }
 
-    /// The names of materials that its parts carry, those that are empty too.
+    /// Returns the material names of all parts, including empty ones.
     pub fn part_names_mut(&mut self) -> Vec<&mut String> {
         let mut names = Vec::new();
         for part in parts_of_mut(self) {
@@ -270,16 +273,16 @@ impl Shape {
         names
     }
 
-    /// The materials that its parts name.
+    /// Returns the materials that its parts name.
     pub fn named_materials(&self) -> Vec<Named<'_>> {
         let mut named = Vec::new();
         for (i, part) in parts_of(self).into_iter().flatten().enumerate() {
-            let at = format!("{}.of.{i}", self.key());
+            let key = format!("{}.of.{i}", self.key());
             if !part.material.is_empty() {
-                named.push((format!("{at}.material"), part.material.as_str()));
+                named.push((format!("{key}.material"), part.material.as_str()));
             }
             let inner = part.shape.named_materials().into_iter();
-            named.extend(inner.map(|(key, name)| (format!("{at}.shape.{key}"), name)));
+            named.extend(inner.map(|(tail, name)| (format!("{key}.shape.{tail}"), name)));
         }
         named
     }

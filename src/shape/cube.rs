@@ -1,4 +1,4 @@
-//! Cube, standing upright.
+//! Upright cube.
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
@@ -15,7 +15,7 @@ description! {
         corner: [f64; 3], in COORDINATE "scene units";
         /// Length of an edge.
         edge: f64, in SIZE "scene units";
-        /// Turn about the vertical through the centre, counter-clockwise seen from above.
+        /// Rotation about the vertical through the centre, counter-clockwise seen from above.
         rotation: f64 = 0.0, in FINITE "degrees";
     }
 }
@@ -53,7 +53,7 @@ impl ShapeDesc for Cube {
     }
 }
 
-/// A square base with its lower left near corner at the origin.
+/// Returns a square base with its lower left near corner at the origin.
 pub(super) fn square(side: f64) -> [DVec2; 4] {
     [(0.0, 0.0), (side, 0.0), (side, -side), (0.0, -side)].map(DVec2::from)
 }

@@ -1,7 +1,7 @@
 //! Box with sides parallel to the axes.
 //!
-//! Centre and sizes, like platform and rectangle: one key moves it, and no pair of corners can be
-//! given inside out. A `transform` turns it.
+//! Described by centre and sizes, like platform and rectangle: one key moves it, and the description
+//! cannot be inside out, as a pair of corners could. A `transform` rotates it.
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
@@ -10,7 +10,7 @@ use crate::value::{Description, ValidationError, description};
 use glam::{DVec2, DVec3};
 
 description! {
-    /// A box with sides parallel to the axes; an object's `transform` can turn it.
+    /// A box with sides parallel to the axes; an object's `transform` can rotate it.
     pub struct Cuboid {
         /// Centre of the solid.
         center: [f64; 3], in COORDINATE "scene units";

@@ -1,4 +1,4 @@
-//! Platform: the ground that things stand on.
+//! Platform: a horizontal rectangle, such as the ground.
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
@@ -7,7 +7,7 @@ use crate::value::{Description, ValidationError, description};
 use glam::{DMat3, DVec3};
 
 description! {
-    /// A horizontal rectangle that faces up: the ground that things stand on.
+    /// A horizontal rectangle that faces up, such as the ground.
     pub struct HorizontalRectangle {
         /// Centre.
         center: [f64; 3], in COORDINATE "scene units";
@@ -33,7 +33,7 @@ impl ShapeDesc for HorizontalRectangle {
         self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).errors()
     }
 
-    /// A table top: at the height of the box's upper side.
+    /// Creates the upper side of the box.
     fn fitted_to(base: DVec3, size: DVec3) -> Self {
         Self { center: [base.x, base.y + size.y, base.z], size: [size.x, size.z] }
     }

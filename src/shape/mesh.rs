@@ -9,20 +9,20 @@ use std::sync::{Arc, LazyLock};
 
 description! {
     /// Triangles from a file: OBJ (with the colours of its MTL), PLY, STL, glTF or GLB. Placed by
-    /// `transform`. Light falls on the side from which the corners of a triangle turn
-    /// counter-clockwise, and on the other if its material is two-sided.
+    /// `transform`. The front of a triangle is the side from which its corners are in
+    /// counter-clockwise order; the back is lit if the material is two-sided.
     pub struct MeshDesc: Default {
-        /// Name of the file, relative to the folder of the scene file. Empty: an icosahedron stands in.
+        /// Name of the file, relative to the folder of the scene file. Empty: an icosahedron.
         file: String = "";
-        /// What light sees: curved triangles or flat ones.
+        /// Normals used for shading: curved triangles or flat ones.
         normals: Normals = "smooth";
-        // The file's content, once it was looked for.
+        // Content of the file, once the file was searched.
         skip content: Option<Result<Arc<Mesh>, AssetError>>;
     }
 }
 
 choices! {
-    /// Normals that light is computed with.
+    /// Shading normals of a mesh.
     pub enum Normals {
         /// interpolated between the vertices: the file's, else the mean of the triangles around
         Smooth = "smooth",
@@ -31,7 +31,7 @@ choices! {
     }
 }
 
-/// An icosahedron that stands on the origin and is 1 high.
+/// Placeholder mesh: an icosahedron of height 1 that stands on the origin.
 static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
     let golden = 0.5 * (1.0 + 5.0f64.sqrt());
     let mut corners = Vec::new();
@@ -42,7 +42,7 @@ static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
             corners.push(DVec3::from(corner));
         }
     }
-    // Edges are 2 long; every three corners that are such neighbours are a triangle.
+    // Edges are 2 long; every three corners that are pairwise neighbours form a triangle.
     let near = |a: usize, b: usize| corners[a].distance_squared(corners[b]) < 4.1;
     let mut triangles = Vec::new();
     for a in 0..12 {
@@ -78,7 +78,7 @@ static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
 });
 
 impl MeshDesc {
-    /// What is drawn: the file's mesh, or the stand-in while there is none.
+    /// Returns the mesh of the file, or the placeholder if there is none.
     fn mesh(&self) -> &Arc<Mesh> {
         match &self.content {
             Some(Ok(mesh)) => mesh,
@@ -109,7 +109,7 @@ impl ShapeDesc for MeshDesc {
         }
     }
 
-    /// The stand-in at the origin: only a transform places it.
+    /// Creates the placeholder at the origin; only a transform moves a mesh.
     fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self::default()
     }
@@ -124,7 +124,7 @@ impl ShapeDesc for MeshDesc {
 }
 
 impl Shape {
-    /// Takes what `load` finds in the file that the shape names, if it has not been looked for yet.
+    /// Loads the file that the shape names with `load`, unless it has been searched already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
         if let Self::MeshDesc(mesh) = self
             && !mesh.file.is_empty()
@@ -134,7 +134,7 @@ impl Shape {
         }
     }
 
-    /// Takes over what `other` found in a file, if this shape names the same.
+    /// Takes the content of the file from `other`, if both shapes name the same file.
     pub fn resolve_as(&mut self, other: &Self) {
         if let (Self::MeshDesc(new), Self::MeshDesc(old)) = (self, other)
             && new.file == old.file
@@ -143,7 +143,7 @@ impl Shape {
         }
     }
 
-    /// The file that the shape names, if it names one.
+    /// Returns the file that the shape names, if any.
     pub fn file(&self) -> Option<&str> {
         match self {
             Self::MeshDesc(mesh) if !mesh.file.is_empty() => Some(&mesh.file),
@@ -157,14 +157,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_stand_in_is_an_icosahedron_on_the_origin() {
+    fn placeholder_is_icosahedron_on_origin() {
         let mesh = PLACEHOLDER.mesh();
         assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 20));
         let form = MeshDesc::fitted_to(DVec3::ZERO, DVec3::ONE).form();
         let (low, high) = form.bounds().unwrap();
         assert!((low - DVec3::new(-0.5, 0.0, -0.5)).length() < 1e-6, "{low}");
         assert!((high - DVec3::new(0.5, 1.0, 0.5)).length() < 1e-6, "{high}");
-        // All corners as far from the middle as any; all fronts outside.
+        // All corners have the same distance from the centre; all fronts face outwards.
         let point =
             |i: u32| DVec3::from(mesh.positions[i as usize].map(f64::from)) - DVec3::Y * 0.5;
         for t in &mesh.triangles {

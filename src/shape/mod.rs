@@ -1,4 +1,5 @@
-//! Shapes: what users describe, one kind a file, and what rays meet, one batch per form.
+//! Shapes as users describe them, one kind per file. `primitive` has what rays intersect.
+
 mod axial;
 mod cone;
 mod csg;

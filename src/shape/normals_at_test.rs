@@ -4,43 +4,43 @@ use crate::primitive::normals_at::AROUND_TIP;
 use crate::shape::{EXAMPLES, Shape};
 use glam::DVec3;
 
-/// Where rays from everywhere meet the kinds, they lie on a surface that faces the ray; a little off they
-/// do not.
+/// At hit points of rays from all sides there is a normal that is not across the ray; at the ray's
+/// origin there is none.
 #[test]
-fn points_that_rays_meet_lie_on_a_surface() {
+fn normals_at_hit_points_face_ray() {
     for (key, _) in EXAMPLES {
         let shape = Shape::fitted_to(key, DVec3::new(1.0, 0.5, -2.0), DVec3::new(1.0, 1.5, 2.0));
         let form = shape.unwrap().form();
         let (low, high) = form.bounds().unwrap_or((DVec3::splat(-1.0), DVec3::splat(1.0)));
         let (middle, size) = (0.5 * (low + high), (high - low).length());
-        let mut met = 0;
+        let mut hits = 0;
         for i in 0..200 {
             let angle = f64::from(i) * 2.4;
-            let from = DVec3::new(angle.cos(), (f64::from(i) * 1.7).sin(), angle.sin());
-            let from = middle + from.normalize() * size;
+            let direction = DVec3::new(angle.cos(), (f64::from(i) * 1.7).sin(), angle.sin());
+            let origin = middle + direction.normalize() * size;
             let aim = middle + DVec3::new(0.11, 0.07, -0.05) * (high - low);
-            let Some(t) = form.cast(from, aim - from) else { continue };
-            met += 1;
-            let point = from + (aim - from) * t;
+            let Some(t) = form.cast(origin, aim - origin) else { continue };
+            hits += 1;
+            let point = origin + (aim - origin) * t;
             let normals = form.normals_at(point, 1e-6);
             assert!(!normals.is_empty() && !normals[0].is_empty(), "{key}: {point}");
-            let out = normals.iter().flatten().any(|n| n.dot(from - point).abs() > 1e-9);
-            assert!(out, "{key}: {normals:?} at {point}");
-            assert!(form.normals_at(from, 1e-6).is_empty(), "{key}: {from}");
+            let facing = normals.iter().flatten().any(|n| n.dot(origin - point).abs() > 1e-9);
+            assert!(facing, "{key}: {normals:?} at {point}");
+            assert!(form.normals_at(origin, 1e-6).is_empty(), "{key}: {origin}");
         }
-        assert!(met > 20, "{key}: {met}");
+        assert!(hits > 20, "{key}: {hits}");
     }
 }
 
 #[test]
-fn corners_and_tips_lie_on_several() {
+fn normals_at_corners_and_tips_are_several() {
     let cube = Shape::fitted_to("cube", DVec3::ZERO, DVec3::ONE).unwrap().form();
-    let at = |p: DVec3| cube.normals_at(p, 1e-9).concat().len();
-    assert_eq!(at(DVec3::new(0.5, 1.0, 0.5)), 3);
-    assert_eq!(at(DVec3::new(0.5, 1.0, 0.2)), 2);
-    assert_eq!(at(DVec3::new(0.1, 1.0, 0.2)), 1);
-    assert_eq!(at(DVec3::new(0.1, 0.5, 0.2)), 0);
-    assert_eq!(at(DVec3::new(0.6, 1.0, 0.2)), 0);
+    let count_at = |p: DVec3| cube.normals_at(p, 1e-9).concat().len();
+    assert_eq!(count_at(DVec3::new(0.5, 1.0, 0.5)), 3);
+    assert_eq!(count_at(DVec3::new(0.5, 1.0, 0.2)), 2);
+    assert_eq!(count_at(DVec3::new(0.1, 1.0, 0.2)), 1);
+    assert_eq!(count_at(DVec3::new(0.1, 0.5, 0.2)), 0);
+    assert_eq!(count_at(DVec3::new(0.6, 1.0, 0.2)), 0);
     let cone = Shape::fitted_to("cone", DVec3::ZERO, DVec3::ONE).unwrap().form();
     assert_eq!(cone.normals_at(DVec3::Y, 1e-9).concat().len(), AROUND_TIP as usize);
 }

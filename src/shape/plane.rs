@@ -7,7 +7,7 @@ use crate::value::{description, turned, unit};
 use glam::{DMat3, DVec3};
 
 description! {
-    /// A plane without end. Its front is the side that `normal` points to.
+    /// An infinite plane. Its front is the side that `normal` points to.
     pub struct Plane {
         /// Any point of the plane.
         point: [f64; 3], in COORDINATE "scene units";
@@ -25,7 +25,7 @@ impl ShapeDesc for Plane {
         Form::Plane { normal, offset: normal.dot(DVec3::from_array(self.point)) }
     }
 
-    /// The ground, through `base`.
+    /// Creates the horizontal plane through `base`.
     fn fitted_to(base: DVec3, _: DVec3) -> Self {
         Self { point: base.to_array(), normal: [0.0, 1.0, 0.0] }
     }

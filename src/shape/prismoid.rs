@@ -1,4 +1,4 @@
-//! Solids that stand on a regular base: what cube, box, pyramid and prism have in common.
+//! Polygonal prisms and frusta on a horizontal base: shared code of cube, box, pyramid and prism.
 
 use crate::primitive::{Form, HalfSpace};
 use crate::value::{round_nice, sin_cos_degrees};
@@ -6,12 +6,13 @@ use glam::{DVec2, DVec3};
 
 /// A convex solid over a horizontal base.
 ///
-/// `base`: the base's corners as (x, z) offsets from `corner`, in order around it. `top_over_base`:
-/// size of the top over that of the base, 0 (an apex) to 1 (upright sides). `rotation`: degrees
-/// about the vertical through the base's centroid, counter-clockwise seen from above.
+/// `base` is the list of the base's corners as (x, z) offsets from `corner`, in order around it.
+/// `top_over_base` is the size of the top relative to the base, from 0 (an apex) to 1 (upright sides).
+/// `rotation` is the angle in degrees about the vertical through the base's centroid,
+/// counter-clockwise seen from above.
 ///
-/// The sides' normals come from the base and the heights, never from differences of corners, so
-/// that a tiny top or a place far from the origin costs them no digits.
+/// The normals of the sides are computed from the base and the height instead of from differences of
+/// corners, so that they keep full precision with a tiny top or far from the origin.
 pub(super) fn prismoid(
     corner: DVec3,
     base: &[DVec2],
@@ -22,11 +23,11 @@ pub(super) fn prismoid(
     let centroid = base.iter().sum::<DVec2>() / base.len() as f64;
     let (sin, cos) = sin_cos_degrees(rotation);
     let turned = |v: DVec2| DVec2::new(v.x * cos + v.y * sin, v.y * cos - v.x * sin);
-    // (b - c) + c is exact where (b + corner - c) + c would not be: an unturned cube keeps its
+    // (b - c) + c is exact where (b + corner - c) + c is rounded: a cube without rotation keeps its
     // corner.
     let place = |scale: f64, b: DVec2, y: f64| {
-        let at = centroid + turned(b - centroid) * scale;
-        corner + DVec3::new(at.x, y, at.y)
+        let offset = centroid + turned(b - centroid) * scale;
+        corner + DVec3::new(offset.x, y, offset.y)
     };
     let mut corners: Vec<DVec3> = base.iter().map(|b| place(1.0, *b, 0.0)).collect();
     if top_over_base > 0.0 {
@@ -40,21 +41,21 @@ pub(super) fn prismoid(
     if top_over_base > 0.0 {
         faces.push(through(corner + DVec3::Y * height, DVec3::Y));
     }
-    for (i, from) in base.iter().enumerate() {
-        let to = base[(i + 1) % base.len()];
-        let across = (to - from).perp().normalize();
-        let reach = across.dot(from - centroid);
-        let outward = turned(across * reach.signum());
-        // At height y the side is `reach (1 - (1 - top_over_base) y / height)` from the axis.
-        let up = reach.abs() * (1.0 - top_over_base) / height;
+    for (i, start) in base.iter().enumerate() {
+        let end = base[(i + 1) % base.len()];
+        let across = (end - start).perp().normalize();
+        let apothem = across.dot(start - centroid);
+        let outward = turned(across * apothem.signum());
+        // At height y the side is `apothem (1 - (1 - top_over_base) y / height)` from the axis.
+        let up = apothem.abs() * (1.0 - top_over_base) / height;
         let normal = DVec3::new(outward.x, up, outward.y).normalize();
         faces.push(through(corners[i], normal));
     }
     Form::ConvexPolyhedron { faces, corners }
 }
 
-/// The corner of a base whose middle is `base`, `width` wide and `depth` deep: half of both away
-/// towards -x and +z, in numbers that read well.
+/// Returns the corner of a base `width` wide and `depth` deep around `base`, half of both away towards
+/// -x and +z, rounded to short decimals.
 pub(super) fn corner_of_centered(base: DVec3, width: f64, depth: f64) -> [f64; 3] {
     let scale = width.min(depth);
     [round_nice(base.x - width / 2.0, scale), base.y, round_nice(base.z + depth / 2.0, scale)]
@@ -74,8 +75,8 @@ mod tests {
     }
 
     fn has_corner(form: &Form, x: f64, y: f64, z: f64) -> bool {
-        let at = DVec3::new(x, y, z);
-        parts(form.clone()).1.iter().any(|c| (c - at).length() < 1e-12)
+        let corner = DVec3::new(x, y, z);
+        parts(form.clone()).1.iter().any(|c| (c - corner).length() < 1e-12)
     }
 
     fn solids() -> Vec<(&'static str, usize, Form)> {
@@ -94,37 +95,37 @@ mod tests {
     }
 
     #[test]
-    fn corners_are_where_faces_meet() {
+    fn corners_lie_on_three_faces() {
         for (name, count, form) in solids() {
             let (faces, corners) = parts(form);
             assert_eq!(faces.len(), count, "{name}");
             for face in &faces {
                 assert!((face.normal.length() - 1.0).abs() < 1e-15, "{name}: {face:?}");
-                let on =
+                let on_face =
                     corners.iter().filter(|c| (face.normal.dot(**c) - face.offset).abs() < 1e-12);
-                assert!(on.count() >= 3, "{name}: {face:?} has too few corners");
+                assert!(on_face.count() >= 3, "{name}: {face:?} has too few corners");
                 for corner in &corners {
                     assert!(face.normal.dot(*corner) <= face.offset + 1e-12, "{name}: {corner}");
                 }
             }
             for corner in &corners {
-                let meet =
+                let at_corner =
                     faces.iter().filter(|f| (f.normal.dot(*corner) - f.offset).abs() < 1e-12);
-                assert!(meet.count() >= 3, "{name}: {corner}");
+                assert!(at_corner.count() >= 3, "{name}: {corner}");
             }
         }
     }
 
     #[test]
-    fn normals_survive_a_place_far_from_the_origin() {
-        let here = Prism { corner: [0.0; 3], side: 1.0, height: 1.0, rotation: 10.0 }.form();
-        let there = Prism { corner: [1e9; 3], side: 1.0, height: 1.0, rotation: 10.0 }.form();
+    fn normals_are_exact_far_from_origin() {
+        let near = Prism { corner: [0.0; 3], side: 1.0, height: 1.0, rotation: 10.0 }.form();
+        let far = Prism { corner: [1e9; 3], side: 1.0, height: 1.0, rotation: 10.0 }.form();
         let normals = |form| parts(form).0.iter().map(|f| f.normal).collect::<Vec<_>>();
-        assert_eq!(normals(here), normals(there));
+        assert_eq!(normals(near), normals(far));
     }
 
     #[test]
-    fn an_unturned_cube_spans_exactly_what_it_says() {
+    fn cube_without_rotation_has_exact_bounds() {
         let cube = Cube { corner: [0.1, 0.2, 0.3], edge: 0.7, rotation: 0.0 }.form();
         let (low, high) = cube.bounds().unwrap();
         assert_eq!((low.x, low.y, high.z), (0.1, 0.2, 0.3));
@@ -132,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn turns_are_counter_clockwise_seen_from_above() {
+    fn rotation_is_counter_clockwise_from_above() {
         let prism = |rotation| Prism { corner: [0.0; 3], side: 1.0, height: 1.0, rotation }.form();
         let h = 0.75f64.sqrt();
         // The centroid is (0.5, -h / 3); the third vertex points away, then to the left.
@@ -143,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn pyramids_are_cut_only_below_their_apex() {
+    fn pyramid_is_truncated_only_below_apex() {
         let corner = [0.0; 3];
         let form = |apex_height, height| {
             Pyramid { corner, side: 0.9, apex_height, height, rotation: 0.0 }.form()

@@ -21,7 +21,7 @@ description! {
         apex_height: f64, in SIZE "scene units";
         /// Height of the truncated pyramid.
         height: f64, in SIZE "scene units";
-        /// Turn about the vertical through the base's centre, counter-clockwise seen from above.
+        /// Rotation about the vertical through the base's centre, counter-clockwise seen from above.
         rotation: f64 = 0.0, in FINITE "degrees";
     }
 }

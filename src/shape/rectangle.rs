@@ -1,8 +1,7 @@
-//! Rectangle anywhere: the flat mirror.
+//! Rectangle in any orientation, such as a flat mirror.
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-
 use crate::value::{Description, ValidationError, description, turned, unit};
 use glam::{DMat3, DVec3};
 
@@ -25,12 +24,12 @@ fn up() -> [f64; 3] {
 }
 
 impl Rectangle {
-    /// Unit vectors to the right (seen from the front), up and to the front; `None` if `up` lies
-    /// along the normal.
+    /// Returns unit vectors to the right (seen from the front), up and to the front; `None` if `up` is
+    /// parallel to the normal.
     fn frame(&self) -> Option<[DVec3; 3]> {
         let front = unit(self.normal)?;
         let right = unit(self.up)?.cross(front);
-        // Within 1e-6 of parallel the direction is noise.
+        // Within 1e-6 of parallel, rounding errors determine the direction.
         (right.length() > 1e-6).then(|| {
             let right = right.normalize();
             [right, front.cross(right), front]
@@ -100,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn the_front_is_where_the_normal_points() {
+    fn rectangle_front_faces_normal() {
         for normal in
             [[0.0, 0.0, 1.0], [0.3, -0.2, -1e-200], [-2e150, 1e150, 1e150], [0.0, 0.1, 3.0]]
         {
@@ -116,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn an_up_along_the_normal_is_a_fault() {
+    fn up_parallel_to_normal_is_rejected() {
         for (normal, sound) in [
             ([0.0, 1.0, 0.0], false),
             ([0.0, -1e-300, 0.0], false),
@@ -130,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn platforms_face_up() {
+    fn platform_faces_up() {
         let platform = HorizontalRectangle { center: [1.0, 2.0, 3.0], size: [8.0, 6.0] };
         let (corner, u, v) = sides(platform.form());
         assert_eq!(u.cross(v), DVec3::new(0.0, 48.0, 0.0));

@@ -1,4 +1,4 @@
-//! The table of kinds. A new kind of shape is one file and one line here.
+//! Table of shape kinds. A new kind is one file and one line here.
 
 use crate::primitive::Form;
 use crate::shape::csg::OF_FIELDS;
@@ -11,46 +11,46 @@ use crate::value::{Description, Field, FieldValue, ValidationError, ValueType, r
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// What every kind's description says of itself.
+/// Description of one kind of shape.
 pub trait ShapeDesc: Description {
-    /// A line for a scene file.
+    /// Example for a scene file.
     const EXAMPLE: &'static str;
 
-    /// The geometry, in double precision. Of a description without faults.
+    /// Compiles the geometry in double precision. The description has no faults.
     fn form(&self) -> Form;
 
-    /// What is wrong with it.
+    /// Returns the errors of the description.
     fn faults(&self) -> Vec<ValidationError> {
         self.validator().errors()
     }
 
-    /// One of this kind that stands upright on `base`, the middle of its lower side, and fills about
-    /// a box with the lengths `size` along x, y and z, all greater than 0.
+    /// Creates an upright instance that roughly fills a box. `base` is the centre of the box's lower
+    /// side, `size` its lengths along x, y and z, all greater than 0.
     fn fitted_to(base: DVec3, size: DVec3) -> Self;
 
-    /// The points that move it: adding a vector to all of them moves the whole shape by that vector.
-    /// Empty: only a transform moves it.
+    /// Returns the points that place the shape: adding a vector to all of them moves the shape by that
+    /// vector. Empty if only a transform moves it.
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]>;
 
-    /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen from
-    /// above. `false`: it has no key for that, and nothing was done.
+    /// Rotates the shape by `degrees` about the vertical through its centre, counter-clockwise seen
+    /// from above. Returns `false`, without a change, if the kind has no key for it.
     fn rotate_y(&mut self, degrees: f64) -> bool;
 
-    /// The axes of the space in which textures lie on it ([`TextureSpace`](crate::shape::TextureSpace)), in its
-    /// own: right-handed, of unit length.
+    /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace) in the shape's space:
+    /// right-handed, orthonormal.
     fn texture_axes(&self) -> DMat3 {
         DMat3::IDENTITY
     }
 }
 
-/// The angle `rotation + degrees` as it is written in a file: above -180, at most 180.
+/// Returns the angle `rotation + degrees` in the form of a scene file: above -180, at most 180.
 pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
-    let rotate_y = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
-    if rotate_y > 180.0 { rounded_to(rotate_y - 360.0, -6) } else { rotate_y }
+    let angle = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
+    if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
 }
 
-/// The keys of a kind; those of compounds by the name of their static, since a constant could not
-/// take part in a table that refers to itself.
+/// Keys of a kind. Compounds pass the name of their static: a constant cannot be part of a table that
+/// refers to itself.
 macro_rules! keys {
     ($kind:ident) => {
         $kind::FIELDS
@@ -62,7 +62,7 @@ macro_rules! keys {
 
 macro_rules! kinds {
     ($($key:literal => $kind:ident $(with $fields:path)?),+ $(,)?) => {
-        /// What an object looks like: one kind with its parameters. In files a table with one key.
+        /// Shape of an object: one kind with its parameters. In scene files a table with one key.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         pub enum Shape {
             $(
@@ -72,34 +72,34 @@ macro_rules! kinds {
             )+
         }
 
-        // A static, since the parts of compounds have shapes, too: the table refers to itself.
+        // A static, because the parts of compounds have shapes: the table refers to itself.
         pub(super) static KIND_TABLE: [Field; [$($key),+].len()] = [
             $(Field::required($key, ValueType::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
         ];
 
-        /// Every kind: its key, its fields, what it is.
+        /// Every kind with its key, its fields and its help text.
         pub const KINDS: &[Field] = &KIND_TABLE;
 
-        /// Every kind's key with an example as it stands in an `[[object]]`.
+        /// Every kind's key with an example for an `[[object]]`.
         pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE),)+];
 
         impl Shape {
-            /// The key of its kind.
+            /// Returns the key of its kind.
             pub fn key(&self) -> &'static str {
                 match self {
                     $(Self::$kind(_) => $key,)+
                 }
             }
 
-            /// The geometry, in double precision, before the object's transform. Only of a shape
-            /// without faults.
+            /// Compiles the geometry in double precision, before the object's transform. The shape has
+            /// no faults.
             pub fn form(&self) -> Form {
                 match self {
                     $(Self::$kind(kind) => kind.form(),)+
                 }
             }
 
-            /// What is wrong with it; keys begin with the kind's.
+            /// Returns the errors of the description, with keys that begin with the kind's.
             pub fn faults(&self) -> Vec<ValidationError> {
                 let faults = match self {
                     $(Self::$kind(kind) => kind.faults(),)+
@@ -107,14 +107,14 @@ macro_rules! kinds {
                 faults.into_iter().map(|f| f.prefixed(self.key())).collect()
             }
 
-            /// The axes of the space in which textures lie on it, in its own.
+            /// Returns the axes of the texture space in the shape's space.
             pub(super) fn texture_axes(&self) -> DMat3 {
                 match self {
                     $(Self::$kind(kind) => kind.texture_axes(),)+
                 }
             }
 
-            /// The kind with this key as [`ShapeDesc::fitted_to`] makes it; `None`: no kind has it.
+            /// Creates the kind with this key by [`ShapeDesc::fitted_to`]; `None` if no kind has it.
             pub fn fitted_to(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
                 match key {
                     $($key => Some(Self::$kind($kind::fitted_to(base, size))),)+
@@ -122,16 +122,16 @@ macro_rules! kinds {
                 }
             }
 
-            /// The points that move it: adding a vector to all of them moves the whole shape by that
-            /// vector. Empty: only a transform moves it.
+            /// Returns the points that place the shape: adding a vector to all of them moves the shape
+            /// by that vector. Empty if only a transform moves it.
             pub fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
                 match self {
                     $(Self::$kind(kind) => kind.anchor_points_mut(),)+
                 }
             }
 
-            /// Turns it by `degrees` about the vertical through its middle, counter-clockwise seen
-            /// from above. `false`: its kind has no key for that, and nothing was done.
+            /// Rotates the shape by `degrees` about the vertical through its centre, counter-clockwise
+            /// seen from above. Returns `false`, without a change, if its kind has no key for it.
             pub fn rotate_y(&mut self, degrees: f64) -> bool {
                 match self {
                     $(Self::$kind(kind) => kind.rotate_y(degrees),)+
@@ -174,8 +174,11 @@ impl FieldValue for Shape {
 }
 
 impl Shape {
-    /// The first of the points that move it; the origin if there is none.
+    /// Returns the first of the points that place the shape; the origin if there are none.
     pub fn position(&self) -> DVec3 {
-        self.clone().anchor_points_mut().first().map_or(DVec3::ZERO, |at| DVec3::from_array(**at))
+        self.clone()
+            .anchor_points_mut()
+            .first()
+            .map_or(DVec3::ZERO, |point| DVec3::from_array(**point))
     }
 }

@@ -35,7 +35,7 @@ impl ShapeDesc for Sphere {
         vec![&mut self.center]
     }
 
-    /// It looks the same from all sides.
+    /// A sphere is symmetric about the vertical.
     fn rotate_y(&mut self, _: f64) -> bool {
         true
     }

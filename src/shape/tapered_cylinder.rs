@@ -1,14 +1,13 @@
-//! Tapered cylinder: its radius changes evenly along the axis between two points.
+//! Tapered cylinder: its radius changes linearly along the axis between two points.
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::axial::axes_between;
-use crate::shape::axial::{degenerate_axis, frustum_between, height, is_upright};
+use crate::shape::axial::{axes_between, degenerate_axis, frustum_between, height, is_upright};
 use crate::value::{Description, NumberRange, ValidationError, description};
 use glam::{DMat3, DVec3};
 
 description! {
-    /// A circular cylinder that narrows or widens evenly, with flat ends: a cone cut off.
+    /// A circular cylinder that narrows or widens linearly, with flat ends: a cone cut off.
     pub struct TaperedCylinder {
         /// Centre of one end.
         base: [f64; 3], in COORDINATE "scene units";
@@ -32,7 +31,7 @@ impl ShapeDesc for TaperedCylinder {
     fn faults(&self) -> Vec<ValidationError> {
         let radii = [("base_radius", self.base_radius), ("top_radius", self.top_radius)];
         let mut sizes: Vec<_> = radii.into_iter().filter(|(_, r)| *r != 0.0).collect();
-        let thin = sizes.is_empty().then(|| {
+        let both_zero = sizes.is_empty().then(|| {
             ValidationError::new(
                 "top_radius",
                 "both radii are 0",
@@ -42,7 +41,7 @@ impl ShapeDesc for TaperedCylinder {
         sizes.push(("top", height(self.base, self.top)));
         self.validator()
             .and(degenerate_axis(self.base, self.top, "top"))
-            .and(thin)
+            .and(both_zero)
             .ratio(&sizes, &[self.base, self.top].concat())
             .errors()
     }
@@ -62,7 +61,7 @@ impl ShapeDesc for TaperedCylinder {
         vec![&mut self.base, &mut self.top]
     }
 
-    /// Upright it looks the same from all sides.
+    /// An upright cylinder is symmetric about the vertical.
     fn rotate_y(&mut self, _: f64) -> bool {
         is_upright(self.base, self.top)
     }

@@ -1,4 +1,4 @@
-//! The space in which textures lie on a shape.
+//! Coordinate systems in which textures are mapped onto shapes.
 
 use crate::primitive::Form;
 use crate::shape::Shape;
@@ -6,68 +6,66 @@ use crate::shape::csg::parts_of;
 use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
 
-/// How a texture lies on a shape if nobody says.
+/// Mapping that a shape uses for `mapping = "auto"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DefaultMapping {
-    /// It is flat.
-    Plane,
-    /// It is round on all sides.
-    Ball,
-    /// It is round about an axis.
-    Turned,
-    /// It has flat sides, or a form of any kind.
-    Sides,
-    /// A mesh with texture coordinates of its own.
+    /// Planar, for flat shapes.
+    Planar,
+    /// Spherical, for spheres and ellipsoids.
+    Spherical,
+    /// Cylindrical, for solids of revolution.
+    Cylindrical,
+    /// Box, for solids with flat faces and for any other form.
+    Box,
+    /// Texture coordinates of a mesh.
     Uv,
 }
 
-/// The space in which textures lie on a simple shape: x to the right, y up or along its axis, z to the
-/// front or along its normal; as large as the scene is before the object's transform.
+/// Texture space of a simple shape: x to the right, y up or along its axis, z to the front or along
+/// its normal. Its unit is the scene unit before the object's transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureSpace {
-    /// From it to the space of the whole shape.
+    /// Map from the texture space to the space of the whole shape.
     pub shape_from_texture: DAffine3,
-    /// Corners of the box around the shape in it; of a plane both are its point.
+    /// Corners of the shape's bounding box in texture space; both are the `point` of a plane.
     pub corners: [DVec3; 2],
-    /// How a texture lies on it if nobody says.
-    pub unwrapped: DefaultMapping,
+    /// Mapping for `mapping = "auto"`.
+    pub default_mapping: DefaultMapping,
 }
 
 impl TextureSpace {
-    /// Of a simple shape without faults.
+    /// Creates the texture space of a simple shape without faults.
     fn new(shape: &Shape) -> Self {
         let form = shape.form();
         let shape_from_texture = DAffine3::from_mat3(shape.texture_axes());
         let texture_from_shape = shape_from_texture.inverse();
-        let unwrapped = match &form {
-            Form::Parallelogram { .. } | Form::Plane { .. } => DefaultMapping::Plane,
-            Form::Sphere { .. } | Form::Ellipsoid { .. } => DefaultMapping::Ball,
-            Form::ConicalFrustum { .. } => DefaultMapping::Turned,
+        let default_mapping = match &form {
+            Form::Parallelogram { .. } | Form::Plane { .. } => DefaultMapping::Planar,
+            Form::Sphere { .. } | Form::Ellipsoid { .. } => DefaultMapping::Spherical,
+            Form::ConicalFrustum { .. } => DefaultMapping::Cylindrical,
             Form::Mesh { mesh, .. } if mesh.mesh().uvs.is_some() => DefaultMapping::Uv,
-            Form::ConvexPolyhedron { .. } | Form::Csg(_) | Form::Mesh { .. } => {
-                DefaultMapping::Sides
-            }
+            Form::ConvexPolyhedron { .. } | Form::Csg(_) | Form::Mesh { .. } => DefaultMapping::Box,
         };
         let point = texture_from_shape.transform_point3(shape.position());
         let corners = form.transformed(&texture_from_shape).bounds().unwrap_or((point, point));
-        Self { shape_from_texture, corners: corners.into(), unwrapped }
+        Self { shape_from_texture, corners: corners.into(), default_mapping }
     }
 
-    /// Whether it has texture coordinates of its own: a mesh whose file has them, or what is flat and
-    /// has edges.
+    /// Returns `true` if the shape has texture coordinates: a mesh whose file has them, or a flat shape
+    /// with edges.
     pub fn has_uv(&self) -> bool {
         let [low, high] = self.corners;
-        match self.unwrapped {
+        match self.default_mapping {
             DefaultMapping::Uv => true,
-            DefaultMapping::Plane => low != high,
+            DefaultMapping::Planar => low != high,
             _ => false,
         }
     }
 }
 
 impl Shape {
-    /// The spaces in which textures lie on its parts, in the order of [`Form::parts`]; of a shape
-    /// without faults.
+    /// Returns the texture spaces of its parts, in the order of [`Form::parts`]. The shape has no
+    /// faults.
     pub fn texture_spaces(&self) -> Vec<TextureSpace> {
         let Some(of) = parts_of(self) else { return vec![TextureSpace::new(self)] };
         let inner = |part: &crate::shape::CsgOperand| {
@@ -82,7 +80,7 @@ impl Shape {
     }
 }
 
-/// The axes around `y`, of unit length: x as far to the right as can be.
+/// Returns orthonormal axes around `y`, with x as close to the right as possible.
 pub(super) fn around_axis(y: DVec3) -> DMat3 {
     let across = y.cross(DVec3::Z);
     let x = if across.length() > 1e-3 { across.normalize() } else { DVec3::X };
@@ -90,15 +88,15 @@ pub(super) fn around_axis(y: DVec3) -> DMat3 {
     DMat3::from_cols(x, y, x.cross(y))
 }
 
-/// The axes on a plane with the unit normal `z`: y as far up as can be; on what lies flat, away from the
-/// viewer.
+/// Returns orthonormal axes on a plane with the unit normal `z`, with y as close to up as possible; on
+/// a horizontal plane y points away from the viewer.
 pub(super) fn on_plane(z: DVec3) -> DMat3 {
     let up = if z.y.abs() > 0.999 { DVec3::NEG_Z * z.y.signum() } else { DVec3::Y };
     let x = up.cross(z).normalize();
     DMat3::from_cols(x, z.cross(x), z)
 }
 
-/// The axes of a shape that is turned about the vertical, counter-clockwise seen from above.
+/// Returns the axes of a shape rotated about the vertical, counter-clockwise seen from above.
 pub(super) fn turned_axes(degrees: f64) -> DMat3 {
     let (sin, cos) = crate::value::sin_cos_degrees(degrees);
     DMat3::from_cols(DVec3::new(cos, 0.0, -sin), DVec3::Y, DVec3::new(sin, 0.0, cos))
@@ -115,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_has_right_handed_axes_and_a_box() {
+    fn texture_axes_of_every_kind_are_right_handed() {
         for (kind, (key, text)) in KINDS.iter().zip(EXAMPLES) {
             for space in shape(text).texture_spaces() {
                 let axes = space.shape_from_texture.matrix3;
@@ -129,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn axes_follow_the_shape() {
+    fn texture_axes_follow_shape() {
         let one = |text: &str| shape(text).texture_spaces()[0];
         let column = |space: &TextureSpace, i: usize| space.shape_from_texture.matrix3.col(i);
         let floor = one("shape.plane = { point = [1.0, 2.0, 3.0], normal = [0.0, 2.0, 0.0] }");
@@ -150,11 +148,11 @@ mod tests {
         let cube = one("shape.cube = { corner = [4.0, 0.0, 1.0], edge = 1.5, rotation = 33.0 }");
         let size = cube.corners[1] - cube.corners[0];
         assert!((size - DVec3::splat(1.5)).length() < 1e-12, "its own sides: {size}");
-        assert_eq!(cube.unwrapped, DefaultMapping::Sides);
+        assert_eq!(cube.default_mapping, DefaultMapping::Box);
     }
 
     #[test]
-    fn parts_keep_their_order_and_their_transforms() {
+    fn texture_spaces_of_parts_keep_order_and_transforms() {
         let compound = shape(
             "shape.union.of = [
                 { shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 } },
@@ -166,8 +164,11 @@ mod tests {
         );
         let spaces = compound.texture_spaces();
         assert_eq!(spaces.len(), compound.form().parts());
-        let kinds: Vec<_> = spaces.iter().map(|s| s.unwrapped).collect();
-        assert_eq!(kinds, [DefaultMapping::Ball, DefaultMapping::Sides, DefaultMapping::Turned]);
+        let kinds: Vec<_> = spaces.iter().map(|s| s.default_mapping).collect();
+        assert_eq!(
+            kinds,
+            [DefaultMapping::Spherical, DefaultMapping::Box, DefaultMapping::Cylindrical]
+        );
         let corner = spaces[1].shape_from_texture.transform_point3(DVec3::ONE);
         assert!((corner - DVec3::new(7.0, 2.0, 2.0)).length() < 1e-12, "{corner}");
     }

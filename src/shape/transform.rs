@@ -1,4 +1,4 @@
-//! Transforms: steps that move, turn and scale an object or a part of one, one after the other.
+//! Transforms: steps that move, rotate and scale an object or a part of one, applied in order.
 
 use crate::primitive::Form;
 use crate::shape::Shape;
@@ -10,26 +10,26 @@ use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 
-/// One step. Angles are in degrees and turn counter-clockwise for one who looks against the axis.
+/// One step of a transform. Angles are in degrees, counter-clockwise seen against the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TransformOp {
     /// Moves by this vector.
     Translate([f64; 3]),
-    /// Turns about the x axis.
+    /// Rotates about the x axis.
     RotateX(f64),
-    /// Turns about the y axis, the vertical: counter-clockwise seen from above.
+    /// Rotates about the y axis, the vertical: counter-clockwise seen from above.
     RotateY(f64),
-    /// Turns about the z axis.
+    /// Rotates about the z axis.
     RotateZ(f64),
-    /// Turns about any axis through the origin.
+    /// Rotates about any axis through the origin.
     Rotate(Rotate),
     /// Scales away from the origin.
     Scale(Scale),
 }
 
 description! {
-    /// Turns about any axis through the origin.
+    /// Rotates about any axis through the origin.
     pub struct Rotate: Copy {
         /// Direction of the axis.
         axis: [f64; 3], as Direction;
@@ -38,7 +38,7 @@ description! {
     }
 }
 
-/// Factors along x, y and z. In files one number stands for three that are equal.
+/// Factors along x, y and z. In scene files one number means three equal factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale(pub [f64; 3]);
 
@@ -77,7 +77,7 @@ impl<'de> Deserialize<'de> for Scale {
     }
 }
 
-/// The keys of a step; each step has exactly one.
+/// Keys of a step; each step has exactly one.
 pub const TRANSFORM_OP_FIELDS: &[Field] = &[
     Field::required(
         "translate",
@@ -85,14 +85,14 @@ pub const TRANSFORM_OP_FIELDS: &[Field] = &[
         "scene units",
         "Moves by this vector.",
     ),
-    Field::required("rotate_x", ANGLE, "degrees", "Turns about the x axis."),
+    Field::required("rotate_x", ANGLE, "degrees", "Rotates about the x axis."),
     Field::required(
         "rotate_y",
         ANGLE,
         "degrees",
-        "Turns about the y axis, the vertical: counter-clockwise seen from above.",
+        "Rotates about the y axis, the vertical: counter-clockwise seen from above.",
     ),
-    Field::required("rotate_z", ANGLE, "degrees", "Turns about the z axis."),
+    Field::required("rotate_z", ANGLE, "degrees", "Rotates about the z axis."),
     Field::required("rotate", ValueType::Table(Rotate::FIELDS), "", Rotate::DOC),
     Field::required(
         "scale",
@@ -105,19 +105,21 @@ pub const TRANSFORM_OP_FIELDS: &[Field] = &[
 const ANGLE: ValueType = ValueType::Number(NumberRange::FINITE);
 
 impl TransformOp {
-    /// The step as a map. Of a step without faults.
+    /// Returns the step as an affine map. The step has no faults.
     pub fn map(&self) -> DAffine3 {
         match *self {
             Self::Translate(by) => DAffine3::from_translation(DVec3::from_array(by)),
-            Self::RotateX(degrees) => turn(DVec3::X, degrees),
-            Self::RotateY(degrees) => turn(DVec3::Y, degrees),
-            Self::RotateZ(degrees) => turn(DVec3::Z, degrees),
-            Self::Rotate(Rotate { axis, degrees }) => turn(unit(axis).unwrap_or(DVec3::Y), degrees),
+            Self::RotateX(degrees) => rotation(DVec3::X, degrees),
+            Self::RotateY(degrees) => rotation(DVec3::Y, degrees),
+            Self::RotateZ(degrees) => rotation(DVec3::Z, degrees),
+            Self::Rotate(Rotate { axis, degrees }) => {
+                rotation(unit(axis).unwrap_or(DVec3::Y), degrees)
+            }
             Self::Scale(Scale(by)) => DAffine3::from_scale(DVec3::from_array(by)),
         }
     }
 
-    /// What is wrong with it.
+    /// Returns the errors of the step.
     pub fn faults(&self) -> Vec<ValidationError> {
         let checks = Validator::new(TRANSFORM_OP_FIELDS);
         match self {
@@ -154,17 +156,17 @@ impl FieldValue for Vec<TransformOp> {
     }
 }
 
-/// Rodrigues' rotation about the unit vector `axis`: exact at quarter turns about the coordinate
-/// axes.
-fn turn(axis: DVec3, degrees: f64) -> DAffine3 {
+/// Returns Rodrigues' rotation about the unit vector `axis`, exact at quarter turns about the
+/// coordinate axes.
+fn rotation(axis: DVec3, degrees: f64) -> DAffine3 {
     let (sin, cos) = sin_cos_degrees(degrees);
-    let turned = |v: DVec3| v * cos + axis.cross(v) * sin + axis * (axis.dot(v) * (1.0 - cos));
-    DAffine3::from_mat3(DMat3::from_cols(turned(DVec3::X), turned(DVec3::Y), turned(DVec3::Z)))
+    let rotated = |v: DVec3| v * cos + axis.cross(v) * sin + axis * (axis.dot(v) * (1.0 - cos));
+    DAffine3::from_mat3(DMat3::from_cols(rotated(DVec3::X), rotated(DVec3::Y), rotated(DVec3::Z)))
 }
 
-/// Whether an affine map can be undone without losing all digits: finite, and no direction
-/// stretched more than 1e12 times as much as another.
-fn is_sound(map: &DAffine3) -> bool {
+/// Returns `true` if an affine map can be inverted with usable precision: it is finite and stretches
+/// no direction more than 1e12 times as much as another.
+fn is_well_conditioned(map: &DAffine3) -> bool {
     let linear = map.matrix3;
     let largest = linear.to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));
     if !map.is_finite() || !(1e-12..=1e12).contains(&largest) {
@@ -174,18 +176,18 @@ fn is_sound(map: &DAffine3) -> bool {
     inverse.is_finite() && inverse.to_cols_array().iter().all(|x| x.abs() <= 1e12)
 }
 
-/// The steps in order, as one map.
+/// Returns the composition of the steps, the first step applied first.
 pub fn compose(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |map, step| step.map() * map)
 }
 
-/// What `steps` as a whole do wrong to `shape`, although each step is right.
+/// Returns the error of `steps` as a whole on `shape`, although each step is valid.
 pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<ValidationError> {
     if steps.is_empty() {
         return None;
     }
     let map = compose(steps);
-    if !is_sound(&map) {
+    if !is_well_conditioned(&map) {
         return Some(ValidationError::new(
             "transform",
             "transform flattens the object or tears it apart",
@@ -193,21 +195,21 @@ pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<Validatio
         ));
     }
     let form = shape.form().transformed(&map);
-    let (reach, extent) = match (&form, form.bounds()) {
+    let (max_coordinate, extent) = match (&form, form.bounds()) {
         (_, Some((low, high))) => {
             (low.abs().max(high.abs()).max_element(), (high - low).max_element())
         }
         (Form::Plane { offset, .. }, None) => (offset.abs(), f64::INFINITY),
         (_, None) => (0.0, f64::INFINITY),
     };
-    if !NumberRange::COORDINATE.holds(reach) {
+    if !NumberRange::COORDINATE.holds(max_coordinate) {
         return Some(ValidationError::new(
             "transform",
             "transform moves the object to coordinates beyond 1e9",
             "coordinates from -1e9 to 1e9",
         ));
     }
-    (extent < 1e-12 * reach).then(|| {
+    (extent < 1e-12 * max_coordinate).then(|| {
         ValidationError::new(
             "transform",
             "transform makes the object too small for the place where it stands",
@@ -225,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn turns_go_counter_clockwise_against_the_axis() {
+    fn rotation_is_counter_clockwise_against_axis() {
         assert_eq!(TransformOp::RotateX(90.0).map().transform_point3(DVec3::Y), DVec3::Z);
         assert_eq!(TransformOp::RotateY(90.0).map().transform_point3(DVec3::Z), DVec3::X);
         assert_eq!(TransformOp::RotateZ(90.0).map().transform_point3(DVec3::X), DVec3::Y);
@@ -236,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn zero_factors_and_axes_are_faults() {
+    fn zero_factors_and_axes_are_rejected() {
         for (step, key) in [
             (TransformOp::Scale(Scale([0.0; 3])), "scale"),
             (TransformOp::Scale(Scale([1.0, 0.0, 1.0])), "scale"),
@@ -254,12 +256,12 @@ mod tests {
     }
 
     #[test]
-    fn soundness_looks_at_ratios() {
+    fn conditioning_depends_on_ratios() {
         let scaled = |x, y, z| DAffine3::from_scale(DVec3::new(x, y, z));
-        assert!(is_sound(&scaled(1e-6, 1e-6, 1e-6)));
-        assert!(is_sound(&scaled(1e5, 1e-5, -1.0)));
-        assert!(!is_sound(&scaled(1e7, 1e-7, 1.0)));
-        assert!(!is_sound(&scaled(1e-200, 1e-200, 1e-200)));
-        assert!(!is_sound(&scaled(1.0, 0.0, 1.0)));
+        assert!(is_well_conditioned(&scaled(1e-6, 1e-6, 1e-6)));
+        assert!(is_well_conditioned(&scaled(1e5, 1e-5, -1.0)));
+        assert!(!is_well_conditioned(&scaled(1e7, 1e-7, 1.0)));
+        assert!(!is_well_conditioned(&scaled(1e-200, 1e-200, 1e-200)));
+        assert!(!is_well_conditioned(&scaled(1.0, 0.0, 1.0)));
     }
 }

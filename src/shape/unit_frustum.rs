@@ -1,4 +1,4 @@
-//! The tapered cylinder in its canonical place:
+//! Canonical tapered cylinder:
 //!   x^2 + y^2 <= (1 + (s - 1) z)^2, 0 <= z <= 1
 
 use crate::primitive::Form;
@@ -23,7 +23,7 @@ impl ShapeDesc for UnitFrustum {
         Form::conical_frustum(DAffine3::IDENTITY, self.s)
     }
 
-    /// A cylinder at the origin: only a transform places it.
+    /// Creates a cylinder at the origin; only a transform moves it.
     fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self { s: 1.0 }
     }

@@ -29,9 +29,13 @@ impl Inventory {
                 parts.push(what.to_string());
             }
         };
-        let shine = |test: fn(&SpecularModel<S>) -> bool| finishes.iter().any(|f| test(&f.shine));
-        say(shine(|s| matches!(s, SpecularModel::Phong { .. })), "Phong");
-        say(shine(|s| matches!(s, SpecularModel::MicrofacetDistribution { .. })), "Cook-Torrance");
+        let specular =
+            |test: fn(&SpecularModel<S>) -> bool| finishes.iter().any(|f| test(&f.specular));
+        say(specular(|s| matches!(s, SpecularModel::Phong { .. })), "Phong");
+        say(
+            specular(|s| matches!(s, SpecularModel::MicrofacetDistribution { .. })),
+            "Cook-Torrance",
+        );
         let spread = |test: fn(&ReflectionLobe<S>) -> bool| {
             finishes.iter().any(|f| f.reflection.as_ref().is_some_and(|r| test(&r.1)))
         };

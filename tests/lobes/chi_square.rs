@@ -1,4 +1,4 @@
-//! Drawn directions against the integrated density that their lobe states (extreme test 22).
+//! Chi-square tests of sampled directions against the integrated density of their lobe (extreme test 22).
 
 use crate::report::{precision, report};
 use crate::setup::*;
@@ -10,8 +10,8 @@ use zerkalo::material::{Bsdf, Lobe, Masking, Material, ReflectionLobe};
 const ALPHAS: [f64; 5] = [1e-3, 0.05, 0.3, 1.0, 2.0];
 const DEGREES: [f64; 4] = [0.0, 60.0, 85.0, 89.9];
 const GRID: [usize; 2] = [16, 24];
-/// Points per bin and coordinate of the midpoint rule that integrates densities; eight times as many
-/// where they end at a step.
+/// Points per bin and coordinate of the midpoint rule that integrates densities; eight times as many for
+/// densities with a discontinuity.
 const FINE: usize = 16;
 const COUNT: u32 = 100_000;
 
@@ -28,7 +28,7 @@ impl Chart {
         combine(&[(2.0 * dot(self.view, self.n), self.n), (-1.0, self.view)])
     }
 
-    /// The frame in which the square lies.
+    /// Frame of the square lobe.
     fn square_frame(&self) -> [Vector; 3] {
         let frame = Frame::around(Vec3::<f64>::of(self.mirror()));
         [vector(frame.t), vector(frame.b), vector(frame.n)]
@@ -62,7 +62,7 @@ impl Chart {
         }
     }
 
-    /// The direction at coordinates, and the solid angle per area there [sr].
+    /// Returns the direction at the coordinates, and the solid angle per area there [sr].
     fn direction(&self, [p, q]: [f64; 2]) -> (Vector, f64) {
         let (sin, cos) = (TAU * q).sin_cos();
         match self.spread {
@@ -95,7 +95,7 @@ impl Chart {
     }
 }
 
-/// Expected share of each bin, by the density of `material`, and of what is outside them.
+/// Expected fraction of each bin, from the density of `material`, and of directions outside of all bins.
 fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
     let finish = Bsdf::<f64>::new(material, true);
     let (_, spread) = finish.reflection.unwrap();
@@ -110,7 +110,7 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
         }
         finish.density(&spread, incident, n, Vec3::of(d)).unwrap() * solid_angle / (w * h) as f64
     };
-    // Facets that turn away from the viewer reflect nothing: the density ends there, at a step.
+    // Facets that face away from the viewer reflect nothing: the density is discontinuous there.
     let visible = |i: usize, j: usize| {
         let p = (i as f64).min(w as f64 - 1e-6);
         chart.direction([p / w as f64, j as f64 / h as f64]).1 > 0.0
@@ -135,8 +135,8 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
     shares
 }
 
-/// The chart of a lobe seen at an angle, and what its density expects there.
-fn claim(material: &Material, degrees: f64) -> (Chart, Vec<f64>) {
+/// Returns the chart of a lobe seen at an angle, and the fractions expected from its density.
+fn expectation(material: &Material, degrees: f64) -> (Chart, Vec<f64>) {
     let n = tilted_normal();
     let view = at_angle(n, degrees.to_radians(), 0.7);
     let (_, spread) = Bsdf::<f64>::new(material, true).reflection.unwrap();
@@ -145,14 +145,14 @@ fn claim(material: &Material, degrees: f64) -> (Chart, Vec<f64>) {
     (chart, shares)
 }
 
-/// Samples of `drawn` against a claim.
+/// Returns the p-value of samples of `drawn` against expected fractions.
 fn p_value<L: SimdFloat>(drawn: &Material, (chart, shares): &(Chart, Vec<f64>), seed: u64) -> f64 {
     let (view, n) = (chart.view, chart.n);
     let mut counts = vec![0u64; shares.len()];
     let incident = combine(&[(-1.0, view)]);
     each_reflection::<L>(drawn, (incident, n), false, Numbers::random(seed), COUNT, |d, _| {
         let at = chart.coordinates(d);
-        // The rim of cone and square is met but for rounding.
+        // Samples at the rim of cone and square may be outside by a rounding error.
         let bin = |x: f64, n: usize| {
             let inside = x > -1e-4 && x < 1.0 + 1e-4;
             inside.then(|| ((x * n as f64) as usize).min(n - 1))
@@ -167,7 +167,7 @@ fn p_value<L: SimdFloat>(drawn: &Material, (chart, shares): &(Chart, Vec<f64>), 
     chi_square_p(&counts, &expected)
 }
 
-/// Every lobe at every slope and angle; masking changes weights, not directions.
+/// Returns every lobe at every alpha and angle; masking changes only weights.
 fn cases() -> Vec<(Material, f64)> {
     let spread = Lobe::ALL.into_iter().filter(|l| *l != Lobe::Mirror);
     let mut cases = Vec::new();
@@ -184,11 +184,11 @@ fn cases() -> Vec<(Material, f64)> {
     cases
 }
 
-fn walk<A: SimdFloat, B: SimdFloat>(cases: &[(Material, f64)]) {
+fn check_cases<A: SimdFloat, B: SimdFloat>(cases: &[(Material, f64)]) {
     let (mut wrong, mut least) = (Vec::new(), 1f64);
     let level = 0.01 / (2 * cases.len()) as f64;
     for (i, (material, degrees)) in cases.iter().enumerate() {
-        let claim = claim(material, *degrees);
+        let claim = expectation(material, *degrees);
         let p =
             [p_value::<A>(material, &claim, i as u64), p_value::<B>(material, &claim, i as u64)];
         least = least.min(p[0]).min(p[1]);
@@ -204,21 +204,21 @@ fn walk<A: SimdFloat, B: SimdFloat>(cases: &[(Material, f64)]) {
 
 #[test]
 fn extreme_22_chi_square() {
-    walk::<f64, Double>(&cases());
+    check_cases::<f64, Double>(&cases());
 }
 
-/// In single precision a half-vector at 89.9 degrees is known to 2e-5: a fiftieth of the narrowest
-/// lobe's slope, and of a bin. From slope 0.05 on that is nothing, and so up to 60 degrees.
+/// In single precision a half-vector at 89.9 degrees has an error of 2e-5: a fiftieth of the narrowest
+/// lobe's alpha, and of a bin. The error is negligible from alpha 0.05, and up to 60 degrees.
 #[test]
 fn extreme_22_chi_square_in_single_precision() {
     let mut cases = cases();
     cases.retain(|(m, degrees)| m.alpha > Some(0.01) || *degrees <= 60.0);
-    walk::<f32, Single>(&cases);
+    check_cases::<f32, Single>(&cases);
 }
 
-/// The test can fail: a slope of 5 % more is told apart in every lobe.
+/// The test has power: it rejects an alpha that is 5 % too large in every lobe.
 #[test]
-fn chi_square_tells_lobes_apart() {
+fn chi_square_rejects_wrong_alpha() {
     for (material, degrees) in cases() {
         if material.alpha != Some(0.3) || degrees > 60.0 {
             continue;
@@ -228,7 +228,7 @@ fn chi_square_tells_lobes_apart() {
             roughness: material.roughness * 1.05,
             ..material.clone()
         };
-        let p = p_value::<f64>(&material, &claim(&wider, degrees), 77);
+        let p = p_value::<f64>(&material, &expectation(&wider, degrees), 77);
         assert!(p < 1e-4, "{:?} {degrees}: {p}", material.lobe);
     }
 }

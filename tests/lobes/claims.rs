@@ -1,4 +1,4 @@
-//! What the models claim, held to it: every lobe, highlight and masking.
+//! Physical properties of the reflection models: every lobe, highlight and masking.
 
 use crate::setup::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -11,10 +11,10 @@ use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::value::{Color, ValueType};
 use zerkalo::world::World;
 
-/// The words of the field table and the lists of variants name the same things in the same order, so
-/// that what users can write is what these tests walk.
+/// The words of the field table and the lists of variants have the same order, so that these tests cover
+/// every word.
 #[test]
-fn every_word_is_walked() {
+fn variants_match_words_of_fields() {
     let words = |key: &str| -> Vec<&str> {
         let field = FIELDS.iter().find(|f| f.name == key).unwrap();
         let ValueType::Choice(choices) = field.takes else { panic!("{key}") };
@@ -30,15 +30,15 @@ fn every_word_is_walked() {
     assert_eq!(read("fresnel").iter().map(|m| m.fresnel_mode()).collect::<Vec<_>>(), Fresnel::ALL);
 }
 
-/// What a transparent surface reflects and transmits together, from outside and from inside, and the
-/// way back. A law that claims less is seen to give less.
+/// Energy and reciprocity of reflection and transmission together, from outside and from inside. A mode
+/// without a property violates it.
 #[test]
-fn transparent_surfaces_keep_what_they_claim() {
-    for law in Fresnel::ALL {
+fn transparent_surfaces_have_declared_properties() {
+    for mode in Fresnel::ALL {
         let material = Material {
             reflection: 1.0,
             transmission: 1.0,
-            fresnel: Some(law),
+            fresnel: Some(mode),
             ..Material::default()
         };
         let transmission = Bsdf::<f64>::new(&material, true).transmission.unwrap();
@@ -58,13 +58,13 @@ fn transparent_surfaces_keep_what_they_claim() {
                 }
             }
         }
-        let claims = law.claims_of_transmission();
-        assert_eq!(lost < 1e-12, claims.energy == Energy::Conserving, "{law:?}: {lost}");
-        assert_eq!(lopsided < 1e-9, claims.reciprocal, "{law:?}: {lopsided}");
+        let claims = mode.transmission_properties();
+        assert_eq!(lost < 1e-12, claims.energy == Energy::Conserving, "{mode:?}: {lost}");
+        assert_eq!(lopsided < 1e-9, claims.reciprocal, "{mode:?}: {lopsided}");
     }
 }
 
-/// Pairs of directions on the same side of a surface, at many angles.
+/// Returns pairs of directions on the same side of a surface, at many angles.
 fn pairs() -> Vec<(Vector, Vector)> {
     let n = tilted_normal();
     let angles = [0.01, 0.3, 0.8, 1.2, 1.5, 1.57];
@@ -79,7 +79,7 @@ fn pairs() -> Vec<(Vector, Vector)> {
     pairs
 }
 
-/// f of the highlight for light from `l` seen from `v`.
+/// Returns f of the highlight for light from `l` seen from `v`.
 fn highlight_f(material: &Material, v: Vector, l: Vector) -> f64 {
     let n = tilted_normal();
     let finish = Bsdf::<f64>::new(material, true);
@@ -87,14 +87,14 @@ fn highlight_f(material: &Material, v: Vector, l: Vector) -> f64 {
     finish.highlight(Vec3::of(n), Vec3::of(v), Vec3::of(l), nl, nv).x / nl
 }
 
-/// f of the reflected ray: weight x density / cos of the light.
+/// Returns f of the reflected ray: weight x density / cos of the light.
 fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
     let n = tilted_normal();
     let finish = Bsdf::<f64>::new(material, true);
     let (strength, spread) = finish.reflection.unwrap();
     match spread {
         ReflectionLobe::Mirror => unreachable!(),
-        // That weight x density is this, is tested pointwise below.
+        // Tested pointwise below: weight x density = f cos.
         ReflectionLobe::MicrofacetDistribution(_) => highlight_f(material, v, l),
         _ => {
             let incident = Vec3::of(combine(&[(-1.0, v)]));
@@ -134,10 +134,10 @@ fn closed_form_13_reciprocity_is_as_claimed() {
                 continue;
             }
             if !has_facets(lobe) {
-                // Its own property, without that of the reflectance.
+                // Property of the lobe alone, with reflectance 1.
                 material.f0 = None;
             }
-            check_reciprocity(&name, lobe.claims(), asymmetry(|v, l| lobe_f(&material, v, l)));
+            check_reciprocity(&name, lobe.properties(), asymmetry(|v, l| lobe_f(&material, v, l)));
         }
     }
     for highlight in Highlight::ALL {
@@ -146,14 +146,14 @@ fn closed_form_13_reciprocity_is_as_claimed() {
             material.highlight = highlight;
             let name = format!("{highlight:?} {lobe:?} {masking:?}");
             let asymmetry = asymmetry(|v, l| highlight_f(&material, v, l));
-            check_reciprocity(&name, highlight.claims(), asymmetry);
+            check_reciprocity(&name, highlight.properties(), asymmetry);
         }
     }
 }
 
-/// A mirror has no f; its ray comes back the way it went, with the same weight.
+/// Checks a mirror, which has no f: the reverse ray has the same path and weight.
 fn mirror_is_reciprocal(material: &Material) {
-    assert!(material.lobe.claims().reciprocal);
+    assert!(material.lobe.properties().reciprocal);
     let n = tilted_normal();
     for (v, _) in pairs() {
         let reflect = |incident: Vector| {
@@ -171,8 +171,7 @@ fn mirror_is_reciprocal(material: &Material) {
     }
 }
 
-/// Lambert's law as the paths apply it: exchanging light and eye changes nothing but the cosine of
-/// the light.
+/// Lambert's law in traced paths: exchanging light and eye changes only the cosine of the light.
 #[test]
 fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
     assert_eq!(
@@ -197,7 +196,7 @@ fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
         trace(&world, &Sampler::new(settings, false), (0, 0), 0, 0)[0][0][0]
     };
     for (v, l) in pairs().into_iter().filter(|(v, l)| dot(*v, n).min(dot(*l, n)) > 0.1) {
-        // Irradiance of a surface that faces the light is pi: f = L / (pi cos).
+        // The irradiance of a surface that faces the light is pi: f = L / (pi cos).
         let (there, back) = (radiance(v, l) / dot(n, l), radiance(l, v) / dot(n, v));
         assert!((there - back).abs() < 1e-12, "{there} {back}");
         // f = albedo / pi, whose integral with the cosine is the albedo.
@@ -225,7 +224,7 @@ fn closed_form_7_energy_is_as_claimed() {
                 material.alpha = Some(alpha);
                 let mean = mean_weight(&material, degrees);
                 let name = format!("{lobe:?} {masking:?} alpha {alpha} at {degrees}: {mean}");
-                match lobe.claims().energy {
+                match lobe.properties().energy {
                     Energy::Conserving => assert!(mean == 1.0, "{name}"),
                     Energy::Losing => assert!(mean <= 1.0 + 1e-3, "{name}"),
                     Energy::Unbounded => unreachable!("no lobe is"),
@@ -235,7 +234,7 @@ fn closed_form_7_energy_is_as_claimed() {
     }
 }
 
-/// Light of all directions that a highlight returns, by the midpoint rule.
+/// Albedo of a highlight for light from all directions, by the midpoint rule.
 fn highlight_albedo(material: &Material, degrees: f64) -> f64 {
     let n = tilted_normal();
     let v = at_angle(n, degrees.to_radians(), 0.0);
@@ -263,7 +262,7 @@ fn closed_form_7_energy_of_highlights_is_as_claimed() {
                 largest = largest.max(highlight_albedo(&material, degrees));
             }
         }
-        match highlight.claims().energy {
+        match highlight.properties().energy {
             Energy::Losing => assert!(largest <= 1.0 + 1e-3, "{highlight:?}: {largest}"),
             Energy::Unbounded => assert!(largest > 1.2, "{highlight:?} is bounded: {largest}"),
             Energy::Conserving => unreachable!("no highlight is"),
@@ -271,8 +270,8 @@ fn closed_form_7_energy_of_highlights_is_as_claimed() {
     }
 }
 
-/// weight x density = f cos at every sampled direction: the drawn reflection and the highlight of a
-/// light are one model.
+/// weight x density = f cos at every sampled direction: sampled reflection and highlight are the same
+/// model.
 #[test]
 fn closed_form_13_weight_times_density_is_the_highlight() {
     let n = tilted_normal();
@@ -298,8 +297,8 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
                     let density = finish.density(&spread, Vec3::of(incident), vn, vd).unwrap();
                     let shine = finish.highlight(vn, Vec3::of(v), vd, dot(n, d), dot(n, v));
                     for (w, f_cos) in weight.into_iter().zip(vector(shine)) {
-                        // exp(-tan^2 / alpha^2) of a slope recovered from rounded directions, and
-                        // the light's cosine, which is tiny when it is grazing.
+                        // Error of exp(-tan^2 / alpha^2) with a slope from rounded directions, and of
+                        // the light's cosine, which is tiny at grazing angles.
                         let error = (w * density / f_cos - 1.0).abs();
                         let limit = 1e-12 / (alpha * degrees.to_radians().cos());
                         let limit = limit + 1e-15 / dot(n, d);
@@ -312,6 +311,6 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
         }
     }
     assert!(compared > 50_000, "{compared}");
-    // The square's frame is the one in which densities are stated.
+    // Densities of the square lobe are stated in its frame.
     assert!(vector(Frame::around(Vec3::<f64>::of(n)).n) == n);
 }

@@ -1,4 +1,4 @@
-//! What a lobe sees of a half-space, in closed form, against the lobes themselves.
+//! Fraction of a lobe inside a half-space: closed forms against sampled lobes.
 
 use crate::report::{precision, report};
 use crate::setup::*;
@@ -8,11 +8,11 @@ use zerkalo::lanes::{Double, Float, Frame, SimdFloat, Single, Vec3};
 use zerkalo::material::{Bsdf, Lobe, Masking, ReflectionLobe};
 use zerkalo::sampling::warp;
 
-/// Share of the uniform cone of half-angle `theta` in a half-space whose boundary contains the apex,
+/// Fraction of the uniform cone of half-angle `theta` in a half-space whose boundary contains the apex,
 /// at angle `delta` from the axis; delta > 0: the axis is inside. For |delta| < theta < pi / 2:
 ///   f = [pi - acos(sin delta / sin theta) - cos theta acos(-tan delta / tan theta)]
 ///       / [pi (1 - cos theta)],
-/// and for cones so narrow that this cancels the share of a flat disc, nearer than theta^2 / 20.
+/// and for cones so narrow that this cancels the fraction of a flat disc, within theta^2 / 20.
 pub fn cone_share(theta: f64, delta: f64) -> f64 {
     if delta.abs() >= theta {
         return if delta > 0.0 { 1.0 } else { 0.0 };
@@ -25,15 +25,15 @@ pub fn cone_share(theta: f64, delta: f64) -> f64 {
     (PI - a - theta.cos() * b) / (PI * 2.0 * (0.5 * theta).sin().powi(2))
 }
 
-/// Share of a disc of radius `r` within a straight edge at distance `d` from its centre; d > 0: the
+/// Fraction of a disc of radius `r` within a straight edge at distance `d` from its centre; d > 0: the
 /// centre is inside. 1/2 + (d sqrt(r^2 - d^2) + r^2 asin(d / r)) / (pi r^2).
 fn disc_share(r: f64, d: f64) -> f64 {
     let d = (d / r).clamp(-1.0, 1.0);
     0.5 + (d * (1.0 - d * d).sqrt() + d.asin()) / PI
 }
 
-/// Share of the square of side `side`, at unit distance, within an edge at distance `d` in its plane,
-/// whose normal is turned by `phi` from a side.
+/// Fraction of the square of side `side`, at unit distance, within an edge at distance `d` in its plane.
+/// `phi` is the angle between the edge's normal and a side.
 pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
     let h = 0.5 * side;
     let (c, s) = (phi.cos().abs(), phi.sin().abs());
@@ -49,8 +49,7 @@ pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
     }
 }
 
-/// A half-space for a lobe about the normal, seen from above: its inward normal and the share of the
-/// lobe within.
+/// A half-space for a lobe about the normal: its inward normal and the fraction of the lobe inside.
 struct Edge {
     inward: Vector,
     share: f64,
@@ -68,8 +67,8 @@ fn edge(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, delta: f64, phi: f6
     Edge { inward: combine(&[(delta.sin(), n), (delta.cos(), e)]), share }
 }
 
-/// Edges at all angles: `count` of them, by the golden ratio in two dimensions. `reach`: as far as
-/// the lobe goes [radians].
+/// Returns `count` edges at all angles, by the golden ratio in two dimensions. `reach` is the largest
+/// angle of the lobe [radians].
 fn edges(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, reach: f64, count: u32) -> Vec<Edge> {
     (0..count)
         .map(|i| {
@@ -79,13 +78,13 @@ fn edges(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, reach: f64, count:
         .collect()
 }
 
-/// Half-angles of the cone [radians].
+/// Returns the half-angles of the tested cones [radians].
 fn half_angles() -> [f64; 7] {
     [1e-6, 1e-4, 1e-2, 0.1, 0.6, 1.3, FRAC_PI_2 - 1e-6]
 }
 
-/// Shares counted among `count` directions against closed forms: the worst deviation in standard
-/// deviations of the count.
+/// Returns the largest deviation of counted fractions from closed forms, in standard deviations of the
+/// count.
 fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
     let count = 40_000;
@@ -104,7 +103,8 @@ fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) 
     edges.iter().zip(&inside).map(z).fold(0.0, f64::max)
 }
 
-/// Root mean square error of shares estimated with `count` Sobol points, an own set for each edge.
+/// Returns the root mean square error of fractions estimated with `count` Sobol points, a separate set
+/// for each edge.
 fn rmse(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge], count: u32) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
     let incident = combine(&[(-1.0, n)]);
@@ -134,9 +134,9 @@ fn spread_of(lobe: Lobe, roughness: f64) -> ReflectionLobe<f64> {
     Bsdf::new(&material, true).reflection.unwrap().1
 }
 
-/// Closed form 3 and its limit 4, over all half-angles, in both precisions. Single precision turns a
-/// direction by half a rounding, 6e-8, which is a share of 2e-6 of the cone of 0.01; for narrower
-/// cones the axis of a turned frame takes its place, and only a normal along z has digits for them.
+/// Closed form 3 and its limit 4, over all half-angles, in both precisions. Single precision rotates a
+/// direction by half a rounding, 6e-8, which is a fraction of 2e-6 of the cone of 0.01. Narrower cones are
+/// limited by the axis of a rotated frame; only a normal along z is precise enough for them.
 #[test]
 fn extreme_19_cone_in_a_half_space() {
     let mut worst = [0f64; 2];
@@ -174,7 +174,7 @@ fn extreme_19_the_error_falls_faster_than_that_of_random_numbers() {
     report(19, "double", &format!("slope {flattest:.2} or steeper"));
 }
 
-/// Closed form 4: the share of the flat disc is the limit of the cone's, nearer than theta^2 / 18.
+/// Closed form 4: the fraction of the flat disc is the limit of the cone's, within theta^2 / 18.
 #[test]
 fn closed_form_04_the_narrow_cone_is_a_disc() {
     for theta in [2e-3, 1e-2, 0.1] {
@@ -186,7 +186,7 @@ fn closed_form_04_the_narrow_cone_is_a_disc() {
     }
 }
 
-/// Half the diagonal of the square as an angle.
+/// Returns half the diagonal of the square as an angle.
 fn square_reach(roughness: f64) -> f64 {
     (roughness * (0.5 * PI).sqrt()).atan()
 }
@@ -215,8 +215,8 @@ fn extreme_20_square_in_a_half_space() {
     report(20, "single", &format!("{:.1} sigma at most", worst[1]));
 }
 
-/// Closed form 5: the direction density 1 / (side^2 cos^3) belongs to a uniform point of the square:
-/// it integrates to 1 and is larger towards the corners.
+/// Closed form 5: 1 / (side^2 cos^3) is the direction density of a uniform point of the square. It
+/// integrates to 1 and is larger towards the corners.
 #[test]
 fn closed_form_05_density_of_the_square() {
     for side in [0.01, 0.5, 3.0] {
@@ -239,7 +239,7 @@ fn closed_form_05_density_of_the_square() {
     }
 }
 
-/// Largest difference between the edge responses of square and cone at tan theta = 0.2, over all
+/// Returns the largest difference between the edge responses of square and cone at tan theta = 0.2, over all
 /// edges.
 fn largest_difference(side: f64) -> f64 {
     let theta = 0.2f64.atan();
@@ -254,8 +254,8 @@ fn largest_difference(side: f64) -> f64 {
     largest
 }
 
-/// Closed form 6: why the square has the cone's area: no other usual choice comes as near. The known
-/// values are rounded ones for a flat disc, from which the cone differs by 0.002 at this angle.
+/// Closed form 6: the square of the cone's area is nearer to the cone than other usual choices. The
+/// reference values are rounded ones for a flat disc, from which the cone differs by 0.002 at this angle.
 #[test]
 fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
     let r = 0.2;
@@ -272,7 +272,7 @@ fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
     assert!((side - PI.sqrt() * r).abs() < 1e-15);
 }
 
-/// The same from the lobes themselves: the responses to one edge, 65 536 Sobol points each.
+/// Closed form 6 with sampled lobes: the responses to one edge, 65 536 Sobol points each.
 #[test]
 fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
     let (r, n) = (0.2f64, tilted_normal());
@@ -308,8 +308,8 @@ fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
     assert!((0.020..0.025).contains(&largest), "{largest}");
 }
 
-/// Extreme test 21: a lobe that half dips under the surface, seen at 89.999 degrees. Folded it keeps
-/// all light; absorbed it loses what the closed forms say.
+/// Extreme test 21: a lobe half below the surface, seen at 89.999 degrees. Folded it keeps all light;
+/// absorbed it loses the fraction of the closed forms.
 #[test]
 fn extreme_21_lobe_at_the_horizon() {
     horizon::<f64>(1e-12);
@@ -333,7 +333,7 @@ fn horizon<L: SimdFloat>(tolerance: f64) {
             material.reflection = rho;
             let share = match spread_of(lobe, roughness) {
                 ReflectionLobe::Square { side } => {
-                    // The square lies as the frame about the kernel's own mirror direction does.
+                    // The square is aligned with the frame about the kernel's mirror direction.
                     let kernel = Vec3::<L>::of(incident).reflect(Vec3::of(n)).normalize();
                     let frame = Frame::around(kernel);
                     let up = [frame.t, frame.b].map(|v| dot(v.lane(0).map(Float::to_f64), n));

@@ -1,21 +1,21 @@
-//! Phong's highlights, from wide ones to those of a single pixel.
+//! Phong highlights, from wide ones to those of a single pixel.
 
 use crate::setup::{across, combine, dot, tilted_normal, unit};
 use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo::material::{Bsdf, Material};
 
-/// A material that shines and does nothing else.
+/// Material with a highlight only.
 fn shiny(exponent: f64) -> Material {
     Material { diffuse: 0.0, specular: 0.7, exponent, ..Material::default() }
 }
 
-/// A unit vector as a kernel has it, and the same numbers in double precision.
+/// Returns a unit vector in the precision of the kernel, and the same numbers in double precision.
 fn rounded<L: SimdFloat>(v: [f64; 3]) -> (Vec3<L>, [f64; 3]) {
     let v = Vec3::<L>::of(v).normalize();
     (v, v.lane(0).map(Float::to_f64))
 }
 
-/// (R.V)^alpha from the tangent of the angle between R and V, which keeps its digits.
+/// Returns (R.V)^alpha from the tangent of the angle between R and V, which keeps full precision.
 fn power(n: [f64; 3], view: [f64; 3], light: [f64; 3], alpha: f64) -> f64 {
     let n = unit(n);
     let r = combine(&[(2.0 * dot(light, n), n), (-1.0, light)]);
@@ -29,8 +29,7 @@ fn power(n: [f64; 3], view: [f64; 3], light: [f64; 3], alpha: f64) -> f64 {
     if along > 0.0 { (-0.5 * alpha * tan2.ln_1p()).exp() } else { 0.0 }
 }
 
-/// Highlights around their middle, for every exponent that a scene may have: at most k_s, and as bright as they
-/// should be.
+/// Checks highlights around their centre for every valid exponent: at most k_s, with the exact value.
 fn check<L: SimdFloat>(rounding: f64) {
     let most = L::from_f64(0.7) * L::from_f64(std::f64::consts::FRAC_1_PI);
     let most = most.lane(0).to_f64();
@@ -42,7 +41,7 @@ fn check<L: SimdFloat>(rounding: f64) {
             let (theta, turn) = (f64::from(step % 30) * 0.05, f64::from(step) * 0.7);
             let n = tilted_normal();
             let [t, b] = across(n);
-            // Off the mirror direction by up to four times the highlight's width.
+            // Up to four times the highlight's width away from the mirror direction.
             let off = f64::from(step % 20) * 0.2 * alpha.recip().sqrt();
             let plane = combine(&[(turn.cos(), t), (turn.sin(), b)]);
             let light = combine(&[(theta.cos(), n), (theta.sin(), plane)]);
@@ -57,14 +56,15 @@ fn check<L: SimdFloat>(rounding: f64) {
             let expected = most * power(n64, view64, light64, alpha);
             worst = worst.max((value - expected).abs() / most);
         }
-        // Of ordinary exponents the cosine's rounding times the exponent; then the angle's, in widths.
+        // Error for ordinary exponents: the cosine's rounding times the exponent; for larger ones the
+        // angle's rounding, in widths.
         let allowed = rounding * (4.0 * alpha.min(1024.0) + 8.0 * alpha.sqrt());
         assert!(worst <= allowed, "{}: {worst:e} off for {alpha:e}, {allowed:e} allowed", L::NAME);
     }
 }
 
 #[test]
-fn no_highlight_exceeds_its_strength() {
+fn phong_highlight_is_at_most_k_s() {
     check::<Single>(f64::from(f32::EPSILON));
     check::<Double>(f64::EPSILON.max(1e-13));
 }

@@ -1,15 +1,15 @@
-//! The lane types: what they promise beyond the operations that IEEE defines.
+//! SIMD lane types: guarantees beyond the operations of IEEE 754.
 
 use zerkalo::lanes::{Double, Float, Frame, MAX_WIDTH, Mask, SimdFloat, SimdU32, Single, Vec3};
 
-/// A sequence of 32-bit numbers with nothing in common.
+/// Pseudo-random 32-bit number `i`.
 fn noise(i: u32) -> u32 {
     let x = (i ^ 0x9e37_79b9).wrapping_mul(0x85eb_ca6b);
     let x = (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35);
     (x ^ (x >> 16)).wrapping_mul(0x27d4_eb2f) ^ (x >> 15)
 }
 
-/// Uniform in [0, 1).
+/// Pseudo-random number `i`, uniform in [0, 1).
 fn uniform(i: u32) -> f64 {
     f64::from(noise(i)) / 4_294_967_296.0
 }
@@ -24,8 +24,8 @@ macro_rules! for_every_instance {
     };
 }
 
-/// The worst error of `f` against `exact` over `inputs`, in roundings of the result of this
-/// precision (of 1, if `of_one`). `exact` sees the input as rounded to this precision.
+/// Returns the largest error of `f` against `exact` over `inputs`, in ulps of the result (of 1, if
+/// `of_one`). `exact` gets the input rounded to this precision.
 fn worst_ulps<L: SimdFloat>(
     inputs: impl Fn(u32) -> f64,
     f: impl Fn(L) -> L,
@@ -45,8 +45,8 @@ fn worst_ulps<L: SimdFloat>(
     worst
 }
 
-/// Sine and cosine of what lobes ask for, 2 pi u with u in [0, 1): within 1.5 roundings of 1, which
-/// is what a direction needs (near a multiple of pi / 2 the smaller of the two is not better known).
+/// Sine and cosine of 2 pi u with u in [0, 1), as lobes use them: within 1.5 ulps of 1, which is enough for
+/// a direction (near a multiple of pi / 2 the smaller of the two has no better precision).
 fn sine_and_cosine<L: SimdFloat>() {
     let angle = |i: u32| std::f64::consts::TAU * uniform(i);
     let sin = worst_ulps::<L>(angle, |x| x.sin_cos().0, f64::sin, true);
@@ -55,7 +55,7 @@ fn sine_and_cosine<L: SimdFloat>() {
     assert!(sin <= 1.5 && cos <= 1.5, "{}: sin {sin}, cos {cos}", L::NAME);
 }
 
-/// Angles of points in all directions: within 3 roundings of 1, of angles up to pi. An axis gives no NaN.
+/// Angles of points in all directions: within 3 ulps of 1, for angles up to pi, without NaN on axes.
 fn arc_tangent<L: SimdFloat>() {
     let angle = |i: u32| std::f64::consts::PI * (2.0 * uniform(i) - 1.0);
     let rounded = |x: f64| L::from_f64(x).lane(0).to_f64();
@@ -72,8 +72,8 @@ fn arc_tangent<L: SimdFloat>() {
     assert_eq!(L::from_f64(0.0).atan2(L::from_f64(2.0)).lane(0).to_f64(), 0.0);
 }
 
-/// Logarithms of what Beckmann's lobe (1 - u) and Phong's highlight (a cosine, at least 1e-30) ask
-/// for, exponentials of what both highlights ask for.
+/// Logarithms of the arguments of Beckmann's lobe (1 - u) and Phong's highlight (a cosine, at least 1e-30),
+/// exponentials of the arguments of both highlights.
 fn logarithm_and_exponential<L: SimdFloat>() {
     let small = |i: u32| 10f64.powf(-30.0 * uniform(i));
     let share = |i: u32| 1.0 - f64::from(noise(i) >> 8) / 16_777_216.0;
@@ -88,7 +88,7 @@ fn logarithm_and_exponential<L: SimdFloat>() {
     // ln 1 = 0 and exp 0 = 1 keep a mirror direction and the top of a highlight exact.
     assert_eq!(L::from_f64(1.0).ln().lane(0).to_f64(), 0.0);
     assert_eq!(L::from_f64(0.0).exp().lane(0).to_f64(), 1.0);
-    // What underflows is nothing: neither negative nor NaN.
+    // Underflow gives 0, neither a negative number nor NaN.
     for x in [-104.0, -800.0, -1e6, -1e30, -L::MAX, f64::NEG_INFINITY] {
         let y = L::from_f64(x).exp().lane(0).to_f64();
         assert!((0.0..1e-44).contains(&y), "{}: exp {x} = {y}", L::NAME);
@@ -102,7 +102,7 @@ fn elementary_functions_are_good_to_stated_ulps() {
     for_every_instance!(logarithm_and_exponential);
 }
 
-/// Sums of rounded lanes are exact: those of the lanes one by one, to nearest even.
+/// Sums of rounded lanes are exact: they equal scalar sums, rounded to nearest even.
 fn fixed_point<L: SimdFloat>() {
     let halves = [0.5, 1.5, 2.5, -0.5, -1.5, -2.5, 0.0, -0.0];
     for i in 0..20_000u32 {
@@ -143,7 +143,7 @@ fn integers<L: SimdFloat>() {
             assert_eq!((x << shift).lane(lane), one << shift);
             assert_eq!((x >> shift).lane(lane), one >> shift);
             assert_eq!((x * x + x).lane(lane), one.wrapping_mul(one).wrapping_add(one));
-            // Uniform numbers: never 1, the top bits kept.
+            // Uniform numbers are less than 1 and keep the top bits.
             let unit = L::to_unit(x).lane(lane).to_f64();
             assert!((0.0..1.0).contains(&unit));
             assert_eq!((unit * 16_777_216.0) as u32, one >> 8);
@@ -154,7 +154,7 @@ fn integers<L: SimdFloat>() {
 }
 
 #[test]
-fn integers_are_those_of_the_processor() {
+fn simd_integers_equal_scalar_integers() {
     for_every_instance!(integers);
 }
 
@@ -179,7 +179,7 @@ fn masks<L: SimdFloat>() {
             assert_eq!(mask.lane(lane), truth);
             let chosen = L::select(mask, yes, no).lane(lane).to_f64();
             assert_eq!(chosen, if truth { 2.0 } else { -3.0 });
-            // `only` clears what would poison a sum.
+            // `masked` clears lanes that would poison a sum.
             let nan = L::from_f64(f64::NAN).masked(mask).lane(lane).to_f64();
             assert_eq!(nan.is_nan(), truth);
             assert!(truth || nan == 0.0);
@@ -188,7 +188,7 @@ fn masks<L: SimdFloat>() {
     assert!(L::mask(true).all() && L::mask(false).none());
 }
 
-/// Labels pass through `select` unchanged, whatever number their bits would be.
+/// Labels pass through `select` unchanged, for any bit pattern.
 fn tags<L: SimdFloat>() {
     let labels = [0, 1, 2, 0x7f80_0000, 0x7fa0_0001, 0x7fc0_0000, 0xff80_0001, u32::MAX];
     for a in labels {
@@ -210,12 +210,12 @@ fn tags<L: SimdFloat>() {
 }
 
 #[test]
-fn masks_select_and_labels_survive() {
+fn masks_select_lanes_and_keep_labels() {
     for_every_instance!(masks);
     for_every_instance!(tags);
 }
 
-/// NaN on the left loses; comparisons with NaN are false.
+/// `min` and `max` drop NaN on the left; comparisons with NaN are false.
 fn not_a_number<L: SimdFloat>() {
     let nan = L::from_f64(f64::NAN);
     for x in [-1.0, 0.0, 2.5, f64::INFINITY, f64::NEG_INFINITY] {
@@ -247,7 +247,7 @@ fn nan_follows_the_stated_rule() {
     for_every_instance!(not_a_number);
 }
 
-/// The smallest and the largest lane, wherever they are and whichever lanes are NaN.
+/// The smallest and the largest lane are found at any place, with NaN in any other lanes.
 fn ends_of_lanes<L: SimdFloat>() {
     for i in 0..2000u32 {
         let numbers: Vec<f64> = (0..L::WIDTH as u32)
@@ -264,11 +264,11 @@ fn ends_of_lanes<L: SimdFloat>() {
 }
 
 #[test]
-fn the_ends_of_lanes_are_found() {
+fn min_max_ignores_nan_lanes() {
     for_every_instance!(ends_of_lanes);
 }
 
-/// Arithmetic up to the square root and the fused product are the same bits at every width.
+/// Arithmetic, square root and fused multiply-add give the same bits at every width.
 fn same_bits<One: SimdFloat, Many: SimdFloat<Scalar = One::Scalar>>() {
     let value =
         |i: u32| One::Scalar::from_f64((uniform(i) - 0.5) * (60.0 * uniform(!i) - 30.0).exp2());
@@ -294,9 +294,9 @@ fn ieee_operations_are_the_same_bits_at_every_width() {
     same_bits::<f64, Double>();
 }
 
-/// The axes of an upright mirror's lobes are level and upright, whichever way it faces.
+/// The axes of an upright mirror's lobes are horizontal and vertical for every orientation.
 #[test]
-fn frames_around_level_vectors_stand_upright() {
+fn frames_around_horizontal_vectors_are_upright() {
     for i in 0..360 {
         let angle = f64::from(i).to_radians();
         let frame = Frame::around(Vec3::<f64>::of([angle.sin(), 0.0, angle.cos()]));

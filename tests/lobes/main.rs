@@ -1,5 +1,5 @@
-//! Lobes, claims, samples, lanes and whole paths, against closed forms and statistics with fixed
-//! seeds.
+//! Lobes, physical properties, samples, lanes and whole paths against closed forms and statistics with
+//! fixed seeds.
 
 mod albedo;
 mod chi_square;

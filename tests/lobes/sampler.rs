@@ -1,4 +1,4 @@
-//! The numbers of samples: nets, independence, moments, order of convergence.
+//! Numbers of the samplers: nets, independence, moments, order of convergence.
 
 use crate::stats::slope;
 use std::f64::consts::PI;
@@ -9,7 +9,8 @@ fn sampler<L: SimdFloat>(kind: SamplerKind, seed: u64, jitter: bool) -> Sampler<
     Sampler::new(SampleSettings { seed, kind }, jitter)
 }
 
-/// Pairs of numbers of `count` samples of a pixel: the pixel's place for `None`, else a bounce's.
+/// Returns pairs of numbers of `count` samples of a pixel: those of the film plane for `None`, else those
+/// of a bounce.
 fn pairs<L: SimdFloat>(
     sampler: &Sampler<L>,
     (x, y): (u32, u32),
@@ -28,7 +29,7 @@ fn pairs<L: SimdFloat>(
     out
 }
 
-/// Of the first 2^m points, one lies in each elementary interval of area 2^-m of whatever shape.
+/// Asserts that each elementary interval of area 2^-m, of any shape, has one of the first 2^m points.
 fn assert_net(points: &[[f64; 2]], name: &str) {
     let m = points.len().ilog2();
     assert_eq!(points.len(), 1 << m);
@@ -44,8 +45,8 @@ fn assert_net(points: &[[f64; 2]], name: &str) {
     }
 }
 
-/// Scrambling keeps the nets of all pairs, in the joint set and in the padded ones, whose indices are
-/// shuffled besides.
+/// Scrambling keeps the nets of all pairs, in the joint set and in the padded ones, whose indices are also
+/// shuffled.
 fn nets<L: SimdFloat>() {
     for seed in [0, 1, u64::MAX] {
         for replicate in 0..2 {
@@ -74,7 +75,7 @@ fn scrambled_sets_remain_nets() {
     nets::<Single>();
 }
 
-/// Bit by bit the same numbers, whatever the width, and however many pixels share a packet.
+/// Checks that the numbers have the same bits at every width and with any number of pixels in a packet.
 fn packets_equal_singles<One: SimdFloat, Many: SimdFloat>() {
     let bits = |x: f64| x.to_bits();
     for kind in [SamplerKind::Sobol, SamplerKind::Random] {
@@ -122,12 +123,12 @@ fn packets_equal_singles<One: SimdFloat, Many: SimdFloat>() {
 }
 
 #[test]
-fn packets_draw_what_single_samples_draw() {
+fn packet_sampler_equals_scalar_sampler() {
     packets_equal_singles::<f32, Single>();
     packets_equal_singles::<f64, Double>();
 }
 
-/// All numbers that sample `index` of a pixel uses in ten bounces.
+/// Returns all numbers that sample `index` of a pixel uses in ten bounces.
 fn numbers(sampler: &Sampler<f64>, pixel: (u32, u32), replicate: usize, index: u32) -> Vec<f64> {
     let points = sampler.block(index, 1);
     let draws = points.for_pixel(sampler.key(pixel, replicate));
@@ -136,9 +137,9 @@ fn numbers(sampler: &Sampler<f64>, pixel: (u32, u32), replicate: usize, index: u
     [place.0, place.1].into_iter().chain(lobes).collect()
 }
 
-/// Over pixels every dimension of every index is uniform: mean, variance, and no correlation with
-/// another dimension, with the other replicate, with the pixel beside it or with another seed. The
-/// limit is 4.8 sigma: one false alarm in a thousand runs of these 1300 tests.
+/// Over pixels every dimension of every index is uniform in mean and variance, and uncorrelated with other
+/// dimensions, the other replicate, the neighbouring pixel and another seed. The limit is 4.8 sigma: one
+/// false alarm in a thousand runs of these 1300 tests.
 #[test]
 fn pixels_and_replicates_are_independent() {
     const SIGMAS: f64 = 4.8;
@@ -182,7 +183,7 @@ fn pixels_and_replicates_are_independent() {
     }
 }
 
-/// An integrand in the pixel's place and the first lobe, with its integral.
+/// Integrand over the film plane and the first lobe, with its integral.
 struct Integrand {
     value: fn([f64; 4], f64) -> f64,
     exact: fn(f64) -> f64,
@@ -203,7 +204,7 @@ const EDGE: Integrand = Integrand {
     exact: |k| 0.25 + 0.25 * k,
 };
 
-/// Errors of the estimates in `pixels` pixels of one replicate.
+/// Returns the errors of the estimates of many pixels of one replicate.
 fn errors(kind: SamplerKind, f: &Integrand, replicate: usize, count: u32) -> Vec<f64> {
     let sampler = sampler::<Double>(kind, 4, true);
     (0..400)
@@ -243,7 +244,7 @@ fn errors_fall_at_the_known_rates() {
     }
 }
 
-/// What the noise estimate rests on: the errors of the replicates have no common part.
+/// Errors of the replicates are uncorrelated, as the noise estimate assumes.
 #[test]
 fn errors_of_the_replicates_are_uncorrelated() {
     for integrand in [SMOOTH, EDGE] {

@@ -1,4 +1,4 @@
-//! What the tests share: materials, vectors, reflections drawn, samples traced.
+//! Shared helpers: materials, vectors, sampled reflections, traced samples.
 
 use zerkalo::lanes::{Float, Mask, SimdFloat, Vec3};
 use zerkalo::material::{Bsdf, Lobe, Masking, Material, ReflectionLobe};
@@ -12,7 +12,7 @@ pub fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// a x + b y + c z.
+/// Returns a x + b y + c z.
 pub fn combine(terms: &[(f64, Vector)]) -> Vector {
     std::array::from_fn(|i| terms.iter().map(|(k, v)| k * v[i]).sum())
 }
@@ -21,7 +21,7 @@ pub fn unit(v: Vector) -> Vector {
     combine(&[(1.0 / dot(v, v).sqrt(), v)])
 }
 
-/// Two unit vectors across `n` and across each other.
+/// Returns two unit vectors orthogonal to `n` and to each other.
 pub fn across(n: Vector) -> [Vector; 2] {
     let axis = if n[0].abs() < 0.5 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
     let t = unit(combine(&[(1.0, axis), (-dot(axis, n), n)]));
@@ -29,12 +29,12 @@ pub fn across(n: Vector) -> [Vector; 2] {
     [t, b]
 }
 
-/// A normal that is parallel to no axis.
+/// Returns a normal that is not parallel to an axis.
 pub fn tilted_normal() -> Vector {
     unit([0.3, -0.5, 0.8])
 }
 
-/// Direction at angle `theta` from `n` [radians], in a plane turned by `phi`.
+/// Returns the direction at angle `theta` from `n` [radians], with the azimuth `phi`.
 pub fn at_angle(n: Vector, theta: f64, phi: f64) -> Vector {
     let [t, b] = across(n);
     unit(combine(&[(theta.cos(), n), (theta.sin() * phi.cos(), t), (theta.sin() * phi.sin(), b)]))
@@ -44,7 +44,7 @@ pub fn vector(v: Vec3<f64>) -> Vector {
     [v.x, v.y, v.z]
 }
 
-/// A white material that reflects everything in `lobe`, with a highlight of the same microfacets.
+/// Returns a white material that reflects all light in `lobe`, with a highlight of the same microfacets.
 pub fn reflector(lobe: Lobe, masking: Masking, roughness: f64) -> Material {
     Material {
         ambient: 0.0,
@@ -59,19 +59,19 @@ pub fn reflector(lobe: Lobe, masking: Masking, roughness: f64) -> Material {
     }
 }
 
-/// Whether the lobe is one of microfacets, for which masking matters.
+/// Returns `true` if the lobe is one of microfacets, for which masking matters.
 pub fn has_facets(lobe: Lobe) -> bool {
     let finish = Bsdf::<f64>::new(&reflector(lobe, Masking::Smith, 1.0), true);
     matches!(finish.reflection, Some((_, ReflectionLobe::MicrofacetDistribution(_))))
 }
 
-/// Every lobe with every masking that makes a difference to it.
+/// Returns every lobe with every masking that affects it.
 pub fn every_lobe() -> Vec<(Lobe, Masking)> {
     let maskings = |lobe| if has_facets(lobe) { &Masking::ALL[..] } else { &Masking::ALL[..1] };
     Lobe::ALL.into_iter().flat_map(|l| maskings(l).iter().map(move |m| (l, *m))).collect()
 }
 
-/// Which numbers reflections are drawn with.
+/// Source of the numbers that reflections are sampled with.
 #[derive(Clone, Copy)]
 pub struct Numbers {
     pub kind: SamplerKind,
@@ -89,8 +89,8 @@ impl Numbers {
     }
 }
 
-/// Draws `count` reflections of light seen along `incident` (towards the surface), as the kernel does
-/// in the lane type `L`; gives each direction and weight to `take`.
+/// Samples `count` reflections like the kernel, in the lane type `L`, and passes each direction and weight
+/// to `take`. `incident` points towards the surface.
 pub fn each_reflection<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
@@ -114,7 +114,7 @@ pub fn each_reflection<L: SimdFloat>(
     }
 }
 
-/// The radiance of the sample `index` of a pixel in every group and channel, WIDTH samples at once.
+/// Returns the radiance of the sample `index` of a pixel in every group and channel, WIDTH samples at once.
 pub fn trace<L: SimdFloat>(
     world: &World<L>,
     sampler: &Sampler<L>,
@@ -142,7 +142,7 @@ pub fn scene(text: &str) -> Scene {
 
 const SETTINGS: SampleSettings = SampleSettings { seed: 3, kind: SamplerKind::Sobol };
 
-/// Sums over groups of the samples `0..count` of every pixel, white lights.
+/// Returns sums over groups of the samples `0..count` of every pixel, white lights.
 pub fn samples<L: SimdFloat>(scene: &Scene, count: u32) -> Vec<Vector> {
     let world = World::<L>::new(scene);
     let sampler = Sampler::<L>::new(SETTINGS, world.jitter());

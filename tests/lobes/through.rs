@@ -1,4 +1,4 @@
-//! Light through transparent things: slabs, furnaces, cameras inside, against closed forms.
+//! Transparent objects against closed forms: slabs, furnaces, cameras inside.
 
 use crate::report::report;
 use crate::setup::*;
@@ -16,12 +16,13 @@ fn mean(samples: &[Vector]) -> Vector {
 const GLASS: &str = "ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\n\
                      fresnel = \"dielectric\"\n";
 
-/// A slab of thickness t shifts a ray by t sin i (1 - cos i / sqrt(n^2 - sin^2 i)) and lets it go on in
-/// the old direction. How far off the shift is at most, as a share of t, while it is no more than
-/// rounding makes it: a direction's last digit over the way through the slab, which at 89.9 degrees is up
-/// to 430 long, and the two starts behind surfaces, 8 roundings of the slab's half width off them.
+/// Returns the largest error of a ray's displacement by a slab, as a fraction of its thickness t.
+///
+/// The slab displaces a ray by t sin i (1 - cos i / sqrt(n^2 - sin^2 i)) and keeps its direction. The error
+/// is bounded by rounding: that of the direction over the path through the slab, which at 89.9 degrees is up
+/// to 430 long, and the two ray offsets of 8 roundings of the slab's half width.
 fn check_slab<L: SimdFloat>() -> f64 {
-    /// The least that holds a ray at 89.9 degrees in a slab that does not bend it.
+    /// Smallest half width that contains a ray at 89.9 degrees in a slab of index 1.
     const HALF_WIDTH: f64 = 450.0;
     let t = 0.75;
     let slab = scene(&format!(
@@ -51,7 +52,7 @@ fn check_slab<L: SimdFloat>() -> f64 {
                 let origin = normal.mul_add(-surface.ray_offset(), surface.point);
                 ray = Ray { origin, direction: interface.refracted };
             }
-            // Beside the way that the ray would have gone.
+            // Displacement from the path without the slab.
             let way = ray.origin - from;
             let shift = (number(way.x) * -cos - number(way.z) * sin).abs();
             // n^2 - sin^2, without cancellation at n = 1.
@@ -62,7 +63,7 @@ fn check_slab<L: SimdFloat>() -> f64 {
             assert!(off <= L::EPSILON * roundings / t, "{}, {n} {i}: {shift} {expected}", L::NAME);
             worst = worst.max(off);
             let turned = number((ray.direction - direction).max_abs());
-            // Near grazing incidence a rounding of the sine is a larger one of the cosine.
+            // Near grazing incidence a rounding error of the sine is a larger one of the cosine.
             let allowed = L::EPSILON * (4.0 * n / cos).min(4.5e5);
             assert!(turned <= allowed, "{}, {n} {i}: turned by {turned}", L::NAME);
         }
@@ -102,8 +103,8 @@ fn between_walls(slab: &str) -> Scene {
     ))
 }
 
-/// Closed form 11: with all orders a slab reflects 2 F / (1 + F) and transmits (1 - F) / (1 + F) at
-/// normal incidence; a pane does by itself.
+/// Closed form 11: with all orders a slab reflects 2 F / (1 + F) and transmits (1 - F) / (1 + F) at normal
+/// incidence; a thin pane has the same values.
 #[test]
 fn closed_form_11_a_slab_with_all_orders() {
     for n in [1.0, 1.5, 4.0, 1e3] {
@@ -114,7 +115,7 @@ fn closed_form_11_a_slab_with_all_orders() {
         );
         let count = 1 << 14;
         let all = samples::<Double>(&between_walls(&slab), count);
-        assert!(all.iter().all(|s| (s[0] + s[1] - 1.0).abs() < 1e-9), "something is lost");
+        assert!(all.iter().all(|s| (s[0] + s[1] - 1.0).abs() < 1e-9), "light is lost");
         let [t, r, _] = mean(&all);
         let sigma = 0.5 / f64::from(count).sqrt();
         assert!((r - 2.0 * f / (1.0 + f)).abs() < 4.0 * sigma, "{n}: {r}");
@@ -129,7 +130,7 @@ fn closed_form_11_a_slab_with_all_orders() {
     }
 }
 
-/// Things between camera and background. `inner`: keys of the material.
+/// Scene with objects between camera and background; `inner` are keys of the material.
 fn ball_in_front(background: &str, depth: u32, inner: &str, objects: &str) -> Scene {
     scene(&format!(
         "film = {{ size = [24, 24] }}
@@ -150,15 +151,15 @@ const BALL: &str =
 const TILES: &str = "[[object]]\nmaterial = \"tile\"\n\
     shape.box = { center = [0.3, 0.2, -2.0], size = [1.0, 0.7, 0.5] }\n";
 
-/// With light of 1 from everywhere a ball that loses nothing is invisible, whatever is nested in it.
+/// A lossless ball is invisible in a white furnace, with any objects nested in it.
 #[test]
-fn a_white_furnace_does_not_see_glass() {
+fn glass_is_invisible_in_white_furnace() {
     let nested = "[[object]]\nmaterial = \"air\"\n\
         shape.sphere = { center = [0.3, 0.2, 0.1], radius = 0.4 }\n\
         [materials.air]\nindex = 1.0\n";
     for index in [0.7, 1.0, 1.5, 1e3] {
         let inner = format!("{GLASS}ior = {index:?}\n");
-        // Light that a bubble turns in glass of index 1000 does not come out: its way is too narrow.
+        // A bubble in glass of index 1000 refracts light so that it is trapped by total reflection.
         let bubble = if index < 100.0 { format!("{nested}{GLASS}") } else { String::new() };
         for more in [String::new(), bubble] {
             let scene = ball_in_front("[1.0, 1.0, 1.0]", 10_000, &inner, &format!("{BALL}{more}"));
@@ -172,7 +173,7 @@ fn a_white_furnace_does_not_see_glass() {
     }
 }
 
-/// Index 1 bends nothing and reflects nothing.
+/// A material of index 1 neither refracts nor reflects.
 #[test]
 fn index_1_is_invisible() {
     let inner = format!("{GLASS}ior = 1.0\n");
@@ -185,10 +186,10 @@ fn index_1_is_invisible() {
     assert!(without.iter().any(|s| s[0] > 0.4), "the box is not seen");
 }
 
-/// Who looks out of glass sees the outside up to the critical angle, 41.8 degrees, and beyond it only
-/// reflections; the same from the near plane, and from within a bubble in the glass.
+/// A camera inside glass sees the outside up to the critical angle, 41.8 degrees, and reflections beyond
+/// it, also with a near plane and from a bubble in the glass.
 #[test]
-fn a_camera_inside_knows_what_it_is_in() {
+fn camera_inside_glass_starts_in_its_medium() {
     let look = |degrees: f64, near: f64, fresnel: &str, more: &str| {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let text = format!(
@@ -214,33 +215,33 @@ fn a_camera_inside_knows_what_it_is_in() {
         assert_eq!(look(41.82, near, "", ""), 0.0);
         assert_eq!(look(60.0, near, "fresnel = \"dielectric\"", ""), 0.0);
         let f = 0.04;
-        // Out at the first surface or at the second.
+        // The ray leaves at the first surface or at the second.
         let seen = look(0.0, near, "fresnel = \"dielectric\"", "");
         assert!((seen - (1.0 - f * f)).abs() < 1e-9, "{near}: {seen}");
     }
-    // From the middle of a bubble rays leave it straight; then they are in glass.
+    // Rays from the centre of a bubble leave it straight and are in glass then.
     assert_eq!(look(41.8, 0.0, "", bubble), 1.0);
     assert_eq!(look(41.82, 0.0, "", bubble), 0.0);
 }
 
-/// C2: a material with fixed coefficients mirrors on its outer side only, so that k_r = 1 does not ring
-/// between inner walls; its light comes out by k_t.
+/// C2: a material with fixed coefficients reflects on its outer side only, so that k_r = 1 gives no endless
+/// reflections between inner walls; its light leaves by k_t.
 #[test]
 fn fixed_coefficients_reflect_outside_only() {
     let inner =
         "ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 0.5\nindex = 1.4286\n";
     let scene = ball_in_front("[1.0, 1.0, 1.0]", 100, inner, BALL);
     let all = samples::<Double>(&scene, 8);
-    // Reflected 1, and 0.5 in and 0.5 out.
+    // 1 is reflected, and 0.5 x 0.5 is transmitted.
     let on_ball = all.iter().filter(|s| (s[0] - 1.25).abs() < 1e-12).count();
     let beside = all.iter().filter(|s| s[0] == 1.0).count();
     assert_eq!(on_ball + beside, all.len());
     assert!(on_ball > all.len() / 3);
 }
 
-/// Every sample of a packet is what it is alone.
+/// Every sample of a packet equals the scalar sample.
 #[test]
-fn packets_of_glass_equal_width_1() {
+fn glass_packets_equal_scalar_samples() {
     for file in ["glass", "transmission", "water-glass"] {
         let mut scene = scene(&std::fs::read_to_string(format!("scenes/{file}.toml")).unwrap());
         scene.film.size = [24, 20];

@@ -1,4 +1,4 @@
-//! Whole paths: furnaces, endless mirrors, the width-1 instances against the packets.
+//! Whole paths: furnaces, parallel mirrors, scalar samples against packets.
 
 use crate::report::report;
 use crate::setup::*;
@@ -7,8 +7,8 @@ use zerkalo::material::{Lobe, Masking};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
-/// A ball in a white furnace returns exactly rho, in every sample, by every lobe that claims to keep
-/// energy; at its silhouette lobes dip under the surface and are folded up.
+/// Every sample of a ball in a white furnace is exactly rho, for every energy-conserving lobe; at the
+/// silhouette lobes are partly below the surface and folded up.
 fn furnace<L: SimdFloat>() {
     use zerkalo::material::Energy;
     let rho = 0.75;
@@ -20,7 +20,7 @@ fn furnace<L: SimdFloat>() {
         shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
         [materials.m]";
     let mut scene = scene(text);
-    for lobe in Lobe::ALL.into_iter().filter(|l| l.claims().energy == Energy::Conserving) {
+    for lobe in Lobe::ALL.into_iter().filter(|l| l.properties().energy == Energy::Conserving) {
         for roughness in [0.0, 1e-3, 0.3, 3.0, 1e4] {
             let mut material = reflector(lobe, Masking::VCavity, roughness);
             material.reflection = rho;
@@ -41,7 +41,7 @@ fn closed_form_7_a_white_furnace_is_exact() {
     furnace::<f64>();
 }
 
-/// At roughness 0 every lobe is the mirror, bit by bit; near 0 the square goes to it.
+/// At roughness 0 every lobe equals the mirror in every bit; near 0 the square converges to it.
 #[test]
 fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
     let mut scene = scene(&std::fs::read_to_string("scenes/lobe-square.toml").unwrap());
@@ -86,8 +86,8 @@ fn parallel_mirrors(depth: u32) -> Scene {
     ))
 }
 
-/// Two parallel mirrors of rho = 0.999 that each shine: sum of rho^k over all images, 1000; the part
-/// beyond the depth limit is what the bias report says. In single precision rho itself is rounded by
+/// Two parallel emitting mirrors of rho = 0.999: the sum of rho^k over all images is 1000, and the part
+/// beyond the depth limit equals the reported bias. In single precision rho itself is rounded by
 /// up to 3e-8, which 1000 images multiply, and so is each of the 10 000 terms of the sum.
 #[test]
 fn extreme_26_parallel_mirrors() {
@@ -102,7 +102,7 @@ fn extreme_26_parallel_mirrors() {
         let told = double.biases();
         assert_eq!(told.len(), 1, "{told:?}");
         assert!(told[0].contains(&format!("max_depth {depth} ")), "{told:?}");
-        // Three digits, rounded up.
+        // The report has three digits, rounded up.
         let (_, bound) = told[0].split_once("at most ").expect("a bound");
         let bound: f64 = bound.split(' ').next().unwrap().parse().expect("a number");
         assert!(bound >= cut && bound < 1.01 * cut, "{told:?}, {cut}");
@@ -123,13 +123,12 @@ fn extreme_26_parallel_mirrors() {
     report(26, "single", &format!("{:.0e} off (relative)", worst[1]));
 }
 
-/// One hundredth of what a lit wall of the physical room returns of its unit light. Differences are
-/// told relative to no less than this: where light grazes a surface, N.L is next to nothing and a
-/// rounding of the direction is a large part of it.
+/// One hundredth of the radiance of a lit wall of the physical room. Differences are relative to at least
+/// this: at grazing light N.L is tiny, and the rounding of a direction is a large fraction of it.
 const DIM: f64 = 1e-4;
 
-/// Samples of the width-1 instance and of the packets, side by side: shares that differ at all and
-/// by more than 1e-3, largest difference of the others (both relative), relative difference of the means.
+/// Compares scalar samples with packets. Returns the fractions that differ at all and by more than 1e-3, the
+/// largest difference of the others (both relative), and the relative difference of the means.
 fn compare<One: SimdFloat, Many: SimdFloat>(scene: &Scene) -> [f64; 4] {
     let (one, many) = (samples::<One>(scene, 16), samples::<Many>(scene, 16));
     assert_eq!(one.len(), many.len());
@@ -159,8 +158,8 @@ fn physical() -> Scene {
     scene
 }
 
-/// Only ln, sin and exp of the mirror differ between the widths; a path that they turn by a rounding
-/// may meet another thing's edge or fall into a shadow.
+/// Only ln, sin and exp of the mirror differ between the widths. Such a rounding may change a path so that
+/// it hits another object's edge or a shadow.
 #[test]
 fn packets_equal_single_samples_but_for_roundings_of_sin_and_ln() {
     for [any, far, near, mean] in
@@ -173,7 +172,7 @@ fn packets_equal_single_samples_but_for_roundings_of_sin_and_ln() {
     assert!(far == 0.0 && near < 1e-9 && mean < 1e-12, "{far} {near} {mean}");
 }
 
-/// Where only IEEE operations take part, every bit is the same.
+/// Every bit is equal if a path uses only IEEE operations.
 #[test]
 fn packets_equal_single_samples_bit_by_bit_without_a_lobe() {
     let mut lambert = physical();

@@ -1,8 +1,8 @@
-//! Things with textures, as the scene file and as the direct evaluation have them; when their pictures
-//! agree; and the neighbours of each, which must be told from it.
+//! Textured objects as scene files and for the direct evaluation; comparison of their pictures; and
+//! variants of each object, whose pictures must differ.
 
 use crate::common::Numbers;
-use crate::direct::{self, Colors, Lay, SIZE, Solid, TO_LIGHT, Thing};
+use crate::direct::{self, Colors, Lay, SIZE, Solid, TO_LIGHT, TexturedObject};
 use crate::support::{picture, rendered};
 use glam::{DAffine3, DVec3};
 use image::RgbImage;
@@ -13,7 +13,7 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Images of random pixels, in a folder for scenes.
+/// Folder of scenes with images of random pixels.
 pub struct Desk {
     pub folder: TempDir,
     colors: RgbImage,
@@ -46,12 +46,12 @@ const EYE: DVec3 = DVec3::new(1.1, 1.3, 3.2);
 pub const EVEN: DVec3 = DVec3::new(0.9, 0.5, 0.1);
 pub const ODD: DVec3 = DVec3::new(0.1, 0.3, 0.8);
 
-/// Something to look at, as the scene file and as the evaluation have it.
+/// A textured object for the scene file and for the direct evaluation.
 #[derive(Clone)]
 pub struct Case {
     pub name: &'static str,
     pub solid: Solid,
-    /// Instead of what `solid` says.
+    /// Shape in the scene file, if it differs from `solid`.
     pub shape: Option<String>,
     pub transform: &'static str,
     pub scene_from_object: DAffine3,
@@ -59,7 +59,7 @@ pub struct Case {
     pub checker: bool,
     pub painted: bool,
     pub height: f64,
-    /// Where everything is moved to.
+    /// Translation of the whole scene.
     pub far: DVec3,
 }
 
@@ -101,7 +101,7 @@ impl Case {
         })
     }
 
-    /// The keys that say how it lies.
+    /// Returns the placement keys.
     fn lay(&self) -> String {
         let Lay { mapping, axis, scale, offset, .. } = self.lay;
         let axis = axis.map(|a| format!("axis = \"{a}\", ")).unwrap_or_default();
@@ -150,7 +150,7 @@ impl Case {
         } else {
             self.painted.then_some(Colors::Image(&desk.colors))
         };
-        let thing = Thing {
+        let thing = TexturedObject {
             solid: self.solid,
             scene_from_object: self.scene_from_object,
             lay: self.lay,
@@ -166,7 +166,7 @@ impl Case {
     }
 }
 
-/// The share of the pixels that show something in which two pictures differ by more than `tolerance`.
+/// Returns the fraction of the covered pixels in which two pictures differ by more than `tolerance`.
 pub fn differing(shown: &[DVec3], expected: &[DVec3], tolerance: f64) -> f64 {
     assert_eq!(shown.len(), expected.len());
     let pairs = shown.iter().zip(expected).filter(|(_, e)| !e.is_nan());
@@ -176,8 +176,8 @@ pub fn differing(shown: &[DVec3], expected: &[DVec3], tolerance: f64) -> f64 {
     wrong.count() as f64 / seen.len() as f64
 }
 
-/// Differences: in double precision, and in single, where an edge may fall on the other side of the
-/// middle of a pixel.
+/// Returns the differences in double and in single precision, where an edge may be on the other side of a
+/// pixel's centre.
 pub fn differences(case: &Case, shown: &[Vec<DVec3>; 2], desk: &Desk) -> [f64; 2] {
     let expected = case.expected(desk);
     [differing(&shown[0], &expected, 2e-5), differing(&shown[1], &expected, 4e-3)]
@@ -185,7 +185,7 @@ pub fn differences(case: &Case, shown: &[Vec<DVec3>; 2], desk: &Desk) -> [f64; 2
 
 pub const ALLOWED: [f64; 2] = [0.001, 0.01];
 
-/// A share that something else differs in at least: many times what is allowed.
+/// Smallest fraction in which a variant must differ: many times the tolerance.
 pub const TOLD: f64 = 0.08;
 
 pub fn check(case: &Case, desk: &Desk) {
@@ -193,7 +193,7 @@ pub fn check(case: &Case, desk: &Desk) {
     let found = differences(case, &shown, desk);
     println!("{}: {found:?}", case.name);
     assert!(found[0] <= ALLOWED[0] && found[1] <= ALLOWED[1], "{}: {found:?}", case.name);
-    for (neighbour, what) in neighbours(case) {
+    for (neighbour, what) in variants(case) {
         let other = differences(&neighbour, &shown, desk);
         assert!(
             other.iter().all(|share| *share > TOLD),
@@ -203,8 +203,8 @@ pub fn check(case: &Case, desk: &Desk) {
     }
 }
 
-/// What the picture must not be.
-fn neighbours(case: &Case) -> Vec<(Case, &'static str)> {
+/// Returns variants whose pictures must differ.
+fn variants(case: &Case) -> Vec<(Case, &'static str)> {
     let with = |change: &dyn Fn(&mut Case)| {
         let mut other = case.clone();
         change(&mut other);
@@ -258,7 +258,7 @@ pub fn lay(mapping: &'static str, scale: [f64; 2], offset: [f64; 2]) -> Lay {
     Lay { scale, offset, ..Lay::new(mapping) }
 }
 
-/// A turn, a squeeze and a step, as steps and as a map.
+/// Returns the case with a rotation, a scaling and a translation, as steps and as a map.
 pub fn moved(mut case: Case) -> Case {
     case.transform = "{ rotate_y = 35 }, { scale = [1.2, 0.8, 1.0] }, { rotate_x = 20 }, \
                       { translate = [0.05, -0.1, 0.1] }, ";

@@ -1,5 +1,5 @@
-//! A textured thing, evaluated plainly in double precision: camera ray, intersection in the thing's own
-//! space, mapping formula, look-up, Lambert's law. Nothing is shared with the program.
+//! Direct evaluation of a textured object in double precision: camera ray, intersection in object space,
+//! mapping formula, texture lookup, Lambert's law. It shares no code with the program.
 
 use glam::{DAffine3, DVec2, DVec3};
 use image::RgbImage;
@@ -11,7 +11,7 @@ pub const SIZE: [u32; 2] = [60, 48];
 /// Direction to the light, before it is normalised.
 pub const TO_LIGHT: DVec3 = DVec3::new(0.5, 0.7, 0.9);
 
-/// What is looked at, in its own space.
+/// Shape of the object, in object space.
 #[derive(Clone, Copy, Debug)]
 pub enum Solid {
     /// Centre, radius.
@@ -20,13 +20,13 @@ pub enum Solid {
     Block(DVec3, DVec3),
     /// Base, height along y, radius.
     Pillar(DVec3, f64, f64),
-    /// Centre, width, height; it faces +z.
+    /// Centre, width, height of a rectangle that faces +z.
     Sheet(DVec3, f64, f64),
-    /// A point; it faces +y.
+    /// Point of a plane that faces +y.
     Floor(DVec3),
 }
 
-/// How a texture lies.
+/// Placement of a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lay {
     pub mapping: &'static str,
@@ -44,15 +44,15 @@ impl Lay {
     }
 }
 
-/// What is seen.
+/// The textured object.
 #[derive(Clone, Debug)]
-pub struct Thing<'a> {
+pub struct TexturedObject<'a> {
     pub solid: Solid,
     pub scene_from_object: DAffine3,
     pub lay: Lay,
-    /// `None`: white.
+    /// Colours; `None` for white.
     pub colors: Option<Colors<'a>>,
-    /// Heights and the height of white above black.
+    /// Height image, and the height of white above black.
     pub bump: Option<(&'a RgbImage, f64)>,
 }
 
@@ -63,7 +63,7 @@ pub enum Colors<'a> {
 }
 
 impl Solid {
-    /// Corners of the box around it.
+    /// Returns the corners of its bounding box.
     fn corners(&self) -> [DVec3; 2] {
         match *self {
             Self::Sphere(c, r) => [c - r, c + r],
@@ -77,8 +77,8 @@ impl Solid {
         }
     }
 
-    /// Where a line meets it first in front of `o`, and the outer normal there.
-    fn meet(&self, o: DVec3, d: DVec3) -> Option<(f64, DVec3)> {
+    /// Returns the distance of the first intersection in front of `o`, and the outer normal there.
+    fn intersect(&self, o: DVec3, d: DVec3) -> Option<(f64, DVec3)> {
         let mut hits: Vec<(f64, DVec3)> = Vec::new();
         match *self {
             Self::Sphere(c, r) => {
@@ -132,19 +132,19 @@ impl Solid {
             }
             Self::Floor(p) => hits.push(((p.y - o.y) / d.y, DVec3::Y)),
         }
-        // Without a crossing t is NaN.
+        // t is NaN without an intersection.
         hits.retain(|(t, _)| *t > 0.0);
         hits.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
     }
 }
 
-/// Coordinates before scale and offset.
+/// Returns the coordinates before scale and offset.
 fn mapped(solid: &Solid, lay: &Lay, p: DVec3, n: DVec3) -> DVec2 {
     let [low, high] = solid.corners();
     let middle = 0.5 * (low + high);
     let around = |x: f64, z: f64| 0.5 + x.atan2(z) / TAU;
     let q = p - middle;
-    // The turned axes: right, up or axis, front.
+    // The permuted axes: right, up or axis, front.
     let (right, up, front) = match lay.axis {
         Some('x') => (q.z, q.x, q.y),
         Some('z') => (q.y, q.z, q.x),
@@ -189,12 +189,12 @@ fn mapped(solid: &Solid, lay: &Lay, p: DVec3, n: DVec3) -> DVec2 {
     }
 }
 
-fn coordinates(thing: &Thing, p: DVec3, n: DVec3) -> DVec2 {
-    let lay = &thing.lay;
-    mapped(&thing.solid, lay, p, n) * DVec2::from(lay.scale) + DVec2::from(lay.offset)
+fn coordinates(object: &TexturedObject, p: DVec3, n: DVec3) -> DVec2 {
+    let lay = &object.lay;
+    mapped(&object.solid, lay, p, n) * DVec2::from(lay.scale) + DVec2::from(lay.offset)
 }
 
-/// The pixel in column `i` and row `j`, counted from below, each anywhere.
+/// Returns the pixel in column `i` and row `j` from below; both may be out of range.
 fn pixel(image: &RgbImage, clamp: bool, i: f64, j: f64) -> DVec3 {
     let (w, h) = (f64::from(image.width()), f64::from(image.height()));
     let wrap = |i: f64, n: f64| if clamp { i.clamp(0.0, n - 1.0) } else { i - n * (i / n).floor() };
@@ -203,27 +203,27 @@ fn pixel(image: &RgbImage, clamp: bool, i: f64, j: f64) -> DVec3 {
     DVec3::from(codes.map(|c| f64::from(c) / 255.0))
 }
 
-/// The mean of four pixels, `of` each.
-fn bilinear(image: &RgbImage, clamp: bool, uv: DVec2, of: impl Fn(DVec3) -> DVec3) -> DVec3 {
+/// Interpolates `value` of the four nearest pixels.
+fn bilinear(image: &RgbImage, clamp: bool, uv: DVec2, value: impl Fn(DVec3) -> DVec3) -> DVec3 {
     let (x, y) = (uv.x * f64::from(image.width()) - 0.5, uv.y * f64::from(image.height()) - 0.5);
     let (i, j) = (x.floor(), y.floor());
     let mut sum = DVec3::ZERO;
     for (di, wi) in [(0.0, 1.0 - (x - i)), (1.0, x - i)] {
         for (dj, wj) in [(0.0, 1.0 - (y - j)), (1.0, y - j)] {
-            sum += of(pixel(image, clamp, i + di, j + dj)) * (wi * wj);
+            sum += value(pixel(image, clamp, i + di, j + dj)) * (wi * wj);
         }
     }
     sum
 }
 
-fn linear(codes: DVec3) -> DVec3 {
+fn linear(levels: DVec3) -> DVec3 {
     let one = |c: f64| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
-    codes.map(one)
+    levels.map(one)
 }
 
-fn color(thing: &Thing, uv: DVec2) -> DVec3 {
-    let lay = &thing.lay;
-    match &thing.colors {
+fn color(object: &TexturedObject, uv: DVec2) -> DVec3 {
+    let lay = &object.lay;
+    match &object.colors {
         None => DVec3::ONE,
         Some(Colors::Checker(colors)) => {
             let square = (2.0 * uv.x).floor() + (2.0 * uv.y).floor();
@@ -237,14 +237,14 @@ fn color(thing: &Thing, uv: DVec2) -> DVec3 {
     }
 }
 
-/// The normal of the surface that the heights make, in the object's space, by differences: of the
-/// coordinates along two directions on the surface, of the heights a pixel to both sides.
-fn bumped(thing: &Thing, p: DVec3, n: DVec3) -> DVec3 {
-    let Some((image, height)) = thing.bump else { return n };
-    let uv = coordinates(thing, p, n);
+/// Returns the perturbed normal in object space by finite differences: of the coordinates along two
+/// directions on the surface, and of the heights one pixel to both sides.
+fn bumped(object: &TexturedObject, p: DVec3, n: DVec3) -> DVec3 {
+    let Some((image, height)) = object.bump else { return n };
+    let uv = coordinates(object, p, n);
     let at = |uv: DVec2| {
         let grey = |c: DVec3| DVec3::splat(c.element_sum() / 3.0);
-        height * bilinear(image, thing.lay.clamp, uv, grey).x
+        height * bilinear(image, object.lay.clamp, uv, grey).x
     };
     let (du, dv) = (1.0 / f64::from(image.width()), 1.0 / f64::from(image.height()));
     let (across, along) = (DVec2::new(du, 0.0), DVec2::new(0.0, dv));
@@ -256,24 +256,24 @@ fn bumped(thing: &Thing, p: DVec3, n: DVec3) -> DVec3 {
     let mut out = n;
     for way in [s, t] {
         let h = 1e-6;
-        let grown = coordinates(thing, p + way * h, n) - coordinates(thing, p - way * h, n);
-        // Across a seam the angle jumps by a turn.
-        let turn = thing.lay.scale[0];
+        let grown = coordinates(object, p + way * h, n) - coordinates(object, p - way * h, n);
+        // The angle jumps by one turn at a seam.
+        let turn = object.lay.scale[0];
         let grown = grown - DVec2::new(turn * (grown.x / turn).round(), 0.0);
         out -= way * slope.dot(grown / (2.0 * h));
     }
     out.normalize()
 }
 
-/// The picture from `eye` towards `target`, 40 degrees high, row by row; NaN: what is seen at so grazing
-/// an angle that the program bends normals back to the viewer.
-pub fn picture(thing: &Thing, eye: DVec3, target: DVec3) -> Vec<DVec3> {
+/// Returns the picture from `eye` towards `target`, 40 degrees high, row by row. Pixels seen at such grazing
+/// angles that the program bends normals back to the viewer are NaN.
+pub fn picture(object: &TexturedObject, eye: DVec3, target: DVec3) -> Vec<DVec3> {
     let view = (target - eye).normalize();
     let right = view.cross(DVec3::Y).normalize();
     let up = right.cross(view);
     let half = 20f64.to_radians().tan();
     let light = TO_LIGHT.normalize();
-    let inverse = thing.scene_from_object.inverse();
+    let inverse = object.scene_from_object.inverse();
     let normals = inverse.matrix3.transpose();
     let mut out = Vec::new();
     for row in 0..SIZE[1] {
@@ -283,14 +283,14 @@ pub fn picture(thing: &Thing, eye: DVec3, target: DVec3) -> Vec<DVec3> {
             let y = (h - 2.0 * (f64::from(row) + 0.5)) / h * half;
             let d = (view + right * x + up * y).normalize();
             let (o, inner) = (inverse.transform_point3(eye), inverse.transform_vector3(d));
-            let Some((t, n)) = thing.solid.meet(o, inner) else {
+            let Some((t, n)) = object.solid.intersect(o, inner) else {
                 out.push(DVec3::ZERO);
                 continue;
             };
             let p = o + inner * t;
             let geometric = (normals * n).normalize();
-            let shading = (normals * bumped(thing, p, n)).normalize();
-            // Seen from behind both face the other way.
+            let shading = (normals * bumped(object, p, n)).normalize();
+            // Both normals are reversed on the back.
             let side = -geometric.dot(d).signum();
             let (geometric, shading) = (geometric * side, shading * side);
             if shading.dot(-d) < 0.03 {
@@ -299,7 +299,7 @@ pub fn picture(thing: &Thing, eye: DVec3, target: DVec3) -> Vec<DVec3> {
             }
             let lit = geometric.dot(light) > 0.0;
             let cos = if lit { shading.dot(light).max(0.0) } else { 0.0 };
-            out.push(color(thing, coordinates(thing, p, n)) * cos);
+            out.push(color(object, coordinates(object, p, n)) * cos);
         }
     }
     out

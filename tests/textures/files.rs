@@ -1,4 +1,4 @@
-//! The images and the mesh that the scenes with textures use: made here, so that everybody can see how.
+//! Images and mesh of the shipped scenes with textures, generated here.
 
 use glam::DVec3;
 use image::{GrayImage, ImageFormat, Luma, Rgb, RgbImage};
@@ -8,7 +8,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use zerkalo::asset::Assets;
 
-/// A number from 0 to 1 for every pair of whole numbers.
+/// Returns a pseudo-random number from 0 to 1 for a pair of integers.
 fn hashed(x: i64, y: i64) -> f64 {
     let mut h = (x as u32).wrapping_mul(0x9e37_79b1) ^ (y as u32).wrapping_mul(0x85eb_ca77);
     h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
@@ -16,7 +16,7 @@ fn hashed(x: i64, y: i64) -> f64 {
     f64::from(h ^ (h >> 15)) / f64::from(u32::MAX)
 }
 
-/// Smooth noise from 0 to 1 that repeats after `period` cells.
+/// Returns smooth noise from 0 to 1 with a period of `period` cells.
 fn noise(x: f64, y: f64, period: [i64; 2]) -> f64 {
     let at = |i: f64, j: f64| {
         hashed((i as i64).rem_euclid(period[0]), (j as i64).rem_euclid(period[1]) + 1000)
@@ -33,14 +33,14 @@ fn code(x: f64) -> u8 {
     (x.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
-/// Boards with grain along u, four across; it repeats.
+/// Tileable image of four boards with grain along u.
 fn wood() -> RgbImage {
     const SIDE: u32 = 192;
     RgbImage::from_fn(SIDE, SIDE, |x, y| {
         let (u, v) = (f64::from(x) / f64::from(SIDE), f64::from(y) / f64::from(SIDE));
         let board = (4.0 * v).floor() as i64;
         let across = 4.0 * v - board as f64;
-        // Every board is cut from another place, and ends somewhere else.
+        // Every board has its own pattern and ends at its own place.
         let along = (u + hashed(board, 7)).fract();
         let wave = noise(3.0 * along, 2.0 * across + 9.0 * board as f64, [3, 1 << 20]);
         let ring = (across * 5.0 + 2.6 * wave + 3.0 * hashed(board, 3)).fract();
@@ -48,14 +48,14 @@ fn wood() -> RgbImage {
         let tone = 0.72 - 0.22 * ring * ring - 0.10 * fibre + 0.14 * (hashed(board, 5) - 0.5);
         let gap = across < 0.03 || along < 0.006;
         let tone = if gap { 0.45 * tone } else { tone };
-        // Few tones, so that the file is small.
+        // Few tones keep the file small.
         let tone = (tone * 48.0).round() / 48.0;
         Rgb([code(1.12 * tone), code(0.78 * tone), code(0.47 * tone)])
     })
 }
 
-/// Bricks, four to a row and eight rows, each second row moved by half a brick; it repeats. Height of
-/// the surface above the mortar's ground, from 0 to 1, and the number of the brick.
+/// Tileable brick wall: eight rows of four bricks, each second row offset by half a brick. Returns the
+/// height of the surface above the mortar, from 0 to 1, and the number of the brick.
 fn brick(u: f64, v: f64) -> (f64, i64) {
     let row = (8.0 * v).floor();
     let shifted = 4.0 * u + 0.5 * row.rem_euclid(2.0);
@@ -91,7 +91,7 @@ fn bricks() -> RgbImage {
     })
 }
 
-/// A sheet of 8 by 8 squares that tell where one is: red grows with u, green with v, and an arrow in
+/// Test image of 8 by 8 squares that show their position: red grows with u, green with v, and an arrow in
 /// every second square points up.
 fn sheet() -> RgbImage {
     const SIDE: u32 = 256;
@@ -115,8 +115,8 @@ fn sheet() -> RgbImage {
     })
 }
 
-/// A vase: its outline turned about the y axis, as binary PLY with texture coordinates, u once around
-/// and v along the outline.
+/// Vase of an outline rotated about the y axis, as binary PLY with texture coordinates, u once around and v
+/// along the outline.
 fn vase() -> Vec<u8> {
     const AROUND: usize = 48;
     const ALONG: usize = 40;
@@ -162,10 +162,10 @@ fn shipped(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
 }
 
-/// Pixels are compared, not files: the packing may change. Sines differ from machine to machine in a
-/// last digit, which may turn a code by one.
+/// Pixels are compared instead of files, because the compression may change. Sines differ between machines
+/// in the last digit, which may change a level by one.
 #[test]
-fn the_files_are_what_makes_them() {
+fn texture_files_match_generators() {
     let bless = std::env::var_os("ZERKALO_BLESS").is_some();
     let images: [(&str, image::DynamicImage); 4] = [
         ("wood.png", wood().into()),
@@ -195,7 +195,7 @@ fn the_files_are_what_makes_them() {
 }
 
 #[test]
-fn the_vase_has_its_front_outside_and_coordinates() {
+fn vase_faces_outwards_and_has_coordinates() {
     let mesh = Assets::default().mesh(&shipped("meshes/vase.ply")).unwrap();
     let mesh = mesh.mesh();
     let uvs = mesh.uvs.as_ref().unwrap();

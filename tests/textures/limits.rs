@@ -1,4 +1,4 @@
-//! What bumps and textures are in the limit, what costs nothing, what is refused.
+//! Limits of bumps and textures, textures without effect, rejected files.
 
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
@@ -17,9 +17,9 @@ fn shown(scene: &Scene, precision: Precision) -> Vec<[f64; 3]> {
     picture(&rendered(scene, 1, precision, 4), Replicates::Both)
 }
 
-/// Heights of nothing, or an even image, change no bit; one texel higher does.
+/// A bump of height 0 or of a uniform image changes no bit; one higher texel does.
 #[test]
-fn a_bump_of_no_height_is_flat_to_the_bit() {
+fn bump_without_height_changes_no_bit() {
     let bumpy = sized(shipped("bump.toml"), [64, 48]);
     let with_height = |factor: f64| {
         let mut scene = bumpy.clone();
@@ -38,16 +38,16 @@ fn a_bump_of_no_height_is_flat_to_the_bit() {
     }
 }
 
-/// On a ramp all normals lean by the angle of its slope, so that light along the leaning normal is
-/// full, and across it, none.
+/// On a ramp all normals tilt by the angle of its slope: light along the tilted normal has full effect,
+/// light across it none.
 #[test]
-fn a_ramp_leans_by_the_angle_of_its_slope() {
+fn ramp_tilts_normals_by_its_slope() {
     let folder = tempfile::tempdir().unwrap();
     // Heights from 0 to 1 over 64 pixels, in 16 bits.
     let ramp = ImageBuffer::from_fn(64, 2, |x, _| Luma([((x * 65535 + 31) / 63) as u16]));
     ramp.save(folder.path().join("ramp.png")).unwrap();
     let (height, width) = (0.7, 2.0);
-    // From the first to the last pixel's middle.
+    // From the first to the last pixel's centre.
     let slope: f64 = height / (width * 63.0 / 64.0);
     let leaning = DVec3::new(-slope, 0.0, 1.0).normalize();
     let towards = |light: DVec3| {
@@ -68,12 +68,12 @@ fn a_ramp_leans_by_the_angle_of_its_slope() {
     for light in [leaning, DVec3::Z, DVec3::new(0.3, 0.5, 0.8).normalize()] {
         let expected = light.dot(leaning);
         for pixel in towards(light) {
-            // 16 bits of height.
+            // The heights have 16 bits.
             assert!((pixel[0] - expected).abs() < 1e-3, "{pixel:?} {expected}");
         }
         assert!((expected - light.z).abs() > 0.02, "a flat one would show {}", light.z);
     }
-    // Light from behind the surface, but in front of the leaning normal, does not reach it.
+    // Light from behind the surface, but in front of the tilted normal, does not reach it.
     let behind = DVec3::new(-0.9, 0.0, -0.1).normalize();
     assert!(behind.dot(leaning) > 0.1);
     assert!(towards(behind).iter().all(|pixel| pixel[0] == 0.0));
@@ -84,7 +84,7 @@ fn inventory(scene: &Scene) -> String {
 }
 
 #[test]
-fn what_shows_nothing_is_not_compiled() {
+fn textures_without_effect_are_not_compiled() {
     let scene = |material: &str| {
         let object =
             "[[object]]\nmaterial = \"m\"\nshape.sphere = { center = [0, 0, 0], radius = 1 }";
@@ -108,7 +108,7 @@ fn what_shows_nothing_is_not_compiled() {
 }
 
 #[test]
-fn the_dashboard_edits_textures_and_reads_no_file_twice() {
+fn texture_edits_read_each_file_once() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["a.png", "b.png"] {
         image::RgbImage::from_pixel(3, 2, image::Rgb([9, 99, 199]))
@@ -159,7 +159,7 @@ fn the_dashboard_edits_textures_and_reads_no_file_twice() {
     scene = step(&scene, &m, "bump.image.height", None, -1.0).unwrap().scene;
     assert_eq!(row(&scene, "bump.image.height").unwrap().value, "0.095");
 
-    // Another kind lies as the one before; the round of kinds has a place for none.
+    // Another kind keeps the placement; the cycle of kinds includes none.
     let checker = toggle(&scene, &m, "texture", true).unwrap().scene;
     assert_eq!(row(&checker, "texture.checker.mapping").unwrap().value, "planar");
     let none = toggle(&checker, &m, "texture", true).unwrap().scene;
@@ -184,14 +184,13 @@ fn the_dashboard_edits_textures_and_reads_no_file_twice() {
     assert!(shown(&sized(moved, [8, 8]), Precision::Auto).len() == 64);
     assert_eq!(reads.load(Ordering::SeqCst), before);
 
-    // In another folder the files would not be found.
+    // The files are missing in another folder.
     let elsewhere = tempfile::tempdir().unwrap();
     let refused = file.save_as(&elsewhere.path().join("s.toml"), &scene, false).unwrap_err();
     assert!(refused.to_string().contains("a.png"), "{refused}");
 }
 
-/// A picture of a scene with textures is the same whatever its packets are: one pixel's samples, or
-/// neighbouring pixels.
+/// Pictures with textures are equal for packets of one pixel's samples and of neighbouring pixels.
 #[test]
 fn textures_do_not_depend_on_packets() {
     let mut glass = shipped("bump.toml");

@@ -1,4 +1,4 @@
-//! Pictures of textured things against the direct evaluation, for every mapping, wrap and kind.
+//! Pictures of textured objects against the direct evaluation, for every mapping, wrap and kind.
 
 use crate::cases::{
     ALLOWED, Case, Desk, TOLD, ball, block, check, differences, differing, lay, mappings, moved,
@@ -21,10 +21,10 @@ fn every_mapping_of_an_image() {
 }
 
 #[test]
-fn every_mapping_of_a_checker_on_things_that_are_transformed() {
+fn every_mapping_of_a_checker_on_transformed_objects() {
     let desk = Desk::new();
     for case in mappings() {
-        // Where a side lies along a projection the edges of squares lie in it: nobody can say which.
+        // On a side along the projection the edges of squares are ambiguous.
         if case.name == "planar block" {
             continue;
         }
@@ -53,14 +53,14 @@ fn bumps_by_every_mapping() {
 }
 
 #[test]
-fn bumps_on_things_that_are_transformed_and_painted() {
+fn bumps_on_transformed_and_textured_objects() {
     let desk = Desk::new();
     for case in mappings() {
         check(&moved(Case { height: 0.08, ..case }), &desk);
     }
 }
 
-/// Where an angle begins and ends, and where all of them meet.
+/// Textures at the seam of the angle and at the poles.
 #[test]
 fn seams_and_poles() {
     let desk = Desk::new();
@@ -76,16 +76,16 @@ fn seams_and_poles() {
     }
 }
 
-/// Far from the origin everything looks as it does there: coordinates have some 1e-10 of a unit left.
+/// Pictures far from the origin equal those at the origin: coordinates have about 1e-10 of a unit left.
 #[test]
-fn textures_stay_where_they_are_far_from_the_origin() {
+fn textures_are_accurate_far_from_the_origin() {
     let desk = Desk::new();
     for case in mappings().into_iter().filter(|c| !matches!(c.solid, Solid::Floor(_))) {
         check(&Case { far: DVec3::new(1e6, -3e5, 7e5), height: 0.05, ..case }, &desk);
     }
 }
 
-/// A rectangle of two triangles whose file has texture coordinates is one with mapping `uv`.
+/// A rectangle of two triangles with texture coordinates equals a rectangle with mapping `uv`.
 #[test]
 fn the_coordinates_of_a_mesh() {
     let desk = Desk::new();
@@ -108,8 +108,7 @@ fn the_coordinates_of_a_mesh() {
     }
 }
 
-/// A ball of triangles with texture coordinates looks like a sphere with mapping `spherical`, the nearer
-/// the finer it is.
+/// A triangle mesh of a sphere with texture coordinates converges to a sphere with mapping `spherical`.
 #[test]
 fn a_mesh_of_a_sphere() {
     let desk = Desk::new();
@@ -143,7 +142,7 @@ fn a_mesh_of_a_sphere() {
         case.lay.mapping = "uv";
         case.shape = Some("shape.mesh = { file = \"ball.obj\" }".into());
         case.transform = "{ scale = 0.9 }, { translate = [0.1, -0.05, 0.0] }, ";
-        // As high as on the sphere after the scale.
+        // The same height as on the sphere after scaling.
         case.height /= 0.9;
         let shown = case.shown(&desk, Precision::Double);
         error.push(differing(&shown, &expected, 0.03));
@@ -152,7 +151,7 @@ fn a_mesh_of_a_sphere() {
     assert!(error[1] < 0.05 && error[1] < 0.3 * error[0], "{error:?}");
 }
 
-/// A part of a compound has its own material, and its own place carries the texture.
+/// A part of a compound has its own material, whose texture is placed in the part's space.
 #[test]
 fn parts_of_compounds() {
     let desk = Desk::new();

@@ -1,27 +1,28 @@
-//! Collects the parts of a mesh as a reader finds them, then checks and compacts them.
+//! Collects the parts of a mesh from a reader, then checks and compacts them.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::mesh::normals::smooth;
 use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, TriangleMesh};
+use glam::DVec3;
 use std::collections::HashMap;
 
 /// Largest magnitude of a coordinate.
-const FARTHEST: f64 = 1e9;
+const MAX_COORDINATE: f64 = 1e9;
 
-/// Smallest extent of a mesh: products of three single-precision coordinates stay normal numbers.
-const SMALLEST: f64 = 1e-9;
+/// Smallest extent of a mesh: products of three single-precision coordinates are normal numbers.
+const MIN_EXTENT: f64 = 1e-9;
 
-/// A mesh so far off its origin that this many of its sizes lie between is moved there.
-const FAR_OFF: f64 = 16.0;
+/// Largest coordinate, relative to the extent of the mesh, from which the mesh is moved to its origin.
+const MAX_OFFSET: f64 = 16.0;
 
 /// A mesh under construction.
 pub struct Builder<'a> {
     source: &'a FileContents,
     positions: Vec<[f64; 3]>,
-    /// As long as `positions`, or shorter where the rest has none; zero: none.
+    /// Normals of the first vertices, at most as many as `positions`; zero if a vertex has none.
     normals: Vec<[f32; 3]>,
-    /// As long as `positions`, or shorter where the rest has none.
+    /// Texture coordinates of the first vertices, at most as many as `positions`.
     uvs: Vec<[f32; 2]>,
     triangles: Vec<[u32; 3]>,
     colors: Vec<[f32; 3]>,
@@ -31,7 +32,7 @@ pub struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// With nothing yet.
+    /// Creates an empty mesh.
     pub fn new(source: &'a FileContents) -> Self {
         Self {
             source,
@@ -46,48 +47,55 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Makes room for so many more, which have been checked against the length of the file.
+    /// Reserves memory for more vertices and triangles, whose numbers were checked against the length of
+    /// the file.
+    ///
+    /// # Errors
+    /// If the mesh would exceed a limit.
     pub fn reserve(&mut self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
-        self.limits(vertices, triangles)?;
+        self.check_limits(vertices, triangles)?;
         self.positions.reserve(vertices);
         self.triangles.reserve(triangles);
         Ok(())
     }
 
-    /// Whether so many more would be too many.
-    pub fn limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
+    /// Checks that the mesh may have this many more vertices and triangles.
+    ///
+    /// # Errors
+    /// If it would exceed a limit.
+    pub fn check_limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         let checks = [
             (self.positions.len().saturating_add(vertices), MAX_VERTICES, "vertices"),
             (self.triangles.len().saturating_add(triangles), MAX_TRIANGLES, "triangles"),
         ];
-        for (count, most, what) in checks {
-            if count > most {
-                let found = format!("the mesh has {count} {what}");
-                let expected = format!("at most {most}");
+        for (count, max, noun) in checks {
+            if count > max {
+                let found = format!("the mesh has {count} {noun}");
+                let expected = format!("at most {max}");
                 return Err(self.source.error(FileLocation::Whole, found, &expected));
             }
         }
         Ok(())
     }
 
-    /// Says what was left out or replaced.
+    /// Records an omission or a replacement.
     pub fn note(&mut self, note: String) {
         if !self.notes.contains(&note) {
             self.notes.push(note);
         }
     }
 
-    /// Number of vertices so far.
+    /// Returns the number of vertices so far.
     pub fn vertices(&self) -> usize {
         self.positions.len()
     }
 
-    /// One more vertex. Beyond [`MAX_VERTICES`] it is counted, and refused in the end.
+    /// Adds a vertex. [`Builder::finish`] rejects more than [`MAX_VERTICES`].
     pub fn vertex(&mut self, position: [f64; 3]) {
         self.positions.push(position);
     }
 
-    /// The normal of the last vertex.
+    /// Sets the normal of the last vertex.
     pub fn normal(&mut self, normal: [f32; 3]) {
         self.normals.resize(self.positions.len(), [0.0; 3]);
         if let Some(last) = self.normals.last_mut() {
@@ -95,7 +103,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The texture coordinates of the last vertex.
+    /// Sets the texture coordinates of the last vertex.
     pub fn uv(&mut self, uv: [f32; 2]) {
         self.uvs.resize(self.positions.len(), [0.0; 2]);
         if let Some(last) = self.uvs.last_mut() {
@@ -103,12 +111,15 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Whether a colour was named.
+    /// Returns `true` if a colour was set.
     pub fn has_colors(&self) -> bool {
         !self.colors.is_empty()
     }
 
-    /// The linear base colour of the triangles that follow; those before the first are white.
+    /// Sets the linear base colour of the triangles that follow; those before the first colour are white.
+    ///
+    /// # Errors
+    /// If there are more than 65536 colours.
     pub fn color(&mut self, color: [f32; 3]) -> Result<(), AssetError> {
         if self.colors.is_empty() && !self.triangles.is_empty() {
             self.colors.push([1.0; 3]);
@@ -125,22 +136,22 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// One more triangle; `place` says where it stands.
+    /// Adds a triangle; `place` returns its place in the file.
     ///
     /// # Errors
-    /// If it names a vertex that does not exist, or is one too many.
+    /// If it names a vertex that does not exist, or the mesh exceeds a limit.
     pub fn triangle(
         &mut self,
         corners: [u32; 3],
         place: impl Fn() -> FileLocation,
     ) -> Result<(), AssetError> {
         let vertices = self.positions.len();
-        if let Some(beyond) = corners.iter().find(|i| **i as usize >= vertices) {
-            let found = format!("the face names vertex {beyond}, counted from 0");
+        if let Some(unknown) = corners.iter().find(|i| **i as usize >= vertices) {
+            let found = format!("the face names vertex {unknown}, counted from 0");
             let expected = format!("a vertex below {vertices}, their number");
             return Err(self.source.error(place(), found, &expected));
         }
-        self.limits(0, 1)?;
+        self.check_limits(0, 1)?;
         self.triangles.push(corners);
         if self.colors.len() > 1 {
             // Triangles before the first change of colour.
@@ -150,7 +161,10 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// The triangles of a polygon: a fan around its first corner.
+    /// Adds the triangles of a polygon: a fan around its first corner.
+    ///
+    /// # Errors
+    /// Those of [`Builder::triangle`].
     pub fn polygon(
         &mut self,
         corners: &[u32],
@@ -162,12 +176,12 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Checks everything.
+    /// Checks and compacts the mesh.
     ///
     /// # Errors
     /// If there is no triangle with an area, or a coordinate is not finite or out of range.
     pub fn finish(mut self) -> Result<TriangleMesh, AssetError> {
-        self.limits(0, 0)?;
+        self.check_limits(0, 0)?;
         let source = self.source;
         if self.triangles.is_empty() {
             return Err(source.error(
@@ -194,7 +208,7 @@ impl<'a> Builder<'a> {
         }
         let extent = (0..3).map(|i| f64::from(bounds[1][i]) - f64::from(bounds[0][i]));
         let extent = extent.fold(0.0, f64::max);
-        if extent < SMALLEST {
+        if extent < MIN_EXTENT {
             let found = format!("the mesh is {extent:e} large");
             return Err(source.error(FileLocation::Whole, found, "a size from 1e-9 to 1e9"));
         }
@@ -222,7 +236,7 @@ impl<'a> Builder<'a> {
 
     /// All coordinates are finite and within range.
     fn coordinates(&self) -> Result<(), AssetError> {
-        let bad = |p: &[f64; 3]| p.iter().any(|x| !(-FARTHEST..=FARTHEST).contains(x));
+        let bad = |p: &[f64; 3]| p.iter().any(|x| !(-MAX_COORDINATE..=MAX_COORDINATE).contains(x));
         match self.positions.iter().position(bad) {
             None => Ok(()),
             Some(i) => {
@@ -234,7 +248,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The point that single-precision coordinates are relative to.
+    /// Returns the origin of the single-precision coordinates: the centre of a mesh far from the origin,
+    /// else zero.
     fn center(&self) -> Result<[f64; 3], AssetError> {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
@@ -245,23 +260,25 @@ impl<'a> Builder<'a> {
             }
         }
         let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
-        let reach = (0..3).map(|i| low[i].abs().max(high[i].abs())).fold(0.0, f64::max);
+        let max_coordinate = (0..3).map(|i| low[i].abs().max(high[i].abs())).fold(0.0, f64::max);
         let center: [f64; 3] = std::array::from_fn(|i| 0.5 * (low[i] + high[i]));
-        Ok(if reach > FAR_OFF * extent { center } else { [0.0; 3] })
+        Ok(if max_coordinate > MAX_OFFSET * extent { center } else { [0.0; 3] })
     }
 
-    /// Drops triangles without an area.
+    /// Removes triangles without area.
+    ///
+    /// # Errors
+    /// If no triangle is left.
     fn drop_flat(&mut self, positions: &[[f32; 3]]) -> Result<(), AssetError> {
         let before = self.triangles.len();
-        let solid = |t: &[u32; 3]| {
-            let p = t.map(|i| positions[i as usize].map(f64::from));
-            let (a, b) = (minus(p[1], p[0]), minus(p[2], p[0]));
-            cross(a, b) != [0.0; 3]
+        let has_area = |t: &[u32; 3]| {
+            let p = t.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
+            (p[1] - p[0]).cross(p[2] - p[0]) != DVec3::ZERO
         };
         if self.color_of.is_empty() {
-            self.triangles.retain(solid);
+            self.triangles.retain(has_area);
         } else {
-            let keep: Vec<bool> = self.triangles.iter().map(solid).collect();
+            let keep: Vec<bool> = self.triangles.iter().map(has_area).collect();
             let mut kept = keep.iter();
             self.triangles.retain(|_| *kept.next().unwrap_or(&true));
             let mut kept = keep.iter();
@@ -280,7 +297,8 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Normals of length 1; those that are missing or have no direction from the triangles.
+    /// Returns unit normals, computed from the triangles where the file has none; `None` if it has none at
+    /// all.
     fn unit_normals(&mut self, positions: &[[f32; 3]]) -> Option<Vec<[f32; 3]>> {
         let mut normals = std::mem::take(&mut self.normals);
         if normals.is_empty() {
@@ -311,7 +329,10 @@ impl<'a> Builder<'a> {
         Some(normals)
     }
 
-    /// Texture coordinates, all finite.
+    /// Returns the texture coordinates, zero where the file has none.
+    ///
+    /// # Errors
+    /// If one is not finite.
     fn checked_uvs(&mut self, vertices: usize) -> Result<Option<Vec<[f32; 2]>>, AssetError> {
         let mut uvs = std::mem::take(&mut self.uvs);
         if uvs.is_empty() {
@@ -327,30 +348,20 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Joins vertices at the same place: for files that give each triangle its own.
+/// Welds vertices with equal positions, for files that repeat the vertices of each triangle.
 #[derive(Default)]
 pub struct Welder {
     known: HashMap<[u32; 3], u32>,
 }
 
 impl Welder {
-    /// The number of the vertex at `position`, new or known.
+    /// Returns the index of the vertex at `position`, added if it is new.
     pub fn index(&mut self, position: [f32; 3], builder: &mut Builder) -> u32 {
-        // Both zeros are one place.
+        // +0 and -0 are the same position.
         let key = position.map(|x| if x == 0.0 { 0 } else { x.to_bits() });
         *self.known.entry(key).or_insert_with(|| {
             builder.vertex(position.map(f64::from));
             (builder.vertices() - 1) as u32
         })
     }
-}
-
-/// a - b.
-pub fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-/// Vector product.
-pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -1,6 +1,6 @@
-//! The tree of boxes over a mesh's triangles, built once per mesh: up to eight triangles a leaf, each
-//! coordinate of the eight side by side, so that either one ray meets eight of them at once or a packet
-//! one after the other.
+//! BVH over the triangles of a mesh, built once per mesh. A leaf has up to eight triangles in
+//! structure-of-arrays layout, so that a single ray intersects eight at once and a packet one after the
+//! other.
 
 use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::normals::smooth;
@@ -9,26 +9,26 @@ use obvhs::BvhBuildParams;
 use std::fmt;
 use std::sync::OnceLock;
 
-/// Up to eight triangles. The places without one hold NaN.
+/// Up to eight triangles; unused slots are NaN.
 #[derive(Clone, Debug)]
 #[repr(align(32))]
 pub struct TriangleBlock {
-    /// Corners, by number in the triangle and axis.
+    /// Coordinates of the triangles, indexed by corner and axis.
     pub corners: [[[f32; BVH_WIDTH]; 3]; 3],
 }
 
-/// A mesh with the tree over it: about 58 bytes a triangle for the tree, 12 for its indices, and 12
-/// to 32 for each vertex.
+/// A mesh with its BVH: about 58 bytes per triangle for the BVH, 12 for its indices, and 12 to 32 per
+/// vertex.
 pub struct Mesh {
     mesh: TriangleMesh,
     boxes: Bvh8,
     leaves: Vec<TriangleBlock>,
-    /// Number of the first triangle in each leaf; the others follow it.
+    /// Index of the first triangle of each leaf; the others follow it.
     firsts: Vec<u32>,
     smooth: OnceLock<Vec<[f32; 3]>>,
 }
 
-/// A mesh equals itself alone: two readings of a file are two meshes.
+/// Compares identity: a file that is read twice gives two different meshes.
 impl PartialEq for Mesh {
     fn eq(&self, other: &Self) -> bool {
         std::ptr::eq(self, other)
@@ -61,14 +61,14 @@ impl TriangleBlock {
 }
 
 impl Mesh {
-    /// Builds the tree; the triangles take the order of its leaves.
+    /// Builds the BVH and reorders the triangles to the order of its leaves.
     pub fn new(mut mesh: TriangleMesh) -> Self {
         let corners = |i: usize| {
             let [a, b, c] = mesh.triangles[i].map(|v| mesh.positions[v as usize]);
-            let of = |f: fn(f32, f32) -> f32| std::array::from_fn(|k| f(f(a[k], b[k]), c[k]));
-            [of(f32::min), of(f32::max)]
+            let reduce = |f: fn(f32, f32) -> f32| std::array::from_fn(|k| f(f(a[k], b[k]), c[k]));
+            [reduce(f32::min), reduce(f32::max)]
         };
-        // Large leaves: a ray meets all of one at the price of one.
+        // Large leaves: a ray intersects all triangles of a leaf at the cost of one.
         let quality =
             BvhBuildParams { collapse_traversal_cost: 8.0, ..BvhBuildParams::fast_build() };
         let Bvh8Build { boxes, order, leaves } =
@@ -83,28 +83,28 @@ impl Mesh {
         Self { mesh, boxes, leaves, firsts, smooth: OnceLock::new() }
     }
 
-    /// The triangles, in the order of the leaves.
+    /// Returns the triangles, in the order of the leaves.
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
     }
 
-    /// The tree over the leaves.
+    /// Returns the BVH over the leaves.
     pub fn boxes(&self) -> &Bvh8 {
         &self.boxes
     }
 
-    /// The leaves.
+    /// Returns the leaves.
     pub fn leaves(&self) -> &[TriangleBlock] {
         &self.leaves
     }
 
-    /// Number of the first triangle in a leaf; the others follow it.
+    /// Returns the index of the first triangle of a leaf; the others follow it.
     pub fn first_triangle(&self, leaf: usize) -> u32 {
         self.firsts[leaf]
     }
 
-    /// A unit normal per vertex: the file's, or the mean over the triangles around it, computed when
-    /// first asked for.
+    /// Returns a unit normal per vertex: that of the file, or the mean of the adjacent triangles, computed
+    /// at the first call.
     pub fn smooth_normals(&self) -> &[[f32; 3]] {
         match &self.mesh.normals {
             Some(normals) => normals,
@@ -112,42 +112,42 @@ impl Mesh {
         }
     }
 
-    /// The largest `direction . corner` of its triangles' corners.
+    /// Returns the support function: the largest `direction . corner` of all triangles.
     pub fn support(&self, direction: [f64; 3]) -> f64 {
         let along = |axis: usize, x: f32| direction[axis] * f64::from(x);
         let mut best = f64::NEG_INFINITY;
-        let mut todo = vec![(0u32, f64::INFINITY)];
-        while let Some((branch, bound)) = todo.pop() {
+        let mut stack = vec![(0u32, f64::INFINITY)];
+        while let Some((index, bound)) = stack.pop() {
             if bound <= best {
                 continue;
             }
-            let branch = &self.boxes.branches()[branch as usize];
-            let first = todo.len();
-            for i in branch.children() {
-                let reach =
-                    |a| along(a, branch.bounds[a][i]).max(along(a, branch.bounds[a + 3][i]));
-                let bound: f64 = (0..3).map(reach).sum();
+            let node = &self.boxes.branches()[index as usize];
+            let first = stack.len();
+            for i in node.children() {
+                let max_along =
+                    |a| along(a, node.bounds[a][i]).max(along(a, node.bounds[a + 3][i]));
+                let bound: f64 = (0..3).map(max_along).sum();
                 if bound <= best {
                     continue;
                 }
-                if branch.child[i] & LEAF_FLAG == 0 {
-                    todo.push((branch.child[i], bound));
+                if node.child[i] & LEAF_FLAG == 0 {
+                    stack.push((node.child[i], bound));
                     continue;
                 }
-                let leaf = &self.leaves[(branch.child[i] & !LEAF_FLAG) as usize];
+                let leaf = &self.leaves[(node.child[i] & !LEAF_FLAG) as usize];
                 for [x, y, z] in &leaf.corners {
                     for ((x, y), z) in x.iter().zip(y).zip(z) {
-                        // Of NaN and a number the number.
+                        // `max` ignores the NaN of unused slots.
                         best = best.max(along(0, *x) + along(1, *y) + along(2, *z));
                     }
                 }
             }
-            todo[first..].sort_by(|a, b| a.1.total_cmp(&b.1));
+            stack[first..].sort_by(|a, b| a.1.total_cmp(&b.1));
         }
         best
     }
 
-    /// Memory that it takes \[bytes\].
+    /// Returns the memory of mesh and BVH \[bytes\].
     pub fn bytes(&self) -> usize {
         self.mesh.bytes()
             + self.boxes.bytes()

@@ -1,9 +1,9 @@
-//! glTF 2.0, text and binary: positions, normals, texture coordinates, base colour factors, with the
-//! transforms of the nodes applied and everything merged into one mesh. Cameras, lights, images,
-//! animations, skins and morph targets are passed over.
+//! glTF 2.0, text and binary: positions, normals, texture coordinates and base colour factors, merged into
+//! one mesh with the transforms of the nodes applied. Cameras, lights, images, animations, skins and morph
+//! targets are ignored.
 //!
-//! The library reads and validates the description. The numbers are read here: its own iterators
-//! trust offsets and types, and panic or wrap where a file lies about them.
+//! The library parses and validates the JSON. The numbers are read here, because its iterators trust
+//! offsets and types: they panic or wrap if a file has wrong ones.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES};
@@ -17,18 +17,21 @@ use gltf::mesh::Mode;
 use gltf::{Accessor, Document, Gltf, Node, Primitive, Semantic};
 use std::borrow::Cow;
 
-/// Reads a mesh.
+/// Parses a glTF or GLB file.
+///
+/// # Errors
+/// Any error in the file.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let (document, blob) = description(source)?;
     let buffers = buffers(source, &document, blob.as_deref())?;
     let mut builder = Builder::new(source);
-    let mut met = vec![false; document.nodes().count()];
+    let mut visited = vec![false; document.nodes().count()];
     let mut stack: Vec<(Node, DAffine3)> =
         roots(&document).into_iter().map(|node| (node, DAffine3::IDENTITY)).collect();
     stack.reverse();
     while let Some((node, outer)) = stack.pop() {
         let place = || FileLocation::Part(format!("nodes[{}]", node.index()));
-        if std::mem::replace(&mut met[node.index()], true) {
+        if std::mem::replace(&mut visited[node.index()], true) {
             let found = "the node has two parents";
             return Err(source.error(place(), found, "a tree of nodes"));
         }
@@ -46,9 +49,9 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// The description, validated, and the data behind it in a binary file.
+/// Returns the validated JSON document and the binary chunk of a GLB file.
 fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), AssetError> {
-    // The library subtracts the header's size from this length, whatever it is.
+    // The library subtracts the header's size from this length without a check.
     let length = source.bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     if source.bytes.starts_with(b"glTF") && length.is_none_or(|length| length < 12) {
         return Err(source.error(
@@ -58,9 +61,9 @@ fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), Ass
         ));
     }
     let gltf = Gltf::from_slice_without_validation(&source.bytes);
-    let gltf = gltf.map_err(|error| refused(source, &error))?;
+    let gltf = gltf.map_err(|error| library_error(source, &error))?;
     let json = gltf.document.into_json();
-    // The library's validation looks these up before it checks them.
+    // The library's validation uses these indices before it checks them.
     for (m, mesh) in json.meshes.iter().enumerate() {
         for index in mesh.primitives.iter().flat_map(|p| p.attributes.values()) {
             if index.value() >= json.accessors.len() {
@@ -71,11 +74,12 @@ fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), Ass
             }
         }
     }
-    let document = Document::from_json(json).map_err(|error| refused(source, &error))?;
+    let document = Document::from_json(json).map_err(|error| library_error(source, &error))?;
     Ok((document, gltf.blob))
 }
 
-/// The nodes to begin with: of the default scene, else of the first, else those without a parent.
+/// Returns the root nodes: those of the default scene, else of the first scene, else those without a
+/// parent.
 fn roots(document: &Document) -> Vec<Node<'_>> {
     if let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) {
         return scene.nodes().collect();
@@ -85,8 +89,8 @@ fn roots(document: &Document) -> Vec<Node<'_>> {
     document.nodes().filter(|n| !child[n.index()]).collect()
 }
 
-/// What the library says of a file.
-fn refused(source: &FileContents, error: &gltf::Error) -> AssetError {
+/// Converts an error of the library.
+fn library_error(source: &FileContents, error: &gltf::Error) -> AssetError {
     let (place, found) = match error {
         gltf::Error::Deserialize(json) => {
             let text = json.to_string();
@@ -106,7 +110,7 @@ fn refused(source: &FileContents, error: &gltf::Error) -> AssetError {
     source.error(place, found, "a glTF 2.0 file")
 }
 
-/// The bytes of all buffers.
+/// Returns the bytes of all buffers.
 fn buffers<'a>(
     source: &FileContents,
     document: &Document,
@@ -132,7 +136,7 @@ fn buffers<'a>(
                     }
                 }
                 None => {
-                    // Spaces are the only escapes that writers commonly use.
+                    // Escaped spaces are the only escapes in common use.
                     let Some(path) = source.resolve_relative(&uri.replace("%20", " ")) else {
                         return wrong(
                             format!("uri is \"{}\"", truncated(uri)),
@@ -155,7 +159,7 @@ fn buffers<'a>(
     Ok(all)
 }
 
-/// A primitive where its node puts it.
+/// A primitive with the transform of its node.
 struct Part<'a> {
     source: &'a FileContents,
     buffers: &'a [Cow<'a, [u8]>],
@@ -186,7 +190,7 @@ impl<'a> Part<'a> {
             let found = "a base colour is not a colour";
             return Err(self.source.error(FileLocation::Whole, found, "numbers of at least 0"));
         }
-        // White is what a file without colours has.
+        // White is also the colour of a file without colours.
         if color != [1.0; 3] || builder.has_colors() {
             builder.color(color)?;
         }
@@ -211,7 +215,7 @@ impl<'a> Part<'a> {
                 builder.normal(n.normalize_or_zero().as_vec3().to_array());
             }
             if let Some([u, v]) = uvs.as_mut().and_then(Iterator::next) {
-                // Images have their first row at the top, here v points upwards.
+                // In glTF v points down, here it points up.
                 builder.uv([u, 1.0 - v]);
             }
         }
@@ -242,7 +246,7 @@ impl<'a> Part<'a> {
         Ok(())
     }
 
-    /// Vectors of single-precision numbers.
+    /// Returns the items of an accessor of single-precision vectors.
     fn floats<const N: usize>(
         &self,
         accessor: Accessor<'a>,
@@ -252,7 +256,7 @@ impl<'a> Part<'a> {
         Ok((0..slice.count).map(move |i| slice.floats(i)))
     }
 
-    /// Texture coordinates, which may be normalised integers.
+    /// Returns texture coordinates, which may be normalised integers.
     fn pairs(&self, accessor: Accessor<'a>) -> Result<impl Iterator<Item = [f32; 2]>, AssetError> {
         let kind = accessor.data_type();
         let slice = self.slice(&accessor, Dimensions::Vec2, kind)?;
@@ -266,7 +270,8 @@ impl<'a> Part<'a> {
         }))
     }
 
-    /// The bytes of an accessor, checked: every item lies in its view, the view in its buffer.
+    /// Returns the bytes of an accessor after checking that every item is inside its view and the view
+    /// inside its buffer.
     fn slice(
         &self,
         accessor: &Accessor<'a>,
@@ -315,7 +320,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// The items of an accessor.
+/// Items of an accessor.
 #[derive(Clone, Copy)]
 struct Slice<'a> {
     bytes: &'a [u8],

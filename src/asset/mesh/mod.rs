@@ -13,40 +13,43 @@ pub use bvh::{Mesh, TriangleBlock};
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 
-/// The most triangles of a mesh: 64 Mi.
+/// Largest number of triangles of a mesh: 64 Mi.
 pub const MAX_TRIANGLES: usize = 1 << 26;
 
-/// The most vertices of a mesh: 128 Mi.
+/// Largest number of vertices of a mesh: 128 Mi.
 pub const MAX_VERTICES: usize = 1 << 27;
 
-/// A mesh of triangles, checked: at least one triangle, all indices in range, all numbers finite, no
-/// triangle without area.
+/// A checked triangle mesh: at least one triangle, all indices in range, all numbers finite, no triangle
+/// without area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TriangleMesh {
-    /// Vertices relative to `center`.
+    /// Vertex positions relative to `center`.
     pub positions: Vec<[f32; 3]>,
-    /// What was subtracted from every vertex: zero unless the mesh stands far from the origin for
-    /// its size, where single precision would lose its shape.
+    /// Offset subtracted from every vertex: zero unless the mesh is so far from the origin, relative to its
+    /// size, that single precision would lose its shape.
     pub center: [f64; 3],
-    /// Three vertices each; the front is where they turn counter-clockwise.
+    /// Vertex indices, three per triangle, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
-    /// A unit vector per vertex, if the file has normals; where it has none for a vertex, that of the
-    /// triangles around it.
+    /// Unit normal per vertex, if the file has normals; a vertex without one has the mean of its
+    /// triangles.
     pub normals: Option<Vec<[f32; 3]>>,
-    /// A pair per vertex, if the file has texture coordinates: u to the right, v upwards.
+    /// Texture coordinates per vertex, if the file has them: u to the right, v upwards.
     pub uvs: Option<Vec<[f32; 2]>>,
-    /// The different base colours, linear; empty: the file names none.
+    /// Distinct linear base colours; empty if the file has none.
     pub colors: Vec<[f32; 3]>,
-    /// For each triangle, which of `colors`; empty if there are fewer than two.
+    /// Index into `colors` per triangle; empty if there are fewer than two colours.
     pub color_of: Vec<u16>,
-    /// Corners of the box around the triangles, relative to `center`.
+    /// Corners of the bounding box, relative to `center`.
     pub bounds: [[f32; 3]; 2],
-    /// What was left out or replaced, in sentences without a full stop.
+    /// Omissions and replacements, in sentences without a full stop.
     pub notes: Vec<String>,
 }
 
 impl TriangleMesh {
-    /// From a file in memory; its name's extension says what it is.
+    /// Parses a file in memory; the extension of its name determines the format.
+    ///
+    /// # Errors
+    /// Any error in the file.
     pub(super) fn parse(source: FileContents) -> Result<Self, AssetError> {
         let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("");
         match extension.to_ascii_lowercase().as_str() {
@@ -65,7 +68,7 @@ impl TriangleMesh {
         }
     }
 
-    /// Memory that the mesh takes \[bytes\].
+    /// Returns the memory of the mesh \[bytes\].
     pub fn bytes(&self) -> usize {
         12 * (self.positions.len() + self.triangles.len())
             + self.normals.as_ref().map_or(0, |n| 12 * n.len())
@@ -73,9 +76,9 @@ impl TriangleMesh {
             + 2 * self.color_of.len()
     }
 
-    /// Base colour of a triangle, if the file names any.
+    /// Returns the base colour of a triangle, if the file has colours.
     pub fn color(&self, triangle: usize) -> Option<[f32; 3]> {
-        let which = self.color_of.get(triangle).copied().unwrap_or(0);
-        self.colors.get(usize::from(which)).copied()
+        let index = self.color_of.get(triangle).copied().unwrap_or(0);
+        self.colors.get(usize::from(index)).copied()
     }
 }

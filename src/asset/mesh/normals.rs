@@ -1,15 +1,16 @@
-//! Normals of vertices from the triangles around them.
+//! Vertex normals from the adjacent triangles.
 
-use crate::asset::mesh::builder::{cross, minus};
+use glam::DVec3;
 use std::collections::HashMap;
 
-/// For each vertex the mean of the normals of the triangles that meet there, weighted by the angle
-/// of each at the vertex (Thürmer and Wüthrich 1998, *Computing Vertex Normals from Polygonal
-/// Facets*). Vertices at the same place count as one, so that a seam of texture coordinates does not
-/// show. A unit vector each; where there are no triangles, or they cancel, an arbitrary one.
+/// Returns the mean normal of the adjacent triangles for each vertex, weighted by their angles at the
+/// vertex (Thürmer and Wüthrich 1998, *Computing Vertex Normals from Polygonal Facets*).
+///
+/// Vertices with equal positions count as one, so that seams of texture coordinates are invisible. Each
+/// normal is a unit vector, along z if there are no adjacent triangles or they cancel.
 pub fn smooth(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[f32; 3]> {
     let mut first: HashMap<[u32; 3], u32> = HashMap::with_capacity(positions.len());
-    let place: Vec<u32> = positions
+    let welded: Vec<u32> = positions
         .iter()
         .zip(0u32..)
         .map(|(p, i)| {
@@ -17,28 +18,22 @@ pub fn smooth(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[f32; 3]> {
             *first.entry(key).or_insert(i)
         })
         .collect();
-    let mut sums = vec![[0.0f64; 3]; positions.len()];
+    let mut sums = vec![DVec3::ZERO; positions.len()];
     for t in triangles {
-        let p = t.map(|i| positions[i as usize].map(f64::from));
-        let normal = unit(cross(minus(p[1], p[0]), minus(p[2], p[0])));
+        let p = t.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
+        let normal = unit((p[1] - p[0]).cross(p[2] - p[0]));
         for k in 0..3 {
-            let a = minus(p[(k + 1) % 3], p[k]);
-            let b = minus(p[(k + 2) % 3], p[k]);
-            let c = cross(a, b);
-            let angle = dot(c, c).sqrt().atan2(dot(a, b));
-            let sum = &mut sums[place[t[k] as usize] as usize];
-            *sum = std::array::from_fn(|i| sum[i] + angle * normal[i]);
+            let a = p[(k + 1) % 3] - p[k];
+            let b = p[(k + 2) % 3] - p[k];
+            let angle = a.cross(b).length().atan2(a.dot(b));
+            sums[welded[t[k] as usize] as usize] += angle * normal;
         }
     }
-    place.iter().map(|i| unit(sums[*i as usize]).map(|x| x as f32)).collect()
+    welded.iter().map(|i| unit(sums[*i as usize]).to_array().map(|x| x as f32)).collect()
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// `v` with length 1; along z if it has no direction.
-fn unit(v: [f64; 3]) -> [f64; 3] {
-    let length = dot(v, v).sqrt();
-    if length > 0.0 { v.map(|x| x / length) } else { [0.0, 0.0, 1.0] }
+/// Returns `v` scaled to length 1; the z axis if its length is 0.
+fn unit(v: DVec3) -> DVec3 {
+    let length = v.length();
+    if length > 0.0 { v / length } else { DVec3::Z }
 }

@@ -1,7 +1,7 @@
 //! Wavefront OBJ with the diffuse colours of its MTL files.
 //!
-//! The library reads; a pass before it counts and checks the indices of faces, because the library
-//! tells no lines and computes with indices before it checks them.
+//! The library parses the file. A pass before it counts the vertices and checks the indices of faces,
+//! because the library reports no line numbers and computes with indices before it checks them.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
@@ -16,17 +16,21 @@ use tobj::{LoadError, LoadOptions, MTLLoadResult};
 /// Largest MTL file [bytes]: 16 MiB.
 const MAX_MTL_BYTES: u64 = 16 << 20;
 
-/// The most MTL files of one OBJ.
+/// Largest number of MTL files of one OBJ.
 const MAX_MTL_FILES: usize = 64;
 
-/// Triangles of a material without a diffuse colour, or without a material in a file that has some.
+/// Colour of triangles whose material has no diffuse colour, and of triangles without a material in a
+/// file with materials.
 const UNCOLORED: [f32; 3] = [1.0; 3];
 
-/// Reads a mesh.
+/// Parses an OBJ file.
+///
+/// # Errors
+/// Any error in the file.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let mut builder = Builder::new(source);
     let counts = check_faces(source)?;
-    builder.limits(counts[0], 0)?;
+    builder.check_limits(counts[0], 0)?;
     let libraries = Libraries::new(source);
     let options = LoadOptions {
         single_index: true,
@@ -55,8 +59,8 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
         let base = builder.vertices();
         let vertices = mesh.positions.len() / 3;
         builder.reserve(vertices, mesh.indices.len() / 3)?;
-        // Shorter lists belong to parts in which only some corners have normals or coordinates; which
-        // ones is not known any more.
+        // Shorter lists belong to parts in which only some corners have normals or coordinates; the
+        // library drops the assignment.
         let normals = (mesh.normals.len() == mesh.positions.len()).then_some(&mesh.normals);
         let uvs = (mesh.texcoords.len() == 2 * vertices).then_some(&mesh.texcoords);
         for (i, p) in mesh.positions.chunks_exact(3).enumerate() {
@@ -76,7 +80,7 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish().map_err(|error| locate_vertex(source, error))
 }
 
-/// What the library's errors say.
+/// Returns a phrase for an error of the library.
 fn describe(error: LoadError) -> &'static str {
     match error {
         LoadError::ReadError => "this is not UTF-8 text",
@@ -96,18 +100,18 @@ fn describe(error: LoadError) -> &'static str {
     }
 }
 
-/// The lines of a text with their numbers.
+/// Returns the lines of a text with their numbers.
 fn numbered(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     bytes.split(|b| *b == b'\n').zip(1..).map(|(line, n)| (n, line))
 }
 
-/// The words of a line.
+/// Returns the words of a line.
 fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty())
 }
 
-/// Counts vertices, texture coordinates and normals, then checks that every index of a face leads to
-/// one of them, and that the triangles are not too many.
+/// Counts vertices, texture coordinates and normals, and checks that every index of a face is valid and
+/// the number of triangles within the limit.
 fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
     let list = |line: &[u8]| match words(line).next() {
         Some(b"v") => Some(0),
@@ -137,7 +141,7 @@ fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
             corners += 1;
             for (list, index) in word.split(|b| *b == b'/').take(3).enumerate() {
                 let index = std::str::from_utf8(index).ok().and_then(|i| i.parse::<i128>().ok());
-                // What is no number, the library says. Without a list nothing is looked up in it.
+                // The library reports words that are not numbers, and ignores indices into empty lists.
                 let Some(index) = index.filter(|_| list == 0 || totals[list] > 0) else { continue };
                 let (from, to) = (-(so_far[list] as i128), totals[list] as i128);
                 if index == 0 || index < from || index > to {
@@ -154,12 +158,12 @@ fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
             }
         }
         triangles += corners.saturating_sub(2);
-        builder.limits(0, triangles)?;
+        builder.check_limits(0, triangles)?;
     }
     Ok(totals)
 }
 
-/// An error about a vertex, with the line where such a vertex stands.
+/// Returns an error about a vertex with the line of that vertex.
 fn locate_vertex(source: &FileContents, error: AssetError) -> AssetError {
     let bad = |line: &[u8]| {
         let mut words = words(line);
@@ -176,8 +180,8 @@ fn locate_vertex(source: &FileContents, error: AssetError) -> AssetError {
     }
 }
 
-/// Gives the library one line at a time and counts them. Colours behind a vertex are cut off: the
-/// library wants all vertices to have some, or none.
+/// Reader that passes one line at a time to the library and counts the lines. Colours after a vertex are
+/// removed: the library requires that all vertices have colours, or none.
 struct Lines<'a> {
     rest: &'a [u8],
     line: usize,
@@ -199,10 +203,10 @@ impl BufRead for Lines<'_> {
             let (line, rest) = self.rest.split_at(end.map_or(self.rest.len(), |e| e + 1));
             self.rest = rest;
             self.line += 1;
-            // The longest kept part ends before the rest of the line, which would be colours; the
-            // line end that is cut off with them is given as a line of its own.
+            // Colours at the end of the line are removed; the line end, which is removed with them, is
+            // passed as a line of its own.
             let colored = words(line).next() == Some(b"v") && words(line).count() > 5;
-            self.current = if colored { cut(line) } else { line };
+            self.current = if colored { without_color(line) } else { line };
         }
         Ok(self.current)
     }
@@ -216,14 +220,14 @@ impl BufRead for Lines<'_> {
     }
 }
 
-/// A line up to its fourth word.
-fn cut(line: &[u8]) -> &[u8] {
+/// Returns a line up to its fourth word.
+fn without_color(line: &[u8]) -> &[u8] {
     let fourth = words(line).nth(3).unwrap_or_default();
     let end = fourth.as_ptr() as usize - line.as_ptr() as usize + fourth.len();
     &line[..end]
 }
 
-/// What became of the MTL files.
+/// Results of loading the MTL files.
 #[derive(Default)]
 struct Found {
     seen: Vec<PathBuf>,
@@ -231,7 +235,7 @@ struct Found {
     error: Option<AssetError>,
 }
 
-/// The MTL files that an OBJ names.
+/// Loader of the MTL files that an OBJ names.
 struct Libraries<'a> {
     source: &'a FileContents,
     found: RefCell<Found>,
@@ -242,7 +246,8 @@ impl<'a> Libraries<'a> {
         Self { source, found: RefCell::default() }
     }
 
-    /// The materials of one file: once; a missing file is noted, one that leads elsewhere is refused.
+    /// Loads the materials of one file, once. A missing file gives a note, a path out of the folder an
+    /// error.
     fn load(&self, name: &Path) -> MTLLoadResult {
         let nothing = || tobj::load_mtl_buf(&mut &b""[..]);
         let mut found = self.found.borrow_mut();
@@ -271,8 +276,8 @@ impl<'a> Libraries<'a> {
     }
 }
 
-/// The names and diffuse colours of an MTL file, the only lines that matter, in the only form that
-/// the library reads without a panic: three finite numbers each.
+/// Returns the names and diffuse colours of an MTL file, with three finite numbers per colour. The other
+/// lines are unused, and the library panics at some of them.
 fn diffuse_colors(bytes: &[u8]) -> String {
     let mut out = String::new();
     for (_, line) in numbered(bytes) {
@@ -314,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn polygons_become_triangles_and_lines_are_left_out() {
+    fn obj_polygons_become_triangles_and_lines_are_ignored() {
         let text = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\r\nv 1 1 0\nv 0 1 0 1.0\nvt 0 0\nvt 1 1\n\
                     l 1 2\nf 1/1 2/1 3/2 -1/2\n";
         let mesh = read(text).unwrap();
@@ -325,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_line() {
+    fn obj_errors_have_line_numbers() {
         let v = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
         for (text, line, words) in [
             ("f 1 2 4\n", 4, "vertex 4"),
@@ -355,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_come_from_the_material_file() {
+    fn obj_colors_come_from_mtl() {
         let folder = tempfile::tempdir().unwrap();
         let mtl = "newmtl red thing\nKd 1 0 0\nKs 1\nnewmtl grey\nKd 0.5\nnewmtl odd\nKd a b c\n";
         std::fs::write(folder.path().join("c.mtl"), mtl).unwrap();

@@ -10,10 +10,10 @@ use ply_rs_bw::ply::{
     ScalarType,
 };
 
-/// Elements are taken from the library in pieces of this many, so that they are never all in memory.
+/// Number of elements that the library parses at a time, which bounds the memory for them.
 const PIECE: usize = 4096;
 
-/// The numbers of a vertex that matter, by the names that writers give them.
+/// Properties of a vertex that are used, by the names that programs give them.
 const NUMBERS: [&[&str]; 8] = [
     &["x"],
     &["y"],
@@ -25,10 +25,10 @@ const NUMBERS: [&[&str]; 8] = [
     &["v", "t", "texture_v"],
 ];
 
-/// The lists of a face that name its corners.
+/// Names of the list property with the corners of a face.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
-/// One vertex or face as the library fills it in.
+/// One vertex or face, filled by the library.
 struct Record {
     numbers: [f64; 8],
     corners: Vec<u32>,
@@ -66,7 +66,7 @@ impl Record {
         if !CORNERS.contains(&name) {
             return PropertyAccessResult::Ignored;
         }
-        // What is negative or no integer becomes an index that no mesh has.
+        // Negative and non-integer indices become an index that no mesh has.
         const NONE: u32 = u32::MAX;
         self.corners = match list {
             Property::ListUInt(list) => list,
@@ -87,11 +87,14 @@ impl Record {
     }
 }
 
-/// Reads a mesh.
+/// Parses a PLY file.
+///
+/// # Errors
+/// Any error in the file.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let parser = Parser::<Record>::new();
     let mut reader = Reader::new(&source.bytes[..]);
-    let header = parser.read_header(&mut reader).map_err(|e| wrong(source, &e, None))?;
+    let header = parser.read_header(&mut reader).map_err(|e| library_error(source, &e, None))?;
     check_header(source, &header, reader.get_ref().len())?;
     let mut builder = Builder::new(source);
     for element in header.elements.values() {
@@ -110,7 +113,7 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
             let records = parser.read_payload_for_element(&mut reader, &piece, &header);
             let records = records.map_err(|e| {
                 let byte = source.bytes.len() - reader.get_ref().len();
-                wrong(source, &e, (header.encoding != Encoding::Ascii).then_some(byte))
+                library_error(source, &e, (header.encoding != Encoding::Ascii).then_some(byte))
             })?;
             for (i, record) in records.iter().enumerate() {
                 let n = &record.numbers;
@@ -137,22 +140,22 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// What the library says of a file.
-fn wrong(source: &FileContents, error: &ParseError, byte: Option<usize>) -> AssetError {
+/// Converts an error of the library.
+fn library_error(source: &FileContents, error: &ParseError, byte: Option<usize>) -> AssetError {
     let place = match (byte, error.line()) {
         (Some(byte), _) => FileLocation::Byte(byte),
         (None, Some(line)) => FileLocation::Line(line),
         (None, None) => FileLocation::Whole,
     };
     let message = error.to_string();
-    // The first line says what, the rest repeats the input.
+    // The first line is the error, the others repeat the input.
     let first = message.lines().next().unwrap_or_default();
     let first =
         first.split_once(": ").filter(|(l, _)| l.starts_with("Line ")).map_or(first, |p| p.1);
     source.error(place, first.trim_end_matches(['.', ':']), "a PLY file")
 }
 
-/// Checks what the header announces against what there is: `left` bytes.
+/// Checks the element counts of the header against the remaining `left` bytes.
 fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(), AssetError> {
     let missing = |what: &str| {
         Err(source.error(FileLocation::Whole, format!("the header names no {what}"), "a mesh"))
@@ -191,7 +194,7 @@ fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(
     Ok(())
 }
 
-/// The fewest bytes that an element takes; a digit and a separator in a text.
+/// Returns the smallest size of an element in bytes; in text a property needs a digit and a separator.
 fn least_bytes(element: &ElementDef, encoding: Encoding) -> usize {
     let size = |scalar: &ScalarType| match scalar {
         _ if encoding == Encoding::Ascii => 2,
@@ -227,7 +230,7 @@ mod tests {
     const TEXT: &str = "0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n4 0 1 2 3 255\n";
 
     #[test]
-    fn three_encodings_give_the_same_mesh() {
+    fn ply_encodings_give_same_mesh() {
         let text = read((header("ascii", "4", "1") + TEXT).as_bytes()).unwrap();
         assert_eq!(text.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(text.uvs.as_ref().unwrap()[2], [1.0, 1.0]);
@@ -258,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told() {
+    fn ply_errors_are_reported() {
         for (text, place, words) in [
             (
                 header("ascii", "9999999999", "1") + TEXT,
@@ -306,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn coordinates_far_from_the_origin_keep_their_shape() {
+    fn ply_far_from_origin_keeps_shape() {
         let text = TEXT
             .replace("1 1 0 1 1", "1 100000000.125 0 1 1")
             .replace("0 1 0 0 1", "0 100000001 0 0 1");

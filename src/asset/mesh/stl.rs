@@ -1,5 +1,5 @@
-//! STL, ASCII and binary. Its triangles have no vertices in common: those at the same place are
-//! joined here, so that normals can be smooth. Its normals say nothing that the corners do not.
+//! STL, ASCII and binary. Its triangles share no vertices: equal positions are welded here, so that
+//! normals can be smooth. The normals in the file are ignored, because they follow from the corners.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
@@ -7,11 +7,14 @@ use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::{Builder, Welder};
 use std::io::{Cursor, Read, Seek, SeekFrom};
 
-/// Bytes before the first triangle of a binary file, and of each triangle.
+/// Sizes of the header and of each triangle in a binary file, in bytes.
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
-/// Reads a mesh.
+/// Parses an STL file.
+///
+/// # Errors
+/// Any error in the file.
 pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     let bytes = &mut source.bytes;
     let announced = bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
@@ -21,7 +24,7 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     let zeros = bytes.iter().take(HEADER).any(|b| *b == 0);
     let text = bytes.starts_with(b"solid") && !exact && !zeros;
     if text {
-        // The library wants a name behind the first word, which the format does not.
+        // The library requires a name after the first word; the format does not.
         if bytes.get(5) != Some(&b' ') {
             bytes.insert(5, b' ');
         }
@@ -37,11 +40,11 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
             let expected = format!("at most {}", (bytes.len() - HEADER) / TRIANGLE);
             return Err(source.error(FileLocation::Byte(80), found, &expected));
         }
-        // Some writers begin the binary header like a text.
+        // Some binary files begin like a text file.
         bytes[0] = b' ';
     }
     let mut builder = Builder::new(&source);
-    builder.limits(0, if text { 0 } else { announced.unwrap_or(0) as usize })?;
+    builder.check_limits(0, if text { 0 } else { announced.unwrap_or(0) as usize })?;
     let mut welder = Welder::default();
     let mut reader = ByLine { cursor: Cursor::new(&source.bytes), line: 0, text };
     let wrong = |error: std::io::Error, place| {
@@ -65,7 +68,7 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
                     let found = "a corner is not finite";
                     return Err(source.error(place(), found, "finite coordinates"));
                 }
-                builder.limits(3, 1)?;
+                builder.check_limits(3, 1)?;
                 let corners = corners.map(|c| welder.index(c, &mut builder));
                 builder.triangle(corners, place)?;
             }
@@ -82,7 +85,7 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// Gives a text line by line, whatever is asked for, so that the lines can be counted.
+/// Reader that returns at most one line per read, so that lines can be counted.
 struct ByLine<'a> {
     cursor: Cursor<&'a Vec<u8>>,
     line: usize,
@@ -95,10 +98,10 @@ impl Read for ByLine<'_> {
             return self.cursor.read(out);
         }
         let bytes = self.cursor.get_ref();
-        let rest = &bytes[(self.cursor.position() as usize).min(bytes.len())..];
-        let end = rest.iter().take(out.len()).position(|b| *b == b'\n').map(|e| e + 1);
-        self.line += usize::from(end.is_some() || rest.len() <= out.len());
-        let n = end.unwrap_or(out.len().min(rest.len()));
+        let remaining = &bytes[(self.cursor.position() as usize).min(bytes.len())..];
+        let end = remaining.iter().take(out.len()).position(|b| *b == b'\n').map(|e| e + 1);
+        self.line += usize::from(end.is_some() || remaining.len() <= out.len());
+        let n = end.unwrap_or(out.len().min(remaining.len()));
         self.cursor.read(&mut out[..n])
     }
 }
@@ -134,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn both_kinds_give_the_same_mesh() {
+    fn stl_encodings_give_same_mesh() {
         let other = FACET.replace("vertex 0 0 0", "vertex 1 1 0");
         let text = read(format!("solid\n{FACET}{other}endsolid\n").as_bytes()).unwrap();
         let bytes = binary(
@@ -149,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told() {
+    fn stl_errors_are_reported() {
         let cut = FACET.replace("vertex 0 1 0", "vertex 0 x 0");
         let error = read(format!("solid a\n{FACET}{cut}").as_bytes()).unwrap_err();
         assert_eq!(error.place, FileLocation::Line(13), "{error}");

@@ -37,15 +37,17 @@ pub(crate) struct ShadingPoints<L: SimdFloat> {
 
 /// The formula that a mapping comes to on a shape.
 fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
-    match (mapping, space.unwrapped) {
-        (Mapping::Planar, _) | (Mapping::Uv | Mapping::Auto, DefaultMapping::Plane) => {
+    match (mapping, space.default_mapping) {
+        (Mapping::Planar, _) | (Mapping::Uv | Mapping::Auto, DefaultMapping::Planar) => {
             Projection::Planar
         }
-        (Mapping::Spherical, _) | (Mapping::Auto, DefaultMapping::Ball) => Projection::Spherical,
-        (Mapping::Cylindrical, _) | (Mapping::Auto, DefaultMapping::Turned) => {
+        (Mapping::Spherical, _) | (Mapping::Auto, DefaultMapping::Spherical) => {
+            Projection::Spherical
+        }
+        (Mapping::Cylindrical, _) | (Mapping::Auto, DefaultMapping::Cylindrical) => {
             Projection::Cylindrical
         }
-        (Mapping::Box, _) | (Mapping::Auto, DefaultMapping::Sides) => Projection::Box,
+        (Mapping::Box, _) | (Mapping::Auto, DefaultMapping::Box) => Projection::Box,
         (Mapping::Uv, _) | (Mapping::Auto, DefaultMapping::Uv) => Projection::Uv,
     }
 }
