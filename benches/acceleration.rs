@@ -13,7 +13,7 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
-use zerkalo::render::pass;
+use zerkalo::render::pass::{self, PassContext};
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Acceleration, Document, Object, Scene};
@@ -58,9 +58,9 @@ impl Bench {
         for tile in 0..self.film.tile_count() as u32 {
             let jobs = vec![Job { tile, first: 8, count: SAMPLES }];
             let wave = Wave { replicate: 0, jobs, estimate: false };
-            let go = AtomicBool::new(false);
-            let (film, estimator) = (&mut self.film, &self.estimator);
-            pass::run(&self.world, film, &wave, &sampling, estimator, &self.pool, &go);
+            let cancel = AtomicBool::new(false);
+            let context = PassContext { sampling: &sampling, pool: &self.pool, cancel: &cancel };
+            pass::run(&self.world, &mut self.film, &wave, &self.estimator, context);
         }
     }
 }

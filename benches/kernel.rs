@@ -11,7 +11,7 @@ use zerkalo::bvh::Ray;
 use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
 use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo::primitive::{Aggregate, Form};
-use zerkalo::render::pass;
+use zerkalo::render::pass::{self, PassContext};
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
@@ -135,8 +135,9 @@ fn paths<L: SimdFloat>(c: &mut Criterion) {
     group.bench_function(name::<L>(), |b| {
         b.iter(|| {
             film.restart();
-            let go = AtomicBool::new(false);
-            pass::run_typed(&world, &mut film, &wave, &SAMPLING, &estimator, &pool, &go)
+            let cancel = AtomicBool::new(false);
+            let context = PassContext { sampling: &SAMPLING, pool: &pool, cancel: &cancel };
+            pass::run_typed(&world, &mut film, &wave, &estimator, context)
         })
     });
 }
@@ -187,8 +188,9 @@ fn wave(c: &mut Criterion) {
             b.iter_batched_ref(
                 || Film::new(header.clone()),
                 |film| {
-                    let go = AtomicBool::new(false);
-                    pass::run(&world, film, &wave, &SAMPLING, &estimator, &pool, &go)
+                    let cancel = AtomicBool::new(false);
+                    let context = PassContext { sampling: &SAMPLING, pool: &pool, cancel: &cancel };
+                    pass::run(&world, film, &wave, &estimator, context)
                 },
                 BatchSize::PerIteration,
             )

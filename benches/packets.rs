@@ -17,7 +17,7 @@ use zerkalo::bvh::Ray;
 use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
 use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo::primitive::{Aggregate, Form};
-use zerkalo::render::pass;
+use zerkalo::render::pass::{self, PassContext};
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Document, Scene};
@@ -82,8 +82,9 @@ fn renderer<L: SimdFloat>(scene: &Scene) -> impl FnMut() + use<L> {
         for tile in 0..film.tile_count() as u32 {
             let jobs = vec![Job { tile, first: 8, count: 8 }];
             let wave = Wave { replicate: 0, jobs, estimate: false };
-            let go = AtomicBool::new(false);
-            pass::run_typed(&world, &mut film, &wave, &sampling, &estimator, &pool, &go);
+            let cancel = AtomicBool::new(false);
+            let context = PassContext { sampling: &sampling, pool: &pool, cancel: &cancel };
+            pass::run_typed(&world, &mut film, &wave, &estimator, context);
         }
     }
 }

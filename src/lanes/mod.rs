@@ -255,6 +255,17 @@ pub trait SimdFloat:
     fn fixed(self, scale: f64) -> [i64; MAX_WIDTH];
 }
 
+/// Id of the first lane of `mask`, and the lanes of `mask` that have this id; `None` if `mask` is empty.
+#[inline(always)]
+pub(crate) fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
+    let bits = mask.bits();
+    if bits == 0 {
+        return None;
+    }
+    let id = ids.id_lane(bits.trailing_zeros() as usize);
+    Some((id, mask & ids.id_eq(id)))
+}
+
 /// 1.5 x 2^52: a double below 2^51 in magnitude plus this has no fraction bits left: it is rounded to
 /// the nearest integer, which is the difference of the bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;

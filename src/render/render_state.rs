@@ -1,6 +1,7 @@
 //! A scene in work: the compiled world and the film that its samples go to.
 
 use crate::film::{Display, Estimator, Film, Header, LightWeights, TILE};
+use crate::render::pass::PassContext;
 use crate::render::relighting::Relighting;
 use crate::render::schedule::{Schedule, Settings};
 use crate::render::session::RenderBackend;
@@ -129,12 +130,13 @@ impl RenderBackend for RenderState {
         abandon: &AtomicBool,
         shown: &mut dyn FnMut(&Film),
     ) -> Option<WaveReport> {
-        first_pass::run(&self.world, &mut self.film, wave, &self.sampling, pool, abandon, shown)
+        let context = PassContext { sampling: &self.sampling, pool, cancel: abandon };
+        first_pass::run(&self.world, &mut self.film, wave, context, shown)
     }
 
     fn run(&mut self, wave: &Wave, pool: &rayon::ThreadPool, interrupt: &AtomicBool) -> WaveReport {
         let Self { world, film, sampling, estimator, .. } = self;
-        pass::run(world, film, wave, sampling, estimator, pool, interrupt)
+        pass::run(world, film, wave, estimator, PassContext { sampling, pool, cancel: interrupt })
     }
 
     fn film(&self) -> &Film {

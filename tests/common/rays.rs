@@ -118,8 +118,8 @@ impl Traced {
     pub fn new(scene: &Scene, precision: Precision) -> Self {
         let world = AnyWorld::compile(scene, &Options { precision });
         let eye = match &world {
-            AnyWorld::Single(w) => w.view().eye(),
-            AnyWorld::Double(w) => w.view().eye(),
+            AnyWorld::Single(w) => w.camera().eye(),
+            AnyWorld::Double(w) => w.camera().eye(),
         };
         let mix = world.mix(scene);
         Self { world, mix, origin: DVec3::from(scene.camera.eye) - eye }

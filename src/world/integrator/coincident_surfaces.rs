@@ -12,10 +12,9 @@
 //! is known before any ray: nothing is asked where a path meets others.
 
 use crate::bvh::Ray;
-use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
 use crate::primitive::{Aggregate, Form, PrimitiveId};
 use crate::world::integrator::nested_dielectrics::MediumStack;
-use crate::world::integrator::opaque::next_distinct;
 use glam::DVec3;
 
 /// Surfaces that are so many roundings of the largest coordinate apart lie on each other, as the parts of a
@@ -80,10 +79,10 @@ pub(crate) struct CoincidentQuery<L: SimdFloat> {
     /// Lanes where something lies on the surface at hand.
     pub touching: L::Mask,
     pub item: L,
-    pub facet: L,
+    pub triangle: L,
     pub layer: L,
     /// How far off rays start that leave it.
-    pub lift: L,
+    pub offset: L,
 }
 
 impl<L: SimdFloat> CoincidentState<L> {
@@ -190,9 +189,9 @@ impl<S: Float> Contacts<S> {
             lanes: L::mask(false),
             touching: L::mask(false),
             item: coincident.item,
-            facet: L::from_id(0),
+            triangle: L::from_id(0),
             layer: L::from_f64(L::MAX),
-            lift: L::zero(),
+            offset: L::zero(),
         };
         self.search(geometry, coincident, inside, &mut out);
         out
@@ -218,9 +217,9 @@ impl<S: Float> Contacts<S> {
             lanes: L::mask(false),
             touching: L::mask(false),
             item: coincident.item,
-            facet: L::from_id(0),
+            triangle: L::from_id(0),
             layer,
-            lift: L::zero(),
+            offset: L::zero(),
         };
         self.search(geometry, &CoincidentState { layer: before, ..*coincident }, inside, &mut out);
         out
@@ -260,11 +259,12 @@ impl<S: Float> Contacts<S> {
                     }
                     let layer = self.layer(other, leaves, coincident.layer);
                     out.touching = out.touching | these;
-                    out.lift = L::select(these, out.lift.max(tie * L::from_f64(LIFT)), out.lift);
+                    out.offset =
+                        L::select(these, out.offset.max(tie * L::from_f64(LIFT)), out.offset);
                     let nearer = these & layer.gt(coincident.layer) & layer.lt(out.layer);
                     out.lanes = out.lanes | nearer;
                     out.item = L::select(nearer, L::from_id(other), out.item);
-                    out.facet = L::select(nearer, hit.triangle, out.facet);
+                    out.triangle = L::select(nearer, hit.triangle, out.triangle);
                     out.layer = L::select(nearer, layer, out.layer);
                 }
             }
