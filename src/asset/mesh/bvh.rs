@@ -71,7 +71,7 @@ impl Mesh {
         // Large leaves: a ray meets all of one at the price of one.
         let quality =
             BvhBuildParams { collapse_traversal_cost: 8.0, ..BvhBuildParams::fast_build() };
-        let Bvh8Build { boxes, order, leaves } =
+        let Bvh8Build { bvh: boxes, order, leaves } =
             Bvh8::build(mesh.triangles.len(), corners, BVH_WIDTH, quality);
         mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();
         if !mesh.color_of.is_empty() {
@@ -121,7 +121,7 @@ impl Mesh {
             if bound <= best {
                 continue;
             }
-            let branch = &self.boxes.branches()[branch as usize];
+            let branch = &self.boxes.nodes()[branch as usize];
             let first = todo.len();
             for i in branch.children() {
                 let reach =
