@@ -81,8 +81,9 @@ impl<S: Float> PacketBounds<S> {
         let (below, _) = min_max(packet.below, mask, first);
         let (low, high) = min_max(d, mask, first);
         let negative = low.map(|d| d < S::default());
-        let origin =
-            |far: bool| std::array::from_fn(|a| if negative[a] == far { above[a] } else { below[a] });
+        let origin = |far: bool| {
+            std::array::from_fn(|a| if negative[a] == far { above[a] } else { below[a] })
+        };
         Some(Self {
             near: std::array::from_fn(|a| if negative[a] { a + 3 } else { a }),
             far: std::array::from_fn(|a| if negative[a] { a } else { a + 3 }),
@@ -122,7 +123,11 @@ impl<S: Float> PacketBounds<S> {
 
 /// Smallest and largest coordinates in the lanes of `mask`, of which `first` is one.
 #[inline(always)]
-fn min_max<L: SimdFloat>(v: Vec3<L>, mask: L::Mask, first: usize) -> ([L::Scalar; 3], [L::Scalar; 3]) {
+fn min_max<L: SimdFloat>(
+    v: Vec3<L>,
+    mask: L::Mask,
+    first: usize,
+) -> ([L::Scalar; 3], [L::Scalar; 3]) {
     let v = Vec3::select(mask, v, Vec3::splat(v.lane(first)));
     let [x, y, z] = [v.x.min_max(), v.y.min_max(), v.z.min_max()];
     ([x.0, y.0, z.0], [x.1, y.1, z.1])

@@ -133,11 +133,7 @@ impl<S: Float> RayTraversal<S> {
     /// Visits the current node: continues with the nearest child that the ray enters, and pushes a frame with the others.
     /// Returns `false` if the ray enters no child.
     #[inline(always)]
-    fn expand<L: SimdFloat<Scalar = S>>(
-        &mut self,
-        bvh: &Bvh8,
-        frames: &mut [StackFrame],
-    ) -> bool {
+    fn expand<L: SimdFloat<Scalar = S>>(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         let node = &bvh.nodes()[self.child as usize];
         let (mut keys, mut entered) = ([NO_KEY; BVH_WIDTH], 0);
         for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {

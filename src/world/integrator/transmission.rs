@@ -1,7 +1,7 @@
 //! Integrator of worlds with transmission: paths split into reflected and transmitted rays.
 
 use crate::bvh::{Hit, Ray};
-use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
+use crate::lanes::{Mask, SimdFloat, Vec3};
 use crate::material::{Interface, ReflectionLobe};
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
@@ -26,8 +26,8 @@ struct Branch<L: SimdFloat> {
     media: MediumStack<L>,
     /// Number of surfaces on the path before the ray.
     bounce: u32,
-    /// State of rays that start on one of several coincident surfaces.
-    coincident: CoincidentState<L>,
+    /// State of rays that start on one of several coincident surfaces; `None` if there are no such rays.
+    coincident: Option<CoincidentState<L>>,
 }
 
 /// Reflected branches that wait for the transmitted branches of the same interface. There is at most one for each
@@ -82,8 +82,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let media = self.nested_dielectrics.at_start(&ray);
         let path = Path { ray, throughput: Vec3::of([1.0; 3]) };
         let mut waiting = BranchStack { branches: [None; SPLIT_DEPTH] };
-        let mut branch =
-            Branch { path, lanes, media, bounce: 0, coincident: CoincidentState::none() };
+        let mut branch = Branch { path, lanes, media, bounce: 0, coincident: None };
         loop {
             let candidates =
                 if branch.bounce == 0 { candidates } else { &self.world.all_candidates };
@@ -107,15 +106,16 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         counts: &mut Counts,
     ) -> bool {
         let world = self.world;
-        let Branch { mut path, media, bounce, coincident, .. } = *branch;
+        let Branch { mut path, media, bounce, .. } = *branch;
         counts.rays += u64::from(branch.lanes.bits().count_ones());
         let mut hit = world.geometry.closest_masked(&path.ray, &candidates.primary, branch.lanes);
         let mut behind = None;
-        if let Some(contacts) = &self.nested_dielectrics.contacts
+        if let (Some(contacts), Some(coincident)) =
+            (&self.nested_dielectrics.contacts, &branch.coincident)
             && (coincident.lanes & branch.lanes).any()
         {
             let coincident =
-                CoincidentState { lanes: coincident.lanes & branch.lanes, ..coincident };
+                CoincidentState { lanes: coincident.lanes & branch.lanes, ..*coincident };
             let next = contacts.next(&world.geometry, &coincident, &media);
             let origin = Vec3::select(next.lanes, coincident.point, path.ray.origin);
             path.ray.origin = origin;
@@ -130,16 +130,16 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let Some(mut interaction) = interact::<_, false>(world, &path.ray, &hit, lanes) else {
             return false;
         };
-        let mut coincident = CoincidentState::none();
+        let mut coincident = None;
         if let Some(contacts) = &self.nested_dielectrics.contacts {
-            coincident = self.coincident(
-                contacts,
-                &path,
-                (&mut hit, &mut interaction),
-                lanes,
-                behind.as_ref(),
-                &media,
-            );
+            let behind_lanes = behind.as_ref().map_or(L::mask(false), |next| next.lanes);
+            let contact_lanes =
+                contacts.near(interaction.item, interaction.point, lanes.and_not(behind_lanes));
+            if behind.is_some() || contact_lanes.any() {
+                let lanes = (lanes, contact_lanes);
+                let hits = (&mut hit, &mut interaction);
+                coincident = self.coincident(contacts, &path, hits, lanes, behind.as_ref(), &media);
+            }
         }
         let interface_hit = self.interface_hit(&interaction, lanes, &media);
         if let Some(interface_hit) = &interface_hit {
@@ -160,7 +160,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 counts,
             );
             branch.bounce = bounce;
-            branch.coincident = coincident.reversed();
+            branch.coincident = coincident.as_ref().map(CoincidentState::reversed);
             return branch.lanes.any();
         };
         let split = self.split_directions(&path, &interaction, &interface_hit, bounce - 1, counts);
@@ -184,7 +184,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 &media,
             ),
             bounce,
-            coincident: coincident.reversed(),
+            coincident: coincident.as_ref().map(CoincidentState::reversed),
         };
         // Lanes that continue with the transmitted ray; the others continue with the reflected one.
         let (mut transmitted, mut reflected_weight, mut transmitted_weight) =
@@ -217,23 +217,27 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         };
         let media =
             MediumStack::select(transmitted, &interface_hit.medium_transmitted, &reflected.media);
-        let coincident = CoincidentState::select(transmitted, &coincident, &reflected.coincident);
+        let coincident = coincident.map(|coincident| {
+            CoincidentState::select(transmitted, &coincident, &coincident.reversed())
+        });
         *branch = Branch { path, lanes, media, bounce, coincident };
         lanes.any()
     }
 
     /// Resolves hits of `lanes` on coincident surfaces: replaces `hit` and `interaction` by those of the surface that
-    /// comes first in the order of layers. `behind` is the surface found behind the one that the rays left, if any.
-    /// Returns the state of rays that pass the surface.
+    /// comes first in the order of layers. `contact_lanes` are those where another primitive may touch; `behind` is the
+    /// surface found behind the one that the rays left, if any. Returns the state of rays that pass the surface; `None`
+    /// if there are no coincident surfaces.
+    #[inline(never)]
     fn coincident(
         &self,
         contacts: &Contacts<L::Scalar>,
         path: &Path<L>,
         (hit, interaction): (&mut Hit<L>, &mut SurfaceInteraction<L>),
-        lanes: L::Mask,
+        (lanes, contact_lanes): (L::Mask, L::Mask),
         behind: Option<&CoincidentQuery<L>>,
         media: &MediumStack<L>,
-    ) -> CoincidentState<L> {
+    ) -> Option<CoincidentState<L>> {
         let (mut layer, mut offset, mut coincident_lanes) =
             (L::zero(), interaction.offset, L::mask(false));
         if let Some(next) = behind {
@@ -243,14 +247,6 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             }
             (layer, coincident_lanes) = (next.layer, next.lanes);
             offset = offset.max(next.offset.masked(coincident_lanes));
-        }
-        let mut contact_lanes = L::mask(false);
-        let mut remaining = lanes.and_not(coincident_lanes);
-        while let Some((item, item_lanes)) = next_distinct(interaction.item, remaining) {
-            if contacts.touches(item) {
-                contact_lanes = contact_lanes | item_lanes;
-            }
-            remaining = remaining.and_not(item_lanes);
         }
         if contact_lanes.any() {
             let (item, point, axis) = (interaction.item, interaction.point, -interaction.geometric);
@@ -273,13 +269,14 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             offset = offset.max(first.offset.masked(first.touching));
         }
         interaction.offset = L::select(coincident_lanes, offset, interaction.offset);
-        CoincidentState {
+        let coincident = CoincidentState {
             lanes: coincident_lanes,
             item: interaction.item,
             point: interaction.point,
             axis: -interaction.geometric,
             layer,
-        }
+        };
+        coincident_lanes.any().then_some(coincident)
     }
 
     /// Returns the hits of `lanes` on transmissive surfaces; `None` if there are none.
