@@ -158,8 +158,8 @@ impl CollapsePlan {
         // Wide nodes whose boxes have no area have a cost as well.
         let least_area = 1e-7 * nodes[0].aabb().half_area() + f32::MIN_POSITIVE;
         let mut order = vec![0];
-        for at in 0.. {
-            let Some(node) = order.get(at) else { break };
+        for position in 0.. {
+            let Some(node) = order.get(position) else { break };
             let node: &Bvh2Node = &nodes[*node];
             if !node.is_leaf() {
                 let first = node.first_index as usize;

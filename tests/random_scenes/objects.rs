@@ -251,9 +251,9 @@ fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<TransformOp> {
         5 => vec![turn(numbers), TransformOp::Scale(Scale([0.7, 1.3, -0.6])), turn(numbers)],
         _ => return Vec::new(),
     };
-    let there = TransformOp::Translate((-base).to_array());
+    let to_origin = TransformOp::Translate((-base).to_array());
     let back = TransformOp::Translate(base.to_array());
-    std::iter::once(there).chain(inner).chain([back]).collect()
+    std::iter::once(to_origin).chain(inner).chain([back]).collect()
 }
 
 /// Names of materials, and the depth of nested compounds.

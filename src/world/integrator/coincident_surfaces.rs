@@ -85,7 +85,7 @@ fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
 /// Pairs of primitives that may touch, at least one of each pair transmissive.
 pub(crate) struct Contacts<S> {
     /// Contacts of each primitive.
-    of: Vec<Vec<Contact<S>>>,
+    contacts: Vec<Vec<Contact<S>>>,
     /// Kind of each primitive, and the magnitude of its layer.
     kinds: Vec<(SurfaceKind, S)>,
 }
@@ -183,8 +183,8 @@ impl<S: Float> Contacts<S> {
             (kind, S::from_f64(layer))
         };
         let kinds = primitives.iter().enumerate().map(kind).collect();
-        let of = primitives.iter().map(|source| touching[source.form].clone()).collect();
-        Some(Self { of, kinds })
+        let contacts = primitives.iter().map(|id| touching[id.form].clone()).collect();
+        Some(Self { contacts, kinds })
     }
 
     /// Mask of `lanes`, each with a `point` on one of `items`, where another primitive may touch. Most primitives touch
@@ -199,7 +199,7 @@ impl<S: Float> Contacts<S> {
         let rounding = rounding(point);
         let (mut near, mut remaining) = (L::mask(false), lanes);
         while let Some((item, item_lanes)) = next_distinct(items, remaining) {
-            for contact in &self.of[item as usize] {
+            for contact in &self.contacts[item as usize] {
                 near = near | (item_lanes & contact.is_near(point, rounding));
             }
             remaining = remaining.and_not(item_lanes);
@@ -281,7 +281,7 @@ impl<S: Float> Contacts<S> {
         let mut remaining = coincident.lanes;
         while let Some((item, item_lanes)) = next_distinct(coincident.item, remaining) {
             remaining = remaining.and_not(item_lanes);
-            for contact in &self.of[item as usize] {
+            for contact in &self.contacts[item as usize] {
                 let near = item_lanes & contact.is_near(coincident.point, rounding);
                 if near.none() {
                     continue;

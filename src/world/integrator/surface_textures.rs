@@ -161,8 +161,8 @@ pub(crate) fn albedo_factor<L: SimdFloat>(
     else {
         return vertex_color;
     };
-    let at = coordinates(&world.geometry, mapping, points);
-    let color = texture.eval((at.u, at.v), points.lanes.bits());
+    let coord = coordinates(&world.geometry, mapping, points);
+    let color = texture.eval((coord.u, coord.v), points.lanes.bits());
     Some(vertex_color.map_or(color, |vertex_color| vertex_color.component_mul(color)))
 }
 
@@ -183,9 +183,9 @@ pub(crate) fn shading_normal<L: SimdFloat>(
     else {
         return normal;
     };
-    let at = coordinates(&world.geometry, mapping, points);
-    let (slope_u, slope_v) = bump.gradient((at.u, at.v), points.lanes.bits());
-    let gradient = at.grad_u * slope_u + at.grad_v * slope_v;
+    let coord = coordinates(&world.geometry, mapping, points);
+    let (slope_u, slope_v) = bump.gradient((coord.u, coord.v), points.lanes.bits());
+    let gradient = coord.grad_u * slope_u + coord.grad_v * slope_v;
     let outward = L::select(front, L::one(), -L::one());
     keep_visible(mapping.bumped(normal, outward, gradient), geometric, direction)
 }
