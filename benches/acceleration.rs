@@ -1,9 +1,9 @@
-//! Acceleration structures: time per sample of each structure on three scenes (the reflecting tracks, 300 objects of
-//! several kinds, a mesh), and its growth with the number of objects, on the tracks with fewer and more balls in each
-//! row, and in a crowd.
+//! Acceleration structures: time per sample of each structure on three scenes (the reflecting
+//! tracks, 300 objects of several kinds, a mesh), and its growth with the number of objects, on the
+//! tracks with fewer and more balls in each row, and in a crowd.
 //!
-//! `cargo bench --bench acceleration`. One core. The structures alternate on each scene; the least of five times
-//! counts.
+//! `cargo bench --bench acceleration`. One core. The structures alternate on each scene; the least
+//! of five times counts.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -87,7 +87,8 @@ diffuse = 0.2
 reflection = 0.7
 "#;
 
-/// Scene with `count` objects in the unit ball. `shapes` are their descriptions, at the origin and of about unit size.
+/// Scene with `count` objects in the unit ball. `shapes` are their descriptions, at the origin and
+/// of about unit size.
 fn crowd(count: usize, shapes: &[&str]) -> Scene {
     let mut random = Random(11);
     let mut text = ROOM.to_string();
@@ -112,8 +113,8 @@ fn crowd(count: usize, shapes: &[&str]) -> Scene {
 
 const BALL: &str = "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }";
 
-/// The reflecting tracks with `4 n n` small balls instead of 400: `4 n` rows of `n`, distributed over the same curves, with
-/// a radius that keeps their share of the picture.
+/// The reflecting tracks with `4 n n` small balls instead of 400: `4 n` rows of `n`, distributed
+/// over the same curves, with a radius that keeps their share of the picture.
 fn tracks(scene: &Scene, n: usize) -> Scene {
     let mut scene = scene.clone();
     let [mirror, ball, ..] = &scene.objects[..] else { panic!("no tracks") };

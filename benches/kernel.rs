@@ -114,8 +114,8 @@ fn list_or_tree(c: &mut Criterion) {
     }
 }
 
-/// Sixteen samples per pixel of a small physical mirror room on one thread, into the film: the gain of the
-/// lanes in a whole render.
+/// Sixteen samples per pixel of a small physical mirror room on one thread, into the film: the gain
+/// of the lanes in a whole render.
 fn paths<L: SimdFloat>(c: &mut Criterion) {
     let mut scene = physical();
     scene.film.size = [160, 120];

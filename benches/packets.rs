@@ -1,5 +1,5 @@
-//! Packets against single rays: closest hits per second by kind, in packets and with the same kernel of width 1,
-//! and samples per second of whole scenes.
+//! Packets against single rays: closest hits per second by kind, in packets and with the same
+//! kernel of width 1, and samples per second of whole scenes.
 //!
 //! `cargo bench --bench packets`. One core; the instances of a kind alternate.
 
@@ -30,7 +30,8 @@ const RAYS: usize = 1 << 15;
 /// Number of times that they are traced.
 const ROUNDS: usize = 8;
 
-/// Origins and directions from a sphere around the form towards its bounding box, eight neighbours at a time.
+/// Origins and directions from a sphere around the form towards its bounding box, eight neighbours
+/// at a time.
 fn rays_towards(form: &Form) -> Vec<([f64; 3], [f64; 3])> {
     let mut random = Random(3);
     let (low, high) = form.bounds().unwrap_or_else(|| (-glam::DVec3::ONE, glam::DVec3::ONE));

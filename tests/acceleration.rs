@@ -38,8 +38,8 @@ fn shipped_scenes_are_equal_under_every_acceleration_in_double_precision() {
     }
 }
 
-/// Objects of every transformable kind and all sizes, rotated and stretched, around and behind the camera, which may be
-/// inside of one of them.
+/// Objects of every transformable kind and all sizes, rotated and stretched, around and behind the
+/// camera, which may be inside of one of them.
 fn crowd(numbers: &mut Numbers, count: usize) -> Scene {
     let shapes = [
         "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }",
@@ -95,8 +95,9 @@ fn random_scenes_are_equal_under_every_acceleration() {
     }
 }
 
-/// Small and elongated pictures with view angles from narrow to almost 180 degrees, so that one tile may span more than a
-/// half space around its centre, with planes and rectangles of every slope.
+/// Small and elongated pictures with view angles from narrow to almost 180 degrees, so that one
+/// tile may span more than a half space around its centre, with planes and rectangles of every
+/// slope.
 #[test]
 fn view_angles_are_equal_under_every_acceleration() {
     let flat = "[[object]]\nshape.plane = { point = [0.0, -6.0, 0.0], normal = [0.0, 1.0, 0.0] }\n\
@@ -130,8 +131,8 @@ const CUBE: &str = "v -0.5 -0.5 -0.5\nv 0.5 -0.5 -0.5\nv 0.5 0.5 -0.5\nv -0.5 0.
     v -0.5 -0.5 0.5\nv 0.5 -0.5 0.5\nv 0.5 0.5 0.5\nv -0.5 0.5 0.5\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
 
-/// Objects of every kind on a coarse grid, so that faces are coplanar with others. Eye and light are on the grid as well,
-/// mostly exactly on surfaces.
+/// Objects of every kind on a coarse grid, so that faces are coplanar with others. Eye and light
+/// are on the grid as well, mostly exactly on surfaces.
 fn coplanar(numbers: &mut Numbers, count: usize, folder: &Path) -> Scene {
     let shapes = [
         "box = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0] }",

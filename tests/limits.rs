@@ -165,7 +165,8 @@ fn reported_truncation_bias_holds_in_many_scenes() {
     checked(400..6000);
 }
 
-/// Light stays inside a single glass ball because of bumps, and because of rounding at its silhouette.
+/// Light stays inside a single glass ball because of bumps, and because of rounding at its
+/// silhouette.
 #[test]
 fn single_glass_ball_has_unbounded_depth_bias() {
     let text = |more: &str, camera: &str| {
@@ -186,7 +187,8 @@ fn single_glass_ball_has_unbounded_depth_bias() {
         difference > 0.01 && reported_bias(&bumped, "depth") == Bias::Unbounded,
         "{difference}"
     );
-    // The silhouette is at cos = 1/5 from the axis. There rounding decides if light leaves the ball.
+    // The silhouette is at cos = 1/5 from the axis. There rounding decides if light leaves the
+    // ball.
     let mut numbers = Numbers::new(4);
     let (mut cut, rounds) = (0, 240);
     for round in 0..rounds {

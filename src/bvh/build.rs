@@ -1,7 +1,8 @@
 //! Eight-wide BVH (BVH8): nodes and build.
 //!
-//! A node stores the bounds of its eight children as structure of arrays. One ray, or the interval bounds of a packet,
-//! is tested against all of them at once. The build collapses the binary BVH of a library into few, full nodes.
+//! A node stores the bounds of its eight children as structure of arrays. One ray, or the interval
+//! bounds of a packet, is tested against all of them at once. The build collapses the binary BVH of
+//! a library into few, full nodes.
 
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
@@ -17,7 +18,8 @@ pub const BVH_WIDTH: usize = 8;
 /// Marks a child that is a leaf.
 pub const LEAF_FLAG: u32 = 1 << 31;
 
-/// Inner node: bounds of up to eight children. Unused slots hold empty boxes, which no ray intersects.
+/// Inner node: bounds of up to eight children. Unused slots hold empty boxes, which no ray
+/// intersects.
 #[derive(Clone, Debug)]
 #[repr(align(32))]
 pub struct Bvh8Node {
@@ -64,8 +66,8 @@ pub struct Bvh8Build {
 }
 
 impl Bvh8 {
-    /// Builds the hierarchy of `count` primitives, at least one. `corners` returns the low and high corner of a
-    /// primitive's bounding box. A leaf holds at most `in_leaf` primitives.
+    /// Builds the hierarchy of `count` primitives, at least one. `corners` returns the low and high
+    /// corner of a primitive's bounding box. A leaf holds at most `in_leaf` primitives.
     pub fn build(
         count: usize,
         corners: impl Fn(usize) -> [[f32; 3]; 2],
@@ -140,13 +142,14 @@ impl Bvh8Build {
     }
 }
 
-/// Optimal collapse of a binary BVH into wide nodes: minimises the sum of the nodes' surface areas, and with it the
-/// expected number of nodes that a random ray visits (Ylitie, Karras and Laine 2017, *Efficient Incoherent Ray Traversal
-/// on GPUs Through Compressed Wide BVHs*, without their choice of leaves).
+/// Optimal collapse of a binary BVH into wide nodes: minimises the sum of the nodes' surface areas,
+/// and with it the expected number of nodes that a random ray visits (Ylitie, Karras and Laine
+/// 2017, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*, without their
+/// choice of leaves).
 struct CollapsePlan {
-    /// Split of `n` slots, 1 to [`BVH_WIDTH`], between the subtrees of each binary node's two children, at index `n - 1`.
-    /// `[0, 0]`: the binary node takes one slot itself. At index 0 is the split of all slots of the wide node that the
-    /// binary node becomes.
+    /// Split of `n` slots, 1 to [`BVH_WIDTH`], between the subtrees of each binary node's two
+    /// children, at index `n - 1`. `[0, 0]`: the binary node takes one slot itself. At index 0 is
+    /// the split of all slots of the wide node that the binary node becomes.
     splits: Vec<[[u8; 2]; BVH_WIDTH]>,
 }
 

@@ -1,9 +1,10 @@
 //! Packet BVH traversal with interval culling.
 //!
-//! A coherent packet is tested against a node's eight boxes at once by interval bounds: the smallest and the largest of
-//! its rays' origins and inverse directions on each axis (Boulos, Wald and Shirley 2006, *Geometric and Arithmetic
-//! Culling Methods for Entire Ray Packets*). The rays themselves are tested against the remaining boxes only. The
-//! single-ray traversal (`single.rs`) tests eight boxes by the same operations, as a packet whose bounds coincide.
+//! A coherent packet is tested against a node's eight boxes at once by interval bounds: the
+//! smallest and the largest of its rays' origins and inverse directions on each axis (Boulos, Wald
+//! and Shirley 2006, *Geometric and Arithmetic Culling Methods for Entire Ray Packets*). The rays
+//! themselves are tested against the remaining boxes only. The single-ray traversal (`single.rs`)
+//! tests eight boxes by the same operations, as a packet whose bounds coincide.
 
 use crate::bvh::Ray;
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
@@ -20,8 +21,8 @@ pub struct SlabPacket<L> {
 }
 
 impl<L: SimdFloat> SlabPacket<L> {
-    /// Prepares rays. Tests treat boxes as larger by `pad` on both sides of each axis; this covers the rounding of the
-    /// primitives' own tests.
+    /// Prepares rays. Tests treat boxes as larger by `pad` on both sides of each axis; this covers
+    /// the rounding of the primitives' own tests.
     #[inline(always)]
     pub fn new(ray: &Ray<L>, pad: Vec3<L>) -> Self {
         let safe = |d: L| L::one() / d.abs().max(L::from_f64(1e-30)).copysign(d);
@@ -40,7 +41,8 @@ impl<L: SimdFloat> SlabPacket<L> {
         self.enters(corner(0), corner(3), limit)
     }
 
-    /// Mask of rays that enter the box between the corners `low` and `high` at a distance of at most `limit`.
+    /// Mask of rays that enter the box between the corners `low` and `high` at a distance of at
+    /// most `limit`.
     #[inline(always)]
     pub fn enters(&self, low: Vec3<L>, high: Vec3<L>, limit: L) -> L::Mask {
         let a = (low - self.above).component_mul(self.inverse);
@@ -93,9 +95,9 @@ impl<S: Float> PacketBounds<S> {
         })
     }
 
-    /// Returns the smallest distance at which a ray may enter each box, and the mask of boxes that a ray may enter at a
-    /// distance of at most `limit`. `side` returns the boxes' sides, numbered as in [`Bvh8Node::bounds`]. `ONE` is
-    /// `true` for the bounds of a single ray.
+    /// Returns the smallest distance at which a ray may enter each box, and the mask of boxes that
+    /// a ray may enter at a distance of at most `limit`. `side` returns the boxes' sides, numbered
+    /// as in [`Bvh8Node::bounds`]. `ONE` is `true` for the bounds of a single ray.
     ///
     /// Rounded differences and products are monotonic, so that the bounds are conservative for
     /// [`SlabPacket::enters`].
@@ -133,7 +135,8 @@ fn min_max<L: SimdFloat>(
     ([x.0, y.0, z.0], [x.1, y.1, z.1])
 }
 
-/// Factor of far distances that covers rounding, so that no hit is lost (Ize 2013, *Robust BVH Ray Traversal*).
+/// Factor of far distances that covers rounding, so that no hit is lost (Ize 2013, *Robust BVH Ray
+/// Traversal*).
 #[inline(always)]
 fn far_scale<L: SimdFloat>() -> L {
     L::from_f64(1.0 + 8.0 * L::EPSILON)
@@ -164,8 +167,8 @@ pub struct StackEntry<S> {
     near: S,
 }
 
-/// Calls `traverse` with a stack of `per_level` entries for each level of the hierarchy. Up to `LARGE` entries are on the
-/// call stack, more on the heap.
+/// Calls `traverse` with a stack of `per_level` entries for each level of the hierarchy. Up to
+/// `LARGE` entries are on the call stack, more on the heap.
 #[inline(always)]
 pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     per_level: usize,
@@ -182,7 +185,8 @@ pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     }
 }
 
-/// Inserts an entry into the part of the stack from `base` on, which is sorted by descending distance.
+/// Inserts an entry into the part of the stack from `base` on, which is sorted by descending
+/// distance.
 #[inline(always)]
 fn push_sorted<S: Float>(
     stack: &mut [StackEntry<S>],
@@ -199,9 +203,10 @@ fn push_sorted<S: Float>(
     *top += 1;
 }
 
-/// Traverses the hierarchy with a packet. Calls `leaf(index, limit)` for leaves whose boxes a ray may enter at a distance
-/// of at most `limit`, in the order of their entry distances by `bounds`. `leaf` returns the new limits. `bounds` are
-/// those of the lanes with a limit of at least zero; `None` if these are incoherent.
+/// Traverses the hierarchy with a packet. Calls `leaf(index, limit)` for leaves whose boxes a ray
+/// may enter at a distance of at most `limit`, in the order of their entry distances by `bounds`.
+/// `leaf` returns the new limits. `bounds` are those of the lanes with a limit of at least zero;
+/// `None` if these are incoherent.
 #[inline(always)]
 pub fn traverse_packet<L: SimdFloat>(
     bvh: &Bvh8,

@@ -18,8 +18,9 @@ impl<L: SimdFloat> Ray<L> {
         self.direction.mul_add(t, self.origin)
     }
 
-    /// Returns `true` if the rays of `lanes`, at least one, are coherent: they differ by at most `max_turn` in
-    /// direction (length of the difference of unit vectors) and `max_shift` in any coordinate of the origin.
+    /// Returns `true` if the rays of `lanes`, at least one, are coherent: they differ by at most
+    /// `max_turn` in direction (length of the difference of unit vectors) and `max_shift` in any
+    /// coordinate of the origin.
     #[inline(always)]
     pub(crate) fn is_coherent(&self, lanes: u32, max_turn: f64, max_shift: f64) -> bool {
         let lane = lanes.trailing_zeros() as usize;

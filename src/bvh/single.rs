@@ -1,9 +1,10 @@
-//! Single-ray BVH traversal, interleaved across lanes: while one ray waits for its next node or leaf from memory, the
-//! others advance.
+//! Single-ray BVH traversal, interleaved across lanes: while one ray waits for its next node or
+//! leaf from memory, the others advance.
 //!
-//! A ray is tested against the eight boxes of a node at once and continues with the nearest child. The other children wait
-//! in an unsorted stack frame; the nearest of them is selected without branches when it is needed. Besides memory
-//! latency, mispredicted branches are the main cost of incoherent rays.
+//! A ray is tested against the eight boxes of a node at once and continues with the nearest child.
+//! The other children wait in an unsorted stack frame; the nearest of them is selected without
+//! branches when it is needed. Besides memory latency, mispredicted branches are the main cost of
+//! incoherent rays.
 
 use crate::bvh::packet::{PacketBounds, SlabPacket, load_wide, valid_lanes};
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
@@ -12,8 +13,8 @@ use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 /// Children of a node that the ray enters and has not visited.
 #[derive(Clone, Copy, Default)]
 pub struct StackFrame {
-    /// Keys by slot: the bits of the entry distance, rounded down, with the slot in the last three. The least key is
-    /// the nearest child. Slots without a child have [`NO_KEY`] or a larger key.
+    /// Keys by slot: the bits of the entry distance, rounded down, with the slot in the last three.
+    /// The least key is the nearest child. Slots without a child have [`NO_KEY`] or a larger key.
     keys: [u32; BVH_WIDTH],
     node: u32,
     /// Number of children that remain.
@@ -37,9 +38,10 @@ struct RayTraversal<S> {
     frames: usize,
 }
 
-/// Traverses the hierarchy with the rays of `lanes`. Calls `leaf(lane, index, limit)` for leaves whose boxes the ray of a lane
-/// enters at a distance of at most its limit, from near to far. `leaf` returns the ray's new limit. `prefetch_leaf(index)` is
-/// called some time before the leaf is visited. `frames` has one entry per lane and level.
+/// Traverses the hierarchy with the rays of `lanes`. Calls `leaf(lane, index, limit)` for leaves
+/// whose boxes the ray of a lane enters at a distance of at most its limit, from near to far.
+/// `leaf` returns the ray's new limit. `prefetch_leaf(index)` is called some time before the leaf
+/// is visited. `frames` has one entry per lane and level.
 #[inline(never)]
 pub fn traverse_rays<L: SimdFloat>(
     bvh: &Bvh8,
@@ -130,8 +132,8 @@ impl<S: Float> RayTraversal<S> {
         each
     }
 
-    /// Visits the current node: continues with the nearest child that the ray enters, and pushes a frame with the others.
-    /// Returns `false` if the ray enters no child.
+    /// Visits the current node: continues with the nearest child that the ray enters, and pushes a
+    /// frame with the others. Returns `false` if the ray enters no child.
     #[inline(always)]
     fn expand<L: SimdFloat<Scalar = S>>(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         let node = &bvh.nodes()[self.child as usize];
@@ -141,7 +143,8 @@ impl<S: Float> RayTraversal<S> {
             let (near, enters) = self.bounds.enters::<true, L>(side, L::splat(self.limit));
             let first = part * L::WIDTH;
             entered |= (enters.bits() & valid_lanes()) << first;
-            // Reduced by more than rounding to single precision adds: no key is larger than the distance.
+            // Reduced by more than rounding to single precision adds: no key is larger than the
+            // distance.
             let near =
                 L::select(enters, near * L::from_f64(1.0 - 2e-7), L::from_f64(f64::INFINITY));
             for (i, key) in keys[first..].iter_mut().enumerate().take(L::WIDTH) {
@@ -161,8 +164,8 @@ impl<S: Float> RayTraversal<S> {
         true
     }
 
-    /// Continues with the nearest child of the topmost frame that has one within the limit. Returns `false` if the stack
-    /// has none.
+    /// Continues with the nearest child of the topmost frame that has one within the limit. Returns
+    /// `false` if the stack has none.
     #[inline(always)]
     fn next(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         while self.frames > 0 {

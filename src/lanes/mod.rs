@@ -1,7 +1,7 @@
 //! SIMD lanes: floats, masks and integers in which kernels are written.
 //!
-//! A kernel (intersection, shading, sampling) is written once, generic over [`SimdFloat`]: a vector of
-//! `WIDTH` floats. Instances:
+//! A kernel (intersection, shading, sampling) is written once, generic over [`SimdFloat`]: a vector
+//! of `WIDTH` floats. Instances:
 //!
 //! | type | precision | width | use |
 //! |---|---|---|---|
@@ -10,9 +10,10 @@
 //! | `wide::f32x16`, `wide::f64x8` | both | 16, 8 | production when built for AVX-512 |
 //! | `f32`, `f64` | both | 1 | tests, benches, and primitives without packet kernels |
 //!
-//! All operations up to `sqrt` are IEEE operations: every instance of one precision returns identical
-//! bits. [`SimdFloat::mul_add`] is fused on all instances or on none. Only `sin_cos`, `atan2`, `ln`
-//! and `exp` may differ between the vector instances and those of width 1, by a few ulps.
+//! All operations up to `sqrt` are IEEE operations: every instance of one precision returns
+//! identical bits. [`SimdFloat::mul_add`] is fused on all instances or on none. Only `sin_cos`,
+//! `atan2`, `ln` and `exp` may differ between the vector instances and those of width 1, by a few
+//! ulps.
 
 mod scalar;
 mod vec3;
@@ -235,27 +236,29 @@ pub trait SimdFloat:
         Self::select(mask, self, Self::zero())
     }
 
-    /// Bit-casts a 32-bit id into every lane. Ids are selected by [`SimdFloat::select`], without arithmetic.
-    /// Ids below 2^31 - 2^23 are ordered by [`SimdFloat::lt`] and [`SimdFloat::le`] like integers, as the bits
-    /// of all positive floats are.
+    /// Bit-casts a 32-bit id into every lane. Ids are selected by [`SimdFloat::select`], without
+    /// arithmetic. Ids below 2^31 - 2^23 are ordered by [`SimdFloat::lt`] and [`SimdFloat::le`]
+    /// like integers, as the bits of all positive floats are.
     fn from_id(id: u32) -> Self;
     /// Id in lane `i`.
     fn id_lane(self, i: usize) -> u32;
     /// Mask of lanes whose id is `id`.
     fn id_eq(self, id: u32) -> Self::Mask;
 
-    /// Maps 32 random bits to [0, 1): 24 of them in single precision, all in double precision (there to the
-    /// middle of a step).
+    /// Maps 32 random bits to [0, 1): 24 of them in single precision, all in double precision
+    /// (there to the middle of a step).
     fn to_unit(bits: Self::SimdU32) -> Self;
 
-    /// Sum over all lanes of `round(lane * scale)`. Each lane is rounded separately, so that the sum
-    /// is exact in any grouping. `|lane * scale|` is at most 2^49.
+    /// Sum over all lanes of `round(lane * scale)`. Each lane is rounded separately, so that the
+    /// sum is exact in any grouping. `|lane * scale|` is at most 2^49.
     fn fixed_sum(self, scale: f64) -> i64;
-    /// Returns `round(lane * scale)` of every lane, and zeros after the last. `|lane * scale|` is at most 2^49.
+    /// Returns `round(lane * scale)` of every lane, and zeros after the last. `|lane * scale|` is
+    /// at most 2^49.
     fn fixed(self, scale: f64) -> [i64; MAX_WIDTH];
 }
 
-/// Id of the first lane of `mask`, and the lanes of `mask` that have this id; `None` if `mask` is empty.
+/// Id of the first lane of `mask`, and the lanes of `mask` that have this id; `None` if `mask` is
+/// empty.
 #[inline(always)]
 pub(crate) fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
     let bits = mask.bits();
@@ -266,8 +269,9 @@ pub(crate) fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32,
     Some((id, mask & ids.id_eq(id)))
 }
 
-/// Rounding constant, 1.5 x 2^52. The sum of it and a double below 2^51 in magnitude has no fraction bits: the double is
-/// rounded to the nearest integer, which is the difference of the bits.
+/// Rounding constant, 1.5 x 2^52. The sum of it and a double below 2^51 in magnitude has no
+/// fraction bits: the double is rounded to the nearest integer, which is the difference of the
+/// bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// Rounds to the nearest integer, ties to even, for `|x| < 2^51`.

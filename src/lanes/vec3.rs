@@ -69,8 +69,8 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn normalize(self) -> Self {
         self * (L::one() / self.length_squared().sqrt())
     }
-    /// Normalises a vector whose length is 1 up to a few roundings, by one step of Newton's method instead
-    /// of a square root.
+    /// Normalises a vector whose length is 1 up to a few roundings, by one step of Newton's method
+    /// instead of a square root.
     #[inline(always)]
     pub fn renormalize(self) -> Self {
         self * self.length_squared().mul_add(L::from_f64(-0.5), L::from_f64(1.5))
@@ -168,9 +168,9 @@ pub struct Frame<L> {
 }
 
 impl<L: SimdFloat> Frame<L> {
-    /// Builds a frame around the unit vector `n` without branches. It is continuous except at n.z = 0. Around
-    /// a horizontal vector (n.y = 0) the first tangent is horizontal and the second vertical, as are the axes
-    /// of the lobes of a vertical mirror.
+    /// Builds a frame around the unit vector `n` without branches. It is continuous except at n.z =
+    /// 0. Around a horizontal vector (n.y = 0) the first tangent is horizontal and the second
+    /// vertical, as are the axes of the lobes of a vertical mirror.
     ///
     /// Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1).
     #[inline(always)]

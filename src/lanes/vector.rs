@@ -53,8 +53,8 @@ const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     table
 }
 
-/// Reverses the bits of each 32-bit lane by byte shuffles: a table lookup per nibble, then a reversal of
-/// the bytes of each word.
+/// Reverses the bits of each 32-bit lane by byte shuffles: a table lookup per nibble, then a
+/// reversal of the bytes of each word.
 #[inline(always)]
 fn reverse8(x: u32x8) -> u32x8 {
     use wide::i8x32;

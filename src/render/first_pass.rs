@@ -8,9 +8,10 @@ use crate::world::{AnyWorld, Counts, TileTracer, World, dispatch};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
-/// Traces the first sample of replicate A: of every 8th pixel in x and y, then of the pixels between in
-/// three stages, each over the whole picture. Calls `on_stage` with the film after all stages but the last.
-/// A cancelled pass skips the stages after the first that have not started, and has no report.
+/// Traces the first sample of replicate A: of every 8th pixel in x and y, then of the pixels
+/// between in three stages, each over the whole picture. Calls `on_stage` with the film after all
+/// stages but the last. A cancelled pass skips the stages after the first that have not started,
+/// and has no report.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
@@ -24,7 +25,8 @@ pub fn run(
 /// Number of adjacent tiles that share packets while the lattice is coarse.
 const STRIP_TILES: usize = 8;
 
-/// Lattice step above which tiles share packets \[pixels\]. With smaller steps the pixels of one tile fill packets.
+/// Lattice step above which tiles share packets \[pixels\]. With smaller steps the pixels of one
+/// tile fill packets.
 const SHARED_ABOVE: usize = 2;
 
 fn trace_first_pass<L: SimdFloat>(
@@ -79,8 +81,8 @@ struct StripPixel {
     position: (u32, u32),
 }
 
-/// Returns the pixels of `tiles`, given with their origins, that a lattice of `steps.1` pixels adds to one of `steps.0`
-/// (0: none).
+/// Returns the pixels of `tiles`, given with their origins, that a lattice of `steps.1` pixels adds
+/// to one of `steps.0` (0: none).
 fn pixels_to_add(
     tiles: &[([usize; 2], &mut Tile)],
     (previous_step, step): (usize, usize),
@@ -98,8 +100,8 @@ fn pixels_to_add(
 }
 
 impl<L: SimdFloat> TileRenderer<'_, L> {
-    /// Traces the first sample of the pixels that a lattice of `steps.1` pixels adds to one of `steps.0` (0: none),
-    /// in adjacent tiles, which share packets while these pixels are few.
+    /// Traces the first sample of the pixels that a lattice of `steps.1` pixels adds to one of
+    /// `steps.0` (0: none), in adjacent tiles, which share packets while these pixels are few.
     fn lattice(&self, slots: Vec<TileHandle>, steps: (usize, usize), counts: &mut [Counts]) {
         let mut tiles: Vec<_> =
             slots.into_iter().map(|slot| (slot.origin, slot.prepare())).collect();
@@ -149,8 +151,9 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
                 }
             }
         });
-        // Rays of shared packets are divided among the tiles by their number of pixels, because the reported cost
-        // must not depend on the packet width. Glossy lobes are reported by packets of a single tile.
+        // Rays of shared packets are divided among the tiles by their number of pixels, because the
+        // reported cost must not depend on the packet width. Glossy lobes are reported by packets
+        // of a single tile.
         let packet_counts = tracer.counts();
         if let [counts] = counts {
             counts.rays += packet_counts.rays;

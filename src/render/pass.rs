@@ -91,8 +91,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Traces the samples of a job into its tile. Packets hold samples of one pixel where `WIDTH` aligned indices are
-    /// requested, of several pixels elsewhere.
+    /// Traces the samples of a job into its tile. Packets hold samples of one pixel where `WIDTH`
+    /// aligned indices are requested, of several pixels elsewhere.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
@@ -139,7 +139,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         tracer.counts()
     }
 
-    /// Traces the samples `first..first + COUNT` of all pixels of a tile, several pixels per packet.
+    /// Traces the samples `first..first + COUNT` of all pixels of a tile, several pixels per
+    /// packet.
     #[inline(never)]
     fn trace_shared<const COUNT: usize>(
         &self,
@@ -168,7 +169,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Calls `add(pixel, group, sums)` with the sums over the `COUNT` lanes of each pixel and light group.
+    /// Calls `add(pixel, group, sums)` with the sums over the `COUNT` lanes of each pixel and light
+    /// group.
     #[inline(always)]
     pub(super) fn sum_by_pixel<const COUNT: usize, P>(
         &self,
@@ -186,7 +188,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Replaces and records samples that the film cannot hold. `sample_of` returns pixel and index of a lane.
+    /// Replaces and records samples that the film cannot hold. `sample_of` returns pixel and index
+    /// of a lane.
     #[inline(always)]
     pub(super) fn reject_invalid(
         &self,
@@ -208,8 +211,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Sets samples to black in light groups where a channel is NaN or negative, and limits brighter and infinite
-    /// ones to the largest value that the film holds.
+    /// Sets samples to black in light groups where a channel is NaN or negative, and limits
+    /// brighter and infinite ones to the largest value that the film holds.
     #[cold]
     fn replace_invalid(
         &self,
@@ -249,15 +252,15 @@ impl RejectedSamples {
     }
 }
 
-/// Returns how many of the samples `first..end` of a pixel the next packet holds: a power of two that divides `first`,
-/// at most `width`.
+/// Returns how many of the samples `first..end` of a pixel the next packet holds: a power of two
+/// that divides `first`, at most `width`.
 fn samples_per_packet(first: u32, end: u32, width: usize) -> usize {
     let aligned = first | width as u32;
     1 << aligned.trailing_zeros().min((end - first).ilog2())
 }
 
-/// Pixels of a tile, numbered row by row, in Morton order. Pixels that share a packet are adjacent: 2 x 1, 2 x 2,
-/// 4 x 2 or 4 x 4 of them.
+/// Pixels of a tile, numbered row by row, in Morton order. Pixels that share a packet are adjacent:
+/// 2 x 1, 2 x 2, 4 x 2 or 4 x 4 of them.
 const MORTON_ORDER: [u8; TILE_PIXELS] = {
     let mut order = [0; TILE_PIXELS];
     let mut i = 0;
@@ -287,8 +290,8 @@ mod tests {
     use crate::lanes::{Float, Single, Vec3};
     use crate::sampling::SamplerKind;
 
-    /// Invalid samples are counted and add nothing. Samples brighter than the film's limit add the limit. Other
-    /// groups are not affected.
+    /// Invalid samples are counted and add nothing. Samples brighter than the film's limit add the
+    /// limit. Other groups are not affected.
     #[test]
     fn extreme_30_a_bad_sample_is_counted_and_leaves_the_pixel_finite() {
         let scene = crate::scene::Scene::parse(

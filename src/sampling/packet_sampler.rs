@@ -35,7 +35,8 @@ pub struct SampleSettings {
     pub kind: SamplerKind,
 }
 
-/// Number of dimensions at the end of the joint set that are reserved for a path's first branch choices.
+/// Number of dimensions at the end of the joint set that are reserved for a path's first branch
+/// choices.
 const CHOICES: u32 = 2;
 
 /// Number of powers of two up to the widest packet.
@@ -61,13 +62,14 @@ pub struct SampleBlock<'a, L: SimdFloat> {
     sampler: &'a Sampler<L>,
     /// Sample index in each lane.
     index: L::SimdU32,
-    /// `owen_prefix[d]`: Sobol points of the indices in dimension d, after [`owen_scramble_prefix`].
+    /// `owen_prefix[d]`: Sobol points of the indices in dimension d, after
+    /// [`owen_scramble_prefix`].
     owen_prefix: [L::SimdU32; DIMENSIONS],
 }
 
 impl<L: SimdFloat> Sampler<L> {
-    /// Creates the sampler of a picture. With `jitter` the first two dimensions distribute samples over their
-    /// pixel, otherwise they belong to the lobes.
+    /// Creates the sampler of a picture. With `jitter` the first two dimensions distribute samples
+    /// over their pixel, otherwise they belong to the lobes.
     pub fn new(settings: SampleSettings, jitter: bool) -> Self {
         let word = |replicate: u32, purpose: u32| {
             hash_words(&[settings.seed as u32, (settings.seed >> 32) as u32, replicate, purpose])
@@ -85,8 +87,9 @@ impl<L: SimdFloat> Sampler<L> {
         }
     }
 
-    /// Creates the block of the indices `first..first + count` for packets of `WIDTH / count` pixels: lane i has
-    /// index `first + i % count`. `count` is a power of two, at most `WIDTH`, and `first` a multiple of it.
+    /// Creates the block of the indices `first..first + count` for packets of `WIDTH / count`
+    /// pixels: lane i has index `first + i % count`. `count` is a power of two, at most `WIDTH`,
+    /// and `first` a multiple of it.
     pub fn block(&self, first: u32, count: usize) -> SampleBlock<'_, L> {
         debug_assert!(count.is_power_of_two() && count <= L::WIDTH);
         debug_assert!((first as usize).is_multiple_of(count));
@@ -98,8 +101,8 @@ impl<L: SimdFloat> Sampler<L> {
         SampleBlock { sampler: self, index: L::SimdU32::splat(first) + within, owen_prefix }
     }
 
-    /// Key of a pixel's samples in one replicate (0: A, 1: B). Keys are distinct for all pixels of a
-    /// picture up to 65536 x 65536, because every step is a bijection of the packed coordinates.
+    /// Key of a pixel's samples in one replicate (0: A, 1: B). Keys are distinct for all pixels of
+    /// a picture up to 65536 x 65536, because every step is a bijection of the packed coordinates.
     #[inline(always)]
     pub fn key(&self, (x, y): (u32, u32), replicate: usize) -> u32 {
         let [before, after] = self.seeds[replicate];

@@ -1,15 +1,17 @@
-//! Sobol points in eight dimensions with a 32-bit index: four pairs, each the first two dimensions of the Sobol
-//! sequence, a (0, 2)-sequence in base 2.
+//! Sobol points in eight dimensions with a 32-bit index: four pairs, each the first two dimensions
+//! of the Sobol sequence, a (0, 2)-sequence in base 2.
 //!
-//! Pair k has its own order of that sequence: the index is `M_k i`, where `M_k` is an upper triangular matrix of bits
-//! with ones on its diagonal. Such a matrix permutes the first 2^m indices for every m, so that each pair remains a
-//! (0, 2)-sequence (Faure and Tezuka 2002, *Another Random Scrambling of Digital (t,s)-Sequences*). With the usual
-//! direction numbers (Joe and Kuo 2008) only the first pair is one. The image in a mirror depends on single pairs:
+//! Pair k has its own order of that sequence: the index is `M_k i`, where `M_k` is an upper
+//! triangular matrix of bits with ones on its diagonal. Such a matrix permutes the first 2^m
+//! indices for every m, so that each pair remains a (0, 2)-sequence (Faure and Tezuka 2002,
+//! *Another Random Scrambling of Digital (t,s)-Sequences*). With the usual direction numbers (Joe
+//! and Kuo 2008) only the first pair is one. The image in a mirror depends on single pairs:
 //! position in the pixel, and direction in the lobe. docs/accuracy.md has the measured benefit.
 //!
-//! The first columns of the matrices were found by search, one after the other. The criterion is the error with which
-//! 2^m randomly scrambled points estimate the volume on one side of a random plane that leans towards the axes of
-//! several pairs, and the mean of a smooth product over several pairs. Further columns are random.
+//! The first columns of the matrices were found by search, one after the other. The criterion is
+//! the error with which 2^m randomly scrambled points estimate the volume on one side of a random
+//! plane that leans towards the axes of several pairs, and the mean of a smooth product over
+//! several pairs. Further columns are random.
 //!
 //! Values are stored with the first binary digit in bit 0, as the scrambling hash requires.
 
@@ -112,8 +114,8 @@ mod tests {
         point(dimension, index).reverse_bits()
     }
 
-    /// Every pair is a (0, m, 2)-net for every m: each elementary interval of volume 2^-m holds exactly
-    /// one of the first 2^m points, and of every later 2^m that are aligned.
+    /// Every pair is a (0, m, 2)-net for every m: each elementary interval of volume 2^-m holds
+    /// exactly one of the first 2^m points, and of every later 2^m that are aligned.
     #[test]
     fn elementary_intervals_hold_one_point_each() {
         for (pair, m) in (0..DIMENSIONS / 2).flat_map(|pair| (0..=12u32).map(move |m| (pair, m))) {
@@ -143,8 +145,9 @@ mod tests {
         (0..).zip(rows).for_each(|(i, published)| assert_eq!(row(i), published));
     }
 
-    /// Error of the estimated volume of random half-spaces, relative to independent points: in the plane of one pair
-    /// (where the usual second pair has 0.30 and 0.23), and over the first four dimensions.
+    /// Error of the estimated volume of random half-spaces, relative to independent points: in the
+    /// plane of one pair (where the usual second pair has 0.30 and 0.23), and over the first four
+    /// dimensions.
     #[test]
     fn scrambled_points_estimate_half_spaces_better_than_random_points() {
         use crate::lanes::{SimdFloat, SimdU32};
@@ -198,15 +201,17 @@ mod tests {
         }
     }
 
-    /// Largest gain coefficient of two dimensions: the variance of the first 2^m scrambled points over that of independent
-    /// points, for the worst integrand of both dimensions (Owen 1997, *Monte Carlo Variance of Scrambled Net Quadrature*).
-    /// It is the maximum over the Haar components (j, k) of the mean over the points p, q of the product over both
-    /// dimensions of 2 [same cell of 2^-(j+1)] - [same cell of 2^-j].
+    /// Largest gain coefficient of two dimensions: the variance of the first 2^m scrambled points
+    /// over that of independent points, for the worst integrand of both dimensions (Owen 1997,
+    /// *Monte Carlo Variance of Scrambled Net Quadrature*). It is the maximum over the Haar
+    /// components (j, k) of the mean over the points p, q of the product over both dimensions of 2
+    /// [same cell of 2^-(j+1)] - [same cell of 2^-j].
     fn gain(a: usize, b: usize, m: u32) -> f64 {
         let count = 1u32 << m;
         let alike = |d: usize| {
             let first = digits(d, 0);
-            // The first 2^m points are a group under XOR: the distances from every point are the same.
+            // The first 2^m points are a group under XOR: the distances from every point are the
+            // same.
             (0..count).map(move |i| (digits(d, i) ^ first).leading_zeros()).collect::<Vec<u32>>()
         };
         let (a, b) = (alike(a), alike(b));
@@ -219,7 +224,8 @@ mod tests {
         levels.map(|(j, k)| component(j, k)).fold(0.0, f64::max)
     }
 
-    /// Table in docs/accuracy.md. The worst pairs join the second lobe and the branch choices: 4 to 7.
+    /// Table in docs/accuracy.md. The worst pairs join the second lobe and the branch choices: 4 to
+    /// 7.
     #[test]
     fn worst_pairs_of_dimensions_are_the_documented_ones() {
         for (m, worst, first_lobes) in [
@@ -240,7 +246,8 @@ mod tests {
         assert!((0..4).all(|pair| gain(2 * pair, 2 * pair + 1, 6) <= 2.0));
     }
 
-    /// Sixteen points at aligned indices are one point XOR sixteen constants, as [`Sampler::block`] requires.
+    /// Sixteen points at aligned indices are one point XOR sixteen constants, as [`Sampler::block`]
+    /// requires.
     #[test]
     fn aligned_points_are_one_point_and_constants() {
         for d in 0..DIMENSIONS {

@@ -1,15 +1,15 @@
-//! Sample warps from the unit square to directions: lobes of reflected rays and microfacet normals, with their
-//! densities.
+//! Sample warps from the unit square to directions: lobes of reflected rays and microfacet normals,
+//! with their densities.
 //!
-//! Directions are in the frame of the lobe. Its z axis is the mirror direction for cone and square, the surface
-//! normal for microfacets.
+//! Directions are in the frame of the lobe. Its z axis is the mirror direction for cone and square,
+//! the surface normal for microfacets.
 
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
-/// Uniform point of the unit disk, and its squared distance from the centre. Concentric squares become circles,
-/// so that neighbours stay neighbours. An edge across the disk costs as many samples as one across the square,
-/// and fewer if it is parallel to an axis.
+/// Uniform point of the unit disk, and its squared distance from the centre. Concentric squares
+/// become circles, so that neighbours stay neighbours. An edge across the disk costs as many
+/// samples as one across the square, and fewer if it is parallel to an axis.
 ///
 /// Shirley and Chiu 1997, *A Low Distortion Map Between Disk and Square*.
 #[inline(always)]
@@ -23,7 +23,8 @@ pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
     (far * L::select(wide, c, s), far * L::select(wide, s, c), far * far)
 }
 
-/// Coefficients by powers of x^2 of the series of the sine (`first` is 1) or cosine (0) of x eighths of a turn.
+/// Coefficients by powers of x^2 of the series of the sine (`first` is 1) or cosine (0) of x
+/// eighths of a turn.
 const fn series(first: u32) -> [f64; 8] {
     let mut terms = [0.0; 8];
     let (mut k, mut n, mut term) = (0, 0, 1.0);
@@ -38,8 +39,8 @@ const fn series(first: u32) -> [f64; 8] {
     terms
 }
 
-/// Sine and cosine of `x` eighths of a turn, for x in [-1, 1]: the first eight terms of their series, with an
-/// error of 1e-15.
+/// Sine and cosine of `x` eighths of a turn, for x in [-1, 1]: the first eight terms of their
+/// series, with an error of 1e-15.
 #[inline(always)]
 fn sin_cos_eighth<L: SimdFloat>(x: L) -> (L, L) {
     const SINE: [f64; 8] = series(1);
@@ -71,8 +72,8 @@ pub fn cone_pdf(direction_z: f64, one_minus_cos: f64) -> f64 {
     if 1.0 - direction_z <= one_minus_cos { 1.0 / (TAU * one_minus_cos) } else { 0.0 }
 }
 
-/// Direction through a uniform point of the square with sides `side` at unit distance, perpendicular to z and
-/// centred on it.
+/// Direction through a uniform point of the square with sides `side` at unit distance,
+/// perpendicular to z and centred on it.
 #[inline(always)]
 pub fn square<L: SimdFloat>(u: L, v: L, side: L) -> Vec3<L> {
     let half = L::from_f64(0.5);
@@ -86,12 +87,12 @@ pub fn square_pdf(direction: [f64; 3], side: f64) -> f64 {
     if inside { 1.0 / (side * side * z * z * z) } else { 0.0 }
 }
 
-/// Microfacet normal with density D(h) cos(h), Beckmann distribution of slope `alpha`. The slopes along x and y are
-/// independent normal deviates with variance alpha^2 / 2, one from each number, so that reflections of edges along
-/// the mirror's axes depend almost entirely on one number.
+/// Microfacet normal with density D(h) cos(h), Beckmann distribution of slope `alpha`. The slopes
+/// along x and y are independent normal deviates with variance alpha^2 / 2, one from each number,
+/// so that reflections of edges along the mirror's axes depend almost entirely on one number.
 ///
-/// Walter et al. 2007, *Microfacet Models for Refraction through Rough Surfaces*, eq. 28, has the same
-/// density by radius and angle.
+/// Walter et al. 2007, *Microfacet Models for Refraction through Rough Surfaces*, eq. 28, has the
+/// same density by radius and angle.
 #[inline(always)]
 pub fn beckmann<L: SimdFloat>(u: L, v: L, alpha: L) -> Vec3<L> {
     Vec3::new(alpha * erf_inverse(u), alpha * erf_inverse(v), L::one()).normalize()
@@ -100,9 +101,9 @@ pub fn beckmann<L: SimdFloat>(u: L, v: L, alpha: L) -> Vec3<L> {
 /// Inverse of the error function at 2 u - 1, for u in [0, 1), to 4e-7 of its value (in double
 /// precision to 1.4e-7); at 0, where it is infinite, -4.7.
 ///
-/// Form of Giles 2010, *Approximating the erfinv Function*, GPU Computing Gems, chapter 10:
-/// (2 u - 1) times a function of w = -ln(1 - (2 u - 1)^2); polynomials fitted for the least relative
-/// error with w up to 23.
+/// Form of Giles 2010, *Approximating the erfinv Function*, GPU Computing Gems, chapter 10: (2 u -
+/// 1) times a function of w = -ln(1 - (2 u - 1)^2); polynomials fitted for the least relative error
+/// with w up to 23.
 #[inline(always)]
 fn erf_inverse<L: SimdFloat>(u: L) -> L {
     const MIDDLE: [f64; 10] = [
@@ -143,8 +144,8 @@ fn erf_inverse<L: SimdFloat>(u: L) -> L {
 
 /// Microfacet normal with density D_v(h): the GGX normals visible from `view` (unit, z >= 0).
 ///
-/// Dupuy and Benyoub 2023, *Sampling Visible GGX Normals with Spherical Caps*. The cap is the image of a
-/// disk.
+/// Dupuy and Benyoub 2023, *Sampling Visible GGX Normals with Spherical Caps*. The cap is the image
+/// of a disk.
 #[inline(always)]
 pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
     let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();
@@ -195,7 +196,8 @@ mod tests {
         0.5 * two_over_root_pi * (-x * x).exp() / fraction
     }
 
-    /// Checks that the error function inverts `erf_inverse`, from the middle to the last number in the tails.
+    /// Checks that the error function inverts `erf_inverse`, from the middle to the last number in
+    /// the tails.
     fn check_erf_inverse<L: SimdFloat>(numbers: &[f64], max_error: f64) {
         for u in numbers {
             let x: f64 = erf_inverse(L::from_f64(*u)).lane(0).to_f64();

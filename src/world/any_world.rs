@@ -103,8 +103,8 @@ impl AnyWorld {
         dispatch!(self, world => world.scales.clone())
     }
 
-    /// Weight of each light group in the picture of `scene`, which may differ from the compiled scene
-    /// in colours, intensities and switches of lights.
+    /// Weight of each light group in the picture of `scene`, which may differ from the compiled
+    /// scene in colours, intensities and switches of lights.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         dispatch!(self, world => world.groups.mix(scene))
     }

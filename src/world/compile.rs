@@ -1,5 +1,5 @@
-//! Compilation of a scene into a world, step by step: recentred geometry, materials, lights, transmission,
-//! culling.
+//! Compilation of a scene into a world, step by step: recentred geometry, materials, lights,
+//! transmission, culling.
 
 use crate::camera::PinholeCamera;
 use crate::lanes::{Float, SimdFloat};
@@ -20,7 +20,8 @@ use crate::world::truncation_bias;
 use crate::world::world::{LightSource, World};
 use glam::{DAffine3, DVec3};
 
-/// Geometry of all objects in double precision, translated so that the scene's centre is the origin.
+/// Geometry of all objects in double precision, translated so that the scene's centre is the
+/// origin.
 pub(super) struct RecenteredGeometry {
     /// Scene coordinates of the new origin.
     pub origin: DVec3,
@@ -72,7 +73,8 @@ struct CompiledMaterials<'a, S> {
 }
 
 impl<'a, S: Float> CompiledMaterials<'a, S> {
-    /// Compiles the materials of all parts. `default` is that of names that the scene does not define.
+    /// Compiles the materials of all parts. `default` is that of names that the scene does not
+    /// define.
     fn new(scene: &'a Scene, default: &'a Material) -> Self {
         let mut materials: Vec<&Material> = Vec::new();
         let mut index_of = |name: &str| {

@@ -1,5 +1,5 @@
-//! Light groups: parts of the picture that are linear in the colour and intensity of one light. The film keeps
-//! them apart, so that both can change without new samples.
+//! Light groups: parts of the picture that are linear in the colour and intensity of one light. The
+//! film keeps them apart, so that both can change without new samples.
 
 use crate::lanes::Float;
 use crate::light::{DeltaLight, Light};
@@ -45,8 +45,8 @@ pub struct LightGroups {
 }
 
 impl LightGroups {
-    /// Creates the light groups of `scene`. `lit` and `ambient` are `true` if some surface returns direct
-    /// or ambient light.
+    /// Creates the light groups of `scene`. `lit` and `ambient` are `true` if some surface returns
+    /// direct or ambient light.
     pub fn new(scene: &Scene, lit: bool, ambient: bool) -> Self {
         let mut members = Vec::new();
         if ambient && scene.ambient.color != Color::BLACK {
@@ -96,8 +96,9 @@ impl LightGroups {
         out
     }
 
-    /// Returns the weight of each group in the picture of `scene`, which may differ from the compiled
-    /// scene in the colours, intensities and switches of lights, ambient light and background.
+    /// Returns the weight of each group in the picture of `scene`, which may differ from the
+    /// compiled scene in the colours, intensities and switches of lights, ambient light and
+    /// background.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         let weight = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => scene.ambient.color.0,
@@ -122,8 +123,8 @@ impl LightGroups {
         self.members.iter().map(name).collect()
     }
 
-    /// Returns the steps per unit of radiance in the film's integers, a power of two for each group, from
-    /// its [`RadianceRange`].
+    /// Returns the steps per unit of radiance in the film's integers, a power of two for each
+    /// group, from its [`RadianceRange`].
     pub(super) fn scales<S: Float>(
         &self,
         scene: &Scene,

@@ -1,4 +1,5 @@
-//! Per-tile state of pixels that all their samples share: coordinates, sampler keys, corner directions.
+//! Per-tile state of pixels that all their samples share: coordinates, sampler keys, corner
+//! directions.
 
 use crate::camera::PinholeCamera;
 use crate::lanes::{Float, SimdFloat, SimdU32, Vec3};
@@ -8,8 +9,8 @@ use std::ops::Range;
 /// Largest number of pixels in a block; a multiple of every packet width.
 pub const MAX_BLOCK_PIXELS: usize = 256;
 
-/// Up to [`MAX_BLOCK_PIXELS`] pixels, in the order in which they share packets. Copies of the last pixel
-/// fill the last packet.
+/// Up to [`MAX_BLOCK_PIXELS`] pixels, in the order in which they share packets. Copies of the last
+/// pixel fill the last packet.
 pub(super) struct PixelBlock<S> {
     count: usize,
     /// Columns of the raster \[pixels\].
@@ -74,8 +75,8 @@ impl<S: Float> PixelBlock<S> {
         (self.keys[i], Vec3::splat(self.corner_directions.each_ref().map(|axis| axis[i])))
     }
 
-    /// Keys and corner directions of the pixels from `first` on, each in `COUNT` adjacent lanes. `COUNT`
-    /// is a power of two, `first` a multiple of `WIDTH / COUNT`.
+    /// Keys and corner directions of the pixels from `first` on, each in `COUNT` adjacent lanes.
+    /// `COUNT` is a power of two, `first` a multiple of `WIDTH / COUNT`.
     #[inline(always)]
     pub fn gather<L: SimdFloat<Scalar = S>, const COUNT: usize>(
         &self,

@@ -1,20 +1,22 @@
-//! Range of the radiance of a light group's samples, and the step of the film's integers that follows from it.
+//! Range of the radiance of a light group's samples, and the step of the film's integers that
+//! follows from it.
 //!
-//! A pixel's sum has 63 bits, a sample at most 49 of them (`SimdFloat::fixed_sum`). Each sample is rounded to whole
-//! steps. Where all samples are equal, as on a matt surface, the mean is wrong by up to half a step for any number of
-//! samples. The step therefore has two bounds:
+//! A pixel's sum has 63 bits, a sample at most 49 of them (`SimdFloat::fixed_sum`). Each sample is
+//! rounded to whole steps. Where all samples are equal, as on a matt surface, the mean is wrong by
+//! up to half a step for any number of samples. The step therefore has two bounds:
 //!
-//! - *The dim end.* The darkest 8-bit level of a display is 2^-11.7 of white. A surface whose brightest spot is white
-//!   at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit levels.
-//! - *The bright end.* With 2^44 steps for the brightest spot, a pixel that shows only this spot holds 2^19
-//!   samples of each replicate before its sum saturates: a million per pixel. Five bits remain for single samples
-//!   that are brighter.
+//! - *The dim end.* The darkest 8-bit level of a display is 2^-11.7 of white. A surface whose
+//!   brightest spot is white at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit
+//!   levels.
+//! - *The bright end.* With 2^44 steps for the brightest spot, a pixel that shows only this spot
+//!   holds 2^19 samples of each replicate before its sum saturates: a million per pixel. Five bits
+//!   remain for single samples that are brighter.
 //!
-//! The ends are 28 bits apart. By default light of typical intensity has 2^28 steps; the bright end is 2^16
-//! times as bright, the dim end 2^-12 times. Where both ends do not fit, the bright end has precedence: a sample
-//! that saturates changes the picture visibly, a sample smaller than a step does not. The dim end has precedence
-//! over two kinds of brightness: spots smaller than a pixel, and light amplified by mirrors. Such samples may
-//! saturate; they are counted.
+//! The ends are 28 bits apart. By default light of typical intensity has 2^28 steps; the bright end
+//! is 2^16 times as bright, the dim end 2^-12 times. Where both ends do not fit, the bright end has
+//! precedence: a sample that saturates changes the picture visibly, a sample smaller than a step
+//! does not. The dim end has precedence over two kinds of brightness: spots smaller than a pixel,
+//! and light amplified by mirrors. Such samples may saturate; they are counted.
 
 use crate::camera::PinholeCamera;
 use crate::lanes::Float;
@@ -49,7 +51,8 @@ pub(super) struct RadianceRange {
     pub typical: f64,
     /// In the brightest spot of the dimmest surface.
     pub dimmest: f64,
-    /// In the brightest spot of the brightest surface, among spots of at least a fraction of a pixel.
+    /// In the brightest spot of the brightest surface, among spots of at least a fraction of a
+    /// pixel.
     pub brightest: f64,
     /// In the brightest spot of any size.
     pub spots: f64,
@@ -58,7 +61,8 @@ pub(super) struct RadianceRange {
 }
 
 impl RadianceRange {
-    /// Returns the range of light that is `least` to `most` times as intense, depending on the channel.
+    /// Returns the range of light that is `least` to `most` times as intense, depending on the
+    /// channel.
     pub fn times(self, least: f64, most: f64) -> Self {
         Self {
             typical: self.typical * most,
@@ -97,8 +101,8 @@ impl RadianceRange {
     }
 }
 
-/// Returns the smallest integer `n` with 2^n >= `x`, computed from the bits of `x`. Exponents of light that is 2^k times
-/// as intense differ by exactly k.
+/// Returns the smallest integer `n` with 2^n >= `x`, computed from the bits of `x`. Exponents of
+/// light that is 2^k times as intense differ by exactly k.
 fn ceil_log2(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return -1022.0;
@@ -168,7 +172,8 @@ pub(super) struct SceneDistances<'a> {
 }
 
 impl<'a> SceneDistances<'a> {
-    /// `materials_of` returns the materials of a form's parts; `epsilon` is that of the world's precision.
+    /// `materials_of` returns the materials of a form's parts; `epsilon` is that of the world's
+    /// precision.
     pub fn new(
         scene: &Scene,
         geometry: &'a RecenteredGeometry,
@@ -191,7 +196,8 @@ impl<'a> SceneDistances<'a> {
         };
         let without_direct = materials.iter().filter(|m| Response::new(m).is_none());
         let faintest = least_of(without_direct.copied().filter_map(passed_on).flatten());
-        // Fresnel's equations divide the light between both; fixed coefficients may exceed 1 in total.
+        // Fresnel's equations divide the light between both; fixed coefficients may exceed 1 in
+        // total.
         let max_factors = materials.iter().map(|m| match m.fresnel_mode() {
             Fresnel::Dielectric => m.reflection.max(m.transmission),
             _ => m.reflection + m.transmission,

@@ -1,8 +1,8 @@
 //! Reuse of samples: comparison of a scene with the compiled one.
 //!
-//! Descriptions are compared as a whole, by `==`, after the few fields that may differ were set to one value or were
-//! named in a pattern without `..`. A key that is added to a description is therefore compared, or has to be
-//! named here before the program compiles.
+//! Descriptions are compared as a whole, by `==`, after the few fields that may differ were set to
+//! one value or were named in a pattern without `..`. A key that is added to a description is
+//! therefore compared, or has to be named here before the program compiles.
 
 use crate::light::Light;
 use crate::material::Material;
@@ -13,9 +13,10 @@ use crate::world::light_groups::{LightGroupSource, LightGroups, emission, emits}
 use std::borrow::Cow;
 
 impl LightGroups {
-    /// Returns `true` if the samples of `compiled`, whose groups these are, are samples of `scene` with other
-    /// group weights. The scenes may differ in the emission of lights, ambient light and background that have
-    /// groups, in names, in unused materials, and in the cap on rays per pixel.
+    /// Returns `true` if the samples of `compiled`, whose groups these are, are samples of `scene`
+    /// with other group weights. The scenes may differ in the emission of lights, ambient light and
+    /// background that have groups, in names, in unused materials, and in the cap on rays per
+    /// pixel.
     pub fn can_reuse(&self, compiled: &Scene, scene: &Scene) -> bool {
         let Scene {
             film,
@@ -45,7 +46,8 @@ impl LightGroups {
             && self.can_relight(compiled, scene)
     }
 
-    /// Returns `true` if the lights of `scene` allow reuse. Lights that do not emit may be anywhere.
+    /// Returns `true` if the lights of `scene` allow reuse. Lights that do not emit may be
+    /// anywhere.
     fn can_relight(&self, compiled: &Scene, scene: &Scene) -> bool {
         let is_compiled = |i: usize| {
             let contains = |source: &LightGroupSource| match source {
@@ -78,12 +80,14 @@ fn uncapped(film: &FilmSettings) -> FilmSettings {
     FilmSettings { rays_per_pixel: 0, ..film.clone() }
 }
 
-/// Returns the light without name, white and of unit intensity, as the samples of its own group contain it.
+/// Returns the light without name, white and of unit intensity, as the samples of its own group
+/// contain it.
 fn with_unit_emission(light: &Light) -> Light {
     Light { name: String::new(), color: Color::WHITE, intensity: 1.0, on: true, ..light.clone() }
 }
 
-/// Returns `true` if objects of two scenes differ in their names and the names of their materials only.
+/// Returns `true` if objects of two scenes differ in their names and the names of their materials
+/// only.
 fn same_object((scene_a, a): (&Scene, &Object), (scene_b, b): (&Scene, &Object)) -> bool {
     let Object { name: _, material: _, shape, transform } = b;
     *transform == a.transform

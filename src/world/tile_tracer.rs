@@ -87,9 +87,10 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         }
     }
 
-    /// Traces the samples `first..first + COUNT` of every pixel in packets of `WIDTH / COUNT` pixels, and
-    /// passes the radiance of each packet to `sink`. Pixel `i` of a packet has the lanes from `i * COUNT`
-    /// on. `COUNT` is a power of two below `WIDTH`, `first` a multiple of it.
+    /// Traces the samples `first..first + COUNT` of every pixel in packets of `WIDTH / COUNT`
+    /// pixels, and passes the radiance of each packet to `sink`. Pixel `i` of a packet has the
+    /// lanes from `i * COUNT` on. `COUNT` is a power of two below `WIDTH`, `first` a multiple of
+    /// it.
     #[inline(always)]
     pub fn radiance_shared<const COUNT: usize>(
         &mut self,

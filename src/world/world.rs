@@ -123,8 +123,8 @@ impl<L: SimdFloat> World<L> {
     }
 
     /// Traces one packet of paths. `origin` and `direction` are those of camera rays, as
-    /// [`PinholeCamera::rays`] makes them. Lanes outside `active` stay black. `candidates` are those
-    /// of the camera rays and of the shadow rays from their hit points, if they are known.
+    /// [`PinholeCamera::rays`] makes them. Lanes outside `active` stay black. `candidates` are
+    /// those of the camera rays and of the shadow rays from their hit points, if they are known.
     #[inline(always)]
     pub fn trace(
         &self,

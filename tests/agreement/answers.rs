@@ -101,8 +101,8 @@ pub fn highlight(material: &Material, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
     }
 }
 
-/// Frame around `w` of Duff et al. 2017, *Building an Orthonormal Basis, Revisited*. Its tangents are the sides of the
-/// square lobe.
+/// Frame around `w` of Duff et al. 2017, *Building an Orthonormal Basis, Revisited*. Its tangents
+/// are the sides of the square lobe.
 fn around(w: DVec3) -> (DVec3, DVec3) {
     let sign = 1f64.copysign(w.z);
     let a = -1.0 / (sign + w.z);

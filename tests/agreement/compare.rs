@@ -65,9 +65,9 @@ impl Picture {
         Self { size: scene.film.size, mean, half, random, samples }
     }
 
-    /// Compares block means with a reference of `samples` samples per pixel, which is far noisier. The variance
-    /// of single samples is the larger one of those of the reference and of this program's random samples,
-    /// because few samples underestimate the variance of rare events.
+    /// Compares block means with a reference of `samples` samples per pixel, which is far noisier.
+    /// The variance of single samples is the larger one of those of the reference and of this
+    /// program's random samples, because few samples underestimate the variance of rare events.
     pub fn beside(&self, reference: &[Estimate], samples: u32) -> Verdict {
         let (mut worst_z, mut chi2, mut count) = (0f64, 0.0, 0.0);
         let per_reference = 2.0 * f64::from(self.samples) / f64::from(samples);
@@ -103,8 +103,8 @@ impl Picture {
     }
 }
 
-/// Quantile of the chi-square distribution with `n` degrees of freedom at the level of the normal quantile `z` (Wilson and
-/// Hilferty 1931).
+/// Quantile of the chi-square distribution with `n` degrees of freedom at the level of the normal
+/// quantile `z` (Wilson and Hilferty 1931).
 fn chi2_quantile(n: f64, z: f64) -> f64 {
     n * (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3)
 }
@@ -151,8 +151,8 @@ fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
     corners.flat_map(|y| (0..width).step_by(BLOCK).map(move |x| block(x, y))).collect()
 }
 
-/// Difference of the variances of single samples, pooled over the picture \[standard errors\]. The standard error is
-/// estimated from the spread of the blocks.
+/// Difference of the variances of single samples, pooled over the picture \[standard errors\]. The
+/// standard error is estimated from the spread of the blocks.
 pub fn variances_differ_by(
     reference: &[Estimate],
     reference_samples: u32,
@@ -166,7 +166,8 @@ pub fn variances_differ_by(
             let reference_variance =
                 pixels.iter().map(|p| reference[*p].variance.element_sum()).sum::<f64>();
             let squares = pixels.iter().map(|p| half[*p].length_squared()).sum::<f64>();
-            // Half the difference of two means of n samples has the variance of a mean of 2 n samples.
+            // Half the difference of two means of n samples has the variance of a mean of 2 n
+            // samples.
             squares * 2.0 * f64::from(samples) - reference_variance * f64::from(reference_samples)
         })
         .collect();

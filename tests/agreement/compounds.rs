@@ -1,5 +1,5 @@
-//! Compounds of the reference tracer. At each crossing of a part's surface, point tests just in front and just behind
-//! decide if the ray enters or leaves the compound.
+//! Compounds of the reference tracer. At each crossing of a part's surface, point tests just in
+//! front and just behind decide if the ray enters or leaves the compound.
 
 use crate::meshes::Triangles;
 use crate::paint::{Canvas, Spot};
@@ -8,7 +8,8 @@ use glam::{DAffine3, DMat3, DVec3};
 use zerkalo::scene::Object;
 use zerkalo::shape::{CsgOperand, Shape};
 
-/// Simple shape: its pieces or triangles, and the transforms between its coordinates and the scene's.
+/// Simple shape: its pieces or triangles, and the transforms between its coordinates and the
+/// scene's.
 pub struct Leaf {
     pub pieces: Vec<Piece>,
     pub mesh: Option<Triangles>,
@@ -62,7 +63,8 @@ impl Leaf {
         self.mesh.as_ref().map_or(DVec3::ONE, |mesh| mesh.color(i))
     }
 
-    /// Converts a point of the scene and its outward normal to the coordinates of the leaf's description.
+    /// Converts a point of the scene and its outward normal to the coordinates of the leaf's
+    /// description.
     pub fn spot(&self, facet: usize, point: DVec3, outer: DVec3) -> Spot<'_> {
         let point = self.own_from_scene.transform_point3(point);
         Spot { leaf: self, facet, point, normal: self.own_normal(outer) }
@@ -95,8 +97,8 @@ impl Body {
         Ok(Self { leaves, tree })
     }
 
-    /// Closest hit beyond the distance `from` (in lengths of `direction`): distance, outward or front unit normal,
-    /// leaf and triangle.
+    /// Closest hit beyond the distance `from` (in lengths of `direction`): distance, outward or
+    /// front unit normal, leaf and triangle.
     pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<Meeting> {
         let mut nearest: Option<Meeting> = None;
         for (i, leaf) in self.leaves.iter().enumerate() {

@@ -1,5 +1,6 @@
-//! Comparison with a second, independent implementation: a slow reference path tracer that shares the scene description
-//! only. The pictures agree within noise, and deliberate errors of the reference are detected.
+//! Comparison with a second, independent implementation: a slow reference path tracer that shares
+//! the scene description only. The pictures agree within noise, and deliberate errors of the
+//! reference are detected.
 
 mod answers;
 #[path = "../common/mod.rs"]
@@ -121,8 +122,8 @@ fn deliberate_errors_are_detected() {
     }
 }
 
-/// With independent random numbers the variance of single samples is equal in both programs, where both sample their
-/// lobes with equal densities.
+/// With independent random numbers the variance of single samples is equal in both programs, where
+/// both sample their lobes with equal densities.
 #[test]
 fn variances_agree_under_independent_random_numbers() {
     for name in ["lobe-cone.toml", "lobe-square.toml", "lobe-beckmann.toml", "mirror-room.toml"] {
@@ -177,7 +178,8 @@ fn one_sided_transparent_objects_reflect_on_their_front_only() {
     }
 }
 
-/// A one-sided pane between a bright and a dark wall. Its back shows k_t of the dark wall and no reflection.
+/// A one-sided pane between a bright and a dark wall. Its back shows k_t of the dark wall and no
+/// reflection.
 #[test]
 fn back_of_one_sided_pane_does_not_reflect() {
     for (two_sided, expected) in [(true, 0.75), (false, 0.0)] {

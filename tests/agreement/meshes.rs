@@ -126,8 +126,8 @@ impl Triangles {
     }
 }
 
-/// Shading normal: `smooth` on the side of the geometric normal `own`, bent towards a viewer who looks along
-/// `direction`.
+/// Shading normal: `smooth` on the side of the geometric normal `own`, bent towards a viewer who
+/// looks along `direction`.
 pub fn seen(smooth: DVec3, own: DVec3, direction: DVec3) -> DVec3 {
     let smooth = smooth.normalize() * smooth.dot(own).signum();
     let short = (MIN_COSINE + smooth.dot(direction)).max(0.0);

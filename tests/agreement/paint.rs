@@ -1,5 +1,5 @@
-//! Textures and bump maps of the reference tracer. Texture coordinates follow from formulas, their derivatives from finite
-//! differences.
+//! Textures and bump maps of the reference tracer. Texture coordinates follow from formulas, their
+//! derivatives from finite differences.
 
 use crate::compounds::Leaf;
 use crate::meshes::Triangles;
@@ -100,7 +100,8 @@ fn around(axis: DVec3) -> DMat3 {
     DMat3::from_cols(right, up, right.cross(up))
 }
 
-/// Frame of a flat shape. Its up vector is the projection of y; on horizontal shapes it points away from the viewer.
+/// Frame of a flat shape. Its up vector is the projection of y; on horizontal shapes it points away
+/// from the viewer.
 fn flat(normal: DVec3) -> DMat3 {
     let front = normal.normalize();
     let up = if front.y.abs() > 0.999 { DVec3::NEG_Z * front.y.signum() } else { DVec3::Y };
@@ -204,7 +205,8 @@ impl Spot<'_> {
             Mapping::Cylindrical => DVec2::new(turns, (from_low.y / size.y).clamp(RIM, 1.0 - RIM)),
             Mapping::Box => {
                 let n = view.transpose() * self.normal;
-                // From the lower left corner of a face, seen from outside; the later axis wins ties.
+                // From the lower left corner of a face, seen from outside; the later axis wins
+                // ties.
                 let (back, p) = (high - seen, from_low);
                 match n.abs() {
                     a if a.z >= a.x.max(a.y) => {

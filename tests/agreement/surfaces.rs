@@ -1,5 +1,6 @@
-//! Shapes of the reference tracer as simple pieces: spheres, polygons, infinite planes, discs and the sides of cones, in
-//! the coordinates of their descriptions. No code is shared with the program.
+//! Shapes of the reference tracer as simple pieces: spheres, polygons, infinite planes, discs and
+//! the sides of cones, in the coordinates of their descriptions. No code is shared with the
+//! program.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use zerkalo::scene::TransformOp;
@@ -179,8 +180,9 @@ fn round(base: DVec3, top: DVec3, radii: [f64; 2]) -> Vec<Piece> {
     ]
 }
 
-/// Base, top and sides of an upright solid. `base` has the corners as x and z relative to `corner`; the top is `top`
-/// times as large. The base is rotated about its centroid, counter-clockwise as seen from above.
+/// Base, top and sides of an upright solid. `base` has the corners as x and z relative to `corner`;
+/// the top is `top` times as large. The base is rotated about its centroid, counter-clockwise as
+/// seen from above.
 fn frustum(corner: DVec3, base: &[[f64; 2]], height: f64, top: f64, degrees: f64) -> Vec<Piece> {
     let base: Vec<DVec2> = base.iter().map(|b| DVec2::from(*b)).collect();
     let middle = base.iter().sum::<DVec2>() / base.len() as f64;

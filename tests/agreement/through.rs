@@ -1,5 +1,5 @@
-//! Transmission of the reference tracer. The media on both sides of a surface are found by point tests just in front of
-//! and just behind it.
+//! Transmission of the reference tracer. The media on both sides of a surface are found by point
+//! tests just in front of and just behind it.
 
 use crate::answers::reflect;
 use crate::common::Numbers;
@@ -19,8 +19,8 @@ pub enum Way {
     On(Option<(DVec3, DVec3)>),
 }
 
-/// Reflectance of both polarisations by the angles on both sides. The angle `t` is `None` for total internal
-/// reflection.
+/// Reflectance of both polarisations by the angles on both sides. The angle `t` is `None` for total
+/// internal reflection.
 fn polarised(i: f64, t: Option<f64>, n_i: f64, n_t: f64) -> [f64; 2] {
     let Some(t) = t else { return [1.0; 2] };
     if i < 1e-4 {
@@ -35,7 +35,8 @@ impl Tracer<'_> {
         if body.is_open() { None } else { materials.into_iter().find(|m| m.transmission > 0.0) }
     }
 
-    /// Index and index of refraction of the solid that fills the space at `point`: the one listed last.
+    /// Index and index of refraction of the solid that fills the space at `point`: the one listed
+    /// last.
     fn medium(&self, point: DVec3) -> (Option<usize>, f64) {
         let bodies = self.bodies.iter().enumerate().rev();
         bodies

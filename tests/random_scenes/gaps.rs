@@ -18,8 +18,8 @@ const SAMPLES: u32 = 4;
 /// Allowed effect of the gap on the mean of a block \[8-bit levels\].
 const FLOOR: f64 = 1.0;
 
-/// Shrinks every bounded object slightly about its centre, and moves the eye by a gap in the direction `aside`. Returns
-/// `None` if the sizes of the objects differ too much.
+/// Shrinks every bounded object slightly about its centre, and moves the eye by a gap in the
+/// direction `aside`. Returns `None` if the sizes of the objects differ too much.
 fn with_gaps(mut scene: Scene, numbers: &mut Numbers, aside: DVec3) -> Option<Scene> {
     let (mut widest, mut least) = (0f64, f64::INFINITY);
     for object in &mut scene.objects {

@@ -10,8 +10,8 @@ use zerkalo::world::{AnyWorld, Options, Precision};
 const SEEDS: u64 = 8;
 /// Samples per pixel and replicate.
 const SAMPLES: u32 = 4;
-/// Allowed error of single precision in the mean of a block \[8-bit levels\]. docs/accuracy.md measures 0.12 over a picture
-/// at the worst proportions for which `auto` selects it.
+/// Allowed error of single precision in the mean of a block \[8-bit levels\]. docs/accuracy.md
+/// measures 0.12 over a picture at the worst proportions for which `auto` selects it.
 const FLOOR: f64 = 0.5;
 
 /// Display values of every pixel, for each seed \[8-bit levels\].

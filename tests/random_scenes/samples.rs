@@ -1,5 +1,5 @@
-//! Adaptive and uniform pictures against a reference of other seeds with more samples: equal means, errors as
-//! reported, and no more rays for equal errors.
+//! Adaptive and uniform pictures against a reference of other seeds with more samples: equal means,
+//! errors as reported, and no more rays for equal errors.
 
 use crate::driver::{Verdict, compare, compare_many, many};
 use crate::layouts::Layout;
@@ -20,11 +20,14 @@ const SAMPLES: u32 = 32;
 const REFERENCE: u32 = 128;
 /// Allowed range of the true error over the reported one.
 const HONEST: [f64; 2] = [0.9, 1.15];
-/// Largest squared error of the reference, relative to that of the uniform pictures, which have a 32nd of its samples.
+/// Largest squared error of the reference, relative to that of the uniform pictures, which have a
+/// 32nd of its samples.
 const MAX_REFERENCE_ERROR: f64 = 0.125;
-/// Largest number of rays of an adaptive picture, relative to a uniform one with the same true error.
+/// Largest number of rays of an adaptive picture, relative to a uniform one with the same true
+/// error.
 const MAX_RAY_RATIO: f64 = 1.5;
-/// Number of rays, relative to the uniform picture, at which an adaptive one that has not reached its noise is stopped.
+/// Number of rays, relative to the uniform picture, at which an adaptive one that has not reached
+/// its noise is stopped.
 const STOP_FACTOR: u64 = 4;
 /// Largest deviation of a measurement \[standard errors\].
 const MAX_DEVIATION: f64 = 5.0;
@@ -116,8 +119,9 @@ impl Reference {
         squares.sum::<f64>() / (3 * picture.len()) as f64 - self.error
     }
 
-    /// Returns the largest significant difference of block means. The variance of single samples is the larger one of
-    /// those of the pictures and the reference, because pictures without a rare event underestimate it.
+    /// Returns the largest significant difference of block means. The variance of single samples is
+    /// the larger one of those of the pictures and the reference, because pictures without a rare
+    /// event underestimate it.
     fn differs(&self, name: &str, shots: &[Shot], size: [u32; 2]) -> Option<String> {
         let blocks = blocks(size);
         let mut worst = Worst::new(3 * blocks.len(), SEEDS as usize - 1);

@@ -1,5 +1,5 @@
-//! Reduction of failing scenes: removes keys and list entries and rounds numbers in the text, as long as it is a valid
-//! scene that fails.
+//! Reduction of failing scenes: removes keys and list entries and rounds numbers in the text, as
+//! long as it is a valid scene that fails.
 
 use std::time::{Duration, Instant};
 use toml::{Table, Value};
@@ -31,8 +31,8 @@ pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> String 
     let mut changed = true;
     while changed {
         changed = false;
-        // Large values first: objects before their keys. Last list entries first, so that the indices of the others
-        // stay valid.
+        // Large values first: objects before their keys. Last list entries first, so that the
+        // indices of the others stay valid.
         let mut places = Vec::new();
         walk(&Value::Table(best.clone()), &mut Vec::new(), &mut places);
         places.reverse();

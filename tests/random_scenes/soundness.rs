@@ -1,4 +1,5 @@
-//! Soundness: no panic, no invalid sample, finite noise; equal replicates in scenes without random choices.
+//! Soundness: no panic, no invalid sample, finite noise; equal replicates in scenes without random
+//! choices.
 
 use crate::driver::{Verdict, compare, compare_many};
 use crate::layouts::Layout;

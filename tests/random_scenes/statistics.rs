@@ -1,5 +1,5 @@
-//! Comparison of pictures of several seeds by block means. Seeds are independent: the spread of their means estimates the
-//! error of the overall mean, for every sampler.
+//! Comparison of pictures of several seeds by block means. Seeds are independent: the spread of
+//! their means estimates the error of the overall mean, for every sampler.
 
 use crate::normal::{two_sided_z, z_of_t};
 
@@ -46,12 +46,14 @@ pub struct Worst {
 }
 
 impl Worst {
-    /// Starts a comparison of `count` numbers, whose standard errors have `freedom` degrees of freedom.
+    /// Starts a comparison of `count` numbers, whose standard errors have `freedom` degrees of
+    /// freedom.
     pub fn new(count: usize, freedom: usize) -> Self {
         Self { count: count as f64, freedom: freedom as f64, z: 0.0, what: String::new() }
     }
 
-    /// Records a difference with its standard error. `floor` is the difference that rounding may cause.
+    /// Records a difference with its standard error. `floor` is the difference that rounding may
+    /// cause.
     pub fn note(&mut self, difference: f64, floor: f64, error: f64, what: impl FnOnce() -> String) {
         let excess = (difference.abs() - floor).max(0.0);
         let t = if excess == 0.0 { 0.0 } else { excess / error };

@@ -1,5 +1,6 @@
-//! Light buffer: possible occluders by direction from a light. Shadow rays test these few primitives instead of
-//! traversing the BVH (Haines and Greenberg 1986, *The Light Buffer: A Shadow-Testing Accelerator*).
+//! Light buffer: possible occluders by direction from a light. Shadow rays test these few
+//! primitives instead of traversing the BVH (Haines and Greenberg 1986, *The Light Buffer: A
+//! Shadow-Testing Accelerator*).
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, next_distinct};
@@ -17,8 +18,8 @@ pub(crate) struct LightBuffer<S> {
     projection: LightProjection<S>,
     /// Number of rows and of columns of cells on a face of the projection.
     side: usize,
-    /// Largest coordinate of the occluders and the light. Rays that start at larger coordinates are less exact
-    /// than the bounds assume.
+    /// Largest coordinate of the occluders and the light. Rays that start at larger coordinates are
+    /// less exact than the bounds assume.
     max_coordinate: S,
     /// Cells of all faces, row by row.
     cells: Vec<Cell<S>>,
@@ -50,14 +51,14 @@ struct Entry<S> {
     number: u32,
     /// [`Occluder::exempt_item`], or [`NO_ITEM`].
     exempt_item: u32,
-    /// Smallest depth: the distance from a point light, or the distance against the direction of light from
-    /// the plane through the origin.
+    /// Smallest depth: the distance from a point light, or the distance against the direction of
+    /// light from the plane through the origin.
     near: S,
 }
 
 impl<S: Float> LightBuffer<S> {
-    /// Creates the buffer of a light. Returns `None` if at least half of the occluders do not fit in most of
-    /// their cells.
+    /// Creates the buffer of a light. Returns `None` if at least half of the occluders do not fit
+    /// in most of their cells.
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
         let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match target {
@@ -125,8 +126,8 @@ impl<S: Float> LightBuffer<S> {
         Some(Self { projection, side, max_coordinate: S::from_f64(max_coordinate), cells, entries })
     }
 
-    /// Returns the lanes of `rays` that are occluded, as [`Aggregate::occluded`] does. `candidates` are the possible
-    /// occluders of these rays.
+    /// Returns the lanes of `rays` that are occluded, as [`Aggregate::occluded`] does. `candidates`
+    /// are the possible occluders of these rays.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
@@ -214,7 +215,8 @@ mod tests {
         (0..).zip(balls).map(|(i, ball)| Occluder { ball: *ball, exempt_item: Some(i) }).collect()
     }
 
-    /// Compares the shadows of rays from many points with those of the BVH. Returns the number of occluded rays.
+    /// Compares the shadows of rays from many points with those of the BVH. Returns the number of
+    /// occluded rays.
     fn compare<L: SimdFloat>(
         target: &LightTarget,
         balls: &[BoundingSphere],
@@ -228,7 +230,8 @@ mod tests {
         };
         let mut count = 0;
         for round in 0..3000 {
-            // Points in space, close together, far apart and far away; on the outside of one ball, or of two.
+            // Points in space, close together, far apart and far away; on the outside of one ball,
+            // or of two.
             let (middle, spread) = (random.point(7.0), [0.01, 1.0, 10.0, 1e4, 0.0, 0.0][round % 6]);
             let pair = [0; 2].map(|_| (random.unit() * balls.len() as f64) as usize);
             let ball_of = |lane: usize| if round % 6 == 4 { pair[0] } else { pair[lane % 2] };

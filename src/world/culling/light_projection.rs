@@ -1,4 +1,5 @@
-//! Projections from a light to the cells of its light buffer: cube map, perspective or orthographic.
+//! Projections from a light to the cells of its light buffer: cube map, perspective or
+//! orthographic.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -14,7 +15,8 @@ const MAX_TANGENT: f64 = 3.0;
 pub(crate) enum LightProjection<S> {
     /// Projection from a point light among the primitives onto the six faces of a cube around it.
     CubeMap,
-    /// Projection from a point light on one side of all primitives; the third axis is the view direction.
+    /// Projection from a point light on one side of all primitives; the third axis is the view
+    /// direction.
     Perspective { axes: [[S; 3]; 3], low: [S; 2], scale: [S; 2] },
     /// Projection along the direction of a directional light, onto two axes.
     Orthographic { axes: [[S; 3]; 2], low: [S; 2], scale: [S; 2] },
@@ -26,8 +28,8 @@ impl<S: Float> LightProjection<S> {
         if matches!(self, Self::CubeMap) { 6 } else { 1 }
     }
 
-    /// Returns the cell in which the light sees the rays' origins, and their depth. Points outside of the
-    /// projection get an arbitrary cell. `limit` is the distance to the light.
+    /// Returns the cell in which the light sees the rays' origins, and their depth. Points outside
+    /// of the projection get an arbitrary cell. `limit` is the distance to the light.
     #[inline(always)]
     pub fn lookup<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
         let side = L::from_f64(side as f64);
@@ -116,8 +118,8 @@ impl<S: Float> ProjectedBounds<S> {
     }
 }
 
-/// Smallest and largest x / z of the points of a ball with z > 0. `x` and `z` are the coordinates of its centre. Returns
-/// `None` if there are no such points.
+/// Smallest and largest x / z of the points of a ball with z > 0. `x` and `z` are the coordinates
+/// of its centre. Returns `None` if there are no such points.
 fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     let distance = x.hypot(z);
     if distance <= radius {
@@ -183,7 +185,8 @@ fn orthographic<S: Float>(
     (LightProjection::Orthographic { axes, low, scale }, rects)
 }
 
-/// Returns the offset and the factor that map all rectangles, given by their corners, to [0, 1], and the mapped rectangles.
+/// Returns the offset and the factor that map all rectangles, given by their corners, to [0, 1],
+/// and the mapped rectangles.
 fn normalized<S: Float>(corners: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<FaceRect>>) {
     let low = corners.iter().map(|s| s.0).fold(DVec2::INFINITY, DVec2::min);
     let high = corners.iter().map(|s| s.1).fold(DVec2::NEG_INFINITY, DVec2::max);

@@ -14,13 +14,13 @@ pub(crate) struct ScreenBounds {
 /// Margin for rounding of raster positions in single precision \[pixels\].
 const MARGIN_PX: f64 = 0.25;
 
-/// Relative error of a ray's position on the picture plane at unit distance: eight roundings in single
-/// precision.
+/// Relative error of a ray's position on the picture plane at unit distance: eight roundings in
+/// single precision.
 const MAX_SLANT_ERROR: f64 = 5e-7;
 
 impl ScreenBounds {
-    /// Projects the corners of a form's bounding box. The bounds are infinite if a corner is not in front
-    /// of the eye.
+    /// Projects the corners of a form's bounding box. The bounds are infinite if a corner is not in
+    /// front of the eye.
     pub fn project(form: &Form, camera: &PinholeCamera) -> Self {
         let infinite = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
         let Some((low, high)) = form.bounds() else { return infinite };
@@ -37,8 +37,8 @@ impl ScreenBounds {
             if depth <= 2.0 * ray_error {
                 return infinite;
             }
-            // A displacement by `ray_error` moves a point at distance l from the picture plane's origin
-            // by at most (1 + l) ray_error / (depth - ray_error) on the plane.
+            // A displacement by `ray_error` moves a point at distance l from the picture plane's
+            // origin by at most (1 + l) ray_error / (depth - ray_error) on the plane.
             let length = from_eye.length() / depth;
             let plane_error =
                 (1.0 + length) * ray_error / (depth - ray_error) + MAX_SLANT_ERROR * length;
@@ -74,8 +74,8 @@ pub(crate) struct ScreenGrid {
 }
 
 impl ScreenGrid {
-    /// Creates the grid of a raster of `size` pixels from the indices of primitives, in ascending order, and
-    /// their bounds.
+    /// Creates the grid of a raster of `size` pixels from the indices of primitives, in ascending
+    /// order, and their bounds.
     pub fn new(
         size: [usize; 2],
         primitives: impl IntoIterator<Item = (u32, ScreenBounds)>,
@@ -102,8 +102,8 @@ impl ScreenGrid {
         Self { columns, rows, candidates }
     }
 
-    /// Returns the candidates of a rectangle of the raster, in ascending order; `None` for more than
-    /// [`MAX_PER_CELL`].
+    /// Returns the candidates of a rectangle of the raster, in ascending order; `None` for more
+    /// than [`MAX_PER_CELL`].
     pub fn candidates(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Vec<u32>> {
         let span = |axis: usize, count: usize| {
             let end = (origin[axis] + extent[axis]).div_ceil(CELL_PX);

@@ -1,5 +1,5 @@
-//! Per-tile candidate lists: primitives that primary rays can hit, and possible occluders for each light. In
-//! most tiles one or two primitives are visible and have no occluder.
+//! Per-tile candidate lists: primitives that primary rays can hit, and possible occluders for each
+//! light. In most tiles one or two primitives are visible and have no occluder.
 
 use crate::camera::PinholeCamera;
 use crate::lanes::{Float, SimdFloat};
@@ -40,8 +40,8 @@ pub(crate) enum CullingMode {
 }
 
 impl CullingMode {
-    /// Returns the candidates of camera rays through a rectangle of the raster, and of shadow rays from
-    /// their hit points to `lights` lights; `None` if no primitive is ruled out.
+    /// Returns the candidates of camera rays through a rectangle of the raster, and of shadow rays
+    /// from their hit points to `lights` lights; `None` if no primitive is ruled out.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
@@ -74,17 +74,18 @@ impl CullingMode {
 pub(crate) struct FrustumCuller {
     /// Bounds of each primitive.
     bounds: Vec<BoundingVolume>,
-    /// For each primitive, `true` if it may occlude lights from its own surface: it is concave, or paths can
-    /// be inside.
+    /// For each primitive, `true` if it may occlude lights from its own surface: it is concave, or
+    /// paths can be inside.
     self_shadowing: Vec<bool>,
     /// Position or direction of each light.
     lights: Vec<LightTarget>,
 }
 
 impl FrustumCuller {
-    /// Creates the culler of `forms`, one for each primitive. `eye` is the start of all camera rays; `None`
-    /// if they start elsewhere. `entered` is `true` for each primitive that paths can be inside.
-    /// `max_end_offset` is the largest distance between a light and the end point of its shadow rays.
+    /// Creates the culler of `forms`, one for each primitive. `eye` is the start of all camera
+    /// rays; `None` if they start elsewhere. `entered` is `true` for each primitive that paths can
+    /// be inside. `max_end_offset` is the largest distance between a light and the end point of its
+    /// shadow rays.
     pub fn new<S: Float>(
         forms: Vec<&Form>,
         eye: Option<DVec3>,
@@ -100,8 +101,8 @@ impl FrustumCuller {
             }
             DeltaLight::Directional { wi } => LightTarget::Direction(vector(wi)),
         });
-        // The outside of a convex primitive does not occlude itself. Paths are inside only if they start
-        // there or are transmitted.
+        // The outside of a convex primitive does not occlude itself. Paths are inside only if they
+        // start there or are transmitted.
         let self_shadowing = |(b, entered): (&BoundingVolume, &bool)| {
             let contains_eye = || eye.is_none_or(|eye| b.ball().contains(eye));
             !b.is_convex() || !b.is_flat() && (*entered || contains_eye())

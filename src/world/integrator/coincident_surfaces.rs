@@ -1,15 +1,17 @@
 //! Coincident surfaces, such as the bottom of a glass and the table on which it rests.
 //!
-//! Rounding decides which of two coincident surfaces a ray hits first, and a ray that leaves one of them starts beyond
-//! the others. Where at least one of the surfaces transmits, paths therefore cross them one after the other, as if
-//! there were a gap of zero width between the primitives: a ray leaves the solids that it is inside, crosses flat
-//! primitives, and enters the solids behind. Of solids on the same side of the contact, transparent ones are outside of
-//! opaque ones, and later listed transparent ones outside of earlier ones. Flat transparent primitives are on both sides
-//! of opaque ones.
+//! Rounding decides which of two coincident surfaces a ray hits first, and a ray that leaves one of
+//! them starts beyond the others. Where at least one of the surfaces transmits, paths therefore
+//! cross them one after the other, as if there were a gap of zero width between the primitives: a
+//! ray leaves the solids that it is inside, crosses flat primitives, and enters the solids behind.
+//! Of solids on the same side of the contact, transparent ones are outside of opaque ones, and
+//! later listed transparent ones outside of earlier ones. Flat transparent primitives are on both
+//! sides of opaque ones.
 //!
-//! Each surface has a layer, its position in the order along the ray. Exits of solids have negative layers, entries
-//! positive ones; for a ray of the opposite direction the signs change. Pairs of primitives that may touch are found at
-//! compilation, so that hits on other primitives cost no lookup.
+//! Each surface has a layer, its position in the order along the ray. Exits of solids have negative
+//! layers, entries positive ones; for a ray of the opposite direction the signs change. Pairs of
+//! primitives that may touch are found at compilation, so that hits on other primitives cost no
+//! lookup.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
@@ -17,7 +19,8 @@ use crate::primitive::{Aggregate, Form, PrimitiveId};
 use crate::world::integrator::nested_dielectrics::MediumStack;
 use glam::DVec3;
 
-/// Distance of coincident surfaces, in roundings of the largest coordinate. Parts of compounds have the same.
+/// Distance of coincident surfaces, in roundings of the largest coordinate. Parts of compounds have
+/// the same.
 const TIE: f64 = 16.0;
 
 /// Offset of ray origins from coincident surfaces, in ties.
@@ -58,14 +61,15 @@ impl<S: Float> Contact<S> {
         Self { item, tie: S::from_f64(tie), low, high }
     }
 
-    /// Half the distance within which surfaces are coincident at points with the given [`rounding`].
+    /// Half the distance within which surfaces are coincident at points with the given
+    /// [`rounding`].
     #[inline(always)]
     fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
         rounding.max(L::splat(self.tie))
     }
 
-    /// Mask of lanes whose point may be on the primitive. One tie is the search distance; the other covers the rounding of
-    /// the search, which is far smaller.
+    /// Mask of lanes whose point may be on the primitive. One tie is the search distance; the other
+    /// covers the rounding of the search, which is far smaller.
     #[inline(always)]
     fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
         let distance =
@@ -137,9 +141,10 @@ impl<L: SimdFloat> CoincidentState<L> {
 }
 
 impl<S: Float> Contacts<S> {
-    /// Finds the contacts of `forms`, whose coordinates are rounded to `epsilon` and have the error `input_error` in the
-    /// scene file. `transparent` is `true` for primitives that transmit; `priority_of` are the priorities of the
-    /// transparent solids that they bound. Returns `None` if no transmissive primitive touches another one.
+    /// Finds the contacts of `forms`, whose coordinates are rounded to `epsilon` and have the error
+    /// `input_error` in the scene file. `transparent` is `true` for primitives that transmit;
+    /// `priority_of` are the priorities of the transparent solids that they bound. Returns `None`
+    /// if no transmissive primitive touches another one.
     pub fn new(
         forms: &[Form],
         primitives: &[PrimitiveId],
@@ -187,8 +192,9 @@ impl<S: Float> Contacts<S> {
         Some(Self { contacts, kinds })
     }
 
-    /// Mask of `lanes`, each with a `point` on one of `items`, where another primitive may touch. Most primitives touch
-    /// others in few places only, which the bounding boxes of the others limit.
+    /// Mask of `lanes`, each with a `point` on one of `items`, where another primitive may touch.
+    /// Most primitives touch others in few places only, which the bounding boxes of the others
+    /// limit.
     #[inline(always)]
     pub fn near<L: SimdFloat<Scalar = S>>(
         &self,
@@ -207,8 +213,8 @@ impl<S: Float> Contacts<S> {
         near
     }
 
-    /// Layer of `item` for rays that come from the layer `before`. `leaves` selects rays in the direction of its outward
-    /// normal.
+    /// Layer of `item` for rays that come from the layer `before`. `leaves` selects rays in the
+    /// direction of its outward normal.
     fn layer<L: SimdFloat<Scalar = S>>(&self, item: u32, leaves: L::Mask, before: L) -> L {
         let (kind, layer) = &self.kinds[item as usize];
         let layer = L::splat(*layer);
@@ -220,8 +226,8 @@ impl<S: Float> Contacts<S> {
         L::select(is_negative, -layer, layer)
     }
 
-    /// Finds the first surface behind the one on which rays start, among those that coincide with it. `media` are those of
-    /// the rays.
+    /// Finds the first surface behind the one on which rays start, among those that coincide with
+    /// it. `media` are those of the rays.
     pub fn next<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
@@ -240,8 +246,9 @@ impl<S: Float> Contacts<S> {
         out
     }
 
-    /// Finds the first surface along the rays among that of `coincident`, whose layer is ignored, and those that coincide
-    /// with it. `leaves` selects rays in the direction of its outward normal.
+    /// Finds the first surface along the rays among that of `coincident`, whose layer is ignored,
+    /// and those that coincide with it. `leaves` selects rays in the direction of its outward
+    /// normal.
     pub fn first<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
@@ -286,7 +293,8 @@ impl<S: Float> Contacts<S> {
                 if near.none() {
                     continue;
                 }
-                // The search ray runs along the normal through the point, independent of the angle of the path's ray.
+                // The search ray runs along the normal through the point, independent of the angle
+                // of the path's ray.
                 let tie = contact.tie(rounding);
                 let origin = coincident.axis.mul_add(-tie, coincident.point);
                 let limit = L::select(near, tie + tie, L::from_f64(-1.0));
@@ -330,8 +338,8 @@ fn max_coordinate(form: &Form) -> f64 {
     }
 }
 
-/// Returns the bounding box of a form, infinite where the form is unbounded. Planes perpendicular to an axis are bounded
-/// along it.
+/// Returns the bounding box of a form, infinite where the form is unbounded. Planes perpendicular
+/// to an axis are bounded along it.
 fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
     let (low, high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
     match form {
@@ -347,7 +355,8 @@ fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
     }
 }
 
-/// Returns the pairs of forms for which `wanted` is true and whose bounding boxes overlap or nearly do, sorted.
+/// Returns the pairs of forms for which `wanted` is true and whose bounding boxes overlap or nearly
+/// do, sorted.
 fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
     let mut out = Vec::new();
     let infinite = (DVec3::NEG_INFINITY, DVec3::INFINITY);

@@ -23,8 +23,8 @@ impl FirstHit {
         Self { object: None, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
 }
 
-/// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the same length.
-/// Points are columns and rows of the raster in pixels, with fractions.
+/// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the same
+/// length. Points are columns and rows of the raster in pixels, with fractions.
 pub(crate) fn trace_first_hits<L: SimdFloat>(
     world: &World<L>,
     points: &[[f64; 2]],

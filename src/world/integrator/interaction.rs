@@ -9,8 +9,8 @@ use crate::world::world::World;
 pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     /// Shading normal, on the side from which the rays come.
     pub normal: Vec3<L>,
-    /// Geometric normal, on the side from which the rays come. It differs from `normal` on smooth meshes
-    /// and bump maps only. Light from behind it does not reach the surface.
+    /// Geometric normal, on the side from which the rays come. It differs from `normal` on smooth
+    /// meshes and bump maps only. Light from behind it does not reach the surface.
     pub geometric: Vec3<L>,
     /// Hit points.
     pub point: Vec3<L>,
@@ -117,8 +117,8 @@ pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     })
 }
 
-/// Creates the interactions of a packet that hit several primitives: `first` in its lanes, others in
-/// `remaining`.
+/// Creates the interactions of a packet that hit several primitives: `first` in its lanes, others
+/// in `remaining`.
 #[inline(never)]
 fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

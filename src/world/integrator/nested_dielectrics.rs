@@ -1,10 +1,10 @@
-//! Nested dielectrics with priorities (Schmidt and Budge 2002, *Simple Nested Dielectrics in Ray Traced
-//! Images*).
+//! Nested dielectrics with priorities (Schmidt and Budge 2002, *Simple Nested Dielectrics in Ray
+//! Traced Images*).
 //!
-//! Where transparent solids overlap, the one that the scene lists last has the highest priority and fills
-//! the common space; boundaries of the others are suppressed there. A bubble is therefore listed after its
-//! ball, and water may overlap the wall of a glass that is listed after it. Outside of all solids the index
-//! of refraction is 1.
+//! Where transparent solids overlap, the one that the scene lists last has the highest priority and
+//! fills the common space; boundaries of the others are suppressed there. A bubble is therefore
+//! listed after its ball, and water may overlap the wall of a glass that is listed after it.
+//! Outside of all solids the index of refraction is 1.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, next_distinct};
@@ -15,11 +15,12 @@ use crate::world::integrator::coincident_surfaces::Contacts;
 use crate::world::integrator::interaction::SurfaceInteraction;
 use glam::DVec3;
 
-/// Number of solids around one point that a medium stack holds; of more, it holds those listed last.
+/// Number of solids around one point that a medium stack holds; of more, it holds those listed
+/// last.
 const MAX_NESTING: usize = 4;
 
-/// Priorities of the solids that rays are inside (interior list), in descending order; 0 is no solid. The
-/// solid with the highest priority fills the space.
+/// Priorities of the solids that rays are inside (interior list), in descending order; 0 is no
+/// solid. The solid with the highest priority fills the space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MediumStack<L> {
     priorities: [L; MAX_NESTING],
@@ -132,8 +133,8 @@ pub(crate) struct InterfaceHit<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> NestedDielectrics<L> {
-    /// Compiles the transmissive surfaces of `primitives`, whose BSDFs are `bsdf_of`. Camera rays start in
-    /// `start`. Returns `None` if no BSDF transmits.
+    /// Compiles the transmissive surfaces of `primitives`, whose BSDFs are `bsdf_of`. Camera rays
+    /// start in `start`. Returns `None` if no BSDF transmits.
     pub fn new(
         geometry: &RecenteredGeometry,
         primitives: &[PrimitiveId],
@@ -179,7 +180,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         self.priority_of.iter().map(|priority| *priority > 0).collect()
     }
 
-    /// Returns the media in which camera rays start: the solids whose boundary they first hit from inside.
+    /// Returns the media in which camera rays start: the solids whose boundary they first hit from
+    /// inside.
     pub fn at_start(&self, ray: &Ray<L>) -> MediumStack<L> {
         let mut media = MediumStack::vacuum();
         for (priority, solid) in &self.around_eye {
@@ -207,8 +209,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         L::from_fn(|lane| index_of(priority.lane(lane)))
     }
 
-    /// Returns the hits of `lanes` on transmissive surfaces. `media` are those of the rays; `thin_index` is
-    /// the index of refraction of thin surfaces.
+    /// Returns the hits of `lanes` on transmissive surfaces. `media` are those of the rays;
+    /// `thin_index` is the index of refraction of thin surfaces.
     pub fn cross(
         &self,
         interaction: &SurfaceInteraction<L>,

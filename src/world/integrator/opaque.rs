@@ -1,5 +1,5 @@
-//! Integrator of worlds without transmission: one ray per path and depth, with direct lighting at each hit
-//! (Whitted 1980), reflections sampled from the lobes.
+//! Integrator of worlds without transmission: one ray per path and depth, with direct lighting at
+//! each hit (Whitted 1980), reflections sampled from the lobes.
 
 use crate::bvh::Ray;
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -60,8 +60,8 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool>(
     }
 }
 
-/// Replaces the rays of `path` by reflected rays, whose directions are sampled from the lobes. `bounce` is
-/// the number of reflections before. Returns the lanes with a throughput of at least
+/// Replaces the rays of `path` by reflected rays, whose directions are sampled from the lobes.
+/// `bounce` is the number of reflections before. Returns the lanes with a throughput of at least
 /// [`min_weight`](World::min_weight).
 #[inline(always)]
 pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool>(

@@ -15,7 +15,8 @@ pub struct Radiance<L> {
 pub struct Counts {
     /// Number of rays: camera, shadow, reflected and transmitted.
     pub rays: u64,
-    /// `true` if a path sampled a glossy lobe or chose between reflection and transmission at random.
+    /// `true` if a path sampled a glossy lobe or chose between reflection and transmission at
+    /// random.
     pub glossy: bool,
 }
 
@@ -31,7 +32,8 @@ impl<L: SimdFloat> Path<L> {
     /// Largest throughput. Larger ones saturate the film, and an infinite one times black is NaN.
     const MAX_THROUGHPUT: f64 = (1u64 << 60) as f64;
 
-    /// Returns `throughput` limited to [`Self::MAX_THROUGHPUT`], for mirrors that amplify without bound.
+    /// Returns `throughput` limited to [`Self::MAX_THROUGHPUT`], for mirrors that amplify without
+    /// bound.
     #[inline(always)]
     pub fn bounded(throughput: Vec3<L>) -> Vec3<L> {
         let max = L::from_f64(Self::MAX_THROUGHPUT);

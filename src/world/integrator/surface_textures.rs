@@ -52,8 +52,8 @@ fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
 
 impl<L: SimdFloat> SurfaceTextures<L> {
     /// Compiles the textures and bump maps of `primitives`. `material_of` returns the material of a
-    /// primitive; `origin` is the point of the scene that became the world's origin. Returns `None` if
-    /// no material has a texture or bump map.
+    /// primitive; `origin` is the point of the scene that became the world's origin. Returns `None`
+    /// if no material has a texture or bump map.
     pub fn new<'a>(
         scene: &Scene,
         primitives: &[PrimitiveId],
@@ -123,8 +123,8 @@ impl<L: SimdFloat> SurfaceTextures<L> {
     }
 }
 
-/// Returns texture coordinates: the mesh's own, where `mapping` uses them and the mesh has some, else
-/// those of the projection.
+/// Returns texture coordinates: the mesh's own, where `mapping` uses them and the mesh has some,
+/// else those of the projection.
 fn coordinates<L: SimdFloat>(
     geometry: &Aggregate<L>,
     mapping: &TextureMapping<L::Scalar>,
@@ -148,8 +148,8 @@ fn surface_texture<L: SimdFloat>(
     world.surface_textures.as_ref()?.of_item[item as usize].as_ref()
 }
 
-/// Returns the factor of the BSDF's albedo: vertex colour times texture; `None` if the primitive has
-/// neither.
+/// Returns the factor of the BSDF's albedo: vertex colour times texture; `None` if the primitive
+/// has neither.
 #[inline(never)]
 pub(crate) fn albedo_factor<L: SimdFloat>(
     world: &World<L>,
@@ -166,9 +166,9 @@ pub(crate) fn albedo_factor<L: SimdFloat>(
     Some(vertex_color.map_or(color, |vertex_color| vertex_color.component_mul(color)))
 }
 
-/// Returns the shading normal of surfaces that rays along `direction` hit: interpolated on smooth meshes,
-/// perturbed by bump maps. It lies on the side of `geometric`, the geometric normal on the side of the
-/// rays, and faces them. `front` selects lanes in which `geometric` points outwards.
+/// Returns the shading normal of surfaces that rays along `direction` hit: interpolated on smooth
+/// meshes, perturbed by bump maps. It lies on the side of `geometric`, the geometric normal on the
+/// side of the rays, and faces them. `front` selects lanes in which `geometric` points outwards.
 #[inline(never)]
 pub(crate) fn shading_normal<L: SimdFloat>(
     world: &World<L>,

@@ -13,8 +13,8 @@ use crate::world::integrator::opaque::sample_reflection;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
-/// Number of interfaces, counted from the eye, at which a path splits into reflection and refraction. Beyond
-/// this depth one of the two is chosen at random.
+/// Number of interfaces, counted from the eye, at which a path splits into reflection and
+/// refraction. Beyond this depth one of the two is chosen at random.
 const SPLIT_DEPTH: usize = 2;
 
 /// A packet of path branches.
@@ -26,12 +26,13 @@ struct Branch<L: SimdFloat> {
     media: MediumStack<L>,
     /// Number of surfaces on the path before the ray.
     bounce: u32,
-    /// State of rays that start on one of several coincident surfaces; `None` if there are no such rays.
+    /// State of rays that start on one of several coincident surfaces; `None` if there are no such
+    /// rays.
     coincident: Option<CoincidentState<L>>,
 }
 
-/// Reflected branches that wait for the transmitted branches of the same interface. There is at most one for each
-/// depth.
+/// Reflected branches that wait for the transmitted branches of the same interface. There is at
+/// most one for each depth.
 struct BranchStack<L: SimdFloat> {
     branches: [Option<Branch<L>>; SPLIT_DEPTH],
 }
@@ -68,8 +69,8 @@ pub(crate) struct TransmissionIntegrator<'a, L: SimdFloat> {
 }
 
 impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
-    /// Traces camera rays. In every lane the transmitted branch of an interface is traced before the reflected one,
-    /// independently of the other lanes.
+    /// Traces camera rays. In every lane the transmitted branch of an interface is traced before
+    /// the reflected one, independently of the other lanes.
     #[inline(never)]
     pub fn trace(
         &self,
@@ -95,8 +96,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         }
     }
 
-    /// Traces the rays of `branch`, adds the radiance of their hit points to `out`, and replaces `branch` by its
-    /// continuation. Returns `false` if no path continues.
+    /// Traces the rays of `branch`, adds the radiance of their hit points to `out`, and replaces
+    /// `branch` by its continuation. Returns `false` if no path continues.
     fn advance(
         &self,
         branch: &mut Branch<L>,
@@ -224,10 +225,11 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         lanes.any()
     }
 
-    /// Resolves hits of `lanes` on coincident surfaces: replaces `hit` and `interaction` by those of the surface that
-    /// comes first in the order of layers. `contact_lanes` are those where another primitive may touch; `behind` is the
-    /// surface found behind the one that the rays left, if any. Returns the state of rays that pass the surface; `None`
-    /// if there are no coincident surfaces.
+    /// Resolves hits of `lanes` on coincident surfaces: replaces `hit` and `interaction` by those
+    /// of the surface that comes first in the order of layers. `contact_lanes` are those where
+    /// another primitive may touch; `behind` is the surface found behind the one that the rays
+    /// left, if any. Returns the state of rays that pass the surface; `None` if there are no
+    /// coincident surfaces.
     #[inline(never)]
     fn coincident(
         &self,
@@ -299,8 +301,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             .then(|| self.nested_dielectrics.cross(interaction, transmissive, media, index))
     }
 
-    /// Samples the reflected and transmitted directions of surfaces of which some transmit. `bounce` is the number of
-    /// surfaces before.
+    /// Samples the reflected and transmitted directions of surfaces of which some transmit.
+    /// `bounce` is the number of surfaces before.
     fn split_directions(
         &self,
         path: &Path<L>,
