@@ -168,9 +168,9 @@ pub struct Frame<L> {
 }
 
 impl<L: SimdFloat> Frame<L> {
-    /// Builds a frame around the unit vector `n` without branches. It is continuous except at n.z =
-    /// 0. Around a horizontal vector (n.y = 0) the first tangent is horizontal and the second
-    /// vertical, as are the axes of the lobes of a vertical mirror.
+    /// Builds a frame around the unit vector `n` without branches. It is continuous except where
+    /// `n.z` is 0. Around a horizontal vector (`n.y` is 0) the first tangent is horizontal and the
+    /// second vertical, as are the axes of the lobes of a vertical mirror.
     ///
     /// Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1).
     #[inline(always)]

@@ -101,9 +101,9 @@ pub fn beckmann<L: SimdFloat>(u: L, v: L, alpha: L) -> Vec3<L> {
 /// Inverse of the error function at 2 u - 1, for u in [0, 1), to 4e-7 of its value (in double
 /// precision to 1.4e-7); at 0, where it is infinite, -4.7.
 ///
-/// Form of Giles 2010, *Approximating the erfinv Function*, GPU Computing Gems, chapter 10: (2 u -
-/// 1) times a function of w = -ln(1 - (2 u - 1)^2); polynomials fitted for the least relative error
-/// with w up to 23.
+/// Form of Giles 2010, *Approximating the erfinv Function*, GPU Computing Gems, chapter 10:
+/// (2 u - 1) times a function of `w = -ln(1 - (2 u - 1)^2)`. The polynomials are fitted for the
+/// least relative error with w up to 23.
 #[inline(always)]
 fn erf_inverse<L: SimdFloat>(u: L) -> L {
     const MIDDLE: [f64; 10] = [

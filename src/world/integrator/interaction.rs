@@ -77,7 +77,7 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
 
     /// Returns `direction`, mirrored at the surface where it points into it.
     #[inline(always)]
-    pub fn into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
+    pub fn reflect_into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
         let height = direction.dot(self.geometric).min(L::zero());
         self.geometric.mul_add(height * L::from_f64(-2.0), direction)
     }

@@ -86,7 +86,7 @@ pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool>(
         let sample = bsdf.sample(*strength, lobe, incident, interaction.normal, uv, world.fold);
         let mut direction = sample.direction;
         if !SIMPLE && world.smooth {
-            direction = interaction.into_hemisphere(direction);
+            direction = interaction.reflect_into_hemisphere(direction);
         }
         path.ray.direction = Vec3::select(lanes, direction, path.ray.direction);
         let throughput = Path::bounded(throughput.component_mul(sample.weight));

@@ -363,9 +363,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             directions.reflected_weight = Vec3::select(lanes, weight, directions.reflected_weight);
         }
         if self.world.smooth {
-            directions.reflected = interaction.into_hemisphere(directions.reflected);
+            directions.reflected = interaction.reflect_into_hemisphere(directions.reflected);
             // Directions that stay in front of the surface are mirrored behind it.
-            directions.transmitted = -interaction.into_hemisphere(-directions.transmitted);
+            directions.transmitted = -interaction.reflect_into_hemisphere(-directions.transmitted);
         }
         directions.reflected_weight = Path::bounded(directions.reflected_weight);
         directions.transmitted_weight = Path::bounded(directions.transmitted_weight);
