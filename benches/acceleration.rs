@@ -1,9 +1,9 @@
-//! What each way of keeping rays from things costs, on three scenes: the reflecting tracks, 300 things of
-//! several kinds, a mesh; and how the time per sample grows with the number of things, on the tracks with
-//! fewer and more balls in each row, and in a crowd.
+//! Acceleration structures: time per sample of each structure on three scenes (the reflecting
+//! tracks, 300 objects of several kinds, a mesh), and its growth with the number of objects, on the
+//! tracks with fewer and more balls in each row, and in a crowd.
 //!
-//! `cargo bench --bench acceleration`. One core; all ways of a scene take turns, and the least of five
-//! times counts.
+//! `cargo bench --bench acceleration`. One core. The structures alternate on each scene; the least
+//! of five times counts.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -13,19 +13,19 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
-use zerkalo::render::pass;
+use zerkalo::render::pass::{self, PassContext};
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Acceleration, Document, Object, Scene};
 use zerkalo::shape::{Shape, Sphere};
 use zerkalo::world::{AnyWorld, Options};
 
-/// The size of the tracks' picture, where their balls are counted.
+/// Picture size of the tracks with varying numbers of balls.
 const SIZE: [u32; 2] = [640, 480];
-/// The size of all other pictures.
+/// Size of all other pictures.
 const SMALL: [u32; 2] = [320, 240];
 
-/// Samples in every pixel.
+/// Samples per pixel.
 const SAMPLES: u32 = 8;
 
 /// A compiled scene and a film for it.
@@ -51,27 +51,27 @@ impl Bench {
         Self { world, film, estimator, pool }
     }
 
-    /// One wave, on this thread, tile by tile.
+    /// Traces one wave on this thread, tile by tile.
     fn trace(&mut self) {
         let sampling = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
         self.film.restart();
         for tile in 0..self.film.tile_count() as u32 {
             let jobs = vec![Job { tile, first: 8, count: SAMPLES }];
             let wave = Wave { replicate: 0, jobs, estimate: false };
-            let go = AtomicBool::new(false);
-            let (film, estimator) = (&mut self.film, &self.estimator);
-            pass::run(&self.world, film, &wave, &sampling, estimator, &self.pool, &go);
+            let cancel = AtomicBool::new(false);
+            let context = PassContext { sampling: &sampling, pool: &self.pool, cancel: &cancel };
+            pass::run(&self.world, &mut self.film, &wave, &self.estimator, context);
         }
     }
 }
 
-/// Nanoseconds per sample of each.
+/// Nanoseconds per sample of each bench.
 fn times(mut benches: Vec<Bench>) -> Vec<f64> {
     let samples = benches[0].film.width() * benches[0].film.height() * SAMPLES as usize;
     let mut traces: Vec<_> = benches.iter_mut().map(|b| move || b.trace()).collect();
-    let mut ways: Vec<&mut dyn FnMut()> =
+    let mut runs: Vec<&mut dyn FnMut()> =
         traces.iter_mut().map(|t| t as &mut dyn FnMut()).collect();
-    in_turns(5, &mut ways).into_iter().map(|seconds| seconds / samples as f64 * 1e9).collect()
+    in_turns(5, &mut runs).into_iter().map(|seconds| seconds / samples as f64 * 1e9).collect()
 }
 
 const ROOM: &str = r#"
@@ -87,7 +87,8 @@ diffuse = 0.2
 reflection = 0.7
 "#;
 
-/// `count` things of the kinds that `shapes` describes at the origin, about 1 large, in the unit ball.
+/// Scene with `count` objects in the unit ball. `shapes` are their descriptions, at the origin and
+/// of about unit size.
 fn crowd(count: usize, shapes: &[&str]) -> Scene {
     let mut random = Random(11);
     let mut text = ROOM.to_string();
@@ -112,8 +113,8 @@ fn crowd(count: usize, shapes: &[&str]) -> Scene {
 
 const BALL: &str = "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }";
 
-/// The reflecting tracks with `4 n n` small balls instead of 400: `4 n` rows of `n`, spread over the same
-/// curves, as large as leaves them the same share of the picture.
+/// The reflecting tracks with `4 n n` small balls instead of 400: `4 n` rows of `n`, distributed
+/// over the same curves, with a radius that keeps their share of the picture.
 fn tracks(scene: &Scene, n: usize) -> Scene {
     let mut scene = scene.clone();
     let [mirror, ball, ..] = &scene.objects[..] else { panic!("no tracks") };
@@ -131,10 +132,12 @@ fn tracks(scene: &Scene, n: usize) -> Scene {
     scene
 }
 
-/// Prints nanoseconds per sample of scenes with some numbers of spheres, by `auto` and in a tree.
+/// Prints nanoseconds per sample by number of spheres, with `auto` and in a BVH.
 fn growth(scenes: &[(usize, Scene)], size: [u32; 2]) {
-    let of = |by| times(scenes.iter().map(|(_, s)| Bench::new(s, by, size)).collect());
-    let [auto, tree] = [Acceleration::Auto, Acceleration::Bvh].map(of);
+    let times_with = |acceleration| {
+        times(scenes.iter().map(|(_, s)| Bench::new(s, acceleration, size)).collect())
+    };
+    let [auto, tree] = [Acceleration::Auto, Acceleration::Bvh].map(times_with);
     let hundred = scenes.iter().position(|(n, _)| *n == 100).expect("a hundred");
     for (((count, _), time), tree) in scenes.iter().zip(&auto).zip(&tree) {
         println!("  {count:6}: {time:8.0} ({:5.2}) {tree:8.0}", time / auto[hundred]);
@@ -154,7 +157,7 @@ fn main() {
     };
     let scenes = [
         ("reflecting tracks, 401 spheres", file("reflecting-tracks.toml")),
-        ("300 things of four kinds", crowd(300, &kinds)),
+        ("300 objects of four kinds", crowd(300, &kinds)),
         ("a mesh on a floor", file("shape-mesh.toml")),
     ];
     println!("nanoseconds per sample (times that of auto), {} x {}:", SMALL[0], SMALL[1]);
@@ -167,7 +170,7 @@ fn main() {
         all.iter().for_each(|t| print!(" {:>8.0} ({:5.2})", t, t / all[0]));
         println!();
     }
-    println!("nanoseconds per sample by number of spheres (times that of 100), in a tree:");
+    println!("nanoseconds per sample by number of spheres (times that of 100), in a BVH:");
     println!("the reflecting tracks, {} x {}", SIZE[0], SIZE[1]);
     let all = [3, 5, 7, 10, 16, 28, 50].map(|n| (4 * n * n, tracks(&scenes[0].1, n)));
     growth(&all, SIZE);

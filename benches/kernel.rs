@@ -1,5 +1,5 @@
-//! The kernel: intersection per kind and lane type, list against tree, whole paths of the physical
-//! mirror room per lane type, sampler, compilation of a scene, one wave of the pass.
+//! Kernel: intersection by kind and lane type, linear list against BVH, whole paths of the physical
+//! mirror room by lane type, sampler, compilation of a scene, one wave of the pass.
 //!
 //! `cargo bench --bench kernel`. Throughput counts lanes, so that instances compare directly.
 
@@ -11,7 +11,7 @@ use zerkalo::bvh::Ray;
 use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
 use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo::primitive::{Aggregate, Form};
-use zerkalo::render::pass;
+use zerkalo::render::pass::{self, PassContext};
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
@@ -24,7 +24,7 @@ fn physical() -> Scene {
     Scene::parse(text, "mirror-room-physical.toml").expect("a shipped scene")
 }
 
-/// A small repeatable generator for test geometry (splitmix64), uniform in [0, 1).
+/// Random generator for test geometry (splitmix64), uniform in [0, 1).
 struct Random(u64);
 
 impl Random {
@@ -45,8 +45,7 @@ impl Random {
         }
     }
 
-    /// A packet of rays from a sphere of radius 4 towards points within 1 of the origin, lanes
-    /// near each other.
+    /// Coherent packet of rays from a sphere of radius 4 towards points within 1 of the origin.
     fn rays<L: SimdFloat>(&mut self) -> Ray<L> {
         let (from, to) = (4.0 * self.direction(), self.direction() * self.next());
         let mut lane = || to + 0.02 * self.direction() - from;
@@ -89,7 +88,7 @@ fn kinds(c: &mut Criterion) {
     }
 }
 
-/// `n` spheres in a unit ball: as a list and in a tree.
+/// Spheres in a unit ball, in a linear list and in a BVH.
 fn list_or_tree(c: &mut Criterion) {
     for n in [8, 16, 24, 32, 64, 256, 4096] {
         let mut random = Random(n as u64);
@@ -115,8 +114,8 @@ fn list_or_tree(c: &mut Criterion) {
     }
 }
 
-/// Sixteen samples in every pixel of a small physical mirror room on one thread, into the film: what
-/// the lanes bring to a whole render.
+/// Sixteen samples per pixel of a small physical mirror room on one thread, into the film: the gain
+/// of the lanes in a whole render.
 fn paths<L: SimdFloat>(c: &mut Criterion) {
     let mut scene = physical();
     scene.film.size = [160, 120];
@@ -135,8 +134,9 @@ fn paths<L: SimdFloat>(c: &mut Criterion) {
     group.bench_function(name::<L>(), |b| {
         b.iter(|| {
             film.restart();
-            let go = AtomicBool::new(false);
-            pass::run_typed(&world, &mut film, &wave, &SAMPLING, &estimator, &pool, &go)
+            let cancel = AtomicBool::new(false);
+            let context = PassContext { sampling: &SAMPLING, pool: &pool, cancel: &cancel };
+            pass::run_typed(&world, &mut film, &wave, &estimator, context)
         })
     });
 }
@@ -162,7 +162,7 @@ fn compile(c: &mut Criterion) {
     c.bench_function("compile the mirror room", |b| b.iter(|| AnyWorld::compile(&scene, &options)));
 }
 
-/// One wave of 8 samples in every pixel of 640x480, on one thread.
+/// One wave of 8 samples per pixel of 640x480, on one thread.
 fn wave(c: &mut Criterion) {
     let scene = physical();
     let mut group = c.benchmark_group("wave of 8 samples, 640x480");
@@ -187,8 +187,9 @@ fn wave(c: &mut Criterion) {
             b.iter_batched_ref(
                 || Film::new(header.clone()),
                 |film| {
-                    let go = AtomicBool::new(false);
-                    pass::run(&world, film, &wave, &SAMPLING, &estimator, &pool, &go)
+                    let cancel = AtomicBool::new(false);
+                    let context = PassContext { sampling: &SAMPLING, pool: &pool, cancel: &cancel };
+                    pass::run(&world, film, &wave, &estimator, context)
                 },
                 BatchSize::PerIteration,
             )

@@ -1,7 +1,7 @@
-//! What packets give over single rays, kind by kind: closest hits per second of packets and of the same
-//! kernel one lane wide, and the samples of a scene with glass.
+//! Packets against single rays: closest hits per second by kind, in packets and with the same
+//! kernel of width 1, and samples per second of whole scenes.
 //!
-//! `cargo bench --bench packets`. One core; a kind's instances take turns.
+//! `cargo bench --bench packets`. One core; the instances of a kind alternate.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -17,21 +17,22 @@ use zerkalo::bvh::Ray;
 use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
 use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo::primitive::{Aggregate, Form};
-use zerkalo::render::pass;
+use zerkalo::render::pass::{self, PassContext};
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Document, Scene};
 use zerkalo::shape::EXAMPLES;
 use zerkalo::world::World;
 
-/// Rays of each measurement.
+/// Number of rays of each measurement.
 const RAYS: usize = 1 << 15;
 
-/// Times that they are traced.
+/// Number of times that they are traced.
 const ROUNDS: usize = 8;
 
-/// Rays from a sphere around the form towards its box, eight neighbours at a time.
-fn lines(form: &Form) -> Vec<([f64; 3], [f64; 3])> {
+/// Origins and directions from a sphere around the form towards its bounding box, eight neighbours
+/// at a time.
+fn rays_towards(form: &Form) -> Vec<([f64; 3], [f64; 3])> {
     let mut random = Random(3);
     let (low, high) = form.bounds().unwrap_or_else(|| (-glam::DVec3::ONE, glam::DVec3::ONE));
     let (middle, size) = (0.5 * (low + high), (high - low).length());
@@ -48,25 +49,25 @@ fn lines(form: &Form) -> Vec<([f64; 3], [f64; 3])> {
     out
 }
 
-/// Something that traces the lines.
-fn tracer<L: SimdFloat>(form: &Form, lines: &[([f64; 3], [f64; 3])]) -> impl FnMut() + use<L> {
+/// Creates a function that traces the rays.
+fn tracer<L: SimdFloat>(form: &Form, rays: &[([f64; 3], [f64; 3])]) -> impl FnMut() + use<L> {
     let geometry = Aggregate::<L>::with_tree(std::slice::from_ref(form), false);
     let vector = |v: [f64; 3]| v.map(L::Scalar::from_f64);
-    let packet = |lines: &[([f64; 3], [f64; 3])]| Ray::<L> {
-        origin: Vec3::from_fn(|i| vector(lines[i].0)),
-        direction: Vec3::from_fn(|i| vector(lines[i].1)),
+    let packet = |rays: &[([f64; 3], [f64; 3])]| Ray::<L> {
+        origin: Vec3::from_fn(|i| vector(rays[i].0)),
+        direction: Vec3::from_fn(|i| vector(rays[i].1)),
     };
-    let rays: Vec<_> = lines.chunks_exact(L::WIDTH).map(packet).collect();
+    let packets: Vec<_> = rays.chunks_exact(L::WIDTH).map(packet).collect();
     move || {
         for _ in 0..ROUNDS {
-            for ray in &rays {
+            for ray in &packets {
                 black_box(geometry.closest(black_box(ray), geometry.all()));
             }
         }
     }
 }
 
-/// Something that traces eight samples in every pixel, tile by tile.
+/// Creates a function that traces eight samples per pixel, tile by tile.
 fn renderer<L: SimdFloat>(scene: &Scene) -> impl FnMut() + use<L> {
     let world = World::<L>::new(scene);
     let scales = world.scales().to_vec();
@@ -82,8 +83,9 @@ fn renderer<L: SimdFloat>(scene: &Scene) -> impl FnMut() + use<L> {
         for tile in 0..film.tile_count() as u32 {
             let jobs = vec![Job { tile, first: 8, count: 8 }];
             let wave = Wave { replicate: 0, jobs, estimate: false };
-            let go = AtomicBool::new(false);
-            pass::run_typed(&world, &mut film, &wave, &sampling, &estimator, &pool, &go);
+            let cancel = AtomicBool::new(false);
+            let context = PassContext { sampling: &sampling, pool: &pool, cancel: &cancel };
+            pass::run_typed(&world, &mut film, &wave, &estimator, context);
         }
     }
 }
@@ -111,30 +113,30 @@ fn main() {
     let scene_from_mesh = DAffine3::IDENTITY;
     forms.push(("mesh of 69,692", Form::Mesh { mesh, scene_from_mesh, smooth: false }));
     for (name, form) in &forms {
-        let lines = lines(form);
-        let mut ways = (
-            tracer::<Single>(form, &lines),
-            tracer::<Double>(form, &lines),
-            tracer::<f32>(form, &lines),
-            tracer::<f64>(form, &lines),
+        let rays = rays_towards(form);
+        let mut tracers = (
+            tracer::<Single>(form, &rays),
+            tracer::<Double>(form, &rays),
+            tracer::<f32>(form, &rays),
+            tracer::<f64>(form, &rays),
         );
-        let ways: &mut [&mut dyn FnMut()] =
-            &mut [&mut ways.0, &mut ways.1, &mut ways.2, &mut ways.3];
-        row(name, (lines.len() * ROUNDS) as f64 * 1e-6, &in_turns(5, ways));
+        let tracers: &mut [&mut dyn FnMut()] =
+            &mut [&mut tracers.0, &mut tracers.1, &mut tracers.2, &mut tracers.3];
+        row(name, (rays.len() * ROUNDS) as f64 * 1e-6, &in_turns(5, tracers));
     }
     println!("samples");
     for name in ["mirror-room-physical", "transmission", "water-glass", "reflecting-tracks"] {
         let path = Path::new("scenes").join(name).with_extension("toml");
         let mut scene = Document::read(&path).unwrap_or_else(|e| panic!("{e}")).scene().clone();
         scene.film.size = [160, 120];
-        let mut ways = (
+        let mut tracers = (
             renderer::<Single>(&scene),
             renderer::<Double>(&scene),
             renderer::<f32>(&scene),
             renderer::<f64>(&scene),
         );
-        let ways: &mut [&mut dyn FnMut()] =
-            &mut [&mut ways.0, &mut ways.1, &mut ways.2, &mut ways.3];
-        row(name, 160.0 * 120.0 * 8.0 * 1e-6, &in_turns(5, ways));
+        let tracers: &mut [&mut dyn FnMut()] =
+            &mut [&mut tracers.0, &mut tracers.1, &mut tracers.2, &mut tracers.3];
+        row(name, 160.0 * 120.0 * 8.0 * 1e-6, &in_turns(5, tracers));
     }
 }

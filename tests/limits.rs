@@ -1,4 +1,4 @@
-//! What the program says about the limits of its paths, held against pictures without them.
+//! Reported truncation bias of `depth` and `min_weight`, against pictures without these limits.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -14,28 +14,31 @@ use zerkalo::world::{self, AnyWorld, Precision};
 
 const SAMPLES: u32 = 4;
 
-/// What is said of a limit.
+/// Reported bias of a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Told {
-    Nothing,
-    BoundingVolume(f64),
-    NoBound,
+enum Bias {
+    /// Not reported.
+    Zero,
+    /// At most this radiance, for surfaces of unit radiance.
+    AtMost(f64),
+    /// Reported without a bound.
+    Unbounded,
 }
 
-fn told(scene: &Scene, limit: &str) -> Told {
+fn reported_bias(scene: &Scene, limit: &str) -> Bias {
     let all = AnyWorld::compile(scene, &world::Options::default()).biases();
-    let Some(text) = all.iter().find(|text| text.starts_with(limit)) else { return Told::Nothing };
+    let Some(text) = all.iter().find(|text| text.starts_with(limit)) else { return Bias::Zero };
     match text.split_once("at most ") {
-        Some((_, rest)) => Told::BoundingVolume(rest.split(' ').next().unwrap().parse().unwrap()),
-        None => Told::NoBound,
+        Some((_, rest)) => Bias::AtMost(rest.split(' ').next().unwrap().parse().unwrap()),
+        None => Bias::Unbounded,
     }
 }
 
-/// A random scene in which no surface is brighter than the number beside it.
+/// Draws a random scene, and returns it with the largest radiance of its surfaces.
 fn random(seed: u64) -> (Scene, f64) {
     let mut numbers = Numbers::new(seed);
     let n = &mut numbers;
-    let things = 1 + [0, 0, 1, 2][n.below(4)];
+    let objects = 1 + [0, 0, 1, 2][n.below(4)];
     let near = [0.0, 0.0, 0.0, 0.5][n.below(4)];
     let depth = [0, 1, 1, 2, 3, 5, 8][n.below(7)];
     let least = [0.0, 0.0, 0.01, 0.2][n.below(4)];
@@ -49,8 +52,8 @@ fn random(seed: u64) -> (Scene, f64) {
         n.between(20.0, 70.0),
         (n.direction() * 6.0).to_array(),
     );
-    for i in 0..2 * things {
-        // Of the second half parts are made.
+    for i in 0..2 * objects {
+        // Parts of compounds have materials of the second half.
         let mut lines = vec![
             format!("color = [{:?}, {:?}, 0.9]", n.unit(), n.unit()),
             format!("specular = {:?}", [0.0, 0.5][n.below(2)]),
@@ -81,24 +84,24 @@ fn random(seed: u64) -> (Scene, f64) {
         }
         write!(text, "[materials.m{i}]\n{}\n", lines.join("\n")).unwrap();
     }
-    for i in 0..things {
+    for i in 0..objects {
         let (_, example) = EXAMPLES[n.below(EXAMPLES.len())];
         // Parts get the materials of the second half.
-        let own = format!("material = \"m{}\", shape.", things + i);
-        let example = example.replacen("{ shape.", &format!("{{ {own}"), 1);
+        let part_key = format!("material = \"m{}\", shape.", objects + i);
+        let example = example.replacen("{ shape.", &format!("{{ {part_key}"), 1);
         let example = example.replace("knot.ply", "stone.obj");
-        let at = n.in_cube(if things == 1 { 0.0 } else { 1.0 });
+        let position = n.in_cube(if objects == 1 { 0.0 } else { 1.0 });
         write!(
             text,
             "[[object]]\nmaterial = \"m{i}\"\n{example}\n\
              transform = [{{ rotate_x = {:?} }}, {{ translate = {:?} }}]\n",
             n.between(-180.0, 180.0),
-            at.to_array(),
+            position.to_array(),
         )
         .unwrap();
     }
     let scene = parsed(&text);
-    // Ambient light and half as much from the lamp, a highlight, the background.
+    // Ambient light, half as much from the light, and a highlight.
     (scene, 1.0 + 0.5 + 0.25)
 }
 
@@ -106,10 +109,11 @@ fn values(scene: &Scene) -> Vec<f64> {
     picture(&rendered(scene, 3, Precision::Single, SAMPLES), Replicates::Both).concat()
 }
 
-fn apart(a: &[f64], b: &[f64]) -> f64 {
+fn max_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
+/// Returns the scene with a larger depth.
 fn deeper(scene: &Scene) -> Scene {
     let mut deeper = scene.clone();
     deeper.trace.max_depth = 2 * scene.trace.max_depth + 7;
@@ -125,18 +129,24 @@ fn checked(seeds: std::ops::Range<u64>) {
         unweighted.trace.min_throughput = 0.0;
         let others = [("max_depth", deeper(&scene)), ("min_throughput", unweighted)];
         for (row, (limit, other)) in others.iter().enumerate() {
-            let off = apart(&picture, &values(other));
-            match told(&scene, limit) {
-                Told::Nothing => {
+            let difference = max_difference(&picture, &values(other));
+            match reported_bias(&scene, limit) {
+                Bias::Zero => {
                     counts[row][0] += 1;
-                    assert!(off == 0.0, "seed {seed}: {limit} cuts {off:e}, not a word of it");
+                    assert!(
+                        difference == 0.0,
+                        "seed {seed}: {limit} cuts {difference:e}, unreported"
+                    );
                 }
-                Told::BoundingVolume(bound) => {
+                Bias::AtMost(bound) => {
                     counts[row][1] += 1;
                     let allowed = bound * brightest * (1.0 + 1e-4) + 1e-7;
-                    assert!(off <= allowed, "seed {seed}: {limit} cuts {off:e} of {bound:e}");
+                    assert!(
+                        difference <= allowed,
+                        "seed {seed}: {limit} cuts {difference:e} of {bound:e}"
+                    );
                 }
-                Told::NoBound => counts[row][2] += 1,
+                Bias::Unbounded => counts[row][2] += 1,
             }
         }
     }
@@ -145,19 +155,20 @@ fn checked(seeds: std::ops::Range<u64>) {
 }
 
 #[test]
-fn what_is_said_of_the_limits_holds() {
+fn reported_truncation_bias_holds() {
     checked(0..400);
 }
 
 #[test]
 #[ignore = "takes minutes"]
-fn what_is_said_of_the_limits_holds_in_many_more_scenes() {
+fn reported_truncation_bias_holds_in_many_scenes() {
     checked(400..6000);
 }
 
-/// A lone ball that light enters: bumps, and rounding at its rim, keep some of it inside.
+/// Light stays inside a single glass ball because of bumps, and because of rounding at its
+/// silhouette.
 #[test]
-fn a_lone_glass_ball_is_cut_by_depth() {
+fn single_glass_ball_has_unbounded_depth_bias() {
     let text = |more: &str, camera: &str| {
         format!(
             "film = {{ size = [24, 18], filter = \"point\" }}\ntrace.max_depth = 2
@@ -171,9 +182,13 @@ fn a_lone_glass_ball_is_cut_by_depth() {
     let bump = "bump.image = { file = \"scenes/textures/brick-heights.png\", height = 0.3 }";
     let whole = "eye = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]";
     let bumped = parsed(&text(bump, whole));
-    let off = apart(&values(&bumped), &values(&deeper(&bumped)));
-    assert!(off > 0.01 && told(&bumped, "max_depth") == Told::NoBound, "{off}");
-    // The rim as seen from the eye: at cos = 1/5 from the axis. There rounding decides whether light gets out.
+    let difference = max_difference(&values(&bumped), &values(&deeper(&bumped)));
+    assert!(
+        difference > 0.01 && reported_bias(&bumped, "depth") == Bias::Unbounded,
+        "{difference}"
+    );
+    // The silhouette is at cos = 1/5 from the axis. There rounding decides if light leaves the
+    // ball.
     let mut numbers = Numbers::new(4);
     let (mut cut, rounds) = (0, 240);
     for round in 0..rounds {
@@ -189,17 +204,17 @@ fn a_lone_glass_ball_is_cut_by_depth() {
             axis.cross(across).to_array()
         );
         let rim =
-            parsed(&text(&format!("ior = {index:?}"), &camera).replace("\"point\"", "\"box\""));
-        assert!(told(&rim, "max_depth") == Told::NoBound);
-        cut += u32::from(apart(&values(&rim), &values(&deeper(&rim))) > 0.0);
+            parsed(&text(&format!("index = {index:?}"), &camera).replace("\"center\"", "\"box\""));
+        assert!(reported_bias(&rim, "depth") == Bias::Unbounded);
+        cut += u32::from(max_difference(&values(&rim), &values(&deeper(&rim))) > 0.0);
     }
-    println!("at the rim depth 2 cuts something in {cut} of {rounds} pictures");
-    assert!(cut > rounds as u32 / 10, "rounding at the rim is told of, but does not happen");
+    println!("at the silhouette depth 2 has an effect in {cut} of {rounds} pictures");
+    assert!(cut > rounds as u32 / 10, "rounding at the silhouette is reported, but does not occur");
 }
 
-/// A flat or convex mirror alone is met once, whatever the angle.
+/// A path hits a single flat or convex mirror once, at any angle.
 #[test]
-fn a_lone_mirror_is_met_once() {
+fn single_mirror_has_no_depth_bias() {
     let mut numbers = Numbers::new(9);
     let mut worst = Vec::new();
     let kinds = ["plane", "rectangle", "platform", "box", "sphere", "cylinder", "cone", "prism"];
@@ -219,19 +234,19 @@ fn a_lone_mirror_is_met_once() {
             numbers.between(0.0, 180.0)
         );
         let mut scene = parsed(&text);
-        if told(&scene, "max_depth") != Told::Nothing {
+        if reported_bias(&scene, "depth") != Bias::Zero {
             continue;
         }
-        // Along the surface: its plane, seen at a grazing angle and so narrowly that all pixels graze.
+        // Grazing view along the surface.
         if round % 2 == 1
             && let Some((low, high)) = scene.objects[0].form().bounds()
         {
             let corner = if numbers.below(2) == 0 { low } else { high };
             scene.camera.target = Some(corner.to_array());
         }
-        let off = apart(&values(&scene), &values(&deeper(&scene)));
-        if off > 0.0 {
-            worst.push(format!("{round}: {kind}, {lobe}: {off:e}"));
+        let difference = max_difference(&values(&scene), &values(&deeper(&scene)));
+        if difference > 0.0 {
+            worst.push(format!("{round}: {kind}, {lobe}: {difference:e}"));
         }
     }
     assert!(worst.is_empty(), "{}", worst.join("\n"));

@@ -2,7 +2,7 @@
 
 use crate::lanes::{Mask, SimdFloat, Vec3};
 
-/// A packet of half-lines.
+/// A packet of rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray<L> {
     /// Origins.
@@ -18,52 +18,53 @@ impl<L: SimdFloat> Ray<L> {
         self.direction.mul_add(t, self.origin)
     }
 
-    /// Whether the rays of some lanes, at least one, differ by no more than `turn` in direction (length
-    /// of the difference of unit vectors) and `shift` in any coordinate of the origin.
+    /// Returns `true` if the rays of `lanes`, at least one, are coherent: they differ by at most
+    /// `max_turn` in direction (length of the difference of unit vectors) and `max_shift` in any
+    /// coordinate of the origin.
     #[inline(always)]
-    pub(crate) fn spread(&self, lanes: u32, turn: f64, shift: f64) -> bool {
+    pub(crate) fn is_coherent(&self, lanes: u32, max_turn: f64, max_shift: f64) -> bool {
         let lane = lanes.trailing_zeros() as usize;
-        let turned = self.direction - Vec3::splat(self.direction.lane(lane));
-        let shifted = self.origin - Vec3::splat(self.origin.lane(lane));
-        let near = turned.length_squared().le(L::from_f64(turn * turn))
-            & shifted.max_abs().le(L::from_f64(shift));
+        let turn = self.direction - Vec3::splat(self.direction.lane(lane));
+        let shift = self.origin - Vec3::splat(self.origin.lane(lane));
+        let near = turn.length_squared().le(L::from_f64(max_turn * max_turn))
+            & shift.max_abs().le(L::from_f64(max_shift));
         near.bits() & lanes == lanes
     }
 }
 
-/// The nearest crossing found so far.
+/// Closest hits found so far.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit<L> {
-    /// Distance along the ray; `L::MAX`: nothing met.
+    /// Distance along the ray; `L::MAX` for a miss.
     pub t: L,
-    /// Tag of the item met; meaningless where nothing was.
+    /// Id of the primitive; undefined for a miss.
     pub item: L,
-    /// Tag of the triangle of a mesh met; meaningless elsewhere.
+    /// Id of the triangle, if the primitive is a mesh; undefined elsewhere.
     pub triangle: L,
 }
 
 impl<L: SimdFloat> Hit<L> {
-    /// Nothing met.
+    /// Misses in all lanes.
     #[inline(always)]
     pub fn none() -> Self {
         Self::with_t_max(L::from_f64(L::MAX))
     }
 
-    /// Nothing met yet, and nothing to be met at `t` or beyond.
+    /// An empty hit that accepts distances below `t` only; inactive lanes get a negative `t`.
     #[inline(always)]
     pub(crate) fn with_t_max(t: L) -> Self {
         Self { t, item: L::from_id(0), triangle: L::from_id(0) }
     }
 
-    /// Takes a distance and the tags of an item and a triangle in `lanes`, whatever is known there.
+    /// Replaces distance and ids of primitive and triangle in `lanes`.
     #[inline(always)]
-    pub fn take_in(&mut self, lanes: L::Mask, t: L, (item, facet): (L, L)) {
+    pub fn take_in(&mut self, lanes: L::Mask, t: L, (item, triangle): (L, L)) {
         self.t = L::select(lanes, t, self.t);
         self.item = L::select(lanes, item, self.item);
-        self.triangle = L::select(lanes, facet, self.triangle);
+        self.triangle = L::select(lanes, triangle, self.triangle);
     }
 
-    /// Takes `t` and `item` where `t` is positive, nearer than what is known, and `mask` is true.
+    /// Accepts `t` and `item` in lanes of `mask` where `t` is positive and closer.
     #[inline(always)]
     pub(crate) fn keep_closer(&mut self, mask: L::Mask, t: L, item: u32) {
         let nearer = mask & t.gt(L::zero()) & t.lt(self.t);
@@ -71,12 +72,12 @@ impl<L: SimdFloat> Hit<L> {
         self.item = L::select(nearer, L::from_id(item), self.item);
     }
 
-    /// Takes `other` where it is nearer, or as near with a lower tag.
+    /// Accepts `other` where it is closer, or equally close with a smaller id.
     #[inline(always)]
     pub(crate) fn merge(&mut self, other: &Self) {
         let mut nearer = other.t.lt(self.t);
         let tie = (other.t.le(self.t) & other.t.lt(L::from_f64(L::MAX))).and_not(nearer);
-        // Rare; and tags are subnormal as floats, which some processors compare slowly.
+        // Rare. Ids are subnormal numbers as floats, which some processors compare slowly.
         if tie.any() {
             nearer = nearer | (tie & other.item.lt(self.item));
         }

@@ -1,18 +1,19 @@
-//! The numbers that kernels are written in.
+//! SIMD lanes: floats, masks and integers in which kernels are written.
 //!
-//! A kernel (intersection, shading, sampling) is written once, generic over [`SimdFloat`]: a vector of
-//! `WIDTH` floats that are computed side by side. Instances:
+//! A kernel (intersection, shading, sampling) is written once, generic over [`SimdFloat`]: a vector
+//! of `WIDTH` floats. Instances:
 //!
 //! | type | precision | width | use |
 //! |---|---|---|---|
 //! | `wide::f32x8` | single | 8 | production, speed |
 //! | `wide::f64x4` | double | 4 | production, accuracy |
-//! | `wide::f32x16`, `wide::f64x8` | both | 16, 8 | the same two when built for AVX-512 |
-//! | `f32`, `f64` | both | 1 | tests, benches, and kinds that resist packets |
+//! | `wide::f32x16`, `wide::f64x8` | both | 16, 8 | production when built for AVX-512 |
+//! | `f32`, `f64` | both | 1 | tests, benches, and primitives without packet kernels |
 //!
-//! All operations up to `sqrt` are IEEE operations, so that every instance of one precision gives the
-//! same bits; [`SimdFloat::mul_add`] is fused exactly where the vectors fuse it. Only `sin_cos`, `atan2`, `ln`
-//! and `exp` may differ between the vector instances and the width-1 ones, by a few ulps.
+//! All operations up to `sqrt` are IEEE operations: every instance of one precision returns
+//! identical bits. [`SimdFloat::mul_add`] is fused on all instances or on none. Only `sin_cos`,
+//! `atan2`, `ln` and `exp` may differ between the vector instances and those of width 1, by a few
+//! ulps.
 
 mod scalar;
 mod vec3;
@@ -25,29 +26,29 @@ use std::ops::{
     Add, AddAssign, BitAnd, BitOr, BitXor, Div, Mul, MulAssign, Neg, Not, Shl, Shr, Sub, SubAssign,
 };
 
-/// The single-precision instance that renders.
+/// Single-precision instance of production.
 #[cfg(not(target_feature = "avx512f"))]
 pub type Single = wide::f32x8;
-/// The double-precision instance that renders.
+/// Double-precision instance of production.
 #[cfg(not(target_feature = "avx512f"))]
 pub type Double = wide::f64x4;
-/// The single-precision instance that renders.
+/// Single-precision instance of production.
 #[cfg(target_feature = "avx512f")]
 pub type Single = wide::f32x16;
-/// The double-precision instance that renders.
+/// Double-precision instance of production.
 #[cfg(target_feature = "avx512f")]
 pub type Double = wide::f64x8;
 
-/// The widest instance: arrays indexed by lane have this length.
+/// Width of the widest instance, and length of arrays indexed by lane.
 pub const MAX_WIDTH: usize = if cfg!(target_feature = "avx512f") { 16 } else { 8 };
 
 /// One lane: `f32` or `f64`.
 pub trait Float: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
     /// Distance from 1 to the next larger number of this precision.
     const EPSILON: f64;
-    /// Nearest value of this precision.
+    /// Rounds to the nearest value of this precision.
     fn from_f64(x: f64) -> Self;
-    /// Exact.
+    /// Converts without rounding.
     fn to_f64(self) -> f64;
 }
 
@@ -75,7 +76,7 @@ impl Float for f64 {
     }
 }
 
-/// The result of a comparison, one truth value per lane.
+/// Mask: result of a comparison, one truth value per lane.
 pub trait Mask:
     Copy
     + Debug
@@ -86,30 +87,30 @@ pub trait Mask:
     + Not<Output = Self>
     + 'static
 {
-    /// True in at least one lane.
+    /// Returns `true` if at least one lane is true.
     fn any(self) -> bool;
-    /// True in every lane.
+    /// Returns `true` if every lane is true.
     fn all(self) -> bool;
-    /// Bit `i` is lane `i`.
+    /// Lanes as bits: bit `i` is lane `i`.
     fn bits(self) -> u32;
-    /// Lane `i`.
+    /// Value of lane `i`.
     #[inline(always)]
     fn lane(self, i: usize) -> bool {
         self.bits() >> i & 1 != 0
     }
-    /// True in no lane.
+    /// Returns `true` if no lane is true.
     #[inline(always)]
     fn none(self) -> bool {
         !self.any()
     }
-    /// `self` and not `other`.
+    /// Lanes of `self` that are not in `other`.
     #[inline(always)]
     fn and_not(self, other: Self) -> Self {
         self & !other
     }
 }
 
-/// Unsigned 32-bit integers, one per lane, for hashes and sample sequences. Arithmetic wraps.
+/// Vector of unsigned 32-bit integers, for hashes and sample sequences. Arithmetic wraps.
 pub trait SimdU32:
     Copy
     + Debug
@@ -124,17 +125,17 @@ pub trait SimdU32:
     + Shr<u32, Output = Self>
     + 'static
 {
-    /// The same value in every lane.
+    /// The value `x` in every lane.
     fn splat(x: u32) -> Self;
-    /// Lane `i` is `f(i)`.
+    /// Vector whose lane `i` is `f(i)`.
     fn from_fn(f: impl FnMut(usize) -> u32) -> Self;
-    /// Lane `i`.
+    /// Value of lane `i`.
     fn lane(self, i: usize) -> u32;
-    /// Bit 0 becomes bit 31 and so on, in each lane.
+    /// Reverses the order of the bits in each lane.
     fn reverse(self) -> Self;
 }
 
-/// A vector of `WIDTH` floats. See the room's description.
+/// Vector of `WIDTH` floats, see the [module](self).
 pub trait SimdFloat:
     Copy
     + Debug
@@ -158,20 +159,20 @@ pub trait SimdFloat:
     const EPSILON: f64 = Self::Scalar::EPSILON;
     /// Largest finite number of this precision.
     const MAX: f64;
-    /// One lane.
+    /// Type of one lane.
     type Scalar: Float;
-    /// The result of comparisons.
+    /// Result of comparisons.
     type Mask: Mask;
     /// Integers of the same width.
     type SimdU32: SimdU32;
 
-    /// The same value in every lane.
+    /// The value `x` in every lane.
     fn splat(x: Self::Scalar) -> Self;
-    /// Lane `i` is `f(i)`.
+    /// Vector whose lane `i` is `f(i)`.
     fn from_fn(f: impl FnMut(usize) -> Self::Scalar) -> Self;
-    /// Lane `i`.
+    /// Value of lane `i`.
     fn lane(self, i: usize) -> Self::Scalar;
-    /// The same value, rounded to this precision, in every lane.
+    /// The value `x`, rounded to this precision, in every lane.
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         Self::splat(Self::Scalar::from_f64(x))
@@ -187,14 +188,14 @@ pub trait SimdFloat:
         Self::from_f64(1.0)
     }
 
-    /// `self * a + b`, rounded once if the target has fused multiply-add, else twice.
+    /// Computes `self * a + b`, rounded once if the target has fused multiply-add, else twice.
     fn mul_add(self, a: Self, b: Self) -> Self;
-    /// The smaller. If `self` is NaN, `other`; unspecified (but no panic) if `other` is NaN.
+    /// Lane-wise minimum. If `self` is NaN, `other`; unspecified (but no panic) if `other` is NaN.
     fn min(self, other: Self) -> Self;
-    /// The larger. If `self` is NaN, `other`; unspecified (but no panic) if `other` is NaN.
+    /// Lane-wise maximum. If `self` is NaN, `other`; unspecified (but no panic) if `other` is NaN.
     fn max(self, other: Self) -> Self;
-    /// The smallest and the largest lane; lanes that are NaN do not count (the largest number and its
-    /// negative, if all are).
+    /// Horizontal minimum and maximum. NaN lanes are ignored; if all lanes are NaN, the results are
+    /// [`SimdFloat::MAX`] and its negative.
     fn min_max(self) -> (Self::Scalar, Self::Scalar);
     /// Absolute value.
     fn abs(self) -> Self;
@@ -202,30 +203,30 @@ pub trait SimdFloat:
     fn sqrt(self) -> Self;
     /// Sine and cosine of radians.
     fn sin_cos(self) -> (Self, Self);
-    /// The angle of the point (`x`, `self`) from the x axis, in radians from -pi to pi.
+    /// Angle of the point (`x`, `self`) from the x axis, in radians from -pi to pi.
     fn atan2(self, x: Self) -> Self;
     /// Natural logarithm.
     fn ln(self) -> Self;
-    /// e to the power `self`.
+    /// Natural exponential.
     fn exp(self) -> Self;
-    /// The magnitude of `self` with the sign of `sign`.
+    /// Magnitude of `self` with the sign of `sign`.
     fn copysign(self, sign: Self) -> Self;
 
-    /// `self < other`; false for NaN.
+    /// Mask of `self < other`; false for NaN.
     fn lt(self, other: Self) -> Self::Mask;
-    /// `self <= other`; false for NaN.
+    /// Mask of `self <= other`; false for NaN.
     fn le(self, other: Self) -> Self::Mask;
-    /// `self > other`; false for NaN.
+    /// Mask of `self > other`; false for NaN.
     #[inline(always)]
     fn gt(self, other: Self) -> Self::Mask {
         other.lt(self)
     }
-    /// `self >= other`; false for NaN.
+    /// Mask of `self >= other`; false for NaN.
     #[inline(always)]
     fn ge(self, other: Self) -> Self::Mask {
         other.le(self)
     }
-    /// The same truth value in every lane.
+    /// The truth value `value` in every lane.
     fn mask(value: bool) -> Self::Mask;
     /// `yes` where `mask` is true, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
@@ -235,42 +236,55 @@ pub trait SimdFloat:
         Self::select(mask, self, Self::zero())
     }
 
-    /// A 32-bit label carried through [`SimdFloat::select`]; not a number to compute with. Labels below
-    /// 2^31 - 2^23 compare by [`SimdFloat::lt`] and [`SimdFloat::le`] like integers, as the bits of all
-    /// positive floats do.
-    fn from_id(label: u32) -> Self;
-    /// The label in lane `i`.
+    /// Bit-casts a 32-bit id into every lane. Ids are selected by [`SimdFloat::select`], without
+    /// arithmetic. Ids below 2^31 - 2^23 are ordered by [`SimdFloat::lt`] and [`SimdFloat::le`]
+    /// like integers, as the bits of all positive floats are.
+    fn from_id(id: u32) -> Self;
+    /// Id in lane `i`.
     fn id_lane(self, i: usize) -> u32;
-    /// Where the label is `label`.
-    fn id_eq(self, label: u32) -> Self::Mask;
+    /// Mask of lanes whose id is `id`.
+    fn id_eq(self, id: u32) -> Self::Mask;
 
-    /// Uniform in [0, 1) from 32 random bits: 24 of them in single precision, all in double (there
-    /// in the middle of its step).
+    /// Maps 32 random bits to [0, 1): 24 of them in single precision, all in double precision
+    /// (there to the middle of a step).
     fn to_unit(bits: Self::SimdU32) -> Self;
 
-    /// The sum over lanes of `round(lane * scale)`. Each lane is rounded by itself, so that the sum
-    /// is exact in any grouping; `|lane * scale|` must not exceed 2^49.
+    /// Sum over all lanes of `round(lane * scale)`. Each lane is rounded separately, so that the
+    /// sum is exact in any grouping. `|lane * scale|` is at most 2^49.
     fn fixed_sum(self, scale: f64) -> i64;
-    /// `round(lane * scale)` of every lane, zeros behind the last; the same bounds.
+    /// Returns `round(lane * scale)` of every lane, and zeros after the last. `|lane * scale|` is
+    /// at most 2^49.
     fn fixed(self, scale: f64) -> [i64; MAX_WIDTH];
 }
 
-/// 1.5 x 2^52: a double below 2^51 in magnitude plus this has no fraction bits left: it is rounded to
-/// the nearest integer, which is the difference of the bits.
+/// Id of the first lane of `mask`, and the lanes of `mask` that have this id; `None` if `mask` is
+/// empty.
+#[inline(always)]
+pub(crate) fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
+    let bits = mask.bits();
+    if bits == 0 {
+        return None;
+    }
+    let id = ids.id_lane(bits.trailing_zeros() as usize);
+    Some((id, mask & ids.id_eq(id)))
+}
+
+/// Rounding constant, 1.5 x 2^52. The sum of it and a double below 2^51 in magnitude has no
+/// fraction bits: the double is rounded to the nearest integer, which is the difference of the
+/// bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
-/// `round(x)` to nearest even, for `|x| < 2^51`.
+/// Rounds to the nearest integer, ties to even, for `|x| < 2^51`.
 #[inline(always)]
 fn round_i64(x: f64) -> i64 {
     ((x + ROUNDER).to_bits() as i64).wrapping_sub(ROUNDER.to_bits() as i64)
 }
 
-/// Begins to bring the cache line in which `thing` begins from memory, where the processor can be asked
-/// to; nothing waits for it.
+/// Prefetches the first cache line of `value` on processors that support it.
 #[inline(always)]
-pub fn prefetch<T>(thing: &T) {
+pub fn prefetch<T>(value: &T) {
     #[cfg(target_arch = "x86_64")]
-    safe_arch::prefetch_t0(thing);
+    safe_arch::prefetch_t0(value);
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = thing;
+    let _ = value;
 }

@@ -1,4 +1,4 @@
-//! The width-1 instances: plain `f32` and `f64`, the same operations in the same order.
+//! Instances of width 1: `f32` and `f64`, with the operations of the vectors in the same order.
 
 use crate::lanes::{MAX_WIDTH, Mask, SimdFloat, SimdU32, round_i64};
 
@@ -17,7 +17,7 @@ impl Mask for bool {
     }
 }
 
-/// One `u32` that wraps.
+/// One `u32` with wrapping arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct One(u32);
 
@@ -101,8 +101,8 @@ macro_rules! scalar_lanes {
             }
             #[inline(always)]
             fn mul_add(self, a: Self, b: Self) -> Self {
-                // The vectors fuse on these targets only; a fused call elsewhere would be slow and
-                // would differ from them.
+                // The vectors fuse on these targets only. A fused call elsewhere would be slow and
+                // would return other bits.
                 if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
                     <$float>::mul_add(self, a, b)
                 } else {
@@ -166,16 +166,16 @@ macro_rules! scalar_lanes {
                 if mask { yes } else { no }
             }
             #[inline(always)]
-            fn from_id(label: u32) -> Self {
-                <$float>::from_bits($bits::from(label))
+            fn from_id(id: u32) -> Self {
+                <$float>::from_bits($bits::from(id))
             }
             #[inline(always)]
             fn id_lane(self, _: usize) -> u32 {
                 self.to_bits() as u32
             }
             #[inline(always)]
-            fn id_eq(self, label: u32) -> bool {
-                self.id_lane(0) == label
+            fn id_eq(self, id: u32) -> bool {
+                self.id_lane(0) == id
             }
             #[inline(always)]
             fn to_unit(bits: One) -> Self {

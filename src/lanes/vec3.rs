@@ -1,9 +1,9 @@
-//! Vectors and orthonormal frames of lanes.
+//! SIMD vectors of three coordinates, and orthonormal frames.
 
 use crate::lanes::{Float, SimdFloat};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-/// Three coordinates (or three colour channels), each a vector of lanes.
+/// Three coordinates or colour channels per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Vec3<L> {
     /// First coordinate or red.
@@ -15,22 +15,22 @@ pub struct Vec3<L> {
 }
 
 impl<L: SimdFloat> Vec3<L> {
-    /// From its coordinates.
+    /// Creates a vector from its coordinates.
     #[inline(always)]
     pub fn new(x: L, y: L, z: L) -> Self {
         Self { x, y, z }
     }
-    /// The same vector in every lane.
+    /// The vector `v` in every lane.
     #[inline(always)]
     pub fn splat(v: [L::Scalar; 3]) -> Self {
         Self::new(L::splat(v[0]), L::splat(v[1]), L::splat(v[2]))
     }
-    /// The same vector, rounded to this precision, in every lane.
+    /// The vector `v`, rounded to this precision, in every lane.
     #[inline(always)]
     pub fn of(v: [f64; 3]) -> Self {
         Self::splat(v.map(L::Scalar::from_f64))
     }
-    /// Lane `i` is `f(i)`.
+    /// Vectors whose lane `i` is `f(i)`.
     #[inline(always)]
     pub fn from_fn(mut f: impl FnMut(usize) -> [L::Scalar; 3]) -> Self {
         Self::new(L::from_fn(|i| f(i)[0]), L::from_fn(|i| f(i)[1]), L::from_fn(|i| f(i)[2]))
@@ -40,17 +40,17 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn zero() -> Self {
         Self::new(L::zero(), L::zero(), L::zero())
     }
-    /// Lane `i`.
+    /// Vector of lane `i`.
     #[inline(always)]
     pub fn lane(self, i: usize) -> [L::Scalar; 3] {
         [self.x.lane(i), self.y.lane(i), self.z.lane(i)]
     }
-    /// Scalar product.
+    /// Dot product.
     #[inline(always)]
     pub fn dot(self, other: Self) -> L {
         self.x.mul_add(other.x, self.y.mul_add(other.y, self.z * other.z))
     }
-    /// Vector product.
+    /// Cross product.
     #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
         Self::new(
@@ -64,33 +64,33 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn length_squared(self) -> L {
         self.dot(self)
     }
-    /// The vector divided by its length; not finite for a zero vector.
+    /// Returns the vector divided by its length; not finite for a zero vector.
     #[inline(always)]
     pub fn normalize(self) -> Self {
         self * (L::one() / self.length_squared().sqrt())
     }
-    /// The vector divided by its length, if that is 1 but for a few roundings: one step of Newton's
-    /// method takes the place of the root.
+    /// Normalises a vector whose length is 1 up to a few roundings, by one step of Newton's method
+    /// instead of a square root.
     #[inline(always)]
     pub fn renormalize(self) -> Self {
         self * self.length_squared().mul_add(L::from_f64(-0.5), L::from_f64(1.5))
     }
-    /// `self * t + b`.
+    /// Computes `self * t + b`.
     #[inline(always)]
     pub fn mul_add(self, t: L, b: Self) -> Self {
         Self::new(self.x.mul_add(t, b.x), self.y.mul_add(t, b.y), self.z.mul_add(t, b.z))
     }
-    /// Coordinate by coordinate.
+    /// Component-wise product.
     #[inline(always)]
     pub fn component_mul(self, o: Self) -> Self {
         Self::new(self.x * o.x, self.y * o.y, self.z * o.z)
     }
-    /// The largest coordinate.
+    /// Largest coordinate.
     #[inline(always)]
     pub fn max_element(self) -> L {
         self.x.max(self.y).max(self.z)
     }
-    /// The largest magnitude among the coordinates.
+    /// Largest magnitude of a coordinate.
     #[inline(always)]
     pub fn max_abs(self) -> L {
         self.x.abs().max(self.y.abs()).max(self.z.abs())
@@ -109,7 +109,7 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn masked(self, mask: L::Mask) -> Self {
         Self::new(self.x.masked(mask), self.y.masked(mask), self.z.masked(mask))
     }
-    /// The mirror image of this direction at a plane with unit normal `n`: v - 2 (v.n) n.
+    /// Reflects this direction at a plane with unit normal `n`: v - 2 (v.n) n.
     #[inline(always)]
     pub fn reflect(self, n: Self) -> Self {
         let twice = self.dot(n) * L::from_f64(-2.0);
@@ -156,21 +156,21 @@ impl<L: SimdFloat> Neg for Vec3<L> {
     }
 }
 
-/// An orthonormal frame around a unit vector.
+/// Orthonormal frame around a unit vector.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<L> {
     /// First tangent.
     pub t: Vec3<L>,
     /// Second tangent.
     pub b: Vec3<L>,
-    /// The vector it was built around.
+    /// Unit vector around which the frame was built.
     pub n: Vec3<L>,
 }
 
 impl<L: SimdFloat> Frame<L> {
-    /// Branch-free basis around the unit vector `n`, continuous but for n.z = 0. Around a level vector
-    /// (n.y = 0) the first tangent is level and the second upright, and so are the axes of the lobes of
-    /// an upright mirror.
+    /// Builds a frame around the unit vector `n` without branches. It is continuous except where
+    /// `n.z` is 0. Around a horizontal vector (`n.y` is 0) the first tangent is horizontal and the
+    /// second vertical, as are the axes of the lobes of a vertical mirror.
     ///
     /// Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1).
     #[inline(always)]
@@ -182,12 +182,12 @@ impl<L: SimdFloat> Frame<L> {
         let b = Vec3::new(b, (n.y * n.y).mul_add(a, sign), -n.y);
         Self { t, b, n }
     }
-    /// From coordinates in this frame (t, b, n) to the frame's surroundings.
+    /// Transforms local coordinates (t, b, n) to world coordinates.
     #[inline(always)]
     pub fn to_world(&self, v: Vec3<L>) -> Vec3<L> {
         self.t.mul_add(v.x, self.b.mul_add(v.y, self.n * v.z))
     }
-    /// From the frame's surroundings to coordinates (t, b, n).
+    /// Transforms world coordinates to local coordinates (t, b, n).
     #[inline(always)]
     pub fn to_local(&self, v: Vec3<L>) -> Vec3<L> {
         Vec3::new(self.t.dot(v), self.b.dot(v), self.n.dot(v))

@@ -1,4 +1,4 @@
-//! The vector instances, over the types of the `wide` crate.
+//! Vector instances, over the types of the `wide` crate.
 
 use crate::lanes::{MAX_WIDTH, Mask, ROUNDER, SimdFloat, SimdU32};
 use wide::bytemuck::cast;
@@ -32,7 +32,7 @@ macro_rules! vector_bits {
 
 /// Reverses the bits of each 32-bit lane by shifts and masks.
 #[inline(always)]
-#[allow(dead_code, reason = "used by the widths that have no byte shuffle of their own")]
+#[allow(dead_code, reason = "used by widths without a byte shuffle")]
 fn reverse_by_shifts<B: SimdU32>(x: B) -> B {
     let swap = |x: B, n: u32, m: u32| ((x >> n) & B::splat(m)) | ((x & B::splat(m)) << n);
     let x = swap(x, 1, 0x5555_5555);
@@ -42,7 +42,7 @@ fn reverse_by_shifts<B: SimdU32>(x: B) -> B {
     (x >> 16) | (x << 16)
 }
 
-/// The reversed bits of each nibble, shifted up by `SHIFT`.
+/// Table of the reversed bits of each nibble, shifted up by `SHIFT`.
 const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     let mut table = [0i8; 16];
     let mut n = 0;
@@ -53,8 +53,8 @@ const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     table
 }
 
-/// Reverses the bits of each 32-bit lane by byte shuffles: a table look-up per nibble, then the bytes
-/// of each word in reverse order.
+/// Reverses the bits of each 32-bit lane by byte shuffles: a table lookup per nibble, then a
+/// reversal of the bytes of each word.
 #[inline(always)]
 fn reverse8(x: u32x8) -> u32x8 {
     use wide::i8x32;
@@ -77,7 +77,7 @@ fn reverse8(x: u32x8) -> u32x8 {
     cast(i8x32::swizzle_half_relaxed(cast(bytes), i8x32::new(ORDER)))
 }
 
-/// The same for four lanes.
+/// [`reverse8`] for four lanes.
 #[inline(always)]
 fn reverse4(x: u32x4) -> u32x4 {
     use wide::i8x16;
@@ -145,10 +145,10 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn min_max(self) -> ($scalar, $scalar) {
-                // Both halves at once, then one by one.
-                let most = $vector::splat($scalar::MAX);
-                let [a, b]: [$half; 2] = cast(SimdFloat::min(self, most));
-                let [c, d]: [$half; 2] = cast(SimdFloat::max(self, -most));
+                // Both halves are combined first, then the remaining lanes one by one.
+                let max = $vector::splat($scalar::MAX);
+                let [a, b]: [$half; 2] = cast(SimdFloat::min(self, max));
+                let [c, d]: [$half; 2] = cast(SimdFloat::max(self, -max));
                 let (low, high) = (a.fast_min(b).to_array(), c.fast_max(d).to_array());
                 let smaller = |a, b| if a < b { a } else { b };
                 let larger = |a, b| if a > b { a } else { b };
@@ -207,16 +207,16 @@ macro_rules! vector_lanes {
                 self & mask
             }
             #[inline(always)]
-            fn from_id(label: u32) -> Self {
-                $vector::splat($scalar::from_bits($raw::from(label)))
+            fn from_id(id: u32) -> Self {
+                $vector::splat($scalar::from_bits($raw::from(id)))
             }
             #[inline(always)]
             fn id_lane(self, i: usize) -> u32 {
                 self.as_array()[i].to_bits() as u32
             }
             #[inline(always)]
-            fn id_eq(self, label: u32) -> Self {
-                $vector::from_bits(self.to_bits().simd_eq(Self::from_id(label).to_bits()))
+            fn id_eq(self, id: u32) -> Self {
+                $vector::from_bits(self.to_bits().simd_eq(Self::from_id(id).to_bits()))
             }
             #[inline(always)]
             fn to_unit(bits: $bits) -> Self {
@@ -225,8 +225,7 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed_sum(self, scale: f64) -> i64 {
-                // The bits of a double plus ROUNDER, less those of ROUNDER, are the integer that it
-                // is rounded to.
+                // The difference of the bits of `x + ROUNDER` and `ROUNDER` is the rounded integer.
                 let (scale, rounder) = (f64x4::splat(scale), f64x4::splat(ROUNDER));
                 let mut sum = i64x4::splat(0);
                 for four in self.as_array().chunks_exact(4) {
@@ -239,7 +238,7 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {
-                // By fours, as above: of single numbers the compiler makes scattered stores.
+                // Groups of four: for single numbers the compiler emits scattered stores.
                 let (scale, rounder) = (f64x4::splat(scale), f64x4::splat(ROUNDER));
                 let mut each = [0; MAX_WIDTH];
                 let fours = self.as_array().chunks_exact(4);

@@ -36,7 +36,7 @@ impl SceneBvh {
             let [low, high] = padded(bounds[i], f64::from(f32::EPSILON));
             [low.as_vec3().to_array(), high.as_vec3().to_array()]
         };
-        let Bvh8Build { boxes, order, leaves } =
+        let Bvh8Build { bvh: boxes, order, leaves } =
             Bvh8::build(bounds.len(), corners, 1, BvhBuildParams::medium_build());
         let items = leaves.iter().map(|(first, _)| order[*first as usize]).collect();
         let low = bounds.iter().map(|b| b.0).fold(DVec3::INFINITY, DVec3::min);
@@ -91,6 +91,6 @@ impl SceneBvh {
             return false;
         }
         let width = L::WIDTH as f64;
-        ray.spread(wanted, width * self.turn, width * self.shift)
+        ray.is_coherent(wanted, width * self.turn, width * self.shift)
     }
 }

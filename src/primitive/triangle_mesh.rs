@@ -143,7 +143,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                 ];
                 let bits = match &bounds {
                     Some(bounds) => {
-                        bounds.meets::<false, L>(|k| sides[k], L::from_f64(L::MAX)).1.bits()
+                        bounds.enters::<false, L>(|k| sides[k], L::from_f64(L::MAX)).1.bits()
                     }
                     None => valid_lanes(),
                 };
@@ -246,7 +246,7 @@ fn is_together<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     let size = (0..3).map(|i| f64::from(high[i]) - f64::from(low[i])).fold(0.0, f64::max);
     let turn = (TOGETHER / (mesh.mesh().triangles.len() as f64).sqrt()).min(TOGETHER_AT_MOST);
     let turn = turn * L::WIDTH as f64;
-    ray.spread(wanted, turn, turn * size)
+    ray.is_coherent(wanted, turn, turn * size)
 }
 
 /// The nearest triangle nearer than `limit`; of several at the same distance the one with the lowest

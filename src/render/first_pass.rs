@@ -1,55 +1,46 @@
-//! The first sample of every pixel, coarse to fine.
+//! First pass: the first sample of every pixel, in interleaved order from coarse to fine.
 
 use crate::film::{Film, TILE, TILE_PIXELS, Tile, TileHandle, lattice_pixels};
 use crate::lanes::SimdFloat;
-use crate::render::pass::{PacketScratch, TileRenderer};
+use crate::render::pass::{PassContext, RejectedSamples, TileRenderer};
 use crate::render::wave::{JobReport, Wave, WaveReport};
-use crate::sampling::SampleSettings;
-use crate::world::{AnyWorld, Counts, TileCandidates, World};
+use crate::world::{AnyWorld, Counts, TileTracer, World, dispatch};
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
-/// The first sample of replicate A in interleaved order: every 8th pixel in x and y, then the gaps in
-/// three stages, each over the whole picture; `shown` sees the film after all but the last. Once `abandon`
-/// is raised the later stages are left out, and there is no report.
+/// Traces the first sample of replicate A: of every 8th pixel in x and y, then of the pixels
+/// between in three stages, each over the whole picture. Calls `on_stage` with the film after all
+/// stages but the last. A cancelled pass skips the stages after the first that have not started,
+/// and has no report.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
     wave: &Wave,
-    sampling: &SampleSettings,
-    pool: &rayon::ThreadPool,
-    abandon: &AtomicBool,
-    shown: &mut dyn FnMut(&Film),
+    context: PassContext,
+    on_stage: &mut dyn FnMut(&Film),
 ) -> Option<WaveReport> {
-    match world {
-        AnyWorld::Single(w) => {
-            trace_first_pass_typed(w, film, wave, sampling, pool, abandon, shown)
-        }
-        AnyWorld::Double(w) => {
-            trace_first_pass_typed(w, film, wave, sampling, pool, abandon, shown)
-        }
-    }
+    dispatch!(world, world => trace_first_pass(world, film, wave, context, on_stage))
 }
 
-/// Tiles side by side that share packets while the lattice is coarse.
+/// Number of adjacent tiles that share packets while the lattice is coarse.
 const STRIP_TILES: usize = 8;
 
-/// They do while the lattice's step is larger than this \[pixels\]; then the tiles' own pixels fill packets.
+/// Lattice step above which tiles share packets \[pixels\]. With smaller steps the pixels of one
+/// tile fill packets.
 const SHARED_ABOVE: usize = 2;
 
-fn trace_first_pass_typed<L: SimdFloat>(
+fn trace_first_pass<L: SimdFloat>(
     world: &World<L>,
     film: &mut Film,
     wave: &Wave,
-    sampling: &SampleSettings,
-    pool: &rayon::ThreadPool,
-    abandon: &AtomicBool,
-    shown: &mut dyn FnMut(&Film),
+    context: PassContext,
+    on_stage: &mut dyn FnMut(&Film),
 ) -> Option<WaveReport> {
-    let tracer = TileRenderer::new(world, sampling);
+    let PassContext { sampling, pool, cancel } = context;
+    let renderer = TileRenderer::new(world, sampling);
     let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
     let mut counts = vec![Counts::default(); tiles.len()];
-    let mut before = 0;
+    let mut previous_step = 0;
     for step in [8, 4, 2, 1] {
         let mut strips: Vec<(Vec<TileHandle>, &mut [Counts])> = Vec::new();
         let mut slots = film.slots(&tiles).into_iter();
@@ -60,93 +51,117 @@ fn trace_first_pass_typed<L: SimdFloat>(
             strips
                 .into_par_iter()
                 .map(|(slots, counts)| {
-                    if step != 8 && abandon.load(Ordering::Relaxed) {
+                    if step != 8 && cancel.load(Ordering::Relaxed) {
                         return false;
                     }
-                    tracer.lattice(slots, before, step, counts);
+                    renderer.lattice(slots, (previous_step, step), counts);
                     true
                 })
                 .reduce(|| true, |a, b| a & b)
         });
         if complete && step != 1 {
-            shown(film);
+            on_stage(film);
         }
-        if !complete || (step != 1 && abandon.load(Ordering::Relaxed)) {
+        if !complete || (step != 1 && cancel.load(Ordering::Relaxed)) {
             return None;
         }
-        before = step;
+        previous_step = step;
     }
     let report = |c: Counts| Some(JobReport { rays: c.rays, glossy: c.glossy, error: None });
     Some(WaveReport { reports: counts.into_iter().map(report).collect() })
 }
 
+/// A pixel of a strip of tiles.
+struct StripPixel {
+    /// Index of the tile in the strip.
+    tile: usize,
+    /// Number of the pixel in its tile, row by row.
+    pixel: usize,
+    /// Column and row in the picture.
+    position: (u32, u32),
+}
+
+/// Returns the pixels of `tiles`, given with their origins, that a lattice of `steps.1` pixels adds
+/// to one of `steps.0` (0: none).
+fn pixels_to_add(
+    tiles: &[([usize; 2], &mut Tile)],
+    (previous_step, step): (usize, usize),
+) -> Vec<StripPixel> {
+    let mut pixels = Vec::with_capacity(TILE_PIXELS);
+    for (index, (origin, tile)) in tiles.iter().enumerate() {
+        let extent = tile.extent();
+        let inside = |p: &usize| p % TILE < extent[0] && p / TILE < extent[1];
+        pixels.extend(lattice_pixels(previous_step, step).filter(inside).map(|pixel| {
+            let (x, y) = (origin[0] + pixel % TILE, origin[1] + pixel / TILE);
+            StripPixel { tile: index, pixel, position: (x as u32, y as u32) }
+        }));
+    }
+    pixels
+}
+
 impl<L: SimdFloat> TileRenderer<'_, L> {
-    /// The first sample of the pixels that a lattice of `step` pixels adds to one of `before` (0:
-    /// none) in tiles side by side, whose pixels share packets while they are few.
-    fn lattice(&self, slots: Vec<TileHandle>, before: usize, step: usize, counts: &mut [Counts]) {
+    /// Traces the first sample of the pixels that a lattice of `steps.1` pixels adds to one of
+    /// `steps.0` (0: none), in adjacent tiles, which share packets while these pixels are few.
+    fn lattice(&self, slots: Vec<TileHandle>, steps: (usize, usize), counts: &mut [Counts]) {
         let mut tiles: Vec<_> =
             slots.into_iter().map(|slot| (slot.origin, slot.prepare())).collect();
+        let (_, step) = steps;
         if step > SHARED_ABOVE {
-            self.add_pixels(&mut tiles, None, (before, step), counts);
+            let pixels = pixels_to_add(&tiles, steps);
+            let tracer = self.tracer.scattered(0, pixels.iter().map(|p| p.position));
+            self.add_pixels(&mut tiles, tracer, &pixels, counts);
         } else {
             for (tile, counts) in tiles.chunks_mut(1).zip(counts.chunks_mut(1)) {
-                let candidates = self.world.candidates(tile[0].0, tile[0].1.extent());
-                if !candidates.as_ref().is_some_and(|candidates| self.world.is_black(candidates)) {
-                    self.add_pixels(tile, candidates, (before, step), counts);
+                let pixels = pixels_to_add(tile, steps);
+                let rectangle = (tile[0].0, tile[0].1.extent());
+                let positions = pixels.iter().map(|p| p.position);
+                if let Some(tracer) = self.tracer.tile(0, rectangle, positions) {
+                    self.add_pixels(tile, tracer, &pixels, counts);
                 }
             }
         }
         tiles.into_iter().for_each(|(_, tile)| tile.set_lattice(step));
     }
 
-    /// Samples of those pixels in tiles, given with their origins, that share packets. `candidates`: of all
-    /// of them.
+    /// Traces the first sample of `pixels`, those of `tracer`, into their tiles.
     fn add_pixels(
         &self,
         tiles: &mut [([usize; 2], &mut Tile)],
-        candidates: Option<TileCandidates>,
-        (before, step): (usize, usize),
+        mut tracer: TileTracer<L>,
+        pixels: &[StripPixel],
         counts: &mut [Counts],
     ) {
-        let mut pixels = Vec::with_capacity(TILE_PIXELS);
-        for (t, (origin, tile)) in tiles.iter().enumerate() {
-            let extent = tile.extent();
-            let inside = |p: &usize| p % TILE < extent[0] && p / TILE < extent[1];
-            pixels.extend(lattice_pixels(before, step).filter(inside).map(|p| (t, *origin, p)));
-        }
-        let place = |(_, origin, p): &(usize, [usize; 2], usize)| {
-            ((origin[0] + p % TILE) as u32, (origin[1] + p / TILE) as u32)
-        };
-        let sites = self.sites(0, pixels.iter().map(place));
-        let points = self.sampler.block(0, 1);
-        let mut work = PacketScratch::new(0, candidates);
-        for range in sites.packets(L::WIDTH) {
-            let packet = &pixels[range.clone()];
-            self.pixels::<1>(&mut work, &points, &sites, range, 0);
-            self.sum_of_each::<1, _>(&work.radiance, packet, |(t, _, p), group, sums| {
-                tiles[*t].1.add_group(0, *p, group, sums);
+        let mut rejected = RejectedSamples::new(0);
+        tracer.radiance_shared::<1>(0, |packet, radiance| {
+            self.reject_invalid(radiance, &mut rejected, |lane| packet.sample(lane));
+            let packet_pixels = &pixels[packet.pixels.clone()];
+            self.sum_by_pixel::<1, _>(radiance, packet_pixels, |p, group, sums| {
+                tiles[p.tile].1.add_group(0, p.pixel, group, sums);
             });
-            let tile_of = |x, y| packet.iter().find(|p| place(p) == (x, y)).map(|(t, ..)| *t);
-            for bad in work.bad.drain(..) {
-                if let Some(t) = tile_of(bad.x, bad.y) {
-                    tiles[t].1.record_bad(bad);
+            let tile_of =
+                |x, y| packet_pixels.iter().find(|p| p.position == (x, y)).map(|p| p.tile);
+            for bad in rejected.bad.drain(..) {
+                if let Some(tile) = tile_of(bad.x, bad.y) {
+                    tiles[tile].1.record_bad(bad);
                 }
             }
-            for bright in work.saturated.drain(..) {
-                if let Some(t) = tile_of(bright.x, bright.y) {
-                    tiles[t].1.record_saturated(1);
+            for saturated in rejected.saturated.drain(..) {
+                if let Some(tile) = tile_of(saturated.x, saturated.y) {
+                    tiles[tile].1.record_saturated(1);
                 }
             }
-        }
-        // Which tile of several the rays were for, packets do not say; and what each is told must not depend on
-        // how many pixels share one. Of glossy lobes tiles learn from their own packets, later.
+        });
+        // Rays of shared packets are divided among the tiles by their number of pixels, because the
+        // reported cost must not depend on the packet width. Glossy lobes are reported by packets
+        // of a single tile.
+        let packet_counts = tracer.counts();
         if let [counts] = counts {
-            counts.rays += work.counts.rays;
-            counts.glossy |= work.counts.glossy;
+            counts.rays += packet_counts.rays;
+            counts.glossy |= packet_counts.glossy;
         } else {
-            let (rays, sharing) = (work.counts.rays, pixels.len().max(1) as u64);
+            let (rays, sharing) = (packet_counts.rays, pixels.len().max(1) as u64);
             counts[0].rays += rays % sharing;
-            pixels.iter().for_each(|(t, ..)| counts[*t].rays += rays / sharing);
+            pixels.iter().for_each(|p| counts[p.tile].rays += rays / sharing);
         }
     }
 }

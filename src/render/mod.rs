@@ -4,7 +4,6 @@ pub mod export;
 mod feature_buffer;
 mod first_pass;
 pub mod pass;
-mod pixel_block;
 mod relighting;
 mod render_state;
 pub mod schedule;

@@ -1,6 +1,7 @@
 //! Compiled scene with its film: the state of one progressive render.
 
 use crate::film::{Display, Estimator, Film, Header, LightWeights, TILE};
+use crate::render::pass::PassContext;
 use crate::render::relighting::Relighting;
 use crate::render::schedule::{Schedule, Settings};
 use crate::render::wave::{Wave, WaveReport};
@@ -158,8 +159,8 @@ impl RenderState {
         cancel_first_pass: &AtomicBool,
         on_refined: &mut dyn FnMut(&Film),
     ) -> Option<WaveReport> {
-        let Self { world, film, sampling, .. } = self;
-        first_pass::run(world, film, wave, sampling, pool, cancel_first_pass, on_refined)
+        let context = PassContext { sampling: &self.sampling, pool, cancel: cancel_first_pass };
+        first_pass::run(&self.world, &mut self.film, wave, context, on_refined)
     }
 
     /// Traces a wave. A raised `cancel_wave` keeps further jobs from starting.
@@ -170,6 +171,6 @@ impl RenderState {
         cancel_wave: &AtomicBool,
     ) -> WaveReport {
         let Self { world, film, sampling, estimator, .. } = self;
-        pass::run(world, film, wave, sampling, estimator, pool, cancel_wave)
+        pass::run(world, film, wave, estimator, PassContext { sampling, pool, cancel: cancel_wave })
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::lanes::SimdU32;
 
-/// A bijective mixer of 32 bits with low bias (constants: Wellons 2018, *Prospecting for Hash
+/// Bijective 32-bit hash with low bias (constants: Wellons 2018, *Prospecting for Hash
 /// Functions*, `lowbias32`).
 #[inline(always)]
 pub fn hash<B: SimdU32>(x: B) -> B {
@@ -11,42 +11,42 @@ pub fn hash<B: SimdU32>(x: B) -> B {
     x ^ (x >> 16)
 }
 
-/// [`mix`] of one word.
+/// [`hash`] of one word.
 pub const fn hash_scalar(mut x: u32) -> u32 {
     x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
     x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
     x ^ (x >> 16)
 }
 
-/// One word from several, each of which changes it.
+/// Hash of several words.
 pub fn hash_words(words: &[u32]) -> u32 {
     words.iter().fold(0x9e37_79b9, |h, w| {
         hash_scalar(h.rotate_left(5).wrapping_add(0x85eb_ca6b) ^ hash_scalar(*w))
     })
 }
 
-/// Owen scrambling of numbers whose first binary digit is in bit 0: every digit is flipped or not by
-/// a function of `seed` and of the digits before it.
+/// Owen scrambling of numbers whose first binary digit is in bit 0: a function of `seed` and of the
+/// preceding digits decides whether a digit is flipped.
 ///
-/// The Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
+/// Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
 #[inline(always)]
 pub fn owen<B: SimdU32>(x: B, seed: B) -> B {
     owen_scramble_suffix(owen_scramble_prefix(x), seed, owen_factor(seed))
 }
 
-/// The part of [`owen`] before the seed takes part.
+/// First part of [`owen`], independent of the seed.
 #[inline(always)]
 pub fn owen_scramble_prefix<B: SimdU32>(x: B) -> B {
     x ^ (x * B::splat(0x3d20_adea))
 }
 
-/// What [`owen`] multiplies with.
+/// Factor of [`owen`], from its seed.
 #[inline(always)]
 pub fn owen_factor<B: SimdU32>(seed: B) -> B {
     (seed >> 16) | B::splat(1)
 }
 
-/// What is left of [`owen`] after [`owen_begin`].
+/// Second part of [`owen`], after [`owen_scramble_prefix`].
 #[inline(always)]
 pub fn owen_scramble_suffix<B: SimdU32>(prefix: B, seed: B, factor: B) -> B {
     let x = (prefix + seed) * factor;

@@ -1,5 +1,5 @@
-//! Numbers for samples: a sample is a pure function of (seed, pixel, replicate, index), never of
-//! thread, order or time.
+//! Random numbers of samples: pure functions of (seed, pixel, replicate, index), independent of
+//! thread, order and time.
 
 mod hash;
 mod packet_sampler;

@@ -1,4 +1,4 @@
-//! The random numbers of a packet of samples.
+//! Sampler of a packet: random numbers of the samples in its lanes.
 
 use crate::lanes::{MAX_WIDTH, SimdFloat, SimdU32};
 use crate::sampling::hash::{
@@ -7,17 +7,17 @@ use crate::sampling::hash::{
 use crate::sampling::sobol;
 use crate::sampling::sobol::DIMENSIONS;
 
-/// Which sequence samples come from.
+/// Sample sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SamplerKind {
-    /// A joint Owen-scrambled Sobol set in eight dimensions, padded by further sets.
+    /// Joint Owen-scrambled Sobol set in eight dimensions, padded with further sets.
     Sobol,
     /// Independent random numbers.
     Random,
 }
 
 impl SamplerKind {
-    /// As written on the command line and in file headers.
+    /// Name on the command line and in file headers.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sobol => "sobol",
@@ -26,51 +26,53 @@ impl SamplerKind {
     }
 }
 
-/// What every sample of a picture depends on beside its pixel, replicate and index.
+/// Settings that determine all samples of a picture, together with pixel, replicate and index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleSettings {
-    /// Any number; another number gives another, independent picture of the same scene.
+    /// Random seed. Pictures with different seeds are independent.
     pub seed: u64,
-    /// The sequence.
+    /// Sample sequence.
     pub kind: SamplerKind,
 }
 
-/// The last dimensions of the joint set are for a path's first choices.
+/// Number of dimensions at the end of the joint set that are reserved for a path's first branch
+/// choices.
 const CHOICES: u32 = 2;
 
-/// Powers of two up to the widest packet.
-const SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
+/// Number of powers of two up to the widest packet.
+const PACKET_SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
 
-/// The numbers that samples of a lane type start from.
+/// Sampler of all samples of a picture: tables and constants.
 pub struct Sampler<L: SimdFloat> {
     settings: SampleSettings,
-    /// Two words per replicate, from the seed.
+    /// Two words per replicate, hashed from the seed.
     seeds: [[u32; 2]; 2],
-    /// Dimensions of the first lobe: after the two of the pixel, if these are used.
+    /// First dimension of the first lobe: after the two of the pixel, if these are used.
     first_lobe: usize,
-    /// `low_bits[k][d]`: Sobol points 0..2^k in dimension d, again and again.
-    low_bits: [[L::SimdU32; DIMENSIONS]; SHAPES],
-    /// 0, 1, 2, ... in the lanes.
+    /// `low_bits[k][d]`: Sobol points 0..2^k in dimension d, repeated over the lanes.
+    low_bits: [[L::SimdU32; DIMENSIONS]; PACKET_SHAPES],
+    /// Lane indices.
     ramp: L::SimdU32,
-    /// A constant per dimension that sets its scrambling apart.
+    /// Constant per dimension that decorrelates its scrambling.
     dimension_salt: [u32; DIMENSIONS],
 }
 
-/// The part of a packet's numbers that depends on the samples' indices alone.
+/// Part of a packet's random numbers that depends on the sample indices only.
 pub struct SampleBlock<'a, L: SimdFloat> {
     sampler: &'a Sampler<L>,
-    /// Index in each lane.
+    /// Sample index in each lane.
     index: L::SimdU32,
-    /// `owen_prefix[d]`: the Sobol points of the indices in dimension d, their scrambling begun.
+    /// `owen_prefix[d]`: Sobol points of the indices in dimension d, after
+    /// [`owen_scramble_prefix`].
     owen_prefix: [L::SimdU32; DIMENSIONS],
 }
 
 impl<L: SimdFloat> Sampler<L> {
-    /// `jitter`: samples move inside their pixel and use the first two dimensions for that;
-    /// otherwise the lobes have them.
+    /// Creates the sampler of a picture. With `jitter` the first two dimensions distribute samples
+    /// over their pixel, otherwise they belong to the lobes.
     pub fn new(settings: SampleSettings, jitter: bool) -> Self {
-        let word = |replicate: u32, use_: u32| {
-            hash_words(&[settings.seed as u32, (settings.seed >> 32) as u32, replicate, use_])
+        let word = |replicate: u32, purpose: u32| {
+            hash_words(&[settings.seed as u32, (settings.seed >> 32) as u32, replicate, purpose])
         };
         let low_bits = |k: usize, d| {
             L::SimdU32::from_fn(|lane| sobol::point(d, lane as u32 & ((1u32 << k) - 1)))
@@ -85,13 +87,13 @@ impl<L: SimdFloat> Sampler<L> {
         }
     }
 
-    /// The indices `first..first + count`, in packets that hold as many of each of WIDTH / `count` pixels:
-    /// lane i has index `first + i % count`. `count` is a power of two, at most WIDTH, and `first` a multiple
-    /// of it.
+    /// Creates the block of the indices `first..first + count` for packets of `WIDTH / count`
+    /// pixels: lane i has index `first + i % count`. `count` is a power of two, at most `WIDTH`,
+    /// and `first` a multiple of it.
     pub fn block(&self, first: u32, count: usize) -> SampleBlock<'_, L> {
         debug_assert!(count.is_power_of_two() && count <= L::WIDTH);
         debug_assert!((first as usize).is_multiple_of(count));
-        // Aligned points are one point XOR constants.
+        // Points at aligned indices are the first point XOR constants.
         let low_bits = &self.low_bits[count.ilog2() as usize];
         let point = |d| L::SimdU32::splat(sobol::point(d, first)) ^ low_bits[d];
         let owen_prefix = std::array::from_fn(|d| owen_scramble_prefix(point(d)));
@@ -99,8 +101,8 @@ impl<L: SimdFloat> Sampler<L> {
         SampleBlock { sampler: self, index: L::SimdU32::splat(first) + within, owen_prefix }
     }
 
-    /// The key of a pixel's samples in one replicate (0: A, 1: B). Distinct for all pixels of a
-    /// picture up to 65536 x 65536, since every step is a bijection of the packed coordinates.
+    /// Key of a pixel's samples in one replicate (0: A, 1: B). Keys are distinct for all pixels of
+    /// a picture up to 65536 x 65536, because every step is a bijection of the packed coordinates.
     #[inline(always)]
     pub fn key(&self, (x, y): (u32, u32), replicate: usize) -> u32 {
         let [before, after] = self.seeds[replicate];
@@ -109,43 +111,43 @@ impl<L: SimdFloat> Sampler<L> {
 }
 
 impl<L: SimdFloat> SampleBlock<'_, L> {
-    /// Samples of the pixel that [`Sampler::key`] gave a key.
+    /// Sampler of a packet of one pixel, given by its [`Sampler::key`].
     #[inline(always)]
     pub fn for_pixel(&self, key: u32) -> PacketSampler<'_, L> {
-        PacketSampler { points: self, key: L::SimdU32::splat(key), of_one: Some(key) }
+        PacketSampler { points: self, key: L::SimdU32::splat(key), single_key: Some(key) }
     }
 
-    /// Samples of several pixels, by the keys of the pixels in the lanes.
+    /// Sampler of a packet of several pixels, given by the keys in the lanes.
     #[inline(always)]
     pub fn for_pixels(&self, keys: L::SimdU32) -> PacketSampler<'_, L> {
-        PacketSampler { points: self, key: keys, of_one: None }
+        PacketSampler { points: self, key: keys, single_key: None }
     }
 }
 
-/// The random numbers of one packet.
+/// Random numbers of one packet.
 pub struct PacketSampler<'a, L: SimdFloat> {
     points: &'a SampleBlock<'a, L>,
     /// Key of the pixel in each lane.
     key: L::SimdU32,
-    /// The key, if all lanes have the same pixel.
-    of_one: Option<u32>,
+    /// Key of all lanes, if the packet has one pixel.
+    single_key: Option<u32>,
 }
 
 impl<L: SimdFloat> PacketSampler<'_, L> {
-    /// Where in its pixel a sample lies, each coordinate in [0, 1).
+    /// Position of samples in their pixel, each coordinate in [0, 1).
     #[inline(always)]
     pub fn pixel(&self) -> (L, L) {
         (self.joint(0), self.joint(1))
     }
 
-    /// Two numbers in [0, 1) for the lobe of the surface met after `bounce` reflections.
+    /// Two numbers in [0, 1) for the lobe of the surface after `bounce` reflections.
     #[inline(always)]
     pub fn lobe_2d(&self, bounce: u32) -> (L, L) {
         let d = self.points.sampler.first_lobe + 2 * bounce as usize;
         if bounce < 2 { (self.joint(d), self.joint(d + 1)) } else { self.padded(bounce - 2) }
     }
 
-    /// A number in [0, 1) for choice `number` of a path, from 0: one of two ways to go on.
+    /// A number in [0, 1) for branch choice `number` of a path, from 0: reflection or transmission.
     #[inline(always)]
     pub fn branch_1d(&self, number: u32) -> L {
         if number < CHOICES {
@@ -160,7 +162,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     fn joint(&self, d: usize) -> L {
         let points = self.points;
         let dimension_salt = points.sampler.dimension_salt[d];
-        let seed = match self.of_one {
+        let seed = match self.single_key {
             Some(key) => L::SimdU32::splat(hash_scalar(key ^ dimension_salt)),
             None => hash(self.key ^ L::SimdU32::splat(dimension_salt)),
         };
@@ -172,7 +174,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Two numbers for lobe `pair` of the padded sets: four lobes share a set.
+    /// Two numbers for lobe `pair` of the padded sets; four lobes share a set.
     #[cold]
     fn padded(&self, pair: u32) -> (L, L) {
         let d = 2 * (pair % 4) as usize;
@@ -180,7 +182,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         (a, b)
     }
 
-    /// A number for choice `number` of the padded sets: eight choices share a set.
+    /// A number for branch choice `number` of the padded sets; eight choices share a set.
     #[cold]
     fn padded_choice(&self, number: u32) -> L {
         let per_set = DIMENSIONS as u32;
@@ -189,22 +191,22 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         x
     }
 
-    /// Some dimensions of the padded set `set`, whose indices are shuffled by a key of its own.
+    /// Some dimensions of the padded set `set`, whose indices are shuffled by a separate key.
     #[inline(always)]
     fn padded_set<const N: usize>(&self, set: u32, dimensions: [usize; N]) -> [L; N] {
         let SampleBlock { sampler, index, .. } = self.points;
         let key = hash(self.key + L::SimdU32::splat(hash_scalar(set)));
         let shuffled = owen(index.reverse(), key).reverse();
-        let mut at = [0; MAX_WIDTH];
-        for (lane, at) in at.iter_mut().enumerate().take(L::WIDTH) {
-            *at = shuffled.lane(lane);
+        let mut indices = [0; MAX_WIDTH];
+        for (lane, index) in indices.iter_mut().enumerate().take(L::WIDTH) {
+            *index = shuffled.lane(lane);
         }
         dimensions.map(|d| {
             let seed = hash(key ^ L::SimdU32::splat(sampler.dimension_salt[d]));
             match sampler.settings.kind {
                 SamplerKind::Random => L::to_unit(hash(hash(*index ^ seed) + key)),
                 SamplerKind::Sobol => {
-                    let x = L::SimdU32::from_fn(|lane| sobol::point(d, at[lane]));
+                    let x = L::SimdU32::from_fn(|lane| sobol::point(d, indices[lane]));
                     L::to_unit(owen(x, seed).reverse())
                 }
             }

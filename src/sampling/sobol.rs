@@ -1,46 +1,46 @@
-//! A sequence of points in eight dimensions, 32-bit index: four pairs, each of which is the first two
-//! dimensions of the Sobol sequence, a (0, 2)-sequence in base 2.
+//! Sobol points in eight dimensions with a 32-bit index: four pairs, each the first two dimensions
+//! of the Sobol sequence, a (0, 2)-sequence in base 2.
 //!
-//! Pair k runs through that sequence in an order of its own: at the index `M_k i`, where `M_k` is an
-//! upper triangular matrix of bits with ones on its diagonal. Such a matrix maps the first 2^m indices to
-//! themselves, for every m, so each pair stays a (0, 2)-sequence (Faure and Tezuka 2002, *Another Random
-//! Scrambling of Digital (t,s)-Sequences*), which no pair but the first is among the usual direction
-//! numbers (Joe and Kuo 2008). What a pixel sees in a mirror depends on a pair: where in the pixel a ray
-//! starts, where in the lobe it leaves; see docs/accuracy.md for what that is worth.
+//! Pair k has its own order of that sequence: the index is `M_k i`, where `M_k` is an upper
+//! triangular matrix of bits with ones on its diagonal. Such a matrix permutes the first 2^m
+//! indices for every m, so that each pair remains a (0, 2)-sequence (Faure and Tezuka 2002,
+//! *Another Random Scrambling of Digital (t,s)-Sequences*). With the usual direction numbers (Joe
+//! and Kuo 2008) only the first pair is one. The image in a mirror depends on single pairs:
+//! position in the pixel, and direction in the lobe. docs/accuracy.md has the measured benefit.
 //!
-//! The first columns of the matrices were searched for, one after the other: the one with which the 2^m
-//! points, scrambled at random, tell best how much of the cube lies on one side of a random plane that
-//! leans towards the axes of several pairs, and the mean of a smooth product of numbers of several pairs;
-//! further columns are as good as random.
+//! The first columns of the matrices were found by search, one after the other. The criterion is
+//! the error with which 2^m randomly scrambled points estimate the volume on one side of a random
+//! plane that leans towards the axes of several pairs, and the mean of a smooth product over
+//! several pairs. Further columns are random.
 //!
-//! Values are stored with the first binary digit in bit 0, as the scrambling hash wants them.
+//! Values are stored with the first binary digit in bit 0, as the scrambling hash requires.
 
 use crate::sampling::hash::hash_scalar;
 
-/// Dimensions of one joint set.
+/// Number of dimensions of one joint set.
 pub const DIMENSIONS: usize = 8;
 
-/// The columns of `M_1`, `M_2`, `M_3` that were searched for: bit r is row r.
+/// First columns of `M_1`, `M_2` and `M_3`, found by search; bit r is row r.
 const COLUMNS: [&[u32]; 3] = [
     &[1, 3, 4, 13, 22, 46, 65, 179, 390, 573, 1694, 2956, 5907],
     &[1, 2, 6, 15, 22, 33, 100, 158, 457, 810],
     &[1, 2, 7, 12, 22, 39, 88, 191, 277],
 ];
 
-/// What bit `bit` of the index of pair `pair` becomes in the index of the first pair.
+/// Column `bit` of the matrix of pair `pair`.
 const fn column(pair: usize, bit: usize) -> u32 {
-    let own = 1 << bit;
+    let diagonal = 1 << bit;
     if pair == 0 {
-        return own;
+        return diagonal;
     }
     let found = COLUMNS[pair - 1];
     if bit < found.len() {
         return found[bit];
     }
-    own | (hash_scalar((32 * (pair - 1) + bit) as u32) & (own - 1))
+    diagonal | (hash_scalar((32 * (pair - 1) + bit) as u32) & (diagonal - 1))
 }
 
-/// The Sobol sequence's directions in dimension 0 or 1, first digit in bit 0.
+/// Direction number of the Sobol sequence in dimension 0 or 1, first digit in bit 0.
 const fn direction(dimension: usize, bit: usize) -> u32 {
     let mut row = 1 << bit;
     if dimension == 1 {
@@ -55,7 +55,7 @@ const fn direction(dimension: usize, bit: usize) -> u32 {
     row
 }
 
-/// Directions of a dimension, first digit in bit 0.
+/// Direction numbers of a dimension, first digit in bit 0.
 const fn directions(dimension: usize) -> [u32; 32] {
     let mut v = [0; 32];
     let mut bit = 0;
@@ -72,7 +72,7 @@ const fn directions(dimension: usize) -> [u32; 32] {
 
 type Tables = [[[u32; 256]; 4]; DIMENSIONS];
 
-/// `TABLES[d][k][byte]`: what byte k of the index adds (XOR) to dimension d, digits reversed.
+/// `TABLES[d][k][byte]`: contribution (XOR) of byte k of the index to dimension d, digits reversed.
 static TABLES: Tables = {
     let mut tables = [[[0u32; 256]; 4]; DIMENSIONS];
     let mut d = 0;
@@ -114,8 +114,8 @@ mod tests {
         point(dimension, index).reverse_bits()
     }
 
-    /// Every pair is a (0, m, 2)-net for every m: each elementary interval of volume 2^-m holds exactly
-    /// one of the first 2^m points, and of every later 2^m that are aligned.
+    /// Every pair is a (0, m, 2)-net for every m: each elementary interval of volume 2^-m holds
+    /// exactly one of the first 2^m points, and of every later 2^m that are aligned.
     #[test]
     fn elementary_intervals_hold_one_point_each() {
         for (pair, m) in (0..DIMENSIONS / 2).flat_map(|pair| (0..=12u32).map(move |m| (pair, m))) {
@@ -136,7 +136,7 @@ mod tests {
         }
     }
 
-    /// The first points of the Sobol sequence as published with the direction numbers.
+    /// First points of the Sobol sequence, as published with the direction numbers.
     #[test]
     fn first_points_are_the_published_ones() {
         let row = |i| [0, 1].map(|d| f64::from(digits(d, i)) / 4_294_967_296.0);
@@ -145,11 +145,11 @@ mod tests {
         (0..).zip(rows).for_each(|(i, published)| assert_eq!(row(i), published));
     }
 
-    /// The share of random half-spaces that the points tell has less error than with as many independent
-    /// points: by so much in the plane of a pair (where the usual second pair has 0.30 and 0.23 of it), and
-    /// where all four first dimensions take part.
+    /// Error of the estimated volume of random half-spaces, relative to independent points: in the
+    /// plane of one pair (where the usual second pair has 0.30 and 0.23), and over the first four
+    /// dimensions.
     #[test]
-    fn scrambled_points_tell_half_spaces_better_than_random_ones() {
+    fn scrambled_points_estimate_half_spaces_better_than_random_points() {
         use crate::lanes::{SimdFloat, SimdU32};
         use crate::sampling::hash::owen;
         type One = f32;
@@ -159,7 +159,7 @@ mod tests {
             state += 1;
             hash_scalar(state)
         };
-        for (name, weights, points, most) in [
+        for (name, weights, points, max_ratio) in [
             ("the lobe", [0.0, 1.0], 64, 0.30),
             ("mostly the lobe", [0.1, 1.0], 64, 0.35),
             ("both", [1.0, 1.0], 64, 0.50),
@@ -169,25 +169,31 @@ mod tests {
         ] {
             let (mut error, mut independent) = (0.0, 0.0);
             for _ in 0..4000 {
-                let turn = [0, 1].map(|_| std::f64::consts::TAU * unit(random()));
+                let angle = [0, 1].map(|_| std::f64::consts::TAU * unit(random()));
                 let normal = [0, 1, 2, 3].map(|d| {
-                    weights[d / 2] * if d % 2 == 0 { turn[d / 2].cos() } else { turn[d / 2].sin() }
+                    weights[d / 2]
+                        * if d % 2 == 0 { angle[d / 2].cos() } else { angle[d / 2].sin() }
                 });
-                let height =
-                    |at: [u32; 4]| at.iter().zip(normal).map(|(x, n)| unit(*x) * n).sum::<f64>();
+                let height = |point: [u32; 4]| {
+                    point.iter().zip(normal).map(|(x, n)| unit(*x) * n).sum::<f64>()
+                };
                 let border = height([0; 4].map(|_: u32| random()));
-                let mut share = || {
+                let mut volume = || {
                     let keys = [0; 4].map(|_: u32| random());
-                    let at = |i| [0, 1, 2, 3].map(|d| owen_1(point(d, i), keys[d]).reverse_bits());
-                    (0..points).filter(|i| height(at(*i)) > border).count() as f64
+                    let scrambled =
+                        |i| [0, 1, 2, 3].map(|d| owen_1(point(d, i), keys[d]).reverse_bits());
+                    (0..points).filter(|i| height(scrambled(*i)) > border).count() as f64
                         / f64::from(points)
                 };
-                let (a, b) = (share(), share());
+                let (a, b) = (volume(), volume());
                 error += (a - b).powi(2) / 2.0;
                 independent += 0.25 * (a + b) * (2.0 - a - b) / f64::from(points);
             }
             let ratio = f64::sqrt(error / independent);
-            assert!(ratio < most, "{name}, {points} points: {ratio} of the error of random ones");
+            assert!(
+                ratio < max_ratio,
+                "{name}, {points} points: {ratio} of the error of random ones"
+            );
         }
         fn owen_1(x: u32, seed: u32) -> u32 {
             owen(<One as SimdFloat>::SimdU32::splat(x), <One as SimdFloat>::SimdU32::splat(seed))
@@ -195,15 +201,17 @@ mod tests {
         }
     }
 
-    /// Largest gain coefficient of two dimensions: how many times the variance of independent points the first 2^m
-    /// scrambled points can have, for the worst integrand of both (Owen 1997, *Monte Carlo Variance of Scrambled Net
-    /// Quadrature*). It is largest over the Haar components (j, k) of
-    /// mean over the points p, q of the product over both dimensions of 2 [same cell of 2^-(j+1)] - [same cell of 2^-j].
+    /// Largest gain coefficient of two dimensions: the variance of the first 2^m scrambled points
+    /// over that of independent points, for the worst integrand of both dimensions (Owen 1997,
+    /// *Monte Carlo Variance of Scrambled Net Quadrature*). It is the maximum over the Haar
+    /// components (j, k) of the mean over the points p, q of the product over both dimensions of 2
+    /// [same cell of 2^-(j+1)] - [same cell of 2^-j].
     fn gain(a: usize, b: usize, m: u32) -> f64 {
         let count = 1u32 << m;
         let alike = |d: usize| {
             let first = digits(d, 0);
-            // The first 2^m points are a group under XOR: every point sees the same distances.
+            // The first 2^m points are a group under XOR: the distances from every point are the
+            // same.
             (0..count).map(move |i| (digits(d, i) ^ first).leading_zeros()).collect::<Vec<u32>>()
         };
         let (a, b) = (alike(a), alike(b));
@@ -216,7 +224,8 @@ mod tests {
         levels.map(|(j, k)| component(j, k)).fold(0.0, f64::max)
     }
 
-    /// The table in docs/accuracy.md. The worst pairs join the second lobe and the branch choices: 4 to 7.
+    /// Table in docs/accuracy.md. The worst pairs join the second lobe and the branch choices: 4 to
+    /// 7.
     #[test]
     fn worst_pairs_of_dimensions_are_the_documented_ones() {
         for (m, worst, first_lobes) in [
@@ -237,7 +246,8 @@ mod tests {
         assert!((0..4).all(|pair| gain(2 * pair, 2 * pair + 1, 6) <= 2.0));
     }
 
-    /// Sixteen aligned points are one point XOR sixteen constants: what the packets rely on.
+    /// Sixteen points at aligned indices are one point XOR sixteen constants, as [`Sampler::block`]
+    /// requires.
     #[test]
     fn aligned_points_are_one_point_and_constants() {
         for d in 0..DIMENSIONS {

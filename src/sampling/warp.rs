@@ -1,15 +1,15 @@
-//! From the unit square to directions: the lobes of reflected rays and microfacets, each with its
-//! density.
+//! Sample warps from the unit square to directions: lobes of reflected rays and microfacet normals,
+//! with their densities.
 //!
-//! Directions are in the frame of the lobe: z along its axis (the mirror direction for cone and
-//! square, the normal for microfacets).
+//! Directions are in the frame of the lobe. Its z axis is the mirror direction for cone and square,
+//! the surface normal for microfacets.
 
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
-/// A uniform point of the unit disk, and the square of its distance from the centre: squares about the
-/// centre become circles, so that what is near stays near. An edge that the disk shows costs as many
-/// samples as one of the square, and fewer when it runs along an axis.
+/// Uniform point of the unit disk, and its squared distance from the centre. Concentric squares
+/// become circles, so that neighbours stay neighbours. An edge across the disk costs as many
+/// samples as one across the square, and fewer if it is parallel to an axis.
 ///
 /// Shirley and Chiu 1997, *A Low Distortion Map Between Disk and Square*.
 #[inline(always)]
@@ -18,12 +18,13 @@ pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
     let (a, b) = (centred(u), centred(v));
     let wide = a.abs().gt(b.abs());
     let (far, near) = (L::select(wide, a, b), L::select(wide, b, a));
-    // In the centre itself, any angle.
+    // In the centre the angle is arbitrary.
     let (s, c) = sin_cos_eighth(near / far.abs().max(L::from_f64(1e-30)).copysign(far));
     (far * L::select(wide, c, s), far * L::select(wide, s, c), far * far)
 }
 
-/// The series of the sine (`first` 1) or cosine (0) of x eighths of a turn, by powers of x^2.
+/// Coefficients by powers of x^2 of the series of the sine (`first` is 1) or cosine (0) of x
+/// eighths of a turn.
 const fn series(first: u32) -> [f64; 8] {
     let mut terms = [0.0; 8];
     let (mut k, mut n, mut term) = (0, 0, 1.0);
@@ -38,8 +39,8 @@ const fn series(first: u32) -> [f64; 8] {
     terms
 }
 
-/// Sine and cosine of `x` eighths of a turn, for x in [-1, 1]: the first eight terms of their series,
-/// which leave 1e-15.
+/// Sine and cosine of `x` eighths of a turn, for x in [-1, 1]: the first eight terms of their
+/// series, with an error of 1e-15.
 #[inline(always)]
 fn sin_cos_eighth<L: SimdFloat>(x: L) -> (L, L) {
     const SINE: [f64; 8] = series(1);
@@ -48,20 +49,20 @@ fn sin_cos_eighth<L: SimdFloat>(x: L) -> (L, L) {
     (x * polynomial(&SINE, x2), polynomial(&COSINE, x2))
 }
 
-/// `k[0] + k[1] x + k[2] x^2 + ...`
+/// Polynomial `k[0] + k[1] x + k[2] x^2 + ...`.
 #[inline(always)]
 fn polynomial<L: SimdFloat>(k: &[f64], x: L) -> L {
     k.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::from_f64(*k)))
 }
 
-/// A uniform direction in the cone of half-angle theta about z.
+/// Uniform direction in the cone of half-angle theta about z.
 ///
 /// `one_minus_cos` is 1 - cos(theta), best computed as 2 sin^2(theta / 2); its range is [0, 1].
 #[inline(always)]
 pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     let (x, y, r2) = disk(u, v);
     let drop = r2 * one_minus_cos;
-    // Areas on the sphere are as areas on the disk; sin = r scale.
+    // Areas on the sphere are proportional to areas on the disk; sin = r scale.
     let scale = (one_minus_cos * (L::from_f64(2.0) - drop)).max(L::zero()).sqrt();
     Vec3::new(x * scale, y * scale, L::one() - drop)
 }
@@ -71,7 +72,7 @@ pub fn cone_pdf(direction_z: f64, one_minus_cos: f64) -> f64 {
     if 1.0 - direction_z <= one_minus_cos { 1.0 / (TAU * one_minus_cos) } else { 0.0 }
 }
 
-/// A direction through a uniform point of the square with sides `side` at unit distance,
+/// Direction through a uniform point of the square with sides `side` at unit distance,
 /// perpendicular to z and centred on it.
 #[inline(always)]
 pub fn square<L: SimdFloat>(u: L, v: L, side: L) -> Vec3<L> {
@@ -86,23 +87,23 @@ pub fn square_pdf(direction: [f64; 3], side: f64) -> f64 {
     if inside { 1.0 / (side * side * z * z * z) } else { 0.0 }
 }
 
-/// A microfacet normal with density D(h) cos(h), Beckmann distribution of slope `alpha`: the slopes along
-/// x and y are independent normal deviates with variance alpha^2 / 2, one from each number, so that what a
-/// mirror shows of edges along its axes depends almost on one number only.
+/// Microfacet normal with density D(h) cos(h), Beckmann distribution of slope `alpha`. The slopes
+/// along x and y are independent normal deviates with variance alpha^2 / 2, one from each number,
+/// so that reflections of edges along the mirror's axes depend almost entirely on one number.
 ///
-/// Walter et al. 2007, *Microfacet Models for Refraction through Rough Surfaces*, eq. 28, has the same
-/// density by radius and angle.
+/// Walter et al. 2007, *Microfacet Models for Refraction through Rough Surfaces*, eq. 28, has the
+/// same density by radius and angle.
 #[inline(always)]
 pub fn beckmann<L: SimdFloat>(u: L, v: L, alpha: L) -> Vec3<L> {
     Vec3::new(alpha * erf_inverse(u), alpha * erf_inverse(v), L::one()).normalize()
 }
 
-/// The inverse of the error function at 2 u - 1, for u in [0, 1), to 4e-7 of its value (in double
+/// Inverse of the error function at 2 u - 1, for u in [0, 1), to 4e-7 of its value (in double
 /// precision to 1.4e-7); at 0, where it is infinite, -4.7.
 ///
-/// The form is that of Giles 2010, *Approximating the erfinv Function*, GPU Computing Gems, chapter 10:
-/// (2 u - 1) times a function of w = -ln(1 - (2 u - 1)^2); polynomials fitted for the least relative
-/// error with w up to 23.
+/// Form of Giles 2010, *Approximating the erfinv Function*, GPU Computing Gems, chapter 10:
+/// (2 u - 1) times a function of `w = -ln(1 - (2 u - 1)^2)`. The polynomials are fitted for the
+/// least relative error with w up to 23.
 #[inline(always)]
 fn erf_inverse<L: SimdFloat>(u: L) -> L {
     const MIDDLE: [f64; 10] = [
@@ -129,22 +130,22 @@ fn erf_inverse<L: SimdFloat>(u: L) -> L {
         7.554_361_036_64e-6,
         3.185_092_156_69e-5,
     ];
-    let within = u.max(L::from_f64(2e-11));
-    let w = -(L::from_f64(4.0) * within * (L::one() - within)).ln();
+    let positive = u.max(L::from_f64(2e-11));
+    let w = -(L::from_f64(4.0) * positive * (L::one() - positive)).ln();
     let mut ratio = polynomial(&MIDDLE, w - L::from_f64(2.5));
-    let outside = w.gt(L::from_f64(5.0));
-    // One in three hundred.
-    if outside.any() {
+    let in_tail = w.gt(L::from_f64(5.0));
+    // Probability 1 / 300.
+    if in_tail.any() {
         let root = w.max(L::zero()).sqrt();
-        ratio = L::select(outside, polynomial(&TAILS, root - L::from_f64(3.5)), ratio);
+        ratio = L::select(in_tail, polynomial(&TAILS, root - L::from_f64(3.5)), ratio);
     }
     ratio * (u + u - L::one())
 }
 
-/// A microfacet normal with density D_v(h), the GGX normals visible from `view` (unit, z >= 0).
+/// Microfacet normal with density D_v(h): the GGX normals visible from `view` (unit, z >= 0).
 ///
-/// Dupuy and Benyoub 2023, *Sampling Visible GGX Normals with Spherical Caps*; the cap is the image of a
-/// disk.
+/// Dupuy and Benyoub 2023, *Sampling Visible GGX Normals with Spherical Caps*. The cap is the image
+/// of a disk.
 #[inline(always)]
 pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
     let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();
@@ -156,7 +157,7 @@ pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L>
     Vec3::new(h.x * alpha, h.y * alpha, h.z.max(L::zero())).normalize()
 }
 
-/// Beckmann's distribution D [1/sr] of microfacet normals at squared tangent `tan2` from the surface
+/// Beckmann distribution D [1/sr] of microfacet normals at squared tangent `tan2` from the surface
 /// normal: exp(-tan2 / alpha^2) / (pi alpha^2 cos^4), with 1 / cos^2 = 1 + tan2.
 #[inline(always)]
 pub fn beckmann_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
@@ -166,7 +167,7 @@ pub fn beckmann_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
         * (inverse_alpha2 * L::from_f64(FRAC_1_PI))
 }
 
-/// The GGX distribution D [1/sr]: 1 / (pi alpha^2 cos^4 (1 + tan2 / alpha^2)^2).
+/// GGX distribution D [1/sr]: 1 / (pi alpha^2 cos^4 (1 + tan2 / alpha^2)^2).
 #[inline(always)]
 pub fn ggx_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
     let ratio = (tan2 + L::one()) / (tan2 * inverse_alpha2 + L::one());
@@ -179,7 +180,7 @@ mod tests {
     use crate::lanes::{Double, Float, Single};
     use std::f64::consts::PI;
 
-    /// 1 - erf(x) for x >= 0 by its continued fraction or series.
+    /// Complementary error function 1 - erf(x) for x >= 0, by its continued fraction or series.
     fn erfc(x: f64) -> f64 {
         let two_over_root_pi = 2.0 / PI.sqrt();
         if x < 2.0 {
@@ -195,16 +196,21 @@ mod tests {
         0.5 * two_over_root_pi * (-x * x).exp() / fraction
     }
 
-    /// The error function undoes it, from the middle to the last number in the tails.
-    fn undone<L: SimdFloat>(numbers: &[f64], most: f64) {
+    /// Checks that the error function inverts `erf_inverse`, from the middle to the last number in
+    /// the tails.
+    fn check_erf_inverse<L: SimdFloat>(numbers: &[f64], max_error: f64) {
         for u in numbers {
             let x: f64 = erf_inverse(L::from_f64(*u)).lane(0).to_f64();
-            // The number that belongs to x, and how far from u, in the slope's own units.
+            // Error of u, converted to an error of x by the slope.
             let tail = u.min(1.0 - u);
-            let off = 0.5 * erfc(x.abs()) - tail;
+            let u_error = 0.5 * erfc(x.abs()) - tail;
             let per_x = (-x * x).exp() / PI.sqrt();
-            let relative = (off / per_x / x.abs().max(1e-3)).abs();
-            assert!(relative < most, "{}: u = {u}, erf_inverse {x}, off by {relative}", L::NAME);
+            let relative = (u_error / per_x / x.abs().max(1e-3)).abs();
+            assert!(
+                relative < max_error,
+                "{}: u = {u}, erf_inverse {x}, off by {relative}",
+                L::NAME
+            );
             assert_eq!(x < 0.0, *u < 0.5, "u = {u}");
         }
     }
@@ -216,45 +222,45 @@ mod tests {
             (1..2048).filter(|i| *i != 1024).map(|i| f64::from(i) * step(2048)).collect();
         let tails: Vec<f64> = (9..24).map(|bits| f64::from(-bits).exp2()).collect();
         numbers.extend(tails.iter().flat_map(|tail| [*tail, 1.0 - tail]));
-        undone::<Single>(&numbers, 2e-6);
+        check_erf_inverse::<Single>(&numbers, 2e-6);
         numbers.extend((24..=32).map(|bits| f64::from(-bits).exp2()));
-        undone::<Double>(&numbers, 2e-7);
+        check_erf_inverse::<Double>(&numbers, 2e-7);
         ends::<Single>();
         ends::<Double>();
     }
 
     fn ends<L: SimdFloat>() {
-        let at = |u: f64| erf_inverse(L::from_f64(u)).lane(0).to_f64();
-        assert_eq!(at(0.5), 0.0);
-        assert!((-5.0..-4.5).contains(&at(0.0)), "{}", at(0.0));
+        let inverse = |u: f64| erf_inverse(L::from_f64(u)).lane(0).to_f64();
+        assert_eq!(inverse(0.5), 0.0);
+        assert!((-5.0..-4.5).contains(&inverse(0.0)), "{}", inverse(0.0));
     }
 
-    /// Squares about the centre become circles, and areas stay areas.
-    fn round<L: SimdFloat>(most: f64) {
-        let at = |u: f64, v: f64| {
+    /// Checks that concentric squares become circles and that equal areas stay equal.
+    fn check_disk<L: SimdFloat>(max_error: f64) {
+        let point = |u: f64, v: f64| {
             let (x, y, r2) = disk(L::from_f64(u), L::from_f64(v));
             [x, y, r2].map(|x| x.lane(0).to_f64())
         };
-        assert_eq!(at(0.5, 0.5), [0.0; 3]);
+        assert_eq!(point(0.5, 0.5), [0.0; 3]);
         let n = 64;
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
             let [u, v] = [i, j].map(|i| (f64::from(i) + 0.5) / f64::from(n));
-            let [x, y, r2] = at(u, v);
+            let [x, y, r2] = point(u, v);
             let side = (2.0 * u - 1.0).abs().max((2.0 * v - 1.0).abs());
-            assert!((r2 - side * side).abs() < most && (x * x + y * y - r2).abs() < most);
+            assert!((r2 - side * side).abs() < max_error && (x * x + y * y - r2).abs() < max_error);
             let angle = y.atan2(x);
-            // To the right, up, to the left, down.
+            // Quadrants in the order right, up, left, down.
             let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
             let (eighths, ahead) = if a.abs() > b.abs() { (b / a, a) } else { (2.0 - a / b, b) };
             let eighth = if ahead > 0.0 { eighths } else { eighths + 4.0 };
             let off = (angle - FRAC_PI_4 * eighth).rem_euclid(2.0 * PI);
-            assert!(off.min(2.0 * PI - off) < most / side, "{u}, {v}: {angle}");
+            assert!(off.min(2.0 * PI - off) < max_error / side, "{u}, {v}: {angle}");
         }
     }
 
     #[test]
-    fn the_disk_is_round_and_its_areas_are_those_of_the_square() {
-        round::<Single>(1e-6);
-        round::<Double>(1e-14);
+    fn disk_maps_squares_to_circles_and_preserves_areas() {
+        check_disk::<Single>(1e-6);
+        check_disk::<Double>(1e-14);
     }
 }

@@ -154,7 +154,7 @@ fn from_mesh(mesh: &Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
         if bound >= least {
             continue;
         }
-        let branch = &mesh.boxes().branches()[branch as usize];
+        let branch = &mesh.boxes().nodes()[branch as usize];
         let first = todo.len();
         for i in branch.children() {
             let corner =

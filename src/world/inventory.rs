@@ -1,99 +1,109 @@
-//! What a world contains, in words.
+//! Inventory: names of the features that a world contains.
 
 use crate::material::{Bsdf, ReflectionLobe, SpecularModel};
 use crate::scene::{BelowHorizon, Filter, RayTypes, Scene};
 use crate::world::light_groups::LightGroupSource;
 use std::fmt;
 
-/// What a world contains; printing it gives one line.
+/// Features that a world contains. Its `Display` is one line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Inventory {
     parts: Vec<String>,
 }
 
+/// Parts of a compiled scene that the inventory names.
+pub(super) struct InventorySources<'a, S> {
+    /// Description of the primitives.
+    pub geometry: String,
+    /// Names of texture features.
+    pub textures: Vec<&'static str>,
+    pub bsdfs: &'a [Bsdf<S>],
+    pub groups: &'a [LightGroupSource],
+    /// Number of lights that emit.
+    pub lights: usize,
+    /// `single` or `double`.
+    pub precision: &'static str,
+}
+
 impl Inventory {
-    /// Of a compiled scene.
-    pub(super) fn new<S>(
-        scene: &Scene,
-        geometry: String,
-        textures: &[&str],
-        finishes: &[Bsdf<S>],
-        members: &[LightGroupSource],
-        lamps: usize,
-        precision: &str,
-    ) -> Self {
+    /// Creates the inventory of a compiled scene.
+    pub(super) fn new<S>(scene: &Scene, sources: InventorySources<S>) -> Self {
+        let InventorySources { geometry, textures, bsdfs, groups, lights, precision } = sources;
         let mut parts = vec![geometry];
-        parts.extend(textures.iter().map(|word| word.to_string()));
-        let mut say = |present: bool, what: &str| {
+        parts.extend(textures.into_iter().map(String::from));
+        let mut add_if = |present: bool, name: &str| {
             if present {
-                parts.push(what.to_string());
+                parts.push(name.to_string());
             }
         };
-        let specular =
-            |test: fn(&SpecularModel<S>) -> bool| finishes.iter().any(|f| test(&f.specular));
-        say(specular(|s| matches!(s, SpecularModel::Phong { .. })), "Phong");
-        say(
-            specular(|s| matches!(s, SpecularModel::MicrofacetDistribution { .. })),
+        let any_specular =
+            |test: fn(&SpecularModel<S>) -> bool| bsdfs.iter().any(|bsdf| test(&bsdf.specular));
+        add_if(any_specular(|s| matches!(s, SpecularModel::Phong { .. })), "Phong");
+        add_if(
+            any_specular(|s| matches!(s, SpecularModel::MicrofacetDistribution { .. })),
             "Cook-Torrance",
         );
-        let spread = |test: fn(&ReflectionLobe<S>) -> bool| {
-            finishes.iter().any(|f| f.reflection.as_ref().is_some_and(|r| test(&r.1)))
+        let any_lobe = |test: fn(&ReflectionLobe<S>) -> bool| {
+            bsdfs.iter().any(|bsdf| bsdf.reflection.as_ref().is_some_and(|(_, lobe)| test(lobe)))
         };
-        say(spread(|s| matches!(s, ReflectionLobe::Mirror)), "perfect mirror");
-        say(spread(|s| matches!(s, ReflectionLobe::Cone { .. })), "cone lobe");
-        say(spread(|s| matches!(s, ReflectionLobe::Square { .. })), "square lobe");
-        say(
-            spread(|s| matches!(s, ReflectionLobe::MicrofacetDistribution(f) if !f.ggx)),
+        add_if(any_lobe(|lobe| matches!(lobe, ReflectionLobe::Mirror)), "perfect mirror");
+        add_if(any_lobe(|lobe| matches!(lobe, ReflectionLobe::Cone { .. })), "cone lobe");
+        add_if(any_lobe(|lobe| matches!(lobe, ReflectionLobe::Square { .. })), "square lobe");
+        add_if(
+            any_lobe(|lobe| matches!(lobe, ReflectionLobe::MicrofacetDistribution(d) if !d.ggx)),
             "Beckmann lobe",
         );
-        say(
-            spread(|s| matches!(s, ReflectionLobe::MicrofacetDistribution(f) if f.ggx)),
+        add_if(
+            any_lobe(|lobe| matches!(lobe, ReflectionLobe::MicrofacetDistribution(d) if d.ggx)),
             "GGX lobe",
         );
-        let through = |dielectric: bool| {
-            let test = |f: &Bsdf<S>| f.transmission.as_ref().map(|t| t.dielectric);
-            finishes.iter().any(|f| test(f) == Some(dielectric))
+        let any_transmission = |dielectric: bool| {
+            let is_dielectric = |b: &Bsdf<S>| b.transmission.as_ref().map(|t| t.dielectric);
+            bsdfs.iter().any(|bsdf| is_dielectric(bsdf) == Some(dielectric))
         };
-        say(through(false), "transmission");
-        say(through(true), "dielectric");
+        add_if(any_transmission(false), "transmission");
+        add_if(any_transmission(true), "dielectric");
         let absorbs = scene.trace.below_horizon == BelowHorizon::Absorb;
-        say(absorbs && spread(|s| !matches!(s, ReflectionLobe::Mirror)), "absorbing horizon");
-        let count = |n: usize, what: &str| match n {
+        add_if(
+            absorbs && any_lobe(|lobe| !matches!(lobe, ReflectionLobe::Mirror)),
+            "absorbing horizon",
+        );
+        let counted = |n: usize, name: &str| match n {
             0 => None,
-            1 => Some(format!("1 {what}")),
-            n => Some(format!("{n} {what}s")),
+            1 => Some(format!("1 {name}")),
+            n => Some(format!("{n} {name}s")),
         };
-        let kind = |directional: bool| {
-            let shining = |m: &LightGroupSource| match m {
+        let light_count = |directional: bool| {
+            let lights_of = |source: &LightGroupSource| match source {
                 LightGroupSource::Light(i) => vec![*i],
                 LightGroupSource::Shared(list) => list.clone(),
                 _ => Vec::new(),
             };
-            members
+            groups
                 .iter()
-                .flat_map(shining)
+                .flat_map(lights_of)
                 .filter(|i| scene.lights[*i].directional.is_some() == directional)
                 .count()
         };
-        parts.extend(count(kind(false), "point light"));
-        parts.extend(count(kind(true), "directional light"));
-        let mut say = |present: bool, what: &str| {
+        parts.extend(counted(light_count(false), "point light"));
+        parts.extend(counted(light_count(true), "directional light"));
+        let mut add_if = |present: bool, name: &str| {
             if present {
-                parts.push(what.to_string());
+                parts.push(name.to_string());
             }
         };
-        let shared = members.iter().any(|m| matches!(m, LightGroupSource::Shared(_)));
-        say(shared, "shared light group");
-        say(members.contains(&LightGroupSource::Ambient), "ambient");
-        say(members.contains(&LightGroupSource::Background), "background");
-        say(scene.trace.ray_types == RayTypes::Primary, "no shadows");
-        say(scene.trace.ray_types == RayTypes::Shadows && lamps > 0, "shadows only");
-        say(scene.film.filter == Filter::Point, "no anti-aliasing");
+        let is_shared = |source: &LightGroupSource| matches!(source, LightGroupSource::Shared(_));
+        add_if(groups.iter().any(is_shared), "shared light group");
+        add_if(groups.contains(&LightGroupSource::Ambient), "ambient");
+        add_if(groups.contains(&LightGroupSource::Background), "background");
+        add_if(scene.trace.ray_types == RayTypes::Primary, "no shadows");
+        add_if(scene.trace.ray_types == RayTypes::Shadows && lights > 0, "shadows only");
+        add_if(scene.film.filter == Filter::Point, "no anti-aliasing");
         parts.push(format!("{precision} precision"));
         Self { parts }
     }
 
-    /// Its parts, in order.
+    /// Names of the features, in order.
     pub fn parts(&self) -> &[String] {
         &self.parts
     }

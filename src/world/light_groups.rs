@@ -1,5 +1,5 @@
-//! Light groups: parts of the picture that are linear in one light's colour and strength, kept apart
-//! so that these can change without new samples.
+//! Light groups: parts of the picture that are linear in the colour and intensity of one light. The
+//! film keeps them apart, so that both can change without new samples.
 
 use crate::lanes::Float;
 use crate::light::{DeltaLight, Light};
@@ -8,44 +8,45 @@ use crate::value::Color;
 use crate::world::radiance_range::{RadianceRange, SceneDistances};
 use glam::DVec3;
 
-/// The most lights with a group of their own; more share the last group.
+/// Largest number of light groups for lights. Of more lights, several share the last group.
 const MAX_LIGHT_GROUPS: usize = 8;
 
-/// The most groups: the lights', ambient and background.
+/// Largest number of light groups: those of lights, ambient light and background.
 pub const MAX_GROUPS: usize = MAX_LIGHT_GROUPS + 2;
 
-/// Memory for sums beyond which lights share groups, in bytes.
+/// Size of the film's sums beyond which lights share groups \[bytes\].
 const FILM_BYTES: u64 = 1 << 30;
 
-/// Bytes per pixel and group: two replicates of three channels.
+/// Bytes per pixel and light group: two replicates of three channels.
 const GROUP_BYTES: u64 = 2 * 3 * 8;
 
-/// What one group holds.
+/// Light sources of one group.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LightGroupSource {
     /// Ambient light.
     Ambient,
-    /// What rays see that meet nothing.
+    /// Background, which rays see that miss all primitives.
     Background,
-    /// One light, by its number in the scene.
+    /// One light, by its index in the scene.
     Light(usize),
-    /// Several lights, each with its colour and strength already in the samples.
+    /// Several lights. The samples contain the colour and intensity of each.
     Shared(Vec<usize>),
 }
 
-/// The groups of a scene: those that can be other than black.
+/// Light groups of a scene: those that can be other than black.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightGroups {
-    /// In the order of the film.
+    /// Source of each group, in the order of the film.
     pub members: Vec<LightGroupSource>,
-    /// Some surface answers lights.
+    /// `true` if some surface returns direct light.
     pub(super) lit: bool,
-    /// Some surface answers ambient light.
+    /// `true` if some surface returns ambient light.
     pub(super) ambient: bool,
 }
 
 impl LightGroups {
-    /// The groups of `scene`. `lit`: some surface answers lights.
+    /// Creates the light groups of `scene`. `lit` and `ambient` are `true` if some surface returns
+    /// direct or ambient light.
     pub fn new(scene: &Scene, lit: bool, ambient: bool) -> Self {
         let mut members = Vec::new();
         if ambient && scene.ambient.color != Color::BLACK {
@@ -54,30 +55,33 @@ impl LightGroups {
         if scene.background.color != Color::BLACK {
             members.push(LightGroupSource::Background);
         }
-        let shining: Vec<usize> =
+        let emitting: Vec<usize> =
             (0..scene.lights.len()).filter(|i| lit && emits(&scene.lights[*i])).collect();
         let pixels = scene.film.size.iter().map(|n| u64::from(*n)).product::<u64>().max(1);
-        let affordable = (FILM_BYTES / (pixels * GROUP_BYTES)) as usize;
-        let room = affordable.saturating_sub(members.len()).clamp(1, MAX_LIGHT_GROUPS);
-        let (own, shared) =
-            shining.split_at(if shining.len() <= room { shining.len() } else { room - 1 });
-        members.extend(own.iter().map(|i| LightGroupSource::Light(*i)));
+        let max_groups = (FILM_BYTES / (pixels * GROUP_BYTES)) as usize;
+        let max_light_groups = max_groups.saturating_sub(members.len()).clamp(1, MAX_LIGHT_GROUPS);
+        let (single, shared) = emitting.split_at(if emitting.len() <= max_light_groups {
+            emitting.len()
+        } else {
+            max_light_groups - 1
+        });
+        members.extend(single.iter().map(|i| LightGroupSource::Light(*i)));
         if !shared.is_empty() {
             members.push(LightGroupSource::Shared(shared.to_vec()));
         }
         if members.is_empty() {
-            // A black picture is a picture too: it needs one group to hold it.
+            // A black picture needs one group as well.
             members.push(LightGroupSource::Background);
         }
         Self { members, lit, ambient }
     }
 
-    /// Position of a member, if there is such a group.
+    /// Returns the index of the group with a source.
     pub fn find(&self, wanted: &LightGroupSource) -> Option<usize> {
         self.members.iter().position(|m| m == wanted)
     }
 
-    /// Each shining light's number with its group and its weight in the samples of that group.
+    /// Returns index, group, and emission in the samples of that group, of each light that emits.
     pub fn lights(&self, scene: &Scene) -> Vec<(usize, usize, [f64; 3])> {
         let mut out = Vec::new();
         for (group, member) in self.members.iter().enumerate() {
@@ -92,8 +96,9 @@ impl LightGroups {
         out
     }
 
-    /// Weight of each group in the picture of `scene`, which may differ from the compiled one in the
-    /// colours, intensities and switches of lights, ambient and background.
+    /// Returns the weight of each group in the picture of `scene`, which may differ from the
+    /// compiled scene in the colours, intensities and switches of lights, ambient light and
+    /// background.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         let weight = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => scene.ambient.color.0,
@@ -104,7 +109,7 @@ impl LightGroups {
         self.members.iter().map(weight).collect()
     }
 
-    /// A name for each group, for layers of files.
+    /// Returns the name of each group, for layers of image files.
     pub fn names(&self, scene: &Scene) -> Vec<String> {
         let name = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => "ambient".to_string(),
@@ -118,45 +123,48 @@ impl LightGroups {
         self.members.iter().map(name).collect()
     }
 
-    /// Steps per unit of radiance in the film's integers, a power of two for each group, as
-    /// [`RadianceRange`] has it.
+    /// Returns the steps per unit of radiance in the film's integers, a power of two for each
+    /// group, from its [`RadianceRange`].
     pub(super) fn scales<S: Float>(
         &self,
         scene: &Scene,
         origin: DVec3,
-        surroundings: &SceneDistances,
+        distances: &SceneDistances,
     ) -> Vec<f64> {
-        let of_light = |i: usize| {
-            let lamp = DeltaLight::<S>::new(&scene.lights[i], origin)?;
-            Some(surroundings.lamp(&lamp))
+        let range_of_light = |i: usize| {
+            let light = DeltaLight::<S>::new(&scene.lights[i], origin)?;
+            Some(distances.light(&light))
         };
-        let of_shared = |i: &usize| {
+        let range_of_emission = |i: &usize| {
             let channels = emission(&scene.lights[*i]).into_iter().filter(|s| *s > 0.0);
-            let (least, most) = (channels.clone().reduce(f64::min)?, channels.reduce(f64::max)?);
-            Some(of_light(*i)?.times(least, most))
+            let (low, high) = (channels.clone().reduce(f64::min)?, channels.reduce(f64::max)?);
+            Some(range_of_light(*i)?.times(low, high))
         };
-        let brightness = |member: &LightGroupSource| match member {
-            LightGroupSource::Ambient => Some(surroundings.ambient()),
-            LightGroupSource::Background => Some(surroundings.background()),
-            LightGroupSource::Light(i) => of_light(*i),
+        let range_of = |member: &LightGroupSource| match member {
+            LightGroupSource::Ambient => Some(distances.ambient()),
+            LightGroupSource::Background => Some(distances.background()),
+            LightGroupSource::Light(i) => range_of_light(*i),
             LightGroupSource::Shared(list) => {
-                list.iter().filter_map(of_shared).reduce(RadianceRange::or)
+                list.iter().filter_map(range_of_emission).reduce(RadianceRange::or)
             }
         };
-        // The limits of samples and their squares are numbers in the precision of the samples.
-        let (least, most) = if S::EPSILON > 1e-10 { (-78.0, 170.0) } else { (-400.0, 900.0) };
+        // The limits of samples and their squares have to be finite in the samples' precision.
+        let (min_exponent, max_exponent) =
+            if S::EPSILON > 1e-10 { (-78.0, 170.0) } else { (-400.0, 900.0) };
         let scale = |member| {
-            brightness(member).map_or(0.0, |b| b.scale_exponent()).clamp(least, most).exp2()
+            let exponent = range_of(member).map_or(0.0, |range| range.scale_exponent());
+            exponent.clamp(min_exponent, max_exponent).exp2()
         };
         self.members.iter().map(scale).collect()
     }
 }
 
-/// Colour times intensity; black if it is off.
+/// Returns the emission of a light: colour times intensity, black if it is off.
 pub(super) fn emission(light: &Light) -> [f64; 3] {
     if light.on { light.color.scaled(light.intensity).0 } else { [0.0; 3] }
 }
 
+/// Returns `true` if the light is on and not black.
 pub(super) fn emits(light: &Light) -> bool {
     emission(light) != [0.0; 3]
 }
@@ -186,84 +194,87 @@ mod tests {
         Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
     }
 
-    fn serves(groups: &LightGroups, scene: &Scene, change: impl Fn(&mut Scene)) -> bool {
+    fn can_reuse(groups: &LightGroups, scene: &Scene, change: impl Fn(&mut Scene)) -> bool {
         let mut changed = scene.clone();
         change(&mut changed);
         groups.can_reuse(scene, &changed)
     }
 
     #[test]
-    fn samples_serve_scenes_that_differ_in_the_mix_only() {
+    fn samples_are_reused_for_scenes_that_differ_in_group_weights_only() {
         let scene = scene(LIGHTS);
         let groups = LightGroups::new(&scene, true, true);
-        let serves = |change: fn(&mut Scene)| serves(&groups, &scene, change);
-        assert!(serves(|_| ()));
-        assert!(serves(|s| s.lights[0].intensity = 7.0));
-        assert!(serves(|s| s.lights[0].color = Color([0.0, 0.5, 1.0])));
-        assert!(serves(|s| s.lights[0].on = false));
-        assert!(serves(|s| s.ambient.color = Color::BLACK));
-        assert!(serves(|s| s.ambient.color = Color::WHITE));
-        assert!(serves(|s| s.film.rays_per_pixel = 9));
-        assert!(serves(|s| s.lights[0].name = "sun".to_string()));
-        assert!(serves(|s| s.objects[0].name = "ball".to_string()));
-        assert!(serves(|s| s.materials.retain(|name, _| name != "spare")));
+        let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
+        assert!(reusable(|_| ()));
+        assert!(reusable(|s| s.lights[0].intensity = 7.0));
+        assert!(reusable(|s| s.lights[0].color = Color([0.0, 0.5, 1.0])));
+        assert!(reusable(|s| s.lights[0].on = false));
+        assert!(reusable(|s| s.ambient.color = Color::BLACK));
+        assert!(reusable(|s| s.ambient.color = Color::WHITE));
+        assert!(reusable(|s| s.film.rays_per_pixel = 9));
+        assert!(reusable(|s| s.lights[0].name = "sun".to_string()));
+        assert!(reusable(|s| s.objects[0].name = "ball".to_string()));
+        assert!(reusable(|s| s.materials.retain(|name, _| name != "spare")));
         // A material under another name is the same material.
-        assert!(serves(|s| {
+        assert!(reusable(|s| {
             let red = s.materials.remove("red").unwrap();
             s.materials.insert("crimson".to_string(), red);
             s.objects[0].material = "crimson".to_string();
         }));
-        // What does not shine may be anywhere, or nowhere.
-        assert!(serves(|s| s.lights[1].intensity = 9.0));
-        assert!(serves(|s| s.lights[1].point.as_mut().unwrap().position[0] = 5.0));
-        assert!(serves(|s| s.lights.truncate(s.lights.len() - 1)));
-        assert!(serves(|s| s.lights.clear()));
-        assert!(serves(|s| {
+        // Lights that do not emit may move or be absent.
+        assert!(reusable(|s| s.lights[1].intensity = 9.0));
+        assert!(reusable(|s| s.lights[1].point.as_mut().unwrap().position[0] = 5.0));
+        assert!(reusable(|s| s.lights.truncate(s.lights.len() - 1)));
+        assert!(reusable(|s| s.lights.clear()));
+        assert!(reusable(|s| {
             s.lights[0].on = false;
             s.lights[0].point.as_mut().unwrap().position[0] = 5.0;
         }));
     }
 
     #[test]
-    fn other_scenes_need_samples_of_their_own() {
+    fn samples_are_not_reused_for_other_scenes() {
         let scene = scene(LIGHTS);
         let groups = LightGroups::new(&scene, true, true);
-        let serves = |change: fn(&mut Scene)| serves(&groups, &scene, change);
-        assert!(!serves(|s| s.lights[1].on = true));
-        assert!(!serves(|s| s.background.color = Color::WHITE));
-        assert!(!serves(|s| s.lights[0].point.as_mut().unwrap().position[0] = 5.0));
-        assert!(!serves(|s| s.lights[0].falloff = crate::light::Falloff::InverseSquare));
-        assert!(!serves(|s| s.lights.push(s.lights[0].clone())));
-        assert!(!serves(|s| s.camera.eye[0] += 0.5));
-        assert!(!serves(|s| s.film.size = [641, 480]));
-        assert!(!serves(|s| s.trace.max_depth = 3));
-        assert!(!serves(|s| s.materials.get_mut("red").unwrap().ambient = 0.5));
-        assert!(!serves(|s| s.objects[0].material = "spare".to_string()));
-        assert!(!serves(|s| s.objects.push(s.objects[0].clone())));
+        let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
+        assert!(!reusable(|s| s.lights[1].on = true));
+        assert!(!reusable(|s| s.background.color = Color::WHITE));
+        assert!(!reusable(|s| s.lights[0].point.as_mut().unwrap().position[0] = 5.0));
+        assert!(!reusable(|s| s.lights[0].falloff = crate::light::Falloff::InverseSquare));
+        assert!(!reusable(|s| s.lights.push(s.lights[0].clone())));
+        assert!(!reusable(|s| s.camera.eye[0] += 0.5));
+        assert!(!reusable(|s| s.film.size = [641, 480]));
+        assert!(!reusable(|s| s.trace.max_depth = 3));
+        assert!(!reusable(|s| s.materials.get_mut("red").unwrap().ambient = 0.5));
+        assert!(!reusable(|s| s.objects[0].material = "spare".to_string()));
+        assert!(!reusable(|s| s.objects.push(s.objects[0].clone())));
     }
 
     #[test]
-    fn without_surfaces_that_answer_them_lights_do_not_matter() {
+    fn lights_do_not_matter_without_surfaces_that_return_light() {
         let scene = scene(LIGHTS);
         let groups = LightGroups::new(&scene, false, false);
-        assert!(serves(&groups, &scene, |s| s.lights[1].on = true));
-        assert!(serves(&groups, &scene, |s| s.lights.push(s.lights[0].clone())));
-        assert!(serves(&groups, &scene, |s| s.ambient.color = Color::WHITE));
-        // The group of a black picture stands for no background.
+        assert!(can_reuse(&groups, &scene, |s| s.lights[1].on = true));
+        assert!(can_reuse(&groups, &scene, |s| s.lights.push(s.lights[0].clone())));
+        assert!(can_reuse(&groups, &scene, |s| s.ambient.color = Color::WHITE));
+        // The group of a black picture holds no background.
         assert_eq!(groups.members, [LightGroupSource::Background]);
-        assert!(!serves(&groups, &scene, |s| s.background.color = Color::WHITE));
+        assert!(!can_reuse(&groups, &scene, |s| s.background.color = Color::WHITE));
     }
 
     #[test]
-    fn lights_that_share_a_group_keep_their_strength() {
-        let lamp = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
-        let scene = scene(&lamp.repeat(MAX_LIGHT_GROUPS + 2));
+    fn samples_are_not_reused_when_a_light_of_a_shared_group_changes() {
+        let light = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
+        let scene = scene(&light.repeat(MAX_LIGHT_GROUPS + 2));
         let groups = LightGroups::new(&scene, true, false);
-        let own = MAX_LIGHT_GROUPS - 1;
-        assert_eq!(groups.members[own], LightGroupSource::Shared((own..own + 3).collect()));
-        assert!(serves(&groups, &scene, |s| s.lights[own - 1].intensity = 3.0));
-        assert!(!serves(&groups, &scene, |s| s.lights[own].intensity = 3.0));
-        assert!(!serves(&groups, &scene, |s| s.lights[own + 1].on = false));
-        assert!(!serves(&groups, &scene, |s| s.lights.truncate(s.lights.len() - 1)));
+        let single = MAX_LIGHT_GROUPS - 1;
+        assert_eq!(
+            groups.members[single],
+            LightGroupSource::Shared((single..single + 3).collect())
+        );
+        assert!(can_reuse(&groups, &scene, |s| s.lights[single - 1].intensity = 3.0));
+        assert!(!can_reuse(&groups, &scene, |s| s.lights[single].intensity = 3.0));
+        assert!(!can_reuse(&groups, &scene, |s| s.lights[single + 1].on = false));
+        assert!(!can_reuse(&groups, &scene, |s| s.lights.truncate(s.lights.len() - 1)));
     }
 }

@@ -1,6 +1,6 @@
-//! The world: a scene compiled for one lane type, holding only what this scene requires, and the
-//! paths traced in it.
+//! The world: a scene compiled for one lane type, and the integrators that trace paths in it.
 
+mod any_world;
 mod clearance;
 mod compile;
 mod culling;
@@ -8,14 +8,22 @@ mod integrator;
 mod inventory;
 mod light_groups;
 mod lights_on_surfaces;
+mod pixel_block;
 mod precision;
 mod radiance_range;
 mod reuse;
+mod tile_tracer;
 mod truncation_bias;
+#[allow(clippy::module_inception, reason = "the file of `World`, in the folder of the same name")]
+mod world;
 
-pub use crate::world::culling::tile::TileCandidates;
-pub use crate::world::integrator::first_hit::FirstHit;
-pub use crate::world::integrator::opaque::{Counts, Radiance};
-pub use compile::{AnyWorld, Options, Precision, World};
+pub(crate) use any_world::dispatch;
+pub use any_world::{AnyWorld, Options, Precision};
+pub use culling::tile::TileCandidates;
+pub use integrator::first_hit::FirstHit;
+pub use integrator::path::{Counts, Radiance};
 pub use inventory::Inventory;
 pub use light_groups::{LightGroupSource, LightGroups, MAX_GROUPS};
+pub use pixel_block::MAX_BLOCK_PIXELS;
+pub use tile_tracer::{CameraTracer, TileTracer, TracedPacket};
+pub use world::World;

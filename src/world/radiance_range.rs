@@ -1,20 +1,22 @@
-//! How bright and how dim the samples of a light group are, and so how long a step of the film's integers is.
+//! Range of the radiance of a light group's samples, and the step of the film's integers that
+//! follows from it.
 //!
-//! A pixel's sum has 63 bits, a sample at most 49 of them (`SimdFloat::fixed_sum`). A sample is rounded to whole steps
-//! by itself; one that is the same each time, as on a matt surface, is wrong by up to half a step however many
-//! there are. So the step has to suit both ends:
+//! A pixel's sum has 63 bits, a sample at most 49 of them (`SimdFloat::fixed_sum`). Each sample is
+//! rounded to whole steps. Where all samples are equal, as on a matt surface, the mean is wrong by
+//! up to half a step for any number of samples. The step therefore has two bounds:
 //!
-//! - *The dim end.* The darkest code of a display is 2^-11.7 of white. A surface whose brightest spot is white
-//!   when it has 2^16 steps still has 20 of them there, which is 0.03 codes.
-//! - *The bright end.* With 2^44 steps for the brightest spot, a pixel that shows nothing else holds 2^19
-//!   samples of each replicate before its sum is full: a million per pixel. Five bits are left for what a single
-//!   sample may have beyond that.
+//! - *The dim end.* The darkest 8-bit level of a display is 2^-11.7 of white. A surface whose
+//!   brightest spot is white at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit
+//!   levels.
+//! - *The bright end.* With 2^44 steps for the brightest spot, a pixel that shows only this spot
+//!   holds 2^19 samples of each replicate before its sum saturates: a million per pixel. Five bits
+//!   remain for single samples that are brighter.
 //!
-//! Between them lie 28 bits. Without reason to the contrary, light of a typical strength has 2^28 steps: 2^16
-//! times as bright is the bright end, 2^-12 times the dim end. Where both ends cannot be had the bright end
-//! counts, for a sample that does not fit changes the picture and one too small for a step does not, to the eye.
-//! Two kinds of brightness yield to the dim end: spots smaller than a pixel, and the products of mirrors that
-//! amplify. Such samples may saturate, and are counted then.
+//! The ends are 28 bits apart. By default light of typical intensity has 2^28 steps; the bright end
+//! is 2^16 times as bright, the dim end 2^-12 times. Where both ends do not fit, the bright end has
+//! precedence: a sample that saturates changes the picture visibly, a sample smaller than a step
+//! does not. The dim end has precedence over two kinds of brightness: spots smaller than a pixel,
+//! and light amplified by mirrors. Such samples may saturate; they are counted.
 
 use crate::camera::PinholeCamera;
 use crate::lanes::Float;
@@ -23,41 +25,44 @@ use crate::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
 use crate::primitive::Form;
 use crate::scene::{RayTypes, Scene};
 use crate::world::clearance::{box_distance, clearance, clearance_of};
+use crate::world::compile::RecenteredGeometry;
 use glam::DVec3;
 use std::f64::consts::{FRAC_1_PI, PI};
 
-/// Bits of a sample of typical brightness.
+/// Bits of a sample of typical radiance.
 const TYPICAL_BITS: f64 = 28.0;
 
-/// Bits that the brightest spot of the dimmest surface has at least.
+/// Smallest number of bits of the brightest spot of the dimmest surface.
 const DIM_BITS: f64 = 16.0;
 
-/// Bits of the brightest sample, when it lasts.
+/// Bits of the brightest radiance that a whole pixel can have.
 const BRIGHT_BITS: f64 = 44.0;
 
-/// Bits of a single sample.
+/// Largest number of bits of a single sample.
 const SAMPLE_BITS: f64 = 49.0;
 
-/// So many bits are given up for any spot, however small.
+/// Largest number of bits given up for spots of any size.
 const SPOT_BITS: f64 = 12.0;
 
-/// Brightness of a group's samples, in radiance.
+/// Radiance of a group's samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RadianceRange {
-    /// In the middle of the scene, on white.
+    /// On a white surface in the middle of the scene.
     pub typical: f64,
-    /// Where the dimmest surface is brightest.
+    /// In the brightest spot of the dimmest surface.
     pub dimmest: f64,
-    /// Where the brightest surface is brightest, in spots as large as a part of a pixel.
+    /// In the brightest spot of the brightest surface, among spots of at least a fraction of a
+    /// pixel.
     pub brightest: f64,
-    /// In spots of any size.
+    /// In the brightest spot of any size.
     pub spots: f64,
-    /// In highlights and after mirrors that amplify.
+    /// In highlights and after amplifying mirrors.
     pub extreme: f64,
 }
 
 impl RadianceRange {
-    /// Of light that is `least` to `most` times as strong, depending on the channel.
+    /// Returns the range of light that is `least` to `most` times as intense, depending on the
+    /// channel.
     pub fn times(self, least: f64, most: f64) -> Self {
         Self {
             typical: self.typical * most,
@@ -68,7 +73,7 @@ impl RadianceRange {
         }
     }
 
-    /// Of two lights that share a group.
+    /// Returns the range of two lights that share a group.
     pub fn or(self, other: Self) -> Self {
         Self {
             typical: self.typical.max(other.typical),
@@ -79,13 +84,15 @@ impl RadianceRange {
         }
     }
 
-    /// The exponent of the number of steps per unit of radiance.
+    /// Returns the base-2 logarithm of the number of steps per unit of radiance.
     pub fn scale_exponent(&self) -> f64 {
-        let above = |bright: f64| {
+        let bits_above_bright_end = |bright: f64| {
             let excess = ceil_log2(bright / self.typical) - (BRIGHT_BITS - TYPICAL_BITS);
             excess.max(0.0)
         };
-        let lost = above(self.spots).min(SPOT_BITS).max(above(self.brightest));
+        let lost = bits_above_bright_end(self.spots)
+            .min(SPOT_BITS)
+            .max(bits_above_bright_end(self.brightest));
         let exponent = TYPICAL_BITS - ceil_log2(self.typical) - lost;
         let dim_end = DIM_BITS + ceil_log2(self.dimmest.recip());
         let room_for_extremes = SAMPLE_BITS - ceil_log2(self.extreme);
@@ -94,8 +101,8 @@ impl RadianceRange {
     }
 }
 
-/// The smallest exponent whose power of two is at least `x`, without the rounding of a logarithm: light that is
-/// 2^k times as strong has exponents that differ by k.
+/// Returns the smallest integer `n` with 2^n >= `x`, computed from the bits of `x`. Exponents of
+/// light that is 2^k times as intense differ by exactly k.
 fn ceil_log2(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return -1022.0;
@@ -105,29 +112,30 @@ fn ceil_log2(x: f64) -> f64 {
     floor + f64::from(u8::from(bits << 12 != 0))
 }
 
-/// What some surfaces do with light: factors of what a white matt surface shows.
+/// Reflected light of some surfaces, relative to a white matt surface.
 #[derive(Clone, Copy, Debug)]
 struct Response {
-    /// The least in a channel that is not black.
+    /// Smallest factor in a channel that is not black.
     least: f64,
+    /// Largest factor outside of highlights.
     most: f64,
-    /// In the middle of highlights.
+    /// Largest factor in highlights.
     peak: f64,
 }
 
 impl Response {
-    /// To lights; `None`: none.
+    /// Creates the response of a material to direct light; `None` if it returns none.
     fn new(material: &Material) -> Option<Self> {
-        let matt = material.color.0.map(|c| c * material.diffuse);
-        let shine = material.specular;
+        let diffuse = material.color.0.map(|c| c * material.diffuse);
+        let specular = material.specular;
         let highlight = match material.highlight {
             Highlight::Phong => 1.0,
             // D F G / 4 of microfacets seen and lit straight on, with D = 1 / (pi alpha^2).
             Highlight::CookTorrance => 0.25 / material.microfacet_alpha().max(SMOOTH_ALPHA).powi(2),
         };
-        let most = matt.into_iter().fold(0.0, f64::max) + shine;
-        let least = least_of(matt).or_else(|| least_of([shine]))?;
-        Some(Self { least, most, peak: most.max(shine * highlight) })
+        let most = diffuse.into_iter().fold(0.0, f64::max) + specular;
+        let least = least_of(diffuse).or_else(|| least_of([specular]))?;
+        Some(Self { least, most, peak: most.max(specular * highlight) })
     }
 
     fn or(self, other: Self) -> Self {
@@ -139,44 +147,46 @@ impl Response {
     }
 }
 
-/// The least number above zero.
+/// Returns the smallest positive number.
 fn least_of(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
     numbers.into_iter().filter(|x| *x > 0.0).reduce(f64::min)
 }
 
-/// What decides how bright samples are, but for the lights.
+/// Properties of a scene, apart from its lights, that determine the range of radiance.
 pub(super) struct SceneDistances<'a> {
     forms: &'a [Form],
-    /// For each form, the response of its parts to lights.
+    /// Response of each form's parts to direct light.
     responses: Vec<Option<Response>>,
-    /// To ambient light, per channel.
+    /// Responses of all materials to ambient light, per channel.
     ambient: Vec<f64>,
-    /// The least share of mirrored or transmitted light that a surface shows, if it shows nothing else.
+    /// Smallest share of light that a purely reflecting or transmitting surface passes on.
     faintest: f64,
-    /// What all mirrors on a path make of light at most, from 1.
+    /// Largest product of the factors of all mirrors on a path, at least 1.
     gain: f64,
-    /// Radius of the scene's middle, where light is typical.
+    /// Radius around the scene's centre within which light is typical.
     radius: f64,
-    /// The eye, and the side of a pixel at unit distance.
+    /// Position of the eye, and the side of a pixel at unit distance.
     eye: (DVec3, f64),
-    /// Rays that leave a surface begin so far above it.
-    lift: f64,
+    /// Largest distance above a surface at which rays start.
+    ray_offset: f64,
 }
 
 impl<'a> SceneDistances<'a> {
-    /// `materials_of`: those of a form's parts. `extent`: the largest coordinate.
+    /// `materials_of` returns the materials of a form's parts; `epsilon` is that of the world's
+    /// precision.
     pub fn new(
         scene: &Scene,
-        forms: &'a [Form],
+        geometry: &'a RecenteredGeometry,
         materials_of: impl Fn(usize) -> Vec<&'a Material>,
-        view: &PinholeCamera,
-        (extent, rounding): (f64, f64),
+        camera: &PinholeCamera,
+        epsilon: f64,
     ) -> Self {
-        let of_form = |form: usize| {
+        let (forms, extent) = (&geometry.forms[..], geometry.extent);
+        let response_of_form = |form: usize| {
             let parts = materials_of(form);
             parts.into_iter().filter_map(Response::new).reduce(Response::or)
         };
-        let responses = (0..forms.len()).map(of_form).collect();
+        let responses = (0..forms.len()).map(response_of_form).collect();
         let materials: Vec<&Material> = (0..forms.len()).flat_map(&materials_of).collect();
         let ambient = materials.iter().flat_map(|m| m.color.0.map(|c| c * m.ambient)).collect();
         let reflects = scene.trace.ray_types == RayTypes::Full && scene.trace.max_depth > 0;
@@ -184,15 +194,16 @@ impl<'a> SceneDistances<'a> {
             let mirrored = m.f0().0.map(|f0| f0 * m.reflection);
             reflects.then_some(mirrored.into_iter().chain([m.transmission]))
         };
-        let of_mirrors = materials.iter().filter(|m| Response::new(m).is_none());
-        let faintest = least_of(of_mirrors.copied().filter_map(passed_on).flatten());
-        // Fresnel's equations share the light between both; fixed coefficients need not.
-        let strongest = materials.iter().map(|m| match m.fresnel_mode() {
+        let without_direct = materials.iter().filter(|m| Response::new(m).is_none());
+        let faintest = least_of(without_direct.copied().filter_map(passed_on).flatten());
+        // Fresnel's equations divide the light between both; fixed coefficients may exceed 1 in
+        // total.
+        let max_factors = materials.iter().map(|m| match m.fresnel_mode() {
             Fresnel::Dielectric => m.reflection.max(m.transmission),
             _ => m.reflection + m.transmission,
         });
         let gain = match reflects {
-            true => strongest.fold(1.0, f64::max).powf(f64::from(scene.trace.max_depth)),
+            true => max_factors.fold(1.0, f64::max).powf(f64::from(scene.trace.max_depth)),
             false => 1.0,
         };
         Self {
@@ -202,58 +213,60 @@ impl<'a> SceneDistances<'a> {
             faintest: faintest.unwrap_or(1.0).min(1.0),
             gain,
             radius: 0.1 * extent,
-            eye: (view.eye(), view.pixel()),
-            lift: 4.0 * rounding * extent,
+            eye: (camera.eye(), camera.pixel()),
+            ray_offset: 4.0 * epsilon * extent,
         }
     }
 
-    /// Of ambient light of unit strength.
+    /// Range of ambient light of unit intensity.
     pub fn ambient(&self) -> RadianceRange {
         let least = least_of(self.ambient.iter().copied()).unwrap_or(1.0);
         let most = self.ambient.iter().copied().fold(0.0, f64::max);
-        self.of(1.0, (least, most, most))
+        self.range_of(1.0, (least, most, most))
     }
 
-    /// Of a background of unit strength.
+    /// Range of a background of unit intensity.
     pub fn background(&self) -> RadianceRange {
-        self.of(1.0, (1.0, 1.0, 1.0))
+        self.range_of(1.0, (1.0, 1.0, 1.0))
     }
 
-    /// Of a lamp of unit strength.
-    pub fn lamp<S: Float>(&self, lamp: &DeltaLight<S>) -> RadianceRange {
-        let typical = lamp.typical_irradiance(self.radius) * FRAC_1_PI;
-        let DeltaLight::InverseSquare { position } = lamp else {
+    /// Range of a light of unit intensity.
+    pub fn light<S: Float>(&self, light: &DeltaLight<S>) -> RadianceRange {
+        let typical = light.typical_irradiance(self.radius) * FRAC_1_PI;
+        let DeltaLight::InverseSquare { position } = light else {
             let all = self.responses.iter().flatten().copied().reduce(Response::or);
             let Response { least, most, peak } =
                 all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 });
-            return self.of(typical, (least, most, peak));
+            return self.range_of(typical, (least, most, peak));
         };
         let position = DVec3::from(position.map(S::to_f64));
-        let light_at = |distance: f64| (distance * distance * PI).recip();
+        let radiance_at = |distance: f64| (distance * distance * PI).recip();
         let (eye, pixel) = self.eye;
-        // A spot under the lamp is about as large as the lamp is high.
-        let least_spot = (0.25 * pixel * eye.distance(position)).max(self.lift);
-        let spots = light_at(clearance(self.forms, position));
+        // The bright spot under a light is about as large as the distance of the light.
+        let min_distance = (0.25 * pixel * eye.distance(position)).max(self.ray_offset);
+        let spots = radiance_at(clearance(self.forms, position));
         let mut out =
             RadianceRange { typical, dimmest: f64::INFINITY, brightest: 0.0, spots, extreme: 0.0 };
         for (form, response) in self.forms.iter().zip(&self.responses) {
             let Some(response) = response else { continue };
-            // A lamp in a surface does not light it: rays begin above the lamp.
-            if let Some(distance) = clearance_of(form, position).filter(|d| *d > self.lift) {
-                let light = light_at(distance.max(least_spot));
-                out.brightest = out.brightest.max(light * response.most);
-                out.spots = out.spots.max(light_at(distance) * response.most);
-                out.extreme = out.extreme.max(light * response.peak * self.gain);
+            // A light in a surface does not illuminate it: shading starts above the light.
+            if let Some(distance) = clearance_of(form, position).filter(|d| *d > self.ray_offset) {
+                let radiance = radiance_at(distance.max(min_distance));
+                out.brightest = out.brightest.max(radiance * response.most);
+                out.spots = out.spots.max(radiance_at(distance) * response.most);
+                out.extreme = out.extreme.max(radiance * response.peak * self.gain);
             }
-            // Inside of the box the walls are about as far as its middle.
-            let inside = || form.bounds().map_or(0.0, |(low, high)| 0.5 * low.distance(high));
-            let far = box_distance(form, position).filter(|d| *d > 0.0).unwrap_or_else(inside);
+            // Inside of the bounding box, half its diagonal stands for the distance.
+            let half_diagonal =
+                || form.bounds().map_or(0.0, |(low, high)| 0.5 * low.distance(high));
+            let far =
+                box_distance(form, position).filter(|d| *d > 0.0).unwrap_or_else(half_diagonal);
             let far = match form {
                 Form::Plane { .. } => clearance_of(form, position).unwrap_or(far),
                 _ => far,
             };
-            let light = light_at(far.max(least_spot));
-            out.dimmest = out.dimmest.min(light * response.least * self.faintest);
+            let radiance = radiance_at(far.max(min_distance));
+            out.dimmest = out.dimmest.min(radiance * response.least * self.faintest);
         }
         let or_typical = |x: f64| if x > 0.0 && x.is_finite() { x } else { typical };
         RadianceRange {
@@ -264,7 +277,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    fn of(&self, light: f64, (least, most, peak): (f64, f64, f64)) -> RadianceRange {
+    /// Range of light with the typical radiance `light`, reflected with the given factors.
+    fn range_of(&self, light: f64, (least, most, peak): (f64, f64, f64)) -> RadianceRange {
         RadianceRange {
             typical: light,
             dimmest: light * least * self.faintest,
@@ -283,7 +297,7 @@ mod tests {
         RadianceRange { typical: 1.0, dimmest: 1.0, brightest: 1.0, spots: 1.0, extreme: 1.0 };
 
     #[test]
-    fn exponents_are_those_of_powers_that_hold_a_number() {
+    fn ceil_log2_is_exact() {
         for (x, exponent) in [(1.0, 0.0), (1.5, 1.0), (2.0, 1.0), (0.75, 0.0), (0.5, -1.0)] {
             assert_eq!(ceil_log2(x), exponent, "{x}");
             assert_eq!(ceil_log2(x * 2f64.powi(-300)), exponent - 300.0, "{x}");
@@ -293,23 +307,23 @@ mod tests {
     }
 
     #[test]
-    fn steps_suit_both_ends() {
+    fn scale_exponent_covers_dim_and_bright_end() {
         let exponent = |change: &dyn Fn(&mut RadianceRange)| {
-            let mut brightness = ONE;
-            change(&mut brightness);
-            brightness.scale_exponent()
+            let mut range = ONE;
+            change(&mut range);
+            range.scale_exponent()
         };
         assert_eq!(exponent(&|_| ()), 28.0);
         assert_eq!(ONE.times(0.5, 0.75).scale_exponent(), 28.0);
         assert_eq!(ONE.times(2f64.powi(40), 2f64.powi(40)).scale_exponent(), -12.0);
-        // A dim surface alone, and beside a bright one.
+        // Dim surfaces, and bright surfaces.
         let [dim, bright, far] = [-40, 20, 60].map(|e| 2f64.powi(e));
         assert_eq!(exponent(&|b| b.dimmest = dim), 44.0);
         assert_eq!(exponent(&|b| b.dimmest = 2f64.powi(-20)), 36.0);
         assert_eq!(exponent(&|b| b.dimmest = 2f64.powi(-12)), 28.0);
         assert_eq!(exponent(&|b| (b.brightest, b.spots) = (bright, bright)), 24.0);
         assert_eq!(exponent(&|b| (b.brightest, b.spots) = (far, far)), -16.0);
-        // Spots that no pixel shows, and what mirrors amplify, leave the dim end its bits.
+        // The dim end keeps its bits beside spots smaller than a pixel and amplified light.
         assert_eq!(exponent(&|b| b.spots = far), 16.0);
         assert_eq!(exponent(&|b| b.spots = f64::INFINITY), 16.0);
         assert_eq!(exponent(&|b| b.extreme = bright), 28.0);

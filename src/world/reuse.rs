@@ -1,8 +1,8 @@
-//! Which scenes the samples of a world serve.
+//! Reuse of samples: comparison of a scene with the compiled one.
 //!
-//! Descriptions are compared whole, by `==`, after the few fields that may differ were set to one value, or were
-//! named in a pattern without `..`. So a key that is added to a description counts as soon as it exists: it is
-//! compared, or the program does not compile before it is named here.
+//! Descriptions are compared as a whole, by `==`, after the few fields that may differ were set to
+//! one value or were named in a pattern without `..`. A key that is added to a description is
+//! therefore compared, or has to be named here before the program compiles.
 
 use crate::light::Light;
 use crate::material::Material;
@@ -13,10 +13,10 @@ use crate::world::light_groups::{LightGroupSource, LightGroups, emission, emits}
 use std::borrow::Cow;
 
 impl LightGroups {
-    /// Whether the samples of the world compiled from `compiled` (whose groups these are) are samples
-    /// of `scene` too, mixed otherwise: they differ in nothing but the strength of lights, ambient and
-    /// background that have groups, in names, in materials that nothing is made of, and in the cap on
-    /// rays per pixel, which only says how many samples there are to be.
+    /// Returns `true` if the samples of `compiled`, whose groups these are, are samples of `scene`
+    /// with other group weights. The scenes may differ in the emission of lights, ambient light and
+    /// background that have groups, in names, in unused materials, and in the cap on rays per
+    /// pixel.
     pub fn can_reuse(&self, compiled: &Scene, scene: &Scene) -> bool {
         let Scene {
             film,
@@ -46,19 +46,22 @@ impl LightGroups {
             && self.can_relight(compiled, scene)
     }
 
-    /// The part of [`LightGroups::can_reuse`] that is about lights. One that does not shine may stand anywhere.
+    /// Returns `true` if the lights of `scene` allow reuse. Lights that do not emit may be
+    /// anywhere.
     fn can_relight(&self, compiled: &Scene, scene: &Scene) -> bool {
         let is_compiled = |i: usize| {
-            let of = |m: &LightGroupSource| match m {
-                LightGroupSource::Light(own) => *own == i,
+            let contains = |source: &LightGroupSource| match source {
+                LightGroupSource::Light(light) => *light == i,
                 LightGroupSource::Shared(list) => list.contains(&i),
                 LightGroupSource::Ambient | LightGroupSource::Background => false,
             };
-            self.members.iter().any(of)
+            self.members.iter().any(contains)
         };
-        let same_place = |i: usize, light: &Light| of_unit(&compiled.lights[i]) == of_unit(light);
-        let mut shining = scene.lights.iter().enumerate().filter(|(_, light)| emits(light));
-        let shared = |member: &LightGroupSource| match member {
+        let same_but_emission = |i: usize, light: &Light| {
+            with_unit_emission(&compiled.lights[i]) == with_unit_emission(light)
+        };
+        let mut emitting = scene.lights.iter().enumerate().filter(|(_, light)| emits(light));
+        let same_emission_if_shared = |source: &LightGroupSource| match source {
             LightGroupSource::Shared(list) => list.iter().all(|i| {
                 scene.lights.get(*i).is_some_and(|l| emission(l) == emission(&compiled.lights[*i]))
             }),
@@ -67,30 +70,32 @@ impl LightGroups {
             | LightGroupSource::Light(_) => true,
         };
         !self.lit
-            || shining.all(|(i, light)| is_compiled(i) && same_place(i, light))
-                && self.members.iter().all(shared)
+            || emitting.all(|(i, light)| is_compiled(i) && same_but_emission(i, light))
+                && self.members.iter().all(same_emission_if_shared)
     }
 }
 
-/// The raster, whatever the number of samples.
+/// Returns the settings without the cap on rays per pixel.
 fn uncapped(film: &FilmSettings) -> FilmSettings {
     FilmSettings { rays_per_pixel: 0, ..film.clone() }
 }
 
-/// The light without name, white and of unit strength: what its own samples hold.
-fn of_unit(light: &Light) -> Light {
+/// Returns the light without name, white and of unit intensity, as the samples of its own group
+/// contain it.
+fn with_unit_emission(light: &Light) -> Light {
     Light { name: String::new(), color: Color::WHITE, intensity: 1.0, on: true, ..light.clone() }
 }
 
-/// Whether objects of two scenes are the same but for names, their own and those of their materials.
+/// Returns `true` if objects of two scenes differ in their names and the names of their materials
+/// only.
 fn same_object((scene_a, a): (&Scene, &Object), (scene_b, b): (&Scene, &Object)) -> bool {
     let Object { name: _, material: _, shape, transform } = b;
     *transform == a.transform
         && *unnamed(shape) == *unnamed(&a.shape)
-        && finishes(scene_b, b).eq(finishes(scene_a, a))
+        && materials(scene_b, b).eq(materials(scene_a, a))
 }
 
-/// The shape without the names of its parts' materials.
+/// Returns the shape without the names of its parts' materials.
 fn unnamed(shape: &Shape) -> Cow<'_, Shape> {
     if shape.named_materials().is_empty() {
         return Cow::Borrowed(shape);
@@ -100,8 +105,8 @@ fn unnamed(shape: &Shape) -> Cow<'_, Shape> {
     Cow::Owned(shape)
 }
 
-/// What each part of the object is made of.
-fn finishes<'a>(scene: &'a Scene, object: &'a Object) -> impl Iterator<Item = Cow<'a, Material>> {
+/// Returns the material of each part of an object.
+fn materials<'a>(scene: &'a Scene, object: &'a Object) -> impl Iterator<Item = Cow<'a, Material>> {
     object.materials().into_iter().map(|name| match scene.materials.get(name) {
         Some(material) => Cow::Borrowed(material),
         None => Cow::Owned(Material::default()),

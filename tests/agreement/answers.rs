@@ -1,4 +1,4 @@
-//! What surfaces do with light, formula by formula.
+//! Surface reflection of the reference tracer, formula by formula.
 
 use crate::common::Numbers;
 use crate::tracer::Mutation;
@@ -7,17 +7,17 @@ use std::f64::consts::{PI, TAU};
 use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Material};
 use zerkalo::scene::BelowHorizon;
 
-/// Slopes below this reflect like mirrors, and highlights are no smaller.
+/// Slope below which surfaces are mirrors; smallest slope of highlights.
 const SMOOTHEST: f64 = 1e-3;
 
-/// Reflectance at cosine `c` between light and facet.
+/// Fresnel reflectance at cosine `c` between light and microfacet normal.
 fn fresnel(material: &Material, c: f64) -> DVec3 {
     let channel = |f0: f64| match material.fresnel_mode() {
         Fresnel::Constant => f0,
         Fresnel::Schlick => f0 + (1.0 - f0) * (1.0 - c).powi(5),
         Fresnel::Exact if f0 >= 1.0 => 1.0,
         Fresnel::Exact | Fresnel::Dielectric => {
-            // The mean of both polarisations (Fresnel), for light from a vacuum.
+            // Mean of both polarisations (Fresnel), for light from vacuum.
             let n = match material.fresnel_mode() {
                 Fresnel::Dielectric => material.ior,
                 _ => (1.0 + f0.sqrt()) / (1.0 - f0.sqrt()),
@@ -32,7 +32,7 @@ fn fresnel(material: &Material, c: f64) -> DVec3 {
     DVec3::from(material.f0().0.map(channel))
 }
 
-/// Density of facet normals at cosine `c` from the surface's.
+/// Density of microfacet normals at cosine `c` from the surface normal.
 fn facet_density(ggx: bool, alpha: f64, c: f64) -> f64 {
     let tan2 = (1.0 - c * c).max(0.0) / (c * c);
     let shape =
@@ -40,7 +40,7 @@ fn facet_density(ggx: bool, alpha: f64, c: f64) -> f64 {
     shape / (PI * alpha * alpha * c.powi(4))
 }
 
-/// The error function, by its series or its continued fraction.
+/// Error function, by its series or continued fraction.
 fn erf(x: f64) -> f64 {
     if x > 3.0 {
         let tail = (1..60).rev().fold(0.0, |below, k| f64::from(k) / 2.0 / (x + below));
@@ -75,7 +75,7 @@ fn masking(material: &Material, ggx: bool, alpha: f64, n: DVec3, v: DVec3, l: DV
     }
 }
 
-/// Radiance towards `v` per irradiance of a surface facing the light, without the diffuse part.
+/// Highlight: radiance towards `v` per irradiance of a surface that faces the light.
 pub fn highlight(material: &Material, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
     let k = material.specular;
     if k == 0.0 {
@@ -101,8 +101,8 @@ pub fn highlight(material: &Material, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
     }
 }
 
-/// The frame about `w` of Duff et al. 2017, *Building an Orthonormal Basis, Revisited*: which one it is
-/// only matters to the square lobe, whose sides lie along it.
+/// Frame around `w` of Duff et al. 2017, *Building an Orthonormal Basis, Revisited*. Its tangents
+/// are the sides of the square lobe.
 fn around(w: DVec3) -> (DVec3, DVec3) {
     let sign = 1f64.copysign(w.z);
     let a = -1.0 / (sign + w.z);
@@ -111,12 +111,12 @@ fn around(w: DVec3) -> (DVec3, DVec3) {
     (u, DVec3::new(b, sign + w.y * w.y * a, -w.y))
 }
 
-/// The density that a lobe takes its own for, over what it is.
-fn believed(mutation: Mutation) -> f64 {
+/// Assumed density of a lobe over its true density.
+fn density_factor(mutation: Mutation) -> f64 {
     if mutation == Mutation::LobeDensity { 1.05 } else { 1.0 }
 }
 
-/// A reflected ray: its direction and the factor of what is seen there; `None`: nothing is.
+/// Samples a reflected ray. Returns its direction and throughput; `None` if it is absorbed.
 pub fn reflect(
     material: &Material,
     n: DVec3,
@@ -135,7 +135,7 @@ pub fn reflect(
     let sharp = material.lobe == Lobe::Mirror
         || if facets { material.microfacet_alpha() < SMOOTHEST } else { radius == 0.0 };
     if facets && !sharp {
-        return facet(material, n, v, mutation, numbers);
+        return microfacet(material, n, v, mutation, numbers);
     }
     let (a, b) = around(mirror);
     let local = if sharp {
@@ -157,13 +157,13 @@ pub fn reflect(
         }
         direction -= 2.0 * direction.dot(n) * n;
     }
-    // The facet half-way between the two directions sends this ray.
+    // Fresnel at the half vector of both directions.
     let f = fresnel(material, v.dot((v + direction).normalize()));
-    Some((direction, f * k / if sharp { 1.0 } else { believed(mutation) }))
+    Some((direction, f * k / if sharp { 1.0 } else { density_factor(mutation) }))
 }
 
-/// By the facets' distribution D cos, whichever it is.
-fn facet(
+/// Samples a microfacet normal with density D cos and reflects at it.
+fn microfacet(
     material: &Material,
     n: DVec3,
     v: DVec3,
@@ -188,6 +188,6 @@ fn facet(
     }
     // f N.L / density, where density = D N.H / (4 V.H).
     let g = masking(material, ggx, alpha, n, v, l);
-    let weight = material.reflection * g * vh / (nv * nh) / believed(mutation);
+    let weight = material.reflection * g * vh / (nv * nh) / density_factor(mutation);
     Some((l, fresnel(material, vh) * weight))
 }

@@ -1,4 +1,4 @@
-//! Two pictures of the same scene by two programs: do they agree as well as their noise allows?
+//! Statistical comparison of two programs' pictures of a scene.
 
 use crate::common::Numbers;
 use crate::normal::two_sided_z;
@@ -13,21 +13,20 @@ use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Raster of the small pictures.
+/// Size of the pictures.
 pub const SIZE: [u32; 2] = [32, 24];
-/// Side of the blocks of pixels whose means are compared.
+/// Side of the pixel blocks whose means are compared.
 const BLOCK: usize = 4;
-/// The chance that all comparisons of one scene together raise a false alarm: one in a thousand for a
-/// hundred scenes.
+/// Probability of a false alarm in all comparisons of one scene: 1 / 1000 for a hundred scenes.
 const LEVEL: f64 = 1e-3 / 100.0;
 
-/// How far two pictures are apart, beside what chance allows.
+/// Deviation of two pictures, and the largest deviation that chance explains.
 #[derive(Debug)]
 pub struct Verdict {
-    /// The largest deviation of a block, in standard errors.
+    /// Largest deviation of a block \[standard errors\].
     pub worst_z: f64,
     pub allowed_z: f64,
-    /// The sum of the squared deviations of all blocks' brightness.
+    /// Sum of the squared deviations of all blocks' brightness.
     pub chi2: f64,
     pub allowed_chi2: f64,
     pub picture: Vec<DVec3>,
@@ -47,46 +46,47 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// The program's picture of a scene with what is known about its noise.
+/// Picture by the program, with estimates of its noise.
 pub struct Picture {
     size: [u32; 2],
     mean: Vec<DVec3>,
     /// Half the difference of the replicates: the noise of `mean`.
     half: Vec<DVec3>,
-    /// The same of another picture, made with independent random numbers.
+    /// Half the difference of the replicates of a picture with independent random numbers.
     random: Vec<DVec3>,
     samples: u32,
 }
 
 impl Picture {
-    /// By `samples` samples for each pixel and replicate.
+    /// Renders with `samples` samples per pixel and replicate.
     pub fn new(scene: &Scene, samples: u32) -> Self {
         let (mean, half) = rendered(scene, samples, SamplerKind::Sobol);
         let (_, random) = rendered(scene, samples, SamplerKind::Random);
         Self { size: scene.film.size, mean, half, random, samples }
     }
 
-    /// Beside a reference of `samples` samples for each pixel, far more noisy than this. Means over
-    /// blocks of pixels are compared. How much single samples vary is taken from the reference or
-    /// from this program's random samples, whichever says more: of an event that is rare enough, the
-    /// few samples of the reference know nothing.
+    /// Compares block means with a reference of `samples` samples per pixel, which is far noisier.
+    /// The variance of single samples is the larger one of those of the reference and of this
+    /// program's random samples, because few samples underestimate the variance of rare events.
     pub fn beside(&self, reference: &[Estimate], samples: u32) -> Verdict {
         let (mut worst_z, mut chi2, mut count) = (0f64, 0.0, 0.0);
         let per_reference = 2.0 * f64::from(self.samples) / f64::from(samples);
         let blocks = blocks(self.size);
         for pixels in &blocks {
             let n = pixels.len() as f64;
-            let sum = |of: &dyn Fn(usize) -> DVec3| pixels.iter().map(|p| of(*p)).sum::<DVec3>();
+            let sum =
+                |value: &dyn Fn(usize) -> DVec3| pixels.iter().map(|p| value(*p)).sum::<DVec3>();
             let difference = sum(&|p| self.mean[p] - reference[p].mean) / n;
-            let theirs = sum(&|p| reference[p].variance);
-            let like_ours = sum(&|p| self.random[p] * self.random[p]) * per_reference;
-            let own = sum(&|p| self.half[p] * self.half[p]);
-            // Roundings of the film and of two ways to compute the same thing.
+            let reference_variance = sum(&|p| reference[p].variance);
+            let random_variance = sum(&|p| self.random[p] * self.random[p]) * per_reference;
+            let picture_variance = sum(&|p| self.half[p] * self.half[p]);
+            // Rounding of the film and of different formulas.
             let floor = 1e-7 * (sum(&|p| reference[p].mean).abs() / n + 1e-3);
-            let variance = (theirs.max(like_ours) + own) / (n * n) + floor * floor;
+            let variance = (reference_variance.max(random_variance) + picture_variance) / (n * n)
+                + floor * floor;
             let z = difference.abs() / variance.map(f64::sqrt);
             worst_z = worst_z.max(z.max_element());
-            // The channels of a block vary together: their sum is one number more.
+            // The channels of a block are correlated; their sum is a separate comparison.
             let z = difference.element_sum() / variance.map(f64::sqrt).element_sum();
             chi2 += z * z;
             count += 1.0;
@@ -103,18 +103,22 @@ impl Picture {
     }
 }
 
-/// The value that a chi-square variable of `n` degrees of freedom exceeds as rarely as a normal one
-/// exceeds `z` (Wilson and Hilferty 1931).
+/// Quantile of the chi-square distribution with `n` degrees of freedom at the level of the normal
+/// quantile `z` (Wilson and Hilferty 1931).
 fn chi2_quantile(n: f64, z: f64) -> f64 {
     n * (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3)
 }
 
-/// The scene with the raster of the comparison.
+/// Returns the scene with the picture size of the comparison.
 pub fn small(scene: Scene) -> Scene {
     sized(scene, SIZE)
 }
 
-/// Every pixel by the plain tracer; `Err`: what is in the scene that it does not know.
+/// Estimates every pixel with the reference tracer.
+///
+/// # Errors
+///
+/// Names a feature of the scene that the reference tracer does not support.
 pub fn reference(scene: &Scene, samples: u32, mutation: Mutation) -> Result<Vec<Estimate>, String> {
     let tracer = Tracer::new(scene, mutation)?;
     let [width, height] = scene.film.size;
@@ -126,7 +130,7 @@ pub fn reference(scene: &Scene, samples: u32, mutation: Mutation) -> Result<Vec<
     Ok(rows.concat())
 }
 
-/// The program's picture and half the difference of its replicates.
+/// Renders with the program. Returns the picture and half the difference of its replicates.
 pub fn rendered(scene: &Scene, samples: u32, kind: SamplerKind) -> (Vec<DVec3>, Vec<DVec3>) {
     let mut rendering = begin_with(scene, SampleSettings { seed: 1, kind }, Precision::Double);
     uniform(&mut rendering, 0, samples, &pool(2));
@@ -136,7 +140,7 @@ pub fn rendered(scene: &Scene, samples: u32, kind: SamplerKind) -> (Vec<DVec3>, 
     (mean, a.iter().zip(&b).map(|(a, b)| 0.5 * (*a - *b)).collect())
 }
 
-/// The pixels of each block, as positions in the picture.
+/// Pixel indices of each block.
 fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
     let [width, height] = [width as usize, height as usize];
     let block = |x0: usize, y0: usize| {
@@ -147,8 +151,8 @@ fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
     corners.flat_map(|y| (0..width).step_by(BLOCK).map(move |x| block(x, y))).collect()
 }
 
-/// How many standard errors the variances of single samples differ by, pooled over the picture; the
-/// standard error is taken from how much the blocks differ from each other.
+/// Difference of the variances of single samples, pooled over the picture \[standard errors\]. The
+/// standard error is estimated from the spread of the blocks.
 pub fn variances_differ_by(
     reference: &[Estimate],
     reference_samples: u32,
@@ -159,10 +163,12 @@ pub fn variances_differ_by(
     let differences: Vec<f64> = blocks(size)
         .iter()
         .map(|pixels| {
-            let theirs = pixels.iter().map(|p| reference[*p].variance.element_sum()).sum::<f64>();
-            let own = pixels.iter().map(|p| half[*p].length_squared()).sum::<f64>();
-            // Half the difference of two means of n samples has the variance of a mean of 2 n.
-            own * 2.0 * f64::from(samples) - theirs * f64::from(reference_samples)
+            let reference_variance =
+                pixels.iter().map(|p| reference[*p].variance.element_sum()).sum::<f64>();
+            let squares = pixels.iter().map(|p| half[*p].length_squared()).sum::<f64>();
+            // Half the difference of two means of n samples has the variance of a mean of 2 n
+            // samples.
+            squares * 2.0 * f64::from(samples) - reference_variance * f64::from(reference_samples)
         })
         .collect();
     let n = differences.len() as f64;
@@ -171,7 +177,7 @@ pub fn variances_differ_by(
     mean.abs() / (spread / n).sqrt()
 }
 
-/// Writes picture, reference and difference where they can be looked at; returns the folder.
+/// Writes picture, reference and difference to files, and returns their folder.
 pub fn keep(name: &str, verdict: &Verdict) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("agreement");
     std::fs::create_dir_all(&folder).unwrap();

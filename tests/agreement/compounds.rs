@@ -1,5 +1,5 @@
-//! Compounds in the plainest way: wherever a ray crosses the surface of a part, points just before and
-//! just behind tell whether the whole begins or ends there.
+//! Compounds of the reference tracer. At each crossing of a part's surface, point tests just in
+//! front and just behind decide if the ray enters or leaves the compound.
 
 use crate::meshes::Triangles;
 use crate::paint::{Canvas, Spot};
@@ -8,19 +8,20 @@ use glam::{DAffine3, DMat3, DVec3};
 use zerkalo::scene::Object;
 use zerkalo::shape::{CsgOperand, Shape};
 
-/// A simple shape: its pieces or its triangles, and the maps between their space and the scene's.
+/// Simple shape: its pieces or triangles, and the transforms between its coordinates and the
+/// scene's.
 pub struct Leaf {
     pub pieces: Vec<Piece>,
     pub mesh: Option<Triangles>,
     pub canvas: Canvas,
     own_from_scene: DAffine3,
-    /// Normals are mapped by the inverse transpose.
+    /// Inverse transpose, which maps normals.
     scene_from_own_normals: DMat3,
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
 }
 
-/// How leaves are combined.
+/// CSG tree over leaves.
 enum Tree {
     Leaf(usize),
     Union(Vec<Tree>),
@@ -28,52 +29,53 @@ enum Tree {
     Difference(Vec<Tree>),
 }
 
-/// An object: its leaves, and how they are combined.
+/// Object: its leaves and their CSG tree.
 pub struct Body {
     pub leaves: Vec<Leaf>,
     tree: Tree,
 }
 
-/// How far before and behind a crossing points are asked, in lengths of the direction.
+/// Distance of the tested points from a crossing, in lengths of the direction.
 const ASIDE: f64 = 1e-7;
 
 /// Distance, normal, leaf and triangle.
 type Meeting = (f64, DVec3, usize, usize);
 
 impl Leaf {
-    /// Distances, normals, and which triangle it is.
+    /// Distances, normals and triangle indices of all crossings.
     fn crossings(&self, origin: DVec3, direction: DVec3) -> Vec<(f64, DVec3, usize)> {
         let origin = self.own_from_scene.transform_point3(origin);
         let direction = self.own_from_scene.transform_vector3(direction);
         let hits = self.pieces.iter().flat_map(|piece| piece.meet(origin, direction)).flatten();
         let hits = hits.map(|(t, n)| (t, n, 0));
-        let of_mesh = self.mesh.iter().flat_map(|mesh| mesh.meet(origin, direction));
-        hits.chain(of_mesh).map(|(t, n, i)| (t, self.scene_normal(n), i)).collect()
+        let mesh_hits = self.mesh.iter().flat_map(|mesh| mesh.meet(origin, direction));
+        hits.chain(mesh_hits).map(|(t, n, i)| (t, self.scene_normal(n), i)).collect()
     }
 
-    /// The interpolated normal of triangle `i` at `point`; `None`: it has none but its own.
+    /// Interpolated normal of triangle `i` at `point`; `None` for flat shading.
     pub fn smooth(&self, i: usize, point: DVec3) -> Option<DVec3> {
         let own = self.mesh.as_ref()?.smooth(i, self.own_from_scene.transform_point3(point))?;
         Some(self.scene_from_own_normals * own)
     }
 
-    /// The colour of its own at triangle `i`.
+    /// Colour of triangle `i` in its file.
     pub fn color(&self, i: usize) -> DVec3 {
         self.mesh.as_ref().map_or(DVec3::ONE, |mesh| mesh.color(i))
     }
 
-    /// A point of the scene and the outer normal there, in the space of the leaf's description.
+    /// Converts a point of the scene and its outward normal to the coordinates of the leaf's
+    /// description.
     pub fn spot(&self, facet: usize, point: DVec3, outer: DVec3) -> Spot<'_> {
         let point = self.own_from_scene.transform_point3(point);
         Spot { leaf: self, facet, point, normal: self.own_normal(outer) }
     }
 
-    /// A normal of the scene in the space of the leaf's description.
+    /// Converts a normal of the scene to the coordinates of the leaf's description.
     pub fn own_normal(&self, normal: DVec3) -> DVec3 {
         (self.scene_from_own_normals.inverse() * normal).normalize()
     }
 
-    /// The other way.
+    /// Converts a normal of the leaf's description to scene coordinates.
     pub fn scene_normal(&self, own: DVec3) -> DVec3 {
         (self.scene_from_own_normals * own).normalize()
     }
@@ -85,7 +87,9 @@ impl Leaf {
 }
 
 impl Body {
-    /// `Err`: a shape that this tracer does not know.
+    /// # Errors
+    ///
+    /// Names a shape that this tracer does not support.
     pub fn new(object: &Object) -> Result<Self, String> {
         let place = object.transform.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all);
         let mut leaves = Vec::new();
@@ -93,8 +97,8 @@ impl Body {
         Ok(Self { leaves, tree })
     }
 
-    /// Nearest distance beyond `from` (in lengths of `direction`) at which the ray meets the body, the
-    /// unit normal there on the front or outside, which leaf it is, and which of its triangles.
+    /// Closest hit beyond the distance `from` (in lengths of `direction`): distance, outward or
+    /// front unit normal, leaf and triangle.
     pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<Meeting> {
         let mut nearest: Option<Meeting> = None;
         for (i, leaf) in self.leaves.iter().enumerate() {
@@ -117,19 +121,19 @@ impl Body {
         nearest
     }
 
-    /// Whether it is made of triangles, whose inside nobody knows.
+    /// Returns `true` for a mesh, which has no defined inside.
     pub fn is_mesh(&self) -> bool {
         self.leaves[0].mesh.is_some()
     }
 
-    /// Whether it is flat, with nothing inside.
+    /// Returns `true` if the body is flat.
     pub fn is_open(&self) -> bool {
         let pieces = &self.leaves[0].pieces;
         matches!(self.tree, Tree::Leaf(_))
             && matches!(pieces[..], [Piece::Polygon(..)] | [Piece::Plane(..)])
     }
 
-    /// Whether `point` is inside.
+    /// Returns `true` if `point` is inside.
     pub fn holds(&self, point: DVec3) -> bool {
         self.contains(&self.tree, point)
     }
@@ -151,8 +155,9 @@ fn grow(
     scene_from_own: DAffine3,
     leaves: &mut Vec<Leaf>,
 ) -> Result<Tree, String> {
-    let mut all = |of: &[CsgOperand]| -> Result<Vec<Tree>, String> {
-        of.iter()
+    let mut all = |operands: &[CsgOperand]| -> Result<Vec<Tree>, String> {
+        operands
+            .iter()
             .map(|part| {
                 let inner =
                     part.transform.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all);

@@ -1,6 +1,6 @@
-//! The program against a second, independent implementation: a slow, plain path tracer that shares
-//! nothing with it but the description of the scene. Their pictures agree as well as noise allows, and
-//! deliberate errors in the plain one are found.
+//! Comparison with a second, independent implementation: a slow reference path tracer that shares
+//! the scene description only. The pictures agree within noise, and deliberate errors of the
+//! reference are detected.
 
 mod answers;
 #[path = "../common/mod.rs"]
@@ -24,12 +24,12 @@ use zerkalo::material::Lobe;
 use zerkalo::sampling::SamplerKind;
 use zerkalo::scene::{Scale, Scene, TransformOp};
 
-/// Samples of the plain tracer for one pixel.
-const PLAIN: u32 = 96;
-/// Samples of the program for one pixel and replicate.
-const OWN: u32 = 512;
+/// Samples per pixel of the reference tracer.
+const REFERENCE_SAMPLES: u32 = 96;
+/// Samples per pixel and replicate of the program.
+const SAMPLES: u32 = 512;
 
-/// Scenes that must be among those that are compared.
+/// Scenes that must be compared.
 const GALLERY: [&str; 9] = [
     "mirror-room.toml",
     "gallery-triptych.toml",
@@ -43,22 +43,22 @@ const GALLERY: [&str; 9] = [
 ];
 
 #[test]
-fn every_shipped_scene_agrees_with_the_plain_tracer() {
+fn shipped_scenes_agree_with_reference_tracer() {
     let mut checked = Vec::new();
     let (mut wrong, mut unknown) = (Vec::new(), Vec::new());
     for (name, scene) in all_shipped() {
         let scene = small(scene);
-        let plain = match Tracer::new(&scene, Mutation::None) {
-            Ok(tracer) if tracer.is_slow() => PLAIN / 4,
-            Ok(_) => PLAIN,
+        let samples = match Tracer::new(&scene, Mutation::None) {
+            Ok(tracer) if tracer.is_slow() => REFERENCE_SAMPLES / 4,
+            Ok(_) => REFERENCE_SAMPLES,
             Err(what) => {
-                println!("{name}: not compared, the plain tracer does not know {what}");
+                println!("{name}: not compared, the reference tracer does not support {what}");
                 unknown.push(name);
                 continue;
             }
         };
-        let reference = reference(&scene, plain, Mutation::None).unwrap();
-        let verdict = Picture::new(&scene, OWN).beside(&reference, plain);
+        let reference = reference(&scene, samples, Mutation::None).unwrap();
+        let verdict = Picture::new(&scene, SAMPLES).beside(&reference, samples);
         println!("{name}: {verdict}");
         if !verdict.agree() {
             let folder = keep(&name, &verdict);
@@ -67,7 +67,7 @@ fn every_shipped_scene_agrees_with_the_plain_tracer() {
         checked.push(name);
     }
     println!("{} scenes compared, not {unknown:?}", checked.len());
-    // All but what is refused above, and of these certainly what shows most at once.
+    // The gallery scenes combine most features.
     for name in GALLERY {
         assert!(checked.iter().any(|c| c == name), "{name} was not compared");
     }
@@ -75,9 +75,9 @@ fn every_shipped_scene_agrees_with_the_plain_tracer() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// A deliberate error is found; without it the same samples agree.
-fn is_found(mutation: Mutation, name: &str, scene: &Scene, samples: u32) {
-    let picture = Picture::new(scene, OWN);
+/// Checks that a deliberate error is detected, and that the same samples agree without it.
+fn check_detection(mutation: Mutation, name: &str, scene: &Scene, samples: u32) {
+    let picture = Picture::new(scene, SAMPLES);
     let beside = |m| picture.beside(&reference(scene, samples, m).unwrap(), samples);
     let (right, wrong) = (beside(Mutation::None), beside(mutation));
     println!("{mutation:?} in {name}: {wrong}; without it {right}");
@@ -85,7 +85,7 @@ fn is_found(mutation: Mutation, name: &str, scene: &Scene, samples: u32) {
     assert!(!wrong.agree(), "{mutation:?} in {name} was not noticed: {wrong}");
 }
 
-/// A thousand times smaller: eye, lights without falloff, and every object.
+/// Scales eye, lights without falloff and objects by 1/1000.
 fn shrunk(mut scene: Scene) -> Scene {
     const FACTOR: f64 = 1e-3;
     let shrink = |v: &mut [f64; 3]| *v = v.map(|x| x * FACTOR);
@@ -98,47 +98,47 @@ fn shrunk(mut scene: Scene) -> Scene {
 }
 
 #[test]
-fn deliberate_errors_are_found() {
+fn deliberate_errors_are_detected() {
     let scene = |name| small(shipped(name));
     for (mutation, name, scene) in [
         (Mutation::ShadowOffset, "a small mirror room", shrunk(scene("mirror-room.toml"))),
         (Mutation::Absorb, "horizon-fold.toml", scene("horizon-fold.toml")),
         (Mutation::NoCosine, "mirror-room-physical.toml", scene("mirror-room-physical.toml")),
     ] {
-        is_found(mutation, name, &scene, 4 * PLAIN);
+        check_detection(mutation, name, &scene, 4 * REFERENCE_SAMPLES);
     }
     for (mutation, name) in [
         (Mutation::NoBending, "transmission.toml"),
         (Mutation::SidewaysTexture, "texture-image.toml"),
         (Mutation::SunkenBumps, "bump.toml"),
     ] {
-        is_found(mutation, name, &scene(name), 8 * PLAIN);
+        check_detection(mutation, name, &scene(name), 8 * REFERENCE_SAMPLES);
     }
     for lobe in [Lobe::Cone, Lobe::Beckmann] {
         let mut scene = scene("roughness-0.3.toml");
         scene.materials.values_mut().for_each(|material| material.lobe = lobe);
-        is_found(Mutation::WiderLobe, &format!("{lobe:?}"), &scene, 32 * PLAIN);
-        is_found(Mutation::LobeDensity, &format!("{lobe:?}"), &scene, PLAIN);
+        check_detection(Mutation::WiderLobe, &format!("{lobe:?}"), &scene, 32 * REFERENCE_SAMPLES);
+        check_detection(Mutation::LobeDensity, &format!("{lobe:?}"), &scene, REFERENCE_SAMPLES);
     }
 }
 
-/// With independent random numbers single samples vary as much in both programs, where both draw
-/// their lobes by the same density.
+/// With independent random numbers the variance of single samples is equal in both programs, where
+/// both sample their lobes with equal densities.
 #[test]
 fn variances_agree_under_independent_random_numbers() {
     for name in ["lobe-cone.toml", "lobe-square.toml", "lobe-beckmann.toml", "mirror-room.toml"] {
         let scene = small(shipped(name));
-        let reference = reference(&scene, PLAIN, Mutation::None).unwrap();
-        let (_, half) = rendered(&scene, OWN, SamplerKind::Random);
-        let z = variances_differ_by(&reference, PLAIN, &half, OWN, scene.film.size);
+        let reference = reference(&scene, REFERENCE_SAMPLES, Mutation::None).unwrap();
+        let (_, half) = rendered(&scene, SAMPLES, SamplerKind::Random);
+        let z = variances_differ_by(&reference, REFERENCE_SAMPLES, &half, SAMPLES, scene.film.size);
         println!("{name}: {z:.2} standard errors");
         assert!(z < 4.0, "{name}: variances differ by {z:.2} standard errors");
     }
 }
 
-/// Panes and solids of every law of reflection, one-sided, from both sides: behind, only what shows through.
+/// One-sided panes and solids with every Fresnel mode, from both sides. Their backs transmit only.
 #[test]
-fn one_sided_transparent_things_reflect_on_their_front_only() {
+fn one_sided_transparent_objects_reflect_on_their_front_only() {
     for law in ["constant", "schlick\"\nreflectance = \"#806040", "dielectric"] {
         for side in [1.0, -1.0] {
             let text = format!(
@@ -169,18 +169,19 @@ fn one_sided_transparent_things_reflect_on_their_front_only() {
                 3.0 * side,
             );
             let scene = small(parsed(&text));
-            let samples = 2 * PLAIN;
+            let samples = 2 * REFERENCE_SAMPLES;
             let reference = reference(&scene, samples, Mutation::None).unwrap();
-            let verdict = Picture::new(&scene, OWN).beside(&reference, samples);
+            let verdict = Picture::new(&scene, SAMPLES).beside(&reference, samples);
             println!("{law:?} from {side}: {verdict}");
             assert!(verdict.agree(), "{law} from {side}: {verdict}");
         }
     }
 }
 
-/// A pane before a bright wall and behind a dark one: whoever looks at its back sees k_t of the dark one, no mirror.
+/// A one-sided pane between a bright and a dark wall. Its back shows k_t of the dark wall and no
+/// reflection.
 #[test]
-fn the_back_of_a_one_sided_pane_mirrors_nothing() {
+fn back_of_one_sided_pane_does_not_reflect() {
     for (two_sided, expected) in [(true, 0.75), (false, 0.0)] {
         for law in ["constant", "schlick"] {
             let text = format!(

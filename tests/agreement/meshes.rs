@@ -1,28 +1,27 @@
-//! Meshes in the plainest way: every triangle is asked, one after the other.
+//! Meshes of the reference tracer, without acceleration structure.
 
 use glam::{DVec2, DVec3};
 use std::collections::HashMap;
 use zerkalo::primitive::Form;
 use zerkalo::shape::{MeshDesc, ShapeDesc};
 
-/// The least cosine between the normal that light sees and the direction to the viewer.
-const LEAST_COSINE: f64 = 0.02;
+/// Smallest cosine between the shading normal and the direction to the viewer.
+const MIN_COSINE: f64 = 0.02;
 
-/// Triangles in the space of their file.
+/// Triangles in the coordinates of their file.
 pub struct Triangles {
     corners: Vec<[DVec3; 3]>,
-    /// Those of the corners; empty: light sees the triangles' own.
+    /// Normals of the corners; empty for flat shading.
     normals: Vec<[DVec3; 3]>,
-    /// Empty: the file names none.
+    /// Colours of the triangles; empty if the file has none.
     colors: Vec<DVec3>,
-    /// Texture coordinates of the corners; empty: the file names none.
+    /// Texture coordinates of the corners; empty if the file has none.
     uvs: Vec<[DVec2; 3]>,
     low: DVec3,
     high: DVec3,
 }
 
-/// The sum over the triangles that meet at a place of their unit normals, each times its angle there,
-/// made a unit vector.
+/// Corner normals: angle-weighted means of the unit normals of adjacent triangles, normalised.
 fn around(corners: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
     let key = |p: DVec3| p.to_array().map(|x| (x + 0.0).to_bits());
     let mut sums: HashMap<[u64; 3], DVec3> = HashMap::new();
@@ -37,10 +36,10 @@ fn around(corners: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
 }
 
 impl Triangles {
-    /// What is in the file.
+    /// Loads the triangles of a file.
     pub fn new(file: &MeshDesc) -> Self {
         let Form::Mesh { mesh, scene_from_mesh, smooth } = file.form() else {
-            unreachable!("a mesh is a mesh")
+            unreachable!("a mesh description has a mesh form")
         };
         let mesh = mesh.mesh();
         let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
@@ -69,10 +68,10 @@ impl Triangles {
         }
     }
 
-    /// Every triangle that the line meets: where, its normal, and which it is.
+    /// Returns distance, normal and index of every triangle on the line.
     pub fn meet(&self, origin: DVec3, direction: DVec3) -> Vec<(f64, DVec3, usize)> {
         let (a, b) = ((self.low - origin) / direction, (self.high - origin) / direction);
-        // NaN where a line runs in a side of the box: it does not count.
+        // NaN for a line in a side of the box is ignored.
         if a.min(b).max_element() > a.max(b).min_element() {
             return Vec::new();
         }
@@ -89,14 +88,14 @@ impl Triangles {
         each.collect()
     }
 
-    /// The mean of the corners' normals at a point of triangle `i`; `None`: light sees the triangle's own.
+    /// Interpolated normal at a point of triangle `i`; `None` for flat shading.
     pub fn smooth(&self, i: usize, point: DVec3) -> Option<DVec3> {
         let normals = self.normals.get(i)?;
         let shares = self.shares(i, point);
         Some((0..3).map(|k| normals[k] * shares[k]).sum())
     }
 
-    /// What each corner of triangle `i` counts at a point of its plane; together 1.
+    /// Barycentric coordinates of a point in the plane of triangle `i`.
     fn shares(&self, i: usize, point: DVec3) -> [f64; 3] {
         let [a, b, c] = self.corners[i];
         let normal = (b - a).cross(c - a);
@@ -104,34 +103,34 @@ impl Triangles {
         [(b, c), (c, a), (a, b)].map(|(a, b)| area(a, b) / normal.length_squared())
     }
 
-    /// Whether the file has texture coordinates.
+    /// Returns `true` if the file has texture coordinates.
     pub fn has_uv(&self) -> bool {
         !self.uvs.is_empty()
     }
 
-    /// Those at a point of the plane of triangle `i`; `None`: the file has none.
+    /// Texture coordinates at a point in the plane of triangle `i`; `None` if the file has none.
     pub fn uv(&self, i: usize, point: DVec3) -> Option<DVec2> {
         let uvs = self.uvs.get(i)?;
         let shares = self.shares(i, point);
         Some((0..3).map(|k| uvs[k] * shares[k]).sum())
     }
 
-    /// All corners of all triangles.
+    /// Corners of all triangles.
     pub fn points(&self) -> impl Iterator<Item = DVec3> {
         self.corners.iter().flatten().copied()
     }
 
-    /// The file's colour of triangle `i`.
+    /// Colour of triangle `i` in the file.
     pub fn color(&self, i: usize) -> DVec3 {
         self.colors.get(i).copied().unwrap_or(DVec3::ONE)
     }
 }
 
-/// The normal that light sees: `smooth` on the side of the triangle's own, and nowhere turned away from
-/// the viewer, who looks along `direction`.
+/// Shading normal: `smooth` on the side of the geometric normal `own`, bent towards a viewer who
+/// looks along `direction`.
 pub fn seen(smooth: DVec3, own: DVec3, direction: DVec3) -> DVec3 {
     let smooth = smooth.normalize() * smooth.dot(own).signum();
-    let short = (LEAST_COSINE + smooth.dot(direction)).max(0.0);
+    let short = (MIN_COSINE + smooth.dot(direction)).max(0.0);
     let bent = (smooth - direction * short).normalize();
     if bent.dot(own) > 0.0 { bent } else { own }
 }

@@ -1,5 +1,5 @@
-//! Textures and bumps in the plainest way: where a point lies in the picture is asked of formulas, how
-//! that changes from place to place of points beside it.
+//! Textures and bump maps of the reference tracer. Texture coordinates follow from formulas, their
+//! derivatives from finite differences.
 
 use crate::compounds::Leaf;
 use crate::meshes::Triangles;
@@ -13,22 +13,22 @@ use zerkalo::material::{
 };
 use zerkalo::shape::Shape;
 
-/// How far beside a point its neighbours are asked, in scene units.
+/// Step of finite differences in scene units.
 const ASIDE: f64 = 1e-6;
 
-/// The ends of a cylinder show what lies this far inside its rims, in heights.
+/// Distance from a cylinder's rims, in heights, of the texture shown on its ends.
 const RIM: f64 = 1e-6;
 
-/// An image of `scenes`, its pixels from the lowest row up.
+/// Image of `scenes`; the lowest row is the first.
 pub struct Pixels {
     /// Columns and rows.
     pub size: DVec2,
-    /// The file's numbers, from 0 to 1.
+    /// Encoded values of the file, from 0 to 1.
     codes: Vec<DVec3>,
 }
 
 impl Pixels {
-    /// A file, as a shipped scene names it.
+    /// Opens a file by its name in a shipped scene.
     pub fn open(file: &str) -> Result<Self, String> {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
         let image = image::open(&path).map_err(|e| format!("{}: {e}", path.display()))?;
@@ -40,41 +40,41 @@ impl Pixels {
         Ok(Self { size, codes: rows.map(code).collect() })
     }
 
-    /// The pixel in a column and a row that may lie beyond the edges.
-    fn pixel(&self, at: DVec2, wrap: Wrap) -> DVec3 {
+    /// Pixel in a column and row that may be beyond the edges.
+    fn pixel(&self, position: DVec2, wrap: Wrap) -> DVec3 {
         let inside = match wrap {
-            Wrap::Repeat => at.rem_euclid(self.size),
-            Wrap::Clamp => at.clamp(DVec2::ZERO, self.size - 1.0),
+            Wrap::Repeat => position.rem_euclid(self.size),
+            Wrap::Clamp => position.clamp(DVec2::ZERO, self.size - 1.0),
         };
         self.codes[(inside.y * self.size.x + inside.x) as usize]
     }
 
-    /// The mean of what `of` says of the four pixels around a point, the nearer the more.
-    fn between(&self, uv: DVec2, wrap: Wrap, of: impl Fn(DVec3) -> DVec3) -> DVec3 {
-        let at = uv * self.size - 0.5;
-        let (first, part) = (at.floor(), at - at.floor());
-        let pixel = |x: f64, y: f64| of(self.pixel(first + DVec2::new(x, y), wrap));
+    /// Bilinear interpolation of `value` of the four pixels around a point.
+    fn bilinear(&self, uv: DVec2, wrap: Wrap, value: impl Fn(DVec3) -> DVec3) -> DVec3 {
+        let position = uv * self.size - 0.5;
+        let (first, part) = (position.floor(), position - position.floor());
+        let pixel = |x: f64, y: f64| value(self.pixel(first + DVec2::new(x, y), wrap));
         let low = pixel(0.0, 0.0).lerp(pixel(1.0, 0.0), part.x);
         low.lerp(pixel(0.0, 1.0).lerp(pixel(1.0, 1.0), part.x), part.y)
     }
 
-    /// The linear colour at a point, in repeats from the lower left corner.
+    /// Linear colour at a point, in repeats from the lower left corner.
     pub fn color(&self, uv: DVec2, wrap: Wrap, filter: Filter) -> DVec3 {
         let linear =
             |c: f64| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
         let light = |code: DVec3| DVec3::from(code.to_array().map(linear));
         match filter {
-            Filter::Bilinear => self.between(uv, wrap, light),
+            Filter::Bilinear => self.bilinear(uv, wrap, light),
             Filter::Nearest => light(self.pixel((uv * self.size).floor(), wrap)),
         }
     }
 
-    /// Grey, 0 to 1.
+    /// Height at a point: grey value from 0 to 1.
     pub fn height(&self, uv: DVec2, wrap: Wrap) -> f64 {
-        self.between(uv, wrap, |code| code).element_sum() / 3.0
+        self.bilinear(uv, wrap, |code| code).element_sum() / 3.0
     }
 
-    /// How heights grow with u and v: by the pixels to both sides.
+    /// Slopes of the height along u and v, by central differences of pixels.
     fn slope(&self, uv: DVec2, wrap: Wrap) -> DVec2 {
         let along = |way: DVec2| {
             let step = way / self.size;
@@ -85,22 +85,23 @@ impl Pixels {
     }
 }
 
-/// Where textures lie on a simple shape, in the space of its description.
+/// Texture frame of a simple shape, in the coordinates of its description.
 pub struct Canvas {
-    /// To the right, up (or along the axis), to the front (or along the normal).
+    /// Right, up (or along the axis), and front (or along the normal).
     frame: DMat3,
-    /// What a texture does if nobody says.
-    usual: Mapping,
+    /// Default mapping.
+    default_mapping: Mapping,
 }
 
-/// As far right as can be, around an axis.
+/// Frame around an axis; its right vector is perpendicular to z.
 fn around(axis: DVec3) -> DMat3 {
     let up = axis.normalize();
     let right = up.cross(DVec3::Z).try_normalize().unwrap_or(DVec3::X);
     DMat3::from_cols(right, up, right.cross(up))
 }
 
-/// On what is flat: as far up as can be, on what lies flat away from the viewer.
+/// Frame of a flat shape. Its up vector is the projection of y; on horizontal shapes it points away
+/// from the viewer.
 fn flat(normal: DVec3) -> DMat3 {
     let front = normal.normalize();
     let up = if front.y.abs() > 0.999 { DVec3::NEG_Z * front.y.signum() } else { DVec3::Y };
@@ -131,14 +132,14 @@ impl Canvas {
             _ if mesh.is_some_and(Triangles::has_uv) => (DMat3::IDENTITY, Mapping::Uv),
             _ => (DMat3::IDENTITY, Mapping::Box),
         };
-        Self { frame, usual }
+        Self { frame, default_mapping: usual }
     }
 
-    /// The mapping, and directions to the right, up and to the front as it sees them.
+    /// Mapping of a placement, with its right, up and front vectors.
     fn view(&self, placement: &Placement) -> (Mapping, DMat3) {
         let mapping = match placement.mapping {
-            Mapping::Auto => self.usual,
-            said => said,
+            Mapping::Auto => self.default_mapping,
+            explicit => explicit,
         };
         let [x, y, z] = [self.frame.x_axis, self.frame.y_axis, self.frame.z_axis];
         let looks = matches!(mapping, Mapping::Planar | Mapping::Uv);
@@ -154,7 +155,7 @@ impl Canvas {
     }
 }
 
-/// The ends of all pieces and triangles along a direction: least and greatest.
+/// Smallest and largest coordinate of all pieces and triangles along a direction.
 fn ends(leaf: &Leaf, along: DVec3) -> (f64, f64) {
     let corners = leaf.mesh.iter().flat_map(Triangles::points).map(|p| (p.dot(along), 0.0));
     let pieces = leaf.pieces.iter().flat_map(|piece| match piece {
@@ -164,7 +165,7 @@ fn ends(leaf: &Leaf, along: DVec3) -> (f64, f64) {
         Piece::Disc(center, normal, radius) => {
             vec![(center.dot(along), radius * normal.cross(along).length())]
         }
-        // Its ends are discs.
+        // The discs at its ends bound it.
         Piece::Side(..) => Vec::new(),
     });
     corners
@@ -172,17 +173,17 @@ fn ends(leaf: &Leaf, along: DVec3) -> (f64, f64) {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (x, r)| (l.min(x - r), h.max(x + r)))
 }
 
-/// A point on a leaf, in the space of its description.
+/// Point on a leaf, in the coordinates of its description.
 pub struct Spot<'a> {
     pub leaf: &'a Leaf,
     pub facet: usize,
     pub point: DVec3,
-    /// Outwards.
+    /// Outward normal.
     pub normal: DVec3,
 }
 
 impl Spot<'_> {
-    /// Where `point`, which lies on the same side of the same thing, is in the picture, in repeats.
+    /// Texture coordinates of `point`, which is on the same side of the same leaf, in repeats.
     fn uv(&self, placement: &Placement, point: DVec3) -> DVec2 {
         let (scale, offset) = (DVec2::from(placement.scale), DVec2::from(placement.offset));
         let (mapping, view) = self.leaf.canvas.view(placement);
@@ -204,7 +205,8 @@ impl Spot<'_> {
             Mapping::Cylindrical => DVec2::new(turns, (from_low.y / size.y).clamp(RIM, 1.0 - RIM)),
             Mapping::Box => {
                 let n = view.transpose() * self.normal;
-                // From a side's lower left corner, seen from outside; of equal ones the later axis.
+                // From the lower left corner of a face, seen from outside; the later axis wins
+                // ties.
                 let (back, p) = (high - seen, from_low);
                 match n.abs() {
                     a if a.z >= a.x.max(a.y) => {
@@ -214,7 +216,7 @@ impl Spot<'_> {
                     _ => DVec2::new(if n.x > 0.0 { back.z } else { p.z }, p.y),
                 }
             }
-            // From edge to edge of what is flat.
+            // From edge to edge of a flat shape.
             Mapping::Uv => from_low.truncate() / size.truncate(),
             Mapping::Planar | Mapping::Auto => from_low.truncate(),
         };
@@ -233,7 +235,7 @@ impl Tracer<'_> {
         Ok(())
     }
 
-    /// What the material's texture multiplies colours with.
+    /// Albedo factor of the material's texture.
     pub fn painted(&self, material: &Material, spot: &Spot) -> DVec3 {
         let Some(texture) = &material.texture else { return DVec3::ONE };
         let mut uv = spot.uv(&texture.placement(), spot.point);
@@ -253,7 +255,7 @@ impl Tracer<'_> {
         }
     }
 
-    /// The outer normal `normal`, turned as that of a surface with the material's bumps.
+    /// Outward normal `normal`, perturbed by the material's bump map.
     pub fn raised(&self, material: &Material, spot: &Spot, normal: DVec3) -> DVec3 {
         let Some(Bump::Image(image)) = &material.bump else { return normal };
         let Some(pixels) = self.images.get(&image.file) else { return normal };
@@ -262,9 +264,9 @@ impl Tracer<'_> {
         let height =
             if self.mutation == Mutation::SunkenBumps { -image.height } else { image.height };
         let rise = |along: DVec3| {
-            let there = spot.uv(&placement, spot.point + along * ASIDE);
-            let mut step = there - spot.uv(&placement, spot.point - along * ASIDE);
-            // Where a turn ends the next begins.
+            let forward_uv = spot.uv(&placement, spot.point + along * ASIDE);
+            let mut step = forward_uv - spot.uv(&placement, spot.point - along * ASIDE);
+            // Coordinates jump by one repeat at the seam.
             let turn = placement.scale[0];
             if step.x.abs() > 0.5 * turn {
                 step.x -= turn * step.x.signum();

@@ -1,25 +1,26 @@
-//! Shapes as the plainest things that rays can meet: spheres, polygons, infinite planes, discs and the
-//! sides of cones, each in the space that its description uses. Nothing here is fast, and nothing is shared with the program.
+//! Shapes of the reference tracer as simple pieces: spheres, polygons, infinite planes, discs and
+//! the sides of cones, in the coordinates of their descriptions. No code is shared with the
+//! program.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use zerkalo::scene::TransformOp;
 use zerkalo::shape::Shape;
 
-/// What a ray can meet, before the object's transform.
+/// Simple surface, before the object's transform.
 pub enum Piece {
     /// Centre, radius.
     Sphere(DVec3, f64),
-    /// Corners in order, and the front's normal.
+    /// Corners in order, and front normal.
     Polygon(Vec<DVec3>, DVec3),
-    /// A point and the front's normal.
+    /// Point and front normal.
     Plane(DVec3, DVec3),
     /// Centre, normal, radius.
     Disc(DVec3, DVec3, f64),
-    /// The side around an axis: where it begins, its direction, its length, the radii at both ends.
+    /// Side of a cone: start of the axis, its direction, its length, and the radii at both ends.
     Side(DVec3, DVec3, f64, [f64; 2]),
 }
 
-/// Distance in lengths of the direction, and normal. What lies behind the origin need not be told.
+/// Distance in lengths of the direction, and normal. Hits behind the origin are optional.
 type Meeting = Option<(f64, DVec3)>;
 
 impl Piece {
@@ -35,8 +36,8 @@ impl Piece {
                     return [None; 2];
                 }
                 let normal = |t: f64| (origin + direction * t - center) / *radius;
-                let at = |sign: f64| (-b + sign * root.sqrt()) / a;
-                [at(-1.0), at(1.0)].map(|t| Some((t, normal(t))))
+                let root_at = |sign: f64| (-b + sign * root.sqrt()) / a;
+                [root_at(-1.0), root_at(1.0)].map(|t| Some((t, normal(t))))
             }
             Self::Disc(center, normal, radius) => {
                 let hit = flat(*center, *normal, origin, direction);
@@ -52,18 +53,18 @@ impl Piece {
                 let b = p.dot(d) - r * widening;
                 let c = p.dot(p) - r * r;
                 let root = (b * b - a * c).sqrt();
-                let at = |t: f64| {
+                let hit_at = |t: f64| {
                     let from_axis = across(f + direction * t);
                     let z = (f + direction * t).dot(*axis);
                     let normal = (from_axis.normalize() - *axis * slope).normalize();
-                    // Without a crossing t is NaN.
+                    // `t` is NaN without a crossing.
                     (z >= 0.0 && z <= *height).then_some((t, normal))
                 };
-                [at((-b - root) / a), at((-b + root) / a)]
+                [hit_at((-b - root) / a), hit_at((-b + root) / a)]
             }
             Self::Plane(point, normal) => [flat(*point, *normal, origin, direction), None],
             Self::Polygon(corners, normal) => {
-                // On the same side of all edges, whichever way they go around.
+                // The point is on the same side of all edges, in either orientation.
                 let inside = |p: DVec3| {
                     let side = |i: usize| {
                         let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);
@@ -80,7 +81,7 @@ impl Piece {
 }
 
 impl Piece {
-    /// Whether a point is inside, as far as this piece of a convex solid knows.
+    /// Returns `true` if a point is on the inner side of this piece of a convex solid.
     pub fn is_behind(&self, point: DVec3) -> bool {
         match self {
             Self::Sphere(center, radius) => point.distance(*center) <= *radius,
@@ -99,23 +100,27 @@ fn flat(point: DVec3, normal: DVec3, origin: DVec3, direction: DVec3) -> Meeting
     (speed != 0.0).then(|| (normal.dot(point - origin) / speed, normal))
 }
 
-/// A step of a transform.
+/// Affine map of a transform step.
 pub fn map(step: &TransformOp) -> DAffine3 {
-    let turn = |axis: DVec3, degrees: f64| {
+    let rotation = |axis: DVec3, degrees: f64| {
         DAffine3::from_axis_angle(axis.normalize(), degrees.to_radians())
     };
     match step {
         TransformOp::Translate(by) => DAffine3::from_translation(DVec3::from(*by)),
-        TransformOp::RotateX(degrees) => turn(DVec3::X, *degrees),
-        TransformOp::RotateY(degrees) => turn(DVec3::Y, *degrees),
-        TransformOp::RotateZ(degrees) => turn(DVec3::Z, *degrees),
-        TransformOp::Rotate(r) => turn(DVec3::from(r.axis), r.degrees),
+        TransformOp::RotateX(degrees) => rotation(DVec3::X, *degrees),
+        TransformOp::RotateY(degrees) => rotation(DVec3::Y, *degrees),
+        TransformOp::RotateZ(degrees) => rotation(DVec3::Z, *degrees),
+        TransformOp::Rotate(r) => rotation(DVec3::from(r.axis), r.degrees),
         TransformOp::Scale(s) => DAffine3::from_mat3(DMat3::from_diagonal(DVec3::from(s.0))),
     }
 }
 
-/// The pieces of a simple shape but a mesh; `Err`: a shape that this tracer does not know.
-#[allow(unreachable_patterns, reason = "kinds that this tracer does not know may be added")]
+/// Returns the pieces of a simple shape other than a mesh.
+///
+/// # Errors
+///
+/// Names a shape that this tracer does not support.
+#[allow(unreachable_patterns, reason = "kinds that this tracer does not support may be added")]
 pub fn pieces(shape: &Shape) -> Result<Vec<Piece>, String> {
     let v = |a: [f64; 3]| DVec3::from(a);
     let square = |side: f64| vec![[0.0, 0.0], [side, 0.0], [side, -side], [0.0, -side]];
@@ -165,7 +170,7 @@ pub fn pieces(shape: &Shape) -> Result<Vec<Piece>, String> {
     })
 }
 
-/// Both ends and the side of a solid around an axis.
+/// Ends and side of a solid of revolution.
 fn round(base: DVec3, top: DVec3, radii: [f64; 2]) -> Vec<Piece> {
     let axis = (top - base).normalize();
     vec![
@@ -175,9 +180,9 @@ fn round(base: DVec3, top: DVec3, radii: [f64; 2]) -> Vec<Piece> {
     ]
 }
 
-/// Base, top and sides of an upright solid whose base has these corners (x and z from `corner`); the
-/// top is `top` times as large. The base is turned counter-clockwise, seen from above, about its
-/// centroid.
+/// Base, top and sides of an upright solid. `base` has the corners as x and z relative to `corner`;
+/// the top is `top` times as large. The base is rotated about its centroid, counter-clockwise as
+/// seen from above.
 fn frustum(corner: DVec3, base: &[[f64; 2]], height: f64, top: f64, degrees: f64) -> Vec<Piece> {
     let base: Vec<DVec2> = base.iter().map(|b| DVec2::from(*b)).collect();
     let middle = base.iter().sum::<DVec2>() / base.len() as f64;

@@ -1,5 +1,5 @@
-//! What goes on behind surfaces that let light through, asked of points: which solid fills the space
-//! just before and just behind the surface?
+//! Transmission of the reference tracer. The media on both sides of a surface are found by point
+//! tests just in front of and just behind it.
 
 use crate::answers::reflect;
 use crate::common::Numbers;
@@ -8,19 +8,19 @@ use crate::tracer::{Hit, Mutation, Tracer};
 use glam::DVec3;
 use zerkalo::material::{Fresnel, Material};
 
-/// How far before and behind the surface points are asked.
+/// Distance of the tested points from the surface.
 const ASIDE: f64 = 1e-6;
 
-/// How a path goes on.
+/// Continuation of a path.
 pub enum Way {
-    /// There is no surface: another solid fills the space.
+    /// Unchanged direction: another solid fills the space, so that the surface has no effect.
     Straight,
-    /// Direction and factor of what is seen there; `None`: nothing is.
+    /// Direction and throughput; `None` if the path ends.
     On(Option<(DVec3, DVec3)>),
 }
 
-/// Shares of the light of both polarisations that are reflected, by the angles on both sides; `None` for
-/// the angle: everything is.
+/// Reflectance of both polarisations by the angles on both sides. The angle `t` is `None` for total
+/// internal reflection.
 fn polarised(i: f64, t: Option<f64>, n_i: f64, n_t: f64) -> [f64; 2] {
     let Some(t) = t else { return [1.0; 2] };
     if i < 1e-4 {
@@ -35,7 +35,8 @@ impl Tracer<'_> {
         if body.is_open() { None } else { materials.into_iter().find(|m| m.transmission > 0.0) }
     }
 
-    /// The solid listed last that holds `point`, and its index of refraction.
+    /// Index and index of refraction of the solid that fills the space at `point`: the one listed
+    /// last.
     fn medium(&self, point: DVec3) -> (Option<usize>, f64) {
         let bodies = self.bodies.iter().enumerate().rev();
         bodies
@@ -44,7 +45,7 @@ impl Tracer<'_> {
             .map_or((None, 1.0), |(i, _, material)| (Some(i), material.ior))
     }
 
-    /// From `hit`, whose material lets light through, one way by chance.
+    /// Chooses reflection or transmission at `hit`, whose material transmits, at random.
     pub fn through(&self, hit: &Hit, direction: DVec3, numbers: &mut Numbers) -> Way {
         let (material, n) = (hit.material, hit.seen);
         let open = self.bodies[hit.body].is_open();
@@ -72,7 +73,7 @@ impl Tracer<'_> {
         let dielectric = material.fresnel_mode() == Fresnel::Dielectric;
         let f = match (dielectric, open) {
             (true, false) => polarised(i, t, n_i, n_t).iter().sum::<f64>() / 2.0,
-            // Between the two sides of a pane the light goes to and fro.
+            // Sum over all internal reflections between the two sides of a pane.
             (true, true) => polarised(i, t, n_i, n_t).iter().map(|r| r / (1.0 + r)).sum(),
             (false, _) => 1.0,
         };
@@ -82,12 +83,13 @@ impl Tracer<'_> {
             _ => true,
         };
         let plain = Material { fresnel: None, ..material.clone() };
-        let own = if dielectric { &plain } else { material };
+        let reflecting = if dielectric { &plain } else { material };
         let horizon = self.scene.trace.below_horizon;
         let mirrored = if !dielectric && !open && t.is_none() {
             Some((direction - 2.0 * direction.dot(n) * n, DVec3::ONE))
         } else if mirrors && material.reflection > 0.0 {
-            reflect(own, n, -direction, horizon, self.mutation, numbers).map(|(d, k)| (d, k * f))
+            reflect(reflecting, n, -direction, horizon, self.mutation, numbers)
+                .map(|(d, k)| (d, k * f))
         } else {
             None
         };
@@ -101,7 +103,7 @@ impl Tracer<'_> {
         let p = r / (r + t);
         let (way, chance, side) =
             if numbers.unit() < p { (mirrored, p, 1.0) } else { (passed, 1.0 - p, -1.0) };
-        // Where bumps would send a ray to the wrong side it leaves as steeply on the right one.
+        // Directions on the wrong side because of bumps are mirrored to the right one.
         let to = side * hit.normal;
         Way::On(way.map(|(d, k)| (d - 2.0 * d.dot(to).min(0.0) * to, k / chance)))
     }

@@ -1,4 +1,4 @@
-//! A path tracer in plain double precision, one sample at a time, written to be read.
+//! Reference path tracer in double precision, one sample at a time, optimised for readability.
 
 use crate::answers::{highlight, reflect};
 use crate::common::Numbers;
@@ -14,26 +14,26 @@ use zerkalo::light::{Falloff, Light};
 use zerkalo::material::Material;
 use zerkalo::scene::{Filter, RayTypes, Scene};
 
-/// A deliberate error, to see that the comparison finds it.
+/// Deliberate error that the comparison has to detect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mutation {
     /// No error.
     None,
     /// Lobes are 5 % wider.
     WiderLobe,
-    /// Lobes believe to be 5 % more dense than they are.
+    /// Lobe densities are overestimated by 5 %.
     LobeDensity,
-    /// Shadow rays begin 1e-3 of a scene unit too far along the light's direction.
+    /// Shadow rays start 1e-3 scene units too far towards the light.
     ShadowOffset,
-    /// Lobes that dip under the surface are lost.
+    /// Lobe directions below the horizon are absorbed.
     Absorb,
-    /// The first light's cosine is left out.
+    /// The cosine of the first light is omitted.
     NoCosine,
-    /// Light that enters a solid goes straight on.
+    /// Light that enters a solid is not refracted.
     NoBending,
-    /// Textures take u for v.
+    /// Texture coordinates u and v are exchanged.
     SidewaysTexture,
-    /// Bumps go down where they should go up.
+    /// Bump heights are negated.
     SunkenBumps,
 }
 
@@ -41,7 +41,7 @@ pub enum Mutation {
 pub struct Tracer<'a> {
     pub scene: &'a Scene,
     pub bodies: Vec<Body>,
-    /// By the names of their files.
+    /// Images by file name.
     pub images: HashMap<String, Pixels>,
     plain: Material,
     pub mutation: Mutation,
@@ -56,23 +56,25 @@ pub struct Estimate {
 
 pub struct Hit<'a> {
     pub point: DVec3,
-    /// On the viewer's side.
+    /// Geometric normal on the viewer's side.
     pub normal: DVec3,
-    /// The one that light sees: another on smooth meshes and under bumps.
+    /// Shading normal: differs on smooth meshes and bump maps.
     pub seen: DVec3,
-    /// Colour of its own.
+    /// Vertex colour times texture.
     pub tint: DVec3,
     pub material: &'a Material,
-    /// Number of the body.
+    /// Index of the body.
     pub body: usize,
-    /// Its outside or front.
+    /// `true` on the outside or front.
     pub front: bool,
-    /// The back of something that has no finish there.
+    /// `true` on the back of a one-sided surface.
     pub bare: bool,
 }
 
 impl<'a> Tracer<'a> {
-    /// `Err`: there is something in the scene that this tracer does not know.
+    /// # Errors
+    ///
+    /// Names a feature of the scene that this tracer does not support.
     pub fn new(scene: &'a Scene, mutation: Mutation) -> Result<Self, String> {
         let bodies = scene.objects.iter().map(Body::new).collect::<Result<Vec<_>, _>>()?;
         let images = HashMap::new();
@@ -89,12 +91,12 @@ impl<'a> Tracer<'a> {
         Ok(tracer)
     }
 
-    /// Whether it asks every triangle of a mesh, which takes long.
+    /// Returns `true` if the scene has meshes, whose triangles are tested one by one.
     pub fn is_slow(&self) -> bool {
         self.bodies.iter().any(Body::is_mesh)
     }
 
-    /// `samples` samples of the pixel `x`, `y`.
+    /// Estimates the pixel `x`, `y` from `samples` samples.
     pub fn pixel(&self, x: u32, y: u32, samples: u32, numbers: &mut Numbers) -> Estimate {
         let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
         for _ in 0..samples {
@@ -155,7 +157,7 @@ impl<'a> Tracer<'a> {
                 numbers,
             );
             let Some((mut next, factor)) = turned else { return radiance };
-            // What would go into the surface goes as steeply out of it.
+            // Directions into the surface are mirrored out of it.
             next -= 2.0 * next.dot(hit.normal).min(0.0) * hit.normal;
             weight *= factor;
             if weight.max_element() <= 0.0 || weight.max_element() < trace.min_throughput {
@@ -166,7 +168,7 @@ impl<'a> Tracer<'a> {
         unreachable!("the depth ends every path");
     }
 
-    /// Through the point `x`, `y` of the raster, in pixels from the upper left corner.
+    /// Ray through the point `x`, `y` of the raster, in pixels from the upper left corner.
     fn camera_ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
         let camera = &self.scene.camera;
         let eye = DVec3::from(camera.eye);
@@ -188,7 +190,7 @@ impl<'a> Tracer<'a> {
         (eye + toward * camera.near, toward.normalize())
     }
 
-    /// Rounding moves a point by less than this times the size of its coordinates.
+    /// Smallest distance of hits from the origin, more than the rounding of its coordinates.
     fn clearance(origin: DVec3) -> f64 {
         1e-10 * (1.0 + origin.abs().max_element())
     }
@@ -227,7 +229,7 @@ impl<'a> Tracer<'a> {
         self.scene.materials.get(name).unwrap_or(&self.plain)
     }
 
-    /// Ambient light and every lamp.
+    /// Ambient light and direct light of all lights.
     fn shade(&self, hit: &Hit, view: DVec3) -> DVec3 {
         let m = hit.material;
         let color = DVec3::from(m.color.0) * hit.tint;
@@ -276,7 +278,7 @@ fn arrival(light: &Light, point: DVec3) -> (DVec3, f64, DVec3) {
     ((position - point) / distance, distance, irradiance)
 }
 
-/// What this tracer reads of a material.
+/// Material keys that this tracer supports.
 const KNOWN: [&str; 19] = [
     "color",
     "ambient",
@@ -299,7 +301,7 @@ const KNOWN: [&str; 19] = [
     "bump",
 ];
 
-/// `Err`: the material says something that this tracer does not read.
+/// Returns an error if the material has a key that this tracer does not support.
 fn unknown_keys(material: &Material) -> Result<(), String> {
     let table = |m: &Material| toml::Table::try_from(m).expect("materials are tables");
     let plain = table(&Material::default());

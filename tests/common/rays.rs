@@ -120,8 +120,8 @@ impl Traced {
     pub fn new(scene: &Scene, precision: Precision) -> Self {
         let world = AnyWorld::compile(scene, &Options { precision });
         let eye = match &world {
-            AnyWorld::Single(w) => w.view().eye(),
-            AnyWorld::Double(w) => w.view().eye(),
+            AnyWorld::Single(w) => w.camera().eye(),
+            AnyWorld::Double(w) => w.camera().eye(),
         };
         let weights = world.mix(scene);
         Self { world, weights, origin: DVec3::from(scene.camera.eye) - eye }

@@ -126,7 +126,8 @@ pub fn trace<L: SimdFloat>(
     let draws = points.for_pixel(sampler.key(pixel, replicate));
     let half = L::from_f64(0.5);
     let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
-    let rays = world.view().rays(Vec3::splat(world.view().pixel_corner_direction(pixel)), jitter);
+    let rays =
+        world.camera().rays(Vec3::splat(world.camera().pixel_corner_direction(pixel)), jitter);
     let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
     let all = L::mask(true);
     assert!(all.all());

@@ -1,4 +1,4 @@
-//! Every way of acceleration gives the same film, byte by byte.
+//! Acceleration structures render identical films, byte for byte.
 
 use crate::driver::{Verdict, compare, compare_many};
 use crate::support::{accelerated, picture};
@@ -6,15 +6,15 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::{Acceleration, Scene};
 use zerkalo::world::Precision;
 
-/// Samples of a pixel and replicate: not a multiple of a packet.
+/// Samples per pixel and replicate; not a multiple of the packet width.
 const SAMPLES: u32 = 3;
 
 fn same_bytes(scene: &Scene) -> Verdict {
     for precision in [Precision::Single, Precision::Double] {
-        let film = |by| accelerated(scene, by, precision, SAMPLES);
+        let film = |acceleration| accelerated(scene, acceleration, precision, SAMPLES);
         let wanted = film(Acceleration::None);
-        for by in Acceleration::ALL {
-            let found = film(by);
+        for acceleration in Acceleration::ALL {
+            let found = film(acceleration);
             if found.film.bytes() == wanted.film.bytes() {
                 continue;
             }
@@ -26,7 +26,7 @@ fn same_bytes(scene: &Scene) -> Verdict {
             return Verdict::Different(format!(
                 "{precision:?}: {} differs from none in {} of {} pixels; the first, none, {0}: \
                  {first:?}",
-                by.name(),
+                acceleration.name(),
                 differ.len(),
                 wanted.len(),
             ));
@@ -41,7 +41,7 @@ fn accelerations() {
 }
 
 #[test]
-#[ignore = "as many scenes as the environment asks for"]
+#[ignore = "long: ZERKALO_SCENES scenes"]
 fn many_accelerations() {
     compare_many("accelerations", same_bytes);
 }

@@ -1,4 +1,4 @@
-//! Compares scene after scene, and keeps those that fail.
+//! Test driver: compares scenes, and writes and shrinks those that fail.
 
 use crate::scene::{Random, scene};
 use crate::shrink::shrunk;
@@ -10,17 +10,17 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use zerkalo::scene::Scene;
 
-/// What a comparison found.
+/// Result of a comparison.
 pub enum Verdict {
     /// The pictures agree.
     Same,
-    /// There is nothing to compare, for this reason.
+    /// The scene cannot be compared, for this reason.
     Skipped(&'static str),
-    /// What differs.
+    /// The pictures differ in this respect.
     Different(String),
 }
 
-/// A comparison of a scene's pictures.
+/// Comparison of a scene's pictures.
 pub type Check = fn(&Scene) -> Verdict;
 
 fn number(name: &str, default: u64) -> u64 {
@@ -29,27 +29,27 @@ fn number(name: &str, default: u64) -> u64 {
     })
 }
 
-/// The seeds that the environment asks for.
+/// Seeds requested by `ZERKALO_FIRST` and `ZERKALO_SCENES`.
 pub fn many() -> Range<u64> {
     let first = number("ZERKALO_FIRST", 0);
     first..first + number("ZERKALO_SCENES", 200)
 }
 
-/// What is wrong by this check, a panic included.
+/// Runs a check and returns its difference or panic, if any.
 fn failure(text: &str, check: Check) -> Option<String> {
     match catch_unwind(AssertUnwindSafe(|| check(&parsed(text)))) {
         Ok(Verdict::Different(what)) => Some(what),
         Ok(_) => None,
-        Err(panic) => Some(format!("panic: {}", words(panic.as_ref()))),
+        Err(panic) => Some(format!("panic: {}", panic_message(panic.as_ref()))),
     }
 }
 
-fn words(panic: &(dyn std::any::Any + Send)) -> String {
+fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().cloned();
     text.or_else(|| panic.downcast_ref::<&str>().map(|t| t.to_string())).unwrap_or_default()
 }
 
-/// Compares the scenes of `seeds`; `name` is that of the comparison.
+/// Compares the scenes of `seeds`. `name` is the name of the test.
 pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
     let (mut wrong, mut skipped) = (Vec::new(), BTreeMap::<&str, u32>::new());
     let mut count = 0;
@@ -66,7 +66,7 @@ pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
                 continue;
             }
             Ok(Verdict::Different(what)) => what,
-            Err(panic) => format!("panic: {}", words(panic.as_ref())),
+            Err(panic) => format!("panic: {}", panic_message(panic.as_ref())),
         };
         let seconds = number("ZERKALO_SHRINK", 10);
         let small = shrunk(&text, seconds, &|text| failure(text, check).is_some());
@@ -84,14 +84,14 @@ pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
     assert!(wrong.is_empty(), "{} of {count} scenes differ:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// As [`compare`], with the seeds that the environment asks for.
+/// Compares the scenes of [`many`] seeds.
 pub fn compare_many(name: &str, check: Check) {
     compare(name, many(), check);
 }
 
-/// Writes the scenes as files, to be looked at.
+/// Writes the scenes to files for inspection.
 #[test]
-#[ignore = "writes the scenes that the environment asks for to target/tmp/random_scenes"]
+#[ignore = "writes the scenes of the requested seeds to target/tmp/random_scenes"]
 fn write_scenes() {
     let folder = folder();
     for seed in many() {
@@ -101,7 +101,7 @@ fn write_scenes() {
     println!("{}", folder.display());
 }
 
-/// The folder for scenes, with the files that they name from the folder of the package.
+/// Creates the folder for scenes, with copies of the files to which scenes refer.
 fn folder() -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("random_scenes");
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -116,7 +116,7 @@ fn folder() -> PathBuf {
     folder
 }
 
-/// Writes the scene and what is left of it when it is made smaller; returns the path of the latter.
+/// Writes the scene and its reduced form, and returns the path of the latter.
 fn keep(name: &str, seed: u64, what: &str, text: &str, last: &str, small: &str) -> PathBuf {
     let folder = folder();
     let comment = |what: &str| what.lines().map(|line| format!("# {line}\n")).collect::<String>();

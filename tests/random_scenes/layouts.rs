@@ -1,30 +1,30 @@
-//! Where the things of a random scene stand.
+//! Arrangement of the objects of a random scene.
 
 use crate::common::Numbers;
-use crate::things::{Finish, Stock, combined, named, object, resolved};
+use crate::objects::{Finish, Stock, combined, named, object, resolved};
 use crate::words::{chance, log, pick};
 use glam::DVec3;
 use zerkalo::scene::{Object, Scale, TransformOp};
 use zerkalo::shape::Shape;
 
-/// What a random scene is about.
+/// Kind of arrangement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Layout {
-    /// Things that touch: on a floor, side by side, on top of each other.
+    /// Objects in contact: on a floor, side by side, on top of each other.
     Contact,
-    /// Things of all sizes anywhere, few or hundreds.
+    /// Objects of all sizes anywhere, from few to hundreds.
     Crowd,
-    /// Compounds in compounds, with materials of their own.
+    /// Nested compounds whose parts have different materials.
     Compounds,
     /// Glass in glass, panes, bubbles.
     Glass,
-    /// Mirrors that face each other, and things between them.
+    /// Facing mirrors with objects between them.
     Mirrors,
-    /// A picture that is mostly empty: stars, hairlines, a distant crowd, a distant chessboard.
+    /// Mostly empty picture: stars, hairlines, a distant crowd, a distant chessboard.
     Sparse,
-    /// Flat things in one plane.
+    /// Flat objects in one plane.
     Flat,
-    /// Places and sizes from 1e-6 to 1e6.
+    /// Positions and sizes from 1e-6 to 1e6.
     Wild,
 }
 
@@ -40,7 +40,7 @@ impl Layout {
         Self::Wild,
     ];
 
-    /// The purposes of its materials.
+    /// Kinds of its materials.
     pub fn finishes(self) -> &'static [Finish] {
         use Finish::{Any, Glass, Glowing, Mirror};
         match self {
@@ -53,7 +53,7 @@ impl Layout {
         }
     }
 
-    /// The things, around the origin; most are within a distance of 4.
+    /// Draws the objects around the origin, most of them within a distance of 4.
     pub fn objects(self, numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
         match self {
             Self::Contact => contact(numbers, stock),
@@ -77,7 +77,7 @@ fn untransformed(mut object: Object) -> Object {
     object
 }
 
-/// A floor at y = 0, of one kind or another.
+/// Floor at y = 0: plane, platform, box or cylinder.
 fn floor(numbers: &mut Numbers, stock: &Stock) -> Object {
     let (key, base, size) = match numbers.below(4) {
         0 => ("plane", DVec3::ZERO, DVec3::ONE),
@@ -90,34 +90,34 @@ fn floor(numbers: &mut Numbers, stock: &Stock) -> Object {
     object
 }
 
-/// Things in cells of edge 1 side by side, in two storeys, no two in the same.
+/// Objects in adjacent cells of edge 1 in two storeys, at most one in a cell.
 fn contact(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let mut all = vec![floor(numbers, stock)];
     let mut cells: Vec<DVec3> = Vec::new();
     for _ in 0..3 + numbers.below(6) {
         let mut cell = |n: usize| numbers.below(n) as f64;
         let base = DVec3::new(cell(3) - 1.0, if cell(4) == 0.0 { 1.0 } else { 0.0 }, cell(3) - 1.0);
-        let thing = object(numbers, stock, base, DVec3::ONE);
-        if !cells.contains(&base) && resolved(&thing).form().bounds().is_some() {
+        let candidate = object(numbers, stock, base, DVec3::ONE);
+        if !cells.contains(&base) && resolved(&candidate).form().bounds().is_some() {
             cells.push(base);
-            all.push(thing);
+            all.push(candidate);
         }
     }
     if chance(numbers, 1, 2) {
-        let at = numbers.below(all.len());
-        all.rotate_left(at);
+        let shift = numbers.below(all.len());
+        all.rotate_left(shift);
     }
     all
 }
 
 fn crowd(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let count = pick(numbers, &[3, 8, 20, 60, 130, 250]);
-    let thing = |_| {
+    let random_object = |_| {
         let size = log(numbers, 0.1, 2.5);
         let base = somewhere(numbers, 4.0);
         object(numbers, stock, base, DVec3::splat(size))
     };
-    (0..count).map(thing).collect()
+    (0..count).map(random_object).collect()
 }
 
 fn compounds(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
@@ -137,7 +137,7 @@ fn compounds(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     all
 }
 
-/// Solids around each other, and panes.
+/// Nested solids, and panes.
 fn glass(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let mut all = vec![floor(numbers, stock)];
     for _ in 0..1 + numbers.below(3) {
@@ -151,7 +151,7 @@ fn glass(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     all
 }
 
-/// Mirrors left and right of what stands between them.
+/// Mirrors on both sides, and objects between them.
 fn mirrors(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let mut all = vec![floor(numbers, stock)];
     for side in [-1.0, 1.0] {
@@ -170,7 +170,7 @@ fn mirrors(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
 fn sparse(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let count = pick(numbers, &[2, 10, 40, 150]);
     let way = numbers.below(4);
-    let thing = |_| {
+    let random_object = |_| {
         let base = somewhere(numbers, 3.5);
         match way {
             // Stars and hairlines.
@@ -188,13 +188,13 @@ fn sparse(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
             }
         }
     };
-    (0..if way == 3 { 1 } else { count }).map(thing).collect()
+    (0..if way == 3 { 1 } else { count }).map(random_object).collect()
 }
 
-/// Flat things and flat sides in the plane y = 0, from both sides.
+/// Flat objects and flat faces in the plane y = 0, from both sides.
 fn flat(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let count = 2 + numbers.below(4);
-    let thing = |_| {
+    let random_object = |_| {
         let base = DVec3::new(numbers.between(-1.5, 1.5), 0.0, numbers.between(-1.5, 1.5));
         let size = DVec3::splat(pick(numbers, &[1.0, 2.0]));
         let key = pick(numbers, &["platform", "plane", "box", "mesh", "mesh", "cylinder", "cube"]);
@@ -205,10 +205,10 @@ fn flat(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
         }
         object
     };
-    (0..count).map(thing).collect()
+    (0..count).map(random_object).collect()
 }
 
-/// From 1e-6 to 1e6, every power of ten as often.
+/// Log-uniform positions and sizes from 1e-6 to 1e6.
 fn wild(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let mut all = Vec::new();
     for _ in 0..1 + numbers.below(6) {

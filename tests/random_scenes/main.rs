@@ -1,11 +1,11 @@
 //! Random scenes of all kinds, each rendered in several ways that must agree.
 //!
-//! The tests without `#[ignore]` compare the same few scenes each time. Those with it, named `many`, compare
-//! `ZERKALO_SCENES` scenes (200) from the seed `ZERKALO_FIRST` (0) on; `ZERKALO_SEED` has any test compare the
-//! scene of that seed alone. CONTRIBUTING.md has examples.
+//! Tests without `#[ignore]` compare a fixed, small set of scenes. Ignored tests, named `many_*`,
+//! compare `ZERKALO_SCENES` scenes (default 200) from the seed `ZERKALO_FIRST` (default 0) on. With
+//! `ZERKALO_SEED` every test compares the scene of that seed only. CONTRIBUTING.md has examples.
 //!
-//! A scene that differs is written to target/tmp/random_scenes as it was drawn and made as small as still differs
-//! within `ZERKALO_SHRINK` seconds (10).
+//! A scene that differs is written to target/tmp/random_scenes, as drawn and as reduced within
+//! `ZERKALO_SHRINK` seconds (default 10) to the smallest scene that still differs.
 
 mod accelerations;
 #[path = "../common/mod.rs"]
@@ -15,6 +15,7 @@ mod gaps;
 mod layouts;
 #[path = "../common/normal.rs"]
 mod normal;
+mod objects;
 mod precisions;
 mod samples;
 mod scene;
@@ -23,6 +24,5 @@ mod soundness;
 mod statistics;
 #[path = "../support/mod.rs"]
 mod support;
-mod things;
 mod threads;
 mod words;

@@ -1,4 +1,4 @@
-//! Where `auto` takes single precision it shows what double precision shows.
+//! Single precision, where `auto` selects it, against double precision.
 
 use crate::driver::{Verdict, compare, compare_many};
 use crate::statistics::{Worst, blocks, mean_and_error, mean_of};
@@ -8,13 +8,13 @@ use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 const SEEDS: u64 = 8;
-/// Samples of a pixel and replicate.
+/// Samples per pixel and replicate.
 const SAMPLES: u32 = 4;
-/// What single precision may get wrong in the mean of a block, in codes: docs/accuracy.md measures 0.12 over a picture
-/// at the worst proportions that `auto` leaves to it.
+/// Allowed error of single precision in the mean of a block \[8-bit levels\]. docs/accuracy.md
+/// measures 0.12 over a picture at the worst proportions for which `auto` selects it.
 const FLOOR: f64 = 0.5;
 
-/// The codes of every pixel, for each seed.
+/// Display values of every pixel, for each seed \[8-bit levels\].
 pub fn codes(scene: &Scene, precision: Precision, samples: u32) -> Vec<Vec<[f64; 3]>> {
     let display = Display::default();
     (0..SEEDS)
@@ -28,7 +28,7 @@ pub fn codes(scene: &Scene, precision: Precision, samples: u32) -> Vec<Vec<[f64;
         .collect()
 }
 
-/// The blocks of two sets of pictures, of which those of one seed have the same samples.
+/// Compares block means of two sets of pictures. Pictures of one seed have the same samples.
 pub fn paired(
     size: [u32; 2],
     names: [&str; 2],
@@ -46,13 +46,14 @@ pub fn paired(
             let differences: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a[c] - b[c]).collect();
             let (mean, error) = mean_and_error(&differences);
             worst.note(mean, floor, error, || {
-                let of = |v: &[[f64; 3]]| v.iter().map(|m| m[c]).sum::<f64>() / v.len() as f64;
+                let mean_of_channel =
+                    |v: &[[f64; 3]]| v.iter().map(|m| m[c]).sum::<f64>() / v.len() as f64;
                 let [first, second] = names;
                 format!(
-                    "block {i} of {}, channel {c}: {first} {:.2}, {second} {:.2} codes",
+                    "block {i} of {}, channel {c}: {first} {:.2}, {second} {:.2} 8-bit levels",
                     blocks.len(),
-                    of(&a),
-                    of(&b)
+                    mean_of_channel(&a),
+                    mean_of_channel(&b)
                 )
             });
         }
@@ -62,10 +63,10 @@ pub fn paired(
 
 fn single_is_double(scene: &Scene) -> Verdict {
     let mut scene = scene.clone();
-    // A sample at a pixel's centre may lie exactly on an edge.
+    // The centre of a pixel may be exactly on an edge.
     scene.film.filter = Filter::Box;
     if let AnyWorld::Double(_) = AnyWorld::compile(&scene, &Options::default()) {
-        return Verdict::Skipped("auto takes double precision");
+        return Verdict::Skipped("auto selects double precision");
     }
     let [single, double] =
         [Precision::Single, Precision::Double].map(|p| codes(&scene, p, SAMPLES));
@@ -78,7 +79,7 @@ fn precisions() {
 }
 
 #[test]
-#[ignore = "as many scenes as the environment asks for"]
+#[ignore = "long: ZERKALO_SCENES scenes"]
 fn many_precisions() {
     compare_many("precisions", single_is_double);
 }

@@ -1,9 +1,9 @@
-//! Random scenes: what stands where, who looks at it, what lights it.
+//! Random scenes: objects, camera, lights and settings.
 
 use crate::common::Numbers;
 use crate::layouts::Layout;
-use crate::things::{Stock, material, resolved, resolver};
-use crate::words::{Own, chance, direction, log, pick, table};
+use crate::objects::{Stock, library, material, resolved};
+use crate::words::{KeyValue, chance, direction, log, pick, table};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -20,15 +20,15 @@ use zerkalo::value::{Color, Field};
 /// A random scene.
 pub struct Random {
     pub layout: Layout,
-    /// As it is written in a file.
+    /// Text of the scene file.
     pub text: String,
 }
 
-/// Points of a scene at which programs of this kind fail.
+/// Points at which renderers often fail.
 struct Spots {
-    /// On surfaces, exactly or to a rounding.
+    /// Points on surfaces, exact up to rounding.
     on: Vec<DVec3>,
-    /// Inside of things.
+    /// Points inside of objects.
     inside: Vec<DVec3>,
     middle: DVec3,
     radius: f64,
@@ -63,8 +63,8 @@ fn on_surface(numbers: &mut Numbers, form: &Form) -> DVec3 {
         Form::ConvexPolyhedron { faces, corners } => {
             let face = &faces[numbers.below(faces.len())];
             let near = |c: &&DVec3| (face.normal.dot(**c) - face.offset).abs() < 1e-9 * c.length();
-            let of_face: Vec<_> = corners.iter().filter(near).collect();
-            of_face.iter().copied().sum::<DVec3>() / of_face.len().max(1) as f64
+            let face_corners: Vec<_> = corners.iter().filter(near).collect();
+            face_corners.iter().copied().sum::<DVec3>() / face_corners.len().max(1) as f64
         }
         other => match other.bounds() {
             Some((low, high)) => DVec3::new(0.5 * (low.x + high.x), high.y, 0.5 * (low.z + high.z)),
@@ -73,7 +73,7 @@ fn on_surface(numbers: &mut Numbers, form: &Form) -> DVec3 {
     }
 }
 
-/// The scene of a seed; `None`: what was drawn has faults, such as things too small for their place.
+/// Draws a scene; `None` if it has validation errors, such as objects too small for their position.
 fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
     let finishes = layout.finishes();
     let materials: BTreeMap<String, _> = (0..2 + numbers.below(4))
@@ -91,7 +91,7 @@ fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
         lights: lights(numbers, &spots, layout),
         materials,
         objects,
-        resolver: resolver(),
+        resolver: library(),
         ..Scene::default()
     };
     if chance(numbers, 1, 4) {
@@ -108,14 +108,14 @@ fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
     }
     scene.resolve();
     if !scene.faults().is_empty() {
-        // A texture that a shape has no coordinates for.
+        // A shape may lack the texture coordinates of its texture.
         scene.materials.values_mut().for_each(|m| (m.texture, m.bump) = (None, None));
     }
     scene.faults().is_empty().then_some(scene)
 }
 
 fn film_size(numbers: &mut Numbers, layout: Layout) -> [u32; 2] {
-    // Sparse pictures have tiles enough for some to be empty.
+    // Sparse pictures have so many tiles that some are empty.
     const LARGE: [[u32; 2]; 4] = [[96, 80], [128, 64], [160, 128], [40, 30]];
     const USUAL: [[u32; 2]; 5] = [[64, 48], [40, 30], [48, 36], [33, 17], [20, 20]];
     const NARROW: [[u32; 2]; 5] = [[1, 1], [1, 1000], [1000, 1], [3, 70], [90, 2]];
@@ -127,7 +127,7 @@ fn film_size(numbers: &mut Numbers, layout: Layout) -> [u32; 2] {
 }
 
 fn trace(numbers: &mut Numbers) -> IntegratorSettings {
-    let own: Own = &|numbers: &mut Numbers, field: &Field| match field.name {
+    let key_value: KeyValue = &|numbers: &mut Numbers, field: &Field| match field.name {
         "ray_types" => Some(Value::String(
             pick(numbers, &["full", "full", "full", "full", "shadows", "primary"]).to_string(),
         )),
@@ -135,7 +135,7 @@ fn trace(numbers: &mut Numbers) -> IntegratorSettings {
         "min_throughput" => Some(Value::Float(pick(numbers, &[0.0, 0.01, 0.1]))),
         _ => None,
     };
-    let keys: Table = table(numbers, TRACE_FIELDS, 0.5, own);
+    let keys: Table = table(numbers, TRACE_FIELDS, 0.5, key_value);
     let mut trace: IntegratorSettings = keys.try_into().expect("keys of the table");
     trace.acceleration = Acceleration::Auto;
     trace
@@ -174,7 +174,7 @@ fn camera(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Camera {
             around(numbers, distance)
         }
     };
-    // From a thing's surface or inside of it the rest may lie anywhere.
+    // A camera on a surface or inside of an object may look anywhere.
     let look = if way < 2 && chance(numbers, 1, 2) { direction(numbers) } else { target - eye };
     let look = if look == DVec3::ZERO { DVec3::NEG_Z } else { look };
     let ups = [DVec3::Y, DVec3::Y, DVec3::Z, DVec3::new(0.3, 0.9, 0.2)];
@@ -229,18 +229,18 @@ fn lights(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Vec<Light> {
     (0..count).map(light).collect()
 }
 
-/// Scales and shifts the whole scene, sometimes.
+/// Scales and translates some scenes as a whole.
 fn displace(numbers: &mut Numbers, scene: &mut Scene) {
     let scale = match numbers.below(3) {
         0 => log(numbers, 1e-4, 1e4),
         _ => 1.0,
     };
-    let reach = if chance(numbers, 1, 2) { 1e5 } else { 10.0 };
+    let max_shift = if chance(numbers, 1, 2) { 1e5 } else { 10.0 };
     let shift = match numbers.below(3) {
-        0 => numbers.in_cube(reach) * scale.max(1e-2),
+        0 => numbers.in_cube(max_shift) * scale.max(1e-2),
         _ => DVec3::ZERO,
     };
-    let moved = |at: [f64; 3]| (DVec3::from_array(at) * scale + shift).to_array();
+    let moved = |point: [f64; 3]| (DVec3::from_array(point) * scale + shift).to_array();
     let mut extra = Vec::new();
     if scale != 1.0 {
         extra.push(TransformOp::Scale(Scale([scale; 3])));
@@ -261,13 +261,13 @@ fn displace(numbers: &mut Numbers, scene: &mut Scene) {
     }
 }
 
-/// The seeds of the scenes of a layout with these numbers.
-pub fn of(layout: Layout, numbers: Range<u64>) -> impl Iterator<Item = u64> {
-    let place = Layout::ALL.iter().position(|l| *l == layout).expect("a layout");
-    numbers.map(move |i| i * Layout::ALL.len() as u64 + place as u64)
+/// Seeds of the scenes of one layout with the given numbers.
+pub fn seeds_of(layout: Layout, numbers: Range<u64>) -> impl Iterator<Item = u64> {
+    let index = Layout::ALL.iter().position(|l| *l == layout).expect("a layout");
+    numbers.map(move |i| i * Layout::ALL.len() as u64 + index as u64)
 }
 
-/// The scene of a seed. Seeds that follow each other go through all layouts.
+/// Scene of a seed. Consecutive seeds cycle through all layouts.
 pub fn scene(seed: u64) -> Random {
     let layout = Layout::ALL[seed as usize % Layout::ALL.len()];
     let mut numbers = Numbers::new(seed ^ 0x5ce4_e000_0000_0000);

@@ -1,28 +1,28 @@
-//! A scene that fails made smaller, by its text alone: keys and list entries removed, numbers made round, as long
-//! as it is a scene and still fails.
+//! Reduction of failing scenes: removes keys and list entries and rounds numbers in the text, as
+//! long as it is a valid scene that fails.
 
 use std::time::{Duration, Instant};
 use toml::{Table, Value};
 use zerkalo::scene::Scene;
 
-/// A key or a place in a list.
+/// Step of a path: a key or an index in a list.
 #[derive(Clone)]
-enum Place {
+enum Step {
     Key(String),
-    At(usize),
+    Index(usize),
 }
 
-type Path = Vec<Place>;
+type Path = Vec<Step>;
 
-/// What is done at a place.
+/// Change of the value at a path.
 enum Change {
     Remove,
-    /// Instead of a compound the shape of its part with this number.
+    /// Replaces a compound by the shape of the part with this index.
     Part(usize),
     Set(Value),
 }
 
-/// The smallest text that was found in so many seconds and of which `fails` is true, as it is of `text`.
+/// Returns the smallest failing text found within `seconds`.
 pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> String {
     let end = Instant::now() + Duration::from_secs(seconds);
     let mut best: Table = text.parse().expect("a scene");
@@ -31,8 +31,8 @@ pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> String 
     let mut changed = true;
     while changed {
         changed = false;
-        // The largest first: whole objects, then what they are made of; of a list the last entry first, so that the
-        // places before it stay what they are.
+        // Large values first: objects before their keys. Last list entries first, so that the
+        // indices of the others stay valid.
         let mut places = Vec::new();
         walk(&Value::Table(best.clone()), &mut Vec::new(), &mut places);
         places.reverse();
@@ -47,7 +47,7 @@ pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> String 
             }
             let Value::Table(candidate) = candidate else { continue };
             let text = written(&candidate);
-            // Without its size a picture has the preset one, which is larger.
+            // A scene without a size would have the preset one, which is larger.
             let small = |scene: Scene| scene.film.size.iter().product::<u32>() <= pixels;
             let sound = candidate != best && Scene::parse(&text, "test").is_ok_and(small);
             if sound && fails(&text) {
@@ -67,18 +67,18 @@ fn walk(value: &Value, path: &mut Path, out: &mut Vec<(Path, Change)>) {
     match value {
         Value::Table(table) => {
             for (key, inner) in table {
-                path.push(Place::Key(key.clone()));
+                path.push(Step::Key(key.clone()));
                 walk(inner, path, out);
                 out.push((path.clone(), Change::Remove));
-                if let Some(of) = inner.get("of").and_then(Value::as_array) {
-                    out.extend((0..of.len()).map(|i| (path.clone(), Change::Part(i))));
+                if let Some(parts) = inner.get("of").and_then(Value::as_array) {
+                    out.extend((0..parts.len()).map(|i| (path.clone(), Change::Part(i))));
                 }
                 path.pop();
             }
         }
         Value::Array(list) => {
             for (i, inner) in list.iter().enumerate() {
-                path.push(Place::At(i));
+                path.push(Step::Index(i));
                 walk(inner, path, out);
                 out.push((path.clone(), Change::Remove));
                 path.pop();
@@ -101,30 +101,30 @@ fn walk(value: &Value, path: &mut Path, out: &mut Vec<(Path, Change)>) {
     }
 }
 
-fn inner<'a>(value: &'a mut Value, place: &Place) -> Option<&'a mut Value> {
-    match place {
-        Place::Key(key) => value.get_mut(key.as_str()),
-        Place::At(i) => value.get_mut(*i),
+fn inner<'a>(value: &'a mut Value, step: &Step) -> Option<&'a mut Value> {
+    match step {
+        Step::Key(key) => value.get_mut(key.as_str()),
+        Step::Index(i) => value.get_mut(*i),
     }
 }
 
-/// `None`: there is no such place any more.
-fn apply(value: &mut Value, path: &[Place], change: &Change) -> Option<()> {
+/// Applies a change; `None` if the path does not exist any more.
+fn apply(value: &mut Value, path: &[Step], change: &Change) -> Option<()> {
     let (last, above) = path.split_last()?;
     let holder = above.iter().try_fold(value, inner)?;
     match (change, holder, last) {
-        (Change::Remove, Value::Table(table), Place::Key(key)) => drop(table.remove(key)?),
-        (Change::Remove, Value::Array(list), Place::At(i)) if *i < list.len() => {
+        (Change::Remove, Value::Table(table), Step::Key(key)) => drop(table.remove(key)?),
+        (Change::Remove, Value::Array(list), Step::Index(i)) if *i < list.len() => {
             list.remove(*i);
         }
         (Change::Set(new), holder, last) => {
-            let at = inner(holder, last)?;
-            if at.as_float().is_some() != new.as_float().is_some() {
+            let target = inner(holder, last)?;
+            if target.as_float().is_some() != new.as_float().is_some() {
                 return None;
             }
-            *at = new.clone();
+            *target = new.clone();
         }
-        (Change::Part(i), Value::Table(table), Place::Key(key)) => {
+        (Change::Part(i), Value::Table(table), Step::Key(key)) => {
             let part = table.get(key)?.get("of")?.get(*i)?.get("shape")?.as_table()?.clone();
             *table = part;
         }

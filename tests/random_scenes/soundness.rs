@@ -1,9 +1,9 @@
-//! No panic, no sample that is no light, a noise that is a number; and where nothing is left to chance both
-//! replicates are the same.
+//! Soundness: no panic, no invalid sample, finite noise; equal replicates in scenes without random
+//! choices.
 
 use crate::driver::{Verdict, compare, compare_many};
 use crate::layouts::Layout;
-use crate::scene::of;
+use crate::scene::seeds_of;
 use crate::support::{parsed, picture, pool, rendered, uniform, without_chance};
 use zerkalo::film::{Display, Replicates};
 use zerkalo::scene::Scene;
@@ -14,7 +14,7 @@ const SAMPLES: u32 = 4;
 fn sound(scene: &Scene) -> Verdict {
     for precision in [Precision::Auto, Precision::Double] {
         let mut rendering = rendered(scene, 1, precision, SAMPLES);
-        // Packets of many pixels and, from here on, of one.
+        // The samples before are traced in packets of many pixels, these in packets of one.
         uniform(&mut rendering, 8, 8, &pool(2));
         let bad = rendering.film.bad_samples();
         if bad.count > 0 {
@@ -25,20 +25,22 @@ fn sound(scene: &Scene) -> Verdict {
         }
         let parts =
             [Replicates::A, Replicates::B, Replicates::Both].map(|part| picture(&rendering, part));
-        let light = |p: &[f64; 3]| p.iter().all(|c| c.is_finite() && *c >= 0.0);
-        if let Some(i) = parts.iter().flatten().position(|p| !light(p)) {
-            return Verdict::Different(format!("{precision:?}: pixel {i} is no light"));
+        let is_valid = |p: &[f64; 3]| p.iter().all(|c| c.is_finite() && *c >= 0.0);
+        if let Some(i) = parts.iter().flatten().position(|p| !is_valid(p)) {
+            return Verdict::Different(format!(
+                "{precision:?}: pixel {i} is not finite or negative"
+            ));
         }
         let noise = rendering.film.noise(&rendering.mix, &Display::default());
-        let told = noise.map(|n| [n.rmse_linear, n.rmse_codes, n.p95_codes, n.worst_codes]);
-        if !told.is_some_and(|told| told.iter().all(|x| x.is_finite() && *x >= 0.0)) {
+        let values = noise.map(|n| [n.rmse_linear, n.rmse_codes, n.p95_codes, n.worst_codes]);
+        if !values.is_some_and(|values| values.iter().all(|x| x.is_finite() && *x >= 0.0)) {
             return Verdict::Different(format!("{precision:?}: a noise of {noise:?}"));
         }
     }
     Verdict::Same
 }
 
-fn alike(scene: &Scene) -> Verdict {
+fn replicates_are_equal(scene: &Scene) -> Verdict {
     let mut scene = scene.clone();
     without_chance(&mut scene);
     for precision in [Precision::Auto, Precision::Double] {
@@ -59,37 +61,37 @@ fn soundness() {
     compare("soundness", 0..160, sound);
 }
 
-/// Of all proportions.
+/// Scenes of all proportions.
 #[test]
 fn wild_soundness() {
-    compare("soundness", of(Layout::Wild, 20..320), sound);
+    compare("soundness", seeds_of(Layout::Wild, 20..320), sound);
 }
 
 #[test]
-#[ignore = "as many scenes as the environment asks for"]
+#[ignore = "long: ZERKALO_SCENES scenes"]
 fn many_soundness() {
     compare_many("soundness", sound);
 }
 
 #[test]
 fn replicates() {
-    compare("replicates", 0..96, alike);
+    compare("replicates", 0..96, replicates_are_equal);
 }
 
 #[test]
 fn wild_replicates() {
-    compare("replicates", of(Layout::Wild, 12..312), alike);
+    compare("replicates", seeds_of(Layout::Wild, 12..312), replicates_are_equal);
 }
 
 #[test]
-#[ignore = "as many scenes as the environment asks for"]
+#[ignore = "long: ZERKALO_SCENES scenes"]
 fn many_replicates() {
-    compare_many("replicates", alike);
+    compare_many("replicates", replicates_are_equal);
 }
 
-/// A lamp a few millionths of the scene above the floor is bright there, not wrong.
+/// A light a few millionths of the scene above the floor makes bright, valid samples.
 #[test]
-fn a_lamp_close_to_the_floor_has_no_bad_sample() {
+fn light_close_to_floor_has_no_bad_sample() {
     let scene = parsed(
         "[film]\nsize = [16, 16]\n[camera]\neye = [0.0, 1e-4, 1e-4]\ntarget = [0.0, 0.0, 0.0]\n\
          [[light]]\npoint = { position = [0.0, 1e-5, 0.0] }\nfalloff = \"inverse-square\"\n\

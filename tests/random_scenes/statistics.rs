@@ -1,15 +1,15 @@
-//! Pictures of several seeds compared by the means of blocks of pixels. Seeds are independent, so that how much
-//! their means differ tells the error of the mean of all, whatever the sampler does within a seed.
+//! Comparison of pictures of several seeds by block means. Seeds are independent: the spread of
+//! their means estimates the error of the overall mean, for every sampler.
 
 use crate::normal::{two_sided_z, z_of_t};
 
-/// The probability that any number of a scene's comparison raises a false alarm.
+/// Probability of a false alarm in the comparison of a scene.
 const LEVEL: f64 = 1e-6;
 
-/// Side of a block in pixels; tiles are cut into whole ones.
+/// Side of a block in pixels; a divisor of the tile size.
 pub const BLOCK: usize = 8;
 
-/// The pixels of each block, as positions in the picture, and last those of the whole picture.
+/// Pixel indices of each block, and last those of the whole picture.
 pub fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
     let [width, height] = [width as usize, height as usize];
     let block = |x0: usize, y0: usize| {
@@ -29,7 +29,7 @@ pub fn mean_of(picture: &[[f64; 3]], pixels: &[usize]) -> [f64; 3] {
     [0, 1, 2].map(|c| pixels.iter().map(|p| picture[*p][c]).sum::<f64>() / n)
 }
 
-/// Mean, and the standard error of the mean.
+/// Mean and standard error of the mean.
 pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -37,7 +37,7 @@ pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (n - 1.0) / n).sqrt())
 }
 
-/// The largest of many deviations.
+/// Largest of many deviations.
 pub struct Worst {
     count: f64,
     freedom: f64,
@@ -46,22 +46,24 @@ pub struct Worst {
 }
 
 impl Worst {
-    /// Of `count` numbers, whose standard errors have so many degrees of freedom.
+    /// Starts a comparison of `count` numbers, whose standard errors have `freedom` degrees of
+    /// freedom.
     pub fn new(count: usize, freedom: usize) -> Self {
         Self { count: count as f64, freedom: freedom as f64, z: 0.0, what: String::new() }
     }
 
-    /// Takes a deviation of `difference` beyond `floor`, what rounding may do, with a standard error.
+    /// Records a difference with its standard error. `floor` is the difference that rounding may
+    /// cause.
     pub fn note(&mut self, difference: f64, floor: f64, error: f64, what: impl FnOnce() -> String) {
-        let beyond = (difference.abs() - floor).max(0.0);
-        let t = if beyond == 0.0 { 0.0 } else { beyond / error };
+        let excess = (difference.abs() - floor).max(0.0);
+        let t = if excess == 0.0 { 0.0 } else { excess / error };
         let z = z_of_t(t.min(1e12), self.freedom);
         if z > self.z || z.is_nan() {
             (self.z, self.what) = (z, format!("{} (t {t:.1})", what()));
         }
     }
 
-    /// What differs by more than chance allows (Bonferroni).
+    /// Returns the largest deviation if it is significant (Bonferroni).
     pub fn beyond_chance(self) -> Option<String> {
         let allowed = two_sided_z(LEVEL / self.count);
         let wrong = self.z.is_nan() || self.z > allowed;

@@ -1,4 +1,4 @@
-//! The film and the decisions of an adaptive rendering do not depend on the number of threads.
+//! Adaptive renderings with different numbers of threads: equal films and decisions.
 
 use crate::driver::{Verdict, compare, compare_many};
 use crate::support::{begin, pool, settings, trace};
@@ -7,12 +7,12 @@ use zerkalo::render::schedule::{Step, Stop, StoppedBy};
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Samples of a pixel, in the mean: several decisions.
+/// Mean number of samples per pixel, enough for several decisions.
 const SAMPLES: u32 = 40;
 
-/// What a rendering came to.
+/// Result of a rendering.
 #[derive(PartialEq)]
-struct End {
+struct Outcome {
     bytes: Vec<u8>,
     noise: Option<Noise>,
     waves: usize,
@@ -20,7 +20,7 @@ struct End {
     reason: StoppedBy,
 }
 
-fn end(scene: &Scene, threads: usize) -> End {
+fn render(scene: &Scene, threads: usize) -> Outcome {
     let mut rendering = begin(scene, 3, Precision::Auto);
     let stop = Stop { spp: Some(SAMPLES), noise_codes: Some(0.5), ..Stop::default() };
     let mut schedule = rendering.schedule(settings(true, scene.film.rays_per_pixel, stop));
@@ -29,7 +29,7 @@ fn end(scene: &Scene, threads: usize) -> End {
         match schedule.next(0.0) {
             Step::Finished(reason) => {
                 let (noise, rays) = (schedule.noise(), schedule.rays());
-                return End { bytes: rendering.film.bytes(), noise, waves, rays, reason };
+                return Outcome { bytes: rendering.film.bytes(), noise, waves, rays, reason };
             }
             Step::Trace(wave) => {
                 let report = trace(&mut rendering, &wave, &pool);
@@ -40,16 +40,17 @@ fn end(scene: &Scene, threads: usize) -> End {
     }
 }
 
-fn same_end(scene: &Scene) -> Verdict {
-    let one = end(scene, 1);
+fn same_outcome(scene: &Scene) -> Verdict {
+    let one = render(scene, 1);
     for threads in [2, 5] {
-        let other = end(scene, threads);
+        let other = render(scene, threads);
         if other != one {
-            let told = |e: &End| format!("{} waves, {} rays, {:?}", e.waves, e.rays, e.noise);
+            let summary =
+                |e: &Outcome| format!("{} waves, {} rays, {:?}", e.waves, e.rays, e.noise);
             return Verdict::Different(format!(
                 "1 thread: {}; {threads} threads: {}",
-                told(&one),
-                told(&other)
+                summary(&one),
+                summary(&other)
             ));
         }
     }
@@ -58,11 +59,11 @@ fn same_end(scene: &Scene) -> Verdict {
 
 #[test]
 fn threads() {
-    compare("threads", 0..48, same_end);
+    compare("threads", 0..48, same_outcome);
 }
 
 #[test]
-#[ignore = "as many scenes as the environment asks for"]
+#[ignore = "long: ZERKALO_SCENES scenes"]
 fn many_threads() {
-    compare_many("threads", same_end);
+    compare_many("threads", same_outcome);
 }

@@ -1,29 +1,29 @@
-//! Random values for the keys of the format, by the format's own tables: a new key is among them.
+//! Random values of scene keys, drawn from the tables of the format, which include new keys.
 
 use crate::common::Numbers;
 use glam::DVec3;
 use toml::{Table, Value};
 use zerkalo::value::{DefaultValue, Field, NumberRange, ValueType};
 
-/// A value for a key; `None`: any that the table allows.
-pub type Own<'a> = &'a dyn Fn(&mut Numbers, &Field) -> Option<Value>;
+/// Function that returns the value of a key; `None` for any value that the table allows.
+pub type KeyValue<'a> = &'a dyn Fn(&mut Numbers, &Field) -> Option<Value>;
 
-/// Any of `from`.
+/// Random element of `from`.
 pub fn pick<T: Copy>(numbers: &mut Numbers, from: &[T]) -> T {
     from[numbers.below(from.len())]
 }
 
-/// True `times` in `of`.
+/// Returns `true` with the probability `times / of`.
 pub fn chance(numbers: &mut Numbers, times: usize, of: usize) -> bool {
     numbers.below(of) < times
 }
 
-/// Between two positive numbers, every power of ten as often.
+/// Log-uniform number between two positive numbers.
 pub fn log(numbers: &mut Numbers, low: f64, high: f64) -> f64 {
     10f64.powf(numbers.between(low.log10(), high.log10()))
 }
 
-/// Along an axis, or anywhere.
+/// Random direction, in one of three cases along an axis.
 pub fn direction(numbers: &mut Numbers) -> DVec3 {
     match numbers.below(3) {
         0 => pick(numbers, &[DVec3::X, DVec3::Y, DVec3::Z]) * pick(numbers, &[1.0, -1.0]),
@@ -31,12 +31,12 @@ pub fn direction(numbers: &mut Numbers) -> DVec3 {
     }
 }
 
-/// A list of numbers.
+/// List of numbers.
 pub fn list(numbers: impl IntoIterator<Item = f64>) -> Value {
     Value::Array(numbers.into_iter().map(Value::Float).collect())
 }
 
-/// A number in `range`, of the middle of which most are.
+/// Number in `range`; magnitudes near 1 are the most frequent.
 fn number(numbers: &mut Numbers, range: NumberRange) -> f64 {
     let ends: Vec<f64> =
         [range.low, range.high].into_iter().filter(|x| x.abs() <= 1.0 && range.holds(*x)).collect();
@@ -49,8 +49,8 @@ fn number(numbers: &mut Numbers, range: NumberRange) -> f64 {
     if range.holds(x) { x } else { x.clamp(range.low.max(-1e3), range.high.min(1e3)) }
 }
 
-/// A value of this type.
-fn value(numbers: &mut Numbers, takes: ValueType, odds: f64, own: Own) -> Value {
+/// Random value of a type.
+fn value(numbers: &mut Numbers, takes: ValueType, odds: f64, key_value: KeyValue) -> Value {
     match takes {
         ValueType::Text => Value::String(String::new()),
         ValueType::Switch => Value::Boolean(chance(numbers, 1, 2)),
@@ -68,33 +68,34 @@ fn value(numbers: &mut Numbers, takes: ValueType, odds: f64, own: Own) -> Value 
             list((0..3).map(|_| log(numbers, 0.3, 3.0) * pick(numbers, &[1.0, -1.0])))
         }
         ValueType::Color(_) => list((0..3).map(|_| numbers.unit())),
-        ValueType::Table(fields) => Value::Table(table(numbers, fields, odds, own)),
-        ValueType::OneOf(fields) => Value::Table(one_of(numbers, fields, odds, own)),
+        ValueType::Table(fields) => Value::Table(table(numbers, fields, odds, key_value)),
+        ValueType::OneOf(fields) => Value::Table(one_of(numbers, fields, odds, key_value)),
         ValueType::ListOf(fields) => {
-            let steps = (0..numbers.below(3)).map(|_| one_of(numbers, fields, odds, own));
+            let steps = (0..numbers.below(3)).map(|_| one_of(numbers, fields, odds, key_value));
             Value::Array(steps.map(Value::Table).collect())
         }
         ValueType::Tables(fields) => {
-            let tables = (0..2 + numbers.below(2)).map(|_| table(numbers, fields, odds, own));
+            let tables = (0..2 + numbers.below(2)).map(|_| table(numbers, fields, odds, key_value));
             Value::Array(tables.map(Value::Table).collect())
         }
         ValueType::Named(_) => Value::Table(Table::new()),
     }
 }
 
-fn one_of(numbers: &mut Numbers, fields: &[Field], odds: f64, own: Own) -> Table {
+fn one_of(numbers: &mut Numbers, fields: &[Field], odds: f64, key_value: KeyValue) -> Table {
     let field = &fields[numbers.below(fields.len())];
-    let value = own(numbers, field).unwrap_or_else(|| value(numbers, field.takes, odds, own));
+    let value =
+        key_value(numbers, field).unwrap_or_else(|| value(numbers, field.takes, odds, key_value));
     [(field.name.to_string(), value)].into_iter().collect()
 }
 
-/// A table with some of these keys: all that are required, each of the others with the probability `odds`.
-pub fn table(numbers: &mut Numbers, fields: &[Field], odds: f64, own: Own) -> Table {
+/// Table with all required keys, and each of the others with the probability `odds`.
+pub fn table(numbers: &mut Numbers, fields: &[Field], odds: f64, key_value: KeyValue) -> Table {
     let mut out = Table::new();
     for field in fields {
         if field.preset == DefaultValue::Required || numbers.unit() < odds {
-            let value =
-                own(numbers, field).unwrap_or_else(|| value(numbers, field.takes, odds, own));
+            let value = key_value(numbers, field)
+                .unwrap_or_else(|| value(numbers, field.takes, odds, key_value));
             out.insert(field.name.to_string(), value);
         }
     }

@@ -71,7 +71,7 @@ impl Mesh {
         // Large leaves: a ray intersects all triangles of a leaf at the cost of one.
         let quality =
             BvhBuildParams { collapse_traversal_cost: 8.0, ..BvhBuildParams::fast_build() };
-        let Bvh8Build { boxes, order, leaves } =
+        let Bvh8Build { bvh: boxes, order, leaves } =
             Bvh8::build(mesh.triangles.len(), corners, BVH_WIDTH, quality);
         mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();
         if !mesh.color_of.is_empty() {
@@ -121,12 +121,11 @@ impl Mesh {
             if bound <= best {
                 continue;
             }
-            let node = &self.boxes.branches()[index as usize];
+            let node = &self.boxes.nodes()[index as usize];
             let first = stack.len();
             for i in node.children() {
-                let max_along =
-                    |a| along(a, node.bounds[a][i]).max(along(a, node.bounds[a + 3][i]));
-                let bound: f64 = (0..3).map(max_along).sum();
+                let reach = |a| along(a, node.bounds[a][i]).max(along(a, node.bounds[a + 3][i]));
+                let bound: f64 = (0..3).map(reach).sum();
                 if bound <= best {
                     continue;
                 }

@@ -1,99 +1,102 @@
-//! For each direction from a light, the few things of a tree that stand there: shadow rays ask these
-//! instead of the tree (Haines and Greenberg 1986, *The Light Buffer: A Shadow-Testing Accelerator*).
+//! Light buffer: possible occluders by direction from a light. Shadow rays test these few
+//! primitives instead of traversing the BVH (Haines and Greenberg 1986, *The Light Buffer: A
+//! Shadow-Testing Accelerator*).
 
 use crate::bvh::Ray;
-use crate::lanes::{Float, Mask, SimdFloat};
+use crate::lanes::{Float, Mask, SimdFloat, next_distinct};
 use crate::primitive::{Aggregate, BoundingSphere, F32_RAY_ERROR, LightTarget, PrimitiveSet};
 use crate::world::culling::light_projection::{LightProjection, ProjectedBounds};
-use crate::world::integrator::opaque::next_distinct;
 
-/// So many things are kept for a cell, the nearest to the light.
+/// Largest number of entries in a cell: those nearest to the light.
 const MAX_PER_CELL: usize = 16;
 
-/// No item's number.
-const NONE: u32 = u32::MAX;
+/// Marks entries without an exempt primitive.
+const NO_ITEM: u32 = u32::MAX;
 
-/// What stands in the way of one light.
+/// Possible occluders of one light, by cells of its projection.
 pub(crate) struct LightBuffer<S> {
     projection: LightProjection<S>,
-    /// Cells in a row of the chart, and rows.
+    /// Number of rows and of columns of cells on a face of the projection.
     side: usize,
-    /// The largest coordinate of the things and the light: from farther off, rays stray too far.
-    scale: S,
-    /// Row by row, face by face.
+    /// Largest coordinate of the occluders and the light. Rays that start at larger coordinates are
+    /// less exact than the bounds assume.
+    max_coordinate: S,
+    /// Cells of all faces, row by row.
     cells: Vec<Cell<S>>,
-    /// Of one cell after the other, those nearer to the light first.
+    /// Entries of all cells, in each cell from the nearest to the light on.
     entries: Vec<Entry<S>>,
 }
 
 #[derive(Clone, Copy)]
 struct Cell<S> {
+    /// Range in `entries`.
     first: u32,
     end: u32,
-    /// Up to this depth all things are known.
+    /// Depth up to which the entries are complete.
     complete_to: S,
 }
 
-/// A thing of the geometry's tree.
+/// A primitive of the BVH as a light buffer needs it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Occluder {
-    /// Around it.
+    /// Bounding sphere.
     pub ball: BoundingSphere,
-    /// The number of the item whose surface it does not shade, because that is its own; `None`: it may
-    /// shade itself.
-    pub own: Option<u32>,
+    /// Id of the primitive, if it does not occlude lights from its own outside; `None` if it may.
+    pub exempt_item: Option<u32>,
 }
 
 #[derive(Clone, Copy)]
 struct Entry<S> {
-    /// Number in the geometry's tree.
+    /// Index in the geometry's BVH.
     number: u32,
-    /// As in [`Occluder`]; [`NONE`] stands for `None`.
-    own: u32,
-    /// The depth that it begins at: the distance from a point, the way along a direction from the plane
-    /// through the origin.
+    /// [`Occluder::exempt_item`], or [`NO_ITEM`].
+    exempt_item: u32,
+    /// Smallest depth: the distance from a point light, or the distance against the direction of
+    /// light from the plane through the origin.
     near: S,
 }
 
 impl<S: Float> LightBuffer<S> {
-    /// Of the things of a tree; `None`: of half of them or more, most of the cells would have no room.
-    pub fn new(towards: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
-        let reach = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
-        let light = match towards {
+    /// Creates the buffer of a light. Returns `None` if at least half of the occluders do not fit
+    /// in most of their cells.
+    pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
+        let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
+        let light = match target {
             LightTarget::Point(light) => light.abs().max_element(),
             LightTarget::Direction(_) => 0.0,
         };
-        let scale = occluders.iter().map(|s| reach(&s.ball)).fold(light, f64::max);
-        // As the light sees them.
-        let seen = |s: &Occluder| {
-            let center = match towards {
+        let max_coordinate = occluders.iter().map(|s| farthest(&s.ball)).fold(light, f64::max);
+        // Relative to the light, with a margin for the error of rays.
+        let relative_to_light = |s: &Occluder| {
+            let center = match target {
                 LightTarget::Point(light) => s.ball.center - light,
                 LightTarget::Direction(_) => s.ball.center,
             };
-            BoundingSphere { center, radius: s.ball.radius + F32_RAY_ERROR * scale }
+            BoundingSphere { center, radius: s.ball.radius + F32_RAY_ERROR * max_coordinate }
         };
-        let balls: Vec<BoundingSphere> = occluders.iter().map(seen).collect();
-        let begin = |ball: &BoundingSphere| match towards {
+        let balls: Vec<BoundingSphere> = occluders.iter().map(relative_to_light).collect();
+        let near_depth = |ball: &BoundingSphere| match target {
             LightTarget::Point(_) => ball.center.length() - ball.radius,
             LightTarget::Direction(direction) => -ball.center.dot(*direction) - ball.radius,
         };
-        let mut order: Vec<(f64, u32)> = balls.iter().map(begin).zip(0..).collect();
+        let mut order: Vec<(f64, u32)> = balls.iter().map(near_depth).zip(0..).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
 
-        let ProjectedBounds { projection, rects: places, side } =
-            ProjectedBounds::new(towards, &balls);
+        let ProjectedBounds { projection, rects, side } = ProjectedBounds::new(target, &balls);
         let count = projection.faces() * side * side;
         let (mut counts, mut complete_to) =
             (vec![0; count], vec![S::from_f64(f64::INFINITY); count]);
         let mut placed: Vec<(usize, Entry<S>)> = Vec::new();
         let mut overflowed = 0;
         for (near, number) in order {
-            let (near, own) = (S::from_f64(near), occluders[number as usize].own.unwrap_or(NONE));
+            let near = S::from_f64(near);
+            let exempt_item = occluders[number as usize].exempt_item.unwrap_or(NO_ITEM);
+            // Cells that hold the occluder, less cells that do not.
             let mut balance = 0;
-            for cell in places[number as usize].iter().flat_map(|place| place.cells(side)) {
+            for cell in rects[number as usize].iter().flat_map(|rect| rect.cells(side)) {
                 if counts[cell] < MAX_PER_CELL {
                     counts[cell] += 1;
-                    placed.push((cell, Entry { number, own, near }));
+                    placed.push((cell, Entry { number, exempt_item, near }));
                     balance += 1;
                 } else {
                     complete_to[cell] =
@@ -108,77 +111,91 @@ impl<S: Float> LightBuffer<S> {
         }
         let mut end = 0;
         let cell = |(count, complete_to): (&usize, &S)| {
-            // Grows to its end when it is filled.
+            // `end` grows when the entries are distributed.
             let cell = Cell { first: end, end, complete_to: *complete_to };
             end += *count as u32;
             cell
         };
         let mut cells: Vec<Cell<S>> = counts.iter().zip(&complete_to).map(cell).collect();
-        let empty = Entry { number: 0, own: NONE, near: S::default() };
+        let empty = Entry { number: 0, exempt_item: NO_ITEM, near: S::default() };
         let mut entries = vec![empty; placed.len()];
         for (cell, entry) in placed {
             entries[cells[cell].end as usize] = entry;
             cells[cell].end += 1;
         }
-        Some(Self { projection, side, scale: S::from_f64(scale), cells, entries })
+        Some(Self { projection, side, max_coordinate: S::from_f64(max_coordinate), cells, entries })
     }
 
-    /// [`Aggregate::blocked`] for rays to this light, which end after `limit`. `on`: tags of the items that the
-    /// rays begin on, and where that is on their outsides.
+    /// Returns the lanes of `rays` that are occluded, as [`Aggregate::occluded`] does. `candidates`
+    /// are the possible occluders of these rays.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
-        ray: &Ray<L>,
-        on: (L, L::Mask),
-        limit: L,
-        wanted: L::Mask,
-        by: &PrimitiveSet,
+        rays: &ShadowRays<L>,
+        candidates: &PrimitiveSet,
     ) -> L::Mask {
-        let mut blocked = geometry.occluded_linear(ray, limit, wanted, by);
-        let mut beyond = wanted.and_not(blocked) & ray.origin.max_abs().gt(L::splat(self.scale));
-        let mut left = wanted.and_not(blocked | beyond);
-        let (cell, depth) = self.projection.lookup(ray, limit, self.side);
-        // The item on whose outside all begin.
-        let own = match next_distinct(on.0, wanted) {
-            Some((own, all)) if wanted.and_not(all & on.1).none() => Some(own),
+        let ShadowRays { ray, start_item, starts_outside, t_max, active } = rays;
+        let (t_max, active) = (*t_max, *active);
+        let mut occluded = geometry.occluded_linear(ray, t_max, active, candidates);
+        let out_of_bounds = ray.origin.max_abs().gt(L::splat(self.max_coordinate));
+        // Lanes that have to traverse the BVH.
+        let mut use_bvh = active.and_not(occluded) & out_of_bounds;
+        let mut remaining = active.and_not(occluded | use_bvh);
+        let (cell, depth) = self.projection.lookup(ray, t_max, self.side);
+        // Primitive on whose outside all rays start.
+        let common_start = match next_distinct(*start_item, active) {
+            Some((item, lanes)) if active.and_not(lanes & *starts_outside).none() => Some(item),
             _ => None,
         };
-        while left.any() {
-            let number = cell.lane(left.bits().trailing_zeros() as usize);
-            let here = L::splat(number);
-            let here = left & cell.le(here) & cell.ge(here);
-            if here.none() {
-                // No number: the chart could not tell.
-                beyond = beyond | left;
+        while remaining.any() {
+            let number = cell.lane(remaining.bits().trailing_zeros() as usize);
+            let first_cell = L::splat(number);
+            let in_cell = remaining & cell.le(first_cell) & cell.ge(first_cell);
+            if in_cell.none() {
+                // The cell is NaN: the projection has no cell for the ray.
+                use_bvh = use_bvh | remaining;
                 break;
             }
-            left = left.and_not(here);
+            remaining = remaining.and_not(in_cell);
             let Cell { first, end, complete_to } = self.cells[number.to_f64() as usize];
-            let farthest = L::select(here, depth, L::from_f64(-L::MAX)).min_max().1;
-            beyond = beyond | (here & depth.gt(L::splat(complete_to)));
-            for thing in &self.entries[first as usize..end as usize] {
-                if thing.near > farthest {
+            let max_depth = L::select(in_cell, depth, L::from_f64(-L::MAX)).min_max().1;
+            use_bvh = use_bvh | (in_cell & depth.gt(L::splat(complete_to)));
+            for entry in &self.entries[first as usize..end as usize] {
+                if entry.near > max_depth {
                     break;
                 }
-                if own == Some(thing.own) {
+                if common_start == Some(entry.exempt_item) {
                     continue;
                 }
-                let open = wanted.and_not(blocked);
-                let new = geometry.occluded_by(thing.number, ray, limit, open);
-                blocked = blocked | (new & open);
-                if here.and_not(blocked).none() {
+                let unoccluded = active.and_not(occluded);
+                let hits = geometry.occluded_by(entry.number, ray, t_max, unoccluded);
+                occluded = occluded | (hits & unoccluded);
+                if in_cell.and_not(occluded).none() {
                     break;
                 }
             }
-            left = left.and_not(blocked);
+            remaining = remaining.and_not(occluded);
         }
-        beyond = beyond.and_not(blocked);
-        if beyond.any() {
-            blocked = blocked | (geometry.occluded(ray, limit, beyond, by) & beyond);
+        use_bvh = use_bvh.and_not(occluded);
+        if use_bvh.any() {
+            occluded = occluded | (geometry.occluded(ray, t_max, use_bvh, candidates) & use_bvh);
         }
-        blocked
+        occluded
     }
+}
+
+/// A packet of shadow rays to one light.
+#[derive(Clone, Copy)]
+pub(crate) struct ShadowRays<L: SimdFloat> {
+    pub ray: Ray<L>,
+    /// Ids of the primitives on which the rays start.
+    pub start_item: L,
+    /// Lanes that start on the outside of their primitive.
+    pub starts_outside: L::Mask,
+    /// Distances at which the rays end.
+    pub t_max: L,
+    pub active: L::Mask,
 }
 
 #[cfg(test)]
@@ -195,25 +212,27 @@ mod tests {
     }
 
     fn occluders(balls: &[BoundingSphere]) -> Vec<Occluder> {
-        (0..).zip(balls).map(|(i, ball)| Occluder { ball: *ball, own: Some(i) }).collect()
+        (0..).zip(balls).map(|(i, ball)| Occluder { ball: *ball, exempt_item: Some(i) }).collect()
     }
 
-    /// Asks for shadows of rays from many places and compares with the tree; how many were blocked.
+    /// Compares the shadows of rays from many points with those of the BVH. Returns the number of
+    /// occluded rays.
     fn compare<L: SimdFloat>(
-        towards: &LightTarget,
+        target: &LightTarget,
         balls: &[BoundingSphere],
         random: &mut Random,
     ) -> usize {
         let form = |b: &BoundingSphere| Form::Sphere { center: b.center, radius: b.radius };
         let forms: Vec<Form> = balls.iter().map(form).collect();
         let geometry = Aggregate::<L>::with_tree(&forms, true);
-        let Some(buffer) = LightBuffer::<L::Scalar>::new(towards, &occluders(balls)) else {
+        let Some(buffer) = LightBuffer::<L::Scalar>::new(target, &occluders(balls)) else {
             panic!("no buffer for {} balls", balls.len());
         };
         let mut count = 0;
         for round in 0..3000 {
-            // In the air, close together, apart, and far off; on the outside of one ball, or of two.
-            let (middle, apart) = (random.point(7.0), [0.01, 1.0, 10.0, 1e4, 0.0, 0.0][round % 6]);
+            // Points in space, close together, far apart and far away; on the outside of one ball,
+            // or of two.
+            let (middle, spread) = (random.point(7.0), [0.01, 1.0, 10.0, 1e4, 0.0, 0.0][round % 6]);
             let pair = [0; 2].map(|_| (random.unit() * balls.len() as f64) as usize);
             let ball_of = |lane: usize| if round % 6 == 4 { pair[0] } else { pair[lane % 2] };
             let normals: Vec<DVec3> =
@@ -222,12 +241,12 @@ mod tests {
                 let BoundingSphere { center, radius } = balls[ball_of(lane)];
                 match round % 6 {
                     4 | 5 => center + normals[lane] * (radius + 1e-4),
-                    _ => middle + normals[lane] * apart,
+                    _ => middle + normals[lane] * spread,
                 }
             };
             let axis = |a: usize| L::from_fn(|i| L::Scalar::from_f64(point(i)[a]));
             let origin = Vec3::new(axis(0), axis(1), axis(2));
-            let (direction, limit) = match towards {
+            let (direction, t_max) = match target {
                 LightTarget::Direction(d) => (Vec3::of(d.to_array()), L::from_f64(L::MAX)),
                 LightTarget::Point(light) => {
                     let to = Vec3::of(light.to_array()) - origin;
@@ -238,21 +257,24 @@ mod tests {
             let ray = Ray { origin, direction };
             let normal = |a: usize| L::from_fn(|i| L::Scalar::from_f64(normals[i][a]));
             let facing = Vec3::new(normal(0), normal(1), normal(2)).dot(direction);
-            let wanted = facing.gt(L::zero());
-            let (first, second) = (L::from_id(ball_of(0) as u32), L::from_id(ball_of(1) as u32));
+            let active = facing.gt(L::zero());
+            let (first_item, second_item) =
+                (L::from_id(ball_of(0) as u32), L::from_id(ball_of(1) as u32));
             let odd = L::from_fn(|i| L::Scalar::from_f64((i % 2) as f64)).gt(L::zero());
-            let on = (L::select(odd, second, first), L::mask(round % 6 >= 4));
+            let (start_item, starts_outside) =
+                (L::select(odd, second_item, first_item), L::mask(round % 6 >= 4));
             let all = geometry.all();
-            let expected = geometry.occluded(&ray, limit, wanted, all) & wanted;
-            let found = buffer.occluded(&geometry, &ray, on, limit, wanted, all) & wanted;
-            assert_eq!(found.bits(), expected.bits(), "{towards:?}, round {round}");
+            let expected = geometry.occluded(&ray, t_max, active, all) & active;
+            let rays = ShadowRays { ray, start_item, starts_outside, t_max, active };
+            let found = buffer.occluded(&geometry, &rays, all) & active;
+            assert_eq!(found.bits(), expected.bits(), "{target:?}, round {round}");
             count += found.bits().count_ones() as usize;
         }
         count
     }
 
     #[test]
-    fn shadows_are_those_of_the_tree() {
+    fn light_buffer_shadows_equal_bvh_shadows() {
         let mut random = Random(1);
         let lights = [
             LightTarget::Point(DVec3::new(1.0, 2.0, -0.5)),
@@ -260,70 +282,72 @@ mod tests {
             LightTarget::Direction(DVec3::new(0.2, -0.9, 0.4).normalize()),
             LightTarget::Direction(DVec3::Z),
         ];
-        for towards in &lights {
+        for target in &lights {
             for (count, radius) in [(3, 8.0), (100, 0.5), (400, 0.3), (60, 1.5)] {
                 let balls = balls(&mut random, count, radius);
-                let blocked = compare::<Single>(towards, &balls, &mut random);
-                assert!(blocked > 100, "{towards:?}, {count} balls: {blocked} blocked");
-                compare::<Double>(towards, &balls, &mut random);
-                compare::<f32>(towards, &balls, &mut random);
+                let occluded = compare::<Single>(target, &balls, &mut random);
+                assert!(occluded > 100, "{target:?}, {count} balls: {occluded} occluded");
+                compare::<Double>(target, &balls, &mut random);
+                compare::<f32>(target, &balls, &mut random);
             }
         }
     }
 
-    /// Behind a crowd the tree has to be asked.
+    /// Rays behind full cells traverse the BVH.
     #[test]
-    fn what_has_no_room_is_found_in_the_tree() {
+    fn light_buffer_falls_back_to_bvh_behind_full_cells() {
         let mut random = Random(4);
         let mut balls = balls(&mut random, 100, 0.5);
-        let crowd =
+        let cluster_ball =
             |_| BoundingSphere { center: random.point(0.3), radius: 0.05 + 0.2 * random.unit() };
-        balls.extend((0..70).map(crowd));
-        for towards in
+        balls.extend((0..70).map(cluster_ball));
+        for target in
             [LightTarget::Point(DVec3::new(0.0, 4.0, 4.0)), LightTarget::Direction(DVec3::X)]
         {
-            let buffer = LightBuffer::<f32>::new(&towards, &occluders(&balls)).expect("a buffer");
-            assert!(
-                buffer.cells.iter().any(|cell| cell.complete_to < f32::INFINITY),
-                "{towards:?}"
-            );
+            let buffer = LightBuffer::<f32>::new(&target, &occluders(&balls)).expect("a buffer");
+            assert!(buffer.cells.iter().any(|cell| cell.complete_to < f32::INFINITY), "{target:?}");
             let mut random = Random(5);
-            assert!(compare::<Single>(&towards, &balls, &mut random) > 100);
-            compare::<Double>(&towards, &balls, &mut random);
+            assert!(compare::<Single>(&target, &balls, &mut random) > 100);
+            compare::<Double>(&target, &balls, &mut random);
         }
     }
 
-    /// On the inside of a thing its other side is in the way.
+    /// The far side of a ball occludes lights from its inside.
     #[test]
-    fn what_begins_inside_is_blocked_by_the_thing_itself() {
+    fn shadow_ray_from_inside_is_occluded_by_its_own_primitive() {
         let balls = [
             BoundingSphere { center: DVec3::ZERO, radius: 1.0 },
             BoundingSphere { center: DVec3::X * 5.0, radius: 1.0 },
         ];
         let forms = balls.map(|b| Form::Sphere { center: b.center, radius: b.radius });
         let geometry = Aggregate::<Single>::with_tree(&forms, true);
-        let towards = LightTarget::Point(DVec3::Y * 9.0);
-        let buffer = LightBuffer::<f32>::new(&towards, &occluders(&balls)).expect("a buffer");
+        let target = LightTarget::Point(DVec3::Y * 9.0);
+        let buffer = LightBuffer::<f32>::new(&target, &occluders(&balls)).expect("a buffer");
         let ray = Ray { origin: Vec3::<Single>::zero(), direction: Vec3::of([0.0, 1.0, 0.0]) };
-        let ask = |outside| {
-            let on = (Single::from_id(0), Single::mask(outside));
-            let wanted = Single::mask(true);
-            buffer.occluded(&geometry, &ray, on, Single::from_f64(9.0), wanted, geometry.all())
+        let occluded = |outside| {
+            let rays = ShadowRays {
+                ray,
+                start_item: Single::from_id(0),
+                starts_outside: Single::mask(outside),
+                t_max: Single::from_f64(9.0),
+                active: Single::mask(true),
+            };
+            buffer.occluded(&geometry, &rays, geometry.all())
         };
-        assert!(ask(false).all());
-        // Who says that this is outside is believed.
-        assert!(ask(true).none());
+        assert!(occluded(false).all());
+        // `starts_outside` is trusted without a test.
+        assert!(occluded(true).none());
     }
 
     #[test]
-    fn few_things_are_asked() {
+    fn light_buffer_cells_have_few_entries() {
         let mut random = Random(3);
         let light = LightTarget::Point(DVec3::ZERO);
-        let few =
+        let buffer =
             LightBuffer::<f32>::new(&light, &occluders(&balls(&mut random, 400, 0.3))).unwrap();
-        let mean = few.entries.len() as f64 / few.cells.len() as f64;
-        assert!(mean < 4.0, "{mean} in a cell");
-        let many = balls(&mut random, 4000, 3.0);
-        assert!(LightBuffer::<f32>::new(&light, &occluders(&many)).is_none());
+        let mean = buffer.entries.len() as f64 / buffer.cells.len() as f64;
+        assert!(mean < 4.0, "{mean} entries per cell");
+        let too_large = balls(&mut random, 4000, 3.0);
+        assert!(LightBuffer::<f32>::new(&light, &occluders(&too_large)).is_none());
     }
 }

@@ -1,4 +1,5 @@
-//! How a light sees things: from a point among them or before them, or from far away.
+//! Projections from a light to the cells of its light buffer: cube map, perspective or
+//! orthographic.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -7,35 +8,35 @@ use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
-/// A window reaches no farther to the sides than so many times its distance.
-const WIDEST: f64 = 3.0;
+/// Largest tangent of a direction in a perspective projection.
+const MAX_TANGENT: f64 = 3.0;
 
-/// Where the light sees a point: on a face, at two coordinates from 0 to 1.
+/// Projection of points to a face and two coordinates from 0 to 1.
 pub(crate) enum LightProjection<S> {
-    /// From a point among the things, on six faces of a cube around it.
+    /// Projection from a point light among the primitives onto the six faces of a cube around it.
     CubeMap,
-    /// From a point before the things, in a window in front of them; the third axis leads through it.
+    /// Projection from a point light on one side of all primitives; the third axis is the view
+    /// direction.
     Perspective { axes: [[S; 3]; 3], low: [S; 2], scale: [S; 2] },
-    /// From far away, along two axes.
+    /// Projection along the direction of a directional light, onto two axes.
     Orthographic { axes: [[S; 3]; 2], low: [S; 2], scale: [S; 2] },
 }
 
 impl<S: Float> LightProjection<S> {
-    /// How many faces it has.
+    /// Number of faces.
     pub fn faces(&self) -> usize {
         if matches!(self, Self::CubeMap) { 6 } else { 1 }
     }
 
-    /// In which cell the light sees where rays begin, and at which depth. What is seen nowhere gets some
-    /// cell.
+    /// Returns the cell in which the light sees the rays' origins, and their depth. Points outside
+    /// of the projection get an arbitrary cell. `limit` is the distance to the light.
     #[inline(always)]
     pub fn lookup<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
         let side = L::from_f64(side as f64);
-        // A number below 2^22 plus this has no fraction bits left in single precision; in double one
-        // below 2^51.
+        // The sum of this and a number below 2^22 (in double precision: 2^51) has no fraction bits.
         let rounder = L::from_f64(1.5 / L::EPSILON);
         let half = L::from_f64(0.5);
-        let number = |x: L| {
+        let cell_index = |x: L| {
             let x = x.mul_add(side, -half).max(L::zero()).min(side - L::one());
             (x + rounder) - rounder
         };
@@ -51,21 +52,22 @@ impl<S: Float> LightProjection<S> {
                 let (u, v) = (pick(d.y, d.z, d.x), pick(d.z, d.x, d.y));
                 let face = pick(L::zero(), L::from_f64(2.0), L::from_f64(4.0))
                     + L::one().masked(major.lt(L::zero()));
-                let (u, v) = (number(u.mul_add(scale, half)), number(v.mul_add(scale, half)));
+                let (u, v) =
+                    (cell_index(u.mul_add(scale, half)), cell_index(v.mul_add(scale, half)));
                 (face.mul_add(side, v).mul_add(side, u), limit)
             }
             Self::Perspective { axes, low, scale } => {
                 let [a, b, c] = axes.map(|axis| d.dot(Vec3::splat(axis)));
                 let inverse = L::one() / c;
                 let along = |x: L, i: usize| {
-                    number(x.mul_add(inverse, -L::splat(low[i])) * L::splat(scale[i]))
+                    cell_index(x.mul_add(inverse, -L::splat(low[i])) * L::splat(scale[i]))
                 };
                 (along(b, 1).mul_add(side, along(a, 0)), limit)
             }
             Self::Orthographic { axes, low, scale } => {
                 let along = |i: usize| {
                     let x = ray.origin.dot(Vec3::splat(axes[i]));
-                    number((x - L::splat(low[i])) * L::splat(scale[i]))
+                    cell_index((x - L::splat(low[i])) * L::splat(scale[i]))
                 };
                 (along(1).mul_add(side, along(0)), -ray.origin.dot(ray.direction))
             }
@@ -73,7 +75,7 @@ impl<S: Float> LightProjection<S> {
     }
 }
 
-/// Where a ball is seen: on a face, between two corners with coordinates from 0 to 1.
+/// Bounds of a projected ball on a face: two corners with coordinates from 0 to 1.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FaceRect {
     face: usize,
@@ -82,7 +84,7 @@ pub(crate) struct FaceRect {
 }
 
 impl FaceRect {
-    /// The cells that it reaches into.
+    /// Indices of the cells that the rectangle overlaps.
     pub fn cells(&self, side: usize) -> impl Iterator<Item = usize> + use<> {
         // The conversion to integers saturates.
         let cell = |x: f64| ((x * side as f64) as usize).min(side - 1);
@@ -93,31 +95,31 @@ impl FaceRect {
     }
 }
 
-/// A chart and what is seen on it.
+/// A projection with the bounds of the projected balls.
 pub(crate) struct ProjectedBounds<S> {
-    /// The chart.
+    /// The projection.
     pub projection: LightProjection<S>,
-    /// Of each ball.
+    /// Bounds of each ball.
     pub rects: Vec<Vec<FaceRect>>,
-    /// So many cells are good in a row.
+    /// Suitable number of cells in a row.
     pub side: usize,
 }
 
 impl<S: Float> ProjectedBounds<S> {
-    /// Of balls, whose places are relative to a light that stands somewhere.
-    pub fn new(towards: &LightTarget, balls: &[BoundingSphere]) -> Self {
-        let (projection, places) = match towards {
+    /// Projects balls. Their centres are relative to the light, if that is a point light.
+    pub fn new(target: &LightTarget, balls: &[BoundingSphere]) -> Self {
+        let (projection, rects) = match target {
             LightTarget::Direction(direction) => orthographic(*direction, balls),
             LightTarget::Point(_) => perspective(balls).unwrap_or_else(|| cube_map(balls)),
         };
         let finest = if matches!(projection, LightProjection::CubeMap) { 2.0 } else { 4.0 };
         let side = (finest * (balls.len() as f64).sqrt()).clamp(8.0, 128.0) as usize;
-        Self { projection, rects: places, side }
+        Self { projection, rects, side }
     }
 }
 
-/// Of the directions to the points of a ball in front of a plane through the origin, the smallest and the
-/// largest x / z: `x` and `z` are its centre's. `None`: it is all behind.
+/// Smallest and largest x / z of the points of a ball with z > 0. `x` and `z` are the coordinates
+/// of its centre. Returns `None` if there are no such points.
 fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     let distance = x.hypot(z);
     if distance <= radius {
@@ -131,9 +133,9 @@ fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     (low < FRAC_PI_2 && high > -FRAC_PI_2).then(|| (slope(low), slope(high)))
 }
 
-/// Balls around a light.
+/// Projects balls around a light.
 fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
-    let on = |ball: &BoundingSphere, face: usize| {
+    let rect_on = |ball: &BoundingSphere, face: usize| {
         let axis = |i: usize| ball.center[(face / 2 + i) % 3];
         let z = if face.is_multiple_of(2) { axis(0) } else { -axis(0) };
         let (x, y) =
@@ -143,56 +145,56 @@ fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<
         let is_seen = low.max_element() <= 1.0 && high.min_element() >= -1.0;
         is_seen.then(|| FaceRect { face, low: half(low), high: half(high) })
     };
-    let places = |ball: &BoundingSphere| (0..6).filter_map(|face| on(ball, face)).collect();
-    (LightProjection::CubeMap, balls.iter().map(places).collect())
+    let rects = |ball: &BoundingSphere| (0..6).filter_map(|face| rect_on(ball, face)).collect();
+    (LightProjection::CubeMap, balls.iter().map(rects).collect())
 }
 
-/// Balls on one side of a light; `None`: they are not.
+/// Projects balls on one side of a light; `None` if they are not.
 fn perspective<S: Float>(
     balls: &[BoundingSphere],
 ) -> Option<(LightProjection<S>, Vec<Vec<FaceRect>>)> {
     let forward = balls.iter().map(|b| b.center).sum::<DVec3>().try_normalize()?;
     let (right, up) = forward.any_orthonormal_pair();
     let axes = [right, up, forward];
-    let seen = |ball: &BoundingSphere| {
+    let tangents = |ball: &BoundingSphere| {
         let [x, y, z] = axes.map(|axis| ball.center.dot(axis));
         let (x, y) = (tangent_range(x, z, ball.radius)?, tangent_range(y, z, ball.radius)?);
-        let seen = (DVec2::new(x.0, y.0), DVec2::new(x.1, y.1));
-        let widest = seen.0.abs().max(seen.1.abs()).max_element();
-        (z > ball.radius && widest <= WIDEST).then_some(seen)
+        let corners = (DVec2::new(x.0, y.0), DVec2::new(x.1, y.1));
+        let max_tangent = corners.0.abs().max(corners.1.abs()).max_element();
+        (z > ball.radius && max_tangent <= MAX_TANGENT).then_some(corners)
     };
-    let seen: Vec<_> = balls.iter().map(seen).collect::<Option<_>>()?;
-    let (low, scale, places) = fitted(&seen);
+    let corners: Vec<_> = balls.iter().map(tangents).collect::<Option<_>>()?;
+    let (low, scale, rects) = normalized(&corners);
     let axes = axes.map(|axis| axis.to_array().map(S::from_f64));
-    Some((LightProjection::Perspective { axes, low, scale }, places))
+    Some((LightProjection::Perspective { axes, low, scale }, rects))
 }
 
-/// Balls seen against `direction`.
+/// Projects balls along `direction`, the direction to the light.
 fn orthographic<S: Float>(
     direction: DVec3,
     balls: &[BoundingSphere],
 ) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
     let (right, up) = direction.any_orthonormal_pair();
-    let seen = |ball: &BoundingSphere| {
-        let at = DVec2::new(ball.center.dot(right), ball.center.dot(up));
-        (at - ball.radius, at + ball.radius)
+    let square = |ball: &BoundingSphere| {
+        let center = DVec2::new(ball.center.dot(right), ball.center.dot(up));
+        (center - ball.radius, center + ball.radius)
     };
-    let seen: Vec<_> = balls.iter().map(seen).collect();
-    let (low, scale, places) = fitted(&seen);
+    let corners: Vec<_> = balls.iter().map(square).collect();
+    let (low, scale, rects) = normalized(&corners);
     let axes = [right, up].map(|axis| axis.to_array().map(S::from_f64));
-    (LightProjection::Orthographic { axes, low, scale }, places)
+    (LightProjection::Orthographic { axes, low, scale }, rects)
 }
 
-/// What has to be taken from coordinates and what they are multiplied with so that all that is seen, between
-/// two corners each, lies from 0 to 1; and where it lies then.
-fn fitted<S: Float>(seen: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<FaceRect>>) {
-    let low = seen.iter().map(|s| s.0).fold(DVec2::INFINITY, DVec2::min);
-    let high = seen.iter().map(|s| s.1).fold(DVec2::NEG_INFINITY, DVec2::max);
+/// Returns the offset and the factor that map all rectangles, given by their corners, to [0, 1],
+/// and the mapped rectangles.
+fn normalized<S: Float>(corners: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<FaceRect>>) {
+    let low = corners.iter().map(|s| s.0).fold(DVec2::INFINITY, DVec2::min);
+    let high = corners.iter().map(|s| s.1).fold(DVec2::NEG_INFINITY, DVec2::max);
     let scale = (high - low).recip();
-    let at = |v: DVec2| (v - low) * scale;
-    let place = |s: &(DVec2, DVec2)| vec![FaceRect { face: 0, low: at(s.0), high: at(s.1) }];
-    let reals = |v: DVec2| v.to_array().map(S::from_f64);
-    (reals(low), reals(scale), seen.iter().map(place).collect())
+    let mapped = |v: DVec2| (v - low) * scale;
+    let rect = |s: &(DVec2, DVec2)| vec![FaceRect { face: 0, low: mapped(s.0), high: mapped(s.1) }];
+    let floats = |v: DVec2| v.to_array().map(S::from_f64);
+    (floats(low), floats(scale), corners.iter().map(rect).collect())
 }
 
 #[cfg(test)]
@@ -213,17 +215,19 @@ pub(crate) mod tests {
         }
     }
 
-    fn points_are_in_the_cells_of_their_ball<L: SimdFloat>(slack: f64) {
+    /// Checks that points of a ball are looked up in cells of the ball's bounds.
+    fn check_points_of_ball<L: SimdFloat>(slack: f64) {
         let mut random = Random(2);
         let side = 64;
         for round in 0..600 {
-            let away = [DVec3::ZERO, DVec3::new(30.0, -9.0, 4.0), DVec3::Y * 20.0][round % 3];
-            let center = random.point(5.0) + away;
+            let light_offset =
+                [DVec3::ZERO, DVec3::new(30.0, -9.0, 4.0), DVec3::Y * 20.0][round % 3];
+            let center = random.point(5.0) + light_offset;
             let ball = BoundingSphere { center, radius: 0.2 + 2.0 * random.unit() };
-            // With another one, so that the ball is not all of the chart.
+            // A second ball, so that the first does not fill the projection.
             let balls =
                 [ball, BoundingSphere { center: center + DVec3::new(0.5, 1.0, 0.7), radius: 0.1 }];
-            let (projection, places) = match round / 3 % 3 {
+            let (projection, rects) = match round / 3 % 3 {
                 0 => cube_map::<L::Scalar>(&balls),
                 1 => match perspective(&balls) {
                     Some(perspective) => perspective,
@@ -231,12 +235,12 @@ pub(crate) mod tests {
                 },
                 _ => orthographic(random.point(1.0).normalize(), &balls),
             };
-            let cells: Vec<usize> = places[0].iter().flat_map(|place| place.cells(side)).collect();
+            let cells: Vec<usize> = rects[0].iter().flat_map(|rect| rect.cells(side)).collect();
             for _ in 0..100 {
-                // On an axis and on a diagonal, too.
-                let to =
+                // Random directions, an axis and a diagonal.
+                let normal =
                     [random.point(1.0), DVec3::X, DVec3::ONE, DVec3::NEG_Z][round % 4].normalize();
-                let point = center + to * ball.radius * (1.0 - slack);
+                let point = center + normal * ball.radius * (1.0 - slack);
                 let origin = Vec3::of(point.to_array());
                 let direction = Vec3::of((-point.normalize()).to_array());
                 let (cell, _) = projection.lookup(&Ray { origin, direction }, L::one(), side);
@@ -247,21 +251,25 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_light_sees_points_of_a_ball_where_it_sees_the_ball() {
-        points_are_in_the_cells_of_their_ball::<Double>(1e-9);
-        points_are_in_the_cells_of_their_ball::<Single>(1e-4);
+    fn light_projection_maps_points_into_cells_of_their_ball() {
+        check_points_of_ball::<Double>(1e-9);
+        check_points_of_ball::<Single>(1e-4);
     }
 
-    /// Directions along which charts divide by zero get some cell.
+    /// Directions for which a projection divides by zero get an arbitrary cell.
     #[test]
-    fn every_direction_has_a_cell() {
+    fn light_projection_has_a_cell_for_every_direction() {
         let balls = [BoundingSphere { center: DVec3::NEG_Y * 5.0, radius: 1.0 }];
-        let (perspective, _) = perspective::<f32>(&balls).expect("it is on one side");
+        let (perspective, _) = perspective::<f32>(&balls).expect("the ball is on one side");
         for projection in [cube_map(&balls).0, perspective, orthographic(DVec3::Y, &balls).0] {
-            for to in [[1.0, 0.0, 0.0], [0.0, 1.0, -0.0], [-0.0, 0.0, -1.0], [f64::NAN; 3]] {
-                let ray = Ray { origin: Vec3::of(to), direction: Vec3::<Single>::of(to) };
+            for direction in [[1.0, 0.0, 0.0], [0.0, 1.0, -0.0], [-0.0, 0.0, -1.0], [f64::NAN; 3]] {
+                let ray =
+                    Ray { origin: Vec3::of(direction), direction: Vec3::<Single>::of(direction) };
                 let cell = projection.lookup(&ray, Single::one(), 8).0.as_array()[0];
-                assert!(cell >= 0.0 && cell < (projection.faces() * 64) as f32, "{to:?}: {cell}");
+                assert!(
+                    cell >= 0.0 && cell < (projection.faces() * 64) as f32,
+                    "{direction:?}: {cell}"
+                );
             }
         }
     }

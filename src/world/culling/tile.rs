@@ -1,6 +1,5 @@
-//! What the rays of one part of the picture may meet: the things that its camera rays see, and those
-//! that may stand between what they see and a light. Most parts see one or two things, and nothing
-//! shades them: the others are never asked.
+//! Per-tile candidate lists: primitives that primary rays can hit, and possible occluders for each
+//! light. In most tiles one or two primitives are visible and have no occluder.
 
 use crate::camera::PinholeCamera;
 use crate::lanes::{Float, SimdFloat};
@@ -12,137 +11,141 @@ use crate::world::culling::light_buffer::{LightBuffer, Occluder};
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use glam::DVec3;
 
-/// The things that some camera rays and the shadow rays from where they end may meet.
+/// Candidates of some camera rays and of the shadow rays from their hit points.
 #[derive(Clone, Debug)]
 pub struct TileCandidates {
-    /// What the camera rays may meet.
+    /// Primitives that the camera rays can hit.
     pub(crate) primary: PrimitiveSet,
-    /// For each light of the world, what shadow rays may meet.
+    /// Possible occluders for each light of the world.
     pub(crate) occluders: Vec<PrimitiveSet>,
 }
 
 impl TileCandidates {
-    /// Everything, for `lamps` lights.
-    pub(crate) fn all<L: SimdFloat>(geometry: &Aggregate<L>, lamps: usize) -> Self {
-        Self { primary: geometry.all().clone(), occluders: vec![geometry.all().clone(); lamps] }
+    /// All primitives, for `lights` lights.
+    pub(crate) fn all<L: SimdFloat>(geometry: &Aggregate<L>, lights: usize) -> Self {
+        Self { primary: geometry.all().clone(), occluders: vec![geometry.all().clone(); lights] }
     }
 }
 
-/// How the rays of a part of the picture are kept from things that they cannot meet.
+/// Source of a tile's candidates.
 pub(crate) enum CullingMode {
-    /// By a pencil of lines from the eye, and what stands between it and the lights.
+    /// The tile's view frustum, and the space between it and the lights.
     Frusta(FrustumCuller),
-    /// By rectangles on the screen.
+    /// Projected bounds of each primitive.
     ScreenBounds(Vec<ScreenBounds>),
-    /// By lists of the few things of a tree that are seen in each part of the screen.
+    /// Candidate lists of screen cells, for primitives in a BVH.
     ScreenGrid(ScreenGrid),
-    /// Not at all, or by the geometry itself.
+    /// No candidate lists; the geometry may have bounding boxes or a BVH.
     Off,
 }
 
 impl CullingMode {
-    /// What camera rays through a rectangle of the raster may meet, and the shadow rays from where they
-    /// end, to `lamps` lights; `None`: nothing is ruled out.
+    /// Returns the candidates of camera rays through a rectangle of the raster, and of shadow rays
+    /// from their hit points to `lights` lights; `None` if no primitive is ruled out.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
-        lamps: usize,
-        view: &PinholeCamera,
+        lights: usize,
+        camera: &PinholeCamera,
         (origin, extent): ([usize; 2], [usize; 2]),
     ) -> Option<TileCandidates> {
         match self {
-            Self::Frusta(surroundings) => {
-                let [_, _, forward] = view.frame();
-                let corners = view.corners(origin, extent);
-                let pencil = Frustum { apex: view.eye(), forward, corners };
-                Some(surroundings.candidates(geometry, Some(&pencil)))
+            Self::Frusta(culler) => {
+                let [_, _, forward] = camera.frame();
+                let corners = camera.corners(origin, extent);
+                let frustum = Frustum { apex: camera.eye(), forward, corners };
+                Some(culler.candidates(geometry, Some(&frustum)))
             }
-            Self::ScreenBounds(of) => {
-                let seen = geometry.select(|item| of[item as usize].overlaps(origin, extent));
-                Some(TileCandidates { primary: seen, ..TileCandidates::all(geometry, lamps) })
+            Self::ScreenBounds(bounds) => {
+                let primary =
+                    geometry.select(|item| bounds[item as usize].overlaps(origin, extent));
+                Some(TileCandidates { primary, ..TileCandidates::all(geometry, lights) })
             }
-            Self::ScreenGrid(cells) => {
-                let seen = geometry.select_indices(&cells.candidates(origin, extent)?);
-                Some(TileCandidates { primary: seen, ..TileCandidates::all(geometry, lamps) })
+            Self::ScreenGrid(grid) => {
+                let primary = geometry.select_indices(&grid.candidates(origin, extent)?);
+                Some(TileCandidates { primary, ..TileCandidates::all(geometry, lights) })
             }
             Self::Off => None,
         }
     }
 }
 
-/// What outlooks are found from.
+/// Culler by view frusta and by the space between them and the lights.
 pub(crate) struct FrustumCuller {
-    /// For each item of the geometry.
+    /// Bounds of each primitive.
     bounds: Vec<BoundingVolume>,
-    /// For each item: paths may be inside it, so that it may shade itself.
+    /// For each primitive, `true` if it may occlude lights from its own surface: it is concave, or
+    /// paths can be inside.
     self_shadowing: Vec<bool>,
-    /// For each light.
-    towards: Vec<LightTarget>,
+    /// Position or direction of each light.
+    lights: Vec<LightTarget>,
 }
 
 impl FrustumCuller {
-    /// `eye`: where paths begin; `None`: not known. `entered`: for each item, whether paths get inside
-    /// it. `off_lamps`: how far from the lamps shadow rays end at most.
+    /// Creates the culler of `forms`, one for each primitive. `eye` is the start of all camera
+    /// rays; `None` if they start elsewhere. `entered` is `true` for each primitive that paths can
+    /// be inside. `max_end_offset` is the largest distance between a light and the end point of its
+    /// shadow rays.
     pub fn new<S: Float>(
         forms: Vec<&Form>,
         eye: Option<DVec3>,
         entered: &[bool],
-        (lamps, off_lamps): (&[DeltaLight<S>], f64),
+        (lights, max_end_offset): (&[DeltaLight<S>], f64),
     ) -> Self {
-        let bound = |form: &Form| BoundingVolume::new(form).grown(off_lamps);
+        let bound = |form: &Form| BoundingVolume::new(form).grown(max_end_offset);
         let bounds: Vec<BoundingVolume> = forms.into_iter().map(bound).collect();
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
-        let towards = lamps.iter().map(|lamp| match lamp {
+        let targets = lights.iter().map(|light| match light {
             DeltaLight::InverseSquare { position } | DeltaLight::Constant { position } => {
                 LightTarget::Point(vector(position))
             }
-            DeltaLight::Directional { wi: towards } => LightTarget::Direction(vector(towards)),
+            DeltaLight::Directional { wi } => LightTarget::Direction(vector(wi)),
         });
-        // The outside of a convex thing does not see itself, and only paths that begin inside, or are
-        // let in, get inside.
+        // The outside of a convex primitive does not occlude itself. Paths are inside only if they
+        // start there or are transmitted.
         let self_shadowing = |(b, entered): (&BoundingVolume, &bool)| {
-            let holds_eye = || eye.is_none_or(|eye| b.ball().contains(eye));
-            !b.is_convex() || !b.is_flat() && (*entered || holds_eye())
+            let contains_eye = || eye.is_none_or(|eye| b.ball().contains(eye));
+            !b.is_convex() || !b.is_flat() && (*entered || contains_eye())
         };
         let self_shadowing = bounds.iter().zip(entered).map(self_shadowing).collect();
-        Self { towards: towards.collect(), self_shadowing, bounds }
+        Self { lights: targets.collect(), self_shadowing, bounds }
     }
 
-    /// For each light what shadow rays to it meet of the things in the geometry's tree.
+    /// Creates the light buffer of each light, of the primitives in the geometry's BVH.
     pub fn light_buffers<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
     ) -> Vec<Option<LightBuffer<L::Scalar>>> {
         let occluder = |item: u32| Occluder {
             ball: self.bounds[item as usize].ball(),
-            own: (!self.self_shadowing[item as usize]).then_some(item),
+            exempt_item: (!self.self_shadowing[item as usize]).then_some(item),
         };
         let occluders: Vec<Occluder> = geometry.in_tree().into_iter().map(occluder).collect();
-        self.towards.iter().map(|towards| LightBuffer::new(towards, &occluders)).collect()
+        self.lights.iter().map(|light| LightBuffer::new(light, &occluders)).collect()
     }
 
-    /// The outlook of camera rays inside `pencil`; `None`: of any rays.
+    /// Returns the candidates of camera rays inside `frustum`; of any rays, if it is `None`.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
-        pencil: Option<&Frustum>,
+        frustum: Option<&Frustum>,
     ) -> TileCandidates {
-        let part = |bound: &BoundingVolume| match pencil {
-            Some(pencil) => bound.clip_to(pencil),
+        let visible_part = |bound: &BoundingVolume| match frustum {
+            Some(frustum) => bound.clip_to(frustum),
             None => Some(bound.ball()),
         };
-        let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(part).collect();
-        let seen = geometry.select(|item| parts[item as usize].is_some());
-        let shades = |item: usize, towards: &LightTarget| {
-            let lit = |(other, part): (usize, &Option<BoundingSphere>)| {
+        let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(visible_part).collect();
+        let primary = geometry.select(|item| parts[item as usize].is_some());
+        let may_occlude = |item: usize, light: &LightTarget| {
+            let may_occlude_part = |(other, part): (usize, &Option<BoundingSphere>)| {
                 part.is_some_and(|part| {
                     (other != item || self.self_shadowing[item])
-                        && self.bounds[item].may_occlude(&part, towards)
+                        && self.bounds[item].may_occlude(&part, light)
                 })
             };
-            parts.iter().enumerate().any(lit)
+            parts.iter().enumerate().any(may_occlude_part)
         };
-        let of_light = |towards| geometry.select(|item| shades(item as usize, towards));
-        TileCandidates { primary: seen, occluders: self.towards.iter().map(of_light).collect() }
+        let occluders_of = |light| geometry.select(|item| may_occlude(item as usize, light));
+        TileCandidates { primary, occluders: self.lights.iter().map(occluders_of).collect() }
     }
 }

@@ -1,39 +1,40 @@
-//! Surfaces that lie on each other, such as the bottom of a glass and the table that it stands on.
+//! Coincident surfaces, such as the bottom of a glass and the table on which it rests.
 //!
-//! Rounding decides which of them a ray meets first, and a ray that leaves one of them begins beyond the
-//! others. So where at least one of two surfaces lets light through, paths pass them one after the other,
-//! as if there were a gap of no width between the things: a ray leaves the solids that it is inside, meets
-//! what is flat, and enters the solids behind. Of solids on the same side of the place, transparent ones
-//! lie outside of opaque ones, and transparent ones outside of those that are listed before them; flat
-//! transparent things lie on both sides of opaque ones.
+//! Rounding decides which of two coincident surfaces a ray hits first, and a ray that leaves one of
+//! them starts beyond the others. Where at least one of the surfaces transmits, paths therefore
+//! cross them one after the other, as if there were a gap of zero width between the primitives: a
+//! ray leaves the solids that it is inside, crosses flat primitives, and enters the solids behind.
+//! Of solids on the same side of the contact, transparent ones are outside of opaque ones, and
+//! later listed transparent ones outside of earlier ones. Flat transparent primitives are on both
+//! sides of opaque ones.
 //!
-//! Each surface has a layer: places in the order along the ray's way. Leaving a solid is below zero,
-//! entering it above, so that a ray that turns back has the layers' signs changed. Which things may touch
-//! is known before any ray: nothing is asked where a path meets others.
+//! Each surface has a layer, its position in the order along the ray. Exits of solids have negative
+//! layers, entries positive ones; for a ray of the opposite direction the signs change. Pairs of
+//! primitives that may touch are found at compilation, so that hits on other primitives cost no
+//! lookup.
 
 use crate::bvh::Ray;
-use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
 use crate::primitive::{Aggregate, Form, PrimitiveId};
 use crate::world::integrator::nested_dielectrics::MediumStack;
-use crate::world::integrator::opaque::next_distinct;
 use glam::DVec3;
 
-/// Surfaces that are so many roundings of the largest coordinate apart lie on each other, as the parts of a
-/// compound do.
+/// Distance of coincident surfaces, in roundings of the largest coordinate. Parts of compounds have
+/// the same.
 const TIE: f64 = 16.0;
 
-/// Rays leave such surfaces so many ties off.
-const LIFT: f64 = 1.5;
+/// Offset of ray origins from coincident surfaces, in ties.
+const OFFSET_TIES: f64 = 1.5;
 
-/// The least cosine between the normals of surfaces that lie on each other.
-const PARALLEL: f64 = 0.5;
+/// Smallest cosine between the normals of coincident surfaces.
+const MIN_COSINE: f64 = 0.5;
 
-/// How an item lies among others.
+/// Kind of a surface, which determines its layer.
 #[derive(Clone, Copy, Debug)]
 enum SurfaceKind {
-    /// The surface of a transparent solid of this rank.
+    /// Boundary of a transparent solid with this priority.
     Transparent(u32),
-    /// The surface of an opaque solid.
+    /// Boundary of an opaque solid.
     Opaque,
     /// Flat and transparent.
     Pane,
@@ -41,92 +42,93 @@ enum SurfaceKind {
     Sheet,
 }
 
-/// An item that may lie on another one.
+/// A primitive that may touch another one.
 #[derive(Clone, Copy, Debug)]
 struct Contact<S> {
-    /// The first part of it, if it is a compound.
+    /// Id of the primitive; of a compound, that of its first part.
     item: u32,
-    /// Half the width within which surfaces lie on each other.
+    /// Half the distance within which surfaces are coincident.
     tie: S,
-    /// A box around it, endless where it is.
+    /// Bounding box, infinite where the primitive is unbounded.
     low: [S; 3],
     high: [S; 3],
 }
 
 impl<S: Float> Contact<S> {
     fn new(item: u32, form: &Form, tie: f64) -> Self {
-        let (low, high) = extent(form);
+        let (low, high) = unbounded_box(form);
         let [low, high] = [low, high].map(|corner| corner.to_array().map(S::from_f64));
         Self { item, tie: S::from_f64(tie), low, high }
     }
 
-    /// Half the width within which surfaces lie on each other at points that are rounded to `rounding` / `TIE`.
+    /// Half the distance within which surfaces are coincident at points with the given
+    /// [`rounding`].
     #[inline(always)]
     fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
         rounding.max(L::splat(self.tie))
     }
 
-    /// SimdFloat whose point may be on it. What is found within one tie of a point is itself found to some roundings,
-    /// far less than the other tie.
+    /// Mask of lanes whose point may be on the primitive. One tie is the search distance; the other
+    /// covers the rounding of the search, which is far smaller.
     #[inline(always)]
     fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
-        let beyond =
+        let distance =
             |p: L, axis: usize| (L::splat(self.low[axis]) - p).max(p - L::splat(self.high[axis]));
-        let beyond = beyond(point.x, 0).max(beyond(point.y, 1)).max(beyond(point.z, 2));
+        let distance = distance(point.x, 0).max(distance(point.y, 1)).max(distance(point.z, 2));
         let tie = self.tie(rounding);
-        beyond.le(tie + tie)
+        distance.le(tie + tie)
     }
 }
 
-/// Rounding of the coordinates of points, `TIE` times.
+/// Rounding of the points' coordinates, times [`TIE`].
 #[inline(always)]
 fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
     point.max_abs() * L::from_f64(TIE * L::EPSILON)
 }
 
-/// The things of a world that may touch.
+/// Pairs of primitives that may touch, at least one of each pair transmissive.
 pub(crate) struct Contacts<S> {
-    /// For each item.
-    of: Vec<Vec<Contact<S>>>,
-    /// For each item its kind and the distance of its layer from zero.
+    /// Contacts of each primitive.
+    contacts: Vec<Vec<Contact<S>>>,
+    /// Kind of each primitive, and the magnitude of its layer.
     kinds: Vec<(SurfaceKind, S)>,
 }
 
-/// Where rays begin on surfaces that lie on others.
+/// State of rays that start on a surface that may coincide with others.
 #[derive(Clone, Copy)]
 pub(crate) struct CoincidentState<L: SimdFloat> {
-    /// Lanes where they do.
+    /// Lanes that do.
     pub lanes: L::Mask,
-    /// Tag of the item.
+    /// Ids of the primitives.
     pub item: L,
-    /// A point of it.
+    /// Points on them.
     pub point: Vec3<L>,
-    /// Unit normal on the side to which the rays go.
+    /// Unit normals on the side to which the rays go.
     pub axis: Vec3<L>,
-    /// Its layer.
+    /// Layers of the surfaces.
     pub layer: L,
 }
 
-/// Surfaces in a layer.
+/// Result of a search for the next coincident surface.
 pub(crate) struct CoincidentQuery<L: SimdFloat> {
-    /// Lanes where there is one.
+    /// Lanes with such a surface.
     pub lanes: L::Mask,
-    /// Lanes where something lies on the surface at hand.
+    /// Lanes whose current surface touches another one.
     pub touching: L::Mask,
     pub item: L,
-    pub facet: L,
+    pub triangle: L,
     pub layer: L,
-    /// How far off rays start that leave it.
-    pub lift: L,
+    /// Offset of the origins of rays that leave it.
+    pub offset: L,
 }
 
 impl<L: SimdFloat> CoincidentState<L> {
-    /// The rays turn back.
+    /// Returns the state of rays in the opposite direction.
     pub fn reversed(&self) -> Self {
         Self { axis: -self.axis, layer: -self.layer, ..*self }
     }
 
-    /// `yes` where `mask` is true, `no` elsewhere; the lanes are those of `no`.
+    /// `yes` where `mask` is true, `no` elsewhere, with the lanes of `no`.
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self {
             lanes: no.lanes,
@@ -139,26 +141,28 @@ impl<L: SimdFloat> CoincidentState<L> {
 }
 
 impl<S: Float> Contacts<S> {
-    /// Of `forms`, whose coordinates are rounded to `epsilon` and were given with the error `given`.
-    /// `transparent`: for each of the items that `sources` lists, whether it lets light through; `rank_of`:
-    /// the rank of the transparent solid that it bounds. `None`: nothing touches anything transparent.
+    /// Finds the contacts of `forms`, whose coordinates are rounded to `epsilon` and have the error
+    /// `input_error` in the scene file. `transparent` is `true` for primitives that transmit;
+    /// `priority_of` are the priorities of the transparent solids that they bound. Returns `None`
+    /// if no transmissive primitive touches another one.
     pub fn new(
         forms: &[Form],
-        sources: &[PrimitiveId],
-        (transparent, rank_of): (&[bool], &[u32]),
-        (epsilon, given): (f64, f64),
+        primitives: &[PrimitiveId],
+        (transparent, priority_of): (&[bool], &[u32]),
+        (epsilon, input_error): (f64, f64),
     ) -> Option<Self> {
         let mut first = vec![0; forms.len()];
-        let mut lets_through = vec![false; forms.len()];
-        for (item, source) in (0..).zip(sources) {
+        let mut transmits = vec![false; forms.len()];
+        for (item, source) in (0..).zip(primitives) {
             if source.part == 0 {
                 first[source.form] = item;
             }
-            lets_through[source.form] |= transparent[item as usize];
+            transmits[source.form] |= transparent[item as usize];
         }
         let mut touching = vec![Vec::new(); forms.len()];
-        for (a, b) in pairs(forms, |a, b| lets_through[a] || lets_through[b]) {
-            let rounding = (epsilon * reach(&forms[a]).max(reach(&forms[b]))).max(given);
+        for (a, b) in pairs(forms, |a, b| transmits[a] || transmits[b]) {
+            let rounding = (epsilon * max_coordinate(&forms[a]).max(max_coordinate(&forms[b])))
+                .max(input_error);
             if may_touch(&forms[a], &forms[b], 4.0 * TIE * rounding) {
                 let tie = TIE * rounding;
                 touching[a].push(Contact::new(first[b], &forms[b], tie));
@@ -173,21 +177,24 @@ impl<S: Float> Contacts<S> {
             let flat =
                 matches!(forms[source.form], Form::Parallelogram { .. } | Form::Plane { .. });
             let number = source.form as f64;
-            let (kind, layer) = match (rank_of[item], flat, transparent[item]) {
+            let (kind, layer) = match (priority_of[item], flat, transparent[item]) {
                 (0, true, true) => (SurfaceKind::Pane, 1.0 + number),
                 (0, true, false) => (SurfaceKind::Sheet, 0.0),
                 (0, false, _) => (SurfaceKind::Opaque, 4.0 * count + number),
-                (rank, ..) => (SurfaceKind::Transparent(rank), 3.0 * count - f64::from(rank)),
+                (priority, ..) => {
+                    (SurfaceKind::Transparent(priority), 3.0 * count - f64::from(priority))
+                }
             };
             (kind, S::from_f64(layer))
         };
-        let kinds = sources.iter().enumerate().map(kind).collect();
-        let of = sources.iter().map(|source| touching[source.form].clone()).collect();
-        Some(Self { of, kinds })
+        let kinds = primitives.iter().enumerate().map(kind).collect();
+        let contacts = primitives.iter().map(|id| touching[id.form].clone()).collect();
+        Some(Self { contacts, kinds })
     }
 
-    /// Of `lanes`, with a `point` of one of the `items` each, those where anything may lie on it. Most surfaces touch
-    /// others in few places masked: the boxes of these tell.
+    /// Mask of `lanes`, each with a `point` on one of `items`, where another primitive may touch.
+    /// Most primitives touch others in few places only, which the bounding boxes of the others
+    /// limit.
     #[inline(always)]
     pub fn near<L: SimdFloat<Scalar = S>>(
         &self,
@@ -196,120 +203,126 @@ impl<S: Float> Contacts<S> {
         lanes: L::Mask,
     ) -> L::Mask {
         let rounding = rounding(point);
-        let (mut near, mut left) = (L::mask(false), lanes);
-        while let Some((item, here)) = next_distinct(items, left) {
-            for contact in &self.of[item as usize] {
-                near = near | (here & contact.is_near(point, rounding));
+        let (mut near, mut remaining) = (L::mask(false), lanes);
+        while let Some((item, item_lanes)) = next_distinct(items, remaining) {
+            for contact in &self.contacts[item as usize] {
+                near = near | (item_lanes & contact.is_near(point, rounding));
             }
-            left = left.and_not(here);
+            remaining = remaining.and_not(item_lanes);
         }
         near
     }
 
-    /// The layer of `item` for rays that come to it from `before`; `leaves`: those that go where its
-    /// normal points to.
+    /// Layer of `item` for rays that come from the layer `before`. `leaves` selects rays in the
+    /// direction of its outward normal.
     fn layer<L: SimdFloat<Scalar = S>>(&self, item: u32, leaves: L::Mask, before: L) -> L {
         let (kind, layer) = &self.kinds[item as usize];
         let layer = L::splat(*layer);
-        let below = match kind {
+        let is_negative = match kind {
             SurfaceKind::Pane => before.lt(L::zero()),
             SurfaceKind::Sheet => return L::zero(),
             SurfaceKind::Transparent(_) | SurfaceKind::Opaque => leaves,
         };
-        L::select(below, -layer, layer)
+        L::select(is_negative, -layer, layer)
     }
 
-    /// The first surface behind the one that rays begin on, of those that lie on it. `inside`: what the
-    /// rays are inside.
+    /// Finds the first surface behind the one on which rays start, among those that coincide with
+    /// it. `media` are those of the rays.
     pub fn next<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
         coincident: &CoincidentState<L>,
-        inside: &MediumStack<L>,
+        media: &MediumStack<L>,
     ) -> CoincidentQuery<L> {
         let mut out = CoincidentQuery {
             lanes: L::mask(false),
             touching: L::mask(false),
             item: coincident.item,
-            facet: L::from_id(0),
+            triangle: L::from_id(0),
             layer: L::from_f64(L::MAX),
-            lift: L::zero(),
+            offset: L::zero(),
         };
-        self.search(geometry, coincident, inside, &mut out);
+        self.search(geometry, coincident, media, &mut out);
         out
     }
 
-    /// The surface that rays meet first of the one that `coincident` says and those that lie on it; the seam's
-    /// layer means nothing. `leaves`: lanes that go where the normal of the seam's item points to.
+    /// Finds the first surface along the rays among that of `coincident`, whose layer is ignored,
+    /// and those that coincide with it. `leaves` selects rays in the direction of its outward
+    /// normal.
     pub fn first<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
         coincident: &CoincidentState<L>,
         leaves: L::Mask,
-        inside: &MediumStack<L>,
+        media: &MediumStack<L>,
     ) -> CoincidentQuery<L> {
         let before = L::from_f64(-L::MAX);
         let mut layer = L::zero();
-        let mut left = coincident.lanes;
-        while let Some((item, here)) = next_distinct(coincident.item, left) {
-            layer = L::select(here, self.layer(item, leaves, before), layer);
-            left = left.and_not(here);
+        let mut remaining = coincident.lanes;
+        while let Some((item, item_lanes)) = next_distinct(coincident.item, remaining) {
+            layer = L::select(item_lanes, self.layer(item, leaves, before), layer);
+            remaining = remaining.and_not(item_lanes);
         }
         let mut out = CoincidentQuery {
             lanes: L::mask(false),
             touching: L::mask(false),
             item: coincident.item,
-            facet: L::from_id(0),
+            triangle: L::from_id(0),
             layer,
-            lift: L::zero(),
+            offset: L::zero(),
         };
-        self.search(geometry, &CoincidentState { layer: before, ..*coincident }, inside, &mut out);
+        self.search(geometry, &CoincidentState { layer: before, ..*coincident }, media, &mut out);
         out
     }
 
-    /// Puts into `out` what comes before its layer and behind that of `coincident`.
+    /// Replaces `out` by the first surface between the layers of `coincident` and `out`.
     #[inline(never)]
     fn search<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
         coincident: &CoincidentState<L>,
-        inside: &MediumStack<L>,
+        media: &MediumStack<L>,
         out: &mut CoincidentQuery<L>,
     ) {
         let rounding = rounding(coincident.point);
-        let mut left = coincident.lanes;
-        while let Some((item, here)) = next_distinct(coincident.item, left) {
-            left = left.and_not(here);
-            for contact in &self.of[item as usize] {
-                let here = here & contact.is_near(coincident.point, rounding);
-                if here.none() {
+        let mut remaining = coincident.lanes;
+        while let Some((item, item_lanes)) = next_distinct(coincident.item, remaining) {
+            remaining = remaining.and_not(item_lanes);
+            for contact in &self.contacts[item as usize] {
+                let near = item_lanes & contact.is_near(coincident.point, rounding);
+                if near.none() {
                     continue;
                 }
-                // Along the normal, through the point: so the angle of the ray does not matter.
+                // The search ray runs along the normal through the point, independent of the angle
+                // of the path's ray.
                 let tie = contact.tie(rounding);
                 let origin = coincident.axis.mul_add(-tie, coincident.point);
-                let limit = L::select(here, tie + tie, L::from_f64(-1.0));
+                let limit = L::select(near, tie + tie, L::from_f64(-1.0));
                 let ray = Ray { origin, direction: coincident.axis };
                 let hit = geometry.closest_to(contact.item, &ray, limit);
-                let mut met = here & hit.t.lt(limit);
-                while let Some((other, these)) = next_distinct(hit.item, met) {
-                    met = met.and_not(these);
+                let mut found = near & hit.t.lt(limit);
+                while let Some((other, other_lanes)) = next_distinct(hit.item, found) {
+                    found = found.and_not(other_lanes);
                     let normal = geometry.surface(other, hit.triangle, coincident.point).normal;
                     let cosine = normal.dot(coincident.axis);
                     let leaves = cosine.gt(L::zero());
-                    let mut these = these & cosine.abs().gt(L::from_f64(PARALLEL));
-                    if let (SurfaceKind::Transparent(rank), _) = &self.kinds[other as usize] {
-                        // What a path is not inside of it cannot leave.
-                        let within = inside.contains(L::from_f64(f64::from(*rank)));
-                        these = these & ((within & leaves) | (!within & !leaves));
+                    let mut parallel = other_lanes & cosine.abs().gt(L::from_f64(MIN_COSINE));
+                    if let (SurfaceKind::Transparent(priority), _) = &self.kinds[other as usize] {
+                        // A path leaves only solids that it is inside, and enters only others.
+                        let within = media.contains(L::from_f64(f64::from(*priority)));
+                        parallel = parallel & ((within & leaves) | (!within & !leaves));
                     }
                     let layer = self.layer(other, leaves, coincident.layer);
-                    out.touching = out.touching | these;
-                    out.lift = L::select(these, out.lift.max(tie * L::from_f64(LIFT)), out.lift);
-                    let nearer = these & layer.gt(coincident.layer) & layer.lt(out.layer);
+                    out.touching = out.touching | parallel;
+                    out.offset = L::select(
+                        parallel,
+                        out.offset.max(tie * L::from_f64(OFFSET_TIES)),
+                        out.offset,
+                    );
+                    let nearer = parallel & layer.gt(coincident.layer) & layer.lt(out.layer);
                     out.lanes = out.lanes | nearer;
                     out.item = L::select(nearer, L::from_id(other), out.item);
-                    out.facet = L::select(nearer, hit.triangle, out.facet);
+                    out.triangle = L::select(nearer, hit.triangle, out.triangle);
                     out.layer = L::select(nearer, layer, out.layer);
                 }
             }
@@ -317,61 +330,63 @@ impl<S: Float> Contacts<S> {
     }
 }
 
-/// Largest magnitude of a coordinate that its surface is computed from.
-fn reach(form: &Form) -> f64 {
+/// Returns the largest magnitude of a coordinate from which a form's surface is computed.
+fn max_coordinate(form: &Form) -> f64 {
     match form {
         Form::Plane { offset, .. } => offset.abs(),
         _ => form.bounds().map_or(0.0, |(low, high)| low.abs().max(high.abs()).max_element()),
     }
 }
 
-/// The box around a form, endless where the form is; of a plane across an axis its place there.
-fn extent(form: &Form) -> (DVec3, DVec3) {
+/// Returns the bounding box of a form, infinite where the form is unbounded. Planes perpendicular
+/// to an axis are bounded along it.
+fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
     let (low, high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
     match form {
         Form::Plane { normal, offset } => {
-            let at = *normal * *offset;
-            let across = |axis: &DVec3| normal.dot(*axis).abs() == 1.0;
-            DVec3::AXES.iter().find(|axis| across(axis)).map_or((low, high), |axis| {
-                let here = axis.cmpne(DVec3::ZERO);
-                (DVec3::select(here, at, low), DVec3::select(here, at, high))
+            let point = *normal * *offset;
+            let is_normal = |axis: &DVec3| normal.dot(*axis).abs() == 1.0;
+            DVec3::AXES.iter().find(|axis| is_normal(axis)).map_or((low, high), |axis| {
+                let bounded = axis.cmpne(DVec3::ZERO);
+                (DVec3::select(bounded, point, low), DVec3::select(bounded, point, high))
             })
         }
         _ => form.bounds().unwrap_or((low, high)),
     }
 }
 
-/// The pairs of forms for which `wanted` is true and whose boxes overlap, or come close.
+/// Returns the pairs of forms for which `wanted` is true and whose bounding boxes overlap or nearly
+/// do, sorted.
 fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
     let mut out = Vec::new();
-    let endless = (DVec3::NEG_INFINITY, DVec3::INFINITY);
+    let infinite = (DVec3::NEG_INFINITY, DVec3::INFINITY);
     let slack = 1e-5;
-    let around = |form: &Form| {
-        form.bounds().map_or(endless, |(low, high)| {
-            let room = slack * low.abs().max(high.abs()).max_element();
-            (low - room, high + room)
+    let padded_box = |form: &Form| {
+        form.bounds().map_or(infinite, |(low, high)| {
+            let margin = slack * low.abs().max(high.abs()).max_element();
+            (low - margin, high + margin)
         })
     };
-    let boxes: Vec<_> = forms.iter().map(around).collect();
+    let boxes: Vec<_> = forms.iter().map(padded_box).collect();
     let mut order: Vec<usize> = (0..forms.len()).collect();
     order.sort_by(|a, b| boxes[*a].0.x.total_cmp(&boxes[*b].0.x));
     for (i, a) in order.iter().enumerate() {
         let (low, high) = boxes[*a];
         for b in order[i + 1..].iter().take_while(|b| boxes[**b].0.x <= high.x) {
-            let apart = boxes[*b].0.cmpgt(high).any() || boxes[*b].1.cmplt(low).any();
-            if !apart && wanted(*a, *b) {
+            let disjoint = boxes[*b].0.cmpgt(high).any() || boxes[*b].1.cmplt(low).any();
+            if !disjoint && wanted(*a, *b) {
                 out.push((*a.min(b), *a.max(b)));
             }
         }
     }
-    // The order of the list, so that nothing depends on places.
+    // The order of the scene's list is independent of positions.
     out.sort_unstable();
     out
 }
 
-/// The least and the largest of `axis . p` over a form, or beyond; `None`: it has no end there.
+/// Returns conservative bounds of `axis . p` over a form; `None` if it is unbounded along `axis`.
 fn span(form: &Form, axis: DVec3) -> Option<(f64, f64)> {
-    let around = |points: &[DVec3]| {
+    let span_of_points = |points: &[DVec3]| {
         let heights = points.iter().map(|p| axis.dot(*p));
         (heights.clone().fold(f64::INFINITY, f64::min), heights.fold(f64::NEG_INFINITY, f64::max))
     };
@@ -379,9 +394,9 @@ fn span(form: &Form, axis: DVec3) -> Option<(f64, f64)> {
         Form::Sphere { center, radius } => {
             Some((axis.dot(*center) - radius, axis.dot(*center) + radius))
         }
-        Form::ConvexPolyhedron { corners, .. } => Some(around(corners)),
+        Form::ConvexPolyhedron { corners, .. } => Some(span_of_points(corners)),
         Form::Parallelogram { corner, u, v } => {
-            Some(around(&[*corner, corner + u, corner + v, corner + u + v]))
+            Some(span_of_points(&[*corner, corner + u, corner + v, corner + u + v]))
         }
         Form::Plane { normal, offset } => {
             let along = normal.dot(axis);
@@ -390,31 +405,31 @@ fn span(form: &Form, axis: DVec3) -> Option<(f64, f64)> {
         }
         _ => {
             let (low, high) = form.bounds()?;
-            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-            let (at, reach) = (axis.dot(middle), axis.abs().dot(half));
-            Some((at - reach, at + reach))
+            let (center, half) = (0.5 * (low + high), 0.5 * (high - low));
+            let (middle, half_span) = (axis.dot(center), axis.abs().dot(half));
+            Some((middle - half_span, middle + half_span))
         }
     }
 }
 
-/// Whether surfaces of two forms may come within `slack` of each other.
+/// Returns `true` if the surfaces of two forms may come within `slack` of each other.
 fn may_touch(a: &Form, b: &Form, slack: f64) -> bool {
     let normal = |form: &Form| match form {
         Form::Parallelogram { u, v, .. } => Some(u.cross(*v).normalize()),
         Form::Plane { normal, .. } => Some(*normal),
         _ => None,
     };
-    let apart = |axis: DVec3| match (span(a, axis), span(b, axis)) {
+    let separated = |axis: DVec3| match (span(a, axis), span(b, axis)) {
         (Some(a), Some(b)) => a.0 > b.1 + slack || b.0 > a.1 + slack,
         _ => false,
     };
-    if DVec3::AXES.into_iter().chain(normal(a)).chain(normal(b)).any(apart) {
+    if DVec3::AXES.into_iter().chain(normal(a)).chain(normal(b)).any(separated) {
         return false;
     }
     if let (Form::Sphere { center, radius }, Form::Sphere { center: other, radius: size }) = (a, b)
     {
         let distance = center.distance(*other);
-        // Beside each other, or one inside the other.
+        // The balls touch side by side, or one inside the other.
         return distance <= radius + size + slack && distance + slack >= (radius - size).abs();
     }
     true
@@ -426,7 +441,7 @@ mod tests {
     use crate::shape::Shape;
 
     #[test]
-    fn only_what_touches_is_paired() {
+    fn contacts_are_pairs_of_touching_forms() {
         let ball = |y: f64, radius| Form::Sphere { center: DVec3::new(0.0, y, 0.0), radius };
         let plane = |normal: DVec3, offset| Form::Plane { normal, offset };
         let cube = Shape::fitted_to("cube", DVec3::ZERO, DVec3::ONE).unwrap().form();

@@ -1,82 +1,77 @@
-//! What the camera sees in one direction: for picking, and for views other than the picture.
+//! First hits of camera rays: features for picking and for views other than the picture.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::world::compile::World;
+use crate::world::world::World;
 
-/// The first thing on a camera ray.
+/// Features of the first hit of a camera ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstHit {
-    /// Number in the scene's list of objects; `None`: the background.
+    /// Index in the scene's list of objects; `None` for the background.
     pub object: Option<u32>,
-    /// Distance from the eye to the point seen, in scene units; infinite for the background.
+    /// Distance from the eye to the hit point in scene units; infinite for the background.
     pub depth: f32,
-    /// Unit geometric normal there in scene axes, on the side that is seen; zero for the background.
+    /// Unit geometric normal in scene axes, on the visible side; zero for the background.
     pub normal: [f32; 3],
-    /// Whether the surface reflects, on the side that is seen.
+    /// `true` if the visible side of the surface reflects rays.
     pub reflects: bool,
 }
 
 impl FirstHit {
-    /// Nothing but background.
+    /// A miss.
     pub const MISS: Self =
         Self { object: None, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
 }
 
-impl<L: SimdFloat> World<L> {
-    /// What the camera sees through each of `points` of the raster (columns and rows in pixels, with
-    /// fractions), into `seen` of the same length.
-    pub fn first_hit(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
-        for (points, seen) in points.chunks(L::WIDTH).zip(seen.chunks_mut(L::WIDTH)) {
-            self.look_at(points, seen);
-        }
-    }
-
-    /// At most one packet of it.
-    fn look_at(&self, points: &[[f64; 2]], seen: &mut [FirstHit]) {
-        let point = |lane: usize| points[lane.min(points.len() - 1)];
-        let base = Vec3::from_fn(|lane| {
-            self.view.pixel_corner_direction(point(lane).map(|c| c as u32).into())
-        });
-        let within = |axis: usize| {
-            L::from_fn(|lane| L::Scalar::from_f64(point(lane)[axis] - point(lane)[axis].floor()))
-        };
-        let (origin, direction) = self.view.rays(base, (within(0), within(1)));
-        let ray = Ray { origin, direction };
-        let hit = self.geometry.closest(&ray, self.geometry.all());
-        let at = ray.at(hit.t);
-        let eye = Vec3::of(self.view.eye().to_array());
-        let from_eye = at - eye;
-        let depth = from_eye.dot(from_eye).sqrt();
-        seen.fill(FirstHit::MISS);
-        let mut left = hit.t.lt(L::from_f64(L::MAX)).bits() & lanes_below(points.len());
-        while left != 0 {
-            let item = hit.item.id_lane(left.trailing_zeros() as usize);
-            let here = hit.item.id_eq(item).bits() & left;
-            left &= !here;
-            let normal = self.geometry.surface(item, hit.triangle, at).normal;
-            let facing = normal.dot(direction);
-            let finish = &self.bsdfs[self.bsdf_of[item as usize] as usize];
-            for (lane, sight) in seen.iter_mut().enumerate().filter(|(l, _)| here >> l & 1 != 0) {
-                let front = facing.lane(lane).to_f64() < 0.0;
-                let side = if front { 1.0 } else { -1.0 };
-                let axis = |c: L| (side * c.lane(lane).to_f64()) as f32;
-                *sight = FirstHit {
-                    object: Some(self.geometry.sources()[item as usize].form as u32),
-                    depth: depth.lane(lane).to_f64() as f32,
-                    normal: [axis(normal.x), axis(normal.y), axis(normal.z)],
-                    reflects: self.depth > 0
-                        && finish.reflection.is_some()
-                        && (front || finish.two_sided),
-                };
-            }
-        }
+/// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the same
+/// length. Points are columns and rows of the raster in pixels, with fractions.
+pub(crate) fn trace_first_hits<L: SimdFloat>(
+    world: &World<L>,
+    points: &[[f64; 2]],
+    hits: &mut [FirstHit],
+) {
+    for (points, hits) in points.chunks(L::WIDTH).zip(hits.chunks_mut(L::WIDTH)) {
+        trace_packet(world, points, hits);
     }
 }
 
-/// The first `count` lanes, as bits.
-fn lanes_below(count: usize) -> u32 {
-    (1 << count) - 1
+/// Writes the first hits of at most `WIDTH` camera rays.
+fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut [FirstHit]) {
+    let point = |lane: usize| points[lane.min(points.len() - 1)];
+    let corner_directions = Vec3::from_fn(|lane| {
+        world.camera.pixel_corner_direction(point(lane).map(|c| c as u32).into())
+    });
+    let offset = |axis: usize| {
+        L::from_fn(|lane| L::Scalar::from_f64(point(lane)[axis] - point(lane)[axis].floor()))
+    };
+    let (origin, direction) = world.camera.rays(corner_directions, (offset(0), offset(1)));
+    let ray = Ray { origin, direction };
+    let hit = world.geometry.closest(&ray, world.geometry.all());
+    let hit_points = ray.at(hit.t);
+    let from_eye = hit_points - Vec3::of(world.camera.eye().to_array());
+    let depth = from_eye.dot(from_eye).sqrt();
+    hits.fill(FirstHit::MISS);
+    let valid_lanes = (1 << points.len()) - 1;
+    let mut remaining = hit.t.lt(L::from_f64(L::MAX)).bits() & valid_lanes;
+    while remaining != 0 {
+        let item = hit.item.id_lane(remaining.trailing_zeros() as usize);
+        let lanes = hit.item.id_eq(item).bits() & remaining;
+        remaining &= !lanes;
+        let normal = world.geometry.surface(item, hit.triangle, hit_points).normal;
+        let facing = normal.dot(direction);
+        let bsdf = &world.bsdfs[world.bsdf_of[item as usize] as usize];
+        for (lane, hit) in hits.iter_mut().enumerate().filter(|(l, _)| lanes >> l & 1 != 0) {
+            let front = facing.lane(lane).to_f64() < 0.0;
+            let side = if front { 1.0 } else { -1.0 };
+            let axis = |c: L| (side * c.lane(lane).to_f64()) as f32;
+            *hit = FirstHit {
+                object: Some(world.geometry.sources()[item as usize].form as u32),
+                depth: depth.lane(lane).to_f64() as f32,
+                normal: [axis(normal.x), axis(normal.y), axis(normal.z)],
+                reflects: world.depth > 0 && bsdf.reflection.is_some() && (front || bsdf.two_sided),
+            };
+        }
+    }
 }
 
 #[cfg(test)]
@@ -110,33 +105,33 @@ mod tests {
 
     fn first_hit<L: SimdFloat>(points: &[[f64; 2]]) -> Vec<FirstHit> {
         let world = World::<L>::new(&Scene::parse(SCENE, "test").unwrap());
-        let mut seen = vec![FirstHit::MISS; points.len()];
-        world.first_hit(points, &mut seen);
-        seen
+        let mut hits = vec![FirstHit::MISS; points.len()];
+        world.first_hit(points, &mut hits);
+        hits
     }
 
-    /// One unit of the picture plane is 10 pixels; the planes of the things are 5 units away.
+    /// One unit of the picture plane is 10 pixels; the rectangles are 5 units away.
     #[test]
-    fn the_camera_sees_objects_distances_and_normals() {
+    fn first_hits_have_objects_distances_and_normals() {
         let points = [[15.0, 10.0], [21.0, 10.0], [9.0, 10.0], [15.0, 0.5], [21.0, 19.9]];
-        for seen in
+        for hits in
             [first_hit::<Single>(&points), first_hit::<Double>(&points), first_hit::<f64>(&points)]
         {
-            let objects: Vec<_> = seen.iter().map(|s| s.object).collect();
+            let objects: Vec<_> = hits.iter().map(|s| s.object).collect();
             assert_eq!(objects, [Some(0), Some(1), Some(2), None, Some(1)]);
-            assert_eq!(seen[3], FirstHit::MISS);
+            assert_eq!(hits[3], FirstHit::MISS);
             assert_eq!(
-                seen.iter().map(|s| s.reflects).collect::<Vec<_>>(),
+                hits.iter().map(|s| s.reflects).collect::<Vec<_>>(),
                 [false, true, false, false, true]
             );
-            // Backs show the side that is seen.
-            for sight in [seen[0], seen[1], seen[2]] {
-                let [x, y, z] = sight.normal;
-                assert!(x.abs() < 1e-5 && y.abs() < 1e-5 && (z - 1.0).abs() < 1e-5, "{sight:?}");
+            // Normals of backs point to the visible side.
+            for hit in [hits[0], hits[1], hits[2]] {
+                let [x, y, z] = hit.normal;
+                assert!(x.abs() < 1e-5 && y.abs() < 1e-5 && (z - 1.0).abs() < 1e-5, "{hit:?}");
             }
             let distances = [4.0, 5.0 * (1.0f32 + 0.36).sqrt()];
-            for (sight, distance) in seen.iter().zip(distances) {
-                assert!((sight.depth - distance).abs() < 1e-4, "{sight:?} {distance}");
+            for (hit, distance) in hits.iter().zip(distances) {
+                assert!((hit.depth - distance).abs() < 1e-4, "{hit:?} {distance}");
             }
         }
     }

@@ -1,8 +1,11 @@
 //! Integrators: radiance along camera rays.
 
 pub(crate) mod coincident_surfaces;
+pub(crate) mod direct_lighting;
 pub(crate) mod first_hit;
+pub(crate) mod interaction;
 pub(crate) mod nested_dielectrics;
 pub(crate) mod opaque;
+pub(crate) mod path;
 pub(crate) mod surface_textures;
 pub(crate) mod transmission;

@@ -1,67 +1,70 @@
-//! What paths are inside of: transparent solids, several of which may hold one point.
+//! Nested dielectrics with priorities (Schmidt and Budge 2002, *Simple Nested Dielectrics in Ray
+//! Traced Images*).
 //!
-//! Where solids overlap, the one that the scene lists last fills the common space; the surfaces of the
-//! others are not there. So a bubble is listed after its ball, and water may reach a little into the wall
-//! of the glass that is listed after it. Light that leaves the last solid is outside, where the index of
-//! refraction is 1.
+//! Where transparent solids overlap, the one that the scene lists last has the highest priority and
+//! fills the common space; boundaries of the others are suppressed there. A bubble is therefore
+//! listed after its ball, and water may overlap the wall of a glass that is listed after it.
+//! Outside of all solids the index of refraction is 1.
 
 use crate::bvh::Ray;
-use crate::lanes::{Float, Mask, SimdFloat};
+use crate::lanes::{Float, Mask, SimdFloat, next_distinct};
 use crate::material::Bsdf;
 use crate::primitive::{Aggregate, Form, PrimitiveId};
+use crate::world::compile::RecenteredGeometry;
 use crate::world::integrator::coincident_surfaces::Contacts;
-use crate::world::integrator::opaque::{SurfaceInteraction, next_distinct};
+use crate::world::integrator::interaction::SurfaceInteraction;
 use glam::DVec3;
 
-/// So many solids around one point are told apart; of more, those that are listed last.
+/// Number of solids around one point that a medium stack holds; of more, it holds those listed
+/// last.
 const MAX_NESTING: usize = 4;
 
-/// The solids that paths are inside, by rank: 0 is none; of two the one with the higher rank fills the
-/// space. From the highest down.
+/// Priorities of the solids that rays are inside (interior list), in descending order; 0 is no
+/// solid. The solid with the highest priority fills the space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MediumStack<L> {
     priorities: [L; MAX_NESTING],
 }
 
 impl<L: SimdFloat> MediumStack<L> {
-    /// Outside of everything.
+    /// The stack of rays outside of all solids.
     #[inline(always)]
     pub fn vacuum() -> Self {
         Self { priorities: [L::zero(); MAX_NESTING] }
     }
 
-    /// Rank of the solid that fills the space.
+    /// Priority of the solid that fills the space.
     #[inline(always)]
     fn top(&self) -> L {
         self.priorities[0]
     }
 
-    /// Whether they are inside of `priority`.
+    /// Mask of lanes whose stack contains `priority`.
     pub fn contains(&self, priority: L) -> L::Mask {
-        self.priorities.iter().fold(L::mask(false), |found, of| found | equal(*of, priority))
+        self.priorities.iter().fold(L::mask(false), |found, entry| found | equal(*entry, priority))
     }
 
-    /// Outside of `priority`.
+    /// Returns the stack without `priority`.
     #[inline(always)]
     fn without(&self, priority: L) -> Self {
         let mut out = *self;
         let mut found = L::mask(false);
-        for (i, of) in self.priorities.iter().enumerate() {
-            found = found | equal(*of, priority);
+        for (i, entry) in self.priorities.iter().enumerate() {
+            found = found | equal(*entry, priority);
             let next = self.priorities.get(i + 1).copied().unwrap_or(L::zero());
-            out.priorities[i] = L::select(found, next, *of);
+            out.priorities[i] = L::select(found, next, *entry);
         }
         out
     }
 
-    /// Inside of `priority`, beside what holds already.
+    /// Returns the stack with `priority`.
     #[inline(always)]
     fn with(&self, priority: L) -> Self {
         let mut out = self.without(priority);
         let mut priority = priority;
-        for of in &mut out.priorities {
-            let (high, low) = (of.max(priority), of.min(priority));
-            (*of, priority) = (high, low);
+        for entry in &mut out.priorities {
+            let (high, low) = (entry.max(priority), entry.min(priority));
+            (*entry, priority) = (high, low);
         }
         out
     }
@@ -82,63 +85,75 @@ fn equal<L: SimdFloat>(a: L, b: L) -> L::Mask {
     a.le(b) & b.le(a)
 }
 
-/// The transparent solids of a world.
+/// Region in which camera rays start: a ball around the eye.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StartRegion {
+    pub eye: DVec3,
+    pub radius: f64,
+}
+
+impl StartRegion {
+    /// Returns `true` if the bounding box of `form` reaches into the region, or if it has none.
+    fn reaches(&self, form: &Form) -> bool {
+        form.bounds()
+            .is_none_or(|(low, high)| self.eye.clamp(low, high).distance(self.eye) <= self.radius)
+    }
+}
+
+/// The transmissive surfaces of a world.
 pub(crate) struct NestedDielectrics<L: SimdFloat> {
-    /// For each item of the geometry, the rank of the transparent solid that it bounds; 0: it bounds
-    /// none.
+    /// Priority of the transparent solid that each primitive bounds; 0 if it bounds none.
     priority_of: Vec<u32>,
-    /// By rank, the index of refraction; that of rank 0 is 1.
+    /// Index of refraction by priority; 1 for priority 0.
     indices: Vec<L::Scalar>,
-    /// The solids that camera rays may begin in, each alone.
+    /// Priority and boundary of each solid in which camera rays may start.
     around_eye: Vec<(u32, Aggregate<L>)>,
-    /// What touches something that lets light through; `None`: nothing does.
+    /// Pairs of touching primitives, at least one of them transmissive; `None` if there are none.
     pub contacts: Option<Contacts<L::Scalar>>,
 }
 
-/// Where rays meet surfaces that let light through.
+/// Hits of a packet on transmissive surfaces.
 pub(crate) struct InterfaceHit<L: SimdFloat> {
-    /// Lanes that do.
+    /// Lanes that hit one.
     pub lanes: L::Mask,
-    /// Of these, those that meet a solid's surface from outside.
+    /// Lanes that hit it from outside of its solid.
     pub outer: L::Mask,
-    /// Those that meet an open surface, a thin pane.
+    /// Lanes that hit a thin surface, which bounds no solid.
     pub thin: L::Mask,
-    /// Those that meet a surface which is not there, because another solid fills the space.
+    /// Lanes that hit a boundary inside of a solid with a higher priority, where it has no effect.
     pub suppressed: L::Mask,
-    /// Index of refraction before the surface.
+    /// Index of refraction in front of the surface.
     pub n_i: L,
-    /// Index of refraction behind it; for a pane, of what it is made of.
+    /// Index of refraction behind the surface; for thin surfaces that of their material.
     pub n_t: L,
-    /// What reflected rays are inside.
+    /// Media of reflected rays.
     pub medium_reflected: MediumStack<L>,
-    /// What transmitted rays are inside.
+    /// Media of transmitted rays.
     pub medium_transmitted: MediumStack<L>,
 }
 
 impl<L: SimdFloat> NestedDielectrics<L> {
-    /// `finish_of`: for each of the items that `sources` lists, its finish; `None`: nothing lets light
-    /// through. `nearest`: how far from the eye the camera's rays begin, at most. `given`: how exactly
-    /// coordinates were given.
+    /// Compiles the transmissive surfaces of `primitives`, whose BSDFs are `bsdf_of`. Camera rays
+    /// start in `start`. Returns `None` if no BSDF transmits.
     pub fn new(
-        forms: &[Form],
-        sources: &[PrimitiveId],
-        finish_of: &[u32],
-        finishes: &[Bsdf<L::Scalar>],
-        (eye, nearest): (DVec3, f64),
-        given: f64,
+        geometry: &RecenteredGeometry,
+        primitives: &[PrimitiveId],
+        bsdf_of: &[u32],
+        bsdfs: &[Bsdf<L::Scalar>],
+        start: StartRegion,
     ) -> Option<Self> {
-        let through = |finish: u32| finishes[finish as usize].transmission;
-        if finishes.iter().all(|f| f.transmission.is_none()) {
+        let forms = &geometry.forms[..];
+        let transmission_of = |bsdf: u32| bsdfs[bsdf as usize].transmission;
+        if bsdfs.iter().all(|bsdf| bsdf.transmission.is_none()) {
             return None;
         }
         let mut indices = vec![None; forms.len() + 1];
-        let priority_of = sources.iter().zip(finish_of).map(|(source, finish)| {
-            let flat =
-                matches!(forms[source.form], Form::Parallelogram { .. } | Form::Plane { .. });
-            let priority = source.form + 1;
-            match through(*finish) {
+        let priority_of = primitives.iter().zip(bsdf_of).map(|(id, bsdf)| {
+            let flat = matches!(forms[id.form], Form::Parallelogram { .. } | Form::Plane { .. });
+            let priority = id.form + 1;
+            match transmission_of(*bsdf) {
                 Some(transmission) if !flat => {
-                    // The first part of a compound that lets light through says what is inside.
+                    // The first transmissive part of a compound determines the index of refraction.
                     indices[priority].get_or_insert(transmission.index);
                     priority as u32
                 }
@@ -146,86 +161,89 @@ impl<L: SimdFloat> NestedDielectrics<L> {
             }
         });
         let priority_of: Vec<u32> = priority_of.collect();
-        let transparent: Vec<bool> = finish_of.iter().map(|f| through(*f).is_some()).collect();
-        let rounding = (L::EPSILON, given);
-        let contacts = Contacts::new(forms, sources, (&transparent, &priority_of), rounding);
-        let near = |form: &Form| {
-            form.bounds().is_none_or(|(low, high)| eye.clamp(low, high).distance(eye) <= nearest)
+        let transparent: Vec<bool> =
+            bsdf_of.iter().map(|bsdf| transmission_of(*bsdf).is_some()).collect();
+        let rounding = (L::EPSILON, geometry.input_error());
+        let contacts = Contacts::new(forms, primitives, (&transparent, &priority_of), rounding);
+        let solid_around_eye = |(form, index): (usize, &Option<_>)| {
+            let may_contain_eye = index.is_some() && start.reaches(&forms[form]);
+            may_contain_eye
+                .then(|| (form as u32 + 1, Aggregate::with_tree(&forms[form..=form], false)))
         };
-        let around = |(form, index): (usize, &Option<_>)| {
-            let around = index.is_some() && near(&forms[form]);
-            around.then(|| (form as u32 + 1, Aggregate::with_tree(&forms[form..=form], false)))
-        };
-        let around_eye = indices[1..].iter().enumerate().filter_map(around).collect();
+        let around_eye = indices[1..].iter().enumerate().filter_map(solid_around_eye).collect();
         let indices = indices.into_iter().map(|n| n.unwrap_or(L::Scalar::from_f64(1.0))).collect();
         Some(Self { priority_of, indices, around_eye, contacts })
     }
 
-    /// For each item, whether paths get inside of what it bounds.
+    /// For each primitive, `true` if paths can be inside of the solid that it bounds.
     pub fn entered(&self) -> Vec<bool> {
         self.priority_of.iter().map(|priority| *priority > 0).collect()
     }
 
-    /// What rays begin inside of: the solids that they meet from inside first.
+    /// Returns the media in which camera rays start: the solids whose boundary they first hit from
+    /// inside.
     pub fn at_start(&self, ray: &Ray<L>) -> MediumStack<L> {
-        let mut inside = MediumStack::vacuum();
+        let mut media = MediumStack::vacuum();
         for (priority, solid) in &self.around_eye {
             let hit = solid.closest(ray, solid.all());
-            let mut left = hit.t.lt(L::from_f64(L::MAX));
+            let mut remaining = hit.t.lt(L::from_f64(L::MAX));
             let mut within = L::mask(false);
-            while let Some((item, here)) = next_distinct(hit.item, left) {
+            while let Some((item, lanes)) = next_distinct(hit.item, remaining) {
                 let normal = solid.surface(item, hit.triangle, ray.at(hit.t)).normal;
-                within = within | (here & normal.dot(ray.direction).gt(L::zero()));
-                left = left.and_not(here);
+                within = within | (lanes & normal.dot(ray.direction).gt(L::zero()));
+                remaining = remaining.and_not(lanes);
             }
-            let entered = inside.with(L::from_f64(f64::from(*priority)));
-            inside = MediumStack::select(within, &entered, &inside);
+            let entered = media.with(L::from_f64(f64::from(*priority)));
+            media = MediumStack::select(within, &entered, &media);
         }
-        inside
+        media
     }
 
-    /// Index of refraction inside of what the ranks say.
+    /// Index of refraction of the solid with `priority`.
     fn index(&self, priority: L) -> L {
-        let of = |priority: L::Scalar| self.indices[priority.to_f64() as usize];
+        let index_of = |priority: L::Scalar| self.indices[priority.to_f64() as usize];
         let first = priority.lane(0);
         if equal(priority, L::splat(first)).all() {
-            return L::splat(of(first));
+            return L::splat(index_of(first));
         }
-        L::from_fn(|lane| of(priority.lane(lane)))
+        L::from_fn(|lane| index_of(priority.lane(lane)))
     }
 
-    /// Where the rays of `lanes`, which are `inside` what they are, meet surfaces that let light through.
-    /// `index_of_pane`: what those are made of that are open.
+    /// Returns the hits of `lanes` on transmissive surfaces. `media` are those of the rays;
+    /// `thin_index` is the index of refraction of thin surfaces.
     pub fn cross(
         &self,
-        met: &SurfaceInteraction<L>,
+        interaction: &SurfaceInteraction<L>,
         lanes: L::Mask,
-        inside: &MediumStack<L>,
-        index_of_pane: L,
+        media: &MediumStack<L>,
+        thin_index: L,
     ) -> InterfaceHit<L> {
-        let outer = lanes & met.front;
+        let outer = lanes & interaction.front;
         let mut priority = L::zero();
-        let mut left = lanes;
-        while let Some((item, here)) = next_distinct(met.item, left) {
-            priority =
-                L::select(here, L::from_f64(f64::from(self.priority_of[item as usize])), priority);
-            left = left.and_not(here);
+        let mut remaining = lanes;
+        while let Some((item, item_lanes)) = next_distinct(interaction.item, remaining) {
+            let of_item = L::from_f64(f64::from(self.priority_of[item as usize]));
+            priority = L::select(item_lanes, of_item, priority);
+            remaining = remaining.and_not(item_lanes);
         }
         let solid = priority.gt(L::zero());
-        let (outside, within) = (inside.without(priority), inside.with(priority));
-        let pick =
-            |yes, no| MediumStack::select(solid, &MediumStack::select(outer, yes, no), inside);
-        let (before, behind) = (pick(&outside, &within), pick(&within, &outside));
-        let n_i = self.index(before.top());
+        let (outside, within) = (media.without(priority), media.with(priority));
+        let select = |if_outer, if_inner| {
+            let of_solid = MediumStack::select(outer, if_outer, if_inner);
+            MediumStack::select(solid, &of_solid, media)
+        };
+        let medium_reflected = select(&outside, &within);
+        let medium_transmitted = select(&within, &outside);
+        let n_i = self.index(medium_reflected.top());
         InterfaceHit {
             lanes,
             outer,
             thin: lanes.and_not(solid),
-            suppressed: lanes & solid & equal(before.top(), behind.top()),
+            suppressed: lanes & solid & equal(medium_reflected.top(), medium_transmitted.top()),
             n_i,
-            n_t: L::select(solid, self.index(behind.top()), index_of_pane),
-            medium_reflected: before,
-            medium_transmitted: behind,
+            n_t: L::select(solid, self.index(medium_transmitted.top()), thin_index),
+            medium_reflected,
+            medium_transmitted,
         }
     }
 }
@@ -234,22 +252,22 @@ impl<L: SimdFloat> NestedDielectrics<L> {
 mod tests {
     use super::*;
 
-    fn priorities(inside: &MediumStack<f64>) -> [f64; MAX_NESTING] {
-        inside.priorities
+    fn priorities(media: &MediumStack<f64>) -> [f64; MAX_NESTING] {
+        media.priorities
     }
 
     #[test]
-    fn the_solid_listed_last_fills_the_space() {
-        let mut inside = MediumStack::<f64>::vacuum();
+    fn medium_stack_is_sorted_and_keeps_solids_listed_last() {
+        let mut media = MediumStack::<f64>::vacuum();
         for priority in [2.0, 5.0, 1.0, 5.0] {
-            inside = inside.with(priority);
+            media = media.with(priority);
         }
-        assert_eq!(priorities(&inside), [5.0, 2.0, 1.0, 0.0]);
-        assert_eq!(priorities(&inside.without(2.0)), [5.0, 1.0, 0.0, 0.0]);
-        assert_eq!(priorities(&inside.without(3.0)), priorities(&inside));
-        assert_eq!(priorities(&inside.without(5.0).without(1.0).without(2.0)), [0.0; 4]);
-        // Of more than can be held those that are listed last.
-        let full = inside.with(3.0).with(4.0);
+        assert_eq!(priorities(&media), [5.0, 2.0, 1.0, 0.0]);
+        assert_eq!(priorities(&media.without(2.0)), [5.0, 1.0, 0.0, 0.0]);
+        assert_eq!(priorities(&media.without(3.0)), priorities(&media));
+        assert_eq!(priorities(&media.without(5.0).without(1.0).without(2.0)), [0.0; 4]);
+        // Of five solids the stack holds the four that are listed last.
+        let full = media.with(3.0).with(4.0);
         assert_eq!(priorities(&full), [5.0, 4.0, 3.0, 2.0]);
     }
 }

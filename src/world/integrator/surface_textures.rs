@@ -1,4 +1,4 @@
-//! Textures and bumps on the things of a world: what materials say, laid on shapes where they stand.
+//! Textures and bump maps of primitives, and their evaluation at the hit points of a packet.
 
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use crate::material::{
@@ -8,34 +8,34 @@ use crate::material::{
 use crate::primitive::{Aggregate, PrimitiveId, SurfacePoint, keep_visible};
 use crate::scene::Scene;
 use crate::shape::{DefaultMapping, TextureSpace};
-use crate::world::compile::World;
+use crate::world::world::World;
 use glam::{DAffine3, DVec3};
 
-/// What one item wears.
+/// Texture and bump map of one primitive.
 struct SurfaceTexture<S> {
-    pattern: Option<(TextureMapping<S>, CompiledTexture<S>)>,
-    heights: Option<(TextureMapping<S>, BumpMap)>,
+    albedo: Option<(TextureMapping<S>, CompiledTexture<S>)>,
+    bump: Option<(TextureMapping<S>, BumpMap)>,
 }
 
-/// What the items of a world wear.
+/// Textures and bump maps of all primitives.
 pub(crate) struct SurfaceTextures<L: SimdFloat> {
+    /// By primitive; `None` without texture and bump map.
     of_item: Vec<Option<SurfaceTexture<L::Scalar>>>,
 }
 
-/// A packet's points on the surface of one item. Made only where it is asked for, so that elsewhere
-/// nothing of it leaves the registers.
+/// Hit points of a packet on one primitive, at which textures are evaluated.
 pub(crate) struct ShadingPoints<L: SimdFloat> {
-    /// Tag of the item.
+    /// Id of the primitive.
     pub item: u32,
-    /// Tags of the triangles, on a mesh.
-    pub facet: L,
-    /// The points, with the normals that point outwards.
+    /// Ids of the triangles, if the primitive is a mesh.
+    pub triangle: L,
+    /// The points, with outward normals.
     pub surface: SurfacePoint<L>,
-    /// The lanes that are there.
+    /// Lanes that hit the primitive.
     pub lanes: L::Mask,
 }
 
-/// The formula that a mapping comes to on a shape.
+/// Returns the projection that a mapping selects on a shape.
 fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
     match (mapping, space.default_mapping) {
         (Mapping::Planar, _) | (Mapping::Uv | Mapping::Auto, DefaultMapping::Planar) => {
@@ -53,134 +53,141 @@ fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
 }
 
 impl<L: SimdFloat> SurfaceTextures<L> {
-    /// For each of the items that `sources` lists what its material says, which `material` finds by
-    /// object and part; `None`: nothing is worn. `origin`: what was subtracted from the scene.
+    /// Compiles the textures and bump maps of `primitives`. `material_of` returns the material of a
+    /// primitive; `origin` is the point of the scene that became the world's origin. Returns `None`
+    /// if no material has a texture or bump map.
     pub fn new<'a>(
         scene: &Scene,
-        sources: &[PrimitiveId],
+        primitives: &[PrimitiveId],
         origin: DVec3,
-        material: impl Fn(&PrimitiveId) -> &'a Material,
+        material_of: impl Fn(&PrimitiveId) -> &'a Material,
     ) -> Option<Self> {
-        let worn = |m: &Material| {
+        let has_texture = |m: &Material| {
             m.texture.as_ref().is_some_and(Texture::has_effect)
                 || m.bump.as_ref().is_some_and(Bump::has_effect)
         };
-        if !sources.iter().any(|source| worn(material(source))) {
+        if !primitives.iter().any(|id| has_texture(material_of(id))) {
             return None;
         }
-        let back = DAffine3::from_translation(-origin);
+        let world_from_scene = DAffine3::from_translation(-origin);
+        // The texture spaces of the last object: primitives of one object are adjacent.
         let mut spaces: (usize, Vec<TextureSpace>) = (usize::MAX, Vec::new());
-        let of_item = sources.iter().map(|source| {
-            let material = material(source);
-            if !worn(material) {
+        let of_item = primitives.iter().map(|id| {
+            let material = material_of(id);
+            if !has_texture(material) {
                 return None;
             }
-            let object = &scene.objects[source.form];
-            if spaces.0 != source.form {
-                spaces = (source.form, object.shape.texture_spaces());
+            let object = &scene.objects[id.form];
+            if spaces.0 != id.form {
+                spaces = (id.form, object.shape.texture_spaces());
             }
-            let space = &spaces.1[source.part];
-            let there = back * object.scene_from_object() * space.shape_from_texture;
-            let projector = |placement: &Placement| {
+            let space = &spaces.1[id.part];
+            let world_from_texture =
+                world_from_scene * object.scene_from_object() * space.shape_from_texture;
+            let mapping_of = |placement: &Placement| {
                 let projection = projection(placement.mapping, space);
-                TextureMapping::new(placement, projection, &there, space.corners)
+                TextureMapping::new(placement, projection, &world_from_texture, space.corners)
             };
             let texture = material.texture.as_ref();
             let bump = material.bump.as_ref();
             Some(SurfaceTexture {
-                pattern: texture
-                    .and_then(|t| Some((projector(&t.placement()), CompiledTexture::new(t)?))),
-                heights: bump.and_then(|b| Some((projector(&b.placement()), BumpMap::new(b)?))),
+                albedo: texture
+                    .and_then(|t| Some((mapping_of(&t.placement()), CompiledTexture::new(t)?))),
+                bump: bump.and_then(|b| Some((mapping_of(&b.placement()), BumpMap::new(b)?))),
             })
         });
         Some(Self { of_item: of_item.collect() })
     }
 
-    fn surface_textures(&self) -> impl Iterator<Item = &SurfaceTexture<L::Scalar>> {
+    fn textures(&self) -> impl Iterator<Item = &SurfaceTexture<L::Scalar>> {
         self.of_item.iter().flatten()
     }
 
-    /// Whether colours vary anywhere.
+    /// Returns `true` if a texture changes the albedo of some primitive.
     pub fn is_colored(&self) -> bool {
-        self.surface_textures().any(|surface_texture| surface_texture.pattern.is_some())
+        self.textures().any(|texture| texture.albedo.is_some())
     }
 
-    /// Whether normals are turned anywhere.
+    /// Returns `true` if a bump map changes the normals of some primitive.
     pub fn is_bumped(&self) -> bool {
-        self.surface_textures().any(|surface_texture| surface_texture.heights.is_some())
+        self.textures().any(|texture| texture.bump.is_some())
     }
 
-    /// What occurs, in words.
-    pub fn words(&self) -> Vec<&'static str> {
-        let patterns = || {
-            self.surface_textures().filter_map(|surface_texture| surface_texture.pattern.as_ref())
-        };
-        let image = |pattern: &CompiledTexture<_>| matches!(pattern, CompiledTexture::Image { .. });
-        let mut words = Vec::new();
-        words.extend(patterns().any(|(_, p)| image(p)).then_some("image texture"));
-        words.extend(patterns().any(|(_, p)| !image(p)).then_some("checker"));
-        words.extend(self.is_bumped().then_some("bump"));
-        words
+    /// Names of the features in use, for the inventory.
+    pub fn features(&self) -> Vec<&'static str> {
+        let albedos = || self.textures().filter_map(|texture| texture.albedo.as_ref());
+        let is_image = |t: &CompiledTexture<_>| matches!(t, CompiledTexture::Image { .. });
+        let mut names = Vec::new();
+        names.extend(albedos().any(|(_, t)| is_image(t)).then_some("image texture"));
+        names.extend(albedos().any(|(_, t)| !is_image(t)).then_some("checker"));
+        names.extend(self.is_bumped().then_some("bump"));
+        names
     }
 }
 
-/// Coordinates by a projection, or by what the mesh says.
+/// Returns texture coordinates: the mesh's own, where `mapping` uses them and the mesh has some,
+/// else those of the projection.
 fn coordinates<L: SimdFloat>(
     geometry: &Aggregate<L>,
-    projector: &TextureMapping<L::Scalar>,
+    mapping: &TextureMapping<L::Scalar>,
     points: &ShadingPoints<L>,
 ) -> TexCoord<L> {
     let surface = &points.surface;
-    if projector.wants_uv()
-        && let Some(own) = geometry.uv(points.item, points.facet, surface.point)
+    if mapping.wants_uv()
+        && let Some(mesh_uv) = geometry.uv(points.item, points.triangle, surface.point)
     {
-        let [u, v] = own.uv;
-        let [du, dv] = own.gradients;
-        return projector.placed(TexCoord { u, v, grad_u: du, grad_v: dv });
+        let [u, v] = mesh_uv.uv;
+        let [grad_u, grad_v] = mesh_uv.gradients;
+        return mapping.placed(TexCoord { u, v, grad_u, grad_v });
     }
-    projector.coordinates(surface.point, surface.normal)
+    mapping.coordinates(surface.point, surface.normal)
 }
 
-impl<L: SimdFloat> World<L> {
-    fn surface_texture(&self, item: u32) -> Option<&SurfaceTexture<L::Scalar>> {
-        self.surface_textures.as_ref()?.of_item[item as usize].as_ref()
-    }
+fn surface_texture<L: SimdFloat>(
+    world: &World<L>,
+    item: u32,
+) -> Option<&SurfaceTexture<L::Scalar>> {
+    world.surface_textures.as_ref()?.of_item[item as usize].as_ref()
+}
 
-    /// The colour of its own that a thing has, if it has one: that in its mesh's file, and its texture.
-    #[inline(never)]
-    pub(crate) fn albedo_factor(&self, points: &ShadingPoints<L>) -> Option<Vec3<L>> {
-        let painted = self.geometry.color(points.item, points.facet);
-        let Some((projector, pattern)) =
-            self.surface_texture(points.item).and_then(|s| s.pattern.as_ref())
-        else {
-            return painted;
-        };
-        let at = coordinates(&self.geometry, projector, points);
-        let color = pattern.eval((at.u, at.v), points.lanes.bits());
-        Some(painted.map_or(color, |painted| painted.component_mul(color)))
-    }
+/// Returns the factor of the BSDF's albedo: vertex colour times texture; `None` if the primitive
+/// has neither.
+#[inline(never)]
+pub(crate) fn albedo_factor<L: SimdFloat>(
+    world: &World<L>,
+    points: &ShadingPoints<L>,
+) -> Option<Vec3<L>> {
+    let vertex_color = world.geometry.color(points.item, points.triangle);
+    let Some((mapping, texture)) =
+        surface_texture(world, points.item).and_then(|texture| texture.albedo.as_ref())
+    else {
+        return vertex_color;
+    };
+    let coord = coordinates(&world.geometry, mapping, points);
+    let color = texture.eval((coord.u, coord.v), points.lanes.bits());
+    Some(vertex_color.map_or(color, |vertex_color| vertex_color.component_mul(color)))
+}
 
-    /// The normal that light is computed with where rays along `direction` meet a surface whose
-    /// geometric normal on their side is `geometric`: smooth, and turned by bumps; on the same side,
-    /// and facing the viewer. `front`: where that normal points outwards.
-    #[inline(never)]
-    pub(crate) fn shading_normal(
-        &self,
-        points: &ShadingPoints<L>,
-        (front, geometric): (L::Mask, Vec3<L>),
-        direction: Vec3<L>,
-    ) -> Vec3<L> {
-        let at = (points.surface.point, geometric);
-        let normal = self.geometry.shading_normal((points.item, points.facet), at, direction);
-        let Some((projector, heights)) =
-            self.surface_texture(points.item).and_then(|s| s.heights.as_ref())
-        else {
-            return normal;
-        };
-        let at = coordinates(&self.geometry, projector, points);
-        let (along_u, along_v) = heights.gradient((at.u, at.v), points.lanes.bits());
-        let gradient = at.grad_u * along_u + at.grad_v * along_v;
-        let outward = L::select(front, L::one(), -L::one());
-        keep_visible(projector.bumped(normal, outward, gradient), geometric, direction)
-    }
+/// Returns the shading normal of surfaces that rays along `direction` hit: interpolated on smooth
+/// meshes, perturbed by bump maps. It lies on the side of `geometric`, the geometric normal on the
+/// side of the rays, and faces them. `front` selects lanes in which `geometric` points outwards.
+#[inline(never)]
+pub(crate) fn shading_normal<L: SimdFloat>(
+    world: &World<L>,
+    points: &ShadingPoints<L>,
+    (front, geometric): (L::Mask, Vec3<L>),
+    direction: Vec3<L>,
+) -> Vec3<L> {
+    let surface = (points.surface.point, geometric);
+    let normal = world.geometry.shading_normal((points.item, points.triangle), surface, direction);
+    let Some((mapping, bump)) =
+        surface_texture(world, points.item).and_then(|texture| texture.bump.as_ref())
+    else {
+        return normal;
+    };
+    let coord = coordinates(&world.geometry, mapping, points);
+    let (slope_u, slope_v) = bump.gradient((coord.u, coord.v), points.lanes.bits());
+    let gradient = coord.grad_u * slope_u + coord.grad_v * slope_v;
+    let outward = L::select(front, L::one(), -L::one());
+    keep_visible(mapping.bumped(normal, outward, gradient), geometric, direction)
 }

@@ -12,7 +12,7 @@ use zerkalo::scene::{AssetResolver, Object, Rotate, Scale, Scene, TransformOp};
 use zerkalo::shape::{CsgOperand, KINDS, Shape};
 use zerkalo::value::{Field, ValueType};
 
-/// Files with triangles; the empty name stands for an icosahedron.
+/// Mesh files; the empty name is the built-in icosahedron.
 const MESHES: &[&str] = &[
     "",
     "scenes/meshes/knot.ply",
@@ -30,13 +30,13 @@ const IMAGES: &[&str] = &[
     "scenes/textures/wood.png",
 ];
 
-/// The files that were read, shared by all scenes.
-pub fn resolver() -> AssetResolver {
+/// Files that scenes refer to, shared by all scenes.
+pub fn library() -> AssetResolver {
     static ASSETS: OnceLock<Arc<Assets>> = OnceLock::new();
     AssetResolver::new(Path::new("test"), ASSETS.get_or_init(Arc::default).clone())
 }
 
-/// A coefficient: zero, one, between, and rarely above.
+/// Random coefficient: 0, 1, between, and rarely above.
 fn coefficient(numbers: &mut Numbers) -> f64 {
     match numbers.below(12) {
         0 => 0.0,
@@ -76,17 +76,17 @@ fn material_key(numbers: &mut Numbers, field: &Field) -> Option<Value> {
     })
 }
 
-/// What a material is for.
+/// Kind of a material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Finish {
     Any,
     Glass,
     Mirror,
-    /// Bright by itself, in ambient light.
+    /// Bright in ambient light.
     Glowing,
 }
 
-/// A material without faults.
+/// Random material without validation errors.
 pub fn material(numbers: &mut Numbers, finish: Finish) -> Material {
     loop {
         let mut keys = table(numbers, material::FIELDS, 0.3, &material_key);
@@ -124,12 +124,12 @@ fn keys_of(kind: &Field) -> &'static [Field] {
     }
 }
 
-/// Whether a kind is made of parts.
+/// Returns `true` if a kind is a compound.
 fn has_parts(kind: &Field) -> bool {
     keys_of(kind).iter().any(|f| matches!(f.takes, ValueType::Tables(_)))
 }
 
-/// The kinds that can be parts of a compound, and the compounds.
+/// Kinds that can be parts of a compound, and the compounds.
 fn solids() -> &'static (Vec<&'static Field>, Vec<&'static Field>) {
     static SOLIDS: OnceLock<(Vec<&Field>, Vec<&Field>)> = OnceLock::new();
     SOLIDS.get_or_init(|| {
@@ -144,16 +144,16 @@ fn solids() -> &'static (Vec<&'static Field>, Vec<&'static Field>) {
     })
 }
 
-/// A compound without faults.
+/// Compound without validation errors.
 fn compound(key: &str, of: Vec<CsgOperand>) -> Option<Shape> {
     let parts = Table::from_iter([("of".to_string(), Value::try_from(of).ok()?)]);
     let whole = Table::from_iter([(key.to_string(), Value::Table(parts))]);
     whole.try_into::<Shape>().ok().filter(|shape| shape.faults().is_empty())
 }
 
-/// A shape of this kind that stands about in a box of the lengths `size` on `base`, by random keys.
+/// Shape of a kind with random keys, approximately in a box of the lengths `size` on `base`.
 fn by_keys(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Option<Shape> {
-    let own = |numbers: &mut Numbers, field: &Field| {
+    let key_value = |numbers: &mut Numbers, field: &Field| {
         let least = size.min_element();
         Some(match field.takes {
             ValueType::Numbers(3, range) if range.low < 0.0 => {
@@ -174,12 +174,12 @@ fn by_keys(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Opt
             _ => return None,
         })
     };
-    let keys = table(numbers, keys_of(kind), 0.5, &own);
+    let keys = table(numbers, keys_of(kind), 0.5, &key_value);
     let whole = Table::from_iter([(kind.name.to_string(), Value::Table(keys))]);
     whole.try_into::<Shape>().ok().filter(|shape| shape.faults().is_empty())
 }
 
-/// A compound in a box of the lengths `size` on `base`: of parts whose faces coincide as often as not.
+/// Compound in a box of the lengths `size` on `base`; faces of its parts often coincide.
 pub fn combined(
     numbers: &mut Numbers,
     base: DVec3,
@@ -195,19 +195,19 @@ pub fn combined(
             let mut quarters = || f64::from(numbers.below(3) as u32 + 2) / 4.0;
             let part = size * DVec3::new(quarters(), quarters(), quarters());
             let mut step = || f64::from(numbers.below(5) as u32) / 4.0 - 0.5;
-            let at = base + DVec3::new(step(), 0.5 + step(), step()) * (size - part);
+            let part_base = base + DVec3::new(step(), 0.5 + step(), step()) * (size - part);
             let shape = if levels > 1 && chance(numbers, 1, 4) {
-                combined(numbers, at, part, materials, levels - 1)
+                combined(numbers, part_base, part, materials, levels - 1)
             } else {
                 let kind = simple[numbers.below(simple.len())];
-                of_kind(numbers, kind, at, part)
+                of_kind(numbers, kind, part_base, part)
             };
             let mut part = CsgOperand::new(shape);
             if chance(numbers, 1, 2) {
                 part.material = materials[numbers.below(materials.len())].clone();
             }
             if chance(numbers, 1, 4) {
-                part.transform = steps(numbers, at);
+                part.transform = steps(numbers, part_base);
             }
             parts.push(part);
         }
@@ -226,7 +226,7 @@ fn of_kind(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Sha
     drawn.unwrap_or_else(|| Shape::fitted_to(kind.name, base, size).expect("a registered kind"))
 }
 
-/// Steps that turn, stretch, shear or mirror what stands on `base`, which stays where it is; mostly none.
+/// Transform steps that rotate, stretch, shear or mirror about the fixed point `base`; mostly none.
 fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<TransformOp> {
     let turn = |numbers: &mut Numbers| {
         let any = 180.0 * numbers.unit();
@@ -246,25 +246,25 @@ fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<TransformOp> {
         2 => vec![stretch(numbers)],
         // Shear.
         3 => vec![turn(numbers), stretch(numbers), turn(numbers)],
-        // A mirror image.
+        // Reflection.
         4 => vec![TransformOp::Scale(Scale([-1.0, 1.0, 1.0])), turn(numbers)],
         5 => vec![turn(numbers), TransformOp::Scale(Scale([0.7, 1.3, -0.6])), turn(numbers)],
         _ => return Vec::new(),
     };
-    let there = TransformOp::Translate((-base).to_array());
+    let to_origin = TransformOp::Translate((-base).to_array());
     let back = TransformOp::Translate(base.to_array());
-    std::iter::once(there).chain(inner).chain([back]).collect()
+    std::iter::once(to_origin).chain(inner).chain([back]).collect()
 }
 
-/// What objects are made of: names of materials, and the levels of compounds in compounds.
+/// Names of materials, and the depth of nested compounds.
 pub struct Stock<'a> {
     pub materials: &'a [String],
     pub levels: usize,
 }
 
-/// An object of any kind on `base`, about as large as `size`, without faults.
+/// Random object on `base`, about as large as `size`, without validation errors.
 pub fn object(numbers: &mut Numbers, stock: &Stock, base: DVec3, size: DVec3) -> Object {
-    // What has no end hides all the rest: not too often.
+    // Unbounded objects hide all others, so that they are rare.
     let kind = loop {
         let kind = &KINDS[numbers.below(KINDS.len())];
         let drawn =
@@ -276,7 +276,7 @@ pub fn object(numbers: &mut Numbers, stock: &Stock, base: DVec3, size: DVec3) ->
     object_of(numbers, stock, kind, base, size)
 }
 
-/// The same of the kind with this key.
+/// Random object of the kind with this key.
 pub fn named(numbers: &mut Numbers, stock: &Stock, key: &str, base: DVec3, size: DVec3) -> Object {
     let kind = KINDS.iter().find(|kind| kind.name == key).expect("a registered kind");
     object_of(numbers, stock, kind, base, size)
@@ -306,15 +306,15 @@ fn object_of(
     object
 }
 
-/// The object with its files.
+/// Returns the object with its files loaded.
 pub fn resolved(object: &Object) -> Object {
     let mut scene =
-        Scene { objects: vec![object.clone()], resolver: resolver(), ..Scene::default() };
+        Scene { objects: vec![object.clone()], resolver: library(), ..Scene::default() };
     scene.resolve();
     scene.objects.remove(0)
 }
 
-/// Scaled and moved into a box of the lengths `size` on `base`.
+/// Scales and moves an object into a box of the lengths `size` on `base`.
 fn fit(object: &mut Object, base: DVec3, size: DVec3) {
     let Some((low, high)) = resolved(object).form().bounds() else { return };
     let factor = (size / (high - low).max(DVec3::splat(1e-9))).min_element();

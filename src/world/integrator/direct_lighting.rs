@@ -1,0 +1,85 @@
+//! Direct lighting: ambient light and shadow rays to all lights.
+
+use crate::bvh::Ray;
+use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::world::culling::light_buffer::ShadowRays;
+use crate::world::culling::tile::TileCandidates;
+use crate::world::integrator::interaction::SurfaceInteraction;
+use crate::world::integrator::path::{Counts, Path, Radiance};
+use crate::world::world::World;
+use std::f64::consts::FRAC_1_PI;
+
+/// Adds the ambient light and the light of every source that the surfaces return to `out`.
+#[inline(always)]
+pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    path: &Path<L>,
+    interaction: &SurfaceInteraction<L>,
+    candidates: &TileCandidates,
+    out: &mut Radiance<L>,
+    counts: &mut Counts,
+) {
+    if let Some(group) = world.ambient {
+        for (index, lanes) in interaction.bsdfs(interaction.has_bsdf) {
+            let mut ambient = Vec3::splat(world.bsdfs[index].ambient);
+            if !SIMPLE && world.colored {
+                ambient = ambient.component_mul(interaction.albedo_factor);
+            }
+            out.groups[group] += path.throughput.component_mul(ambient).masked(lanes);
+        }
+    }
+    if interaction.direct_mask.none() {
+        return;
+    }
+    let origin = interaction.ray_origin();
+    for (index, (source, occluders)) in world.sources.iter().zip(&candidates.occluders).enumerate()
+    {
+        let light = source.light.sample_li(origin);
+        let cos_light = interaction.normal.dot(light.wi);
+        let mut lit = interaction.direct_mask & cos_light.gt(L::zero());
+        if !SIMPLE && world.smooth {
+            lit = lit & interaction.geometric.dot(light.wi).gt(L::zero());
+        }
+        if lit.none() {
+            continue;
+        }
+        if world.shadows {
+            counts.rays += u64::from(lit.bits().count_ones());
+            let (direction, t_max) = match &source.on_surface {
+                None => (light.wi, light.distance),
+                Some(on_surface) => on_surface.end(origin),
+            };
+            let ray = Ray { origin, direction };
+            let occluded = if SIMPLE {
+                world.geometry.occluded_linear(&ray, t_max, lit, occluders)
+            } else if let Some(Some(buffer)) = world.light_buffers.get(index) {
+                let rays = ShadowRays {
+                    ray,
+                    start_item: interaction.item,
+                    starts_outside: interaction.front,
+                    t_max,
+                    active: lit,
+                };
+                buffer.occluded(&world.geometry, &rays, occluders)
+            } else {
+                world.geometry.occluded(&ray, t_max, lit, occluders)
+            };
+            lit = lit.and_not(occluded);
+            if lit.none() {
+                continue;
+            }
+        }
+        let mut value = interaction.diffuse * (cos_light * L::from_f64(FRAC_1_PI));
+        for (index, lanes) in interaction.bsdfs(interaction.highlight_mask & lit) {
+            let (bsdf, view) = (&world.bsdfs[index], -path.ray.direction);
+            let cos_view = interaction.normal.dot(view);
+            let highlight = bsdf.highlight(interaction.normal, view, light.wi, cos_light, cos_view);
+            value += highlight.masked(lanes);
+        }
+        let mut value = path.throughput.component_mul(value) * light.irradiance;
+        if let Some(emission) = source.emission {
+            value = value.component_mul(Vec3::splat(emission));
+        }
+        out.groups[source.group] += value.masked(lit);
+    }
+}

@@ -1,0 +1,183 @@
+//! Surface interactions: normals, offsets and BSDFs at the hit points of a packet.
+
+use crate::bvh::{Hit, Ray};
+use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
+use crate::world::integrator::surface_textures::{ShadingPoints, albedo_factor, shading_normal};
+use crate::world::world::World;
+
+/// Surface properties at the hit points of a packet.
+pub(crate) struct SurfaceInteraction<L: SimdFloat> {
+    /// Shading normal, on the side from which the rays come.
+    pub normal: Vec3<L>,
+    /// Geometric normal, on the side from which the rays come. It differs from `normal` on smooth
+    /// meshes and bump maps only. Light from behind it does not reach the surface.
+    pub geometric: Vec3<L>,
+    /// Hit points.
+    pub point: Vec3<L>,
+    /// Distance from `point`, along the normal, at which secondary rays start.
+    pub offset: L,
+    /// Lanes that hit the side to which the primitive's own normal points.
+    pub front: L::Mask,
+    /// Ids of the primitives.
+    pub item: L,
+    /// Ids of the BSDFs.
+    bsdf: L,
+    /// Factor of the BSDF's albedo, from textures and vertex colours.
+    pub albedo_factor: Vec3<L>,
+    /// Diffuse albedo.
+    pub diffuse: Vec3<L>,
+    /// Lanes with a BSDF: all but those that hit the back of a one-sided surface.
+    pub has_bsdf: L::Mask,
+    /// Lanes whose BSDF returns direct light.
+    pub direct_mask: L::Mask,
+    /// Lanes whose BSDF has a highlight.
+    pub highlight_mask: L::Mask,
+    /// Lanes whose BSDF reflects rays.
+    pub reflecting: L::Mask,
+}
+
+impl<L: SimdFloat> SurfaceInteraction<L> {
+    /// Index of each BSDF that occurs among `lanes`, with its lanes.
+    #[inline(always)]
+    pub fn bsdfs(&self, lanes: L::Mask) -> impl Iterator<Item = (usize, L::Mask)> {
+        let (bsdf, mut remaining) = (self.bsdf, lanes);
+        std::iter::from_fn(move || {
+            let (index, lanes) = next_distinct(bsdf, remaining)?;
+            remaining = remaining.and_not(lanes);
+            Some((index as usize, lanes))
+        })
+    }
+
+    /// Origin of rays that leave on the side from which the rays came.
+    #[inline(always)]
+    pub fn ray_origin(&self) -> Vec3<L> {
+        self.geometric.mul_add(self.offset, self.point)
+    }
+
+    /// Origin of rays that leave on the other side.
+    #[inline(always)]
+    pub fn ray_origin_behind(&self) -> Vec3<L> {
+        self.geometric.mul_add(-self.offset, self.point)
+    }
+
+    /// Removes the BSDF from `lanes`.
+    #[inline(always)]
+    pub fn mask_out(&mut self, lanes: L::Mask) {
+        self.has_bsdf = self.has_bsdf.and_not(lanes);
+        self.direct_mask = self.direct_mask.and_not(lanes);
+        self.highlight_mask = self.highlight_mask.and_not(lanes);
+        self.reflecting = self.reflecting.and_not(lanes);
+    }
+
+    /// Removes `lanes` from direct lighting.
+    #[inline(always)]
+    pub fn shade(&mut self, lanes: L::Mask) {
+        self.direct_mask = self.direct_mask.and_not(lanes);
+    }
+
+    /// Returns `direction`, mirrored at the surface where it points into it.
+    #[inline(always)]
+    pub fn reflect_into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
+        let height = direction.dot(self.geometric).min(L::zero());
+        self.geometric.mul_add(height * L::from_f64(-2.0), direction)
+    }
+
+    /// Takes `other` in `lanes`, in which no mask of `self` is set.
+    #[inline(always)]
+    fn blend(&mut self, lanes: L::Mask, other: &Self) {
+        self.normal = Vec3::select(lanes, other.normal, self.normal);
+        self.geometric = Vec3::select(lanes, other.geometric, self.geometric);
+        self.albedo_factor = Vec3::select(lanes, other.albedo_factor, self.albedo_factor);
+        self.point = Vec3::select(lanes, other.point, self.point);
+        self.offset = L::select(lanes, other.offset, self.offset);
+        self.front = self.front | other.front;
+        self.bsdf = L::select(lanes, other.bsdf, self.bsdf);
+        self.diffuse = Vec3::select(lanes, other.diffuse, self.diffuse);
+        self.has_bsdf = self.has_bsdf | other.has_bsdf;
+        self.direct_mask = self.direct_mask | other.direct_mask;
+        self.highlight_mask = self.highlight_mask | other.highlight_mask;
+        self.reflecting = self.reflecting | other.reflecting;
+    }
+}
+
+/// Creates the interactions of the active rays; `None` if no ray is active.
+#[inline(always)]
+pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    ray: &Ray<L>,
+    hit: &Hit<L>,
+    active: L::Mask,
+) -> Option<SurfaceInteraction<L>> {
+    let (item, lanes) = next_distinct(hit.item, active)?;
+    let remaining = active.and_not(lanes);
+    Some(if remaining.none() {
+        interact_one::<_, SIMPLE>(world, ray, hit, item, lanes)
+    } else {
+        interact_mixed::<_, SIMPLE>(world, ray, hit, (item, lanes), remaining)
+    })
+}
+
+/// Creates the interactions of a packet that hit several primitives: `first` in its lanes, others
+/// in `remaining`.
+#[inline(never)]
+fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    ray: &Ray<L>,
+    hit: &Hit<L>,
+    (first, first_lanes): (u32, L::Mask),
+    mut remaining: L::Mask,
+) -> SurfaceInteraction<L> {
+    let mut interaction = interact_one::<_, SIMPLE>(world, ray, hit, first, first_lanes);
+    while let Some((item, lanes)) = next_distinct(hit.item, remaining) {
+        interaction.blend(lanes, &interact_one::<_, SIMPLE>(world, ray, hit, item, lanes));
+        remaining = remaining.and_not(lanes);
+    }
+    interaction
+}
+
+/// Creates the interactions of `lanes`, which hit the primitive `item`.
+#[inline(always)]
+fn interact_one<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    ray: &Ray<L>,
+    hit: &Hit<L>,
+    item: u32,
+    lanes: L::Mask,
+) -> SurfaceInteraction<L> {
+    let surface = world.geometry.surface(item, hit.triangle, ray.at(hit.t));
+    let front = surface.normal.dot(ray.direction).lt(L::zero());
+    let geometric = Vec3::select(front, surface.normal, -surface.normal);
+    let index = world.bsdf_of[item as usize];
+    let bsdf = &world.bsdfs[index as usize];
+    let mut normal = geometric;
+    // Built at each use: one shared instance would be spilled to memory in worlds without textures.
+    let shading_points = || ShadingPoints { item, triangle: hit.triangle, surface, lanes };
+    if !SIMPLE && world.smooth {
+        normal = shading_normal(world, &shading_points(), (front, geometric), ray.direction);
+    }
+    let mut factor = Vec3::of([1.0; 3]);
+    let mut diffuse = Vec3::splat(bsdf.diffuse);
+    if !SIMPLE
+        && world.colored
+        && let Some(color) = albedo_factor(world, &shading_points())
+    {
+        (factor, diffuse) = (color, diffuse.component_mul(color));
+    }
+    let has_bsdf = if bsdf.two_sided { lanes } else { lanes & front };
+    let lanes_if = |has_lobe: bool| if has_lobe { has_bsdf } else { L::mask(false) };
+    SurfaceInteraction {
+        normal,
+        geometric,
+        albedo_factor: factor,
+        point: surface.point,
+        offset: surface.ray_offset(),
+        front: front & lanes,
+        item: hit.item,
+        bsdf: L::from_id(index),
+        diffuse,
+        has_bsdf,
+        direct_mask: lanes_if(bsdf.has_direct),
+        highlight_mask: lanes_if(bsdf.has_highlight()),
+        reflecting: lanes_if(bsdf.reflection.is_some()),
+    }
+}

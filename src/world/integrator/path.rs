@@ -1,0 +1,42 @@
+//! State of a packet of paths, and the result of tracing it.
+
+use crate::bvh::Ray;
+use crate::lanes::{SimdFloat, Vec3};
+use crate::world::light_groups::MAX_GROUPS;
+
+/// Radiance of a packet's samples, per light group, for lights of unit colour and intensity.
+pub struct Radiance<L> {
+    /// The first [`World::groups`](crate::world::World::groups) entries are in use.
+    pub groups: [Vec3<L>; MAX_GROUPS],
+}
+
+/// Cost of traced packets.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Counts {
+    /// Number of rays: camera, shadow, reflected and transmitted.
+    pub rays: u64,
+    /// `true` if a path sampled a glossy lobe or chose between reflection and transmission at
+    /// random.
+    pub glossy: bool,
+}
+
+/// A packet of paths at their current vertex.
+#[derive(Clone, Copy)]
+pub(crate) struct Path<L> {
+    pub ray: Ray<L>,
+    /// Factor of radiance along the ray in the radiance of the sample (beta).
+    pub throughput: Vec3<L>,
+}
+
+impl<L: SimdFloat> Path<L> {
+    /// Largest throughput. Larger ones saturate the film, and an infinite one times black is NaN.
+    const MAX_THROUGHPUT: f64 = (1u64 << 60) as f64;
+
+    /// Returns `throughput` limited to [`Self::MAX_THROUGHPUT`], for mirrors that amplify without
+    /// bound.
+    #[inline(always)]
+    pub fn bounded(throughput: Vec3<L>) -> Vec3<L> {
+        let max = L::from_f64(Self::MAX_THROUGHPUT);
+        Vec3::new(max.min(throughput.x), max.min(throughput.y), max.min(throughput.z))
+    }
+}

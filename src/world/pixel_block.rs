@@ -1,0 +1,99 @@
+//! Per-tile state of pixels that all their samples share: coordinates, sampler keys, corner
+//! directions.
+
+use crate::camera::PinholeCamera;
+use crate::lanes::{Float, SimdFloat, SimdU32, Vec3};
+use crate::sampling::Sampler;
+use std::ops::Range;
+
+/// Largest number of pixels in a block; a multiple of every packet width.
+pub const MAX_BLOCK_PIXELS: usize = 256;
+
+/// Up to [`MAX_BLOCK_PIXELS`] pixels, in the order in which they share packets. Copies of the last
+/// pixel fill the last packet.
+pub(super) struct PixelBlock<S> {
+    count: usize,
+    /// Columns of the raster \[pixels\].
+    x: [u32; MAX_BLOCK_PIXELS],
+    /// Rows of the raster \[pixels\].
+    y: [u32; MAX_BLOCK_PIXELS],
+    /// Keys of the pixels' random numbers.
+    keys: [u32; MAX_BLOCK_PIXELS],
+    /// Vectors from the eye to the pixels' corners on the plane at unit distance, by axis.
+    corner_directions: [[S; MAX_BLOCK_PIXELS]; 3],
+}
+
+impl<S: Float> PixelBlock<S> {
+    /// Creates the block of `pixels` (column and row) in one replicate.
+    pub fn new<L: SimdFloat<Scalar = S>>(
+        camera: &PinholeCamera,
+        sampler: &Sampler<L>,
+        replicate: usize,
+        mut pixels: impl Iterator<Item = (u32, u32)>,
+    ) -> Self {
+        let mut out = Self {
+            count: 0,
+            x: [0; MAX_BLOCK_PIXELS],
+            y: [0; MAX_BLOCK_PIXELS],
+            keys: [0; MAX_BLOCK_PIXELS],
+            corner_directions: [[S::default(); MAX_BLOCK_PIXELS]; 3],
+        };
+        for ((x, y), pixel) in out.x.iter_mut().zip(&mut out.y).zip(pixels.by_ref()) {
+            (*x, *y) = pixel;
+            out.count += 1;
+        }
+        debug_assert!(pixels.next().is_none(), "more than {MAX_BLOCK_PIXELS} pixels");
+        let Some(last) = out.count.checked_sub(1) else { return out };
+        let padded = out.count.next_multiple_of(L::WIDTH);
+        let (x, y) = (out.x[last], out.y[last]);
+        out.x[last..padded].fill(x);
+        out.y[last..padded].fill(y);
+        let pixels = || out.x[..padded].iter().copied().zip(out.y[..padded].iter().copied());
+        for (key, pixel) in out.keys.iter_mut().zip(pixels()) {
+            *key = sampler.key(pixel, replicate);
+        }
+        let [x, y, z] = &mut out.corner_directions;
+        for (((x, y), z), pixel) in x.iter_mut().zip(y).zip(z).zip(pixels()) {
+            [*x, *y, *z] = camera.pixel_corner_direction(pixel);
+        }
+        out
+    }
+
+    /// Number of pixels.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Column and row of pixel `i`.
+    pub fn pixel(&self, i: usize) -> (u32, u32) {
+        (self.x[i], self.y[i])
+    }
+
+    /// Key and corner direction of pixel `i`, the latter in all lanes.
+    #[inline(always)]
+    pub fn broadcast<L: SimdFloat<Scalar = S>>(&self, i: usize) -> (u32, Vec3<L>) {
+        (self.keys[i], Vec3::splat(self.corner_directions.each_ref().map(|axis| axis[i])))
+    }
+
+    /// Keys and corner directions of the pixels from `first` on, each in `COUNT` adjacent lanes.
+    /// `COUNT` is a power of two, `first` a multiple of `WIDTH / COUNT`.
+    #[inline(always)]
+    pub fn gather<L: SimdFloat<Scalar = S>, const COUNT: usize>(
+        &self,
+        first: usize,
+    ) -> (L::SimdU32, Vec3<L>) {
+        let pixels = first..first + L::WIDTH / COUNT;
+        let keys = &self.keys[pixels.clone()];
+        let [x, y, z] = self.corner_directions.each_ref().map(|axis| {
+            let axis = &axis[pixels.clone()];
+            L::from_fn(|lane| axis[lane / COUNT])
+        });
+        (L::SimdU32::from_fn(|lane| keys[lane / COUNT]), Vec3::new(x, y, z))
+    }
+
+    /// Ranges of pixels, `packet_pixels` each, the last one possibly shorter.
+    pub fn packets(&self, packet_pixels: usize) -> impl Iterator<Item = Range<usize>> + use<S> {
+        let count = self.count;
+        (0..count).step_by(packet_pixels).map(move |first| first..count.min(first + packet_pixels))
+    }
+}

@@ -1,0 +1,158 @@
+//! Camera samples of a tile's pixels: the renderer's only way to radiance.
+
+use crate::lanes::{Float, SimdFloat, Vec3};
+use crate::sampling::{PacketSampler, SampleSettings, Sampler};
+use crate::world::culling::tile::TileCandidates;
+use crate::world::integrator::path::{Counts, Radiance};
+use crate::world::light_groups::MAX_GROUPS;
+use crate::world::pixel_block::PixelBlock;
+use crate::world::world::World;
+use std::ops::Range;
+
+/// A world with a sample sequence.
+pub struct CameraTracer<'a, L: SimdFloat> {
+    world: &'a World<L>,
+    sampler: Sampler<L>,
+}
+
+impl<'a, L: SimdFloat> CameraTracer<'a, L> {
+    pub(super) fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
+        Self { world, sampler: Sampler::new(*sampling, world.jitter()) }
+    }
+
+    /// Creates the tracer of `pixels` (column and row), at most
+    /// [`MAX_BLOCK_PIXELS`](crate::world::MAX_BLOCK_PIXELS) of them, that lie in a rectangle of the
+    /// raster. Returns `None` if all samples there are black: all camera rays miss and the
+    /// background is black.
+    pub fn tile(
+        &self,
+        replicate: usize,
+        (origin, extent): ([usize; 2], [usize; 2]),
+        pixels: impl Iterator<Item = (u32, u32)>,
+    ) -> Option<TileTracer<'_, L>> {
+        let candidates = self.world.candidates(origin, extent);
+        if candidates.as_ref().is_some_and(|candidates| self.world.is_black(candidates)) {
+            return None;
+        }
+        Some(TileTracer { candidates, ..self.scattered(replicate, pixels) })
+    }
+
+    /// Creates the tracer of `pixels` anywhere in the raster, without culling.
+    pub fn scattered(
+        &self,
+        replicate: usize,
+        pixels: impl Iterator<Item = (u32, u32)>,
+    ) -> TileTracer<'_, L> {
+        TileTracer {
+            world: self.world,
+            sampler: &self.sampler,
+            candidates: None,
+            pixels: PixelBlock::new(&self.world.camera, &self.sampler, replicate, pixels),
+            radiance: Radiance { groups: [Vec3::zero(); MAX_GROUPS] },
+            counts: Counts::default(),
+        }
+    }
+}
+
+/// Tracer of the samples of some pixels in one replicate, with the candidate sets of their tile.
+pub struct TileTracer<'a, L: SimdFloat> {
+    world: &'a World<L>,
+    sampler: &'a Sampler<L>,
+    candidates: Option<TileCandidates>,
+    pixels: PixelBlock<L::Scalar>,
+    radiance: Radiance<L>,
+    counts: Counts,
+}
+
+impl<L: SimdFloat> TileTracer<'_, L> {
+    /// Traces the samples `first..first + WIDTH` of every pixel, one packet a pixel, and passes the
+    /// radiance of each packet to `sink`. `first` is a multiple of `WIDTH`.
+    #[inline(always)]
+    pub fn radiance(
+        &mut self,
+        first: u32,
+        mut sink: impl FnMut(TracedPacket<'_, L::Scalar>, &mut Radiance<L>),
+    ) {
+        let block = self.sampler.block(first, L::WIDTH);
+        for i in 0..self.pixels.len() {
+            let (key, corner_direction) = self.pixels.broadcast(i);
+            self.trace(corner_direction, &block.for_pixel(key), L::mask(true));
+            let packet = TracedPacket {
+                block: &self.pixels,
+                pixels: i..i + 1,
+                first,
+                samples_per_pixel: L::WIDTH,
+            };
+            sink(packet, &mut self.radiance);
+        }
+    }
+
+    /// Traces the samples `first..first + COUNT` of every pixel in packets of `WIDTH / COUNT`
+    /// pixels, and passes the radiance of each packet to `sink`. Pixel `i` of a packet has the
+    /// lanes from `i * COUNT` on. `COUNT` is a power of two below `WIDTH`, `first` a multiple of
+    /// it.
+    #[inline(always)]
+    pub fn radiance_shared<const COUNT: usize>(
+        &mut self,
+        first: u32,
+        mut sink: impl FnMut(TracedPacket<'_, L::Scalar>, &mut Radiance<L>),
+    ) {
+        let block = self.sampler.block(first, COUNT);
+        for pixels in self.pixels.packets(L::WIDTH / COUNT) {
+            let (keys, corner_directions) = self.pixels.gather::<L, COUNT>(pixels.start);
+            let active = first_lanes::<L>(pixels.len() * COUNT);
+            self.trace(corner_directions, &block.for_pixels(keys), active);
+            let packet =
+                TracedPacket { block: &self.pixels, pixels, first, samples_per_pixel: COUNT };
+            sink(packet, &mut self.radiance);
+        }
+    }
+
+    /// Cost of all packets traced so far.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    #[inline(always)]
+    fn trace(
+        &mut self,
+        corner_directions: Vec3<L>,
+        sampler: &PacketSampler<'_, L>,
+        active: L::Mask,
+    ) {
+        let world = self.world;
+        let center = L::from_f64(0.5);
+        let offset = if world.jitter() { sampler.pixel() } else { (center, center) };
+        let rays = world.camera().rays(corner_directions, offset);
+        let candidates = self.candidates.as_ref();
+        let counts = world.trace(rays, candidates, sampler, active, &mut self.radiance);
+        self.counts.rays += counts.rays;
+        self.counts.glossy |= counts.glossy;
+    }
+}
+
+/// Pixels and sample indices of a packet.
+pub struct TracedPacket<'a, S> {
+    block: &'a PixelBlock<S>,
+    /// Pixels of the packet, numbered as the tracer's pixels.
+    pub pixels: Range<usize>,
+    first: u32,
+    samples_per_pixel: usize,
+}
+
+impl<S: Float> TracedPacket<'_, S> {
+    /// Pixel (column and row) and sample index of a lane.
+    pub fn sample(&self, lane: usize) -> ((u32, u32), u32) {
+        let pixel = self.pixels.start + lane / self.samples_per_pixel;
+        (self.block.pixel(pixel), self.first + (lane % self.samples_per_pixel) as u32)
+    }
+}
+
+/// Mask of the first `count` lanes.
+fn first_lanes<L: SimdFloat>(count: usize) -> L::Mask {
+    if count == L::WIDTH {
+        return L::mask(true);
+    }
+    let lanes = L::from_fn(|lane| L::Scalar::from_f64(if lane < count { 1.0 } else { 0.0 }));
+    lanes.gt(L::zero())
+}

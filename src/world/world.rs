@@ -1,0 +1,157 @@
+//! `World`: the scene as the integrators read it.
+
+use crate::bvh::Ray;
+use crate::camera::PinholeCamera;
+use crate::lanes::{SimdFloat, Vec3};
+use crate::light::DeltaLight;
+use crate::material::Bsdf;
+use crate::primitive::Aggregate;
+use crate::sampling::{PacketSampler, SampleSettings};
+use crate::world::culling::light_buffer::LightBuffer;
+use crate::world::culling::tile::{CullingMode, TileCandidates};
+use crate::world::integrator::first_hit::{self, FirstHit};
+use crate::world::integrator::nested_dielectrics::NestedDielectrics;
+use crate::world::integrator::opaque::trace_opaque;
+use crate::world::integrator::path::{Counts, Radiance};
+use crate::world::integrator::surface_textures::SurfaceTextures;
+use crate::world::integrator::transmission::TransmissionIntegrator;
+use crate::world::inventory::Inventory;
+use crate::world::light_groups::LightGroups;
+use crate::world::lights_on_surfaces::OnSurface;
+use crate::world::tile_tracer::CameraTracer;
+
+/// A light with its group.
+pub(super) struct LightSource<S> {
+    pub light: DeltaLight<S>,
+    /// Index of the light group.
+    pub group: usize,
+    /// Emission that the group's samples contain; `None` is 1 in every channel.
+    pub emission: Option<[S; 3]>,
+    /// End points of shadow rays, for a light that lies on a surface.
+    pub on_surface: Option<OnSurface<S>>,
+}
+
+/// A scene compiled for the lane type `L`. It holds only what the scene requires.
+pub struct World<L: SimdFloat> {
+    /// All primitives, in coordinates relative to the scene's centre.
+    pub(super) geometry: Aggregate<L>,
+    /// Index into `bsdfs` of each primitive.
+    pub(super) bsdf_of: Vec<u32>,
+    pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
+    pub(super) sources: Vec<LightSource<L::Scalar>>,
+    /// Light group of ambient light; `None` if no surface returns any.
+    pub(super) ambient: Option<usize>,
+    /// Light group of the background; `None` if it is black.
+    pub(super) background: Option<usize>,
+    /// `true` if shadow rays are traced.
+    pub(super) shadows: bool,
+    /// `true` if shading normals differ from geometric normals somewhere.
+    pub(super) smooth: bool,
+    /// `true` if vertex colours or textures multiply the albedo somewhere.
+    pub(super) colored: bool,
+    /// `true` if the world is neither `smooth` nor `colored` and all its primitives are in linear
+    /// lists, without BVH and bounding boxes.
+    pub(super) simple: bool,
+    /// Textures and bump maps; `None` if there are none.
+    pub(super) surface_textures: Option<SurfaceTextures<L>>,
+    /// Transmissive surfaces; `None` if there are none.
+    pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,
+    /// Largest number of surfaces on a path after the first; 0 if no surface reflects or transmits.
+    pub(super) depth: u32,
+    /// Throughput below which a path ends.
+    pub(super) min_weight: f64,
+    /// `true` if lobe directions below the horizon are mirrored above it.
+    pub(super) fold: bool,
+    pub(super) camera: PinholeCamera,
+    /// Candidates of rays about which nothing is known.
+    pub(super) all_candidates: TileCandidates,
+    /// Light buffer of each light; empty, or `None`, where shadow rays traverse the BVH.
+    pub(super) light_buffers: Vec<Option<LightBuffer<L::Scalar>>>,
+    pub(super) culling: CullingMode,
+    pub(super) groups: LightGroups,
+    /// Name of each light group.
+    pub(super) group_names: Vec<String>,
+    /// Steps per unit of radiance in the film's integers, per light group.
+    pub(super) scales: Vec<f64>,
+    /// `true` if samples are distributed over their pixel.
+    pub(super) jitter: bool,
+    pub(super) inventory: Inventory,
+    /// One sentence for each limit of the scene that truncates paths.
+    pub(super) truncation_biases: Vec<String>,
+}
+
+impl<L: SimdFloat> World<L> {
+    /// Number of light groups.
+    pub fn groups(&self) -> usize {
+        self.scales.len()
+    }
+
+    /// Steps per unit of radiance in the film's integers, per light group.
+    pub fn scales(&self) -> &[f64] {
+        &self.scales
+    }
+
+    /// Returns `true` if samples are distributed over their pixel.
+    pub fn jitter(&self) -> bool {
+        self.jitter
+    }
+
+    /// The camera, in coordinates relative to the scene's centre.
+    pub fn camera(&self) -> &PinholeCamera {
+        &self.camera
+    }
+
+    /// Creates the tracer of camera samples.
+    pub fn camera_tracer(&self, sampling: &SampleSettings) -> CameraTracer<'_, L> {
+        CameraTracer::new(self, sampling)
+    }
+
+    /// Candidates of the camera rays through a rectangle of the raster, and of the shadow rays from
+    /// their hit points; `None` if no primitive is ruled out.
+    pub(super) fn candidates(
+        &self,
+        origin: [usize; 2],
+        extent: [usize; 2],
+    ) -> Option<TileCandidates> {
+        let lights = self.sources.len();
+        self.culling.candidates(&self.geometry, lights, &self.camera, (origin, extent))
+    }
+
+    /// Returns `true` if all camera rays with these candidates miss and the background is black.
+    pub(super) fn is_black(&self, candidates: &TileCandidates) -> bool {
+        self.background.is_none() && candidates.primary.is_empty()
+    }
+
+    /// Traces one packet of paths. `origin` and `direction` are those of camera rays, as
+    /// [`PinholeCamera::rays`] makes them. Lanes outside `active` stay black. `candidates` are
+    /// those of the camera rays and of the shadow rays from their hit points, if they are known.
+    #[inline(always)]
+    pub fn trace(
+        &self,
+        (origin, direction): (Vec3<L>, Vec3<L>),
+        candidates: Option<&TileCandidates>,
+        sampler: &PacketSampler<'_, L>,
+        active: L::Mask,
+        out: &mut Radiance<L>,
+    ) -> Counts {
+        for group in &mut out.groups[..self.groups()] {
+            *group = Vec3::zero();
+        }
+        let ray = Ray { origin, direction };
+        let candidates = candidates.unwrap_or(&self.all_candidates);
+        if let Some(nested_dielectrics) = &self.nested_dielectrics {
+            TransmissionIntegrator { world: self, nested_dielectrics, sampler }
+                .trace(ray, candidates, active, out)
+        } else if self.simple {
+            trace_opaque::<_, true>(self, ray, candidates, sampler, active, out)
+        } else {
+            trace_opaque::<_, false>(self, ray, candidates, sampler, active, out)
+        }
+    }
+
+    /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
+    /// same length. Points are columns and rows of the raster in pixels, with fractions.
+    pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
+        first_hit::trace_first_hits(self, points, hits);
+    }
+}
