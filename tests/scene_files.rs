@@ -1,7 +1,7 @@
 //! The scene files that come with the program, and those that must be refused.
 
 use std::path::{Path, PathBuf};
-use zerkalo::primitive::Form;
+use zerkalo::primitive::{ConvexPolyhedronForm, Form, SphereForm};
 use zerkalo::scene::{Document, Scene};
 
 fn files(folder: &str) -> Vec<PathBuf> {
@@ -86,7 +86,9 @@ fn the_reference_is_fresh() {
 fn corners(scene: &Scene, name: &str) -> Vec<[f64; 3]> {
     let object = scene.objects.iter().find(|o| o.name == name).unwrap();
     match object.shape.form() {
-        Form::ConvexPolyhedron { corners, .. } => corners.iter().map(|c| c.to_array()).collect(),
+        Form::ConvexPolyhedron(ConvexPolyhedronForm { corners, .. }) => {
+            corners.iter().map(|c| c.to_array()).collect()
+        }
         other => panic!("{other:?}"),
     }
 }
@@ -186,5 +188,5 @@ fn the_tracks_are_where_their_formula_puts_them() {
 }
 
 fn ball(center: [f64; 3], radius: f64) -> Form {
-    Form::Sphere { center: center.into(), radius }
+    Form::Sphere(SphereForm { center: center.into(), radius })
 }

@@ -403,10 +403,11 @@ impl<L: SimdFloat> Aggregate<L> {
         (item >= base).then(|| meshes.color((item - base) as usize, facet))?
     }
 
-    /// The texture coordinates of its own that `item` has at `point`, near `facet`, if it has any.
+    /// Texture coordinates that `item` has of its own at `point`, near its triangles tagged `facet`; `None`
+    /// if it has none.
     pub fn uv(&self, item: u32, facet: L, point: Vec3<L>) -> Option<UvGradients<L>> {
-        let (meshes, base) = self.meshes()?;
-        (item >= base).then(|| meshes.uv((item - base) as usize, facet, point))?
+        let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
+        part.batch.uv((item - part.base) as usize, facet, point)
     }
 }
 

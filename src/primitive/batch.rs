@@ -9,7 +9,8 @@ use crate::primitive::csg::Compounds;
 use crate::primitive::ellipsoid::Ellipsoid;
 use crate::primitive::form::Form;
 use crate::primitive::mesh_instance::Meshes;
-use crate::primitive::planar::{Parallelogram, Plane};
+use crate::primitive::parallelogram::Parallelogram;
+use crate::primitive::plane::Plane;
 use crate::primitive::sphere::Sphere;
 use std::ops::Range;
 
@@ -51,43 +52,80 @@ pub trait Primitive<L: SimdFloat> {
 
     /// The surface at `point` (near it, from `ray.at(t)`).
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L>;
+
+    /// Texture coordinates that the primitive has of its own at `point`. Forms whose default mapping is
+    /// [`DefaultMapping::Uv`](crate::primitive::DefaultMapping::Uv) return them.
+    fn uv(&self, _point: Vec3<L>) -> Option<UvGradients<L>> {
+        None
+    }
 }
 
-/// All items of one form.
-pub enum PrimitiveBatch<L: SimdFloat> {
-    /// Parallelograms.
-    Parallelograms(Vec<Parallelogram<L::Scalar>>),
-    /// Infinite planes.
-    Planes(Vec<Plane<L::Scalar>>),
-    /// Spheres.
-    Spheres(Vec<Sphere<L::Scalar>>),
-    /// Ellipsoids.
-    Ellipsoids(Vec<Ellipsoid<L::Scalar>>),
-    /// Convex solids.
-    ConvexPolyhedron(Vec<ConvexPolyhedron<L::Scalar>>),
-    /// Tapered cylinders.
-    ConicalFrustum(Vec<ConicalFrustum<L::Scalar>>),
-    /// Compounds, whose items are parts.
-    Compounds(Compounds<L::Scalar>),
-    /// Meshes.
-    Meshes(Meshes<L::Scalar>),
-}
+macro_rules! batches {
+    ($($(#[$doc:meta])+ $kind:ident($item:ident)),+ $(,)?) => {
+        /// All primitives of one form.
+        pub enum PrimitiveBatch<L: SimdFloat> {
+            $($(#[$doc])+ $kind(Vec<$item<L::Scalar>>),)+
+            /// Compounds, whose items are parts.
+            Compounds(Compounds<L::Scalar>),
+            /// Meshes.
+            Meshes(Meshes<L::Scalar>),
+        }
 
-/// The same expression for the items of any form but compounds and meshes, and one for each of those.
-macro_rules! each {
-    ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
-        $meshes:ident => $third:expr) => {
-        match $batch {
-            PrimitiveBatch::Parallelograms($items) => $value,
-            PrimitiveBatch::Planes($items) => $value,
-            PrimitiveBatch::Spheres($items) => $value,
-            PrimitiveBatch::Ellipsoids($items) => $value,
-            PrimitiveBatch::ConvexPolyhedron($items) => $value,
-            PrimitiveBatch::ConicalFrustum($items) => $value,
-            PrimitiveBatch::Compounds($compounds) => $other,
-            PrimitiveBatch::Meshes($meshes) => $third,
+        /// Evaluates one expression for the primitives of any form but compounds and meshes, and one for
+        /// each of those.
+        macro_rules! each {
+            ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
+                $meshes:ident => $third:expr) => {
+                match $batch {
+                    $(PrimitiveBatch::$kind($items) => $value,)+
+                    PrimitiveBatch::Compounds($compounds) => $other,
+                    PrimitiveBatch::Meshes($meshes) => $third,
+                }
+            };
+        }
+
+        /// Compiles `forms` to one batch per form that occurs.
+        pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
+            let mut out = Vec::new();
+            $(
+                let items = forms.iter().enumerate().filter_map(|(form, f)| {
+                    Some((PrimitiveId { form, part: 0 }, $item::new(f)?))
+                });
+                let (sources, items): (Vec<_>, Vec<_>) = items.unzip();
+                out.extend(LabelledBatch::new(PrimitiveBatch::$kind(items), sources, forms));
+            )+
+            let sources_of = |wanted: fn(&Form) -> bool| -> Vec<_> {
+                let matching = forms.iter().enumerate().filter(|(_, f)| wanted(f));
+                let parts = |(form, f): (usize, &Form)| {
+                    (0..f.parts()).map(move |part| PrimitiveId { form, part })
+                };
+                matching.flat_map(parts).collect()
+            };
+            let sources = sources_of(|f| matches!(f, Form::Csg(_)));
+            let compounds = PrimitiveBatch::Compounds(Compounds::new(forms));
+            out.extend(LabelledBatch::new(compounds, sources, forms));
+            let sources = sources_of(|f| matches!(f, Form::Mesh(_)));
+            let meshes = PrimitiveBatch::Meshes(Meshes::new(forms));
+            out.extend(LabelledBatch::new(meshes, sources, forms));
+            out
         }
     };
+}
+
+// The list of compiled primitives, in the order in which items are numbered: a new one is a line here.
+batches! {
+    /// Parallelograms.
+    Parallelograms(Parallelogram),
+    /// Infinite planes.
+    Planes(Plane),
+    /// Spheres.
+    Spheres(Sphere),
+    /// Ellipsoids.
+    Ellipsoids(Ellipsoid),
+    /// Convex polyhedra.
+    ConvexPolyhedra(ConvexPolyhedron),
+    /// Conical frusta.
+    ConicalFrusta(ConicalFrustum),
 }
 
 impl<L: SimdFloat> PrimitiveBatch<L> {
@@ -123,6 +161,14 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             items => items[item].surface(point),
             compounds => compounds.surface(item, point),
             meshes => meshes.surface(item, facet, point))
+    }
+
+    /// Texture coordinates that `item` has of its own at `point`; `None` if it has none.
+    pub fn uv(&self, item: usize, facet: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+        each!(self,
+            items => items[item].uv(point),
+            compounds => compounds.uv(item, point),
+            meshes => meshes.uv(item, facet, point))
     }
 }
 
@@ -178,70 +224,18 @@ pub struct LabelledBatch<L: SimdFloat> {
     pub infinite: bool,
 }
 
-/// One batch per form that occurs in `forms`.
-pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
-    let mut out = Vec::new();
-    /// The items that `new` makes of some forms, as one batch.
-    macro_rules! add {
-        ($batch:ident, $item:ident, $noun:expr, $infinite:expr) => {
-            let made = forms
-                .iter()
-                .enumerate()
-                .filter_map(|(form, f)| Some((PrimitiveId { form, part: 0 }, $item::new(f)?)));
-            let (sources, items): (Vec<_>, Vec<_>) = made.unzip();
-            if !items.is_empty() {
-                let batch = PrimitiveBatch::$batch(items);
-                let detail = String::new();
-                out.push(LabelledBatch {
-                    batch,
-                    sources,
-                    noun: $noun,
-                    detail,
-                    infinite: $infinite,
-                });
-            }
+impl<L: SimdFloat> LabelledBatch<L> {
+    /// Creates the batch of the primitives that `sources` lists; `None` if there are none.
+    fn new(batch: PrimitiveBatch<L>, sources: Vec<PrimitiveId>, forms: &[Form]) -> Option<Self> {
+        let noun = forms[sources.first()?.form].noun();
+        let triangles: usize = sources.iter().map(|s| forms[s.form].triangles()).sum();
+        let detail = match triangles {
+            0 => String::new(),
+            n => format!(" of {} triangles", with_thousands_separators(n)),
         };
+        let infinite = sources.iter().any(|s| forms[s.form].bounds().is_none());
+        Some(Self { batch, sources, noun, detail, infinite })
     }
-    add!(Parallelograms, Parallelogram, ("rectangle", "rectangles"), false);
-    add!(Planes, Plane, ("plane", "planes"), true);
-    add!(Spheres, Sphere, ("sphere", "spheres"), false);
-    add!(Ellipsoids, Ellipsoid, ("ellipsoid", "ellipsoids"), false);
-    add!(ConvexPolyhedron, ConvexPolyhedron, ("convex solid", "convex solids"), false);
-    add!(
-        ConicalFrustum,
-        ConicalFrustum,
-        ("conical_frustum cylinder", "conical_frustum cylinders"),
-        false
-    );
-    let compounds = forms.iter().enumerate().filter(|(_, f)| matches!(f, Form::Csg(_)));
-    let sources: Vec<_> = compounds
-        .flat_map(|(form, f)| (0..f.parts()).map(move |part| PrimitiveId { form, part }))
-        .collect();
-    if !sources.is_empty() {
-        let batch = PrimitiveBatch::Compounds(Compounds::new(forms));
-        let (noun, detail) = (("compound", "compounds"), String::new());
-        out.push(LabelledBatch { batch, sources, noun, detail, infinite: false });
-    }
-    let mut triangles = 0;
-    let mut sources = Vec::new();
-    for (form, f) in forms.iter().enumerate() {
-        if let Form::Mesh { mesh, .. } = f {
-            triangles += mesh.mesh().triangles.len();
-            sources.push(PrimitiveId { form, part: 0 });
-        }
-    }
-    if !sources.is_empty() {
-        let batch = PrimitiveBatch::Meshes(Meshes::new(forms));
-        let detail = format!(" of {} triangles", with_thousands_separators(triangles));
-        out.push(LabelledBatch {
-            batch,
-            sources,
-            noun: ("mesh", "meshes"),
-            detail,
-            infinite: false,
-        });
-    }
-    out
 }
 
 /// `69,451`

@@ -5,7 +5,7 @@ use crate::bvh::packet::SlabPacket;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::form::Form;
 use crate::value::Choice;
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// How rays are kept from things that they cannot meet. No way changes a picture, only its time.
@@ -88,7 +88,7 @@ impl<S: Float> ItemBox<S> {
             let [low, high] = padded(bounds, S::EPSILON.max(GIVEN)).map(vector);
             Self { low, high, space }
         };
-        let Some((scene_from_own, (low, high))) = form.own_box().filter(|_| own) else {
+        let Some((scene_from_own, (low, high))) = form.oriented_box().filter(|_| own) else {
             return Some(made(bounds, None));
         };
         let rows = scene_from_own.matrix3.inverse().transpose();
@@ -126,25 +126,5 @@ impl<S: Float> ItemBox<S> {
             }
         };
         beam.enters(Vec3::splat(self.low), Vec3::splat(self.high), limit)
-    }
-}
-
-impl Form {
-    /// The space in which a form was described, and a box around it there, if it still has one: those
-    /// that keep their map do.
-    fn own_box(&self) -> Option<(DAffine3, (DVec3, DVec3))> {
-        match self {
-            Self::Ellipsoid { scene_from_unit } => {
-                Some((*scene_from_unit, (DVec3::NEG_ONE, DVec3::ONE)))
-            }
-            Self::ConicalFrustum { scene_from_unit, .. } => {
-                Some((*scene_from_unit, (DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE)))
-            }
-            Self::Mesh { mesh, scene_from_mesh, .. } => {
-                let [low, high] = mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
-                Some((*scene_from_mesh, (low, high)))
-            }
-            _ => None,
-        }
     }
 }

@@ -1,6 +1,6 @@
 //! Solids that stand on a regular base: what cube, box, pyramid and prism have in common.
 
-use crate::primitive::{Form, HalfSpace};
+use crate::primitive::{ConvexPolyhedronForm, Form, HalfSpace};
 use crate::value::{round_nice, sin_cos_degrees};
 use glam::{DVec2, DVec3};
 
@@ -50,7 +50,7 @@ pub(super) fn prismoid(
         let normal = DVec3::new(outward.x, up, outward.y).normalize();
         faces.push(through(corners[i], normal));
     }
-    Form::ConvexPolyhedron { faces, corners }
+    Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners })
 }
 
 /// The corner of a base whose middle is `base`, `width` wide and `depth` deep: half of both away
@@ -62,13 +62,13 @@ pub(super) fn corner_of_centered(base: DVec3, width: f64, depth: f64) -> [f64; 3
 
 #[cfg(test)]
 mod tests {
-    use crate::primitive::{Form, HalfSpace};
+    use crate::primitive::{ConvexPolyhedronForm, Form, HalfSpace};
     use crate::shape::{Cube, Cuboid, Prism, Pyramid, ShapeDesc};
     use glam::DVec3;
 
     fn parts(form: Form) -> (Vec<HalfSpace>, Vec<DVec3>) {
         match form {
-            Form::ConvexPolyhedron { faces, corners } => (faces, corners),
+            Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners }) => (faces, corners),
             other => panic!("{other:?}"),
         }
     }

@@ -1,6 +1,6 @@
 //! Sphere: the points at distance `radius` from `center`.
 
-use crate::primitive::Form;
+use crate::primitive::{Form, SphereForm};
 use crate::shape::ShapeDesc;
 use crate::value::{Field, NumberRange, ValidationError, Validator, ValueType, round_nice};
 use glam::DVec3;
@@ -30,7 +30,7 @@ impl ShapeDesc for Sphere {
     ];
 
     fn form(&self) -> Form {
-        Form::Sphere { center: DVec3::from_array(self.center), radius: self.radius }
+        Form::Sphere(SphereForm { center: DVec3::from_array(self.center), radius: self.radius })
     }
 
     fn faults(&self) -> Vec<ValidationError> {

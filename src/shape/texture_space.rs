@@ -1,25 +1,10 @@
 //! The space in which textures lie on a shape.
 
-use crate::primitive::Form;
+use crate::primitive::DefaultMapping;
 use crate::shape::Shape;
 use crate::shape::csg::parts_of;
 use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
-
-/// How a texture lies on a shape if nobody says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DefaultMapping {
-    /// It is flat.
-    Plane,
-    /// It is round on all sides.
-    Ball,
-    /// It is round about an axis.
-    Turned,
-    /// It has flat sides, or a form of any kind.
-    Sides,
-    /// A mesh with texture coordinates of its own.
-    Uv,
-}
 
 /// The space in which textures lie on a simple shape: x to the right, y up or along its axis, z to the
 /// front or along its normal; as large as the scene is before the object's transform.
@@ -39,15 +24,7 @@ impl TextureSpace {
         let form = shape.form();
         let shape_from_texture = DAffine3::from_mat3(shape.texture_axes());
         let texture_from_shape = shape_from_texture.inverse();
-        let unwrapped = match &form {
-            Form::Parallelogram { .. } | Form::Plane { .. } => DefaultMapping::Plane,
-            Form::Sphere { .. } | Form::Ellipsoid { .. } => DefaultMapping::Ball,
-            Form::ConicalFrustum { .. } => DefaultMapping::Turned,
-            Form::Mesh { mesh, .. } if mesh.mesh().uvs.is_some() => DefaultMapping::Uv,
-            Form::ConvexPolyhedron { .. } | Form::Csg(_) | Form::Mesh { .. } => {
-                DefaultMapping::Sides
-            }
-        };
+        let unwrapped = form.default_mapping();
         let point = texture_from_shape.transform_point3(shape.position());
         let corners = form.transformed(&texture_from_shape).bounds().unwrap_or((point, point));
         Self { shape_from_texture, corners: corners.into(), unwrapped }
@@ -66,7 +43,7 @@ impl TextureSpace {
 }
 
 impl Shape {
-    /// The spaces in which textures lie on its parts, in the order of [`Form::parts`]; of a shape
+    /// The spaces in which textures lie on its parts, in the order of [`Form::parts`](crate::primitive::Form::parts); of a shape
     /// without faults.
     pub fn texture_spaces(&self) -> Vec<TextureSpace> {
         let Some(of) = parts_of(self) else { return vec![TextureSpace::new(self)] };

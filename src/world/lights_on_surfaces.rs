@@ -35,10 +35,7 @@ impl<S: Float> OnSurface<S> {
         // What the scene's own coordinates, in double precision, round off.
         let given = f64::EPSILON * origin.abs().max_element();
         for form in forms {
-            let reach = match form {
-                Form::Plane { offset, .. } => offset.abs(),
-                _ => form.bounds().map_or(0.0, |(l, h)| l.abs().max(h.abs()).max_element()),
-            };
+            let reach = form.max_coordinate();
             let rounding = (epsilon * reach.max(position.abs().max_element())).max(given);
             let normals = form.normals_at(position, ON * rounding);
             if !normals.is_empty() {

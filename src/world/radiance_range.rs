@@ -20,9 +20,9 @@ use crate::camera::PinholeCamera;
 use crate::lanes::Float;
 use crate::light::DeltaLight;
 use crate::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
-use crate::primitive::Form;
+use crate::primitive::{Form, box_distance};
 use crate::scene::{RayTypes, Scene};
-use crate::world::clearance::{box_distance, clearance, clearance_of};
+use crate::world::clearance::clearance;
 use glam::DVec3;
 use std::f64::consts::{FRAC_1_PI, PI};
 
@@ -239,18 +239,19 @@ impl<'a> SceneDistances<'a> {
         for (form, response) in self.forms.iter().zip(&self.responses) {
             let Some(response) = response else { continue };
             // A lamp in a surface does not light it: rays begin above the lamp.
-            if let Some(distance) = clearance_of(form, position).filter(|d| *d > self.lift) {
+            if let Some(distance) = form.clearance(position).filter(|d| *d > self.lift) {
                 let light = light_at(distance.max(least_spot));
                 out.brightest = out.brightest.max(light * response.most);
                 out.spots = out.spots.max(light_at(distance) * response.most);
                 out.extreme = out.extreme.max(light * response.peak * self.gain);
             }
-            // Inside of the box the walls are about as far as its middle.
-            let inside = || form.bounds().map_or(0.0, |(low, high)| 0.5 * low.distance(high));
-            let far = box_distance(form, position).filter(|d| *d > 0.0).unwrap_or_else(inside);
-            let far = match form {
-                Form::Plane { .. } => clearance_of(form, position).unwrap_or(far),
-                _ => far,
+            // Inside the box the walls are about as far as its middle.
+            let far = match form.bounds() {
+                Some(bounds) => match box_distance(bounds, position) {
+                    away if away > 0.0 => away,
+                    _ => 0.5 * bounds.0.distance(bounds.1),
+                },
+                None => form.clearance(position).unwrap_or(0.0),
             };
             let light = light_at(far.max(least_spot));
             out.dimmest = out.dimmest.min(light * response.least * self.faintest);

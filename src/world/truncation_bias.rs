@@ -1,7 +1,6 @@
 //! What the limits of path tracing leave out, as a bound.
 
 use crate::material::{Fresnel, Material};
-use crate::primitive::Form;
 use crate::scene::{Object, RayTypes, Scene};
 use glam::DVec3;
 
@@ -25,8 +24,8 @@ fn max_albedo(material: &Material, flat: bool) -> f64 {
 /// What matters of an object's geometry.
 struct ObjectTraits {
     flat: bool,
-    /// It may see itself from outside.
-    compound: bool,
+    /// The outside may see itself.
+    concave: bool,
     /// Paths may begin inside.
     contains_eye: bool,
 }
@@ -37,7 +36,7 @@ const ROUNDING: f64 = 1e-6;
 impl ObjectTraits {
     fn new(object: &Object, scene: &Scene) -> Self {
         let form = object.form();
-        let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
+        let flat = form.is_flat();
         let eye = DVec3::from(scene.camera.eye);
         let within = form.bounds().is_some_and(|(low, high)| {
             let extent = low.abs().max(high.abs()).max(eye.abs()).max_element();
@@ -46,7 +45,7 @@ impl ObjectTraits {
         });
         Self {
             flat,
-            compound: matches!(form, Form::Csg(_) | Form::Mesh { .. }),
+            concave: !form.is_convex(),
             contains_eye: !flat && (within || scene.camera.near > 0.0),
         }
     }
@@ -56,7 +55,7 @@ impl ObjectTraits {
     /// that: what they would reflect into the surface leaves it, and what they would keep outside goes in.
     fn sees_itself(&self, material: &Material) -> bool {
         let let_in = !self.flat && material.transmission > 0.0;
-        self.compound || let_in || self.contains_eye && material.two_sided
+        self.concave || let_in || self.contains_eye && material.two_sided
     }
 }
 

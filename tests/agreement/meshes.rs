@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use std::collections::HashMap;
-use zerkalo::primitive::Form;
+use zerkalo::primitive::{Form, MeshForm};
 use zerkalo::shape::{MeshDesc, ShapeDesc};
 
 /// The least cosine between the normal that light sees and the direction to the viewer.
@@ -39,7 +39,7 @@ fn around(corners: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
 impl Triangles {
     /// What is in the file.
     pub fn new(file: &MeshDesc) -> Self {
-        let Form::Mesh { mesh, scene_from_mesh, smooth } = file.form() else {
+        let Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth }) = file.form() else {
             unreachable!("a mesh is a mesh")
         };
         let mesh = mesh.mesh();

@@ -5,7 +5,7 @@ use crate::common::Numbers;
 use crate::rays::{Line, ball, closest, every_kind, scene};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use zerkalo::lanes::Double;
-use zerkalo::primitive::{Aggregate, Form};
+use zerkalo::primitive::Aggregate;
 
 fn random_map(numbers: &mut Numbers) -> DAffine3 {
     let mut factor = || {
@@ -25,7 +25,7 @@ fn random_map(numbers: &mut Numbers) -> DAffine3 {
 fn objects_under_affine_maps_are_met_where_their_originals_are() {
     for (i, (name, form)) in every_kind().into_iter().enumerate() {
         let mut numbers = Numbers::new(400 + i as u64);
-        let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
+        let flat = form.is_flat();
         let original = Aggregate::<f64>::new(std::slice::from_ref(&form));
         for round in 0..20 {
             let map = random_map(&mut numbers);

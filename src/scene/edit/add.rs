@@ -2,7 +2,7 @@
 
 use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::Material;
-use crate::primitive::Form;
+use crate::primitive::{Form, ParallelogramForm};
 use crate::scene::edit::bounds::{BoundingSphere, scene_bounds};
 use crate::scene::edit::placement::place_for;
 use crate::scene::edit::properties::Word;
@@ -61,7 +61,7 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
         return Err(EditError::new(&found, &format!("Expected one of {}.", names.join(", "))));
     };
     face_camera(&mut shape, scene);
-    if let Form::Plane { .. } = shape.form() {
+    if let Form::Plane(_) = shape.form() {
         // Under everything, so that it does not lie in a ground that is there already.
         let lows = scene.objects.iter().filter_map(|o| Some(o.form().bounds()?.0.y));
         if let Some(lowest) = lows.reduce(f64::min) {
@@ -113,7 +113,7 @@ fn usual_size(scene: &Scene) -> f64 {
     let solid = |object: &Object| {
         let form = object.form();
         let (low, high) = form.bounds()?;
-        crate::scene::edit::bounds::is_solid(&form).then(|| (high - low).max_element())
+        form.is_solid().then(|| (high - low).max_element())
     };
     let mut sizes: Vec<f64> = scene.objects.iter().filter_map(solid).collect();
     sizes.sort_by(f64::total_cmp);
@@ -127,7 +127,7 @@ fn usual_size(scene: &Scene) -> f64 {
 
 /// Turns a flat thing that stands upright so that its front is towards the camera.
 fn face_camera(shape: &mut Shape, scene: &Scene) {
-    let Form::Parallelogram { u, v, .. } = shape.form() else { return };
+    let Form::Parallelogram(ParallelogramForm { u, v, .. }) = shape.form() else { return };
     let front = u.cross(v).normalize();
     if front.y.abs() > 0.5 {
         return;

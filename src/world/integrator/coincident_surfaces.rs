@@ -13,7 +13,7 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::{Aggregate, Form, PrimitiveId};
+use crate::primitive::{Aggregate, Form, PrimitiveId, SphereForm};
 use crate::world::integrator::nested_dielectrics::MediumStack;
 use crate::world::integrator::opaque::next_distinct;
 use glam::DVec3;
@@ -131,7 +131,8 @@ impl<S: Float> Contacts<S> {
         }
         let mut touching = vec![Vec::new(); forms.len()];
         for (a, b) in pairs(forms, |a, b| lets_through[a] || lets_through[b]) {
-            let rounding = (epsilon * reach(&forms[a]).max(reach(&forms[b]))).max(given);
+            let rounding =
+                (epsilon * forms[a].max_coordinate().max(forms[b].max_coordinate())).max(given);
             if may_touch(&forms[a], &forms[b], 4.0 * TIE * rounding) {
                 let tie = S::from_f64(TIE * rounding);
                 touching[a].push(Contact { item: first[b], tie });
@@ -143,8 +144,7 @@ impl<S: Float> Contacts<S> {
         }
         let count = forms.len() as f64;
         let kind = |(item, source): (usize, &PrimitiveId)| {
-            let flat =
-                matches!(forms[source.form], Form::Parallelogram { .. } | Form::Plane { .. });
+            let flat = forms[source.form].is_flat();
             let number = source.form as f64;
             let (kind, layer) = match (rank_of[item], flat, transparent[item]) {
                 (0, true, true) => (SurfaceKind::Pane, 1.0 + number),
@@ -272,14 +272,6 @@ impl<S: Float> Contacts<S> {
     }
 }
 
-/// Largest magnitude of a coordinate that its surface is computed from.
-fn reach(form: &Form) -> f64 {
-    match form {
-        Form::Plane { offset, .. } => offset.abs(),
-        _ => form.bounds().map_or(0.0, |(low, high)| low.abs().max(high.abs()).max_element()),
-    }
-}
-
 /// The pairs of forms for which `wanted` is true and whose boxes overlap, or come close.
 fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
     let mut out = Vec::new();
@@ -308,49 +300,20 @@ fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, u
     out
 }
 
-/// The least and the largest of `axis . p` over a form, or beyond; `None`: it has no end there.
-fn span(form: &Form, axis: DVec3) -> Option<(f64, f64)> {
-    let around = |points: &[DVec3]| {
-        let heights = points.iter().map(|p| axis.dot(*p));
-        (heights.clone().fold(f64::INFINITY, f64::min), heights.fold(f64::NEG_INFINITY, f64::max))
-    };
-    match form {
-        Form::Sphere { center, radius } => {
-            Some((axis.dot(*center) - radius, axis.dot(*center) + radius))
-        }
-        Form::ConvexPolyhedron { corners, .. } => Some(around(corners)),
-        Form::Parallelogram { corner, u, v } => {
-            Some(around(&[*corner, corner + u, corner + v, corner + u + v]))
-        }
-        Form::Plane { normal, offset } => {
-            let along = normal.dot(axis);
-            let parallel = along.abs() > 1.0 - 1e-12;
-            parallel.then_some((along.signum() * offset, along.signum() * offset))
-        }
-        _ => {
-            let (low, high) = form.bounds()?;
-            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-            let (at, reach) = (axis.dot(middle), axis.abs().dot(half));
-            Some((at - reach, at + reach))
-        }
-    }
-}
-
 /// Whether surfaces of two forms may come within `slack` of each other.
 fn may_touch(a: &Form, b: &Form, slack: f64) -> bool {
-    let normal = |form: &Form| match form {
-        Form::Parallelogram { u, v, .. } => Some(u.cross(*v).normalize()),
-        Form::Plane { normal, .. } => Some(*normal),
-        _ => None,
-    };
-    let apart = |axis: DVec3| match (span(a, axis), span(b, axis)) {
+    let normal = |form: &Form| form.plane().map(|plane| plane.normal);
+    let apart = |axis: DVec3| match (a.extent_along(axis), b.extent_along(axis)) {
         (Some(a), Some(b)) => a.0 > b.1 + slack || b.0 > a.1 + slack,
         _ => false,
     };
     if DVec3::AXES.into_iter().chain(normal(a)).chain(normal(b)).any(apart) {
         return false;
     }
-    if let (Form::Sphere { center, radius }, Form::Sphere { center: other, radius: size }) = (a, b)
+    if let (
+        Form::Sphere(SphereForm { center, radius }),
+        Form::Sphere(SphereForm { center: other, radius: size }),
+    ) = (a, b)
     {
         let distance = center.distance(*other);
         // Beside each other, or one inside the other.
@@ -362,12 +325,14 @@ fn may_touch(a: &Form, b: &Form, slack: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::primitive::PlaneForm;
     use crate::shape::Shape;
 
     #[test]
     fn only_what_touches_is_paired() {
-        let ball = |y: f64, radius| Form::Sphere { center: DVec3::new(0.0, y, 0.0), radius };
-        let plane = |normal: DVec3, offset| Form::Plane { normal, offset };
+        let ball =
+            |y: f64, radius| Form::Sphere(SphereForm { center: DVec3::new(0.0, y, 0.0), radius });
+        let plane = |normal: DVec3, offset| Form::Plane(PlaneForm { normal, offset });
         let cube = Shape::fitted_to("cube", DVec3::ZERO, DVec3::ONE).unwrap().form();
         let slanted = DVec3::new(0.6, 0.8, 0.0);
         for (a, b, touch) in [

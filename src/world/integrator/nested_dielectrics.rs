@@ -133,8 +133,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         }
         let mut indices = vec![None; forms.len() + 1];
         let priority_of = sources.iter().zip(finish_of).map(|(source, finish)| {
-            let flat =
-                matches!(forms[source.form], Form::Parallelogram { .. } | Form::Plane { .. });
+            let flat = forms[source.form].is_flat();
             let priority = source.form + 1;
             match through(*finish) {
                 Some(transmission) if !flat => {
