@@ -12,6 +12,7 @@ use crate::primitive::mesh_instance::Meshes;
 use crate::primitive::parallelogram::Parallelogram;
 use crate::primitive::plane::Plane;
 use crate::primitive::sphere::Sphere;
+use crate::primitive::torus::Torus;
 use std::ops::Range;
 
 /// Where a ray meets a surface.
@@ -126,6 +127,8 @@ batches! {
     ConvexPolyhedra(ConvexPolyhedron),
     /// Conical frusta.
     ConicalFrusta(ConicalFrustum),
+    /// Tori.
+    Tori(Torus),
 }
 
 impl<L: SimdFloat> PrimitiveBatch<L> {

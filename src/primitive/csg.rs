@@ -23,6 +23,7 @@ use crate::primitive::form::Form;
 use crate::primitive::plane::Plane;
 use crate::primitive::solid::SolidPrimitive;
 use crate::primitive::sphere::Sphere;
+use crate::primitive::torus::Torus;
 use std::ops::Range;
 
 /// Surfaces that are so many roundings of the largest coordinate apart lie on each other: two faces
@@ -81,6 +82,7 @@ leaves! {
     Ellipsoid(1),
     ConvexPolyhedron(1),
     ConicalFrustum(1),
+    Torus(2),
     // The half-space behind it.
     Plane(1),
 }

@@ -14,6 +14,7 @@ use crate::primitive::mesh_instance::MeshForm;
 use crate::primitive::parallelogram::ParallelogramForm;
 use crate::primitive::plane::PlaneForm;
 use crate::primitive::sphere::SphereForm;
+use crate::primitive::torus::TorusForm;
 use glam::{DAffine3, DVec3};
 
 macro_rules! forms {
@@ -70,6 +71,8 @@ forms! {
     Parallelogram(ParallelogramForm),
     /// Infinite plane.
     Plane(PlaneForm),
+    /// Image of a torus.
+    Torus(TorusForm),
 }
 
 impl Form {

@@ -19,6 +19,7 @@ mod scene_bvh;
 mod shading_normal;
 pub(crate) mod solid;
 pub(crate) mod sphere;
+mod torus;
 pub mod triangle_mesh;
 
 pub use aggregate::{Aggregate, BVH_MIN_PRIMITIVES, PrimitiveSet};
@@ -38,3 +39,4 @@ pub use parallelogram::ParallelogramForm;
 pub use plane::PlaneForm;
 pub use shading_normal::keep_visible;
 pub use sphere::SphereForm;
+pub use torus::TorusForm;

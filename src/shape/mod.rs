@@ -16,6 +16,7 @@ mod registry;
 mod sphere;
 mod tapered_cylinder;
 mod texture_space;
+mod torus;
 mod transform;
 mod unit_frustum;
 
@@ -35,6 +36,7 @@ pub use registry::{EXAMPLES, KINDS, Shape, ShapeDesc};
 pub use sphere::Sphere;
 pub use tapered_cylinder::TaperedCylinder;
 pub use texture_space::TextureSpace;
+pub use torus::Torus;
 pub use transform::{Rotate, Scale, TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
 pub use unit_frustum::UnitFrustum;
 

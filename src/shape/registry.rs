@@ -6,7 +6,7 @@ use crate::shape::{
     Cone, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection, MeshDesc, Plane,
     Prism, Pyramid,
 };
-use crate::shape::{Rectangle, Sphere, TaperedCylinder, Union, UnitFrustum};
+use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, Union, UnitFrustum};
 use crate::value::{Field, ValidationError, ValueType, rounded_to};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -153,6 +153,7 @@ kinds! {
     "cone" => Cone,
     "tapered_cylinder" => TaperedCylinder,
     "unit_cylinder" => UnitFrustum,
+    "torus" => Torus,
     "platform" => HorizontalRectangle,
     "rectangle" => Rectangle,
     "plane" => Plane,

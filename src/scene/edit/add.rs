@@ -275,7 +275,7 @@ mod tests {
             assert_eq!(edit.scene.faults(), []);
         }
         assert!(add_object(&Scene::default(), "sphere", Some("none")).is_err());
-        assert!(add_object(&Scene::default(), "torus", None).is_err());
+        assert!(add_object(&Scene::default(), "blob", None).is_err());
     }
 
     #[test]
