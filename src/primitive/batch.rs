@@ -1,4 +1,4 @@
-//! What rays meet: one batch per form, all items of a form side by side, so that a form that does
+//! Batches of compiled primitives: one per form, all items of a form side by side, so that a form that does
 //! not occur costs nothing.
 
 use crate::bvh::{Hit, Ray};
@@ -15,7 +15,7 @@ use crate::primitive::sphere::Sphere;
 use crate::primitive::torus::Torus;
 use std::ops::Range;
 
-/// Where a ray meets a surface.
+/// Surface at the point that a ray hits.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint<L> {
     /// The point, put back on the surface as exactly as the precision allows.
@@ -37,7 +37,7 @@ pub struct UvGradients<L> {
 }
 
 impl<L: SimdFloat> SurfacePoint<L> {
-    /// How far from the point rays start that leave the surface: a few roundings of the largest number
+    /// Distance from the point at which rays start that leave the surface: a few roundings of the largest number
     /// involved.
     #[inline(always)]
     pub fn ray_offset(&self) -> L {
@@ -45,7 +45,7 @@ impl<L: SimdFloat> SurfacePoint<L> {
     }
 }
 
-/// One thing that rays meet, compiled for the lane type.
+/// One primitive, compiled for the lane type.
 pub trait Primitive<L: SimdFloat> {
     /// Distance at which each line through a ray meets the item first in front of the ray's origin, and
     /// where it meets it; there, a distance that is not positive is no hit. `None`: it meets it nowhere.
@@ -141,7 +141,7 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.closest(range, base, ray, hit));
     }
 
-    /// Where a surface of the items in `range` lies at a distance in (0, limit) of the ray. May stop
+    /// Lanes that hit an item in `range` at a distance in (0, limit) of the ray. May stop
     /// early once all lanes of `wanted` are blocked.
     #[inline(always)]
     pub fn occluded(
@@ -203,12 +203,12 @@ fn occluded<L: SimdFloat>(
     occluded
 }
 
-/// What an item came from.
+/// Origin of an item: its form and part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PrimitiveId {
     /// Position in the list given to `compile`.
     pub form: usize,
-    /// Which part of a compound; 0 for all other forms. Part 0 stands for the whole compound where
+    /// Part of a compound; 0 for all other forms. Part 0 stands for the whole compound where
     /// rays ask for items; its other parts never meet anything by themselves.
     pub part: usize,
 }
@@ -219,9 +219,9 @@ pub struct LabelledBatch<L: SimdFloat> {
     pub batch: PrimitiveBatch<L>,
     /// `sources[item]`: which form, which part of it.
     pub sources: Vec<PrimitiveId>,
-    /// How the inventory counts the items: singular and plural.
+    /// Singular and plural by which the inventory counts the items.
     pub noun: (&'static str, &'static str),
-    /// What it says behind that.
+    /// Words of the inventory behind that.
     pub detail: String,
     /// Items without an end, which no tree can hold.
     pub infinite: bool,

@@ -1,4 +1,4 @@
-//! Where things are, roughly: enough to tell that some rays cannot meet them. In double precision, and
+//! Bounding volumes, enough to rule out that some rays hit a primitive. In double precision, and
 //! with room for the roundings of single: whatever a ray in lanes may meet is never ruled out.
 
 use crate::primitive::form::Form;
@@ -12,11 +12,11 @@ pub const F32_RAY_ERROR: f64 = 1e-5;
 pub struct BoundingSphere {
     /// Centre.
     pub center: DVec3,
-    /// Radius; infinite for things without an end.
+    /// Radius; infinite for forms without an end.
     pub radius: f64,
 }
 
-/// Where shadow rays lead.
+/// Target of shadow rays.
 #[derive(Clone, Copy, Debug)]
 pub enum LightTarget {
     /// To a point.
@@ -37,7 +37,7 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    /// Whether a ball may reach between the lines: into the cone around them, if that is narrower than a half
+    /// Returns `true` if a ball may reach between the lines: into the cone around them, if that is narrower than a half
     /// space; otherwise, as no circular cone is convex then, to the inner side of the four planes through the
     /// apex and neighbouring corners.
     fn meets(&self, ball: &BoundingSphere) -> bool {
@@ -59,15 +59,15 @@ impl Frustum {
     }
 }
 
-/// The surroundings of one thing.
+/// Bounding volume of one form.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundingVolume {
     ball: BoundingSphere,
-    /// Unit normal and offset of the plane that a flat thing lies in.
+    /// Unit normal and offset of the plane that a flat form lies in.
     plane: Option<(DVec3, f64)>,
     /// It does not see itself from outside.
     convex: bool,
-    /// How far rays end from where they are said to.
+    /// Largest distance between the end of a ray and its nominal end.
     slack: f64,
 }
 
@@ -78,7 +78,7 @@ impl BoundingSphere {
         Self { center, radius }
     }
 
-    /// Whether `point` lies inside or near the surface.
+    /// Returns `true` if `point` lies inside or near the surface.
     pub fn contains(&self, point: DVec3) -> bool {
         self.center.distance(point) <= self.radius + ray_error(self.center) + ray_error(point)
     }
@@ -94,7 +94,7 @@ fn ray_error(point: DVec3) -> f64 {
 }
 
 impl BoundingVolume {
-    /// Of a form.
+    /// Creates the bounding volume of a form.
     pub fn new(form: &Form) -> Self {
         let plane = form.plane().map(|plane| (plane.normal, plane.offset));
         let (ball, convex) = (form.bounding_sphere(), form.is_convex());
@@ -106,12 +106,12 @@ impl BoundingVolume {
         self.ball
     }
 
-    /// Whether it is flat: a ray that leaves it does not meet it again.
+    /// Returns `true` if it is flat: a ray that leaves it does not hit it again.
     pub fn is_flat(&self) -> bool {
         self.plane.is_some()
     }
 
-    /// Whether it is convex: its outside does not see itself.
+    /// Returns `true` if it is convex: its outside does not see itself.
     pub fn is_convex(&self) -> bool {
         self.convex
     }
@@ -124,7 +124,7 @@ impl BoundingVolume {
             return None;
         }
         let room = ray_error(*apex) + ray_error(ball.center);
-        // Depths along `forward` between which the thing lies.
+        // Depths along `forward` between which the form lies.
         let middle = (ball.center - *apex).dot(*forward);
         let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
         if let Some((normal, offset)) = self.plane {
@@ -166,7 +166,7 @@ impl BoundingVolume {
         Self { ball, slack: self.slack + by, ..self }
     }
 
-    /// How far off a flat thing's plane rays that lead to `point` meet it.
+    /// Distance from the plane of a flat form at which rays that lead to `point` may hit it.
     fn ray_error(&self, point: DVec3) -> f64 {
         let BoundingSphere { center, radius } = self.ball;
         let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
@@ -174,7 +174,7 @@ impl BoundingVolume {
         self.slack + ray_error(point) + F32_RAY_ERROR * reach.max(offset)
     }
 
-    /// Whether it may stand between some point of `lit` and the light.
+    /// Returns `true` if it may stand between some point of `lit` and the light.
     pub fn may_occlude(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
         let slack = ray_error(lit.center) + F32_RAY_ERROR * lit.radius;
         let radius = lit.radius + slack;
@@ -229,7 +229,7 @@ struct Cone {
 }
 
 impl Cone {
-    /// Whether a ball may reach into the cone: it is not all behind the apex, and its centre is no
+    /// Returns `true` if a ball may reach into the cone: it is not all behind the apex, and its centre is no
     /// farther from the cone's side than its radius.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let to = ball.center - self.apex;
@@ -347,7 +347,7 @@ mod tests {
         }
     }
 
-    /// No point of a thing seen through the pencil lies outside the ball.
+    /// No point of a form seen through the pencil lies outside the ball.
     #[test]
     fn the_part_seen_holds_every_point_met() {
         let mut random = 1u64;

@@ -227,7 +227,7 @@ impl<S: Float> ConicalFrustum<S> {
     }
 }
 
-/// Where a line crosses a solid.
+/// Crossings of a line with a solid.
 struct Chord<L: SimdFloat> {
     /// The point of the line nearest to the middle of the axis, and its direction, of unit length in
     /// the canonical space.
@@ -239,7 +239,7 @@ struct Chord<L: SimdFloat> {
     /// Steps from `point` to both ends.
     enter: L,
     leave: L,
-    /// Where an end lies on the side, not on a flat end.
+    /// Lanes whose end lies on the side, not on a flat end.
     enters_side: L::Mask,
     leaves_side: L::Mask,
     meets: L::Mask,

@@ -109,7 +109,7 @@ struct SolidOperand<S> {
     depth: usize,
 }
 
-/// All compounds of a scene. Every part is an item of its own, so that a hit tells the part; the
+/// All compounds of a scene. Every part is an item of its own, so that a hit names the part; the
 /// first one of a compound stands for it where rays ask for items.
 pub struct Compounds<S> {
     compounds: Vec<SolidOperand<S>>,
@@ -192,7 +192,7 @@ impl<S: Float> Compounds<S> {
         &spans[self.parts[one.parts.start + i as usize].spans.clone()]
     }
 
-    /// Where the point at distance `t` of each line is inside the whole.
+    /// Lanes whose point at distance `t` is inside the whole.
     #[inline(always)]
     fn inside<L: SimdFloat<Scalar = S>>(
         &self,
@@ -220,7 +220,7 @@ impl<S: Float> Compounds<S> {
         })
     }
 
-    /// What is to be seen of the surface between the distances `before` and `after`.
+    /// Visible change of the surface between the distances `before` and `after`.
     fn change<L: SimdFloat<Scalar = S>>(
         &self,
         one: &SolidOperand<S>,
@@ -368,7 +368,7 @@ impl<S: Float> Compounds<S> {
         }
     }
 
-    /// Where a surface of the compounds that begin in `range` lies at a distance in (0, limit) of the
+    /// Lanes with a surface of the compounds that begin in `range` at a distance in (0, limit) of the
     /// ray, of the lanes in `wanted`.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(

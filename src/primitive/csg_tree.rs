@@ -7,7 +7,7 @@ use crate::primitive::canonical::{
 use crate::primitive::form::{Form, cast_compiled};
 use glam::{DAffine3, DVec3};
 
-/// How parts are combined.
+/// Combination of parts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CsgTree {
     /// A part, by its position in [`CsgSolid::parts`].
@@ -36,7 +36,7 @@ impl CsgTree {
 /// A solid made of solids.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CsgSolid {
-    /// Convex solids: `Sphere`, `Ellipsoid`, `Convex`, `Tapered`, and `Plane` for the half-space
+    /// Solids: `Sphere`, `Ellipsoid`, `ConvexPolyhedron`, `ConicalFrustum`, `Torus`, and `Plane` for the half-space
     /// behind it.
     pub parts: Vec<Form>,
     /// Every part occurs once, in order.

@@ -1,4 +1,4 @@
-//! What is asked before a thing is asked whether a ray meets it.
+//! Bounding boxes tested before a primitive's own intersection.
 
 use crate::bvh::Ray;
 use crate::bvh::packet::SlabPacket;
@@ -8,21 +8,21 @@ use crate::value::Choice;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// How rays are kept from things that they cannot meet. No way changes a picture, only its time.
+/// Acceleration structure. Every choice renders the same image; only speed differs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Acceleration {
-    /// What has been measured to be fastest: a tree for many things, else for each part of the picture
-    /// the things that its rays may meet.
+    /// The fastest by measurement: a tree for many primitives, else for each part of the picture
+    /// the primitives that its rays may hit.
     #[default]
     Auto,
     /// Every ray meets everything.
     None,
-    /// Camera rays meet what stands on their part of the screen: each thing has a rectangle there.
+    /// Camera rays test the primitives on their part of the screen: each has a rectangle there.
     ScreenBounds,
-    /// Each thing has a box in its own space.
+    /// Each primitive has a box in its own space.
     Obb,
-    /// Each thing has a box in the scene's space.
+    /// Each primitive has a box in the scene's space.
     Aabb,
     /// A tree of boxes.
     Bvh,
@@ -49,7 +49,7 @@ impl Acceleration {
     }
 }
 
-/// A box around one thing.
+/// A box around one primitive.
 pub struct ItemBox<S> {
     low: [S; 3],
     high: [S; 3],
@@ -63,7 +63,7 @@ struct BoxFrame<S> {
     rows: [[S; 3]; 3],
     /// For each row the sum of its magnitudes: coordinates grow by so much at most.
     growth: [S; 3],
-    /// Largest magnitude of a coordinate of the thing in the scene.
+    /// Largest magnitude of a coordinate of the primitive in the scene.
     reach: S,
 }
 
@@ -75,12 +75,12 @@ pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
     [low - pad, high + pad]
 }
 
-/// What faces and corners of one solid may differ by, as a part of its extent: in a scene far from the
+/// Difference between faces and corners of one solid at most, as a part of its extent: in a scene far from the
 /// origin of its file both were rounded to what double precision has there.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> ItemBox<S> {
-    /// Of a form, in its own space if `own` and if it has one; `None`: it has no end.
+    /// Creates the box of a form, in its own space if `own` and if it has one; `None`: it has no end.
     pub fn new(form: &Form, own: bool) -> Option<Self> {
         let bounds = form.bounds()?;
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
@@ -103,7 +103,7 @@ impl<S: Float> ItemBox<S> {
         Some(made((low - middle, high - middle), Some(space)))
     }
 
-    /// Which rays may meet the thing no farther than `limit`.
+    /// Rays that may hit the primitive no farther than `limit`.
     #[inline(always)]
     pub fn meets<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L) -> L::Mask {
         let far = ray.origin.max_abs();
@@ -114,7 +114,7 @@ impl<S: Float> ItemBox<S> {
             }
             Some(space) => {
                 // What origin, direction and centre lose on their way into the space, at most, by the
-                // time the ray has come to the thing.
+                // time the ray has come to the primitive.
                 let lost = (far + L::splat(space.reach)) * L::from_f64(64.0 * L::EPSILON);
                 let rows = space.rows.map(Vec3::splat);
                 let of = |v: Vec3<L>| Vec3::new(rows[0].dot(v), rows[1].dot(v), rows[2].dot(v));

@@ -370,7 +370,7 @@ impl<S: Float> Meshes<S> {
             }
             let (inner, length) = item.ray(ray);
             // Beyond by what the way into the mesh's space and back rounds off: what is known decides only
-            // here below, in the scene's distances, so that the order of things does not matter.
+            // here below, in the scene's distances, so that the order of primitives does not matter.
             let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
             let limit = L::select(near, limit, L::from_f64(-1.0));
             let found = triangle_mesh::closest(&item.mesh, &inner, limit);
@@ -381,7 +381,7 @@ impl<S: Float> Meshes<S> {
         }
     }
 
-    /// Which of the `wanted` lanes meet one of the meshes in `range` at a distance in (0, limit).
+    /// Lanes of `wanted` that hit one of the meshes in `range` at a distance in (0, limit).
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
@@ -488,12 +488,12 @@ impl<S: Float> Meshes<S> {
         }))
     }
 
-    /// Whether light sees anything but the triangles' own normals.
+    /// Returns `true` if light sees any normals but the triangles' own.
     pub fn is_smooth(&self) -> bool {
         self.items.iter().any(|item| item.smooth)
     }
 
-    /// Whether a file names colours.
+    /// Returns `true` if a file names colours.
     pub fn is_colored(&self) -> bool {
         self.items.iter().any(|item| item.mesh.mesh().color(0).is_some())
     }

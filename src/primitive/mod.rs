@@ -1,4 +1,4 @@
-//! Primitives: what rays intersect. One kind a file, with its bounds and its intersection.
+//! Primitives that rays intersect. Each has one file with its canonical form, its compiled kernel and its tests.
 
 mod aggregate;
 pub(crate) mod batch;

@@ -27,7 +27,7 @@ pub(super) struct OnSurface<S> {
 }
 
 impl<S: Float> OnSurface<S> {
-    /// Of a lamp at `position` among `forms`, both around `origin`, where coordinates are rounded to
+    /// Creates the record of a lamp at `position` among `forms`, both around `origin`, where coordinates are rounded to
     /// `epsilon`; `None`: it lies on none.
     pub fn new(forms: &[Form], position: DVec3, origin: DVec3, epsilon: f64) -> Option<Self> {
         let mut solids = Vec::new();
@@ -49,7 +49,7 @@ impl<S: Float> OnSurface<S> {
         (!solids.is_empty()).then_some(Self { position, solids, lift })
     }
 
-    /// How far from the lamp shadow rays end at most.
+    /// Largest distance from the lamp at which shadow rays end.
     pub fn farthest(&self) -> f64 {
         SHARPEST * self.lift.to_f64() * self.solids.len() as f64
     }

@@ -1,8 +1,8 @@
-//! Which precision a scene needs: single precision as long as nothing that it blurs can be seen.
+//! Choice of the precision: single as long as nothing that it blurs can be seen.
 //!
 //! In single precision a coordinate is known to some 2^-23 of the scene's extent, and rays that leave a
 //! surface start 2^-20 of the extent above it. What is smaller than a few times that is lost: thin
-//! things, gaps between things, the surroundings of a lamp, and what a pixel shows of a thing close
+//! objects, gaps between objects, the surroundings of a lamp, and what a pixel shows of an object close
 //! to the eye. Each of them has its ratio here; `tests/extremes/precision.rs` measures what single
 //! precision gets wrong at each.
 
@@ -13,21 +13,22 @@ use crate::world::clearance::clearance;
 use glam::DVec3;
 use std::ops::Range;
 
-/// The largest extent over the thinnest thing: rays start 1/128 of it above a surface.
+/// Largest ratio of scene extent to thickness for single precision. At this ratio a ray's offset is 1/128 of
+/// the thickness.
 const MAX_EXTENT_PER_THICKNESS: f64 = 8192.0;
 
-/// The largest extent over the narrowest gap between things: eight times the height at which rays start.
+/// The largest extent over the narrowest gap between objects: eight times the height at which rays start.
 const MAX_EXTENT_PER_GAP: f64 = 131_072.0;
 
-/// The largest extent over what a pixel shows of the thing nearest to the eye: 32 times the height at
+/// The largest extent over what a pixel shows of the object nearest to the eye: 32 times the height at
 /// which rays start.
 const MAX_EXTENT_PER_PIXEL: f64 = 32_768.0;
 
-/// How much closer the eye may be to flat things: points are put back on a plane almost exactly, and its
+/// Factor by which the eye may be closer to flat objects: points are put back on a plane almost exactly, and its
 /// normal is the same everywhere.
 const FLAT: f64 = 8.0;
 
-/// The largest extent over the distance of a lamp from things: the height at which rays start is then
+/// The largest extent over the distance of a lamp from objects: the height at which rays start is then
 /// 1/512 of it, and so is the error of the light's angle.
 const MAX_EXTENT_PER_LIGHT_DISTANCE: f64 = 2048.0;
 
@@ -38,11 +39,11 @@ const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 /// numbers that were meant to be equal.
 const COINCIDENT_GAP: f64 = 1.0 / 17_592_186_044_416.0;
 
-/// The most pairs of things that are looked at for gaps; a scene that crowded has no room for more.
+/// Largest number of pairs of objects that are searched for gaps; a scene that crowded has no room for more.
 const MOST_PAIRS: usize = 1 << 20;
 
-/// Whether single precision shows `scene` as well as double does, as far as its proportions tell.
-/// `forms`: all things, around `origin`; `extent`: the largest coordinate of things and eye there.
+/// Returns `true` if single precision shows `scene` as well as double does, as far as its proportions tell.
+/// `forms` are all objects, around `origin`; `extent` is the largest coordinate of objects and eye there.
 pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
     let thinnest = forms.iter().map(Form::thickness).fold(f64::INFINITY, f64::min);
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
@@ -73,7 +74,7 @@ fn are_near(a: &Proxy, b: &Proxy, limit: f64) -> bool {
     (a.low - b.high).max(b.low - a.high).max_element() <= limit
 }
 
-/// Where two sides are closest to each other.
+/// Closest place of two faces.
 struct Clearance {
     width: f64,
     /// For sides that bend away from each other: the place, and the radius of a ball that would bend away
@@ -82,7 +83,7 @@ struct Clearance {
 }
 
 impl Clearance {
-    /// Whether it is narrow, and wherever it is narrow so is more than half a pixel around: a ball beside
+    /// Returns `true` if it is narrow, and wherever it is narrow so is more than half a pixel around: a ball beside
     /// another, or on a floor, is close to it in a spot too small to see.
     fn is_seen(&self, narrow: &Range<f64>, pixel: &impl Fn(DVec3) -> f64) -> bool {
         let wide =
@@ -125,7 +126,7 @@ fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
     }
 }
 
-/// Whether sides of two things run at a distance within `narrow` of each other where that can be seen;
+/// Returns `true` if faces of two objects run at a distance within `narrow` of each other where that can be seen;
 /// `pixel`: what a pixel shows at a place.
 fn has_gap(forms: &[Form], narrow: Range<f64>, pixel: impl Fn(DVec3) -> f64) -> bool {
     let seen = |a: &ProxyFace, b: &ProxyFace| {

@@ -1,4 +1,4 @@
-//! How bright and how dim the samples of a light group are, and so how long a step of the film's integers is.
+//! Brightness range of the samples of a light group, and the step of the film's integers that follows.
 //!
 //! A pixel's sum has 63 bits, a sample at most 49 of them (`SimdFloat::fixed_sum`). A sample is rounded to whole steps
 //! by itself; one that is the same each time, as on a matt surface, is wrong by up to half a step however many
@@ -46,9 +46,9 @@ const SPOT_BITS: f64 = 12.0;
 pub(super) struct RadianceRange {
     /// In the middle of the scene, on white.
     pub typical: f64,
-    /// Where the dimmest surface is brightest.
+    /// Brightest spot of the dimmest surface.
     pub dimmest: f64,
-    /// Where the brightest surface is brightest, in spots as large as a part of a pixel.
+    /// Brightest spot of the brightest surface, in spots as large as a part of a pixel.
     pub brightest: f64,
     /// In spots of any size.
     pub spots: f64,
@@ -57,7 +57,7 @@ pub(super) struct RadianceRange {
 }
 
 impl RadianceRange {
-    /// Of light that is `least` to `most` times as strong, depending on the channel.
+    /// Range of light that is `least` to `most` times as strong, depending on the channel.
     pub fn times(self, least: f64, most: f64) -> Self {
         Self {
             typical: self.typical * most,
@@ -68,7 +68,7 @@ impl RadianceRange {
         }
     }
 
-    /// Of two lights that share a group.
+    /// Range of two lights that share a group.
     pub fn or(self, other: Self) -> Self {
         Self {
             typical: self.typical.max(other.typical),
@@ -105,7 +105,7 @@ fn ceil_log2(x: f64) -> f64 {
     floor + f64::from(u8::from(bits << 12 != 0))
 }
 
-/// What some surfaces do with light: factors of what a white matt surface shows.
+/// Response of some surfaces to light: factors of what a white matt surface shows.
 #[derive(Clone, Copy, Debug)]
 struct Response {
     /// The least in a channel that is not black.
@@ -144,7 +144,7 @@ fn least_of(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
     numbers.into_iter().filter(|x| *x > 0.0).reduce(f64::min)
 }
 
-/// What decides how bright samples are, but for the lights.
+/// Everything that decides the brightness of samples, but for the lights.
 pub(super) struct SceneDistances<'a> {
     forms: &'a [Form],
     /// For each form, the response of its parts to lights.
@@ -153,7 +153,7 @@ pub(super) struct SceneDistances<'a> {
     ambient: Vec<f64>,
     /// The least share of mirrored or transmitted light that a surface shows, if it shows nothing else.
     faintest: f64,
-    /// What all mirrors on a path make of light at most, from 1.
+    /// Largest factor that all mirrors on a path make of light, from 1.
     gain: f64,
     /// Radius of the scene's middle, where light is typical.
     radius: f64,
@@ -207,19 +207,19 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Of ambient light of unit strength.
+    /// Range of ambient light of unit strength.
     pub fn ambient(&self) -> RadianceRange {
         let least = least_of(self.ambient.iter().copied()).unwrap_or(1.0);
         let most = self.ambient.iter().copied().fold(0.0, f64::max);
         self.of(1.0, (least, most, most))
     }
 
-    /// Of a background of unit strength.
+    /// Range of a background of unit strength.
     pub fn background(&self) -> RadianceRange {
         self.of(1.0, (1.0, 1.0, 1.0))
     }
 
-    /// Of a lamp of unit strength.
+    /// Range of a lamp of unit strength.
     pub fn lamp<S: Float>(&self, lamp: &DeltaLight<S>) -> RadianceRange {
         let typical = lamp.typical_irradiance(self.radius) * FRAC_1_PI;
         let DeltaLight::InverseSquare { position } = lamp else {

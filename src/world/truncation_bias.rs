@@ -1,4 +1,4 @@
-//! What the limits of path tracing leave out, as a bound.
+//! Bound of the bias by the limits of path tracing.
 
 use crate::material::{Fresnel, Material};
 use crate::scene::{Object, RayTypes, Scene};
@@ -21,7 +21,7 @@ fn max_albedo(material: &Material, flat: bool) -> f64 {
     }
 }
 
-/// What matters of an object's geometry.
+/// Properties of an object's geometry that the bound needs.
 struct ObjectTraits {
     flat: bool,
     /// The outside may see itself.
@@ -30,7 +30,7 @@ struct ObjectTraits {
     contains_eye: bool,
 }
 
-/// How far beside its place rounding to single precision may put the eye, as a share of the scene's extent.
+/// Largest displacement of the eye by rounding to single precision, as a share of the scene's extent.
 const ROUNDING: f64 = 1e-6;
 
 impl ObjectTraits {
@@ -50,7 +50,7 @@ impl ObjectTraits {
         }
     }
 
-    /// Whether a path may meet the object twice in a row. Every thing but a compound or a mesh is convex, so only
+    /// Returns `true` if a path may hit the object twice in a row. The outside of a convex form cannot see itself: only
     /// its inside sees itself, and only paths that begin inside, or are let in, get there. Bumps do not change
     /// that: what they would reflect into the surface leaves it, and what they would keep outside goes in.
     fn sees_itself(&self, material: &Material) -> bool {
@@ -59,7 +59,7 @@ impl ObjectTraits {
     }
 }
 
-/// What surfaces send on.
+/// Shares of light that surfaces send on.
 struct Reach {
     /// The largest share of one surface.
     first: f64,

@@ -1,4 +1,4 @@
-//! How large things are and where: for framing, for steps, for placing.
+//! Bounds of objects: for framing, for steps, for placing.
 
 use crate::primitive::Form;
 use crate::scene::edit::Target;
@@ -70,13 +70,13 @@ fn ball((low, high): Extent) -> BoundingSphere {
 }
 
 /// The coarse step of a coordinate: a power of ten, between a hundredth and a tenth of the diameter of
-/// the scene's solids (0.1 in a room with things a few units apart). A fine step is a tenth of it.
+/// the scene's solids (0.1 in a room with objects a few units apart). A fine step is a tenth of it.
 pub fn step_length(scene: &Scene) -> f64 {
     let exponent = floor_log10(2.0 * scene_bounds(scene).radius) - 1;
     format!("1e{}", exponent.clamp(-12, 8)).parse().unwrap_or(0.1)
 }
 
-/// How far from the eye the camera's pivot is: its target, or, if it only has a direction, the point
+/// Distance of the camera's pivot from the eye: its target, or, if it only has a direction, the point
 /// of the view axis nearest to the scene's middle. Greater than 0.
 pub fn focus_distance(scene: &Scene) -> f64 {
     let eye = DVec3::from_array(scene.camera.eye);

@@ -1,4 +1,4 @@
-//! What things stand on, and room to stand.
+//! Snap to ground, and free places for new objects.
 
 use crate::camera::Camera;
 use crate::primitive::Form;
@@ -88,7 +88,7 @@ fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     support_points
 }
 
-/// The middle of the underside of a new thing with the lengths `size`: in the middle of what the
+/// The middle of the underside of a new object with the lengths `size`: in the middle of what the
 /// camera sees, on what is there, and free of what stands there already.
 pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
@@ -100,7 +100,7 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
         forms.iter().filter(|f| f.is_solid()).filter_map(Form::bounds).collect();
     let walls: Vec<&Form> = forms.iter().filter(|form| !form.is_solid()).collect();
     let floors: Vec<&Form> = walls.iter().copied().filter(|form| is_level(form)).collect();
-    // New places are round numbers: of a thing one metre wide, whole centimetres.
+    // New places are round numbers: of an object one metre wide, whole centimetres.
     let grid = floor_log10(size.min_element()) - 2;
     let candidate = |offset: DVec2| {
         let at = DVec3::new(aim.x + offset.x, aim.y, aim.z + offset.y);
@@ -148,7 +148,7 @@ fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     heights(DVec3::NEG_Y).reduce(f64::max).or_else(|| heights(DVec3::Y).reduce(f64::min))
 }
 
-/// Whether a flat thing (a wall) goes through the inside of a box.
+/// Returns `true` if a flat form (a wall) goes through the inside of a box.
 fn intersects(form: &Form, (low, high): Extent) -> bool {
     let shrink = (high - low) * 1e-6;
     let (low, high) = (low + shrink, high - shrink);
@@ -166,7 +166,7 @@ fn overlap(a: Extent, b: Extent) -> bool {
     a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()
 }
 
-/// Whether a point is well inside the picture.
+/// Returns `true` if a point is well inside the picture.
 fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
     let [right, up, forward] = camera.frame();
     let to = point - DVec3::from_array(camera.eye);
@@ -177,7 +177,7 @@ fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
         && to.dot(up).abs() < 0.85 * half_height * depth
 }
 
-/// Whether nothing stands between the eye and a point.
+/// Returns `true` if nothing stands between the eye and a point.
 fn is_visible(forms: &[Form], eye: DVec3, point: DVec3) -> bool {
     !forms.iter().any(|form| form.cast(eye, point - eye).is_some_and(|t| t < 1.0))
 }

@@ -2,13 +2,13 @@
 //!
 //! Rounding decides which of them a ray meets first, and a ray that leaves one of them begins beyond the
 //! others. So where at least one of two surfaces lets light through, paths pass them one after the other,
-//! as if there were a gap of no width between the things: a ray leaves the solids that it is inside, meets
+//! as if there were a gap of no width between the objects: a ray leaves the solids that it is inside, meets
 //! what is flat, and enters the solids behind. Of solids on the same side of the place, transparent ones
 //! lie outside of opaque ones, and transparent ones outside of those that are listed before them; flat
 //! transparent things lie on both sides of opaque ones.
 //!
 //! Each surface has a layer: places in the order along the ray's way. Leaving a solid is below zero,
-//! entering it above, so that a ray that turns back has the layers' signs changed. Which things may touch
+//! entering it above, so that a ray that turns back has the layers' signs changed. Which objects may touch
 //! is known before any ray: nothing is asked where a path meets others.
 
 use crate::bvh::Ray;
@@ -28,7 +28,7 @@ const LIFT: f64 = 1.5;
 /// The least cosine between the normals of surfaces that lie on each other.
 const PARALLEL: f64 = 0.5;
 
-/// How an item lies among others.
+/// Kind of a surface among coincident ones.
 #[derive(Clone, Copy, Debug)]
 enum SurfaceKind {
     /// The surface of a transparent solid of this rank.
@@ -50,7 +50,7 @@ struct Contact<S> {
     tie: S,
 }
 
-/// The things of a world that may touch.
+/// Objects of a world that may touch.
 pub(crate) struct Contacts<S> {
     /// For each item.
     of: Vec<Vec<Contact<S>>>,
@@ -58,7 +58,7 @@ pub(crate) struct Contacts<S> {
     kinds: Vec<(SurfaceKind, S)>,
 }
 
-/// Where rays begin on surfaces that lie on others.
+/// Start of rays on surfaces that lie on others.
 #[derive(Clone, Copy)]
 pub(crate) struct CoincidentState<L: SimdFloat> {
     /// Lanes where they do.
@@ -82,7 +82,7 @@ pub(crate) struct CoincidentQuery<L: SimdFloat> {
     pub item: L,
     pub facet: L,
     pub layer: L,
-    /// How far off rays start that leave it.
+    /// Distance off the surface at which rays start that leave it.
     pub lift: L,
 }
 
@@ -112,7 +112,7 @@ impl<L: SimdFloat> CoincidentState<L> {
 }
 
 impl<S: Float> Contacts<S> {
-    /// Of `forms`, whose coordinates are rounded to `epsilon` and were given with the error `given`.
+    /// Creates the contacts of `forms`, whose coordinates are rounded to `epsilon` and were given with the error `given`.
     /// `transparent`: for each of the items that `sources` lists, whether it lets light through; `rank_of`:
     /// the rank of the transparent solid that it bounds. `None`: nothing touches anything transparent.
     pub fn new(
@@ -159,7 +159,7 @@ impl<S: Float> Contacts<S> {
         Some(Self { of, kinds })
     }
 
-    /// Whether anything may lie on `item`.
+    /// Returns `true` if a surface may lie on `item`.
     #[inline(always)]
     pub fn touches(&self, item: u32) -> bool {
         !self.of[item as usize].is_empty()
@@ -300,7 +300,7 @@ fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, u
     out
 }
 
-/// Whether surfaces of two forms may come within `slack` of each other.
+/// Returns `true` if surfaces of two forms may come within `slack` of each other.
 fn may_touch(a: &Form, b: &Form, slack: f64) -> bool {
     let normal = |form: &Form| form.plane().map(|plane| plane.normal);
     let apart = |axis: DVec3| match (a.extent_along(axis), b.extent_along(axis)) {

@@ -1,4 +1,4 @@
-//! What paths are inside of: transparent solids, several of which may hold one point.
+//! Nested dielectrics: the transparent solids that paths are inside of, several of which may hold one point.
 //!
 //! Where solids overlap, the one that the scene lists last fills the common space; the surfaces of the
 //! others are not there. So a bubble is listed after its ball, and water may reach a little into the wall
@@ -13,7 +13,7 @@ use crate::world::integrator::coincident_surfaces::Contacts;
 use crate::world::integrator::opaque::{SurfaceInteraction, next_distinct};
 use glam::DVec3;
 
-/// So many solids around one point are told apart; of more, those that are listed last.
+/// Number of solids around one point that are distinguished; of more, those that are listed last.
 const MAX_NESTING: usize = 4;
 
 /// The solids that paths are inside, by rank: 0 is none; of two the one with the higher rank fills the
@@ -36,7 +36,7 @@ impl<L: SimdFloat> MediumStack<L> {
         self.priorities[0]
     }
 
-    /// Whether they are inside of `priority`.
+    /// Lanes that are inside of `priority`.
     pub fn contains(&self, priority: L) -> L::Mask {
         self.priorities.iter().fold(L::mask(false), |found, of| found | equal(*of, priority))
     }
@@ -91,15 +91,15 @@ pub(crate) struct NestedDielectrics<L: SimdFloat> {
     indices: Vec<L::Scalar>,
     /// The solids that camera rays may begin in, each alone.
     around_eye: Vec<(u32, Aggregate<L>)>,
-    /// What touches something that lets light through; `None`: nothing does.
+    /// Surfaces that touch one that lets light through; `None` if there are none.
     pub contacts: Option<Contacts<L::Scalar>>,
 }
 
-/// Where rays meet surfaces that let light through.
+/// Crossings of rays with surfaces that let light through.
 pub(crate) struct InterfaceHit<L: SimdFloat> {
     /// Lanes that do.
     pub lanes: L::Mask,
-    /// Of these, those that meet a solid's surface from outside.
+    /// Those of them that hit a solid's surface from outside.
     pub outer: L::Mask,
     /// Those that meet an open surface, a thin pane.
     pub thin: L::Mask,
@@ -109,9 +109,9 @@ pub(crate) struct InterfaceHit<L: SimdFloat> {
     pub n_i: L,
     /// Index of refraction behind it; for a pane, of what it is made of.
     pub n_t: L,
-    /// What reflected rays are inside.
+    /// Media that reflected rays are inside.
     pub medium_reflected: MediumStack<L>,
-    /// What transmitted rays are inside.
+    /// Media that transmitted rays are inside.
     pub medium_transmitted: MediumStack<L>,
 }
 
@@ -165,7 +165,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         self.priority_of.iter().map(|priority| *priority > 0).collect()
     }
 
-    /// What rays begin inside of: the solids that they meet from inside first.
+    /// Media that rays begin inside of: the solids that they hit from inside first.
     pub fn at_start(&self, ray: &Ray<L>) -> MediumStack<L> {
         let mut inside = MediumStack::vacuum();
         for (priority, solid) in &self.around_eye {
@@ -193,7 +193,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         L::from_fn(|lane| of(priority.lane(lane)))
     }
 
-    /// Where the rays of `lanes`, which are `inside` what they are, meet surfaces that let light through.
+    /// Crossings of the rays of `lanes`, which are `inside` these media, with surfaces that let light through.
     /// `index_of_pane`: what those are made of that are open.
     pub fn cross(
         &self,
