@@ -42,7 +42,7 @@ const COINCIDENT_GAP: f64 = 1.0 / 17_592_186_044_416.0;
 /// Largest number of pairs of objects that are searched for gaps; a scene that crowded has no room for more.
 const MOST_PAIRS: usize = 1 << 20;
 
-/// Returns `true` if single precision shows `scene` as well as double does, as far as its proportions tell.
+/// Returns `true` if single precision shows `scene` as well as double does, as far as its proportions show.
 /// `forms` are all objects, around `origin`; `extent` is the largest coordinate of objects and eye there.
 pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
     let thinnest = forms.iter().map(Form::thickness).fold(f64::INFINITY, f64::min);

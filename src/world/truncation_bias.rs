@@ -131,10 +131,10 @@ impl Reach {
 /// which one sees the other. So all paths that have met n surfaces weigh at most
 /// w(n) = pair^(n/2) together, for odd n that of n - 1 times the largest share, and all of n and
 /// more at most (w(n) + w(n + 1)) / (1 - pair). What they add is at most that times the brightest surface (or the
-/// background, if that is brighter). So nothing is cut only where nothing sends light on, or a flat or convex thing
+/// background, if that is brighter). So nothing is cut only where nothing sends light on, or a flat or convex form
 /// does alone, which is met once.
 ///
-/// Of a transparent ball it is not claimed that light leaves it where it comes to its surface again: the angles are
+/// A transparent ball carries no claim that light leaves it where it comes to its surface again: the angles are
 /// equal there, but at the rim rounding decides whether the critical angle is passed, and bumps change them.
 pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
     let reach = Reach::new(scene);

@@ -5,7 +5,7 @@
 //! as if there were a gap of no width between the objects: a ray leaves the solids that it is inside, meets
 //! what is flat, and enters the solids behind. Of solids on the same side of the place, transparent ones
 //! lie outside of opaque ones, and transparent ones outside of those that are listed before them; flat
-//! transparent things lie on both sides of opaque ones.
+//! transparent forms lie on both sides of opaque ones.
 //!
 //! Each surface has a layer: places in the order along the ray's way. Leaving a solid is below zero,
 //! entering it above, so that a ray that turns back has the layers' signs changed. Which objects may touch
